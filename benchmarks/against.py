@@ -39,7 +39,7 @@ def serve(root: str, law: str, objects: str, particles: str) -> None:
     from cost.blocks import drop_of
     from cost.contest import Ours
 
-    from corporeal.types import Law
+    from corporeal.core.types import Law
 
     many = int(objects)
     ours = Ours(drop_of(int(particles), law=Law[law], objects=many, heap=many > 1))

@@ -16,16 +16,16 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import norm, t
 
+from corporeal.core.types import Evidence
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.evaluation.mass import anonymous
-from corporeal.evaluation.truth import Weighed, read_truth
 from corporeal.geometry.arrangement import life_sized
-from corporeal.mixture import DRAWS, HIGH, Scale, likelihood, quantiles
-from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import describe
-from corporeal.stages.ground import GroundConfig
-from corporeal.stages.segment import segment
-from corporeal.types import Evidence
+from corporeal.lab.evaluation.mass import anonymous
+from corporeal.lab.evaluation.truth import Weighed, read_truth
+from corporeal.pipeline.mixture import DRAWS, HIGH, Scale, likelihood, quantiles
+from corporeal.pipeline.stages.assemble import assemble
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.ground import GroundConfig
+from corporeal.pipeline.stages.segment import segment
 
 ANSWERS = 3
 MISS = 2 / (2 * (1 - HIGH))

@@ -28,8 +28,8 @@ from grounds import FLOOR, GROUNDS, Ground, noise
 from PIL import Image
 from scipy.ndimage import gaussian_filter, uniform_filter1d
 
-from corporeal.formats.transforms import read_views, write_views
-from corporeal.types import Camera, Views
+from corporeal.core.types import Camera, Views
+from corporeal.io.transforms import read_views, write_views
 
 SWITCHES = ("wall", "clutter", "flash", "rolled", "stop", "turned")
 """Of how pictures are taken."""

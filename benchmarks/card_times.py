@@ -17,7 +17,7 @@ import warp as wp
 from cost.blocks import Drop, drop_of
 from cost.contest import Ours, contest
 
-from corporeal.machine import cores
+from corporeal.core.machine import cores
 from corporeal.mpm.cuda import layout, planning
 
 SIZES = (10_000, 100_000, 1_000_000, 5_000_000)

@@ -18,11 +18,11 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from stories import Told, tell
 
-from corporeal.findings import pair_name
+from corporeal.core.findings import pair_name
 from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.pipeline import Settings
-from corporeal.stages.fill import FillConfig
-from corporeal.stages.simulate import SimulateConfig
+from corporeal.pipeline.runner import Settings
+from corporeal.pipeline.stages.fill import FillConfig
+from corporeal.pipeline.stages.simulate import SimulateConfig
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "controls.png"
 COLOURS = {"corporeal": "#1f6f8b", "single field": "#c8553d", "capped stiffness": "#8a8a3c"}

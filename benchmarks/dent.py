@@ -14,15 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.pipeline import read_back
+from corporeal.core.terminal import show_table
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import read_back
+from corporeal.pipeline.stages.film import reel_of
 from corporeal.render.camera import Aim, camera_of
 from corporeal.render.camera_track import track
 from corporeal.render.skin import bind
-from corporeal.results import Results
-from corporeal.stages.film import reel_of
-from corporeal.terminal import show_table
-from corporeal.trajectory.moving_gaussians import fluid, granular
-from corporeal.trajectory.residual_shape import trusted_fit
+from corporeal.simulation.moving_gaussians import fluid, granular
+from corporeal.simulation.residual_shape import trusted_fit
 
 SEEN = 0.5
 """Share of the deepest displacement: the full width at half maximum is given."""

@@ -31,12 +31,12 @@ from laws.bodies import (
 )
 from laws.watching import started
 
-from corporeal.machine import cores
+from corporeal.core.machine import cores
+from corporeal.core.types import Law, Material, Structure, Treatment
+from corporeal.discretization.part import Motion, PartGeometry
+from corporeal.discretization.plan import QUALITIES, Detail, plan
 from corporeal.materials import find
-from corporeal.trajectory.surface_mark import surface_mark
-from corporeal.treatment.part import Motion, PartGeometry
-from corporeal.treatment.plan import QUALITIES, Detail, plan
-from corporeal.types import Law, Material, Structure, Treatment
+from corporeal.simulation.surface_mark import surface_mark
 
 PAGE = Path(__file__).parents[1] / "docs" / "detail.md"
 G = 9.81

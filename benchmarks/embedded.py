@@ -11,11 +11,11 @@ import argparse
 import json
 from pathlib import Path
 
-from recognition import page
 from recognition.facts import FACTS, SETS, facts, judge, record
 
-from corporeal import store
-from corporeal.evaluation import recognition as measured
+from corporeal.core import store
+from corporeal.lab.evaluation import recognition as measured
+from recognition import page
 
 DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
 

@@ -23,8 +23,8 @@ from cost.blocks import Drop, drop_of
 from cost.contest import Contestant, Ours, contest
 from cost.peer import Peer, install
 
-from corporeal.machine import cores
-from corporeal.types import Law
+from corporeal.core.machine import cores
+from corporeal.core.types import Law
 
 
 @dataclass(frozen=True)

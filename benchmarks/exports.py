@@ -36,7 +36,7 @@ from corporeal.export.target import MENU, Asked, ExportConfig
 from corporeal.export.usd_scene import write_usd
 from corporeal.geometry.mesh import Mesh, joined
 from corporeal.geometry.shape import Shape
-from corporeal.in_memory import load_scene, prepare
+from corporeal.pipeline.in_memory import load_scene, prepare
 
 EACH, ALL, MEMORY = 15.0, 60.0, 2e9
 """Bounds: CPU seconds of a target but HDF5, of all, and bytes."""

@@ -21,14 +21,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from corporeal.features.descriptor import descriptor, seen_from
-from corporeal.features.lifting import back_projection, fill, uplift, visible
-from corporeal.formats.transforms import read_views
+from corporeal.core.machine import cores
+from corporeal.core.types import Camera, Views
 from corporeal.geometry.shape import sphere_directions
-from corporeal.machine import cores
-from corporeal.splats.feature_distillation import distilled
-from corporeal.splats.radiance import FieldConfig, learn, points
-from corporeal.types import Camera, Views
+from corporeal.io.transforms import read_views
+from corporeal.reconstruction.features.descriptor import descriptor, seen_from
+from corporeal.reconstruction.features.lifting import back_projection, fill, uplift, visible
+from corporeal.reconstruction.gaussians.feature_distillation import distilled
+from corporeal.reconstruction.gaussians.radiance import FieldConfig, learn, points
 
 SIDE, FOCAL, AWAY = 256, 300.0, 3.0
 GRID = 37

@@ -48,12 +48,12 @@ class Set:
 
 def taken(run: Path, frames: int) -> Set:
     """Read a run and pose its surfaces as its film does, evenly over its time."""
-    from corporeal.pipeline import read_back
+    from corporeal.pipeline.results import Results
+    from corporeal.pipeline.runner import read_back
+    from corporeal.pipeline.stages.film import reel_of
     from corporeal.render.camera_track import track
     from corporeal.render.skin import bind
-    from corporeal.results import Results
-    from corporeal.stages.film import reel_of
-    from corporeal.trajectory.moving_gaussians import granular
+    from corporeal.simulation.moving_gaussians import granular
 
     results: Results = read_back(run)
     prepared, trajectory = results.prepared, results.trajectory
@@ -105,8 +105,8 @@ def serve(root: str, file: str) -> None:
 
 
 def _stage(made: Set) -> Any:
+    from corporeal.core.types import Finish, Scene, SceneObject, Surface
     from corporeal.render.stage import Stage
-    from corporeal.types import Finish, Scene, SceneObject, Surface
 
     surfaces = tuple(_fit(Surface, s) for s in made.surfaces)
     count = 1 + max(s.object for s in surfaces)
@@ -147,10 +147,10 @@ def film_errors(run: Path, frames: int) -> list[tuple[float, float]]:
 
     Of a film of Gaussians, these are the surfaces behind them.
     """
-    from corporeal.pipeline import read_back, reopen
+    from corporeal.pipeline.runner import read_back, reopen
+    from corporeal.pipeline.stages.film import moments
     from corporeal.render import embree
     from corporeal.render.film_picture import FilmCaster
-    from corporeal.stages.film import moments
 
     embree.SAMPLING["exact"] = embree.Sampling(3, 1, 16)
     results, config, caster = read_back(run), reopen(run).settings.film, FilmCaster()

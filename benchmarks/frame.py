@@ -17,15 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.formats.transforms import read_views
-from corporeal.geometry.region import region
+from corporeal.core.types import Camera, Views
 from corporeal.geometry.rotation import matrix
-from corporeal.geometry.similarity import moved_cameras, similarity
-from corporeal.geometry.upright import upright
-from corporeal.splats.intake import Intake, turned_upright
-from corporeal.splats.train import train
-from corporeal.splats.training_schedule import TrainConfig
-from corporeal.types import Camera, Views
+from corporeal.io.transforms import read_views
+from corporeal.multiview.region import region
+from corporeal.multiview.similarity import moved_cameras, similarity
+from corporeal.multiview.upright import upright
+from corporeal.reconstruction.gaussians.intake import Intake, turned_upright
+from corporeal.reconstruction.gaussians.train import train
+from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
 
 TWO = 2
 """Threads."""

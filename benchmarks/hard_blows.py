@@ -3,7 +3,7 @@
     python benchmarks/hard_blows.py [--check]
 
 Weightless balls strike a plane. What they lose, as a loss factor by the inverse of hereditary Hertz
-contact, less their own: the constant of ``treatment/hard_blows.py``. ``--check`` strikes other
+contact, less their own: the constant of ``discretization/hard_blows.py``. ``--check`` strikes other
 balls, at other places of the grid, with the loss factor that treatments leave them, and says how
 far their rebound is from the theory's, without that constant and with it (decision 103).
 """
@@ -18,12 +18,12 @@ from laws.bodies import Stuff, ball, problem
 from rich.console import Console
 from rich.table import Table
 
-from corporeal.backends import load
+from corporeal.core.registry import load
+from corporeal.discretization.dents import dent_of_blow
+from corporeal.discretization.hard_blows import ringing
 from corporeal.materials.rebound import loss_of, rebound
 from corporeal.mpm.constants import GRID_LOSS
 from corporeal.mpm.problem import FLOOR, MENU
-from corporeal.treatment.dents import dent_of_blow
-from corporeal.treatment.hard_blows import ringing
 
 CELLS = (8, 10, 12, 16, 20)
 HARDNESS = (0.003, 0.01, 0.03, 0.06, 0.1)

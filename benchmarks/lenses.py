@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.formats.photographs import read_photographs
-from corporeal.geometry.agreement import agreement
-from corporeal.terminal import show_table
-from corporeal.types import Camera
+from corporeal.core.terminal import show_table
+from corporeal.core.types import Camera
+from corporeal.io.photographs import read_photographs
+from corporeal.multiview.agreement import agreement
 
 WRONG = {
     "right": (1.0, 0.0, 0.0),

@@ -6,7 +6,7 @@ Every thing goes through the verbs as a scene of a person would: names or materi
 in balls, one word of detail; nothing else can be set. ``--quick`` drops each once, at draft;
 ``--docs`` writes docs/life.md. Every drop is written to FILE as it ends; ``--resume`` goes on from
 what is there, which holds as long as the code is the same. Ranges and sources:
-src/corporeal/evaluation/life.toml.
+src/corporeal/lab/evaluation/life.toml.
 """
 
 import argparse
@@ -21,12 +21,12 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from corporeal.errors import SimulationError
-from corporeal.evaluation.drop_test import Drop, drop
-from corporeal.evaluation.life import Rebound, contradictory, rebounds, sources
-from corporeal.machine import cores
-from corporeal.pipeline import Settings
-from corporeal.vlm.lexicon import heads, tokens_of
+from corporeal.core.errors import SimulationError
+from corporeal.core.machine import cores
+from corporeal.lab.evaluation.drop_test import Drop, drop
+from corporeal.lab.evaluation.life import Rebound, contradictory, rebounds, sources
+from corporeal.pipeline.runner import Settings
+from corporeal.recognition.lexicon import heads, tokens_of
 
 DOCS = Path(__file__).parents[1] / "docs"
 DETAILS, SEEDS = ("draft", "normal"), (0, 1, 2)
@@ -176,7 +176,7 @@ over the real modulus (of a thickened wall much less), *unbooked* what the blow 
 between particles and grid, and to no loss that is booked. Rigid things rebound by the
 coefficient of restitution that was measured of the pair, else by those of their materials. Where a
 height was published, the range is of speeds at the floor: the drag of a sphere in air is taken off
-on both ways. Ranges and sources: `src/corporeal/evaluation/life.toml`."""
+on both ways. Ranges and sources: `src/corporeal/lab/evaluation/life.toml`."""
 
 
 def blind(found: Sequence[Result]) -> str:

@@ -21,13 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.mixture import ground_weighed
-from corporeal.pipeline import Settings
-from corporeal.results import Results
+from corporeal.pipeline.mixture import ground_weighed
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import Settings
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.fill import fill
+from corporeal.pipeline.stages.segment import segment
 from corporeal.showcase.scenes import SCENES, build
-from corporeal.stages.describe import describe
-from corporeal.stages.fill import fill
-from corporeal.stages.segment import segment
 from corporeal.viewer.live import Live, live_scene, threads_here
 from corporeal.viewer.orders import Order
 from corporeal.viewer.shelf import Made

@@ -25,13 +25,13 @@ import numpy as np
 from as_photographed import add_switches, degraded, look_of
 from PIL import Image
 
-from corporeal.errors import UserError
-from corporeal.formats.colmap import write_colmap
+from corporeal.core.errors import UserError
+from corporeal.core.types import Camera, Views
 from corporeal.geometry.arrangement import boxes_of
+from corporeal.io.colmap import write_colmap
+from corporeal.pipeline.stages.assemble import assemble
+from corporeal.pipeline.stages.capture import pictures
 from corporeal.render.camera import Aim
-from corporeal.stages.assemble import assemble
-from corporeal.stages.capture import pictures
-from corporeal.types import Camera, Views
 
 FIELD = 48.0
 """Vertical field of view [deg]: a telephone's, held level."""

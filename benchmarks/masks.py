@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
-from corporeal.errors import UserError
-from corporeal.formats.photographs import holds_photographs, read_photographs
-from corporeal.masking.doubt import doubt
-from corporeal.masking.grow import FINE, ROUGH, Grown, grow
-from corporeal.masking.pointed import Spot, pointed_at
-from corporeal.masking.reduced import reduced
-from corporeal.masking.seeds import Seeds, looked_at
+from corporeal.core.errors import UserError
+from corporeal.io.photographs import holds_photographs, read_photographs
+from corporeal.reconstruction.masks.doubt import doubt
+from corporeal.reconstruction.masks.grow import FINE, ROUGH, Grown, grow
+from corporeal.reconstruction.masks.pointed import Spot, pointed_at
+from corporeal.reconstruction.masks.reduced import reduced
+from corporeal.reconstruction.masks.seeds import Seeds, looked_at
 
 ON = 128
 """Of 255: from here on a drawn mask shows an object."""

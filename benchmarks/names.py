@@ -24,22 +24,22 @@ from recognition.shapes import shape
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from corporeal.geometry.make import Make
-from corporeal.geometry.scene_survey import examine
-from corporeal.geometry.survey import Anatomy
-from corporeal.in_memory import load_scene
-from corporeal.materials import find
-from corporeal.mixture import ground_weighed
-from corporeal.settings.ground_config import GroundConfig
-from corporeal.stages.describe import describe
-from corporeal.stages.fill import composed
-from corporeal.stages.segment import segment
-from corporeal.treatment.object_masses import (
+from corporeal.core.types import Inventory, MaterialField, Parts, Scene
+from corporeal.discretization.make import Make
+from corporeal.discretization.object_masses import (
     implausible_masses,
     masses_not_as_named,
     walls_drawn_too_thick,
 )
-from corporeal.types import Inventory, MaterialField, Parts, Scene
+from corporeal.discretization.scene_survey import examine
+from corporeal.discretization.survey import Anatomy
+from corporeal.materials import find
+from corporeal.pipeline.in_memory import load_scene
+from corporeal.pipeline.mixture import ground_weighed
+from corporeal.pipeline.settings.ground_config import GroundConfig
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.fill import composed
+from corporeal.pipeline.stages.segment import segment
 
 LIST = Path(__file__).parent / "recognition" / "names.toml"
 WITHIN = 2.5

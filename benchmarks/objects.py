@@ -20,12 +20,12 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.evaluation.objects import Judged, ObjectsEvaluationConfig, ObjectsRow, judge
-from corporeal.evaluation.objects_figure import draw
-from corporeal.regions.objects import objects
-from corporeal.store import read_json, write_json
-from corporeal.typed import typed
-from corporeal.types import Cloud
+from corporeal.core.store import read_json, write_json
+from corporeal.core.typed import typed
+from corporeal.core.types import Cloud
+from corporeal.lab.evaluation.objects import Judged, ObjectsEvaluationConfig, ObjectsRow, judge
+from corporeal.lab.evaluation.objects_figure import draw
+from corporeal.reconstruction.segment.objects import objects
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAIRS = {
@@ -182,7 +182,7 @@ def main() -> None:
 
 PAGE = """# Separating objects that touch
 
-Settled objects touch, so that distance alone does not separate them. `corporeal.regions` has four
+Settled objects touch, so that distance alone does not separate them. `reconstruct.segment` has four
 methods:
 
 | method | needs |

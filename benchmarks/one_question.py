@@ -18,11 +18,11 @@ from pathlib import Path
 from pydantic import BaseModel, Field
 
 from corporeal import vlm
+from corporeal.core.errors import UserError
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.errors import UserError
-from corporeal.evaluation.mass import MassConfig, compare, predict_all
-from corporeal.evaluation.truth import objects
-from corporeal.stages.ground import GroundConfig
+from corporeal.lab.evaluation.mass import MassConfig, compare, predict_all
+from corporeal.lab.evaluation.truth import objects
+from corporeal.pipeline.stages.ground import GroundConfig
 from corporeal.vlm.answers import MaterialsAnswer, PartAnswer, Value, ValueAnswer, ValuePart, Way
 from corporeal.vlm.by_hand import ByHand
 from corporeal.vlm.words import another

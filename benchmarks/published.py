@@ -24,10 +24,10 @@ import numpy as np
 from names import Weighed, weigh
 from recognition.shapes import shape
 
+from corporeal.discretization.object_masses import walls_drawn_too_thick
 from corporeal.geometry.arrangement import life_sized
-from corporeal.mixture import Scale, weighed
-from corporeal.settings.ground_config import GroundConfig
-from corporeal.treatment.object_masses import walls_drawn_too_thick
+from corporeal.pipeline.mixture import Scale, weighed
+from corporeal.pipeline.settings.ground_config import GroundConfig
 
 FOLDER = Path(__file__).parent / "recognition"
 LIST, SECOND = FOLDER / "published.toml", FOLDER / "published_second.toml"

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal import pipeline
-from corporeal.pipeline import FOLDERS, Settings
-from corporeal.stages.film import FilmConfig
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import FOLDERS, Settings
+from corporeal.pipeline.stages.film import FilmConfig
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "showcase.webp"
 PANEL = 300, 225
@@ -73,9 +73,9 @@ PANELS = (
 def stills(panel: Panel, folder: Path) -> list[Image.Image]:
     """Simulate and film a scene; return its frames as panels."""
     run = folder / f"{panel.scene}-draft"
-    scene = pipeline.write_showcase(panel.scene, run / "input")
+    scene = runner.write_showcase(panel.scene, run / "input")
     film = FilmConfig(width=FILMED[0], height=FILMED[1], stills=True)
-    pipeline.run([scene], run, Settings(film=film), until="film")
+    runner.run([scene], run, Settings(film=film), until="film")
     paths = sorted((run / FOLDERS["film"] / "stills").glob("*.png"))
     return [panel.cut(Image.open(path).convert("RGB")) for path in paths[::EVERY]]
 

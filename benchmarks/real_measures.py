@@ -11,14 +11,14 @@ import trimesh
 from jaxtyping import Bool, Float
 from PIL import Image
 
-from corporeal.formats.colmap import ColmapModel, read_colmap
-from corporeal.formats.photographs import MASKS, companion
+from corporeal.core.typed import typed
+from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.silhouette_overlap import silhouette_overlaps
-from corporeal.geometry.similarity import parted, similarity
-from corporeal.stages.reconstruct import Reconstructed
-from corporeal.typed import typed
-from corporeal.types import Camera
+from corporeal.io.colmap import ColmapModel, read_colmap
+from corporeal.io.photographs import MASKS, companion
+from corporeal.multiview.silhouette_overlap import silhouette_overlaps
+from corporeal.multiview.similarity import parted, similarity
+from corporeal.pipeline.stages.reconstruct import Reconstructed
 
 KNOWN, FACTS = Path(__file__).parent / "real_sets.toml", "known.toml"
 GOOD_ANGLE, GOOD_PLACE = 1.5, 0.03

@@ -20,12 +20,12 @@ import sys
 import time
 from pathlib import Path
 
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.in_memory import load_scene, prepare
-from corporeal.stages.assemble import AssembleConfig
-from corporeal.stages.ground import doubts
-from corporeal.trajectory.audit_file import AUDIT, read_run_audit
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.pipeline.in_memory import load_scene, prepare
+from corporeal.pipeline.stages.assemble import AssembleConfig
+from corporeal.pipeline.stages.ground import doubts
+from corporeal.simulation.audit_file import AUDIT, read_run_audit
 
 EXTENTS = {
     "duck": 0.13,

@@ -31,14 +31,14 @@ from typing import Any, Literal, NoReturn, get_args
 import numpy as np
 import real_measures as measure
 
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.poses.pose import POSES
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.terminal import progress_bars, show_table
+from corporeal.pipeline.stages.reconstruct import Reconstructed, reconstruct
+from corporeal.reconstruction.gaussians.training_schedule import PRESETS
 from corporeal.reconstruction.picture_intake import OBJECT_POSES
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.splats.training_schedule import PRESETS
-from corporeal.stages.reconstruct import Reconstructed, reconstruct
-from corporeal.terminal import progress_bars, show_table
+from corporeal.reconstruction.sfm.pose import POSES
 
 Case = Literal["all", "unmasked", "unposed", "bare", "film"]
 WORDS: dict[Case, str] = {

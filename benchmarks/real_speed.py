@@ -22,12 +22,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageOps
 
-from corporeal import store
+from corporeal.core import store
+from corporeal.core.terminal import show_table
+from corporeal.pipeline.stages.reconstruct import TRAINED, reconstruct
+from corporeal.reconstruction.gaussians.training_schedule import PRESETS
 from corporeal.reconstruction.picture_intake import MASKED, POSED
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.splats.training_schedule import PRESETS
-from corporeal.stages.reconstruct import TRAINED, reconstruct
-from corporeal.terminal import show_table
 
 PHASES = {
     "poses": POSED * TRAINED,

@@ -26,7 +26,7 @@ BATCH = 10_000
 
 def scene(points: int, channels: int):
     """Return a cloud of boxes, their words' vectors, and which point is of which box."""
-    from corporeal.types import Cloud
+    from corporeal.core.types import Cloud
 
     rng = np.random.default_rng(0)
     part = np.sort(rng.integers(0, PARTS, points))
@@ -52,9 +52,9 @@ def scene(points: int, channels: int):
 
 def once(points: int, channels: int) -> None:
     """Take one cloud apart, in this process, and print what it took."""
-    from corporeal.evaluation.overlap import named_iou
-    from corporeal.regions.naming import name_parts
-    from corporeal.types import ObjectWords, PartWords
+    from corporeal.core.types import ObjectWords, PartWords
+    from corporeal.lab.evaluation.overlap import named_iou
+    from corporeal.reconstruction.segment.naming import name_parts
 
     thing = ObjectWords("boxes", "boxes", tuple(PartWords(f"box {k}", None) for k in range(PARTS)))
     small, words, _ = scene(2000, channels)

@@ -25,15 +25,15 @@ from typing import get_args
 import numpy as np
 from rich.console import Console
 
-from corporeal.errors import UserError
-from corporeal.formats.scene_file import SceneFile, write_scene_file
+from corporeal.core.errors import UserError
+from corporeal.discretization.plan import Detail
 from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.pipeline import Progress, Settings, opened
-from corporeal.stages.assemble import AssembleConfig
-from corporeal.stages.fill import FillConfig
-from corporeal.trajectory.audit_file import read_audit
-from corporeal.trajectory.played import Played
-from corporeal.treatment.plan import Detail
+from corporeal.io.scene_file import SceneFile, write_scene_file
+from corporeal.pipeline.runner import Progress, Settings, opened
+from corporeal.pipeline.stages.assemble import AssembleConfig
+from corporeal.pipeline.stages.fill import FillConfig
+from corporeal.simulation.audit_file import read_audit
+from corporeal.simulation.played import Played
 
 STILL = 0.5
 """Largest drift of what is at rest [dx]."""

@@ -16,9 +16,9 @@ import trimesh
 from scipy.special import ellipk
 
 import corporeal as co
+from corporeal.core.types import ROUNDING
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.state import Matter
-from corporeal.types import ROUNDING
 
 G, SLOPE = 9.81, np.radians(5)
 LEVEL = (0.0, 0.0, -G)

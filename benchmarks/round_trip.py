@@ -30,29 +30,29 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 from skimage.color import rgb2lab
 
-from corporeal import store
+from corporeal.core import store
+from corporeal.core.terminal import progress_bars, show_table
+from corporeal.core.types import MaterialField, Reconstruction, Scene, Views
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.formats.scene_file import (
+from corporeal.discretization.anatomy import inner_share
+from corporeal.discretization.foliage import is_leafy
+from corporeal.discretization.scene_survey import examine
+from corporeal.discretization.survey import Anatomy, Member
+from corporeal.geometry.arrangement import box_of, boxes_of
+from corporeal.io.scene_file import (
     ObjectEntry,
     SceneFile,
     read_scene_file,
     write_scene_file,
 )
-from corporeal.formats.transforms import read_views, write_views
-from corporeal.geometry.anatomy import inner_share
-from corporeal.geometry.arrangement import box_of, boxes_of
-from corporeal.geometry.foliage import is_leafy
-from corporeal.geometry.scene_survey import examine
-from corporeal.geometry.similarity import moved_points
-from corporeal.geometry.survey import Anatomy, Member
-from corporeal.pipeline import Settings, opened, write_showcase
+from corporeal.io.transforms import read_views, write_views
+from corporeal.multiview.similarity import moved_points
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import Settings, opened, write_showcase
+from corporeal.pipeline.stages.capture import CaptureConfig, capture
+from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES
-from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.stages.fill import FillConfig
-from corporeal.terminal import progress_bars, show_table
-from corporeal.types import MaterialField, Reconstruction, Scene, Views
 
 SIZE = (512, 512)
 """Of the photographs [px]."""
@@ -215,7 +215,11 @@ def _colour(rgb: np.ndarray) -> str:
 
 def _called(rgb: np.ndarray) -> str:
     """Return the basic colour term that is nearest in CIELAB."""
-    text = files("corporeal.regions").joinpath("attributes.toml").read_text(encoding="utf-8")
+    text = (
+        files("corporeal.reconstruction.segment")
+        .joinpath("attributes.toml")
+        .read_text(encoding="utf-8")
+    )
     table = tomllib.loads(text)["colour"]
     terms = [(word, code) for word in BASIC for code in table[word]]
     known = [[int(code[i : i + 2], 16) / 255 for i in (1, 3, 5)] for _, code in terms]

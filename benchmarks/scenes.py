@@ -19,9 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.pipeline.stages.compose import ComposeConfig, compose
 from corporeal.pool.index import read_pool
-from corporeal.stages.compose import ComposeConfig, compose
 
 WARM_UP = 20
 """Scenes before memory is looked at: code is loaded and compiled, pieces are cut."""

@@ -16,8 +16,8 @@ import numpy as np
 from answer_rules import Drawn, Scored, against, drawn
 from jaxtyping import Float
 
-from corporeal.evaluation.truth import read_truth
-from corporeal.mixture import quantiles
+from corporeal.lab.evaluation.truth import read_truth
+from corporeal.pipeline.mixture import quantiles
 from corporeal.vlm.outside_evidence import WRONG, likelihood, readings
 
 SHARED, TOGETHER = 0.268, 0.676

@@ -19,16 +19,16 @@ from typing import get_args
 from rich.console import Console
 from stories import Told, tell, told
 
-from corporeal import store
-from corporeal.evaluation.dynamics.places import OURS, reference_folder, run_folder
-from corporeal.findings import Audit
-from corporeal.machine import cores
-from corporeal.pipeline import FOLDERS, Settings
+from corporeal.core import store
+from corporeal.core.findings import Audit
+from corporeal.core.machine import cores
+from corporeal.discretization.plan import Detail
+from corporeal.lab.evaluation.dynamics.places import OURS, reference_folder, run_folder
+from corporeal.pipeline.runner import FOLDERS, Settings
+from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.showcase.expectations import EXPECTED
 from corporeal.showcase.scenes import SCENES
-from corporeal.stages.fill import FillConfig
-from corporeal.trajectory.audit_words import breaches, passage
-from corporeal.treatment.plan import Detail
+from corporeal.simulation.audit_words import breaches, passage
 
 PAGE = Path(__file__).parents[1] / "docs" / "showcase.md"
 BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"

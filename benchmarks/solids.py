@@ -18,17 +18,17 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from corporeal.formats.splat_ply import write_splat
-from corporeal.formats.splats import read_splat
-from corporeal.formats.transforms import read_views
-from corporeal.geometry.filling import sample_surface
+from corporeal.core.types import Gaussians, Scene, Views
+from corporeal.discretization.filling import sample_surface
 from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.shape import Shape
-from corporeal.splats.solid import Solid, solids
-from corporeal.splats.train import train
-from corporeal.splats.training_schedule import TrainConfig
-from corporeal.stages.assemble import assemble
-from corporeal.types import Gaussians, Scene, Views
+from corporeal.io.splat_ply import write_splat
+from corporeal.io.splats import read_splat
+from corporeal.io.transforms import read_views
+from corporeal.pipeline.stages.assemble import assemble
+from corporeal.reconstruction.gaussians.solid import Solid, solids
+from corporeal.reconstruction.gaussians.train import train
+from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "solids.md"
 CORES = 2
@@ -172,7 +172,7 @@ HEAD = (
     "# Solids from Gaussians",
     "",
     "A Gaussian splat has no inside and no outside. To weigh, fill and simulate its objects, "
-    "`corporeal.splats.solid` extracts one closed surface per object:",
+    "`corporeal.reconstruction.gaussians.solid` extracts one closed surface per object:",
     "",
     "    solids(gaussians, object_of_gaussian, cameras, masks) -> tuple[Solid, ...]",
     "",

@@ -22,18 +22,18 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.formats.transforms import read_views
-from corporeal.geometry.region import region
-from corporeal.machine import cores
-from corporeal.splats.depth_rendering import render_depth
-from corporeal.splats.exposure import differ
-from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
-from corporeal.splats.quality import quality
-from corporeal.splats.raster import back, draw, pinhole
-from corporeal.splats.thread_pool import ThreadPool
-from corporeal.splats.train import train
-from corporeal.splats.training_schedule import PRESETS, TrainConfig
-from corporeal.types import Camera, Gaussians, Views
+from corporeal.core.machine import cores
+from corporeal.core.types import Camera, Gaussians, Views
+from corporeal.io.transforms import read_views
+from corporeal.multiview.region import region
+from corporeal.reconstruction.gaussians.depth_rendering import render_depth
+from corporeal.reconstruction.gaussians.exposure import differ
+from corporeal.reconstruction.gaussians.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
+from corporeal.reconstruction.gaussians.quality import quality
+from corporeal.reconstruction.gaussians.raster import back, draw, pinhole
+from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
+from corporeal.reconstruction.gaussians.train import train
+from corporeal.reconstruction.gaussians.training_schedule import PRESETS, TrainConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "splats.md"
 CORES = 2
@@ -172,7 +172,7 @@ def main() -> None:
 HEAD = (
     "# Gaussians from pictures",
     "",
-    "`corporeal.splats` renders Gaussians on the CPU, learns them from posed pictures, and "
+    "`reconstruct.gaussians` renders Gaussians on the CPU, learns them from posed pictures, and "
     "deforms them with simulated particles:",
     "",
     "    train(views, masks) -> Trained            pictures and cameras in, Gaussians out",
@@ -226,7 +226,7 @@ TAIL = (
     "sparse points: a few hundred points grow too slowly. Where a small trial training gives "
     "lower loss, a fifth of the Gaussians begin inside the hull (decision 15), since a seat "
     "between its arms lies below it. None of these three scenes needs it.",
-    "- Exposures (`splats/exposure.py`) are learned as one gain for each photograph and channel. "
+    "- Exposures (`exposure.py`) are learned as one gain for each photograph and channel. "
     "The Gaussians take the mean exposure, and held-out views are compared after fitting their "
     "gain.",
     "- Imitated photographs: `python benchmarks/as_photographed.py scenes/helmet photo/helmet` "

@@ -8,17 +8,17 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal import pipeline
-from corporeal.findings import Audit, Expectation, Outcome
+from corporeal.core.findings import Audit, Expectation, Outcome
+from corporeal.core.store import read_meta
+from corporeal.core.types import MaterialField, Particles, Scene, Trajectory
 from corporeal.mpm.constants import PARTICLE_RADIUS
-from corporeal.pipeline import FOLDERS, Settings
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import FOLDERS, Settings
 from corporeal.showcase.expectations import expect
-from corporeal.store import read_meta
-from corporeal.trajectory.audit import believed
-from corporeal.trajectory.audit_file import read_audit
-from corporeal.trajectory.frames import read_trajectory
-from corporeal.trajectory.outcome import outcome
-from corporeal.types import MaterialField, Particles, Scene, Trajectory
+from corporeal.simulation.audit import believed
+from corporeal.simulation.audit_file import read_audit
+from corporeal.simulation.frames import read_trajectory
+from corporeal.simulation.outcome import outcome
 
 
 @dataclass(frozen=True)
@@ -59,15 +59,15 @@ class Told:
 
 def tell(name: str, folder: Path, settings: Settings) -> Told:
     """Simulate a scene of the showcase; what lies in ``folder`` already is used again."""
-    scene = pipeline.write_showcase(name, folder / "input")
-    pipeline.run([scene], folder, settings, pipeline.quiet, until="simulate")
+    scene = runner.write_showcase(name, folder / "input")
+    runner.run([scene], folder, settings, runner.quiet, until="simulate")
     return told(name, folder)
 
 
 def told(name: str, folder: Path) -> Told:
     """Read back a scene of the showcase that was simulated."""
     simulated = folder / FOLDERS["simulate"]
-    prepared = pipeline.read_back(folder).prepared  # with what lies in vessels
+    prepared = runner.read_back(folder).prepared  # with what lies in vessels
     return Told(
         name,
         prepared.scene,

@@ -22,7 +22,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from corporeal.machine import cores
+from corporeal.core.machine import cores
 
 DOCS = Path(__file__).parents[1] / "docs"
 

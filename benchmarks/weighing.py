@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from corporeal.corpus.weighing import weigh
-from corporeal.errors import UserError
-from corporeal.formats.glb_writer import write_glb
+from corporeal.core.errors import UserError
+from corporeal.io.glb_writer import write_glb
+from corporeal.lab.corpus.weighing import weigh
 from corporeal.pool.asset import Asset
 from corporeal.pool.index import index
-from corporeal.settle.mass_properties import MassProperties
+from corporeal.scene.mass_properties import MassProperties
 from corporeal.showcase.models import PROPS
 from corporeal.showcase.props import prop
 from corporeal.vlm.sizes import real_extent, usual_sizes

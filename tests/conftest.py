@@ -10,20 +10,21 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
 
+import numpy as np
 import pytest
 from jaxtyping import install_import_hook
 
 # Kernels are excluded: neither Warp nor numba can read a wrapped function.
 install_import_hook(
     [
-        "corporeal.types",
+        "corporeal.core.types",
         "corporeal.mpm.problem",
         "corporeal.mpm.laws",
         "corporeal.mpm.substance",
-        "corporeal.stages",
-        "corporeal.formats",
-        "corporeal.features",
-        "corporeal.store",
+        "corporeal.pipeline.stages",
+        "corporeal.io",
+        "corporeal.reconstruction.features",
+        "corporeal.core.store",
     ],
     "beartype.beartype",
 )
@@ -44,6 +45,11 @@ def no_network(monkeypatch):
         return connect(self, address)
 
     monkeypatch.setattr(socket.socket, "connect", guarded)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from corporeal.core.types import Gaussians
 from corporeal.geometry.harmonics import DC
-from corporeal.types import Gaussians
 
 SPACING = 0.014
 """Of Gaussians on their faces [m]."""

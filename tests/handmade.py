@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from corporeal.types import Finish, Scene, SceneObject, Surface
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
 
 CORNER = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])

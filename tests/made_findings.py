@@ -1,7 +1,7 @@
 """Outcomes and audits made by hand: what a test does not name is as in a run where all is well."""
 
-from corporeal.findings import ObjectOutcome, Outcome, PairOutcome, PartAudit, RunAudit
-from corporeal.types import NOTHING_ASKED
+from corporeal.core.findings import ObjectOutcome, Outcome, PairOutcome, PartAudit, RunAudit
+from corporeal.core.types import NOTHING_ASKED
 
 
 def object_outcome(**what):

@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from corporeal.types import Ledger
+from corporeal.core.types import Ledger
 
 VECTORS = ("centre", "momentum", "angular_momentum", "external_impulse")
 COUNTS = ("lost", "steps", "nan")

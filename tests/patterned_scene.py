@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from corporeal.core.types import Camera, Finish, Scene, SceneObject, Surface
 from corporeal.render.camera import Aim, camera_of
 from corporeal.render.embree import render
 from corporeal.render.stage import Light, Stage
-from corporeal.types import Camera, Finish, Scene, SceneObject, Surface
 
 OF_SLAB = 12
 """Triangles of the slab, which come first."""

@@ -5,7 +5,7 @@ import io
 import numpy as np
 from PIL import Image
 
-from corporeal.types import Finish, Scene, SceneObject, Surface
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from glb_maker import Maker, pack
 
 

@@ -8,9 +8,9 @@ import pytest
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.materials.shipped import citation
-from corporeal.stages.describe import describe
-from corporeal.stages.ground import UNFIT, ground
-from corporeal.stages.segment import segment
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.ground import UNFIT, ground
+from corporeal.pipeline.stages.segment import segment
 
 FOLDER = Path(__file__).parent / "recordings"
 KINDS = {"sheet": "shell", "hollow": "shell", "filled": "filled", "solid": "solid", None: "solid"}

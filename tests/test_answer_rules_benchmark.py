@@ -5,7 +5,7 @@ import pytest
 from answer_rules import Drawn, Scored, each, scored, verdict
 from scipy.stats import norm, t
 
-from corporeal.types import Evidence
+from corporeal.core.types import Evidence
 
 NARROW = np.exp(1e-3 * norm.ppf((np.arange(100) + 0.5) / 100))
 """Draws of one answer [kg], about 1 kg."""

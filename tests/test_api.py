@@ -11,7 +11,7 @@ import pytest
 
 import corporeal as co
 
-HEAVY = ("numpy", "warp", "trimesh", "numba", "scipy", "corporeal.types")
+HEAVY = ("numpy", "warp", "trimesh", "numba", "scipy", "corporeal.core.types")
 CUBE = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 
 
@@ -35,13 +35,17 @@ except SystemExit:
 @pytest.mark.parametrize(
     ("done", "unwanted"),
     [
-        (HELP, "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline"),
+        (
+            HELP,
+            "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline.runner",
+        ),
         # What a run of a model has imported when its first verb begins.
         (
-            "import corporeal.cli.validate, corporeal.pipeline",
+            "import corporeal.cli.validate, corporeal.pipeline.runner",
             "numba warp trimesh networkx matplotlib mujoco torch pydantic_ai embreex scipy.ndimage "
-            "corporeal.splats.train corporeal.stages.reconstruct corporeal.stages.simulate "
-            "corporeal.stages.film corporeal.run_files corporeal.formats.photographs",
+            "corporeal.reconstruction.gaussians.train corporeal.pipeline.stages.reconstruct "
+            "corporeal.pipeline.stages.simulate "
+            "corporeal.pipeline.stages.film corporeal.pipeline.run_files corporeal.io.photographs",
         ),
     ],
 )

@@ -10,11 +10,11 @@ import pytest
 
 from corporeal.cli.validate import validate
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.formats.splat_ply import write_splat
 from corporeal.geometry.gaussians import placed
-from corporeal.pipeline import Settings, opened
-from corporeal.splats import solid
-from corporeal.stages import reconstruct as stage
+from corporeal.io.splat_ply import write_splat
+from corporeal.pipeline.runner import Settings, opened
+from corporeal.pipeline.stages import reconstruct as stage
+from corporeal.reconstruction.gaussians import solid
 from gaussian_boxes import DOWN, box, together
 from oracle import decomposed, part, weighs
 

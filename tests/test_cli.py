@@ -6,12 +6,14 @@ import sys
 import numpy as np
 import pytest
 
-from corporeal import cli, pipeline, store
-from corporeal.formats.glb_writer import write_glb
-from corporeal.pipeline import Settings
+from corporeal import cli
+from corporeal.core import store
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
+from corporeal.core.version import __version__
+from corporeal.io.glb_writer import write_glb
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import Settings
 from corporeal.render import figures
-from corporeal.types import Finish, Scene, SceneObject, Surface
-from corporeal.version import __version__
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -214,7 +216,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
     nobody = ("--vlm", "openai:gpt-5.4")
     refused(typed("run", "box.glb", *nobody), "OPENAI_API_KEY")
     assert not (tmp_path / "runs").exists()
-    pipeline.run([tmp_path / "box.glb"], tmp_path / "box", Settings(), quietly, "ground")
+    runner.run([tmp_path / "box.glb"], tmp_path / "box", Settings(), quietly, "ground")
     before = (tmp_path / "box" / "run.json").read_bytes()
     wrong = [
         ("run", "box.glb", "--out", ".", *nobody),
@@ -228,7 +230,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
     for words in wrong:
         refused(typed(*words))
         assert (tmp_path / "box" / "run.json").read_bytes() == before, words
-    assert {row.state for row in pipeline.status(tmp_path / "box")[:4]} == {"finished"}
+    assert {row.state for row in runner.status(tmp_path / "box")[:4]} == {"finished"}
     assert typed("ground", "box")[0] == 0
 
 

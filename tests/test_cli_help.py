@@ -12,7 +12,7 @@ import tyro
 
 from corporeal import cli
 from corporeal.cli.help_layout import FIRST, lay_out, options_of
-from corporeal.pipeline import Settings
+from corporeal.pipeline.runner import Settings
 
 NEEDED = ("detail", "vlm", "annotations", "drop", "things", "out")
 
@@ -158,7 +158,16 @@ def test_an_option_of_another_sub_command_is_refused(command):
     assert "--anonymous" in said.err
 
 
-HEAVY = ("warp", "numba", "scipy", "igl", "embreex", "trimesh", "pydantic", "corporeal.pipeline")
+HEAVY = (
+    "warp",
+    "numba",
+    "scipy",
+    "igl",
+    "embreex",
+    "trimesh",
+    "pydantic",
+    "corporeal.pipeline.runner",
+)
 
 
 @pytest.mark.parametrize("words", [["--version"], ["run", "--help"]])

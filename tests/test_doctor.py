@@ -2,7 +2,7 @@
 
 import pytest
 
-from corporeal import doctor
+from corporeal.cli import doctor
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal.machine import cores
+from corporeal.core.machine import cores
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 KEYS = {
@@ -119,7 +119,7 @@ def test_phases_of_a_heap_add_up_and_contact_costs_nothing_where_there_is_none(e
 
 
 def test_phases_are_not_timed_on_several_threads():
-    from corporeal.errors import UserError
+    from corporeal.core.errors import UserError
     from corporeal.mpm.cpu.phase_clock import PhaseClock
 
     class OnTwo:

@@ -7,14 +7,14 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from corporeal import store
-from corporeal.formats.colmap import write_colmap
-from corporeal.formats.transforms import write_views
-from corporeal.geometry.similarity import moved_cameras, similarity
+from corporeal.core import store
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
+from corporeal.io.colmap import write_colmap
+from corporeal.io.transforms import write_views
+from corporeal.multiview.similarity import moved_cameras, similarity
+from corporeal.pipeline.stages.capture import CaptureConfig, capture
+from corporeal.reconstruction.gaussians import train, training_schedule
 from corporeal.render import figures
-from corporeal.splats import train, training_schedule
-from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.types import Finish, Scene, SceneObject, Surface
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0, 1)], float)
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -101,7 +101,7 @@ def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
 
 
 def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch):
-    """What comes of it to the last bit: see tests/splats/test_train.py."""
+    """What comes of it to the last bit: see tests/reconstruct/gaussians/test_train.py."""
     write_views(tmp_path / "photos", views)
     monkeypatch.setattr(train, "EVERY", 0.0)
     steps, step = [], train._step

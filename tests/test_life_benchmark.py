@@ -5,7 +5,7 @@ from dataclasses import replace
 import life
 import pytest
 
-from corporeal.evaluation.life import rebounds
+from corporeal.lab.evaluation.life import rebounds
 
 ROWS = {row.name: row for row in rebounds()}
 

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from corporeal.machine import OBJECTS_MADE, collect_seldom, cores, keep_freed_memory
+from corporeal.core.machine import OBJECTS_MADE, collect_seldom, cores, keep_freed_memory
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="Linux only")
@@ -78,7 +78,7 @@ def test_the_command_line_gives_blas_one_thread_unless_the_environment_says_so(b
 FAULTS = """
 import resource, sys
 import numpy as np
-from corporeal.machine import keep_freed_memory
+from corporeal.core.machine import keep_freed_memory
 if sys.argv[1] == "keep" and not keep_freed_memory():
     sys.exit("no")
 np.ones(2_000_000)
@@ -103,7 +103,7 @@ HEAP = """
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 import numpy as np
-from corporeal.machine import keep_freed_memory
+from corporeal.core.machine import keep_freed_memory
 keep_freed_memory()
 def kept_by_the_program():
     place = np.ones(2_000_000).ctypes.data
@@ -127,7 +127,7 @@ def test_a_setting_of_ones_own_for_memory_stays(monkeypatch):
 
 
 LOOPED = """
-from corporeal.machine import collect_seldom
+from corporeal.core.machine import collect_seldom
 collect_seldom()
 class Loop:
     def __init__(self):

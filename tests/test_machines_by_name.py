@@ -11,13 +11,13 @@ from trimesh.creation import box
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from corporeal.geometry.scene_survey import examine
-from corporeal.in_memory import load_scene
+from corporeal.discretization.scene_survey import examine
 from corporeal.materials import find
-from corporeal.stages.describe import describe
-from corporeal.stages.fill import composed
-from corporeal.stages.ground import ground
-from corporeal.stages.segment import segment
+from corporeal.pipeline.in_memory import load_scene
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.fill import composed
+from corporeal.pipeline.stages.ground import ground
+from corporeal.pipeline.stages.segment import segment
 
 UP = trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
 NEAR, FAR = 1.5, 1.8

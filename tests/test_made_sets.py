@@ -10,8 +10,8 @@ from as_photographed import Look, Room, backdrop, degraded, photographed
 from grounds import GROUNDS
 from made_sets import sides_of, way_around, write_set
 
-from corporeal.formats.colmap import read_colmap
-from corporeal.stages.capture import pictures
+from corporeal.io.colmap import read_colmap
+from corporeal.pipeline.stages.capture import pictures
 from patterned_scene import patterned
 
 SIDES = np.array([0.6, 0.6, 0.14])

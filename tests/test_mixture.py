@@ -7,21 +7,7 @@ import pytest
 import trimesh
 
 from corporeal import materials
-from corporeal.geometry.make import Leeway, width_of
-from corporeal.materials.scale import place
-from corporeal.mixture import (
-    FORM,
-    Scale,
-    doubt,
-    drawn_given,
-    quantiles,
-    summed,
-    weighed,
-)
-from corporeal.stages.describe import describe
-from corporeal.stages.ground import GroundConfig, ground
-from corporeal.stages.segment import segment
-from corporeal.types import (
+from corporeal.core.types import (
     Evidence,
     Finish,
     Hypothesis,
@@ -35,6 +21,20 @@ from corporeal.types import (
     Swelling,
     in_way,
 )
+from corporeal.discretization.make import Leeway, width_of
+from corporeal.materials.scale import place
+from corporeal.pipeline.mixture import (
+    FORM,
+    Scale,
+    doubt,
+    drawn_given,
+    quantiles,
+    summed,
+    weighed,
+)
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.ground import GroundConfig, ground
+from corporeal.pipeline.stages.segment import segment
 from corporeal.vlm.outside_evidence import PACKAGING, contradiction, likelihood
 
 RADIUS = 0.05

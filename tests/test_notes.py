@@ -7,14 +7,14 @@ import pickle
 import numpy as np
 import pytest
 
-from corporeal import store
-from corporeal.formats.likely_unit import LikelyUnit, sentences
-from corporeal.formats.shots import left_out
-from corporeal.formats.sources import not_read_below
-from corporeal.formats.typical_extents import doubt
-from corporeal.geometry.metric import chosen, of_distance, of_file
-from corporeal.stages.fill import by_name
-from corporeal.types import Inventory, Note, NoteKind, kind_of, kinds_of, reworded, with_kinds
+from corporeal.core import store
+from corporeal.core.types import Inventory, Note, NoteKind, kind_of, kinds_of, reworded, with_kinds
+from corporeal.io.shots import left_out
+from corporeal.io.sources import not_read_below
+from corporeal.multiview.metric import chosen, of_distance, of_file
+from corporeal.pipeline.stages.fill import by_name
+from corporeal.recognition.likely_unit import LikelyUnit, sentences
+from corporeal.recognition.typical_extents import doubt
 from handmade import scene
 
 GONE = Note("a.jpg was left out.", NoteKind.LEFT_OUT)

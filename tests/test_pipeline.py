@@ -4,14 +4,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from corporeal import pipeline, run_files, store
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.types import Film, Inventory, ObjectWords
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.errors import UserError
-from corporeal.formats.typical_extents import doubt
-from corporeal.pipeline import Settings, _Run, reopen, run
+from corporeal.pipeline import run_files, runner
+from corporeal.pipeline.runner import Settings, _Run, reopen, run
+from corporeal.pipeline.stages.fill import FillConfig
+from corporeal.recognition.typical_extents import doubt
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.stages.fill import FillConfig
-from corporeal.types import Film, Inventory, ObjectWords
 from glb_maker import cube
 from handmade import plain, scene
 
@@ -45,20 +46,20 @@ def test_a_run_that_was_moved_finds_its_film(tmp_path):
     store.write_json(there / "run.json", {"state": "finished", "inputs": [], "settings": {}})
     store.save(there / "9-film" / store.DATA, Film(made / "film.mp4", 30, 64, 64))
     store.finish(there / "9-film", "key", None, 1.0)
-    assert pipeline.read_back(there).movie.path == there / "9-film" / "film.mp4"
+    assert runner.read_back(there).movie.path == there / "9-film" / "film.mp4"
 
 
 def test_an_edited_annotation_makes_its_answers_stale(tmp_path):
     path = tmp_path / "said.yaml"
     path.write_text("a: steel")
-    before = pipeline.files_read(DescribeConfig(annotations=path))
+    before = runner.files_read(DescribeConfig(annotations=path))
     path.write_text("a: glass")
-    assert pipeline.files_read(DescribeConfig(annotations=path)) != before
+    assert runner.files_read(DescribeConfig(annotations=path)) != before
 
 
 def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do(tmp_path):
     def names(**config):
-        return pipeline.files_read(DescribeConfig(**config))
+        return runner.files_read(DescribeConfig(**config))
 
     (tmp_path / "one.json").write_text("{}")
     written, read = names(record=tmp_path), names(vlm=f"replay:{tmp_path}")
@@ -70,9 +71,9 @@ def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do
 def test_other_weights_in_a_folder_make_what_they_saw_stale(tmp_path):
     (tmp_path / "model.safetensors").write_text("1")
     config = ReconstructConfig(semantic=f"clip:{tmp_path}")
-    before = pipeline.files_read(config)
+    before = runner.files_read(config)
     (tmp_path / "model.safetensors").write_text("2")
-    assert before and pipeline.files_read(config) != before
+    assert before and runner.files_read(config) != before
 
 
 def test_memory_is_counted_in_megabytes():
@@ -103,7 +104,7 @@ def building(monkeypatch, tmp_path):
         return folder / f"{name}.glb"
 
     monkeypatch.setenv(store.CACHE, str(tmp_path / "cache"))
-    monkeypatch.setattr(pipeline, "write_showcase", write)
+    monkeypatch.setattr(runner, "write_showcase", write)
     return tmp_path / "cache" / "scenes", built
 
 
@@ -112,12 +113,12 @@ def test_a_scene_of_our_own_is_built_once_for_each_state_of_the_code(
 ):
     kept, built = building
     for run_name in ("a", "b"):
-        path = pipeline.kept_showcase("duck-on-mud", tmp_path / run_name)
+        path = runner.kept_showcase("duck-on-mud", tmp_path / run_name)
         assert path.read_bytes() == b"duck-on-mud as built"
     assert built == ["duck-on-mud"]
-    pipeline.kept_showcase("duck-on-can", tmp_path / "a")
+    runner.kept_showcase("duck-on-can", tmp_path / "a")
     monkeypatch.setattr(store, "source", lambda: "edited")
-    pipeline.kept_showcase("duck-on-mud", tmp_path / "a")
+    runner.kept_showcase("duck-on-mud", tmp_path / "a")
     assert built == ["duck-on-mud", "duck-on-can", "duck-on-mud"]
     # Of each scene only the newest is kept.
     assert len(list(kept.iterdir())) == 2
@@ -127,7 +128,7 @@ def test_a_scene_that_cannot_be_kept_is_built_each_time(building, tmp_path):
     kept, built = building
     kept.parent.write_text("in the way")
     for run_name in ("a", "b"):
-        assert pipeline.kept_showcase("duck-on-mud", tmp_path / run_name).exists()
+        assert runner.kept_showcase("duck-on-mud", tmp_path / run_name).exists()
     assert len(built) == 2
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from corporeal import terminal
-from corporeal.masking import grown_masks as module
-from corporeal.progress import within
-from corporeal.terminal import Doing, lasting, log_lines
+from corporeal.core import terminal
+from corporeal.core.progress import within
+from corporeal.core.terminal import Doing, lasting, log_lines
+from corporeal.reconstruction.masks import grown_masks as module
 
 
 def test_a_part_is_told_as_of_the_whole():

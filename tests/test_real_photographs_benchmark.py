@@ -11,13 +11,13 @@ import real_photographs as benchmark
 import trimesh
 from PIL import Image
 
-from corporeal.formats.colmap import read_colmap, write_colmap
+from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.similarity import moved_cameras, similarity
+from corporeal.io.colmap import read_colmap, write_colmap
+from corporeal.multiview.similarity import moved_cameras, similarity
+from corporeal.reconstruction.gaussians import training_schedule
 from corporeal.render.embree import identify
 from corporeal.render.stage import Stage
-from corporeal.splats import training_schedule
-from corporeal.types import Camera
 from patterned_scene import OF_SLAB, patterned, photographs, ring
 
 COUNT = 16

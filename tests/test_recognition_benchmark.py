@@ -4,11 +4,11 @@ import json
 from pathlib import Path
 
 import pytest
-from recognition import page
 from recognition.facts import FACTS, SETS, facts, judge, read
 
 from corporeal import materials
-from corporeal.evaluation.recognition import Row, bands, ordering, score
+from corporeal.lab.evaluation.recognition import Row, bands, ordering, score
+from recognition import page
 
 DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
 SEEN_AGAIN = ("armchair_kaolin", "plant_potted_market", "guitar_market")

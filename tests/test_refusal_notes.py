@@ -5,14 +5,14 @@ import pytest
 from PIL import Image
 
 from corporeal.cli import main
-from corporeal.errors import UserError, noticed
-from corporeal.poses.pose import Posed
+from corporeal.core.errors import UserError, noticed
+from corporeal.core.types import Gaussians
+from corporeal.pipeline.stages import reconstruct
 from corporeal.reconstruction import picture_intake
+from corporeal.reconstruction.gaussians.intake import Intake
 from corporeal.reconstruction.picture_intake import take_pictures
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.splats.intake import Intake
-from corporeal.stages import reconstruct
-from corporeal.types import Gaussians
+from corporeal.reconstruction.sfm.pose import Posed
 
 DOUBTED = "No masks were grown from what all photographs show: it reaches beyond."
 LEFT_OUT = "1 of 9 photographs do not fit the others and were left out: a.jpg."

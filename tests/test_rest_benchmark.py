@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.formats.glb_writer import write_glb
-from corporeal.types import Finish, Scene, SceneObject, Surface
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
+from corporeal.io.glb_writer import write_glb
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 

@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal import pipeline, store
-from corporeal.errors import UserError
-from corporeal.formats.glb_writer import write_glb
-from corporeal.pipeline import Settings
-from corporeal.types import Finish, Scene, SceneObject, Surface
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
+from corporeal.io.glb_writer import write_glb
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import Settings
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -23,8 +24,8 @@ FACES = np.array([t for a, b, c, d in QUADS for t in ([a, b, c], [a, c, d])])
 SIMULATE = """
 import sys
 from pathlib import Path
-from corporeal.trajectory import checkpoint
-from corporeal.pipeline import Settings, run
+from corporeal.simulation import checkpoint
+from corporeal.pipeline.runner import Settings, run
 checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
 silent = lambda fraction, words: None
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
@@ -68,7 +69,7 @@ def ended(process: subprocess.Popen) -> None:
 
 def wait_for(process: subprocess.Popen, folder: Path, frame: int) -> None:
     """Wait until a frame is written; fails when the process ends first."""
-    file = folder / pipeline.FOLDERS["simulate"] / "frames" / f"{frame:05d}.npz"
+    file = folder / runner.FOLDERS["simulate"] / "frames" / f"{frame:05d}.npz"
     patience = time.monotonic() + PATIENCE
     while not file.exists():
         assert process.poll() is None, process.communicate()[1]
@@ -85,7 +86,7 @@ def kill(process: subprocess.Popen) -> None:
 
 def told(folder: Path) -> dict[str, bytes]:
     """Every file of a simulation that follows from its inputs."""
-    simulated = folder / pipeline.FOLDERS["simulate"]
+    simulated = folder / runner.FOLDERS["simulate"]
     names = [
         *sorted(simulated.glob("frames/*")),
         simulated / "ledger.npz",
@@ -108,7 +109,7 @@ def test_a_killed_run_ends_exactly_like_one_that_was_not_and_nobody_else_gets_in
 
     def here(folder):
         told = lambda verb: lambda fraction, said: words.append(said)  # noqa: E731
-        pipeline.run([scene], folder, Settings(), told, until="simulate")
+        runner.run([scene], folder, Settings(), told, until="simulate")
 
     broken = tmp_path / "broken"
     process = start(scene, broken)
@@ -127,7 +128,7 @@ def test_a_killed_run_ends_exactly_like_one_that_was_not_and_nobody_else_gets_in
 @pytest.mark.slow
 def test_three_kills_at_random_moments_change_nothing(tmp_path):
     scene, chance = a_scene(tmp_path / "two.glb", duration=0.3), random.Random(7)
-    pipeline.run([scene], tmp_path / "whole", until="simulate")
+    runner.run([scene], tmp_path / "whole", until="simulate")
     broken = tmp_path / "broken"
     for number in sorted(chance.sample(range(1, 16), 3)):
         process = start(scene, broken)
@@ -141,18 +142,18 @@ def test_three_kills_at_random_moments_change_nothing(tmp_path):
 def test_a_run_of_the_engine_that_was_called_warp_is_opened_and_not_done_again(tmp_path):
     scene, folder, said = a_scene(tmp_path / "two.glb", duration=0.05), tmp_path / "run", []
     quiet = lambda verb: lambda fraction, words: said.append(words)  # noqa: E731
-    pipeline.run([scene], folder, Settings(), quiet, until="simulate")
-    filled, simulated = (folder / pipeline.FOLDERS[verb] for verb in ("fill", "simulate"))
+    runner.run([scene], folder, Settings(), quiet, until="simulate")
+    filled, simulated = (folder / runner.FOLDERS[verb] for verb in ("fill", "simulate"))
     former = {"engine": "warp", "contact": "multi"}
     key = store.key("simulate", former, [store.read_json(filled / store.META)["key"]])
     store.finish(simulated, key, former, 1.0)
-    declared = store.read_json(folder / pipeline.RUN)
+    declared = store.read_json(folder / runner.RUN)
     declared["settings"]["simulate"] = former
-    store.write_json(folder / pipeline.RUN, declared)
-    asked = pipeline.reopen(folder)
+    store.write_json(folder / runner.RUN, declared)
+    asked = runner.reopen(folder)
     assert asked.settings.simulate.engine == "cpu"
     said.clear()
-    pipeline.run(asked.inputs, folder, asked.settings, quiet, until="simulate")
+    runner.run(asked.inputs, folder, asked.settings, quiet, until="simulate")
     assert not said, "what is done is not done again"
 
 
@@ -167,7 +168,7 @@ def test_a_run_is_let_go_of_when_it_ends(tmp_path):
 def test_runs_that_start_at_once_on_an_empty_kernel_cache_leave_each_other_alone(tmp_path):
     scene = a_scene(tmp_path / "two.glb", duration=0.05)
     # What is simulated is the same for all; what they compile is the engine and all about it.
-    pipeline.run([scene], tmp_path / "killed", until="fill")
+    runner.run([scene], tmp_path / "killed", until="fill")
     for name in ("one", "two"):
         shutil.copytree(tmp_path / "killed", tmp_path / name)
     kernels = tmp_path / "kernels"

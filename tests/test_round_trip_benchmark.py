@@ -7,10 +7,10 @@ import yaml
 from round_trip import ASIDE, Piece, _called, _merged, as_told, put_aside
 
 from corporeal.geometry.arrangement import boxes_of
-from corporeal.pipeline import Settings, opened
-from corporeal.results import Results
-from corporeal.stages.assemble import assemble
-from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import Settings, opened
+from corporeal.pipeline.stages.assemble import assemble
+from corporeal.pipeline.stages.capture import CaptureConfig, capture
 
 
 def piece(name, pixels, colour, material, area, **said):

@@ -3,12 +3,12 @@
 import pytest
 from rich.console import Console
 
-from corporeal import store
 from corporeal.cli import run_summary
 from corporeal.cli.run_summary import show_summary
-from corporeal.findings import Breakage
-from corporeal.trajectory.audit_file import AUDIT
-from corporeal.types import Note, NoteKind
+from corporeal.core import store
+from corporeal.core.findings import Breakage
+from corporeal.core.types import Note, NoteKind
+from corporeal.simulation.audit_file import AUDIT
 from made_findings import run_audit
 
 

@@ -5,7 +5,7 @@ import pytest
 from answer_rules import Drawn
 from shared_errors import SHARED, TOGETHER, ranked, weights
 
-from corporeal.types import Evidence, PrintedFact
+from corporeal.core.types import Evidence, PrintedFact
 
 RNG = np.random.default_rng(0)
 

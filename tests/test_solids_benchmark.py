@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.formats.transforms import write_views
-from corporeal.splats import solid, training_schedule
-from corporeal.stages.assemble import assemble
-from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.io.transforms import write_views
+from corporeal.pipeline.stages.assemble import assemble
+from corporeal.pipeline.stages.capture import CaptureConfig, capture
+from corporeal.reconstruction.gaussians import solid, training_schedule
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal.formats.transforms import write_views
+from corporeal.io.transforms import write_views
 
 HERE = Path(__file__).parent
 ROW = {"scene", "preset", "masked", "views", "size", "psnr", "psnr_things", "ssim", "deep", "near",

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.types import (
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
     Finish,
     Hypothesis,
     Law,

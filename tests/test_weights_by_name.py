@@ -5,7 +5,7 @@ from names import weigh
 from trimesh.creation import icosphere, revolve
 
 from corporeal import materials
-from corporeal.vlm.named_weights import fitting, materials_of_ways
+from corporeal.recognition.named_weights import fitting, materials_of_ways
 
 
 def bell():

@@ -14,8 +14,8 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 import uvicorn
 
 import corporeal as co
-from corporeal.formats.glb_writer import write_glb
-from corporeal.pipeline import Settings, run
+from corporeal.io.glb_writer import write_glb
+from corporeal.pipeline.runner import Settings, run
 from corporeal.viewer.guard import Door
 from corporeal.viewer.serve import Address, listening
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from corporeal.core.types import Law
 from corporeal.mpm.problem import Body, Plane, Problem
-from corporeal.types import Law
 
 CELL = 1.0 / 64.0
 """[m]"""

@@ -11,8 +11,8 @@ import matplotlib
 import numpy as np
 import warp as wp
 
+from corporeal.core.types import Law
 from corporeal.mpm.laws import MENU
-from corporeal.types import Law
 from cost.blocks import Drop
 
 matplotlib.use("Agg")

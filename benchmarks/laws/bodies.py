@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from corporeal.geometry.roundness import reach_of, surrounded
+from corporeal.core.types import ROUNDING, Law
+from corporeal.discretization.roundness import reach_of, surrounded
 from corporeal.mpm.problem import Body, Plane, Problem
-from corporeal.types import ROUNDING, Law
 
 Points = Float[np.ndarray, "N 3"]
 Distance = Callable[[np.ndarray], np.ndarray]

@@ -9,10 +9,10 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from scipy.optimize import brentq
 
+from corporeal.core.types import Law
 from corporeal.mpm.constants import COURANT
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
 from corporeal.mpm.problem import Engine, Plane, Problem
-from corporeal.types import Law
 from laws.bodies import G, Stuff, body, floor, problem, walls
 from laws.watching import started
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from corporeal.core.types import Law
 from corporeal.mpm.problem import Body, Plane, Problem
-from corporeal.types import Law
 from laws.bodies import DOWN, Stuff, body, cylinder_sdf, floor, lattice, problem
 from laws.outcome import Outcome, absolute, relative
 from laws.watching import started

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corporeal.types import Law
+from corporeal.core.types import Law
 from laws.bodies import Stuff, cylinder, floor, problem
 from laws.outcome import Outcome, absolute, relative
 from laws.watching import started

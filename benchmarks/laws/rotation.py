@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from corporeal.core.types import Law
 from corporeal.mpm.laws import MENU, flow, tau
 from corporeal.mpm.laws.drucker_prager import cone_slope
 from corporeal.mpm.laws.law import Numbers, lame
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law
 from laws.bodies import Stuff, box, problem
 from laws.outcome import Check, Outcome, absolute
 from laws.watching import started

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corporeal.types import Law
+from corporeal.core.types import Law
 from laws.bodies import DOWN, G, Stuff, box, floor, problem, walls
 from laws.outcome import Check, Outcome, relative
 from laws.watching import Path, crossing, follow, started

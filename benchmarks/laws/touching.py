@@ -3,9 +3,9 @@
 import numpy as np
 
 import corporeal as co
-from corporeal.findings import PairSurfaces
+from corporeal.core.findings import PairSurfaces
 from corporeal.mpm.problem import Problem
-from corporeal.trajectory.mesh_gaps import surface_pairs
+from corporeal.simulation.mesh_gaps import surface_pairs
 from laws.bodies import DOWN, Stuff, ball, ball_surface, body, box, box_surface, floor, problem
 from laws.outcome import Check, Outcome, absolute
 from laws.watching import started

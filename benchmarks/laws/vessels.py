@@ -5,9 +5,9 @@ from math import pi, sqrt
 
 import numpy as np
 
+from corporeal.core.types import Law
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
 from corporeal.mpm.problem import Engine, Problem, WettedSurface
-from corporeal.types import Law
 from laws.bodies import G, Stuff, body, floor, problem
 
 GLASS = 2500.0

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.evaluation.recognition import Row
-from corporeal.geometry.identity import Identity, identify, words
-from corporeal.stages.assemble import AssembleConfig, assemble
-from corporeal.types import Finish, Part, Scene, SceneObject, Surface
-from corporeal.vlm.metadata import Evidence, evidence, matter_hint, recognise
+from corporeal.core.types import Finish, Part, Scene, SceneObject, Surface
+from corporeal.lab.evaluation.recognition import Row
+from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
+from corporeal.recognition.identity import Identity, identify, words
+from corporeal.recognition.metadata import Evidence, evidence, matter_hint, recognise
 
 HERE = Path(__file__).parent
 FACTS = HERE / "facts.json"

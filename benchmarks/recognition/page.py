@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from corporeal.evaluation.recognition import Row, bands, score
+from corporeal.lab.evaluation.recognition import Row, bands, score
 from recognition.facts import SETS, facts, judge
 
 HEAD = """# Recognition without a model

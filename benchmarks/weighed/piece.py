@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.core.types import Scene
 from corporeal.showcase.mesh import Model, Part
 from corporeal.showcase.scenes import Placed, scene_of
-from corporeal.types import Scene
 
 Profile = Float[np.ndarray, "N 2"]
 """Radius and height of a turned body, from its axis below to its axis above [m]."""

@@ -5,9 +5,9 @@ import trimesh
 
 import corporeal as co
 from chromium import browser
-from corporeal.formats.glb_writer import write_glb
-from corporeal.pipeline import Settings, run
-from corporeal.stages.simulate import SimulateConfig
+from corporeal.io.glb_writer import write_glb
+from corporeal.pipeline.runner import Settings, run
+from corporeal.pipeline.stages.simulate import SimulateConfig
 
 READY = "window.viewer?.stats.ready && viewer.stats.drawn > 2"
 OBJECTS = "viewer.stages[0].meshes.map(m => m.surface.object)"
@@ -32,7 +32,7 @@ def broken_run(tmp_path_factory):
 
 @pytest.mark.slow
 def test_the_page_shows_the_pieces_of_what_broke(broken_run, tmp_path):
-    from corporeal.pipeline import read_back
+    from corporeal.pipeline.runner import read_back
     from corporeal.viewer.shelf import Shelf
     from corporeal.viewer.site import Shown, site
     from viewer_served import LOCAL, serving

@@ -7,12 +7,12 @@ import pytest
 from PIL import Image
 
 from chromium import browser
+from corporeal.core.types import Cloud, Gaussians, Reconstruction
 from corporeal.geometry.harmonics import DC
-from corporeal.pipeline import read_back
-from corporeal.playback import cast_of, playback, recorded
+from corporeal.pipeline.playback import cast_of, playback, recorded
+from corporeal.pipeline.runner import read_back
 from corporeal.render.page import page, safe
 from corporeal.render.viewer_page import inline_view
-from corporeal.types import Cloud, Gaussians, Reconstruction
 
 READY = "window.viewer?.stats.ready && viewer.stats.drawn > 2"
 CONTEXT = "viewer.renderer.getContext()"
@@ -35,7 +35,12 @@ def report(small_run, tmp_path_factory):
     above = ("summary", "film", "caption", "verdict", "expectations", "parts", "masses", "figures")
     empty = dict.fromkeys((*above, "grounds", "audit", "sources", "credits", "settings"), "")
     text = page(
-        "corporeal.stages", "report.html", **empty, title=safe("drop"), width=640, view=view
+        "corporeal.pipeline.stages",
+        "report.html",
+        **empty,
+        title=safe("drop"),
+        width=640,
+        view=view,
     )
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(text)

@@ -8,7 +8,7 @@ import pytest
 
 import corporeal as co
 from chromium import browser
-from corporeal.formats.glb_writer import write_glb
+from corporeal.io.glb_writer import write_glb
 
 READY = "!!window.viewer?.stats.ready && viewer.stats.drawn > 2"
 DROP = """(() => {

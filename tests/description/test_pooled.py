@@ -7,13 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.description.pooled import pooled
-from corporeal.materials.listing import materials_json
-from corporeal.mixture import Scale, drawn_given, quantiles, weighed
-from corporeal.stages.describe import describe
-from corporeal.stages.ground import GroundConfig, ground
-from corporeal.stages.segment import segment
-from corporeal.types import (
+from corporeal.core.types import (
     Account,
     Evidence,
     Finish,
@@ -28,6 +22,12 @@ from corporeal.types import (
     Swelling,
     in_way,
 )
+from corporeal.description.pooled import pooled
+from corporeal.materials.listing import materials_json
+from corporeal.pipeline.mixture import Scale, drawn_given, quantiles, weighed
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.ground import GroundConfig, ground
+from corporeal.pipeline.stages.segment import segment
 
 BALL = trimesh.creation.icosphere(3, 0.05)
 THING = ObjectWords("ball_0", "ball", ())

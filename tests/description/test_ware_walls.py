@@ -9,13 +9,13 @@ from published import MORE_WARE
 from recognition.shapes import shape
 
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.description.ware import Called, ware_wall
-from corporeal.stages.describe import describe
-from corporeal.vlm.lexicon import tokens_of
+from corporeal.discretization.ware import Called, ware_wall
+from corporeal.pipeline.stages.describe import describe
+from corporeal.recognition.lexicon import tokens_of
 from handmade import plain, scene
 
 ROWS = tomllib.loads(MORE_WARE.read_text(encoding="utf-8"))["things"]
-LEXICON = files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
+LEXICON = files("corporeal.recognition").joinpath("lexicon.toml").read_text(encoding="utf-8")
 PAN = "turned 0 0 .1 0 .1 .1 0 .1"
 BASKET = "turned 0 0 .13 0 .15 .2 0 .2"
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from corporeal.stages.describe import describe
-from corporeal.stages.ground import doubts, ground
-from corporeal.stages.segment import segment
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.ground import doubts, ground
+from corporeal.pipeline.stages.segment import segment
 from handmade import plain, scene
 
 

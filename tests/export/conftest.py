@@ -9,7 +9,7 @@ import corporeal as co
 from corporeal.export.motion import motion_of_scene
 from corporeal.export.physical_scene import physical_scene
 from corporeal.export.target import Asked, ExportConfig
-from corporeal.pipeline import read_back
+from corporeal.pipeline.runner import read_back
 
 TITLE = "мяч ball 1"
 """A name with a space and letters that no identifier has."""

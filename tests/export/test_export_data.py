@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
+from corporeal.core.types import Law
 from corporeal.export.particle_arrays import KINDS, table_of
 from corporeal.export.particle_table import write_h5, write_npz
 from corporeal.export.readers import check
 from corporeal.export.table_statistics import Statistics
 from corporeal.export.target import NothingToWriteError
-from corporeal.types import Law
 
 OBSTACLE = 3
 """What both loaders hold still."""

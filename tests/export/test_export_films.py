@@ -11,15 +11,15 @@ import pytest
 from exported import asked_of, rigid
 
 import corporeal as co
+from corporeal.core.types import Cloud, Gaussians, Reconstruction
 from corporeal.export.glb_film import write_glb_film
 from corporeal.export.read_glb_film import read_film
 from corporeal.export.readers import check
 from corporeal.export.splat_film import write_splat_film
 from corporeal.export.target import NothingToWriteError
-from corporeal.formats.gltf_container import pack_glb, split_glb
-from corporeal.formats.splats import read_splat
-from corporeal.trajectory.played import Played
-from corporeal.types import Cloud, Gaussians, Reconstruction
+from corporeal.io.gltf_container import pack_glb, split_glb
+from corporeal.io.splats import read_splat
+from corporeal.simulation.played import Played
 
 ROOT = Path(__file__).parents[2]
 EMPTY = np.zeros((0, 3))

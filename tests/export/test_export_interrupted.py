@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import corporeal
-from corporeal import store
+from corporeal.core import store
 from corporeal.export import export as verb
 
 SOURCE = str(Path(corporeal.__file__).parents[1])

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from exported import asked_of, replaced, rigid, soft, turned
 
+from corporeal.core.types import Law
 from corporeal.export.readers import check
 from corporeal.export.usd_scene import write_usd
-from corporeal.types import Law
 
 pxr = pytest.importorskip("pxr", reason="usd-core reads USD: pip install 'corporeal[export]'")
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade  # noqa: E402
@@ -220,7 +220,7 @@ def test_what_cannot_be_simulated_is_left_out_where_asked(played, written):
 def test_a_wall_stands_where_it_did(settled, tmp_path):
     from dataclasses import replace
 
-    from corporeal.types import Wall
+    from corporeal.core.types import Wall
 
     walls = (Wall((-1.0, 0.0, 0.0), (1.5, 0.0, 0.0)), Wall((0.0, 0.0, -1.0), (0.0, 0.0, 3.0)))
     of = replace(settled, scene=replace(settled.scene, walls=walls))

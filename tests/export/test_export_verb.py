@@ -9,7 +9,7 @@ import shutil
 import pytest
 
 import corporeal as co
-from corporeal import store
+from corporeal.core import store
 from corporeal.export import export as verb
 from corporeal.export.record import read_record
 from corporeal.export.target import MENU
@@ -56,7 +56,7 @@ def test_without_a_place_it_goes_into_the_run(run_folder, tmp_path):
     verb.export(run, ["glb"])
     assert (run / "export" / "glb" / "film.glb").exists()
     # The run is none the staler for it.
-    from corporeal.pipeline import status
+    from corporeal.pipeline.runner import status
 
     assert ("simulate", "finished") in {(s.verb, s.state) for s in status(run)}
 

@@ -9,13 +9,13 @@ from exported import asked_of
 pytest.importorskip("pxr", reason="usd-core reads USD: pip install 'corporeal[export]'")
 
 import corporeal as co
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Wall
 from corporeal.export.motion import motion_of_scene
 from corporeal.export.physical_scene import physical_scene
 from corporeal.export.target import Asked, ExportConfig
 from corporeal.export.usd_scene import write_usd
-from corporeal.formats.usd_bodies import read_usd_physics
-from corporeal.types import Wall
+from corporeal.io.usd_bodies import read_usd_physics
 
 FOREIGN = """#usda 1.0
 (

@@ -6,9 +6,9 @@ import numpy as np
 
 from corporeal.geometry.mesh import joined
 from corporeal.geometry.spread import sample_surface
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.segment import segment
 from corporeal.showcase.props import prop
-from corporeal.stages.describe import describe
-from corporeal.stages.segment import segment
 
 VOXELS = 64
 """Along the longest side."""

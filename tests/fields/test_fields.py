@@ -7,16 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from corporeal.errors import BadFileError, UserError
+from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.types import Law
 from corporeal.fields.impose import impose
 from corporeal.fields.per_part import nearest_samples, numbers_per_part
 from corporeal.fields.registration import axis_turns, register
 from corporeal.fields.samples import checked
 from corporeal.fields.specification import asked
 from corporeal.fields.vomp import read_vomp
-from corporeal.settings.ground_config import GroundConfig, validate
-from corporeal.stages.ground import doubts, ground
-from corporeal.types import Law
+from corporeal.pipeline.settings.ground_config import GroundConfig, validate
+from corporeal.pipeline.stages.ground import doubts, ground
 from fields import made_up
 
 WRITERS = {"vomp": (made_up.write_vomp, "npz"), "pixie": (made_up.write_pixie, "ply")}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
+from corporeal.core.types import Surface
 from corporeal.geometry.creases import creased
-from corporeal.types import Surface
 
 
 def surface(shape, **given):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.geometry.extent import oriented_size
+from corporeal.discretization.extent import oriented_size
 from corporeal.geometry.mesh import Mesh, convergence, openness, orient, signed_volume, weld
 
 

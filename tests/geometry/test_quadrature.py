@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.geometry import filling
-from corporeal.geometry.filling import Filling, fill_body
+from corporeal.discretization import filling
+from corporeal.discretization.filling import Filling, fill_body
 from corporeal.geometry.mesh import weld
 from corporeal.geometry.quadrature import centred
 from corporeal.geometry.shape import Shape

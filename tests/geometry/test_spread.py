@@ -3,7 +3,7 @@ import pytest
 import trimesh
 from scipy.spatial import KDTree
 
-from corporeal.geometry.filling import fill_body, fill_wall, match_moments
+from corporeal.discretization.filling import fill_body, fill_wall, match_moments
 from corporeal.geometry.mesh import Mesh, weld
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import repel, sample_surface, scatter, scattered, thin_out

@@ -7,10 +7,10 @@ import warnings
 import numpy as np
 import pytest
 
-from corporeal.errors import BadFileError, UserError
-from corporeal.formats.glb import read_glb
-from corporeal.stages.assemble import assemble
-from corporeal.types import Scene
+from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.types import Scene
+from corporeal.io.glb import read_glb
+from corporeal.pipeline.stages.assemble import assemble
 
 NOT_TO_BE_READ = (
     "GLB_INVALID_MAGIC",

@@ -12,8 +12,8 @@ import DracoPy
 import numpy as np
 import pytest
 
-from corporeal.errors import BadFileError
-from corporeal.formats.glb import read_glb
+from corporeal.core.errors import BadFileError
+from corporeal.io.glb import read_glb
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube, pack
 
 

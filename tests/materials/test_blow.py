@@ -6,9 +6,9 @@ from math import inf
 import pytest
 
 from corporeal import materials
+from corporeal.core.types import Ground
 from corporeal.materials.blow import at_speed, ratings, yielding
 from corporeal.materials.rebound import rebound
-from corporeal.types import Ground
 
 
 def made(name):

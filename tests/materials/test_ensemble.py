@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from corporeal import materials
-from corporeal.materials.ensemble import NAMED_WALLS, _shares, otherwise, sample, triangle
-from corporeal.materials.inflated import sealed_air
-from corporeal.types import (
+from corporeal.core.types import (
     Hypothesis,
     Inventory,
     MaterialField,
@@ -19,6 +17,8 @@ from corporeal.types import (
     Structure,
     in_way,
 )
+from corporeal.materials.ensemble import NAMED_WALLS, _shares, otherwise, sample, triangle
+from corporeal.materials.inflated import sealed_air
 
 
 def usual(name):

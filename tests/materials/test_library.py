@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from corporeal import materials
-from corporeal.errors import OutOfRangeError, UnknownChoiceError, UserError
+from corporeal.core.errors import OutOfRangeError, UnknownChoiceError, UserError
+from corporeal.core.types import Ground, Law, MaterialField, Part, Parts, PartWords, Structure
 from corporeal.materials.blow import ratings
 from corporeal.materials.contact import pairs, rebounds
 from corporeal.materials.crush import layers
 from corporeal.materials.shipped import source_table
-from corporeal.types import Ground, Law, MaterialField, Part, Parts, PartWords, Structure
 
 LIBRARIES = ["default", "reference"]
 

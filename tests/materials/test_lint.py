@@ -5,7 +5,7 @@ import random
 import pytest
 
 from corporeal import materials
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 from corporeal.materials.lint import inspect
 from corporeal.materials.shipped import source_table, text
 

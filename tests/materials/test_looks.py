@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 import corporeal as co
+from corporeal.core.types import Finish
 from corporeal.materials.looks import LIQUIDS, METALS, PLAIN, SOLIDS, finish_of
-from corporeal.types import Finish
 
 
 def test_every_material_has_a_look():

@@ -3,6 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from corporeal import materials
+from corporeal.core.types import PartWords, Placement, Range
 from corporeal.materials.consistency import contradictions
 from corporeal.materials.offer import choice, contents_offered, substances_offered
 from corporeal.materials.placement import (
@@ -16,7 +17,6 @@ from corporeal.materials.placement import (
 )
 from corporeal.materials.scale import fraction_of, logarithmic, place
 from corporeal.materials.treatments import treatment_problems, treatments
-from corporeal.types import PartWords, Placement, Range
 
 NARROW = Range(2e9, 2.5e9, 3e9, "s")
 WIDE = Range(1e4, 6e4, 1.5e5, "s")

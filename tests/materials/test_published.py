@@ -5,9 +5,9 @@ from math import radians
 import pytest
 
 from corporeal import materials
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Ground, Law
 from corporeal.materials.shipped import source_table
-from corporeal.types import Ground, Law
 
 PUBLISHED = """
 gold           1 4 77.2       .42-.44   19.29     120

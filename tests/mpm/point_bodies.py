@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from corporeal.core.types import Law
 from corporeal.mpm.problem import FLOOR, Body, Problem
-from corporeal.types import Law
 
 CELL = 0.02
 """Grid spacing [m]."""

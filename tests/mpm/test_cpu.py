@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from point_bodies import CELL, ball, body, problem, step_together
 
-from corporeal.errors import SimulationError
+from corporeal.core.errors import SimulationError
+from corporeal.core.types import Law, Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law, Push
 
 
 def side_by_side(given, steps):

@@ -8,13 +8,13 @@ from laws import asked
 from laws.asked import CARD, on_device
 from point_bodies import CELL, ball, body, problem, round_body, step_together
 
-from corporeal.errors import SimulationError, UserError
+from corporeal.core.errors import SimulationError, UserError
+from corporeal.core.types import Law, Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda import program
 from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.problem import MENU, Problem
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law, Push
 
 ARCHITECTURES = [86, 90, 120]
 OLDEST = ARCHITECTURES[:1]

@@ -9,11 +9,11 @@ from cost.blocks import drop_of, problem_of
 from point_bodies import CELL, ball, body, problem
 from test_cuda import fall
 
+from corporeal.core.types import Push
 from corporeal.mpm.constants import OUT_OF_BLOCK_SHARE
 from corporeal.mpm.cuda import arena, layout, particle_memory, scatter, step
 from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.cuda.layout import wp
-from corporeal.types import Push
 
 OBJECT, HEAP = drop_of(4_000), drop_of(4_000, objects=8, heap=True)
 STATE = particle_memory.STATE

@@ -5,9 +5,9 @@ import pytest
 from laws.asked import on_device
 from test_cuda import AS_IT_WAS, CELL, ball, body, problem, same
 
+from corporeal.core.types import Law
 from corporeal.mpm.problem import Plane
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law
 
 G = 9.81
 REST = (0.0, 0.0, 0.0)

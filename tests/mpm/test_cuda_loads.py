@@ -7,10 +7,10 @@ import pytest
 from laws.asked import on_device
 from test_cuda import CELL, ball, body, problem, side_by_side
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Law, Push, Wind
 from corporeal.mpm.problem import Faces, Interactive, Joint, Tether
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law, Push, Wind
 
 STORM = Wind((20.0, 3.0, 0.0), gust=0.4, start=0.002, end=1.0)
 

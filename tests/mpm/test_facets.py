@@ -7,10 +7,10 @@ import pytest
 from laws.asked import on_device
 from point_bodies import CELL, SIZE, board, body, flat_faces, problem, round_body, step_together
 
+from corporeal.core.types import Keyframes
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.physics.facets import facets_of, on_facet
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Keyframes
 
 TOP = 0.2
 ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": on_device}

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
-from corporeal.backends import load
+from corporeal.core.registry import load
+from corporeal.discretization.problem_from_scene import clusters, frames_of
 from corporeal.mpm.physics.rigid import mass_of
 from corporeal.mpm.problem import MENU
 from corporeal.mpm.reference.inclusions import join
-from corporeal.trajectory.ledger_row import ledger_row
-from corporeal.treatment.problem_from_scene import clusters, frames_of
+from corporeal.simulation.ledger_row import ledger_row
 
 CELL = 0.05
 FOAM = Stuff(young=2.5e5, poisson=0.35, density=30.0)

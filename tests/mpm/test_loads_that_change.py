@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import corporeal as co
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Wind
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.interaction import Interaction
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Wind
 
 ENGINES = (CpuEngine, ReferenceEngine)
 LIGHT = (0.0, 0.0, -1.62)

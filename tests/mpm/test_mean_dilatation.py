@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, ball, box, floor, problem
 
+from corporeal.core.types import Law
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.physics.spline import stencil
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.mpm.reference.mean_dilatation import clusters
 from corporeal.mpm.state import Matter, State, elastic_stress, mean_pressure, strain_energy
-from corporeal.types import Law
 
 ELASTIC = [Law.NEO_HOOKEAN, Law.COROTATED, Law.HENCKY]
 

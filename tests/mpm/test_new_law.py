@@ -24,7 +24,7 @@ PLACES = {
     "materials/library.toml",
     "mpm/formulas/laws.h",
     f"mpm/laws/{NAME}.py",
-    "types/matter.py",
+    "core/types/matter.py",
 }
 SWING = """
 import json, sys
@@ -142,7 +142,7 @@ def test_it_compiles_for_cards_without_one(larger, tmp_path):
     {
         f"mpm/laws/{NAME}.py": f"there is no mpm/laws/{NAME}.py",
         "mpm/formulas/laws.h": f"laws.h has no struct Rule<{NAME.upper()}, R>",
-        "types/matter.py": f"KeyError: '{NAME.upper()}'",
+        "core/types/matter.py": f"KeyError: '{NAME.upper()}'",
         "materials/library.toml": f"Unknown material '{MATERIAL}'",
     }.items(),
 )

@@ -9,7 +9,8 @@ from laws.bodies import box, problem
 from point_bodies import CELL, board
 from point_bodies import problem as posed
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Keyframes, Push
 from corporeal.mpm import formulas
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.formulas import one_lane
@@ -17,7 +18,6 @@ from corporeal.mpm.physics import prescribed, rigid
 from corporeal.mpm.problem import Joint
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.mpm.warp_start import wp
-from corporeal.types import Keyframes, Push
 
 wp.set_module_options(formulas.options())
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from point_bodies import CELL, body, problem
 
-from corporeal.errors import SimulationError
+from corporeal.core.errors import SimulationError
+from corporeal.core.types import Law
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.branches import share_of
 from corporeal.mpm.physics.spline import stencil
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law
 
 LOSSLESS = {
     "name": "cube",

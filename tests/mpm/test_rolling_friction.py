@@ -7,13 +7,13 @@ import pytest
 from laws.asked import on_device
 from point_bodies import CELL, SIZE, board, problem, round_body, step_together
 
+from corporeal.core.types import Keyframes, Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.formulas import one_lane, options
 from corporeal.mpm.physics.rolling import RollingSide, brake
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.mpm.state import Matter
-from corporeal.types import Keyframes, Push
 
 wp.set_module_options(options())
 COUNT, RADIUS, G = 100, 0.05, 9.81

@@ -5,7 +5,7 @@ import pytest
 from laws.asked import on_device
 from point_bodies import CELL, body, problem, round_body, step_together
 
-from corporeal.geometry.roundness import reach_of
+from corporeal.discretization.roundness import reach_of
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.physics import curved
 from corporeal.mpm.reference.engine import ReferenceEngine

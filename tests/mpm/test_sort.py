@@ -3,10 +3,10 @@
 import numpy as np
 from point_bodies import CELL, ball, body, problem
 
+from corporeal.core.types import Law
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cpu.layout import CHANNELS
 from corporeal.mpm.cpu.sort import Spare
-from corporeal.types import Law
 
 
 def test_sort_after_sort_two_memories_take_turns():

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, box, problem
 
-from corporeal.errors import SimulationError
+from corporeal.core.errors import SimulationError
+from corporeal.core.types import Law
 from corporeal.mpm.constants import VAST
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.state import Matter
 from corporeal.mpm.substance import Substances
-from corporeal.types import Law
 
 SAND = Stuff(law=Law.DRUCKER_PRAGER, young=1e6, friction_angle=0.6, cohesion=300.0)
 METAL = Stuff(law=Law.VON_MISES, young=2e6, yield_stress=1e4, hardening=5e4)

@@ -7,7 +7,7 @@ import pytest
 from laws.asked import CARD, on_device
 from laws.suite import CASES
 
-from corporeal.backends import load
+from corporeal.core.registry import load
 from corporeal.mpm.problem import MENU
 
 ROUND_OFF = {"reference": 1e-12, "cpu": 1e-5, "cuda": 1e-5}

@@ -8,8 +8,8 @@ from laws.asked import in_fixed_order
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.mpm.problem import Plane
-from corporeal.trajectory import static_equilibrium
-from corporeal.trajectory.static_equilibrium import WATCH, Relaxation, before
+from corporeal.simulation import static_equilibrium
+from corporeal.simulation.static_equilibrium import WATCH, Relaxation, before
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)

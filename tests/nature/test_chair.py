@@ -9,15 +9,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from corporeal import pipeline
+from corporeal.core.store import DATA, load
+from corporeal.discretization import plan
 from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.pipeline import FOLDERS, Settings
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import FOLDERS, Settings
+from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.showcase import scenes
-from corporeal.stages.fill import FillConfig
-from corporeal.store import DATA, load
-from corporeal.trajectory.frames import read_trajectory
-from corporeal.trajectory.residual_shape import diagonal, largest
-from corporeal.treatment import plan
+from corporeal.simulation.frames import read_trajectory
+from corporeal.simulation.residual_shape import diagonal, largest
 
 SCENE = "ball-on-armchair"
 FEW = 5_000
@@ -38,10 +38,10 @@ def thrown(tmp_path_factory):
         coarse = replace(plan.QUALITIES["draft"], particles=particles)
         patch.setitem(plan.QUALITIES, "draft", coarse)
         folder = tmp_path_factory.mktemp(stiffness)
-        file = pipeline.write_showcase(SCENE, folder / "input")
+        file = runner.write_showcase(SCENE, folder / "input")
         settings = Settings(fill=FillConfig(stiffness=stiffness))
         silent = lambda verb: lambda fraction, words: None  # noqa: E731
-        pipeline.run([file], folder, settings, silent, until="simulate")
+        runner.run([file], folder, settings, silent, until="simulate")
         parts, particles = (load(folder / FOLDERS[v] / DATA) for v in ("segment", "fill"))
         film = read_trajectory(folder / FOLDERS["simulate"])
         names = [entry.name for entry in parts.catalogue]

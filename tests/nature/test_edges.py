@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 import corporeal as co
+from corporeal.core.types import Keyframes
 from corporeal.mpm.state import Matter
-from corporeal.types import Keyframes
 
 G = 9.81
 SIDE, TOP = 0.04, 0.06

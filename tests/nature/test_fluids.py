@@ -15,9 +15,9 @@ from laws.fluids import (
     stopped_paste,
 )
 
+from corporeal.core.types import Law
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Law
 
 G = 9.81
 

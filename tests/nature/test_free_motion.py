@@ -5,8 +5,8 @@ import pytest
 from laws.asked import in_fixed_order
 from laws.bodies import RUBBER, Stuff, ball, box, problem
 
+from corporeal.core.types import Law, Push
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.types import Law, Push
 
 G = np.array([0.0, 0.0, -9.81])
 CELL = 0.02

@@ -7,7 +7,7 @@ import pytest
 from laws import grains
 from laws.bodies import Stuff, ball, box, cylinder, cylinder_sdf, floor, problem
 
-from corporeal.types import Law
+from corporeal.core.types import Law
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from laws.bodies import box, problem
 
-from corporeal.types import Law
+from corporeal.core.types import Law
 
 
 def test_a_body_of_metal_and_rubber_falls_like_any_other(engine):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, box, box_surface, cylinder, floor, problem
 
-from corporeal.types import Keyframes
+from corporeal.core.types import Keyframes
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)

@@ -5,8 +5,8 @@ import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
 from laws.fluids import WATER, Tank, level, moved
 
+from corporeal.core.types import Law
 from corporeal.mpm.problem import Plane
-from corporeal.types import Law
 
 G = 9.81
 CELL = 0.025

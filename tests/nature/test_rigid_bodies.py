@@ -9,8 +9,8 @@ from laws import touching
 from laws.bodies import Stuff, ball, ball_rounding, ball_surface, box, box_surface, floor, problem
 
 import corporeal as co
+from corporeal.core.types import ROUNDING
 from corporeal.mpm.physics import backing
-from corporeal.types import ROUNDING
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)

@@ -8,8 +8,8 @@ import trimesh
 from scipy.special import ellipk
 
 import corporeal as co
+from corporeal.core.types import ROUNDING
 from corporeal.mpm.state import Matter
-from corporeal.types import ROUNDING
 
 SLOPE, G = np.radians(5), 9.81
 DOWN_SLOPE = (G * np.sin(SLOPE), 0.0, -G * np.cos(SLOPE))

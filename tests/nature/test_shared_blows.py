@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, ball, box, problem
 
+from corporeal.core.types import Law, Material
+from corporeal.discretization.blow_frequency import MIDDLE
+from corporeal.discretization.dents import contact_time
+from corporeal.discretization.lossy_partners import loss_for_both
+from corporeal.discretization.part import Motion, Partner
 from corporeal.materials.rebound import rebound
 from corporeal.mpm.problem import FLOOR
-from corporeal.treatment.blow_frequency import MIDDLE
-from corporeal.treatment.dents import contact_time
-from corporeal.treatment.lossy_partners import loss_for_both
-from corporeal.treatment.part import Motion, Partner
-from corporeal.types import Law, Material
 
 YOUNG, DENSITY, POISSON, CELL = 60e3, 60.0, 0.2, 0.0125
 SIDE, HEIGHT, RADIUS = 0.2, 0.1, 0.04

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, ball, box, box_surface, floor, problem
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Joint, Tether
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Push
 
 CELL = 0.02
 FALL = (0.0, 0.0, -9.81)

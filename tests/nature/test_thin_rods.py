@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, body, problem
 
-from corporeal.geometry.rods import Rod, rings
-from corporeal.types import Law
+from corporeal.core.types import Law
+from corporeal.discretization.rods import Rod, rings
 
 LENGTH, DIAMETER, CELL = 1.0, 0.012, 0.02
 ROOT = 4.7300407

@@ -8,8 +8,8 @@ from laws.bodies import DOWN, Stuff, box, floor, problem
 from laws.fluids import Film, Liquid, Tank, film_flow, moved
 from laws.vessels import Tumbler
 
+from corporeal.core.types import Law
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
-from corporeal.types import Law
 
 HONEY = Liquid(1400.0, 10.0)
 PASTE = Liquid(1100.0, 12.0, 25.0, 0.5)

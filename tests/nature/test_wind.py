@@ -7,12 +7,12 @@ import pytest
 from laws.bodies import Stuff, ball, ball_surface, box, problem
 from scipy.spatial import cKDTree
 
+from corporeal.core.types import Wind
 from corporeal.mpm.constants import AIR_DENSITY, PLATE
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.physics import wind
 from corporeal.mpm.problem import Faces
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.types import Wind
 
 CELL, R = 0.02, 0.05
 LIGHT = Stuff(density=30.0, young=1e4)

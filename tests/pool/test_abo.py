@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.pool import abo
 from corporeal.pool.index import IndexConfig, index
 from corporeal.pool.origins import OriginConfig

@@ -7,7 +7,7 @@ import random
 import numpy as np
 import pytest
 
-from corporeal.formats.glb import read_glb
+from corporeal.io.glb import read_glb
 from corporeal.pool import gate
 from corporeal.pool.index import IndexConfig, index
 from corporeal.pool.origins import OriginConfig

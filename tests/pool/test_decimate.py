@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from corporeal.core.types import Scene
 from corporeal.geometry.mesh import boundary, signed_volume, weld
 from corporeal.geometry.shape import Shape
 from corporeal.pool.decimate import decimated
-from corporeal.types import Scene
 from pool_models import ball, checks, scene
 
 RADIUS = 0.1

@@ -8,7 +8,7 @@ import urllib.error
 
 import pytest
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.pool import objaverse
 from corporeal.pool.index import IndexConfig, index
 from corporeal.pool.objaverse import Wanted

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.formats.glb import read_glb
-from corporeal.formats.glb_writer import write_glb
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.io.glb import read_glb
+from corporeal.io.glb_writer import write_glb
 from corporeal.pool import verdict
 from corporeal.pool.gate import GateConfig
 from corporeal.pool.index import IndexConfig, index, read_pool

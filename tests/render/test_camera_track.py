@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from corporeal.core.types import Frame
 from corporeal.render.camera import axes
 from corporeal.render.camera_track import Contact, Reel, first_contact, track
 from corporeal.render.pace import between, instants
-from corporeal.types import Frame
 from made_ledger import ledger
 
 SIZE = (320, 240)

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.render.camera import Aim, axes, place
 from corporeal.render.embree import identify, render
 from corporeal.render.stage import Stage
-from corporeal.types import Finish, Scene, SceneObject, Surface
 
 SIZE = (96, 72)
 RED = Finish("red", (0.8, 0.05, 0.05, 1.0), roughness=0.5)

@@ -8,11 +8,8 @@ from matplotlib import font_manager
 from matplotlib.ft2font import FT2Font
 from PIL import Image
 
-from corporeal.errors import UserError
-from corporeal.render import colours, figures, video
-from corporeal.render.figures import fields_figure, si, strip
-from corporeal.render.glyphs import drawable
-from corporeal.types import (
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
     Film,
     Finish,
     Law,
@@ -26,6 +23,9 @@ from corporeal.types import (
     Structure,
     Surface,
 )
+from corporeal.render import colours, figures, video
+from corporeal.render.figures import fields_figure, si, strip
+from corporeal.render.glyphs import drawable
 
 STEEL = (0.4409, 0.8171, 0.681)
 """Its colour in every figure ever printed."""

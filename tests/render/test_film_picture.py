@@ -3,6 +3,7 @@ import pytest
 import trimesh
 from test_embree import RED, ball, front, scene, sheet
 
+from corporeal.core.types import Finish, Surface
 from corporeal.geometry.srgb import encoded
 from corporeal.render import cull, embree, film_picture
 from corporeal.render.arriving import Asker
@@ -14,7 +15,6 @@ from corporeal.render.kernels_film import CURVE, CURVED
 from corporeal.render.kernels_floor import NEAR, TILE
 from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.render.stage import Stage
-from corporeal.types import Finish, Surface
 
 LEAF = Finish(
     "leaf",

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from corporeal.core.types import AnsweredMass, Evidence, MassMixture, PrintedFact, WeighedHypothesis
 from corporeal.render.mass_tables import weighed
-from corporeal.types import AnsweredMass, Evidence, MassMixture, PrintedFact, WeighedHypothesis
 
 WAYS = tuple(WeighedHypothesis(f"way {k}", 0.5 - 0.1 * k, 0.2, 1.0 + k) for k in range(3))
 PRINTED = (PrintedFact("net weight", 0.453, "Net Wt 1 lb"),)

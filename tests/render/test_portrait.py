@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.render.portrait import COLOURS, Portrait, colour_of_part, portraits
-from corporeal.types import Finish, Scene, SceneObject, Surface
 
 BOX = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
 SIDES = np.array(

@@ -3,11 +3,11 @@
 import numpy as np
 import trimesh
 
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.render.camera import place
 from corporeal.render.embree import render
 from corporeal.render.repainted import render_each
 from corporeal.render.stage import Light, Stage
-from corporeal.types import Finish, Scene, SceneObject, Surface
 
 
 def two_blocks():

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 import trimesh
 
+from corporeal.core.types import Frame, Part, Particles, Parts, Scene, SceneObject, Surface
 from corporeal.render.look import positions
 from corporeal.render.skin import Facets, bind, bounded
-from corporeal.types import Frame, Part, Particles, Parts, Scene, SceneObject, Surface
 
 
 def grid_of(low, high, step):

@@ -7,11 +7,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import corporeal as co
-from corporeal.playback import cast_of, playback, recorded
+from corporeal.core.types import Frame
+from corporeal.pipeline.playback import cast_of, playback, recorded
 from corporeal.render.deltas import in_time, octahedral, unfolded
 from corporeal.render.take import STEP, Cast, record, stress_bytes, take
 from corporeal.showcase.scenes import SCENES
-from corporeal.types import Frame
 
 NEAR = 0.5 * STEP * np.sqrt(3) + 1e-6
 """Rounding of three coordinates, and that of float32 [m]."""

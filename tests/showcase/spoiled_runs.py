@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal import pipeline
-from corporeal.evaluation.judge.simulated_controls import SIMULATED, simulate_control
-from corporeal.pipeline import Settings
-from corporeal.trajectory.played import Played
+from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED, simulate_control
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import Settings
+from corporeal.simulation.played import Played
 
 HEIGHT_LEFT = 0.7
 ASIDE = 0.1
@@ -32,8 +32,8 @@ class Changed(Sequence):
 
 def sound_run(name: str, folder: Path) -> Path:
     """Simulate a scene as it should be."""
-    scene = pipeline.write_showcase(name, folder / "input")
-    pipeline.run([scene], folder / "ours", Settings(), until="simulate")
+    scene = runner.write_showcase(name, folder / "input")
+    runner.run([scene], folder / "ours", Settings(), until="simulate")
     return folder / "ours"
 
 
@@ -43,7 +43,7 @@ def spoiled(fault: str, ours: Path) -> Played:
         made = simulate_control(fault, ours, ours.parent / fault)
         assert made is not None, f"{fault} has no place in {ours}"
         return made
-    return PLANTED[fault](pipeline.read_back(ours).played)
+    return PLANTED[fault](runner.read_back(ours).played)
 
 
 def frozen(played: Played) -> Played:

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from corporeal.showcase.expectations import EXPECTED, SPOILERS, Demand, expect
 from corporeal.showcase.scenes import SCENES
-from corporeal.trajectory.outcome import height, reach
+from corporeal.simulation.outcome import height, reach
 from made_findings import object_outcome, outcome, pair_outcome
 
 

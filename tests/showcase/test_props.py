@@ -2,7 +2,7 @@
 
 import pytest
 
-from corporeal.errors import UnknownChoiceError
+from corporeal.core.errors import UnknownChoiceError
 from corporeal.showcase.props import prop
 
 

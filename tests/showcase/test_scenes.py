@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.errors import UnknownChoiceError
+from corporeal.core.errors import UnknownChoiceError
 from corporeal.showcase import check, scenes
 from corporeal.showcase.models import MODELS
 

@@ -4,11 +4,11 @@ from functools import partial
 
 import pytest
 
-from corporeal.geometry.identity import identify
-from corporeal.pipeline import write_showcase
+from corporeal.pipeline.runner import write_showcase
+from corporeal.pipeline.stages.assemble import assemble
+from corporeal.recognition.identity import identify
+from corporeal.recognition.metadata import matter_hint
 from corporeal.showcase import scenes
-from corporeal.stages.assemble import assemble
-from corporeal.vlm.metadata import matter_hint
 from recorded import FOLDER, check_answered, check_chosen, grounded, rows
 
 MACHINE = ("/work", "/tmp", "/home", "/Users", "C:\\")

@@ -7,8 +7,8 @@ themselves are tried in scenes of some seconds; `corporeal evaluate judge` makes
 import pytest
 from spoiled_runs import PLANTED, happened, spoiled
 
-from corporeal import pipeline
-from corporeal.evaluation.judge.simulated_controls import SIMULATED
+from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED
+from corporeal.pipeline import runner
 from corporeal.showcase.expectations import EXPECTED, SPOILERS, expect
 
 SHORT = ("steel-and-rubber", "ketchup-stops", "honey-poured")
@@ -23,7 +23,7 @@ def test_faults_are_simulated_or_planted():
 @pytest.mark.parametrize("name", EXPECTED)
 def test_a_sound_run_meets_all_and_each_fault_fails_what_it_must(sound, name):
     ours = sound(name)
-    seen = expect(name, happened(pipeline.read_back(ours).played))
+    seen = expect(name, happened(runner.read_back(ours).played))
     assert [e for e in seen if not e.met] == []
     for fault in {d.spoiled_by for d in EXPECTED[name]}:
         if fault in PLANTED or name in SHORT:

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.viewer.hands import JOIN, Hands
 from corporeal.viewer.live import Live, live_scene
 from corporeal.viewer.orders import Order, parsed

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from corporeal.errors import UserError
-from corporeal.treatment.live_quality import (
+from corporeal.core.errors import UserError
+from corporeal.discretization.live_quality import (
     CELLS,
     FEWEST,
     MOST,

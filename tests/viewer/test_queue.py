@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 
 import corporeal as co
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.formats.glb_writer import write_glb
-from corporeal.pipeline import Settings, status
-from corporeal.stages.assemble import AssembleConfig
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.io.glb_writer import write_glb
+from corporeal.pipeline.runner import Settings, status
+from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.viewer.edits import changed, new_name
 from corporeal.viewer.queue import FILE, Asked, Queue
 
@@ -116,7 +116,7 @@ def test_a_new_run_has_a_name_that_is_free(tmp_path):
 
 
 def test_a_change_is_another_run_with_annotations(small_run):
-    from corporeal.pipeline import read_back
+    from corporeal.pipeline.runner import read_back
 
     made = read_back(small_run)
     before = sorted(p.name for p in small_run.rglob("*"))
@@ -146,7 +146,7 @@ def test_a_change_is_another_run_with_annotations(small_run):
     ],
 )
 def test_a_change_that_cannot_be_is_refused_and_makes_no_run(small_run, asked_for, why):
-    from corporeal.pipeline import read_back
+    from corporeal.pipeline.runner import read_back
 
     made = read_back(small_run)
     runs = sorted(p.name for p in small_run.parent.iterdir())

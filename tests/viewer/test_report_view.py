@@ -2,8 +2,8 @@
 
 import pytest
 
-from corporeal import run_files
-from corporeal.pipeline import read_back
+from corporeal.pipeline import run_files
+from corporeal.pipeline.runner import read_back
 from made_findings import run_audit
 
 

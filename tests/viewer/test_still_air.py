@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from corporeal.core.types import Wind
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.types import Wind
 from corporeal.viewer.live import live_scene
 from corporeal.viewer.shelf import Shelf
 from corporeal.viewer.still_air import in_air

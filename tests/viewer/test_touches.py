@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corporeal.stages.fill import FillConfig
-from corporeal.stages.ground import GroundConfig
-from corporeal.treatment.plan import QUALITIES
+from corporeal.discretization.plan import QUALITIES
+from corporeal.pipeline.stages.fill import FillConfig
+from corporeal.pipeline.stages.ground import GroundConfig
 from corporeal.viewer.growth import Growth
 from corporeal.viewer.hands import HOLD, Hands, Touch
 from corporeal.viewer.live import Live, live_scene, no_things

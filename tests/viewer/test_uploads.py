@@ -7,7 +7,7 @@ import zipfile
 
 import pytest
 
-from corporeal.errors import BadFileError, UserError
+from corporeal.core.errors import BadFileError, UserError
 from corporeal.viewer import unpack as unpacking
 from corporeal.viewer import uploads
 from corporeal.viewer.shelf import Shelf

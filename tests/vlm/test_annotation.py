@@ -1,6 +1,6 @@
 import pytest
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.vlm.annotation import Annotation, read_annotations
 
 SCENE = {"duck_0": ["body", "beak"], "vase_0": ["vase"]}

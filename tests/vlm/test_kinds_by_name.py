@@ -2,12 +2,12 @@
 
 import pytest
 
-from corporeal.stages.describe import describe
-from corporeal.types import SceneObject
+from corporeal.core.types import SceneObject
+from corporeal.pipeline.stages.describe import describe
+from corporeal.recognition.metadata import Evidence, hollowed, recognise
+from corporeal.recognition.stated import walled
 from corporeal.vlm.annotation import Annotation
 from corporeal.vlm.annotation import built as annotated
-from corporeal.vlm.metadata import Evidence, hollowed, recognise
-from corporeal.vlm.stated import walled
 from handmade import plain, scene
 
 

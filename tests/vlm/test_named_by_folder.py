@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from corporeal.errors import UserError
-from corporeal.formats.splat_ply import write_splat
+from corporeal.core.errors import UserError
 from corporeal.geometry.gaussians import placed
+from corporeal.io.splat_ply import write_splat
+from corporeal.pipeline.stages import reconstruct as stage
+from corporeal.pipeline.stages.reconstruct import reconstruct
+from corporeal.reconstruction.gaussians import solid
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.splats import solid
-from corporeal.stages import reconstruct as stage
-from corporeal.stages.reconstruct import reconstruct
 from corporeal.vlm.seen_objects import check_extents, metres, of_name, telling, usual
 from gaussian_boxes import DOWN, box
 

@@ -2,7 +2,7 @@ import datetime
 
 import pytest
 
-from corporeal.types import NOTHING_ASKED
+from corporeal.core.types import NOTHING_ASKED
 from corporeal.vlm import prices
 from corporeal.vlm.words import usage
 

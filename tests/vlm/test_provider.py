@@ -8,7 +8,7 @@ from fake_server import FakeServer
 from pydantic import BaseModel
 
 import corporeal
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.vlm import Question, UnansweredError, Vlm, connect
 from corporeal.vlm.patience import Patience
 from corporeal.vlm.provider import Anthropic, Google, Ollama, OpenAI

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.vlm import Question, Vlm, connect
 from corporeal.vlm.recordings import Recorder, record
 

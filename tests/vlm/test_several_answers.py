@@ -8,7 +8,7 @@ import pytest
 from fake_server import FakeServer
 from pydantic import BaseModel
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.vlm import Question, Spent, Turn
 from corporeal.vlm.cache import Cached
 from corporeal.vlm.patience import Patience

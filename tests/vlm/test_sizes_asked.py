@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from fake_server import FakeServer
 
-from corporeal.errors import BadFileError, UserError
-from corporeal.formats.typical_extents import typical_extent
-from corporeal.types import NOTHING_ASKED
+from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.types import NOTHING_ASKED
+from corporeal.recognition.typical_extents import typical_extent
 from corporeal.vlm.answer_checks import size_complaints
 from corporeal.vlm.answers import SizeAnswer
 from corporeal.vlm.by_hand import WaitingError

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import trimesh
 
+from corporeal.core.errors import UserError
+from corporeal.core.types import Finish, PartWords, Scene, SceneObject, Surface
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.errors import UserError
-from corporeal.geometry.drawn import NOTHING, drawn
-from corporeal.stages.describe import describe
-from corporeal.types import Finish, PartWords, Scene, SceneObject, Surface
+from corporeal.discretization.drawn import NOTHING, drawn
+from corporeal.pipeline.stages.describe import describe
 from corporeal.vlm import Reply
 from corporeal.vlm.answer_checks import thickness_complaints
 from corporeal.vlm.answers import MaterialsAnswer, ThicknessAnswer, Vocabulary
@@ -126,7 +126,7 @@ def asked_about(mesh, model, monkeypatch):
     things = (SceneObject("blade_0", "blade", 0.1),)
     scene = Scene("one", "", things, (surface(mesh),), (Finish("plain"),))
     scene = replace(scene, surfaces=(replace(scene.surfaces[0], name="blade"),))
-    monkeypatch.setattr("corporeal.stages.describe.connect", lambda *a: model)
+    monkeypatch.setattr("corporeal.pipeline.stages.describe.connect", lambda *a: model)
     with pytest.raises(UserError, match="stop here"):
         describe(scene, DescribeConfig(vlm="noting:x"))
     return [q for q in model.asked if q.task == "thickness"]

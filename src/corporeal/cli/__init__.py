@@ -25,10 +25,10 @@ from corporeal.cli.grow_masks import verb_masks
 from corporeal.cli.parse import parse
 from corporeal.cli.run_summary import show_summary
 from corporeal.cli.view import verb_view
-from corporeal.errors import UserError
-from corporeal.machine import collect_seldom, keep_freed_memory
-from corporeal.terminal import console, progress_bars, show_table
-from corporeal.version import __version__
+from corporeal.core.errors import UserError
+from corporeal.core.machine import collect_seldom, keep_freed_memory
+from corporeal.core.terminal import console, progress_bars, show_table
+from corporeal.core.version import __version__
 
 Inputs = Annotated[
     tuple[Path, ...],
@@ -64,7 +64,7 @@ def verb_run() -> None:
     Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
     Results that are up to date are reused.
     """
-    from corporeal.settings.all_verbs import Settings
+    from corporeal.pipeline.settings.all_verbs import Settings
 
     @dataclass(frozen=True)
     class Run:
@@ -83,7 +83,7 @@ def verb_demo() -> None:
     The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a
     GLB, and then run like any other.
     """
-    from corporeal.settings.all_verbs import Settings
+    from corporeal.pipeline.settings.all_verbs import Settings
     from corporeal.showcase.scenes import SCENES, view
 
     first = next(iter(SCENES))
@@ -97,7 +97,7 @@ def verb_demo() -> None:
     first_options = ("detail", "duration", "quality", "view", "name", "out")
     words = f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}."
     asked = parse(Demo, "demo", words, first=first_options)
-    from corporeal.pipeline import kept_showcase
+    from corporeal.pipeline.runner import kept_showcase
 
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
@@ -111,7 +111,7 @@ def verb_demo() -> None:
 
 def verb_status() -> None:
     """Show which verbs of a run are finished, and the time that each took."""
-    from corporeal.pipeline import status
+    from corporeal.pipeline.runner import status
 
     @dataclass(frozen=True)
     class Status:
@@ -153,7 +153,7 @@ def verb_materials() -> None:
 
 def verb_doctor() -> None:
     """Check engines, libraries, encoder and keys on this machine, with advice."""
-    from corporeal.doctor import examine
+    from corporeal.cli.doctor import examine
 
     parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
     show_table(
@@ -164,7 +164,7 @@ def verb_doctor() -> None:
 
 def _again(verb: str) -> Callable[[], None]:
     def redo() -> None:
-        from corporeal.pipeline import Settings, reopen
+        from corporeal.pipeline.runner import Settings, reopen
 
         known = verb in Settings.__dataclass_fields__
         kept = reopen(Path(sys.argv[2])).settings if _names_a_run() else Settings()
@@ -209,8 +209,8 @@ def verb_simulate() -> None:
     drawn from the measured ranges and the stated alternatives. ensemble.json and ensemble.png in
     the run's folder hold the spread of rebounds, dents and displacements.
     """
-    from corporeal.pipeline import reopen
-    from corporeal.stages.simulate import SimulateConfig
+    from corporeal.pipeline.runner import reopen
+    from corporeal.pipeline.stages.simulate import SimulateConfig
 
     known = reopen(Path(sys.argv[2])).settings.simulate if _names_a_run() else SimulateConfig()
 
@@ -233,8 +233,8 @@ def verb_simulate() -> None:
 
 def _spread(asked: Any) -> None:
     """Simulate an ensemble, and show the spread of its outcomes."""
-    from corporeal.evaluation import spread_report
-    from corporeal.evaluation.ensemble import ensemble
+    from corporeal.lab.evaluation import spread_report
+    from corporeal.lab.evaluation.ensemble import ensemble
 
     with progress_bars() as tell:
         result = ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
@@ -284,7 +284,7 @@ def _folder(where: Where, inputs: list[Path]) -> Path:
 
 def _called(path: Path) -> str:
     """Return a scene's name: a file's own, but of the many that are scene.toml their folder's."""
-    from corporeal.formats.sources import called
+    from corporeal.io.sources import called
 
     return path.resolve().parent.name if path.name == "scene.toml" else called(path)
 
@@ -299,7 +299,7 @@ def _go(
 ) -> None:
     """Do every verb up to ``until``, that one ``again`` even where its settings are the same."""
     from corporeal.cli.validate import validate
-    from corporeal.pipeline import forget_simulation, outdate, run
+    from corporeal.pipeline.runner import forget_simulation, outdate, run
 
     validate(folder, settings)
     if again:

@@ -8,11 +8,11 @@ from typing import Annotated, Any
 import tyro
 
 from corporeal.cli.parse import parse
-from corporeal.errors import UserError
-from corporeal.formats.words import safe
+from corporeal.core.errors import UserError
+from corporeal.core.terminal import progress_bars, show_table
 from corporeal.pool.asset import Pool
-from corporeal.settle.composition import read_certificate, read_composition
-from corporeal.terminal import progress_bars, show_table
+from corporeal.recognition.words import safe
+from corporeal.scene.composition import read_certificate, read_composition
 
 
 def compose_from_pool() -> None:
@@ -28,10 +28,10 @@ def compose_from_pool() -> None:
 
     `corporeal assemble RUN` instead redoes that verb of a run.
     """
-    from corporeal.corpus.assemble import compose_scene
-    from corporeal.corpus.jobs import Job, perform
-    from corporeal.stages.capture import CaptureConfig
-    from corporeal.stages.compose import ComposeConfig
+    from corporeal.jobs.jobs import Job, perform
+    from corporeal.lab.corpus.assemble import compose_scene
+    from corporeal.pipeline.stages.capture import CaptureConfig
+    from corporeal.pipeline.stages.compose import ComposeConfig
 
     @dataclass(frozen=True)
     class Assemble:

@@ -10,9 +10,9 @@ from typing import Annotated
 import tyro
 
 from corporeal.cli.parse import do_second_word, parse
-from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.core.errors import UnknownChoiceError, UserError
+from corporeal.core.terminal import progress_bars, show_table
 from corporeal.pool.asset import Asset, Pool
-from corporeal.terminal import progress_bars, show_table
 
 POOL = Path("pool")
 Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
@@ -175,10 +175,10 @@ def _props() -> None:
     corporeal assets index props/
     corporeal assemble --from pool/ --seed 7
     """
-    from corporeal.formats.glb_writer import write_glb
+    from corporeal.core.store import writing
+    from corporeal.io.glb_writer import write_glb
     from corporeal.showcase.models import PROPS
     from corporeal.showcase.props import prop
-    from corporeal.store import writing
 
     @dataclass(frozen=True)
     class Props:

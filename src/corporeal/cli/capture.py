@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from corporeal.cli.parse import parse
-from corporeal.terminal import progress_bars
+from corporeal.core.terminal import progress_bars
 
 
 def verb_capture() -> None:
@@ -16,9 +16,9 @@ def verb_capture() -> None:
     SCENE is what `corporeal run` takes. The folder gets transforms.json, as instant-ngp and
     nerfstudio read it, and the pictures.
     """
-    from corporeal.formats.transforms import write_views
-    from corporeal.stages.assemble import AssembleConfig, assemble
-    from corporeal.stages.capture import CaptureConfig, capture
+    from corporeal.io.transforms import write_views
+    from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
+    from corporeal.pipeline.stages.capture import CaptureConfig, capture
 
     @dataclass(frozen=True)
     class Capture:

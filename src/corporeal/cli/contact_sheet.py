@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.formats.glb import read_glb
+from corporeal.core.types import Vector
 from corporeal.geometry.arrangement import box_of, moved
+from corporeal.io.glb import read_glb
 from corporeal.pool.asset import Asset
 from corporeal.render.camera import place
 from corporeal.render.embree import render
 from corporeal.render.sheet import Tile, sheet
 from corporeal.render.stage import Stage
-from corporeal.types import Vector
 
 VIEW: Vector = (0.6, -1.0, 0.45)
 """From the front, which is -Y here and +Z in the file, a little from the right and from above."""

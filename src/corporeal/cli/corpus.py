@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from corporeal.cli.parse import do_second_word, parse
-from corporeal.errors import UserError
-from corporeal.machine import cores
-from corporeal.terminal import console, progress_bars, show_table
+from corporeal.core.errors import UserError
+from corporeal.core.machine import cores
+from corporeal.core.terminal import console, progress_bars, show_table
 
 Corpus = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CORPUS")]
 
@@ -49,12 +49,12 @@ def _assemble() -> None:
     with what was interrupted and to try again what failed. CORPUS/manifest.json says what became of
     each scene.
     """
-    from corporeal.corpus.assemble import Sources, assemble_corpus
-    from corporeal.corpus.plan import CorpusConfig
-    from corporeal.geometry.sizes import Sizing
+    from corporeal.discretization.sizes import Sizing
+    from corporeal.lab.corpus.assemble import Sources, assemble_corpus
+    from corporeal.lab.corpus.plan import CorpusConfig
+    from corporeal.pipeline.stages.capture import CaptureConfig
+    from corporeal.pipeline.stages.compose import ComposeConfig
     from corporeal.pool.index import read_pool
-    from corporeal.stages.capture import CaptureConfig
-    from corporeal.stages.compose import ComposeConfig
 
     @dataclass(frozen=True)
     class Assemble:
@@ -96,8 +96,8 @@ def _run() -> None:
     stops the others; what is finished is not done again, an interrupted simulation goes on from its
     checkpoint. Say the same again to go on.
     """
-    from corporeal.corpus.run import RunConfig, run_corpus
-    from corporeal.settings.all_verbs import Settings
+    from corporeal.lab.corpus.run import RunConfig, run_corpus
+    from corporeal.pipeline.settings.all_verbs import Settings
 
     @dataclass(frozen=True)
     class Run:
@@ -118,9 +118,9 @@ def _run() -> None:
 
 def _report() -> None:
     """Write CORPUS/report.html, report.csv and report.json of what was run so far."""
-    from corporeal.corpus.collect import collect
-    from corporeal.corpus.report import report_corpus
-    from corporeal.corpus.report_docs import write_docs
+    from corporeal.lab.corpus.collect import collect
+    from corporeal.lab.corpus.report import report_corpus
+    from corporeal.lab.corpus.report_docs import write_docs
 
     @dataclass(frozen=True)
     class Report:
@@ -142,8 +142,8 @@ def _report() -> None:
 
 def _carry_out(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: str) -> None:
     """Do it with a bar or with lines, and say what came of it."""
-    from corporeal.corpus.carry_out import Hands
-    from corporeal.corpus.local import LOGS
+    from corporeal.jobs.carry_out import Hands
+    from corporeal.jobs.local import LOGS
 
     with progress_bars() as tell:
         rows = do(Hands(hire(asked.crew, asked.corpus), tell(verb), say))
@@ -173,9 +173,9 @@ def hire(crew: Crew, folder: Path) -> Callable[[], Any]:
         raise UserError("--workers, --threads and --gpus cannot be negative, --threads not 0.")
     slots = crew.workers or max(1, cores() // crew.threads)
     if crew.on == "ray":
-        from corporeal.corpus.on_ray import on_ray
+        from corporeal.jobs.on_ray import on_ray
 
         return lambda: on_ray(slots, crew.threads, crew.gpus, crew.address)
-    from corporeal.corpus.local import LOGS, local
+    from corporeal.jobs.local import LOGS, local
 
     return lambda: local(slots, crew.threads, folder / LOGS)

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from corporeal import store
 from corporeal.cli.corpus import Crew, hire, say
 from corporeal.cli.parse import do_second_word, parse
-from corporeal.errors import UserError
-from corporeal.evaluation.result_table import Table
-from corporeal.terminal import console, progress_bars, show_table
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.terminal import console, progress_bars, show_table
+from corporeal.lab.evaluation.result_table import Table
 
 if TYPE_CHECKING:
-    from corporeal.evaluation.dynamics.summary import Summary
-    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
+    from corporeal.lab.evaluation.dynamics.summary import Summary
+    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
 
 Folder = Annotated[
     Path | None,
@@ -54,8 +54,8 @@ def evaluate_mass() -> None:
     predicted only. A folder in the layout of ABO-500 needs no CSV: choose its --split.
     """
     from corporeal.description.describe_config import DescribeConfig
-    from corporeal.evaluation import mass, mass_report, truth
-    from corporeal.stages.ground import GroundConfig
+    from corporeal.lab.evaluation import mass, mass_report, truth
+    from corporeal.pipeline.stages.ground import GroundConfig
 
     @dataclass(frozen=True)
     class Mass:
@@ -93,8 +93,8 @@ def evaluate_materials() -> None:
     first.
     """
     from corporeal.description.describe_config import DescribeConfig
-    from corporeal.evaluation import recognition
-    from corporeal.stages.ground import GroundConfig
+    from corporeal.lab.evaluation import recognition
+    from corporeal.pipeline.stages.ground import GroundConfig
 
     @dataclass(frozen=True)
     class Materials:
@@ -128,8 +128,8 @@ def evaluate_parts() -> None:
     selects learned features.
     """
     from corporeal.description.describe_config import DescribeConfig
-    from corporeal.evaluation import parts, parts_figure
-    from corporeal.regions.parts import PartsConfig
+    from corporeal.lab.evaluation import parts, parts_figure
+    from corporeal.reconstruction.segment.parts import PartsConfig
 
     @dataclass(frozen=True)
     class PartsAsked:
@@ -164,7 +164,7 @@ def evaluate_objects() -> None:
     FOLDER holds scenes that `assemble` wrote. Objects are segmented in points on the visible
     surfaces, or in Gaussians: --points-from gaussians.
     """
-    from corporeal.evaluation import objects, objects_figure
+    from corporeal.lab.evaluation import objects, objects_figure
 
     @dataclass(frozen=True)
     class Objects:
@@ -200,13 +200,13 @@ def evaluate_dynamics() -> None:
     fails is a row. With --judge a vision-language model judges films of the runs, after proving
     on control films what it can tell; corporeal evaluate judge OUT does the same later.
     """
-    from corporeal.corpus.carry_out import Hands
-    from corporeal.evaluation.dynamics import dynamics_tables
-    from corporeal.evaluation.dynamics.run_evaluation import DynamicsConfig
-    from corporeal.evaluation.dynamics.run_evaluation import evaluate_dynamics as evaluate
-    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
-    from corporeal.evaluation.judge.put_to_judge import connected
-    from corporeal.settings.all_verbs import Settings
+    from corporeal.jobs.carry_out import Hands
+    from corporeal.lab.evaluation.dynamics import dynamics_tables
+    from corporeal.lab.evaluation.dynamics.run_evaluation import DynamicsConfig
+    from corporeal.lab.evaluation.dynamics.run_evaluation import evaluate_dynamics as evaluate
+    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
+    from corporeal.lab.evaluation.judge.put_to_judge import connected
+    from corporeal.pipeline.settings.all_verbs import Settings
     from corporeal.vlm import NOBODY
 
     @dataclass(frozen=True)
@@ -253,8 +253,8 @@ def evaluate_dynamics() -> None:
 
 def _keep_dynamics(found: "Summary", asked: Any, out: Path) -> None:
     """Write the report of an evaluation of dynamics, and the files that somebody asks for."""
-    from corporeal.evaluation.dynamics import dynamics_figure, dynamics_page
-    from corporeal.evaluation.dynamics.summary import record
+    from corporeal.lab.evaluation.dynamics import dynamics_figure, dynamics_page
+    from corporeal.lab.evaluation.dynamics.summary import record
 
     page = asked.page or out / "report.html"
     dynamics_page.write_page(found, page)
@@ -276,7 +276,7 @@ def evaluate_judge() -> None:
     "ours" with one known fault each. Of a law of physics the judge is believed only where its
     answers tell the controls of that law; else the tables say that this judge cannot tell.
     """
-    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
+    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
 
     @dataclass(frozen=True)
     class Judge:
@@ -294,8 +294,8 @@ def evaluate_judge() -> None:
 
 def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) -> None:
     """Judge the runs in OUT, show what follows, and keep it where somebody asks for it."""
-    from corporeal.evaluation.judge import judge_page, judge_tables
-    from corporeal.evaluation.judge.judge_runs import judge_runs
+    from corporeal.lab.evaluation.judge import judge_page, judge_tables
+    from corporeal.lab.evaluation.judge.judge_runs import judge_runs
 
     with progress_bars() as tell:
         found = judge_runs(out, how, console.print, tell("judge"))

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from corporeal.cli.parse import parse
-from corporeal.terminal import progress_bars
+from corporeal.core.terminal import progress_bars
 
 MOST = 6
 """Files of one target that are named."""

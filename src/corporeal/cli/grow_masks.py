@@ -8,8 +8,8 @@ from typing import Annotated
 import tyro
 
 from corporeal.cli.parse import parse
-from corporeal.errors import UserError
-from corporeal.terminal import progress_bars
+from corporeal.core.errors import UserError
+from corporeal.core.terminal import progress_bars
 
 
 def verb_masks() -> None:
@@ -19,10 +19,10 @@ def verb_masks() -> None:
     a point and a box it begins at what all cameras look at. The masks are PNG pictures with the
     names of the photographs, to be looked at, corrected, and given to `corporeal run --masks`.
     """
-    from corporeal.formats.photographs import MASKS
-    from corporeal.formats.sources import called, unposed
-    from corporeal.masking.grown_masks import grown_masks
-    from corporeal.masking.pointed import Pointed
+    from corporeal.io.photographs import MASKS
+    from corporeal.io.sources import called, unposed
+    from corporeal.reconstruction.masks.grown_masks import grown_masks
+    from corporeal.reconstruction.masks.pointed import Pointed
 
     @dataclass(frozen=True)
     class Masks:

@@ -8,7 +8,7 @@ from typing import Any
 import tyro
 
 from corporeal.cli.help_layout import lay_out
-from corporeal.errors import UnknownChoiceError
+from corporeal.core.errors import UnknownChoiceError
 
 
 def parse(

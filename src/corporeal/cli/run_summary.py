@@ -6,11 +6,11 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from corporeal.findings import Breakage, PartAudit
-from corporeal.terminal import console, print_line, print_table
-from corporeal.trajectory.audit_file import read_run_audit
-from corporeal.trajectory.audit_words import breakage_words
-from corporeal.trajectory.closing_words import DOUBT, LEFT_OUT, Section, closing_words, parted
+from corporeal.core.findings import Breakage, PartAudit
+from corporeal.core.terminal import console, print_line, print_table
+from corporeal.simulation.audit_file import read_run_audit
+from corporeal.simulation.audit_words import breakage_words
+from corporeal.simulation.closing_words import DOUBT, LEFT_OUT, Section, closing_words, parted
 
 MOST_PARTS = 12
 """Rows of the table; a scene of more parts is in the report."""

@@ -4,9 +4,8 @@ from pathlib import Path
 
 from corporeal.description import describe_config
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.pipeline import RUN, Settings, reopen
-from corporeal.reconstruction import reconstruct_config
-from corporeal.settings import (
+from corporeal.pipeline.runner import RUN, Settings, reopen
+from corporeal.pipeline.settings import (
     assemble_config,
     fill_config,
     film_config,
@@ -14,6 +13,7 @@ from corporeal.settings import (
     segment_config,
     simulate_config,
 )
+from corporeal.reconstruction import reconstruct_config
 from corporeal.vlm import connect, critic_of
 from corporeal.vlm.annotation import mapping_of
 

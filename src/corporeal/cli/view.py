@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from corporeal.cli.parse import parse
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 
 NEEDED = ("starlette", "uvicorn", "websockets")
 MOST = 2
@@ -93,7 +93,7 @@ def _show(asked: View) -> None:
 
 def _names(asked: View) -> tuple[str, ...]:
     """Return the names of the runs that were asked for; refuse what is none."""
-    from corporeal.pipeline import reopen
+    from corporeal.pipeline.runner import reopen
 
     if len(asked.runs) > MOST:
         raise UserError(f"A page shows one run, or two beside each other, not {len(asked.runs)}.")

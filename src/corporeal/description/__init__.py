@@ -1,1 +1,1 @@
-"""What is said of a scene: by its file, by a person, by a model."""
+"""The stage ``describe``: materials from an annotation file, from names, or from a model."""

@@ -5,16 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from corporeal import materials
-from corporeal.description.describe_config import DescribeConfig
-from corporeal.description.file_words import OPEN
-from corporeal.description.ware import Called, with_usual_wall
-from corporeal.geometry.identity import Identity
-from corporeal.types import (
+from corporeal.core.types import (
     PartWords,
     Scene,
 )
+from corporeal.description.describe_config import DescribeConfig
+from corporeal.description.file_words import OPEN
+from corporeal.discretization.ware import Called, with_usual_wall
+from corporeal.recognition.identity import Identity
+from corporeal.recognition.lexicon import tokens_of
 from corporeal.vlm.annotation import Annotation, built, named_pieces, read_annotations
-from corporeal.vlm.lexicon import tokens_of
 from corporeal.vlm.words import (
     gathered,
 )

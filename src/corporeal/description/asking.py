@@ -8,16 +8,22 @@ from importlib.resources import files
 import numpy as np
 
 from corporeal import materials
+from corporeal.core.types import (
+    Inventory,
+    Note,
+    NoteKind,
+    ObjectWords,
+    PartWords,
+    Scene,
+)
 from corporeal.description.annotated import with_annotations
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.file_words import has_wall, stated_material
 from corporeal.description.offers import Placed, in_all_ways, offer, places_of
 from corporeal.description.pooled import pooled
 from corporeal.description.several import told_several_times
-from corporeal.geometry.drawn import drawn
-from corporeal.geometry.extent import oriented_size
-from corporeal.geometry.identity import Identity
-from corporeal.geometry.identity import words as telling
+from corporeal.discretization.drawn import drawn
+from corporeal.discretization.extent import oriented_size
 from corporeal.materials.offer import contents_offered, substances_offered
 from corporeal.materials.placement import (
     choices,
@@ -27,23 +33,17 @@ from corporeal.materials.placement import (
     usual,
     wall_put,
 )
-from corporeal.render.portrait import Portrait, colour_of_part, portraits
-from corporeal.types import (
-    Inventory,
-    Note,
-    NoteKind,
-    ObjectWords,
-    PartWords,
-    Scene,
+from corporeal.recognition.identity import Identity
+from corporeal.recognition.identity import words as telling
+from corporeal.recognition.stated import (
+    sealed,
+    stated_thickness,
 )
+from corporeal.render.portrait import Portrait, colour_of_part, portraits
 from corporeal.vlm import Album, Vlm
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Subject
-from corporeal.vlm.stated import (
-    sealed,
-    stated_thickness,
-)
 from corporeal.vlm.together import together
 from corporeal.vlm.words import (
     against,

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from corporeal import store
-from corporeal.errors import check_range
+from corporeal.core import store
+from corporeal.core.errors import check_range
 
 MOST_ANSWERS = 40
 """To one question: Wang et al. (2022) sampled so many."""

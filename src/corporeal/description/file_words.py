@@ -5,16 +5,8 @@ from dataclasses import replace
 from functools import partial
 
 from corporeal import materials
-from corporeal.description.no_block import no_block
-from corporeal.description.ware import Called, sheet_if_full, with_usual_wall
-from corporeal.description.wet import values_when_wet
-from corporeal.errors import UnknownChoiceError, UserError
-from corporeal.geometry.identity import Identity
-from corporeal.materials.placement import (
-    entry_of,
-)
-from corporeal.materials.quantities import QUANTITIES
-from corporeal.types import (
+from corporeal.core.errors import UnknownChoiceError, UserError
+from corporeal.core.types import (
     Ground,
     ObjectWords,
     PartWords,
@@ -22,13 +14,20 @@ from corporeal.types import (
     Scene,
     Surface,
 )
-from corporeal.vlm.metadata import (
+from corporeal.discretization.no_block import no_block
+from corporeal.discretization.ware import Called, sheet_if_full, with_usual_wall
+from corporeal.materials.placement import (
+    entry_of,
+)
+from corporeal.materials.quantities import QUANTITIES
+from corporeal.recognition.identity import Identity
+from corporeal.recognition.metadata import (
     evidence,
     hollowed,
     recognise,
 )
-from corporeal.vlm.said_contents import as_said
-from corporeal.vlm.stated import (
+from corporeal.recognition.said_contents import as_said
+from corporeal.recognition.stated import (
     as_stated,
     sealed,
     stated_inflation,
@@ -37,7 +36,8 @@ from corporeal.vlm.stated import (
     stated_values,
     walled,
 )
-from corporeal.vlm.usual import usual_inflation, usual_rebound
+from corporeal.recognition.usual import usual_inflation, usual_rebound
+from corporeal.recognition.wet import values_when_wet
 
 OPEN = ("sheet", "metadata")
 """What an open vessel is by its name, and who says so."""

@@ -2,16 +2,16 @@
 
 from collections.abc import Mapping
 
+from corporeal.core.types import (
+    PartWords,
+    Placement,
+    in_way,
+)
 from corporeal.materials.offer import Choice
 from corporeal.materials.placement import (
     Judgement,
     from_fractions,
     from_values,
-)
-from corporeal.types import (
-    PartWords,
-    Placement,
-    in_way,
 )
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer
 from corporeal.vlm.interview import Offer

@@ -14,8 +14,7 @@ from math import exp, hypot, log
 
 import numpy as np
 
-from corporeal.geometry.make import NINE_IN_TEN
-from corporeal.types import (
+from corporeal.core.types import (
     Account,
     Evidence,
     Hypothesis,
@@ -26,6 +25,7 @@ from corporeal.types import (
     Swelling,
     in_way,
 )
+from corporeal.discretization.make import NINE_IN_TEN
 from corporeal.vlm.words import gathered
 
 LOOKED = ("model", "recording")

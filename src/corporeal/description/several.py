@@ -7,7 +7,7 @@ from its first question to its last before answers are pooled.
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from corporeal.types import Account, Evidence, PartWords
+from corporeal.core.types import Account, Evidence, PartWords
 from corporeal.vlm import ONCE, Turn
 from corporeal.vlm.by_hand import WaitingError
 from corporeal.vlm.interview import Interview

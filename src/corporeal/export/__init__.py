@@ -1,1 +1,1 @@
-"""A scene and its motion in the formats of other tools; nothing of the run is changed."""
+"""Writers for other tools: OpenUSD, MJCF, URDF, animated GLB, splats, HDF5, Alembic."""

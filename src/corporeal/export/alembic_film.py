@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.store import require_room
+from corporeal.core.types import Surface
+from corporeal.core.version import __version__
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.target import Asked, NothingToWriteError, Written
-from corporeal.store import require_room
-from corporeal.types import Surface
-from corporeal.version import __version__
 
 NAME = "film.abc"
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])

@@ -3,16 +3,16 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from corporeal import store
-from corporeal.corpus.plan import PLAN
-from corporeal.corpus.run import RUNS
-from corporeal.errors import UserError
+from corporeal.core import store
+from corporeal.core.errors import UserError
 from corporeal.export.motion import motion_of_run
 from corporeal.export.particle_table import save_h5, save_npz
 from corporeal.export.physical_scene import physical_scene
 from corporeal.export.record import ExportRecord, TargetRecord, write_record
 from corporeal.export.target import Asked, ExportConfig, Target, Written
-from corporeal.pipeline import FOLDERS, RUN, read_back
+from corporeal.lab.corpus.plan import PLAN
+from corporeal.lab.corpus.run import RUNS
+from corporeal.pipeline.runner import FOLDERS, RUN, read_back
 
 TOGETHER: dict[Target, Callable[[Path, Iterator[Asked]], Written]] = {
     "h5": save_h5,

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
-from corporeal import backends, store
-from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.core import registry, store
+from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.export.corpus_data import TOGETHER, export_together, finished_runs, is_corpus
 from corporeal.export.motion import motion_of_run, motion_of_scene
 from corporeal.export.physical_scene import physical_scene
@@ -25,10 +25,10 @@ from corporeal.export.target import (
     Writer,
     Written,
 )
-from corporeal.formats.sources import called
-from corporeal.in_memory import load_scene, prepare
-from corporeal.pipeline import RUN, read_back
-from corporeal.trajectory.played import Played, Prepared
+from corporeal.io.sources import called
+from corporeal.pipeline.in_memory import load_scene, prepare
+from corporeal.pipeline.runner import RUN, read_back
+from corporeal.simulation.played import Played, Prepared
 
 FOLDER = "export"
 USUAL: tuple[Target, ...] = ("usd", "mjcf", "urdf", "glb")
@@ -143,7 +143,7 @@ def _usual_folder(source: str | Path | Played | Prepared, name: str) -> Path:
 
 
 def _write(asked: Asked, target: Target, out: Path) -> TargetRecord:
-    writer: Writer = backends.load("target", target, MENU)
+    writer: Writer = registry.load("target", target, MENU)
     try:
         with store.whole_folder(out / target) as folder:
             written = writer(asked, folder)

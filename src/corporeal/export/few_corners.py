@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.export.solids import Collider, PhysicalScene, Solid
+from corporeal.geometry.convex_thinning import thinned
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
-from corporeal.settle.thinning import thinned
 
 ON_CARD, ON_PROCESSOR = 64, 255
 """Corners of a convex mesh that PhysX simulates on a graphics card, and on a processor; it cooks

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.store import write_bytes
+from corporeal.core.types import Surface
 from corporeal.export.motion import Shapes
 from corporeal.export.solids import Solid
 from corporeal.export.target import Asked, Written
-from corporeal.formats.glb_writer import COMPONENTS, FLOAT, VERTEX_BUFFER, GlbDocument
 from corporeal.geometry.shape_modes import ShapeModes, following, shape_modes
-from corporeal.store import write_bytes
-from corporeal.types import Surface
+from corporeal.io.glb_writer import COMPONENTS, FLOAT, VERTEX_BUFFER, GlbDocument
 
 NAME = "film.glb"
 MOST = 64

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from corporeal.core.types import Finish
 from corporeal.export.solids import Solid
-from corporeal.formats.obj_text import obj_text
-from corporeal.settle.hull import Piece
-from corporeal.types import Finish
+from corporeal.geometry.convex_hull import Piece
+from corporeal.io.obj_text import obj_text
 
 FOLDER = "meshes"
 

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
+from corporeal.core.version import __version__
 from corporeal.export.friction import ROLLING, SPINNING
 from corporeal.export.meshes import FOLDER, write_collider, write_picture, write_surfaces
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.target import Asked, Written
 from corporeal.export.usd_soft import CELLS, tetrahedra_of
-from corporeal.formats.words import writable
-from corporeal.formats.xml_text import comment, words, write_xml
-from corporeal.version import __version__
+from corporeal.io.xml_text import comment, words, write_xml
+from corporeal.recognition.words import writable
 
 NAME = "scene.xml"
 CONTACT = 4e-3

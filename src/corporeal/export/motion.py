@@ -9,15 +9,15 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial.transform import Rotation
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Frame, Particles, Scene, Trajectory
+from corporeal.discretization.problem_from_scene import pose
 from corporeal.export.solids import Solid
 from corporeal.mpm.physics.rigid import mass_of
 from corporeal.render.skin import Skin, bind
-from corporeal.trajectory.frames import Frames
-from corporeal.trajectory.moving_gaussians import fluid, granular
-from corporeal.trajectory.played import Played, Prepared
-from corporeal.treatment.problem_from_scene import pose
-from corporeal.types import Frame, Particles, Scene, Trajectory
+from corporeal.simulation.frames import Frames
+from corporeal.simulation.moving_gaussians import fluid, granular
+from corporeal.simulation.played import Played, Prepared
 
 CLOSE = 1e-9
 """Two instants nearer than this are one [s]."""

@@ -4,7 +4,7 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
-from corporeal.formats.words import unique
+from corporeal.recognition.words import unique
 
 
 def identifiers(titles: Iterable[str], taken: Iterable[str] = ()) -> list[str]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from corporeal.core.types import Law, Treatment
 from corporeal.export.target import Asked, NothingToWriteError
-from corporeal.types import Law, Treatment
 
 KINDS = {
     Law.COROTATED: 7,

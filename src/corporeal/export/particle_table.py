@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.store import require_room, write_json
 from corporeal.export.particle_arrays import Table, table_of
 from corporeal.export.table_statistics import Statistics
 from corporeal.export.target import Asked, Written
-from corporeal.store import require_room, write_json
-from corporeal.trajectory.played import Played
+from corporeal.simulation.played import Played
 
 H5, NPZ, METADATA = "train.h5", "train.npz", "metadata.json"
 

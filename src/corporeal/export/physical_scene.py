@@ -9,20 +9,20 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.store import plain
+from corporeal.core.types import Particles, PartWords, Surface
+from corporeal.discretization.sizes import scale_of_part
 from corporeal.export.motion import Motion
 from corporeal.export.names import identifiers
 from corporeal.export.solids import Collider, Grains, Matter, PhysicalScene, Solid
 from corporeal.export.unsaid import unsaid
+from corporeal.geometry.convex_decompose import decompose
+from corporeal.geometry.convex_hull import Piece, hull_of
 from corporeal.geometry.mesh import joined
-from corporeal.geometry.sizes import scale_of_part
 from corporeal.materials import materials_json
 from corporeal.mpm.physics.rigid import mass_of
-from corporeal.settle.decompose import decompose
-from corporeal.settle.hull import Piece, hull_of
-from corporeal.store import plain
-from corporeal.trajectory.played import Prepared
-from corporeal.types import Particles, PartWords, Surface
+from corporeal.simulation.played import Prepared
 
 THIN = 1e-4
 """Of the extent: thickness that the hull of a flat thing is given."""

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.formats.gltf_accessors import as_real, rows_of
-from corporeal.formats.gltf_document import Document
-from corporeal.formats.gltf_nodes import walk
 from corporeal.geometry.rotation import matrix
+from corporeal.io.gltf_accessors import as_real, rows_of
+from corporeal.io.gltf_document import Document
+from corporeal.io.gltf_nodes import walk
 
 
 @dataclass(frozen=True)

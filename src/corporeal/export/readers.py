@@ -19,7 +19,7 @@ from corporeal.export.mjcf import write_mjcf
 from corporeal.export.read_glb_film import read_film
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.target import Asked, Target
-from corporeal.formats.splats import read_splat
+from corporeal.io.splats import read_splat
 
 REST = 2.0
 """How long a settled scene must stay where it is [s]."""

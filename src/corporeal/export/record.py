@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from corporeal import store
-from corporeal.errors import BadFileError
-from corporeal.typed import typed
-from corporeal.version import __version__
+from corporeal.core import store
+from corporeal.core.errors import BadFileError
+from corporeal.core.typed import typed
+from corporeal.core.version import __version__
 
 NAME = "export.json"
 

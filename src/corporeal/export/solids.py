@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.settle.hull import Piece
-from corporeal.types import Finish, Material, Surface, Treatment, Vector, Wall
+from corporeal.core.types import Finish, Material, Surface, Treatment, Vector, Wall
+from corporeal.geometry.convex_hull import Piece
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from corporeal.core.store import write_json
 from corporeal.export.target import Asked, NothingToWriteError, Written
 from corporeal.export.usd_splats import write_splats
-from corporeal.formats.splat_ply import write_splat
-from corporeal.store import write_json
-from corporeal.trajectory.moving_gaussians import moving_gaussians
+from corporeal.io.splat_ply import write_splat
+from corporeal.simulation.moving_gaussians import moving_gaussians
 
 FRAME = "frame_{:04d}.ply"
 BESIDE = "film.json"

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.export.motion import Motion
 from corporeal.export.solids import PhysicalScene
-from corporeal.trajectory.played import Played
+from corporeal.simulation.played import Played
 
 Target = Literal["usd", "mjcf", "urdf", "glb", "splats", "h5", "npz", "abc"]
 Soft = Literal["particles", "tetrahedra", "none"]

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from corporeal.core.types import Particles, Scene
 from corporeal.export.motion import Motion
-from corporeal.types import Particles, Scene
 
 
 def unsaid(scene: Scene, particles: Particles, motion: Motion) -> tuple[str, ...]:

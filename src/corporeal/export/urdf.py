@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
+from corporeal.core.store import write_json
 from corporeal.export.meshes import FOLDER, write_collider, write_surfaces
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.target import Asked, NothingToWriteError, Written
-from corporeal.formats.xml_text import comment, words, write_xml
-from corporeal.store import write_json
+from corporeal.io.xml_text import comment, words, write_xml
 
 PLACEMENTS = "placements.json"
 

@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from corporeal.core.types import Finish, Surface
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.target import Soft
 from corporeal.export.usd_soft import grains_prim, tetrahedra_prim
-from corporeal.formats.usd_text import (
+from corporeal.geometry.convex_hull import Piece
+from corporeal.io.usd_text import (
     Prim,
     integers,
     number,
@@ -22,8 +24,6 @@ from corporeal.formats.usd_text import (
     vector,
     vectors,
 )
-from corporeal.settle.hull import Piece
-from corporeal.types import Finish, Surface
 
 TEXTURES = "textures"
 WORLD = "World"

@@ -5,7 +5,7 @@ from functools import partial
 from corporeal.export.motion import Motion, Shapes
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.usd_geometry import WORLD, surface_name
-from corporeal.formats.usd_text import Prim, text, vector, vectors
+from corporeal.io.usd_text import Prim, text, vector, vectors
 
 POINT = partial(vectors, digits=6)
 """Vertices to a millionth of the solid's size."""

@@ -16,8 +16,8 @@ from corporeal.export.solids import Matter, PhysicalScene, Solid
 from corporeal.export.target import Engine, Soft
 from corporeal.export.usd_geometry import WORLD, named_colliders, path_of, surface_name
 from corporeal.export.usd_soft import bind, deformable, deformable_matter
-from corporeal.formats.usd_bodies import KEY
-from corporeal.formats.usd_text import Prim, custom_data, number, text, title, vector
+from corporeal.io.usd_bodies import KEY
+from corporeal.io.usd_text import Prim, custom_data, number, text, title, vector
 
 RULES: dict[Engine, Rule] = {
     "physx": "multiply",

@@ -7,14 +7,14 @@ readers of physics take defaults.
 
 from pathlib import Path
 
+from corporeal.core.version import __version__
 from corporeal.export.few_corners import ON_CARD, colliders, with_few_corners
 from corporeal.export.solids import PhysicalScene
 from corporeal.export.target import Asked, Written
 from corporeal.export.usd_geometry import WORLD, geometry
 from corporeal.export.usd_motion import motion_prims
 from corporeal.export.usd_physics import fitted, physics
-from corporeal.formats.usd_text import Layer, Prim
-from corporeal.version import __version__
+from corporeal.io.usd_text import Layer, Prim
 
 GEOMETRY, PHYSICS, MOTION = "geometry.usda", "physics.usda", "motion.usda"
 SIM, FILM = "sim.usda", "film.usda"

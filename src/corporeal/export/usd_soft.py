@@ -7,9 +7,11 @@ proposal for deformables under both names that readers look for, ``physics:`` (N
 
 import numpy as np
 
+from corporeal.core.types import Law
 from corporeal.export.solids import Matter, PhysicalScene, Solid, Tetrahedra
 from corporeal.export.target import Soft
-from corporeal.formats.usd_text import (
+from corporeal.geometry.voxel_tetrahedra import outer_faces, voxel_tetrahedra
+from corporeal.io.usd_text import (
     Prim,
     floats,
     inactive,
@@ -19,8 +21,6 @@ from corporeal.formats.usd_text import (
     vectors,
     whole_vectors,
 )
-from corporeal.geometry.voxel_tetrahedra import outer_faces, voxel_tetrahedra
-from corporeal.types import Law
 
 CELLS = 2.0
 """Edge of the cells that tetrahedra are cut from [dx]: what a particle mesh resolves."""

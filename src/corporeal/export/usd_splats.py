@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
+from corporeal.core.types import Gaussians
+from corporeal.core.version import __version__
 from corporeal.export.motion import Motion, on_disk
 from corporeal.export.solids import PhysicalScene
 from corporeal.export.usd_geometry import WORLD
-from corporeal.formats.usd_bodies import KEY
-from corporeal.formats.usd_text import Layer, Prim, custom_data, floats, text, title, vectors
 from corporeal.geometry.harmonics import DEGREES
-from corporeal.trajectory.moving_gaussians import MovingGaussians
-from corporeal.types import Gaussians
-from corporeal.version import __version__
+from corporeal.io.usd_bodies import KEY
+from corporeal.io.usd_text import Layer, Prim, custom_data, floats, text, title, vectors
+from corporeal.simulation.moving_gaussians import MovingGaussians
 
 NAME = "splats.usda"
 SIGMAS = 3.0

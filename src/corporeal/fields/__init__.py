@@ -1,1 +1,1 @@
-"""Material fields of other methods: read, registered with a scene, and summed up per part."""
+"""Material fields predicted by other methods: reading, registration, averages per part."""

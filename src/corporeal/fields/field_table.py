@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 from corporeal.fields.samples import SampledField
 
 COLUMNS = {"young": "E", "poisson": "nu", "density": "density"}

@@ -9,15 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from corporeal.errors import UserError
-from corporeal.fields.per_part import PartNumbers, numbers_per_part
-from corporeal.fields.registration import register
-from corporeal.fields.specification import Uniform, asked
-from corporeal.geometry.mesh import Mesh, joined
-from corporeal.geometry.spread import sample_surface
-from corporeal.materials import find
-from corporeal.mpm.laws import MENU
-from corporeal.types import (
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
     Ground,
     Law,
     Material,
@@ -27,6 +20,13 @@ from corporeal.types import (
     Scene,
     Structure,
 )
+from corporeal.fields.per_part import PartNumbers, numbers_per_part
+from corporeal.fields.registration import register
+from corporeal.fields.specification import Uniform, asked
+from corporeal.geometry.mesh import Mesh, joined
+from corporeal.geometry.spread import sample_surface
+from corporeal.materials import find
+from corporeal.mpm.laws import MENU
 
 FIELD, BORROWED = "field", "borrowed"
 """Who chose a value: the other method, or we, where it tells none."""

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 from corporeal.fields.samples import SampledField
-from corporeal.formats.ply import read_ply
+from corporeal.io.ply import read_ply
 
 KINDS = ("jelly", "metal", "sand", "visplas", "fluid", "snow", "stationary", "background")
 """By material_id."""

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 
 ALIKE = 1.1
 """Misfits within this factor of the best are as good."""

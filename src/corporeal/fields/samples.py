@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 
 BOUNDS: Mapping[str, tuple[float, float]] = {
     "young": (0.0, np.inf),

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.fields.field_table import read_table
 from corporeal.fields.pixie import read_pixie
 from corporeal.fields.samples import BOUNDS, SampledField, checked

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 from corporeal.fields.samples import SampledField
 
 COLUMNS = {"young": "youngs_modulus", "poisson": "poissons_ratio", "density": "density"}

@@ -1,1 +1,1 @@
-"""Pure array maths on points and triangles."""
+"""Triangle meshes: queries, sampling, rays, repair."""

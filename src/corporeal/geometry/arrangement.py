@@ -7,9 +7,9 @@ import igl
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.core.types import Scene, SceneObject, Surface, Vector
 from corporeal.geometry import placing
 from corporeal.geometry.mesh import joined
-from corporeal.types import Scene, SceneObject, Surface, Vector
 
 SAMPLES = 2000
 """Vertices of an object, and places on its triangles, that are looked up in another."""

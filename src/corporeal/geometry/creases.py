@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.types import Surface
+from corporeal.core.types import Surface
 
 SHARP = 40.0
 """Faces that meet at a larger angle have an edge between them [deg]: sixteen sides look round."""

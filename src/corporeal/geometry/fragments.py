@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
-from corporeal.types import Surface
+from corporeal.core.types import Surface
 
 PIECES = 14
 """Pieces that a thing breaks into at most."""

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from corporeal.core.types import Gaussians, Vector
 from corporeal.geometry.harmonics import turned
 from corporeal.geometry.rotation import product, quaternion
-from corporeal.types import Gaussians, Vector
 
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 """Which of a file's axes points up."""

@@ -11,9 +11,9 @@ from functools import cache
 from importlib.resources import files
 from math import pi, sqrt
 
+from corporeal.core.typed import typed
+from corporeal.core.types import Law, Material
 from corporeal.materials.rebound import loss_of, rebound
-from corporeal.typed import typed
-from corporeal.types import Law, Material
 
 NOMINAL = 1.0
 """Speed at which restitution of pairs is stated where no other is said [m/s]."""

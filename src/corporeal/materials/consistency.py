@@ -8,7 +8,7 @@ and fibrous matter, E/ρ² (Gibson and Ashby 1997: E ∝ ρ² in open cells).
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from corporeal.types import Range
+from corporeal.core.types import Range
 
 LEEWAY = 1.5
 """By what factor a set may leave what the grades have."""

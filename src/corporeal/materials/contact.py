@@ -7,10 +7,10 @@ from functools import cache
 from importlib.resources import files
 from math import sqrt
 
+from corporeal.core.types import Material, Range
 from corporeal.materials.blow import LEAST, NOMINAL, at_speed, stated, yielding
 from corporeal.materials.entry import Entry
 from corporeal.materials.rebound import loss_of, rebound
-from corporeal.types import Material, Range
 
 
 @dataclass(frozen=True)

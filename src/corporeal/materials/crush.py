@@ -15,11 +15,11 @@ from math import log, pi, sqrt
 
 from scipy.optimize import brentq
 
+from corporeal.core.typed import typed
+from corporeal.core.types import Material
 from corporeal.materials.blow import at_speed, compliance_of
 from corporeal.materials.contact import BlowLaw, share
 from corporeal.materials.rebound import rebound
-from corporeal.typed import typed
-from corporeal.types import Material
 
 PACKED = 1.4
 """A cellular solid is packed at a strain of 1 - 1.4 of its relative density (Gibson and Ashby,

@@ -12,13 +12,8 @@ from math import erf, sqrt
 
 import numpy as np
 
-from corporeal.errors import UserError
-from corporeal.materials.contact import Striker, friction_between, restitution
-from corporeal.materials.entry import Entry
-from corporeal.materials.library import find, library, substances
-from corporeal.materials.placement import CONTENTS, entry_of
-from corporeal.materials.scale import fraction_of, place
-from corporeal.types import (
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
     WALLED,
     Ground,
     Hypothesis,
@@ -32,6 +27,11 @@ from corporeal.types import (
     Structure,
     in_way,
 )
+from corporeal.materials.contact import Striker, friction_between, restitution
+from corporeal.materials.entry import Entry
+from corporeal.materials.library import find, library, substances
+from corporeal.materials.placement import CONTENTS, entry_of
+from corporeal.materials.scale import fraction_of, place
 
 SPAN = {"typical": 1.0, "fallback": 1.0, "model": 0.5, "recording": 0.5, "annotation": 0.0}
 SPAN |= {"field": 0.0}

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from corporeal.errors import OutOfRangeError, UserError
+from corporeal.core.errors import OutOfRangeError, UserError
+from corporeal.core.types import Ground, Law, Material, Range
 from corporeal.materials.quantities import QUANTITIES, si
-from corporeal.types import Ground, Law, Material, Range
 
 POISSON_LIMIT = 0.5
 """λ = E ν / ((1 + ν)(1 - 2 ν)) has no finite value here."""

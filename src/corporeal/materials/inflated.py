@@ -17,10 +17,10 @@ from math import pi, sqrt
 
 from scipy.optimize import brentq
 
+from corporeal.core.types import Ground, Law, Material, Range
 from corporeal.materials.blow import stated
 from corporeal.materials.rebound import loss_of, rebound
 from corporeal.mpm.constants import AIR_DENSITY
-from corporeal.types import Ground, Law, Material, Range
 
 ATMOSPHERE = 101_325.0
 """[Pa]"""

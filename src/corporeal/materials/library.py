@@ -9,7 +9,7 @@ import tomllib
 from functools import lru_cache
 from pathlib import Path
 
-from corporeal.errors import NEAR, BadFileError, UnknownChoiceError, UserError
+from corporeal.core.errors import NEAR, BadFileError, UnknownChoiceError, UserError
 from corporeal.materials.entry import Entry, entries, plain
 from corporeal.materials.lint import RESERVED, Problem, inspect
 from corporeal.materials.shipped import SHIPPED, shipped, source_table

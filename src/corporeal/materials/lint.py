@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Law
 from corporeal.materials.entry import ABOUT, POISSON_LIMIT
 from corporeal.materials.plausible import doubt, namesake, strain_doubt
 from corporeal.materials.quantities import QUANTITIES, UNITS, examples, si
 from corporeal.materials.rebound import rebound_range
 from corporeal.mpm.laws import MENU
-from corporeal.types import Law
 
 ALWAYS = ("young", "poisson", "density")
 PARTICULAR = {

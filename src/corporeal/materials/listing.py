@@ -4,14 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import degrees
 
-from corporeal.materials.contact import pairs, rebounds
-from corporeal.materials.entry import Entry
-from corporeal.materials.library import find, library
-from corporeal.materials.quantities import QUANTITIES
-from corporeal.materials.scale import fraction_of, logarithmic
-from corporeal.materials.shipped import citation, source_table
-from corporeal.materials.treatments import inside, treatments
-from corporeal.types import (
+from corporeal.core.types import (
     Ground,
     Hypothesis,
     MassMixture,
@@ -24,6 +17,13 @@ from corporeal.types import (
     Structure,
     Swelling,
 )
+from corporeal.materials.contact import pairs, rebounds
+from corporeal.materials.entry import Entry
+from corporeal.materials.library import find, library
+from corporeal.materials.quantities import QUANTITIES
+from corporeal.materials.scale import fraction_of, logarithmic
+from corporeal.materials.shipped import citation, source_table
+from corporeal.materials.treatments import inside, treatments
 
 SCALES = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
 COLUMNS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion")

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from corporeal.core.types import Finish
 from corporeal.geometry.srgb import linear
-from corporeal.types import Finish
 
 LIQUIDS: dict[str, tuple[str, float]] = {
     "liquid": ("#8fb3c8", 0.7),

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import degrees
 
+from corporeal.core.types import Range
 from corporeal.materials.library import contents, library, substances
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.materials.treatments import inside, treatments
-from corporeal.types import Range
 
 UNITS = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
 

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from corporeal.errors import UnknownChoiceError
+from corporeal.core.errors import UnknownChoiceError
+from corporeal.core.types import WALLED, PartWords, Placement
 from corporeal.materials.consistency import contradictions
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import counterpart, find, library
 from corporeal.materials.offer import Choice, choice
 from corporeal.materials.scale import fraction_of, place
-from corporeal.types import WALLED, PartWords, Placement
 
 PLACED = (
     "young",

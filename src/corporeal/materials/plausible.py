@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from corporeal.core.types import Law
 from corporeal.materials.entry import Entry, plain
 from corporeal.materials.quantities import QUANTITIES, UNITS, si
 from corporeal.materials.shipped import shipped
-from corporeal.types import Law
 
 WIDER = 3.0
 """How far a new material may lie beyond all that are like it, as a factor."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import pi
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 
 
 @dataclass(frozen=True)

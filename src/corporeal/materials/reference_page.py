@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from corporeal.core.types import Law
 from corporeal.materials.blow import ratings
 from corporeal.materials.contact import pairs, rebounds
 from corporeal.materials.crush import layers
@@ -11,7 +12,6 @@ from corporeal.materials.listing import COLUMNS, HEADS, span
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.shipped import source_table
 from corporeal.mpm.laws import MENU
-from corporeal.types import Law
 
 OTHER = (
     "friction",

@@ -2,7 +2,7 @@
 
 import math
 
-from corporeal.types import Range
+from corporeal.core.types import Range
 
 WIDE = 10.0
 """A range whose ends differ by more than this factor is divided on a logarithmic scale."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
+from corporeal.core.types import Range
 from corporeal.materials.quantities import QUANTITIES, si
-from corporeal.types import Range
 
 
 @dataclass(frozen=True)

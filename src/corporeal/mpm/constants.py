@@ -7,7 +7,7 @@ constitutive law stand with the law, coefficients of a formula in the formula. A
 
 from collections.abc import Mapping
 
-from corporeal import types
+from corporeal.core import types
 
 # ---------------------------------------------------------------- how long a step may be
 

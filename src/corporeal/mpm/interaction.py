@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Vector, Wind
 from corporeal.mpm.measure import Diagnostics
 from corporeal.mpm.physics.grips import Grip, Hold, check, regripped, take_hold, take_hold_of_rigid
 from corporeal.mpm.state import Motion
-from corporeal.types import Vector, Wind
 
 
 class Interaction(Diagnostics):

@@ -8,8 +8,8 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from corporeal.core.types import ROUNDING, Keyframes, Push, Vector, Wind
 from corporeal.mpm.constants import COURANT, GRAVITY
-from corporeal.types import ROUNDING, Keyframes, Push, Vector, Wind
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
+from corporeal.core.types import ROUNDING
 from corporeal.mpm.problem import Body, Problem
-from corporeal.types import ROUNDING
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from corporeal.core.types import ROUNDING
 from corporeal.mpm import laws
 from corporeal.mpm.constants import SMALLEST_VOLUME
 from corporeal.mpm.laws.kinematics import determinant
@@ -15,7 +16,6 @@ from corporeal.mpm.physics.branches import Branches, Memory
 from corporeal.mpm.physics.facets import Facets, facets_of, has_edges, of_flat_faces
 from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.substance import Substances
-from corporeal.types import ROUNDING
 
 
 def rounding_of(body: Body) -> Float[np.ndarray, "S 12"]:

@@ -10,7 +10,8 @@ from math import sqrt
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.errors import SimulationError
+from corporeal.core.errors import SimulationError
+from corporeal.core.types import Law
 from corporeal.mpm import laws
 from corporeal.mpm.constants import LEAST_LOSS, OWN_BULK, TINY, VAST
 from corporeal.mpm.laws.drucker_prager import apex_strain, cone_slope
@@ -18,7 +19,6 @@ from corporeal.mpm.laws.law import Numbers, lame
 from corporeal.mpm.physics.branches import Branches, relaxing_bulk, share_of
 from corporeal.mpm.physics.stability import forgetting_rate
 from corporeal.mpm.problem import Body, Problem
-from corporeal.types import Law
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""The asset pool: what scenes are made of."""
+"""A pool of 3D models that scenes are composed of."""

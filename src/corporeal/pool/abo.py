@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from corporeal.errors import BadFileError, UserError
+from corporeal.core.errors import BadFileError, UserError
 from corporeal.pool.candidate import Candidate
 from corporeal.pool.table import Row
 

@@ -4,11 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.formats.typical_extents import LARGEST, SMALLEST, doubt, typical_extent
-from corporeal.formats.words import safe, writable
 from corporeal.pool.asset import UNKNOWN, Asset, Rejection
 from corporeal.pool.candidate import Candidate
 from corporeal.pool.verdict import MODELS, Verdict
+from corporeal.recognition.typical_extents import LARGEST, SMALLEST, doubt, typical_extent
+from corporeal.recognition.words import safe, writable
 
 ABSURD = 10.0
 """How many times beyond the usual sizes of its class an object that is in metres may be."""

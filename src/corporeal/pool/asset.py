@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.formats.credits import Credit
+from corporeal.io.credits import Credit
 
 UNKNOWN = "unknown"
 """Licence of what says nothing about it."""

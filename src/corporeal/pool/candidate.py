@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from corporeal.errors import UserError
-from corporeal.formats.mesh_suffixes import is_mesh
-from corporeal.formats.sources import GLTF
-from corporeal.formats.words import everyday
+from corporeal.core.errors import UserError
+from corporeal.io.mesh_suffixes import is_mesh
+from corporeal.io.sources import GLTF
 from corporeal.pool.table import Row, read_table
+from corporeal.recognition.words import everyday
 
 MANIFEST = "manifest.csv"
 """Table that is picked up where it lies in an indexed folder or right above it."""

@@ -13,7 +13,7 @@ import igl
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.types import Scene, Surface
+from corporeal.core.types import Scene, Surface
 
 GRID = 2**21 - 1
 """Steps along an extent within which vertices are one: three numbers fit into 63 bits."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 
 
 def draw(

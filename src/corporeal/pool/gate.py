@@ -10,10 +10,10 @@ from scipy.ndimage import label
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from corporeal.core.types import Scene, Surface
 from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.spread import sample_surface
 from corporeal.pool.decimate import decimated
-from corporeal.types import Scene, Surface
 
 SLIVER = 1e-12
 """Area, in squares of the extent, below which a triangle is degenerate: a millionth across."""

@@ -9,15 +9,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from corporeal import store
-from corporeal.errors import BadFileError, UserError
-from corporeal.formats.words import writable
+from corporeal.core import store
+from corporeal.core.errors import BadFileError, UserError
 from corporeal.pool.admission import Admission, Member
 from corporeal.pool.asset import Asset, Pool, Rejection
 from corporeal.pool.candidate import Candidate
 from corporeal.pool.gate import GateConfig
 from corporeal.pool.origins import OriginConfig, candidates
 from corporeal.pool.verdict import Verdicts
+from corporeal.recognition.words import writable
 
 POOL = "pool.json"
 INDEX_AGAIN = "Make it again: corporeal assets index FOLDER --pool POOL."

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from corporeal.errors import BadFileError, UserError
-from corporeal.formats.words import writable
+from corporeal.core.errors import BadFileError, UserError
 from corporeal.pool.candidate import Candidate
 from corporeal.pool.table import Row
+from corporeal.recognition.words import writable
 
 CACHE = Path("~/.objaverse/hf-objaverse-v1")
 PATHS = "object-paths.json.gz"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.pool import abo, objaverse
 from corporeal.pool.candidate import Candidate, candidates_in
 

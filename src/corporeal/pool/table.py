@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 
 COLUMNS = {
     "class_name": ("class", "category"),

@@ -7,16 +7,16 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.formats.any_model import read_model
-from corporeal.formats.credits import Credit, credit_in
-from corporeal.formats.glb_writer import encode_glb
-from corporeal.formats.gltf_document import Document
-from corporeal.formats.sources import GLTF, sources
-from corporeal.formats.words import everyday, writable
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.types import Scene
+from corporeal.io.any_model import read_model
+from corporeal.io.credits import Credit, credit_in
+from corporeal.io.glb_writer import encode_glb
+from corporeal.io.gltf_document import Document
+from corporeal.io.sources import GLTF, sources
 from corporeal.pool.gate import GateConfig, Measures, Rejected, inspect
-from corporeal.types import Scene
+from corporeal.recognition.words import everyday, writable
 
 RULES = "2"
 """Changes when the gate judges otherwise: older verdicts then count no more."""

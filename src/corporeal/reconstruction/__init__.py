@@ -1,1 +1,1 @@
-"""From photographs or a splat to objects: what the stage ``reconstruct`` is put together from."""
+"""From photographs or a splat to objects: poses, masks, Gaussians, surfaces, segments."""

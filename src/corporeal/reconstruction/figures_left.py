@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from corporeal.poses.pose import FIGURE as CAMERAS
-from corporeal.poses.pose import POSES
 from corporeal.reconstruction.masks_figure import FIGURE as OBJECTS
+from corporeal.reconstruction.sfm.pose import FIGURE as CAMERAS
+from corporeal.reconstruction.sfm.pose import POSES
 
 
 def figures_in(folder: Path) -> dict[str, Path]:

@@ -7,17 +7,17 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.features import Reader, connect
-from corporeal.features.vectors import similarity as likeness
-from corporeal.features.vectors import unit
-from corporeal.geometry.extent import oriented_size
+from corporeal.core.types import Cloud
+from corporeal.discretization.extent import oriented_size
+from corporeal.reconstruction.features import Reader, connect
+from corporeal.reconstruction.features.vectors import similarity as likeness
+from corporeal.reconstruction.features.vectors import unit
+from corporeal.reconstruction.gaussians.closed import Closed
+from corporeal.reconstruction.gaussians.intake import Intake
+from corporeal.reconstruction.gaussians.solid import Solid
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.regions.match import match
+from corporeal.reconstruction.segment.match import match
 from corporeal.render.portrait import COLOURS, colour_of_part
-from corporeal.splats.closed import Closed
-from corporeal.splats.intake import Intake
-from corporeal.splats.solid import Solid
-from corporeal.types import Cloud
 from corporeal.vlm.seen_objects import (
     UNKNOWN,
     SeenObject,

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from corporeal.errors import BadFileError, noticed
-from corporeal.features.learned_masks import learned_masks
-from corporeal.features.maskers import connect_masker
-from corporeal.formats.photographs import MASKS, read_photographs
-from corporeal.geometry.agreement import INCOHERENT, SIDE
-from corporeal.geometry.cropped import cropped
-from corporeal.geometry.silhouettes import coherence
-from corporeal.masking.doubt import CROPPED
-from corporeal.progress import Progress
+from corporeal.core.errors import BadFileError, noticed
+from corporeal.core.progress import Progress
+from corporeal.core.types import Camera, Note, NoteKind
+from corporeal.io.photographs import MASKS, read_photographs
+from corporeal.multiview.agreement import INCOHERENT, SIDE
+from corporeal.multiview.cropped import cropped
+from corporeal.multiview.silhouettes import coherence
+from corporeal.reconstruction.features.learned_masks import learned_masks
+from corporeal.reconstruction.features.maskers import connect_masker
+from corporeal.reconstruction.gaussians.intake import ON
+from corporeal.reconstruction.masks.doubt import CROPPED
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.splats.intake import ON
-from corporeal.types import Camera, Note, NoteKind
 
 DISPUTED = 0.5
 """Share of a mask that is of all masks' hull, below which more is in dispute than agreed on: masks

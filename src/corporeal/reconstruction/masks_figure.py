@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from corporeal.errors import UserError
-from corporeal.formats.photographs import read_photographs
+from corporeal.core.errors import UserError
+from corporeal.core.store import writing
+from corporeal.io.photographs import read_photographs
+from corporeal.reconstruction.gaussians.intake import ON
 from corporeal.render.sheet import Tile, sheet
-from corporeal.splats.intake import ON
-from corporeal.store import writing
 
 FIGURE = "objects.png"
 """Beside what was reconstructed."""

@@ -9,23 +9,23 @@ import numpy as np
 from jaxtyping import Int
 from scipy.spatial import KDTree
 
-from corporeal.errors import UserError
-from corporeal.features.clouds import Placed, projected
-from corporeal.features.descriptor import LET_THROUGH, seen_from
-from corporeal.features.lifting import Lifted, known, uplift
+from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
+from corporeal.core.types import Cloud
 from corporeal.geometry.harmonics import DC
-from corporeal.progress import Progress
+from corporeal.reconstruction.features.clouds import Placed, projected
+from corporeal.reconstruction.features.descriptor import LET_THROUGH, seen_from
+from corporeal.reconstruction.features.lifting import Lifted, known, uplift
+from corporeal.reconstruction.gaussians.depth_rendering import render_depth
+from corporeal.reconstruction.gaussians.feature_distillation import distilled
+from corporeal.reconstruction.gaussians.field_points import field_points
+from corporeal.reconstruction.gaussians.foreground import Shown, foreground, shown
+from corporeal.reconstruction.gaussians.intake import Intake
+from corporeal.reconstruction.gaussians.radiance import FieldConfig
+from corporeal.reconstruction.gaussians.raster import weights
+from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.regions.masks import lifted
-from corporeal.splats.depth_rendering import render_depth
-from corporeal.splats.feature_distillation import distilled
-from corporeal.splats.field_points import field_points
-from corporeal.splats.foreground import Shown, foreground, shown
-from corporeal.splats.intake import Intake
-from corporeal.splats.radiance import FieldConfig
-from corporeal.splats.raster import weights
-from corporeal.splats.thread_pool import ThreadPool
-from corporeal.types import Cloud
+from corporeal.reconstruction.segment.masks import lifted
 
 MOST_POINTS = 100_000
 """Points that are looked at; other Gaussians do as their neighbours."""

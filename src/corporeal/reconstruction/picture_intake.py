@@ -8,13 +8,20 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool
 
-from corporeal.errors import BadFileError, noticed
-from corporeal.features.maskers import split
-from corporeal.formats.mask_files import corrected
-from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
-from corporeal.formats.sources import kind_of, unposed
-from corporeal.masking.grown_masks import GrownMasks, grown_masks
-from corporeal.poses.pose import (
+from corporeal.core.errors import BadFileError, noticed
+from corporeal.core.progress import Progress, within
+from corporeal.core.types import Note, NoteKind
+from corporeal.io.mask_files import corrected
+from corporeal.io.photographs import MASKS, has_masks, listed, read_photographs
+from corporeal.io.sources import kind_of, unposed
+from corporeal.reconstruction.features.maskers import split
+from corporeal.reconstruction.gaussians.intake import ON, Intake, Masked, doubt_of_poses, take_in
+from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
+from corporeal.reconstruction.masks.grown_masks import GrownMasks, grown_masks
+from corporeal.reconstruction.masks_by_model import CORRECT, masks_by_model
+from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
+from corporeal.reconstruction.reconstruct_config import AUTO, NONE, ReconstructConfig
+from corporeal.reconstruction.sfm.pose import (
     POSES,
     Posed,
     moved_within,
@@ -22,13 +29,6 @@ from corporeal.poses.pose import (
     pose_object,
     without_strangers,
 )
-from corporeal.progress import Progress, within
-from corporeal.reconstruction.masks_by_model import CORRECT, masks_by_model
-from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
-from corporeal.reconstruction.reconstruct_config import AUTO, NONE, ReconstructConfig
-from corporeal.splats.intake import ON, Intake, Masked, doubt_of_poses, take_in
-from corporeal.splats.training_schedule import TrainConfig
-from corporeal.types import Note, NoteKind
 
 POSED = 0.5
 """Share of learning from pictures that is done when poses that nobody gave are found."""

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from corporeal.errors import UserError, check_range
-from corporeal.features import connect
-from corporeal.features.maskers import MENU as MASKERS
-from corporeal.features.maskers import connect_masker, split
+from corporeal.core.errors import UserError, check_range
 from corporeal.geometry.gaussians import LARGEST, AskedUp
-from corporeal.geometry.metric import MetricScale, TwoPoints, measured
-from corporeal.regions.rule import Rule
+from corporeal.multiview.metric import MetricScale, TwoPoints, measured
+from corporeal.reconstruction.features import connect
+from corporeal.reconstruction.features.maskers import MENU as MASKERS
+from corporeal.reconstruction.features.maskers import connect_masker, split
+from corporeal.reconstruction.segment.rule import Rule
 
 AUTO, NONE = "auto", "none"
 
@@ -74,7 +74,7 @@ def validate(
 
     """
     # A person who asks for help needs neither what trains nor what answers.
-    from corporeal.splats import training_schedule
+    from corporeal.reconstruction.gaussians import training_schedule
     from corporeal.vlm.seen_objects import check_extents, usual
 
     check_range("--count", config.count, 1, 1000)

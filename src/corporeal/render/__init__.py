@@ -1,1 +1,1 @@
-"""Pictures of triangles."""
+"""Rendering of triangle meshes and Gaussians to images and videos."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.types import Camera, Vector
+from corporeal.core.types import Camera, Vector
 
 VIEW: Vector = (0.80, -0.62, 0.36)
 """Three-quarter view: objects face +x."""

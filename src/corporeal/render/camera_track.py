@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
+from corporeal.core.types import Ledger, Vector
 from corporeal.render.camera import Aim, place
 from corporeal.render.choices import Shot
-from corporeal.types import Ledger, Vector
 
 SMOOTH = 0.12
 """A camera that moves with something follows a mean over this time [s, standard deviation]."""

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.core.types import Law
 from corporeal.mpm.laws import MENU
-from corporeal.types import Law
 
 SALT = "s41605"
 """Chosen so that materials which meet in the showcase lie far apart."""

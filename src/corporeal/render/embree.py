@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float32, Int
 
+from corporeal.core.machine import cores
 from corporeal.geometry.srgb import linear
-from corporeal.machine import cores
 from corporeal.render import kernels, kernels_light
 from corporeal.render.camera import Aim, axes
 from corporeal.render.kernels import NOTHING, Samples

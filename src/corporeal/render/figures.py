@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Film, MaterialField, Parts, Scene
 from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
@@ -19,7 +20,6 @@ from corporeal.render.glyphs import drawable
 from corporeal.render.png import write_png
 from corporeal.render.repainted import render_each
 from corporeal.render.stage import Light, Stage
-from corporeal.types import Film, MaterialField, Parts, Scene
 
 PAPER = Light(
     sun_colour=(2.6, 2.6, 2.6),

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
-from corporeal.machine import cores
+from corporeal.core.machine import cores
 from corporeal.render import (
     crop,
     cull,

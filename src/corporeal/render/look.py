@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
+from corporeal.core.types import Finish, Scene, Surface
 from corporeal.geometry.mesh import joined
 from corporeal.geometry.srgb import encoded, linear
-from corporeal.types import Finish, Scene, Surface
 
 TEXTURE_LIMIT = 2048
 """Larger pictures are halved: a film of 1280 pixels cannot show more."""

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from corporeal.core.types import AnsweredMass, Evidence, MassMixture, WeighedHypothesis
 from corporeal.render.page import cells, safe
-from corporeal.types import AnsweredMass, Evidence, MassMixture, WeighedHypothesis
 
 WAYS_SHOWN = 2
 """Ways an object may be, of those that were drawn."""

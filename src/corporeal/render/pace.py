@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.types import Frame
+from corporeal.core.types import Frame
 
 BEFORE, AFTER = 0.06, 0.24
 """A slow motion begins and ends so long before and after its instant [s]."""

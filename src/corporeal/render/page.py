@@ -13,7 +13,7 @@ def page(room: str, name: str, **content: object) -> str:
     """Fill a template that lies in a package with ready HTML, in the look of all pages.
 
     Args:
-        room: The package ("corporeal.stages").
+        room: The package ("corporeal.pipeline.stages").
         name: Of the template, which names ``$style``.
         content: What takes the place of each ``$name``.
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from corporeal.store import writing
+from corporeal.core.store import writing
 
 EFFORT = 4
 """Of zlib, 1 to 9: pictures are a sixth larger than by its usual 6, and the view of a report a

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from corporeal.core.machine import cores
+from corporeal.core.types import Scene, Vector
 from corporeal.geometry.arrangement import box_of, moved
-from corporeal.machine import cores
 from corporeal.render.camera import Aim, place
 from corporeal.render.embree import identify, render
 from corporeal.render.stage import Light, Stage
-from corporeal.types import Scene, Vector
 
 DIRECTIONS = 8
 """Even set of views about the vertical, alternately low and high."""

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from jaxtyping import UInt8
 
-from corporeal.machine import cores
+from corporeal.core.machine import cores
 from corporeal.render.camera import Aim
 from corporeal.render.embree import BAND, SAMPLING, Block, Job, Quality, Rays, Sampling
 from corporeal.render.kernels import Samples

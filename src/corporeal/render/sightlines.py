@@ -9,10 +9,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from corporeal.core.types import Vector
 from corporeal.render.camera import Aim, place
 from corporeal.render.look import TRANSMIT
 from corporeal.render.stage import Stage
-from corporeal.types import Vector
 
 HIDDEN = 0.6
 """Share of an object that the usual direction may hide, as a mean over time [-]."""

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
+from corporeal.core.types import Frame, Particles, Parts, Scene
 from corporeal.geometry.mesh import joined
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.render import kernels_skin
 from corporeal.render.look import positions, vertex_normals
-from corporeal.types import Frame, Particles, Parts, Scene
 
 NEIGHBOURS = 12
 STRETCH = (0.3, 3.0)

@@ -9,6 +9,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from jaxtyping import Float
 
+from corporeal.core.types import Scene, Vector
 from corporeal.render import kernels
 from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.render.look import (
@@ -20,7 +21,6 @@ from corporeal.render.look import (
     sees_through,
     vertex_normals,
 )
-from corporeal.types import Scene, Vector
 
 BOXES = 12
 """About what can be hit, for rays that need not be cast."""

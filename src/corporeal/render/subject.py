@@ -2,7 +2,7 @@
 
 import re
 
-from corporeal.types import Parts, Scene
+from corporeal.core.types import Parts, Scene
 
 
 def parts_named(sentence: str, scene: Scene, parts: Parts) -> list[int]:

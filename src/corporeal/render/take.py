@@ -19,12 +19,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int8, Int16, UInt8
 from PIL import Image
 
+from corporeal.core.types import Finish, Frame, Particles, Parts, Scene, Surface
 from corporeal.geometry.rigid_fit import rigid_fit
 from corporeal.geometry.srgb import encoded
 from corporeal.render.deltas import in_time, octahedral
 from corporeal.render.look import positions, vertex_normals
 from corporeal.render.skin import Skin
-from corporeal.types import Finish, Frame, Particles, Parts, Scene, Surface
 
 STEP = 5e-5
 """Resolution of what is left after the rigid motion [m]; 16 bits of it reach 1.6 m."""

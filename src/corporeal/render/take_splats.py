@@ -10,9 +10,9 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
+from corporeal.core.types import Reconstruction
 from corporeal.geometry.harmonics import DC
 from corporeal.render.take import Cast, Splats
-from corporeal.types import Reconstruction
 
 MOST = 80_000
 """Gaussians that a page is given: of more, those that cover most."""

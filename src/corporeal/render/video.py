@@ -10,9 +10,9 @@ from typing import IO, Any
 import imageio_ffmpeg
 import numpy as np
 
-from corporeal.errors import UserError
-from corporeal.formats.words import writable
-from corporeal.store import DiskError, writing
+from corporeal.core.errors import UserError
+from corporeal.core.store import DiskError, writing
+from corporeal.recognition.words import writable
 
 EFFORT, COMPRESSION = "veryfast", 14
 """x264's preset and constant rate factor: 0 is lossless, 23 its default. "medium" at 17

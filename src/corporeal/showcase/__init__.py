@@ -1,1 +1,1 @@
-"""Our own props, and the scenes made of them."""
+"""Built-in demo scenes and the models they are made of."""

@@ -12,7 +12,7 @@ from math import inf, pi
 from operator import attrgetter
 from typing import Any, Literal
 
-from corporeal.findings import Expectation, ObjectOutcome, Outcome
+from corporeal.core.findings import Expectation, ObjectOutcome, Outcome
 
 Measure = Callable[[Outcome], float | None]
 Spoiler = Literal[

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from corporeal.core.types import Finish
 from corporeal.showcase import paint, shape
 from corporeal.showcase.mesh import (
     STILL,
@@ -19,7 +20,6 @@ from corporeal.showcase.mesh import (
     union,
 )
 from corporeal.showcase.shape import Box, Cushion
-from corporeal.types import Finish
 
 
 def armchair() -> Model:

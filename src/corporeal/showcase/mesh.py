@@ -9,8 +9,8 @@ from jaxtyping import Float, Int, UInt8
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from corporeal.core.types import Finish
 from corporeal.geometry.srgb import linear
-from corporeal.types import Finish
 
 Point = tuple[float, float, float]
 STILL: Point = (0.0, 0.0, 0.0)

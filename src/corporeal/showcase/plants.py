@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.core.types import Finish
 from corporeal.showcase import paint, sdf, shape
 from corporeal.showcase.mesh import Mesh, Model, Part, cut, pictured, together, union, unit
-from corporeal.types import Finish
 
 CHILDREN = {3: 5, 2: 4, 1: 3}
 """Branches on a branch, by how many generations follow it."""

@@ -1,9 +1,9 @@
 """The showcase's models one by one: a pool of objects that comes with the package."""
 
-from corporeal.errors import UnknownChoiceError
+from corporeal.core.errors import UnknownChoiceError
+from corporeal.core.types import Scene
 from corporeal.showcase.models import MODELS
 from corporeal.showcase.scenes import Placed, scene_of
-from corporeal.types import Scene
 
 
 def prop(name: str) -> Scene:

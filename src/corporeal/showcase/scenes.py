@@ -10,10 +10,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from corporeal.errors import UnknownChoiceError
+from corporeal.core.errors import UnknownChoiceError
+from corporeal.core.types import (
+    DOWNWARDS,
+    GRAVITY,
+    MATTER,
+    SUBSTANCE,
+    Push,
+    Scene,
+    SceneObject,
+    Surface,
+)
 from corporeal.showcase.mesh import STILL, Model, Part, Point, cut, together
 from corporeal.showcase.models import MODELS
-from corporeal.types import DOWNWARDS, GRAVITY, MATTER, SUBSTANCE, Push, Scene, SceneObject, Surface
 
 CUSHIONS = ("seat_cushion", "back_cushion")
 """Of the armchair."""

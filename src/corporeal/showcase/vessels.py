@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from corporeal.core.types import Finish
 from corporeal.showcase import labels, paint, sdf, shape
 from corporeal.showcase.mesh import Mesh, Model, Part, cut, pictured, plain, union
-from corporeal.types import Finish
 
 
 def soda_can() -> Model:

@@ -1,1 +1,1 @@
-"""A server for the viewer's page: runs to look at, to touch and to change, and files to upload."""
+"""The web viewer's server: browse runs, interact with a live simulation, upload files."""

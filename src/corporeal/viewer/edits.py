@@ -10,15 +10,15 @@ from typing import Any
 
 import yaml
 
-from corporeal.errors import UserError
-from corporeal.formats.words import safe
-from corporeal.geometry.beginnings import said_lift, said_velocity
+from corporeal.core.errors import UserError
 from corporeal.materials.library import find
 from corporeal.materials.quantities import QUANTITIES
-from corporeal.pipeline import Settings, reopen
-from corporeal.results import Results
-from corporeal.settings.assemble_config import validate as validate_assemble
-from corporeal.stages.assemble import AssembleConfig
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import Settings, reopen
+from corporeal.pipeline.settings.assemble_config import validate as validate_assemble
+from corporeal.pipeline.stages.assemble import AssembleConfig
+from corporeal.recognition.words import safe
+from corporeal.scene.beginnings import said_lift, said_velocity
 from corporeal.viewer.queue import Asked
 
 ANNOTATIONS = "annotations.yaml"

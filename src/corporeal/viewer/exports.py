@@ -11,7 +11,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.export.export import FOLDER, export
 from corporeal.export.record import ExportRecord
 from corporeal.export.target import MENU

@@ -6,17 +6,17 @@ from functools import cached_property
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Scene, Vector
+from corporeal.discretization.broken import Filled
+from corporeal.discretization.contents import Whole, with_contents
+from corporeal.discretization.joined import joined, shifted
+from corporeal.discretization.plan import Quality
+from corporeal.discretization.problem_from_scene import Posed, pose
 from corporeal.geometry.arrangement import box_of, moved, underside
-from corporeal.geometry.broken import Filled
-from corporeal.geometry.contents import Whole, with_contents
-from corporeal.geometry.joined import joined, shifted
-from corporeal.stages.fill import fill
-from corporeal.stages.ground import GroundConfig, pairs
-from corporeal.trajectory.played import Prepared
-from corporeal.treatment.plan import Quality
-from corporeal.treatment.problem_from_scene import Posed, pose
-from corporeal.types import Scene, Vector
+from corporeal.pipeline.stages.fill import fill
+from corporeal.pipeline.stages.ground import GroundConfig, pairs
+from corporeal.simulation.played import Prepared
 from corporeal.viewer.still_air import in_air
 
 MOST = 12

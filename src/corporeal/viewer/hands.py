@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Vector
+from corporeal.discretization.problem_from_scene import Posed
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Problem
-from corporeal.treatment.problem_from_scene import Posed
-from corporeal.types import Vector
 from corporeal.viewer.growth import HIGHEST, Added, Growth
 from corporeal.viewer.orders import Order
 

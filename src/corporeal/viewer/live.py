@@ -9,17 +9,17 @@ from itertools import chain
 
 import numpy as np
 
-from corporeal.errors import UserError
-from corporeal.geometry.contents import Whole
-from corporeal.machine import cores
+from corporeal.core.errors import UserError
+from corporeal.core.machine import cores
+from corporeal.discretization.contents import Whole
+from corporeal.discretization.live_quality import Demand, held, live_quality
+from corporeal.discretization.problem_from_scene import pose
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Snapshot
-from corporeal.playback import cast_of, playback, slowed
+from corporeal.pipeline.playback import cast_of, playback, slowed
+from corporeal.pipeline.stages.fill import fill
 from corporeal.render.take import Cast, stress_bytes
-from corporeal.stages.fill import fill
-from corporeal.trajectory.played import Prepared
-from corporeal.treatment.live_quality import Demand, held, live_quality
-from corporeal.treatment.problem_from_scene import pose
+from corporeal.simulation.played import Prepared
 from corporeal.viewer.growth import Find, Grown, Growth
 from corporeal.viewer.hands import Hands, falls
 from corporeal.viewer.moments import Moments

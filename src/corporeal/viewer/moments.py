@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from corporeal.core.types import Frame
+from corporeal.discretization.problem_from_scene import Posed
 from corporeal.mpm.problem import Snapshot
-from corporeal.trajectory.stress import VonMises
-from corporeal.treatment.problem_from_scene import Posed
-from corporeal.types import Frame
+from corporeal.simulation.stress import VonMises
 
 
 class Moments:

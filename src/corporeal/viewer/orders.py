@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from corporeal.errors import UserError
-from corporeal.types import Vector
+from corporeal.core.errors import UserError
+from corporeal.core.types import Vector
 
 FARTHEST = 100.0
 """Of a point that is pulled to [m]."""

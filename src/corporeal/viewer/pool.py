@@ -5,7 +5,7 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.viewer.live import Room
 from corporeal.viewer.things import Things
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from corporeal import store
-from corporeal.corpus.jobs import Event, Job, Progress
-from corporeal.corpus.local import LocalWorkers
-from corporeal.errors import UserError
-from corporeal.machine import cores
-from corporeal.pipeline import Settings, run, verbs
-from corporeal.typed import typed
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.machine import cores
+from corporeal.core.typed import typed
+from corporeal.jobs.jobs import Event, Job, Progress
+from corporeal.jobs.local import LocalWorkers
+from corporeal.pipeline.runner import Settings, run, verbs
 
 FILE = ".queue.json"
 JOBS = ".jobs"

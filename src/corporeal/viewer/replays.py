@@ -12,10 +12,10 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from corporeal.corpus.jobs import Event, Job
-from corporeal.corpus.local import LocalWorkers
-from corporeal.errors import UserError
-from corporeal.machine import cores
+from corporeal.core.errors import UserError
+from corporeal.core.machine import cores
+from corporeal.jobs.jobs import Event, Job
+from corporeal.jobs.local import LocalWorkers
 from corporeal.render.viewer_page import web_file
 from corporeal.viewer.live import Room
 from corporeal.viewer.shelf import Shelf

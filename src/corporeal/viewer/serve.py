@@ -11,7 +11,7 @@ from ipaddress import ip_address
 import uvicorn
 from starlette.applications import Starlette
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.viewer.guard import LOCAL, Door
 
 ANY = ("0.0.0.0", "::")

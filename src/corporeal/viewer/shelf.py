@@ -6,17 +6,17 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from corporeal import store
-from corporeal.errors import UserError
-from corporeal.findings import RunAudit
-from corporeal.geometry.beginnings import said_lift
-from corporeal.pipeline import FOLDERS, RUN, read_back, reopen
-from corporeal.playback import cast_of, playback, recorded
-from corporeal.results import Results
-from corporeal.stages.ground import DEFAULT, GroundConfig
-from corporeal.trajectory.audit_file import AUDIT
-from corporeal.treatment.plan import Detail
-from corporeal.typed import typed
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.findings import RunAudit
+from corporeal.core.typed import typed
+from corporeal.discretization.plan import Detail
+from corporeal.pipeline.playback import cast_of, playback, recorded
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import FOLDERS, RUN, read_back, reopen
+from corporeal.pipeline.stages.ground import DEFAULT, GroundConfig
+from corporeal.scene.beginnings import said_lift
+from corporeal.simulation.audit_file import AUDIT
 
 INBOX = ".inbox"
 """Folder of uploads, among the runs."""

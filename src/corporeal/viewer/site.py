@@ -14,8 +14,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from corporeal.errors import UserError
-from corporeal.pipeline import FOLDERS
+from corporeal.core.errors import UserError
+from corporeal.pipeline.runner import FOLDERS
 from corporeal.render.viewer_page import MODULES, web_file
 from corporeal.viewer.guard import POLICY_OF_REPORT, Door, Guard
 from corporeal.viewer.shelf import THUMBNAIL, Shelf

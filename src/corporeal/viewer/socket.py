@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.viewer.live import Live, Room
 from corporeal.viewer.orders import PER_SECOND, parsed
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from corporeal.types import Scene, Wind
+from corporeal.core.types import Scene, Wind
 
 CALM = Wind((1e-3, 0.0, 0.0), start=float("inf"))
 """Gives every object its faces for a wind to come, and acts at no time: what air at rest takes from

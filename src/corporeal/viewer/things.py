@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.errors import UserError
-from corporeal.geometry.contents import Whole
-from corporeal.mixture import ground_weighed
-from corporeal.pipeline import Settings
+from corporeal.core.errors import UserError
+from corporeal.core.types import MaterialField, Parts, Scene
+from corporeal.discretization.contents import Whole
+from corporeal.pipeline.mixture import ground_weighed
+from corporeal.pipeline.runner import Settings
+from corporeal.pipeline.stages.describe import describe
+from corporeal.pipeline.stages.segment import segment
 from corporeal.showcase.models import PROPS
 from corporeal.showcase.props import prop
-from corporeal.stages.describe import describe
-from corporeal.stages.segment import segment
-from corporeal.types import MaterialField, Parts, Scene
 from corporeal.viewer.shelf import Shelf
 
 OURS = "corporeal"

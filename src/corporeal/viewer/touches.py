@@ -12,17 +12,17 @@ from typing import Literal
 
 import numpy as np
 
-from corporeal import store
-from corporeal.machine import cores
-from corporeal.pipeline import read_back, reopen
-from corporeal.playback import FAST, cast_of, playback
+from corporeal.core import store
+from corporeal.core.machine import cores
+from corporeal.core.typed import typed
+from corporeal.core.types import Frame, Particles
+from corporeal.discretization.plan import QUALITIES
+from corporeal.pipeline.playback import FAST, cast_of, playback
+from corporeal.pipeline.results import Results
+from corporeal.pipeline.runner import read_back, reopen
+from corporeal.pipeline.stages.fill import FillConfig, fill
 from corporeal.render.take import record
-from corporeal.results import Results
-from corporeal.stages.fill import FillConfig, fill
-from corporeal.trajectory.played import Prepared
-from corporeal.treatment.plan import QUALITIES
-from corporeal.typed import typed
-from corporeal.types import Frame, Particles
+from corporeal.simulation.played import Prepared
 from corporeal.viewer.growth import Added, Growth
 from corporeal.viewer.hands import JOIN, Hands, Touch, falls
 from corporeal.viewer.moments import Moments

@@ -7,7 +7,7 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from corporeal.errors import BadFileError
+from corporeal.core.errors import BadFileError
 
 ENTRIES = 2_000
 """Most files in a zip."""

@@ -12,7 +12,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.viewer.shelf import INBOX
 from corporeal.viewer.unpack import unpack
 

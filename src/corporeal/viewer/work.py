@@ -10,10 +10,10 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.materials.library import library
-from corporeal.pipeline import Settings, reopen
-from corporeal.settings.assemble_config import validate as validate_assemble
+from corporeal.pipeline.runner import Settings, reopen
+from corporeal.pipeline.settings.assemble_config import validate as validate_assemble
 from corporeal.viewer.edits import DETAILS, changed, new_name, number
 from corporeal.viewer.queue import Asked, Queue
 from corporeal.viewer.shelf import Shelf

@@ -10,8 +10,8 @@ from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 import numpy as np
 from pydantic import BaseModel
 
-from corporeal import backends
-from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.core import registry
+from corporeal.core.errors import UnknownChoiceError, UserError
 
 Answer = TypeVar("Answer", bound=BaseModel)
 
@@ -190,9 +190,9 @@ def connect(spec: str, record: Path | None = None) -> Vlm | None:
             "'corporeal[models]'. Without it there are --vlm ask:FOLDER (you answer), --vlm "
             "replay:FOLDER and --vlm metadata."
         )
-    model = backends.load("vision-language model", name, MENU)(rest)
+    model = registry.load("vision-language model", name, MENU)(rest)
     if name in LIVE:
-        model = backends.load("wrapper", "cache", WRAPPERS)(model, spec, {})
+        model = registry.load("wrapper", "cache", WRAPPERS)(model, spec, {})
     if record is not None:
-        model = backends.load("wrapper", "record", WRAPPERS)(model, Path(record))
+        model = registry.load("wrapper", "record", WRAPPERS)(model, Path(record))
     return model

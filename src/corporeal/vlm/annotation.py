@@ -8,9 +8,9 @@ from typing import Any
 
 import yaml
 
-from corporeal.errors import BadFileError
-from corporeal.types import PartWords
-from corporeal.vlm.stated import HIGHEST_INFLATION, SEALABLE
+from corporeal.core.errors import BadFileError
+from corporeal.core.types import PartWords
+from corporeal.recognition.stated import HIGHEST_INFLATION, SEALABLE
 
 KEYS = (
     "material",

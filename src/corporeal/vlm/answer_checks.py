@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from math import isclose
 
-from corporeal.formats.typical_extents import typical_extent
+from corporeal.recognition.typical_extents import typical_extent
 from corporeal.vlm.answers import (
     KILOGRAMS,
     ExtentsAnswer,

@@ -13,8 +13,8 @@ import numpy as np
 from PIL import Image
 from pydantic import BaseModel, ValidationError
 
-from corporeal import store
-from corporeal.errors import UserError
+from corporeal.core import store
+from corporeal.core.errors import UserError
 from corporeal.vlm import Answer, Check, Question, Reply, nothing
 from corporeal.vlm.recordings import Recordings, asked, digest, first_problem, record
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from corporeal import store
+from corporeal.core import store
 from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
 from corporeal.vlm.recordings import schema_digest
 

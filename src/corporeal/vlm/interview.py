@@ -7,7 +7,7 @@ from string import Template
 
 import numpy as np
 
-from corporeal.geometry.drawn import NOTHING, Drawn, Thin
+from corporeal.discretization.drawn import NOTHING, Drawn, Thin
 from corporeal.vlm import (
     ONCE,
     Answer,

@@ -8,8 +8,8 @@ from math import log
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.geometry.make import NINE_IN_TEN
-from corporeal.types import Evidence, Note, NoteKind, ObjectWords
+from corporeal.core.types import Evidence, Note, NoteKind, ObjectWords
+from corporeal.discretization.make import NINE_IN_TEN
 from corporeal.vlm.words import leaves
 
 JUDGED = 0.25

@@ -40,7 +40,7 @@ from pydantic_ai.profiles import ModelProfile
 from pydantic_ai.settings import ModelSettings
 from pydantic_ai.usage import RunUsage
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.vlm import (
     Answer,
     Check,

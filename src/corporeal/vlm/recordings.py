@@ -12,8 +12,8 @@ from threading import Lock
 
 from pydantic import BaseModel, ValidationError
 
-from corporeal import store
-from corporeal.errors import BadFileError, UserError
+from corporeal.core import store
+from corporeal.core.errors import BadFileError, UserError
 from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
 
 FIELDS = ("task", "scene", "prompt", "schema", "views")

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import UserError
-from corporeal.formats.typical_extents import length, one_of, typical_extent, words_in
-from corporeal.formats.words import everyday, safe, unique
-from corporeal.geometry.metric import Extent, MetricScale, chosen, implausible, of_file
-from corporeal.geometry.sizes import said_extent
-from corporeal.types import NOTHING_ASKED, Note, NoteKind, Usage
+from corporeal.core.errors import UserError
+from corporeal.core.types import NOTHING_ASKED, Note, NoteKind, Usage
+from corporeal.discretization.sizes import said_extent
+from corporeal.multiview.metric import Extent, MetricScale, chosen, implausible, of_file
+from corporeal.recognition.typical_extents import length, one_of, typical_extent, words_in
+from corporeal.recognition.words import everyday, safe, unique
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.interview import Interview, Subject
 from corporeal.vlm.sizes import ANSWERED, TABLE

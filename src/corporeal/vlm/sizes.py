@@ -11,8 +11,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from corporeal.formats.typical_extents import MARGIN, typical_extent
-from corporeal.types import NOTHING_ASKED, Note, NoteKind, Usage
+from corporeal.core.types import NOTHING_ASKED, Note, NoteKind, Usage
+from corporeal.recognition.typical_extents import MARGIN, typical_extent
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Subject

@@ -5,8 +5,7 @@ from dataclasses import replace
 from math import exp, hypot, log
 from typing import Literal
 
-from corporeal.geometry.make import width_of
-from corporeal.types import (
+from corporeal.core.types import (
     NOTHING_ASKED,
     Evidence,
     Hypothesis,
@@ -21,6 +20,7 @@ from corporeal.types import (
     Usage,
     in_way,
 )
+from corporeal.discretization.make import width_of
 from corporeal.vlm.answers import (
     CUBIC_METRES,
     KILOGRAMS,

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from corporeal.core.types import Law
 from corporeal.mpm import formulas, laws
 from corporeal.mpm.formulas.one_lane import (
     OPENED,
@@ -20,7 +21,6 @@ from corporeal.mpm.laws.drucker_prager import apex_strain, cone_slope
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.laws.law import Numbers, lame
 from corporeal.mpm.warp_start import wp
-from corporeal.types import Law
 
 wp.set_module_options(formulas.options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from corporeal.core.types import Law
 from corporeal.mpm import laws
 from corporeal.mpm.laws import kinematics
 from corporeal.mpm.laws.law import lame
-from corporeal.types import Law
 
 MU, LAM = lame(1e3, 0.3)
 

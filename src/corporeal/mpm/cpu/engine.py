@@ -8,8 +8,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from corporeal.errors import SimulationError
-from corporeal.machine import cores
+from corporeal.core.errors import SimulationError
+from corporeal.core.machine import cores
 from corporeal.mpm.constants import (
     FALL,
     FARTHEST,

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
 from corporeal.mpm.cpu import program
 from corporeal.mpm.cpu.layout import NANOSECONDS
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from corporeal.errors import SimulationError
+from corporeal.core.errors import SimulationError
 from corporeal.mpm.cpu.layout import (
     BLOCK,
     CHANNELS,

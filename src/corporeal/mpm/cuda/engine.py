@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.errors import SimulationError, UserError
+from corporeal.core.errors import SimulationError, UserError
 from corporeal.mpm.cuda import layout, memory, particle_memory
 from corporeal.mpm.cuda import load_memory as extras
 from corporeal.mpm.cuda.layout import wp

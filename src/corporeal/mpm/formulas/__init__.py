@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from corporeal.core.types import Law
 from corporeal.mpm import constants, laws
 from corporeal.mpm.warp_start import wp
-from corporeal.types import Law
 
 HERE = Path(__file__).parent.resolve()
 HEADERS = tuple(sorted(path.name for path in HERE.glob("*.h")))

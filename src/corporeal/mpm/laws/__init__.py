@@ -9,10 +9,10 @@ from importlib import import_module
 import numpy as np
 from jaxtyping import Bool, Int
 
+from corporeal.core.types import Law
 from corporeal.mpm.constants import BULK_ROUNDING, OWN_BULK
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors, stretches
 from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Numbers
-from corporeal.types import Law
 
 
 def _written(law: Law) -> ConstitutiveLaw:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Vector
 from corporeal.mpm.constants import GRIP_DAMPING, GRIP_REACH, GRIP_STIFFNESS
 from corporeal.mpm.problem import Body, Problem
-from corporeal.types import Vector
 
 
 @dataclass(frozen=True)

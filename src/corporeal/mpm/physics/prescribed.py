@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from corporeal.errors import UserError
+from corporeal.core.errors import UserError
+from corporeal.core.types import Keyframes, Vector
 from corporeal.mpm.constants import (
     KEY_FRAME,
     KEY_PLACE,
@@ -25,7 +26,6 @@ from corporeal.mpm.constants import (
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.springs import turn_of
 from corporeal.mpm.problem import Body, Problem
-from corporeal.types import Keyframes, Vector
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline

@@ -17,8 +17,8 @@ object gives another are left out.
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.core.types import Wind
 from corporeal.mpm.constants import AIR_DENSITY, GUST_PARTS, PLATE, SLOWEST_GUST, TINY
-from corporeal.types import Wind
 
 HALF_RHO_C = 0.5 * AIR_DENSITY * PLATE
 """½ ρ C: what the square of a wind's speed presses with on a plate that faces it [kg/m³]."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.errors import SimulationError
+from corporeal.core.errors import SimulationError
 from corporeal.mpm import laws
 from corporeal.mpm.constants import (
     FALL,

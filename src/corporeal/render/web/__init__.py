@@ -1,1 +1,1 @@
-"""Files of the viewer that a browser reads."""
+"""The viewer's web page."""

@@ -1,0 +1,119 @@
+"""What works on this machine, with advice."""
+
+import os
+import platform
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from typing import Any
+
+from corporeal.core.machine import cores
+from corporeal.core.version import __version__
+
+KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
+LIBRARIES = {
+    "embreex": "films and pictures",
+    "igl": "filling of meshes",
+    "DracoPy": "Draco files",
+    "pycolmap": "photographs without poses, and films",
+    "pxr": "meshes in USD",
+    "lxml": "meshes in 3MF and DAE",
+    "collada": "meshes in DAE",
+}
+PACKAGES = {"igl": "libigl", "pxr": "usd-core", "collada": "pycollada"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the examination."""
+
+    what: str
+    works: bool
+    found: str
+    advice: str = ""
+    """What to do, or what would be gained; empty when there is nothing to say."""
+
+
+def examine() -> list[Finding]:
+    """Look at everything; a broken piece is a finding, never an exception."""
+    checks: list[Callable[[], list[Finding]]] = [_machine, _engines, _libraries, _encoder, _keys]
+    return [finding for check in checks for finding in check()]
+
+
+def _machine() -> list[Finding]:
+    system = f"corporeal {__version__}, Python {platform.python_version()}, {platform.platform()}"
+    free = shutil.disk_usage(".").free / 1e9
+    return [
+        Finding("system", True, system),
+        Finding("processor", True, _cores(cores(), os.cpu_count() or 1)),
+        Finding("disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."),
+    ]
+
+
+def _cores(used: int, all_of_them: int) -> str:
+    """Say how many cores are used, and of how many where that is fewer than there are."""
+    said = f"{used} core{'s' * (used != 1)}"
+    return said if used >= all_of_them else f"{said} of the {all_of_them} that the machine has"
+
+
+def _engines() -> list[Finding]:
+    try:
+        from corporeal.mpm.cpu.program import wp  # started without its word about cards on stderr
+
+        cards = [_card(device) for device in wp.get_cuda_devices()]
+    except Exception as error:  # whatever is broken in a native library belongs in the table
+        return [Finding("cpu engine", False, str(error), "Reinstall: pip install warp-lang.")]
+    gpu = ", ".join(cards) or "no CUDA card: simulations run on the processor"
+    use = "Simulate on it with --engine cuda." if cards else "Not needed."
+    return [
+        Finding("cpu engine", True, f"Warp {version('warp-lang')}, on the processor"),
+        Finding("GPU", bool(cards), gpu, use),
+        Finding("reference engine", True, "NumPy, slow: for checking"),
+    ]
+
+
+def _card(device: Any) -> str:
+    return f"{device.name} (sm_{device.arch}, {device.total_memory / 2**30:.0f} GB)"
+
+
+def _libraries() -> list[Finding]:
+    return [_library(module, use) for module, use in LIBRARIES.items()]
+
+
+def _library(module: str, use: str) -> Finding:
+    package = PACKAGES.get(module, module)
+    try:
+        return Finding(package, find_spec(module) is not None, f"{version(package)}, for {use}")
+    except PackageNotFoundError:
+        return Finding(package, False, "missing", f"pip install {package} (for {use}).")
+
+
+def _encoder() -> list[Finding]:
+    try:
+        import imageio_ffmpeg
+
+        path = imageio_ffmpeg.get_ffmpeg_version()
+    except Exception as error:  # as above
+        return [Finding("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
+    return [Finding("ffmpeg", True, f"{path}, a separate program, for films")]
+
+
+def _keys() -> list[Finding]:
+    present = [name for name in KEYS if os.environ.get(name)]
+    found = ", ".join(present) or "no API key in the environment"
+    advice = (
+        "Only to ask a model what objects are made of (--vlm openai:MODEL). Without one there are "
+        "the names in the file, --annotations, --vlm ask:FOLDER (you answer) and --vlm "
+        "replay:FOLDER."
+    )
+    installed = find_spec("pydantic_ai") is not None
+    client = f"pydantic-ai {version('pydantic-ai-slim')}" if installed else "not installed"
+    install = (
+        "" if installed else "pip install 'corporeal[models]', to ask models over the network."
+    )
+    return [
+        Finding("model client", installed, client, install),
+        Finding("model keys", bool(present), found, "" if present else advice),
+    ]

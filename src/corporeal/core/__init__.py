@@ -1,0 +1,1 @@
+"""Data types, errors, stored results, plug-in registry, progress and terminal output."""

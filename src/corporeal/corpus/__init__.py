@@ -1,1 +1,0 @@
-"""Many scenes: planned, assembled, run and reported."""

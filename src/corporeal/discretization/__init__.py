@@ -1,0 +1,1 @@
+"""How each part is simulated: solid, shell, sheet or filled, with which parameters."""

@@ -1,0 +1,123 @@
+"""Expected impact speed and acceleration of every object, before anything is simulated."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.core.types import Scene, SceneObject
+from corporeal.discretization.falls import falls
+from corporeal.discretization.outer_skin import cross_section
+from corporeal.discretization.part import Landing, Motion
+from corporeal.discretization.survey import Anatomy
+from corporeal.mpm.physics.prescribed import fastest_velocity
+from corporeal.mpm.physics.wind import greatest_acceleration
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a push, wind or a prescribed path does to an object."""
+
+    velocity: Float[np.ndarray, " 3"]
+    """Gained at most [m/s]."""
+    acceleration: float
+    """Largest [m/s²]."""
+
+
+def motions(
+    scene: Scene,
+    anatomies: list[Anatomy],
+    masses: list[float],
+    seed: int,
+    vessels: Mapping[int, int] = MappingProxyType({}),
+) -> list[Motion]:
+    """Estimate every object's speed at impact.
+
+    Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add
+    horizontally. What may be hit by another object is hit at the difference of their horizontal
+    velocities, and at the larger of their speeds of fall.
+
+    Args:
+        scene: The objects, gravity, and what acts on each object.
+        anatomies: One per object.
+        masses: Of every object [kg].
+        seed: Of the points by which free heights are measured.
+        vessels: Of each object that lies loose in another, that other.
+
+    """
+    gravity = float(np.linalg.norm(scene.gravity))
+    drops = falls([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
+    # Each object by itself.
+    horizontal, fall, forced = [], [], []
+    single = [
+        driven(obj, anatomies[k], masses[k], scene.duration) for k, obj in enumerate(scene.objects)
+    ]
+    drives = carried(single, masses, vessels)
+    for obj, height, drive in zip(scene.objects, drops.height, drives, strict=True):
+        velocity = np.array(obj.velocity) + drive.velocity
+        horizontal.append(velocity[:2])
+        dropped = 0.0 if obj.path is not None else height
+        fall.append(np.sqrt(velocity[2] ** 2 + 2 * gravity * dropped))
+        forced.append(drive.acceleration)
+    # Each object against every other.
+    result = []
+    for i in range(len(scene.objects)):
+        speeds = [float(np.hypot(fall[i], np.linalg.norm(horizontal[i])))]
+        for j in range(len(scene.objects)):
+            if j != i:
+                closing = np.linalg.norm(horizontal[i] - horizontal[j])
+                speeds.append(float(np.hypot(max(fall[i], fall[j]), closing)))
+        lands = Landing(int(drops.onto[i]), float(fall[i]), masses[i])
+        result.append(Motion(max(speeds), gravity + forced[i], forced[i], lands))
+    return result
+
+
+def carried(
+    drives: Sequence[Drive], masses: Sequence[float], vessels: Mapping[int, int]
+) -> list[Drive]:
+    """Share what drives a vessel with what lies loose in it, which it carries along.
+
+    Args:
+        drives: Of every object by itself.
+        masses: Of every object [kg].
+        vessels: Of each object that lies loose in another, that other.
+
+    """
+    found = list(drives)
+    for vessel in set(vessels.values()):
+        load = [k for k, v in vessels.items() if v == vessel]
+        share = masses[vessel] / (masses[vessel] + sum(masses[k] for k in load))
+        drive = drives[vessel]
+        for k in (vessel, *load):
+            found[k] = Drive(share * drive.velocity, share * drive.acceleration)
+    return found
+
+
+def driven(obj: SceneObject, anatomy: Anatomy, mass: float, duration: float) -> Drive:
+    """Estimate what push and wind do to an object: wind makes it no faster than the air.
+
+    Args:
+        obj: With its push, wind or path.
+        anatomy: Its shape.
+        mass: [kg]
+        duration: Of the simulation [s].
+
+    """
+    gained, strongest = np.zeros(3), 0.0
+    if obj.path is not None:
+        reach = float(np.ptp(anatomy.everything.vertices, axis=0).max())
+        return Drive(fastest_velocity(obj.path, reach), 0.0)
+    if obj.push is not None:
+        push = np.array(obj.push.acceleration)
+        gained += push * max(0.0, min(obj.push.end, duration) - obj.push.start)
+        strongest += float(np.linalg.norm(push))
+    if obj.wind is not None:
+        air = np.array(obj.wind.velocity) * (1.0 + obj.wind.gust)
+        shown = cross_section(anatomy, obj.wind.velocity)
+        blown = greatest_acceleration(obj.wind, shown, mass)
+        lasts = max(0.0, min(obj.wind.end, duration) - obj.wind.start)
+        gained += air * min(1.0, blown * lasts / max(float(np.linalg.norm(air)), 1e-30))
+        strongest += blown
+    return Drive(gained, strongest)

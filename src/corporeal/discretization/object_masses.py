@@ -1,0 +1,181 @@
+"""Masses of whole objects: those that a file states, and those that are implausible."""
+
+from collections.abc import Mapping, Sequence
+
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
+    Material,
+    MaterialField,
+    Note,
+    NoteKind,
+    PartWords,
+    Scene,
+    SceneObject,
+)
+from corporeal.discretization.extent import oriented_size
+from corporeal.discretization.make import DRAWN, Make, heavier
+from corporeal.discretization.survey import Anatomy
+from corporeal.materials.quantities import QUANTITIES
+from corporeal.recognition.said_mass import doubt_said_mass
+from corporeal.recognition.typical_bulk import doubt_mass
+
+NOTABLE = 0.01
+"""Relative difference between a stated mass and the computed one that is reported."""
+THICK = 1.5
+"""A wall that is drawn thicker than the thickest of its material, times this, is reported."""
+SHEETS = ("leather", "synthetic_leather", "aluminium_can_sheet")
+"""Materials that come in sheets alone."""
+LAYERS = 8.0
+"""So many of the thickest sheets on one another are reported."""
+UNSEEN = ("metadata", "unknown")
+"""Who recognises a material without having looked at the object."""
+
+
+def as_heavy_as_stated(
+    scene: Scene, anatomies: Sequence[Anatomy], makes: Mapping[int, Make]
+) -> tuple[dict[int, Make], tuple[str, ...]]:
+    """Let objects weigh what their file states: all parts of one object by the same factor.
+
+    Args:
+        scene: The objects, with the masses that their files state.
+        anatomies: One per object.
+        makes: How every part is made.
+
+    Returns:
+        How every part is made, and a sentence for each object that its materials and its shape
+        would give another mass.
+
+    Raises:
+        UserError: No material is as dense as that.
+
+    """
+    made, warnings = dict(makes), []
+    for obj, anatomy in zip(scene.objects, anatomies, strict=True):
+        own = [m.part for m in anatomy.members]
+        usual = sum(makes[k].mass for k in own)
+        if obj.mass is None or usual <= 0:
+            continue
+        made |= {k: heavier(makes[k], obj.mass / usual) for k in own}
+        possible = QUANTITIES["density"]
+        for row in (made[k] for k in own):
+            if not possible.low <= row.density <= possible.high:
+                raise UserError(
+                    f"{obj.name}: its file states {obj.mass:.3g} kg, so that its material would "
+                    f"have {row.density:.3g} kg/m³; no material has less than {possible.low:g} or "
+                    f"more than {possible.high:g}. Correct the file, or its unit of mass."
+                )
+        if abs(obj.mass / usual - 1) > NOTABLE:
+            warnings.append(
+                f"{obj.name} weighs {obj.mass:.3g} kg, as its file states; its materials and "
+                f"its shape would give {usual:.3g} kg."
+            )
+    return made, tuple(warnings)
+
+
+def implausible_masses(
+    scene: Scene, anatomies: Sequence[Anatomy], masses: Sequence[float]
+) -> list[str]:
+    """Say which objects are too heavy or too light for the room that they take.
+
+    Args:
+        scene: The objects, with what they are.
+        anatomies: One per object.
+        masses: Of every part, as large as it is in the scene [kg].
+
+    """
+    doubts = (
+        doubt_mass(
+            obj.name,
+            obj.class_name or obj.name,
+            sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
+            _real(oriented_size(anatomy.vertices), obj.scale),
+        )
+        for obj, anatomy in zip(scene.objects, anatomies, strict=True)
+    )
+    return [sentence for sentence in doubts if sentence]
+
+
+def masses_not_as_named(
+    scene: Scene, anatomies: Sequence[Anatomy], masses: Sequence[float]
+) -> list[str]:
+    """Say which objects do not weigh what their names say ("dumbbell_5kg").
+
+    Args:
+        scene: The objects, with what they are called.
+        anatomies: One per object.
+        masses: Of every part, as large as it is in the scene [kg].
+
+    """
+    doubts = (
+        doubt_said_mass(
+            obj.name,
+            sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
+            obj.name,
+            obj.stem,
+        )
+        for obj, anatomy in zip(scene.objects, anatomies, strict=True)
+    )
+    return [sentence for sentence in doubts if sentence]
+
+
+def _real(sides: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
+    """Return lengths in the scene as they are in life [m]."""
+    a, b, c = sides
+    return a / scale, b / scale, c / scale
+
+
+def walls_drawn_too_thick(
+    scene: Scene, anatomies: Sequence[Anatomy], makes: Mapping[int, Make], field: MaterialField
+) -> list[str]:
+    """Say which walls weigh too much, because nobody but the mesh said how thick they are.
+
+    Artists draw walls as thick as looks well: a bin of polypropylene had 9 mm. What comes in sheets
+    and is a block, because nobody said that it covers something, is said, too.
+
+    Args:
+        scene: The objects.
+        anatomies: One per object.
+        makes: How every part is made.
+        field: What it is made of, with walls as thick as in the scene.
+
+    """
+    doubts = (
+        _thick_wall(obj, makes[m.part], field.words[m.part], field.materials[m.part])
+        for obj, anatomy in zip(scene.objects, anatomies, strict=True)
+        for m in anatomy.members
+    )
+    return [sentence for sentence in doubts if sentence]
+
+
+def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Material) -> str:
+    """Say that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
+    ground = material.grounds.get("shell_thickness")
+    if ground is None or words.answered_by not in UNSEEN:
+        return ""
+    if material.name in SHEETS and made.thickness == 0:
+        return _thick_block(obj, made, words, ground.range.high)
+    if made.whose != DRAWN:
+        return ""
+    drawn, usual = made.thickness / obj.scale, ground.range
+    if drawn <= usual.high * THICK:
+        return ""
+    low, typical, high = (f"{1e3 * x:.2g}" for x in (usual.low, usual.typical, usual.high))
+    return Note(
+        f"{obj.name}: the mesh of {words.name} draws a wall {1e3 * drawn:.2g} mm thick, and such "
+        f"walls of {material.name} have {low} to {high} mm, usually {typical}: it may be "
+        f"{drawn / usual.typical:.2g} times too heavy. Say how thick it is with --annotations.",
+        NoteKind.ASSUMED,
+    )
+
+
+def _thick_block(obj: SceneObject, made: Make, words: PartWords, thickest: float) -> str:
+    """Say that what comes in sheets is a block; "": it may be some sheets on one another."""
+    through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
+    if through <= LAYERS * thickest:
+        return ""
+    return Note(
+        f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, "
+        f"and that comes in sheets of up to {1e3 * thickest:.2g} mm: it may be many times too "
+        "heavy. Say what is behind the sheet with --annotations.",
+        NoteKind.ASSUMED,
+    )

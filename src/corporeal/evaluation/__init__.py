@@ -1,1 +1,0 @@
-"""How good it is: what was predicted against what was measured."""

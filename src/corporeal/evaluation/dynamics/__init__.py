@@ -1,1 +1,0 @@
-"""Dynamics evaluated: methods against a finer run and against life, measured alike."""

@@ -1,0 +1,149 @@
+"""Convex hulls: of anything that has a surface, and how they stand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import ConvexHull, QhullError
+
+from corporeal.core.errors import UserError
+
+FOOT = 2e-3
+"""Of the largest side: what is no higher than this above the lowest point carries weight."""
+FACES = 16
+"""Faces of a hull that are tried as undersides, largest first."""
+LEAN, LEVEL = 0.17, 0.1
+"""How far a face may be from the horizontal: of a body that is upright, and of its top [rad]."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A convex body."""
+
+    vertices: Float[np.ndarray, "V 3"]
+    """[m]"""
+    triangles: Int[np.ndarray, "T 3"]
+    """Anticlockwise seen from outside."""
+
+    @property
+    def volume(self) -> float:
+        """How much it holds [m³]."""
+        return float(self._tetrahedra.sum())
+
+    @property
+    def centre(self) -> Float[np.ndarray, "3"]:
+        """Centre of mass [m]."""
+        middle = self.vertices.mean(axis=0)
+        corners = self.vertices[self.triangles]
+        weight = self._tetrahedra
+        return (corners.sum(axis=1) + middle).T @ weight / (4 * weight.sum())
+
+    @property
+    def _tetrahedra(self) -> Float[np.ndarray, " T"]:
+        """Volume between each triangle and the middle [m³]."""
+        a, b, c = np.swapaxes(self.vertices[self.triangles] - self.vertices.mean(axis=0), 0, 1)
+        return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+
+
+def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> Piece:
+    """Enclose points; what is flatter than ``thinnest`` [m] becomes a plate of that thickness.
+
+    Raises:
+        UserError: The points lie on a line or are fewer than three.
+
+    """
+    points = np.unique(points, axis=0)
+    points = points if len(points) < 3 else _thickened(points, thinnest)
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise UserError("it has no surface: its points are fewer than three, or on a line") from (
+            error
+        )
+    triangles = hull.simplices
+    a, b, c = np.swapaxes(points[triangles], 0, 1)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    triangles = np.where(inward[:, None], triangles[:, ::-1], triangles)
+    used, number = np.unique(triangles, return_inverse=True)
+    return Piece(points[used], number.reshape(-1, 3).astype(np.int64))
+
+
+def _thickened(points: np.ndarray, thinnest: float) -> np.ndarray:
+    """Move points apart along the direction in which there is least of them."""
+    _, spread, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    if spread[1] <= 1e-6 * spread[0]:
+        return points
+    lacking = thinnest - float(np.ptp(points @ axes[2]))
+    if lacking <= 0:
+        return points
+    shift = 0.5 * lacking * axes[2]
+    return np.concatenate([points - shift, points + shift])
+
+
+def tip_angle(hull: Piece, centre: Float[np.ndarray, "3"], down: Float[np.ndarray, "3"]) -> float:
+    """How far a body must be tilted before it falls over [rad]; 0 where it does not stand at all.
+
+    The least angle, over the edges of the polygon it stands on, by which its centre of mass must
+    turn to be above the edge.
+
+    Args:
+        hull: The body's.
+        centre: Its centre of mass [m].
+        down: Unit, in the body's frame: where the floor is.
+
+    """
+    below = (hull.vertices - centre) @ down
+    side = float(np.ptp(hull.vertices, axis=0).max())
+    foot = hull.vertices[below > below.max() - FOOT * side] - centre
+    across = np.linalg.svd(down[None])[2][1:]
+    try:
+        edges = ConvexHull(foot @ across.T).equations
+    except (QhullError, ValueError):
+        return 0.0
+    margin = float(-edges[:, 2].max())
+    return float(np.arctan2(margin, below.max())) if margin > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Stance:
+    """One way for a body to stand."""
+
+    down: Float[np.ndarray, "3"]
+    """Unit, in the body's frame: where the floor is."""
+    tip: float
+    """How far it must be tilted before it falls over [rad]."""
+    top: float
+    """Area of what is level at its top [m²]: what other objects can stand on."""
+
+
+def stances(hull: Piece, centre: Float[np.ndarray, "3"]) -> tuple[Stance, Stance]:
+    """Return how a body stands upright, and how it stands best of all.
+
+    Feet are seldom even: upright is any face of the hull that looks down to within ``LEAN``.
+    """
+    a, b, c = np.swapaxes(hull.vertices[hull.triangles], 0, 1)
+    vector = 0.5 * np.cross(b - a, c - a)
+    area = np.linalg.norm(vector, axis=1)
+    normal = vector / np.maximum(area, 1e-300)[:, None]
+    below = np.where(normal[:, 2] < -np.cos(LEAN), area, 0.0)
+
+    def stance(down: np.ndarray) -> Stance:
+        level = normal @ down < -np.cos(LEVEL)
+        return Stance(down, tip_angle(hull, centre, down), float(area[level].sum()))
+
+    straight = stance(np.array([0.0, 0.0, -1.0]))
+    leaning = [stance(d) for d in _faces(normal, below, 0.01)]
+    upright = max([straight, *leaning], key=lambda s: s.tip)
+    any_way = [stance(d) for d in _faces(normal, area, LEVEL)]
+    return upright, max([upright, *any_way], key=lambda s: s.tip)
+
+
+def _faces(normal: np.ndarray, area: np.ndarray, alike: float) -> list[np.ndarray]:
+    """Return the normals of the largest faces, no two within ``alike`` [rad]."""
+    found: list[np.ndarray] = []
+    area = area.copy()
+    while len(found) < FACES and area.max() > 0:
+        best = normal[np.argmax(area)]
+        found.append(best)
+        area[normal @ best > np.cos(alike)] = 0.0
+    return found

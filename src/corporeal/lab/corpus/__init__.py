@@ -1,0 +1,1 @@
+"""Plan, assemble, run and report many scenes."""

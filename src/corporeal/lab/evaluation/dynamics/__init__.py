@@ -1,0 +1,1 @@
+"""Evaluation of motion: methods against a finer simulation and against measurements."""

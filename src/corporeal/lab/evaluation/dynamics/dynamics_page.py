@@ -1,0 +1,132 @@
+"""The page of an evaluation of dynamics, and the same for the documentation."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from corporeal.core import store
+from corporeal.lab.evaluation.dynamics import dynamics_figure
+from corporeal.lab.evaluation.dynamics.dynamics_tables import (
+    as_markdown,
+    missing_references,
+    tables,
+    verdicts,
+)
+from corporeal.lab.evaluation.dynamics.methods import WORDS
+from corporeal.lab.evaluation.dynamics.summary import Summary
+from corporeal.lab.evaluation.result_table import Table
+from corporeal.render.page import inlined, page, safe
+
+COLUMNS = {
+    "expected": "expectations of the showcase that are met; none is in a run that gained energy.",
+    "path": (
+        "distance of the centres of mass from the reference's until .2 s after an object's first "
+        "new contact, root mean square over time, over its diagonal; mean over objects. =: no "
+        "farther than ours at this detail, which is as near as this comparison can tell."
+    ),
+    "contacts": "pairs that touched in both runs over those that touched in either (Jaccard).",
+    "Δt": "mean difference of the times of first contacts.",
+    "parted": "share of pairs that parted again in both runs or in neither.",
+    "shape": "median of |log10| of the ratio of largest shape errors.",
+    "rebound": "mean difference of rebounds, as shares of the fall.",
+    "audit": "whether every bound of the audit holds; else its first sentence.",
+    "τ": (
+        "Kendall's rank correlation over pairs within a scene: of the real E with how little what "
+        "was touched deforms, and of restitution with rebound, real balls included."
+    ),
+    "mean distance": "of the restitution from its published range.",
+}
+RULE = (
+    "Columns are expectations, audit, path, contacts and separation; ours is first where no "
+    "baseline that was run is better in more of them than it is worse. What is better than ours is "
+    "named. Means are over the scenes that a method was run in: compare them only where these are "
+    "as many."
+)
+
+
+def write_page(found: Summary, path: Path) -> None:
+    """Write a page that holds all it shows.
+
+    Raises:
+        UserError: The disk refuses it.
+
+    """
+    with TemporaryDirectory() as folder:
+        drawing = Path(folder) / "figure.png"
+        dynamics_figure.draw(found, drawing)
+        figure = inlined(drawing)
+    missing = "".join(f'<p class="warn">{safe(s)}</p>' for s in missing_references(found))
+    text = page(
+        "corporeal.lab.evaluation.dynamics",
+        "dynamics.html",
+        summary=safe(summed(found)),
+        rule=safe(RULE),
+        verdicts="".join(f"<li>{safe(s)}</li>" for s in verdicts(found)),
+        missing=missing,
+        figure=figure,
+        tables="".join(_html(t) for t in tables(found) if t.rows),
+        columns="".join(f"<dt>{safe(k)}</dt><dd>{safe(v)}</dd>" for k, v in COLUMNS.items()),
+        notes="".join(f"<li>{safe(s)}</li>" for s in borrowed(found)),
+    )
+    store.write_bytes(path, text.encode())
+
+
+def summed(found: Summary) -> str:
+    """Say in a sentence what was compared."""
+    run = [r for r in found.rows if r.numbers is not None]
+    failed = sum(r.error.startswith("failed") for r in found.rows)
+    scenes = len({r.scene for r in found.rows})
+    said = "; ".join(f"{m}: {WORDS[m]}" for m in found.methods)
+    return (
+        f"{len(run)} of {len(found.rows)} runs of {scenes} scenes at {found.detail} are done, "
+        f"{failed} failed, against ours at {found.reference}. {said}.{_older(found)}"
+    )
+
+
+def _older(found: Summary) -> str:
+    """Say how many runs the present code has not made; a finished run is kept when it changes."""
+    numbers = [r.numbers for r in (*found.rows, *found.references) if r.numbers is not None]
+    older = sum(n.source != store.source() for n in numbers)
+    if not older:
+        return ""
+    which = f"{older} of {len(numbers)} runs, references included,"
+    return f" {which} were made by an earlier state of the code."
+
+
+def borrowed(found: Summary) -> list[str]:
+    """Say which numbers of which method are ours, each sentence once."""
+    said = [
+        f"{row.method}: {note}" for row in found.rows if row.numbers for note in row.numbers.notes
+    ]
+    return list(dict.fromkeys(said)) or ["Nothing: no method brought numbers of its own."]
+
+
+def _html(table: Table) -> str:
+    heads = "".join(f"<th>{safe(h)}</th>" for h in table.heads)
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{safe(cell)}</td>' for cell in row)}</tr>" for row in table.rows
+    )
+    return (
+        f'<h2>{safe(table.title)}</h2><div class="wide"><table><tr>{heads}</tr>{rows}</table></div>'
+    )
+
+
+def write_docs(found: Summary, command: str, path: Path) -> None:
+    """Write the measured rows as a page of the documentation; what was not run is left out.
+
+    Args:
+        found: The evaluation.
+        command: That made it.
+        path: Of the page (Markdown).
+
+    """
+    lines = ["# Dynamics against baselines", "", f"Written by `{command}`. {summed(found)}", ""]
+    lines += [RULE, "", *(f"- {s}" for s in verdicts(found)), ""]
+    lines += [f"- {s}" for s in missing_references(found)] + [""]
+    done = {(r.scene, r.method) for r in found.rows if r.numbers or r.error.startswith("failed")}
+    for table in tables(found):
+        rows = [r for r in table.rows if table.heads[0] != "scene" or (r[0], r[1]) in done]
+        if rows:
+            text = as_markdown(Table(table.title, table.heads, rows))
+            lines += [f"## {table.title}", "", text, ""]
+    lines += ["## What the columns are", "", *(f"- **{k}**: {v}" for k, v in COLUMNS.items()), ""]
+    store.write_bytes(path, "\n".join(lines).encode())

@@ -1,0 +1,135 @@
+"""An evaluation of dynamics as tables: per scene, per group, ranks and life."""
+
+from collections.abc import Sequence
+
+from corporeal.lab.evaluation.dynamics.first_place import Row
+from corporeal.lab.evaluation.dynamics.places import OURS
+from corporeal.lab.evaluation.dynamics.summary import Mean, Summary
+from corporeal.lab.evaluation.result_table import Table
+
+NONE = "–"
+HEADS = ("scene", "method", "expected", "path", "contacts", "parted", "audit")
+MEAN_HEADS = ("method", "scenes", "expected", "clean", "path", "contacts", "Δt [ms]", "parted")
+MEAN_HEADS = (*MEAN_HEADS, "shape", "rebound")
+
+
+def tables(found: Summary) -> list[Table]:
+    """Return all tables of an evaluation."""
+    return [scene_table(found), *group_tables(found), rank_table(found), life_table(found)]
+
+
+def scene_table(found: Summary) -> Table:
+    """Return one row per scene and method."""
+    rows = [_cells(row, found.row(row.scene, OURS)) for row in found.rows]
+    return Table(f"Scenes at {found.detail}, against ours at {found.reference}", HEADS, rows)
+
+
+def _cells(row: Row, ours: Row) -> tuple[str, ...]:
+    if row.numbers is None:
+        return (row.scene, row.method, *(NONE,) * 4, row.error)
+    count = len(row.numbers.expectations)
+    expected = f"{row.met} of {count}" if count else NONE
+    audit = row.error or ("clean" if row.clean else row.numbers.faults[0])
+    if row.against is None:
+        return (row.scene, row.method, expected, NONE, NONE, NONE, audit)
+    path = f"{row.against.path:.2f}"
+    yardstick = ours.against
+    if row.method != OURS and yardstick is not None and row.against.path <= yardstick.path:
+        path = f"= ({path})"
+    contacts, parted = f"{row.against.contacts:.2f}", number(row.against.parted)
+    return (row.scene, row.method, expected, path, contacts, parted, audit)
+
+
+def group_tables(found: Summary) -> list[Table]:
+    """Return means of all scenes, and per material class and law."""
+    titles = {"all": "All scenes", "material class": "By material class", "law": "By law"}
+    return [
+        Table(
+            titles[kind],
+            MEAN_HEADS if kind == "all" else (kind, *MEAN_HEADS),
+            [
+                mean_cells(m) if kind == "all" else (m.group, *mean_cells(m))
+                for m in means
+                if m.scenes
+            ],
+        )
+        for kind, means in found.means.items()
+    ]
+
+
+def mean_cells(mean: Mean) -> tuple[str, ...]:
+    """Return one line of means as text."""
+    return (
+        mean.method,
+        str(mean.scenes),
+        share(mean.met),
+        share(mean.clean) if mean.scenes else NONE,
+        number(mean.path),
+        number(mean.contacts),
+        NONE if mean.delay is None else f"{1e3 * mean.delay:.0f}",
+        number(mean.parted),
+        number(mean.shape),
+        number(mean.rebound),
+    )
+
+
+def rank_table(found: Summary) -> Table:
+    """Return how far each method keeps the order of stiffness and of restitution."""
+    heads = ("method", "τ of stiffness", "pairs", "τ of restitution", "pairs")
+    rows = [
+        (
+            r.method,
+            number(r.stiffness.tau),
+            str(r.stiffness.pairs),
+            number(r.restitution.tau),
+            str(r.restitution.pairs),
+        )
+        for r in found.ranks
+        if r.stiffness.pairs or r.restitution.pairs
+    ]
+    return Table("Ranks: 1 keeps the real order", heads, rows)
+
+
+def life_table(found: Summary) -> Table:
+    """Return how each method does against published rebounds."""
+    heads = ("method", "dropped", "in their range", "mean distance")
+    rows = [(f.method, str(f.drops), str(f.inside), f"{f.off:.3f}") for f in found.life]
+    return Table("Rebound against life", heads, rows)
+
+
+def verdicts(found: Summary) -> list[str]:
+    """Say scene by scene whether ours comes first, and where it does not, why."""
+    said = []
+    for s in found.standings:
+        ours = found.row(s.scene, OURS)
+        where = f"Better than ours: {'; '.join(s.lost)}." if s.lost else ""
+        unmet = [e for e in (ours.numbers.expectations if ours.numbers else ()) if not e.met]
+        why = [f"{e.sentence}: {e.value}, asked {e.target}" for e in unmet]
+        if ours.numbers and ours.numbers.faults:
+            why.append(ours.numbers.faults[0])
+        because = f" Ours falls short in: {'; '.join(why)}." if why else ""
+        place = f"ours {'first' if s.first else 'is not first'}, beside {', '.join(s.beside)}"
+        place += "" if s.referred else " (by expectations and the audit alone)"
+        said.append(f"{s.scene}: {place}. {where}{because}".replace("..", ".").strip())
+    return said
+
+
+def missing_references(found: Summary) -> list[str]:
+    """Say which scenes have no reference, and why."""
+    return [f"{r.scene}: no reference ({r.error})" for r in found.references if r.numbers is None]
+
+
+def number(value: float | None) -> str:
+    """Write a number with two digits after the point."""
+    return NONE if value is None else f"{value:.2f}"
+
+
+def share(value: float | None) -> str:
+    """Write a share as a percentage."""
+    return NONE if value is None else f"{value:.0%}"
+
+
+def as_markdown(table: Table) -> str:
+    """Write a table for the documentation."""
+    lines: list[Sequence[str]] = [table.heads, ["---"] * len(table.heads), *table.rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in x) + " |" for x in lines)

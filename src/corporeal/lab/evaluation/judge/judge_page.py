@@ -1,0 +1,111 @@
+"""The page of a judged evaluation: first what the judge cannot tell, at the end every film."""
+
+import io
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from corporeal.core.store import write_bytes
+from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, tables
+from corporeal.lab.evaluation.judge.put_to_judge import Judged
+from corporeal.lab.evaluation.judge.staging import DATED
+from corporeal.lab.evaluation.judge.telling import FilmVerdict
+from corporeal.lab.evaluation.result_table import Table
+from corporeal.render.page import figure, held, page, safe
+
+Progress = Callable[[float, str], None]
+ROW = 6
+"""Pictures of a film on the page."""
+QUALITY = 80
+"""Of their JPEG."""
+
+
+def write_page(
+    judged: Judged,
+    result: JudgeResult,
+    path: Path,
+    progress: Progress = lambda fraction, words: None,
+) -> None:
+    """Write the page; ``ROW`` pictures of every film's first look are rendered for it.
+
+    Args:
+        judged: What was said of which films.
+        result: What follows.
+        path: Of the page.
+        progress: Told the fraction done and which film is rendered.
+
+    Raises:
+        UserError: The file cannot be written.
+
+    """
+    trusted = {q for questions in result.believed.values() for q in questions}
+    looked = {(a.scene, a.condition): a for a in judged.films.asked if a.look == 0}
+    films = []
+    strips: dict[tuple[str, str], bytes] = {}
+    for number, verdict in enumerate(judged.verdicts):
+        progress(number / len(judged.verdicts), f"{verdict.scene} {verdict.condition}")
+        question = looked[verdict.scene, verdict.condition].question
+        # A baseline that is also a control is one motion, and is rendered once.
+        motion = question.scene, question.prompt
+        if motion not in strips:
+            strips[motion] = _strip(question.pictures)
+        films.append(_film(verdict, strips[motion], trusted))
+    text = page(
+        "corporeal.lab.evaluation.judge",
+        "judge.html",
+        summary=safe(_summary(judged)),
+        cannot=safe(cannot_tell(result)),
+        tables="\n".join(_table(t) for t in tables(judged, result) if t.rows),
+        films="\n".join(films),
+        footer=safe(f"Judge: {judged.judge}"),
+    )
+    write_bytes(path, text.encode())
+
+
+def cannot_tell(result: JudgeResult) -> str:
+    """Say in a sentence which laws of physics the judge cannot tell."""
+    none = [law for law, questions in result.believed.items() if not questions]
+    if not none:
+        return "Of each law of physics at least one question tells a control it is meant for."
+    return (
+        f"Of {', '.join(none)} this judge cannot tell: no question about them reports the faults "
+        "it is meant for more often than on the reference, so no method is marked there."
+    )
+
+
+def _summary(judged: Judged) -> str:
+    by = ", ".join(judged.answered_by) or "nobody"
+    scenes = len({v.scene for v in judged.verdicts})
+    missing = f" {judged.unanswered} looks have no usable answer." if judged.unanswered else ""
+    return f"{len(judged.verdicts)} films of {scenes} scenes, answered by {by}.{missing}"
+
+
+def _table(table: Table) -> str:
+    heads = "".join(f"<th>{safe(h)}</th>" for h in table.heads)
+    rows = "".join(
+        f"<tr>{''.join(f'<td>{safe(cell)}</td>' for cell in row)}</tr>" for row in table.rows
+    )
+    return f"<h2>{safe(table.title)}</h2><table><tr>{heads}</tr>{rows}</table>"
+
+
+def _film(verdict: FilmVerdict, row: bytes, trusted: set[str]) -> str:
+    alarms = [
+        f"<b>{safe(q)}</b>" if q in trusted else safe(q)
+        for q, share in verdict.alarm.items()
+        if share > 0
+    ]
+    said = "; ".join(safe(words) for words in verdict.happens)
+    name = f"{verdict.scene}: {verdict.condition}"
+    strip = figure(name, held(row, "image/jpeg"))
+    reported = ", ".join(alarms) or "no violation"
+    return f"{strip}<p>{reported}; whole {verdict.whole:.1f} of 5. “{said}”</p>"
+
+
+def _strip(pictures: Sequence[np.ndarray]) -> bytes:
+    chosen = np.linspace(0, DATED - 1, ROW).round().astype(int)
+    out = io.BytesIO()
+    row = np.hstack([pictures[int(k)] for k in chosen])
+    Image.fromarray(row).save(out, "JPEG", quality=QUALITY)
+    return out.getvalue()

@@ -1,0 +1,73 @@
+"""Judge the runs that lie in the folder of an evaluation: OUT/SCENE/METHOD."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from corporeal.core.errors import UserError
+from corporeal.lab.evaluation.dynamics.places import METHODS, OURS, reference_folder, run_folder
+from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig, SceneRuns, gather_films
+from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, weigh_judge
+from corporeal.lab.evaluation.judge.put_to_judge import Judged, check_judging, put_to_judge
+from corporeal.pipeline.runner import RUN
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class JudgedRuns:
+    """What a judge said, and what follows."""
+
+    judged: Judged
+    result: JudgeResult
+
+
+def judge_runs(
+    out: Path, config: JudgeConfig, say: Callable[[str], None], progress: Progress
+) -> JudgedRuns:
+    """Judge all scenes of an evaluation; controls that are absent are simulated.
+
+    Args:
+        out: Holds ``SCENE/METHOD``, each a run.
+        config: Who judges, how often.
+        say: Told the price before anybody is asked.
+        progress: Told the fraction done and what is being done.
+
+    Raises:
+        UserError: There are no such runs, nobody judges, or it costs more than was agreed to.
+
+    """
+    check_judging(config)
+    scenes = scenes_in(out)
+    films = gather_films(scenes, out, config, progress)
+    judged = put_to_judge(films, config, say, progress)
+    return JudgedRuns(judged, weigh_judge(judged))
+
+
+def scenes_in(out: Path) -> list[SceneRuns]:
+    """Find the scenes of an evaluation that have our own run.
+
+    Raises:
+        UserError: There are none.
+
+    """
+    folders = sorted(p for p in out.iterdir() if p.is_dir()) if out.is_dir() else []
+    scenes = [
+        _scene(out, p.name) for p in folders if (run_folder(out, p.name, OURS) / RUN).exists()
+    ]
+    if not scenes:
+        raise UserError(
+            f"{out} holds no runs to judge: it has no SCENE/{OURS}. Make them with: corporeal "
+            "evaluate dynamics."
+        )
+    return scenes
+
+
+def _scene(out: Path, name: str) -> SceneRuns:
+    runs = {m: run_folder(out, name, m) for m in METHODS}
+    finer = [reference_folder(out, name, detail) for detail in ("fine", "normal")]
+    return SceneRuns(
+        name,
+        {m: folder for m, folder in runs.items() if (folder / RUN).exists()},
+        next((folder for folder in finer if (folder / RUN).exists()), None),
+    )

@@ -1,0 +1,117 @@
+"""Controls that are simulated: the reference's own scene, with one thing in it that is wrong.
+
+``single`` and ``capped`` are settings of the simulation; ``halfgravity`` is another scene;
+``wrong`` exchanges stiff and soft materials. Each is an ordinary run in a folder of its own, so
+what is finished is not done again.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import yaml
+
+from corporeal.core import store
+from corporeal.core.types import MaterialField, Parts, Scene
+from corporeal.io.glb_writer import write_glb
+from corporeal.mpm.laws import MENU
+from corporeal.pipeline import runner
+from corporeal.pipeline.runner import Settings
+from corporeal.simulation.played import Played
+
+Progress = Callable[[float, str], None]
+SIMULATED = ("halfgravity", "wrong", "single", "capped")
+GRAVITY_SHARE = 0.5
+"""Of gravity that is left in the control "halfgravity" [-]."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a control's run is asked to do."""
+
+    inputs: list[Path]
+    settings: Settings
+
+
+def order_control(control: str, reference: Path, folder: Path) -> Order | None:
+    """Write down how a control of a reference run is simulated; None: it does not apply.
+
+    Args:
+        control: One of ``SIMULATED``.
+        reference: Folder of our own run.
+        folder: Where files that only the control needs are kept.
+
+    Raises:
+        UserError: The reference is not a finished run.
+
+    """
+    asked = runner.reopen(reference)
+    settings = asked.settings
+    if control == "single":
+        return Order(
+            asked.inputs, replace(settings, simulate=replace(settings.simulate, contact="single"))
+        )
+    if control == "capped":
+        return Order(
+            asked.inputs, replace(settings, fill=replace(settings.fill, stiffness="capped"))
+        )
+    made = runner.read_back(reference)
+    if control == "halfgravity":
+        return Order([_lighter(made.scene, folder)], settings)
+    said = exchanged(made.scene, made.parts, made.field)
+    if not said:
+        return None
+    store.write_bytes(folder / "exchanged.yaml", yaml.safe_dump(said).encode())
+    describe = replace(settings.describe, annotations=folder / "exchanged.yaml")
+    return Order(asked.inputs, replace(settings, describe=describe))
+
+
+def simulate_control(
+    control: str, reference: Path, folder: Path, tell: runner.Tell = runner.quiet
+) -> Played | None:
+    """Simulate a control, or read it back where it is finished; None: it does not apply.
+
+    Args:
+        control: One of ``SIMULATED``.
+        reference: Folder of our own run.
+        folder: Of the control's run.
+        tell: Whom to tell about progress.
+
+    Raises:
+        UserError: The scene cannot be simulated so.
+
+    """
+    order = order_control(control, reference, folder.parent / f"{folder.name}-input")
+    if order is None:
+        return None
+    runner.run(order.inputs, folder, order.settings, tell, until="simulate")
+    return runner.read_back(folder).played
+
+
+def exchanged(scene: Scene, parts: Parts, field: MaterialField) -> dict[str, dict]:
+    """Give the stiffest part the softest part's material, and so on; annotations of all parts.
+
+    Parts of liquids and grains keep theirs. Nothing is said where all others are alike.
+    """
+    solid = [k for k, m in enumerate(field.materials) if not MENU[m.law].loose]
+    order = sorted(solid, key=lambda k: (field.materials[k].young, k))
+    said: dict[str, dict] = {}
+    for mine, theirs in zip(order, reversed(order), strict=True):
+        if field.materials[mine].name == field.materials[theirs].name:
+            continue
+        part = parts.catalogue[mine]
+        of_object = said.setdefault(scene.objects[part.object].name, {"parts": {}})
+        of_object["parts"][part.name] = {
+            "material": field.materials[theirs].name,
+            "structure": "solid",
+        }
+    return said
+
+
+def _lighter(scene: Scene, folder: Path) -> Path:
+    x, y, z = (GRAVITY_SHARE * g for g in scene.gravity)
+    path = folder / f"{scene.name}.glb"
+    with store.writing(path):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_glb(path, replace(scene, gravity=(x, y, z)))
+    return path

@@ -1,0 +1,195 @@
+"""What a judge can tell: every question against every control, with intervals.
+
+A question tells a control where it raises an alarm on the control more often than on the reference
+of the same scene, beyond chance. Of a law of physics a judge is believed only through questions
+that tell a control they are meant for.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from statistics import fmean
+
+import numpy as np
+from scipy.stats import beta
+
+from corporeal.lab.evaluation.judge.subquestions import HIGHEST, Catalogue, Verdict, catalogue
+
+LEVEL = 0.90
+"""Of intervals [-]."""
+CHANCE = 0.5
+"""Accuracy of a coin [-]."""
+WHOLE = "whole"
+"""The mark for the whole film, beside the questions."""
+DRAWS = 2000
+"""Of scenes, for the interval of a mean."""
+
+
+@dataclass(frozen=True)
+class FilmVerdict:
+    """What is said of one film: means over looks."""
+
+    scene: str
+    condition: str
+    alarm: Mapping[str, float]
+    """Question → share of looks that report a violation [-]; absent: it applies in no look."""
+    whole: float
+    """Mark, 1 to 5."""
+    happens: tuple[str, ...]
+    """In the judge's words, a look each."""
+
+
+def film_verdict(scene: str, condition: str, looks: Sequence[Verdict]) -> FilmVerdict:
+    """Take the mean of the looks at one film; "unclear" reports nothing."""
+    said = [look.said() for look in looks]
+    alarm = {}
+    for q in catalogue().question:
+        given = [answers[q.id] for answers in said if answers[q.id] != "na"]
+        if given:
+            alarm[q.id] = fmean(float(a == q.violation) for a in given)
+    happens = tuple(look.happens for look in looks)
+    return FilmVerdict(scene, condition, alarm, fmean(look.whole for look in looks), happens)
+
+
+# ---------------------------------------------------------------- controls
+
+
+@dataclass(frozen=True)
+class Interval:
+    """From the 5th to the 95th percentile."""
+
+    low: float
+    high: float
+
+
+def jeffreys(wins: float, count: int) -> Interval:
+    """Interval of a share by Jeffreys' prior, 90 %; a tie is half a win."""
+    tail = (1 - LEVEL) / 2
+    low, high = beta.ppf([tail, 1 - tail], wins + 0.5, count - wins + 0.5)
+    return Interval(float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Telling:
+    """How one question compares one control with the reference."""
+
+    control: str
+    question: str
+    meant: bool
+    """Whether the question is meant to report this control."""
+    scenes: int
+    hits: int
+    """Scenes in which the control raises the greater alarm."""
+    false_alarms: float
+    """Alarms on the references of these scenes."""
+    accuracy: float
+    """Share of scenes in which the control raises the greater alarm, ties half [-]."""
+    interval: Interval
+    tells: bool
+
+
+def tellings(
+    films: Sequence[FilmVerdict], reference: str, controls: Mapping[str, str]
+) -> list[Telling]:
+    """Compare every control with the reference by every question and by the whole mark.
+
+    Args:
+        films: Of controls only those that differ from the reference enough to be told.
+        reference: Name of the reference among the conditions.
+        controls: Control → its name among the conditions.
+
+    """
+    told = {(f.scene, f.condition): f for f in films}
+    scenes = sorted({f.scene for f in films if f.condition == reference})
+    rows = []
+    for control, name in controls.items():
+        pairs = [(told[s, name], told[s, reference]) for s in scenes if (s, name) in told]
+        for question in (*(q.id for q in catalogue().question), WHOLE):
+            both = [
+                (alarm_of(a, question), alarm_of(b, question))
+                for a, b in pairs
+                if alarm_of(a, question) is not None and alarm_of(b, question) is not None
+            ]
+            if both:
+                rows.append(_telling(control, question, np.array(both, dtype=float)))
+    return rows
+
+
+def alarm_of(film: FilmVerdict, question: str) -> float | None:
+    """Return a question's alarm, or how far the whole mark is from the best; None: not asked."""
+    return HIGHEST - film.whole if question == WHOLE else film.alarm.get(question)
+
+
+def _telling(control: str, question: str, both: np.ndarray) -> Telling:
+    worse, better = both.T
+    hits, ties = int((worse > better).sum()), int((worse == better).sum())
+    wins = hits + 0.5 * ties
+    interval = jeffreys(wins, len(both))
+    return Telling(
+        control=control,
+        question=question,
+        meant=question in catalogue().meant(control),
+        scenes=len(both),
+        hits=hits,
+        false_alarms=float(better.sum()),
+        accuracy=wins / len(both),
+        interval=interval,
+        tells=interval.low > CHANCE,
+    )
+
+
+def believed(rows: Sequence[Telling], known: Catalogue | None = None) -> dict[str, list[str]]:
+    """Return law of physics → questions that tell a control they are meant for; laws in order."""
+    known = known or catalogue()
+    telling = {r.question for r in rows if r.tells and r.meant}
+    return {
+        law: [q.id for q in known.question if q.law == law and q.id in telling]
+        for law in known.laws()
+    }
+
+
+# ---------------------------------------------------------------- methods
+
+
+@dataclass(frozen=True)
+class Mark:
+    """How well one method does in a group of scenes, by questions that are believed."""
+
+    method: str
+    group: str
+    """A law of physics, a class of materials or a constitutive law."""
+    scenes: int
+    mark: float
+    """Share of questions without an alarm, mean over scenes [-]."""
+    interval: Interval
+    """By drawing scenes with replacement, 90 %."""
+
+
+def mark_of(
+    films: Sequence[FilmVerdict], method: str, group: str, questions: Sequence[str]
+) -> Mark | None:
+    """Mark a method by some questions; None: none of them applies to any of its films.
+
+    Args:
+        films: Of the group's scenes.
+        method: Name among the conditions.
+        group: What the scenes or questions have in common.
+        questions: That are believed.
+
+    """
+    shares = []
+    for film in films:
+        given = [film.alarm[q] for q in questions if q in film.alarm]
+        if film.condition == method and given:
+            shares.append(1.0 - fmean(given))
+    if not shares:
+        return None
+    return Mark(method, group, len(shares), fmean(shares), resampled(shares))
+
+
+def resampled(values: Sequence[float]) -> Interval:
+    """Interval of a mean by drawing values with replacement, 90 %; equal input, equal result."""
+    dice = np.random.default_rng(0)
+    means = np.array(values)[dice.integers(0, len(values), (DRAWS, len(values)))].mean(axis=1)
+    tail = 100 * (1 - LEVEL) / 2
+    low, high = np.percentile(means, [tail, 100 - tail])
+    return Interval(float(low), float(high))

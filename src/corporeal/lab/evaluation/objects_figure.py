@@ -1,0 +1,54 @@
+"""Scenes as points: what they look like, whose each point is, and whose it was taken for."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from corporeal.lab.evaluation.figure import keep_points
+from corporeal.lab.evaluation.objects import Judged
+from corporeal.lab.evaluation.overlap import iou
+from corporeal.lab.evaluation.parts_figure import seen, tinted
+from corporeal.reconstruction.segment.match import match
+
+COLUMNS = ("points of photographs", "identity", "superpoints", "components")
+
+DRAWN = 5000
+"""Points of a scene that are drawn, about."""
+
+
+def draw(found: Sequence[Judged], path: Path) -> None:
+    """Draw one row per scene."""
+    figure = Figure(figsize=(10, 2.6 * len(found)), dpi=72, layout="constrained")
+    grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
+    for judged, axes in zip(found, grid, strict=True):
+        row = judged.row
+        truth = judged.taken.object_of_point
+        place, order = seen(judged.taken.cloud.position)
+        order = order[:: max(1, len(order) // DRAWN)]
+        tints = (
+            np.clip(judged.taken.cloud.colour, 0, 1),
+            tinted(truth, "tab10"),
+            tinted(_as(truth, judged.ours.object_of_point), "tab10"),
+            tinted(_as(truth, judged.components), "tab10"),
+        )
+        for axis, tint in zip(axes, tints, strict=True):
+            axis.scatter(*place[order].T, s=2.0, c=tint[order], lw=0)
+            axis.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
+        scores = ("", *(f"mean IoU {v:.2f}" for v in (row.identity, row.ours, row.components)))
+        for axis, text in zip(axes, scores, strict=True):
+            axis.set_xlabel(text, fontsize=8)
+        axes[0].set_ylabel(row.scene.replace("_", " "), fontsize=9)
+    for axis, title in zip(grid[0], COLUMNS, strict=True):
+        axis.set_title(title, fontsize=9)
+    keep_points(figure, path)
+
+
+def _as(truth: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Give what was found the number of what it fits best; what fits nothing comes after."""
+    count, known = int(found.max()) + 1, int(truth.max()) + 1
+    number = match(iou(truth, found, known, count).T)
+    left = number < 0
+    number[left] = known + np.arange(left.sum())
+    return number[found]

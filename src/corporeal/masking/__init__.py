@@ -1,1 +1,0 @@
-"""Masks of objects in posed photographs, from colours and the visual hull; no weights needed."""

@@ -1,0 +1,1 @@
+"""Geometry of several cameras: rays, silhouettes, ground plane and the vertical."""

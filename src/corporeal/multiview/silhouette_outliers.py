@@ -1,0 +1,120 @@
+"""Views whose silhouettes contradict those of all others: their poses, or their masks, are wrong.
+
+A camera that was placed on the wrong piece of a repeating pattern has an ordinary reprojection
+error; only what it shows of the object is not where the others see it. The visual hull is carved
+with each view left out, and forgives a few of the rest, so that one wrong view does not carve away
+what the right ones agree on.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8
+from scipy.ndimage import binary_dilation
+
+from corporeal.core.types import Camera
+from corporeal.multiview.epipolar import projection
+from corporeal.multiview.silhouettes import Compared, cells_of, cube_around, shares, small
+
+SIDE = 128
+"""Longer side at which silhouettes are compared [px], at most: a step of the grid that the hull is
+carved from is no longer than a pixel, or the hull's silhouette would have holes."""
+FORGIVEN = 0.1
+"""Share of the views that may deny a point of the hull, at least one."""
+FEWEST = 8
+"""Views from which on a hull tells one that is wrong from those that are right."""
+MOST = 0.34
+"""Share of the views from which on nobody can say which ones are right."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Below both of which a view is wrong.
+
+    A right view may overlap little where it alone sees that a place is empty.
+    """
+
+    overlap: float
+    """With the hull of the others, over the median of all views [-]."""
+    filled: float
+    """Share of its mask that the hull of the others fills [-]."""
+
+
+GIVEN = Bounds(0.75, 0.95)
+"""Of masks that somebody gave. Measured on real sets: overlaps of right views 0.9 and more, of
+wrong ones 0.7 and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
+"""
+GROWN = Bounds(0.85, 0.8)
+"""Of grown masks that are believed, which vary more: of 17 sets of one thing every right view is
+filled by 0.91 and more; views that show another thing on the same floor by 0.68 and less, at
+overlaps of 0.8 and less."""
+
+
+def outliers(
+    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...], bounds: Bounds = GIVEN
+) -> tuple[int, ...]:
+    """Return the numbers of views that do not show what the others see; (): of none that is known.
+
+    Args:
+        masks: 255: the object; views with an empty one say nothing.
+        cameras: In any frame and unit.
+        bounds: Of what is right.
+
+    """
+    if len(cameras) < FEWEST:
+        return ()
+    found = compare(masks, cameras)
+    apart = found.overlap < bounds.overlap * np.nanmedian(found.overlap)
+    wrong = np.flatnonzero(apart & (found.filled < bounds.filled))
+    return tuple(wrong.tolist()) if len(wrong) <= MOST * len(cameras) else ()
+
+
+def filled_by_others(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:
+    """Return which share of a mask the hull of the others fills, the median of all views."""
+    return float(np.nanmedian(compare(masks, cameras).filled))
+
+
+def compare(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> Compared:
+    """Compare each mask with the hull of the others."""
+    points = cube_around(masks, cameras)
+    side = min(SIDE, _finest(points, cameras))
+    coarse = [small(mask, side) for mask in masks]
+    denied = np.zeros(len(points), np.int16)
+    seen = np.zeros(len(points), np.int16)
+    cells, denials = [], []
+    for mask, camera in zip(coarse, cameras, strict=True):
+        cell = cells_of(points, camera, mask.shape)
+        near = np.asarray(binary_dilation(mask), bool)
+        deny = (cell >= 0) & ~near.ravel()[cell]
+        cells.append(cell.astype(np.int32))
+        denials.append(deny)
+        denied += deny
+        seen += cell >= 0
+    allowed = max(1, int(FORGIVEN * len(cameras)))
+    looked = seen > len(cameras) / 4
+    shares = np.array(
+        [
+            _shares(mask, cell[looked & (denied - deny <= allowed)])
+            for mask, cell, deny in zip(coarse, cells, denials, strict=True)
+        ]
+    )
+    return Compared(shares[:, 0], shares[:, 1])
+
+
+def _finest(points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...]) -> int:
+    """Return the longer side of pictures in which a step of a cubic grid is a pixel [px]."""
+    step, middle = float(np.linalg.norm(points[1] - points[0])), points.mean(axis=0)
+    shares = []
+    for camera in cameras:
+        P = projection(camera)
+        depth = abs(float(P[2, :3] @ middle + P[2, 3]))
+        focal = float(np.linalg.norm(P[0, :3] - (P[0, :3] @ P[2, :3]) * P[2, :3]))
+        shares.append(step * focal / depth / max(camera.width, camera.height))
+    return int(1.0 / float(np.median(shares)))
+
+
+def _shares(mask: Bool[np.ndarray, "h w"], cell: np.ndarray) -> tuple[float, float]:
+    """Compare a mask with pixels that are shown."""
+    shown = np.zeros(mask.size, bool)
+    shown[cell[cell >= 0]] = True
+    return shares(shown.reshape(mask.shape), mask)

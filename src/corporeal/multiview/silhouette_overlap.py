@@ -1,0 +1,71 @@
+"""How well the silhouettes of closed surfaces agree with masks."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from corporeal.core.types import Camera
+from corporeal.geometry.mesh import Mesh
+from corporeal.multiview.silhouettes import Compared, cells_of, shares, small
+
+SIDE = 256
+"""Longer side at which they are compared [px]."""
+SAMPLES = 400_000
+"""Points on all surfaces that are drawn: several to a pixel of the silhouette."""
+FAINTEST = 4
+"""A pixel that holds less than one in so many of the usual number of points is only touched."""
+
+
+def silhouette_overlaps(
+    meshes: Sequence[Mesh],
+    cameras: Sequence[Camera],
+    masks: Sequence[UInt8[np.ndarray, "H W"]],
+    rng: np.random.Generator,
+) -> Float[np.ndarray, " V"]:
+    """Return the intersection over union of surfaces and mask in each view; NaN: an empty mask.
+
+    Args are those of ``compared``.
+    """
+    return compared(meshes, cameras, masks, rng).overlap
+
+
+def compared(
+    meshes: Sequence[Mesh],
+    cameras: Sequence[Camera],
+    masks: Sequence[UInt8[np.ndarray, "H W"]],
+    rng: np.random.Generator,
+) -> Compared:
+    """Compare silhouettes of surfaces with a mask in each view.
+
+    Args:
+        meshes: In the frame and unit of the cameras.
+        cameras: One or more.
+        masks: 255: the objects. Of any size, in the proportions of the camera's picture.
+        rng: Where points fall on the surfaces.
+
+    """
+    points = sampled(meshes, SAMPLES, rng)
+    found = []
+    for camera, mask in zip(cameras, masks, strict=True):
+        real = small(mask, SIDE)
+        cell = cells_of(points, camera, real.shape)
+        count = np.bincount(cell[cell >= 0], minlength=real.size)
+        usual = np.median(count[count > 0]) if count.any() else 0
+        drawn = (count > usual / FAINTEST).reshape(real.shape)
+        found.append(shares(drawn, real))
+    overlap, filled = np.array(found).T
+    return Compared(overlap, filled)
+
+
+def sampled(
+    meshes: Sequence[Mesh], count: int, rng: np.random.Generator
+) -> Float[np.ndarray, "N 3"]:
+    """Return points on surfaces, as many on equal areas."""
+    corners = np.concatenate([mesh.corners for mesh in meshes])
+    areas = np.concatenate([mesh.areas for mesh in meshes])
+    chosen = corners[rng.choice(len(corners), count, p=areas / areas.sum())]
+    # Uniform on a triangle (Turk 1990).
+    root, along = np.sqrt(rng.random(count)), rng.random(count)
+    weight = np.stack([1 - root, root * (1 - along), root * along], axis=1)
+    return np.einsum("nk,nkd->nd", weight, chosen)

@@ -1,0 +1,80 @@
+"""A whole scene turned, scaled and moved as one: points, cameras and Gaussians alike.
+
+A similarity is a matrix (4, 4) that takes x to s R x + t: its upper left is s R, its last column t.
+Pictures before and after are the same, but that depths are multiplied by s.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.core.types import Camera, Gaussians, Vector
+from corporeal.geometry.gaussians import placed
+
+Matrix = Float[np.ndarray, "4 4"]
+ROUNDING = 1e-6
+
+
+class Similarity(NamedTuple):
+    """A similarity in its parts."""
+
+    rotation: Float[np.ndarray, "3 3"]
+    scale: float
+    shift: Vector
+
+
+def similarity(
+    rotation: Float[np.ndarray, "3 3"] | None = None,
+    scale: float = 1.0,
+    shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
+) -> Matrix:
+    """Return the matrix that takes x to scale · R x + shift."""
+    made = np.eye(4)
+    made[:3, :3] = scale * (np.eye(3) if rotation is None else rotation)
+    made[:3, 3] = shift
+    return made
+
+
+def parted(matrix: Matrix) -> Similarity:
+    """Return the parts of a similarity.
+
+    Raises:
+        ValueError: The matrix mirrors, shears, or is not finite.
+
+    """
+    if not np.isfinite(matrix).all():
+        raise ValueError("A matrix with numbers that are not finite is no similarity.")
+    scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
+    if not scale > 0:
+        raise ValueError(f"A matrix of determinant {scale**3:.3g} is no similarity.")
+    rotation = matrix[:3, :3] / scale
+    off = np.abs(rotation @ rotation.T - np.eye(3)).max()
+    if not off < ROUNDING or not np.allclose(matrix[3], [0, 0, 0, 1]):
+        raise ValueError(f"A matrix that shears by {off:.3g} is no similarity.")
+    x, y, z = matrix[:3, 3].tolist()
+    return Similarity(rotation, scale, (x, y, z))
+
+
+def moved_points(points: Float[np.ndarray, "N 3"], matrix: Matrix) -> Float[np.ndarray, "N 3"]:
+    """Return where points come to be."""
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def moved_cameras(cameras: Sequence[Camera], matrix: Matrix) -> tuple[Camera, ...]:
+    """Return cameras that see the moved scene as they saw it before; lenses stay."""
+    rotation, scale, shift = parted(matrix)
+
+    def moved(camera: Camera) -> Camera:
+        pose = camera.world_from_camera.astype(np.float64)
+        turned = similarity(rotation @ pose[:3, :3], 1.0, scale * rotation @ pose[:3, 3] + shift)
+        return replace(camera, world_from_camera=turned)
+
+    return tuple(moved(camera) for camera in cameras)
+
+
+def moved_gaussians(gaussians: Gaussians, matrix: Matrix) -> Gaussians:
+    """Return the same Gaussians elsewhere: places, rotations, scales and harmonics."""
+    return placed(gaussians, *parted(matrix))

@@ -1,0 +1,140 @@
+"""What the verbs of a run made, one typed field a verb."""
+
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+from corporeal.core.types import (
+    Film,
+    Inventory,
+    MaterialField,
+    Particles,
+    Parts,
+    Reconstruction,
+    Scene,
+    Trajectory,
+)
+from corporeal.discretization.broken import Filled, with_breaks
+from corporeal.discretization.contents import Whole, with_contents
+from corporeal.scene.followed import followed
+from corporeal.simulation.audit_file import AUDIT
+from corporeal.simulation.played import Played, Prepared
+
+T = TypeVar("T")
+
+FILES = (
+    *("film.mp4", "report.html", "materials.json", AUDIT, "fields.png", "strip.png"),
+    "close-up.png",
+    *("ensemble.json", "ensemble.png"),
+)
+"""All that may lie in a run's folder beside the folders of its verbs."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """What each verb made; None: it has not been done, or need not be.
+
+    The fields carry the names of the verbs. Read the properties, which carry the names of objects:
+    they raise LookupError where a verb has not been done.
+    """
+
+    reconstruct: Reconstruction | None = None
+    assemble: Scene | None = None
+    describe: Inventory | None = None
+    segment: Parts | None = None
+    ground: MaterialField | None = None
+    fill: Particles | None = None
+    simulate: Trajectory | None = None
+    film: Film | None = None
+    report: None = None
+
+    def having(self, verb: str, made: Any) -> "Results":
+        """Return the results with what one more verb made."""
+        return replace(self, **{verb: made})
+
+    @property
+    def scene(self) -> Scene:
+        """From assemble; later with what moves in its vessels, and the pieces of what broke."""
+        return self._filled.whole.scene if self._changes else _made(self.assemble, "assemble")
+
+    @property
+    def assembled(self) -> Whole:
+        """Scene, parts and materials as fill is given them: contents still in their vessels."""
+        scene, parts = _made(self.assemble, "assemble"), _made(self.segment, "segment")
+        return Whole(scene, parts, _made(self.ground, "ground"))
+
+    @property
+    def _changes(self) -> bool:
+        pours = self.fill is not None and len(self.fill.contents) > 0
+        return pours or (self.simulate is not None and len(self.simulate.breaks) > 0)
+
+    @property
+    def _filled(self) -> Filled:
+        """With what moves in vessels, and the pieces of what broke."""
+        particles = _made(self.fill, "fill")
+        whole = with_contents(*self.assembled.all, particles.contents)
+        breaks = () if self.simulate is None else self.simulate.breaks
+        return with_breaks(whole, particles, breaks)
+
+    @property
+    def inventory(self) -> Inventory:
+        """From describe."""
+        return _made(self.describe, "describe")
+
+    @property
+    def parts(self) -> Parts:
+        """From segment."""
+        return self._filled.whole.parts if self._changes else _made(self.segment, "segment")
+
+    @property
+    def field(self) -> MaterialField:
+        """From ground."""
+        return self._filled.whole.field if self._changes else _made(self.ground, "ground")
+
+    @property
+    def particles(self) -> Particles:
+        """From fill, and once it is simulated with the pieces of what broke."""
+        return self._filled.particles if self._changes else _made(self.fill, "fill")
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """From simulate."""
+        return _made(self.simulate, "simulate")
+
+    @property
+    def movie(self) -> Film:
+        """From film."""
+        return _made(self.film, "film")
+
+    @property
+    def reconstruction(self) -> Reconstruction | None:
+        """What was reconstructed, where the scene's objects stand now; None: nothing was."""
+        return (
+            None
+            if self.reconstruct is None
+            else followed(self.reconstruct, _made(self.assemble, "assemble"))
+        )
+
+    @property
+    def filmed(self) -> Reconstruction | None:
+        """The same, to be filmed: None where others stand beside it, which have no Gaussians."""
+        found = self.reconstruction
+        whole = found is not None and len(found.names) == len(
+            _made(self.assemble, "assemble").objects
+        )
+        return found if whole else None
+
+    @property
+    def prepared(self) -> Prepared:
+        """All up to fill."""
+        return Prepared(self.scene, self.inventory, self.parts, self.field, self.particles)
+
+    @property
+    def played(self) -> Played:
+        """All up to simulate."""
+        return Played(self.prepared, self.trajectory, self.filmed)
+
+
+def _made(value: T | None, verb: str) -> T:
+    if value is None:
+        raise LookupError(f"{verb} has not been done")
+    return value

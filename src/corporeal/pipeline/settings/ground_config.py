@@ -1,0 +1,31 @@
+"""Where material numbers come from: what a person may ask."""
+
+from dataclasses import dataclass
+
+from corporeal.core.errors import UserError
+
+
+@dataclass(frozen=True)
+class GroundConfig:
+    """Where the numbers come from."""
+
+    library: str = "default"
+    """"default", "reference" (the 22 materials as first published), or the path of a TOML file."""
+    floor: str = "concrete"
+    """What the floor and the walls are made of, for friction and rebound."""
+    neutral: str = "plastics-PP"
+    """What stands in for a part of unknown material."""
+    field: str = ""
+    """Numbers of another method instead of ours: vomp:PATH, pixie:PATH or table:PATH.csv (a file of
+    the scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs."""
+
+
+def validate(config: GroundConfig) -> None:
+    """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
+    from corporeal.fields.specification import asked  # help reads no library
+    from corporeal.materials.placement import entry_of
+
+    entry_of(config.floor, config.library)
+    if entry_of(config.neutral, config.library).group == "liquid":
+        raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
+    asked(config.field)

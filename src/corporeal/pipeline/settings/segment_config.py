@@ -1,0 +1,18 @@
+"""How objects from pictures are taken apart: what a person may ask."""
+
+from dataclasses import dataclass
+
+from corporeal.core.errors import check_range
+
+
+@dataclass(frozen=True)
+class SegmentConfig:
+    """Part segmentation of objects from pictures; a model's parts are its nodes and materials."""
+
+    position_weight: float = 0.3
+    """Weight of position relative to appearance features; 0: position is not used."""
+
+
+def validate(config: SegmentConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    check_range("--position-weight", config.position_weight, 0.0, 100.0)

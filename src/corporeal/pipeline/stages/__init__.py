@@ -1,0 +1,1 @@
+"""The stages of a run: one module and one command each."""

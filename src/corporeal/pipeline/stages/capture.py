@@ -1,0 +1,139 @@
+"""Capture: posed pictures of a scene at rest, with depth, normals and who is where.
+
+The cameras stand evenly about the upper half of a sphere, each as near as it can while it sees
+every object whole. Nothing is left to chance.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.core.errors import UserError
+from corporeal.core.machine import cores
+from corporeal.core.types import Camera, Scene, Views
+from corporeal.geometry.arrangement import boxes_of
+from corporeal.render.camera import VIEW, Aim, around, camera_of
+from corporeal.render.embree import first_seen, render
+from corporeal.render.kernels import NOTHING
+from corporeal.render.stage import Light, Stage
+
+Progress = Callable[[float, str], None]
+
+FILL = 0.9
+"""Share of the picture that the objects take at most."""
+LARGEST = 2**28
+"""Pixels of all views together."""
+
+
+@dataclass(frozen=True)
+class CaptureConfig:
+    """Number, size and quality of pictures."""
+
+    views: int = 24
+    """Number of cameras around the scene."""
+    size: tuple[int, int] = (256, 256)
+    """Width and height [px]."""
+    quality: Literal["draft", "normal", "fine"] = "draft"
+    """Rays per pixel for colour; depth, normals and object ids are exact at any quality."""
+    threads: int | None = None
+    """Threads; None: one per core."""
+
+
+DEFAULT = CaptureConfig()
+
+
+def capture(
+    scene: Scene,
+    config: CaptureConfig = DEFAULT,
+    progress: Progress = lambda fraction, words: None,
+) -> Views:
+    """Picture a scene from all sides above the floor, which is in the pictures.
+
+    Raises:
+        UserError: The scene holds nothing, or more is asked for than makes sense.
+
+    """
+    _check(scene, config)
+    progress(0.0, "placing the cameras")
+    aims = around(boxes_of(scene)[None], config.views, config.size, FILL)
+    return pictures(scene, aims, config, progress)
+
+
+def pictures(
+    scene: Scene,
+    aims: Sequence[Aim],
+    config: CaptureConfig = DEFAULT,
+    progress: Progress = lambda fraction, words: None,
+) -> Views:
+    """Picture a scene from where somebody stands; all pictures have one size.
+
+    Args:
+        scene: At rest.
+        aims: Of the cameras, which take the place of ``views`` and ``size`` of the configuration.
+        config: Quality and threads.
+        progress: Told the fraction done and what is being done.
+
+    """
+    stage = Stage(scene, Light(front=VIEW))  # shadows stay where they are from view to view
+    shape = (len(aims), aims[0].height, aims[0].width)
+    views = Views(
+        rgb=np.empty((*shape, 3), np.uint8),
+        cameras=tuple(camera_of(aim) for aim in aims),
+        depth=np.empty(shape, np.float32),
+        normals=np.empty((*shape, 3), np.float32),
+        object_of_pixel=np.empty(shape, np.int32),
+        part_of_pixel=np.empty(shape, np.int32),
+    )
+
+    def take(k: int) -> None:
+        # One thread a picture: the renderer's bands depend on how many there are.
+        views.rgb[k] = render(stage, aims[k], config.quality, threads=1)
+        _measure(scene, stage, aims[k], views, k)
+
+    with ThreadPoolExecutor(config.threads or cores()) as pool:
+        for k, _ in enumerate(pool.map(take, range(len(aims)))):
+            progress((k + 1) / len(aims), f"view {k + 1} of {len(aims)}")
+    return views
+
+
+def stretch(camera: Camera) -> Float[np.ndarray, "H W"]:
+    """Return the length of each pixel's ray per metre of depth [-]."""
+    u, v = np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5
+    K = camera.K
+    x, y = (u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]
+    return np.sqrt(1 + x[None] ** 2 + y[:, None] ** 2)
+
+
+def _measure(scene: Scene, stage: Stage, aim: Aim, views: Views, k: int) -> None:
+    """Fill in what is not colour."""
+    seen = first_seen(stage, aim)
+    shape = aim.height, aim.width
+    nothing = (seen.kind == NOTHING).reshape(shape)
+    depth = seen.depth.reshape(shape) / stretch(views.cameras[k])
+    counts = [len(s.triangles) for s in scene.surfaces]
+    surface_of_triangle = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    part = np.where(seen.triangle < 0, -1, surface_of_triangle[seen.triangle]).reshape(shape)
+    owner = np.array([*(s.object for s in scene.surfaces), -1], np.int32)
+    assert views.depth is not None and views.normals is not None
+    assert views.object_of_pixel is not None and views.part_of_pixel is not None
+    views.depth[k] = np.where(nothing, np.inf, depth)
+    views.normals[k] = np.where(nothing[..., None], 0, seen.flat.reshape(*shape, 3))
+    views.part_of_pixel[k] = part
+    views.object_of_pixel[k] = owner[part]
+
+
+def _check(scene: Scene, config: CaptureConfig) -> None:
+    if not any(len(s.triangles) for s in scene.surfaces):
+        raise UserError(f"{scene.name} holds no surface to take a picture of.")
+    width, height = config.size
+    if config.views < 1 or min(width, height) < 8:
+        raise UserError("Ask for at least 1 view, and for pictures of at least 8 × 8 pixels.")
+    if config.views * width * height > LARGEST:
+        raise UserError(
+            f"{config.views} views of {width} × {height} pixels do not fit into memory. "
+            f"Ask for at most {LARGEST >> 20} million pixels in all."
+        )

@@ -1,0 +1,472 @@
+"""Report: one self-contained page that shows what was assumed, what happened, and how sure it is.
+
+The page holds its film and figures, so that it can be mailed. Every number carries the measured
+range it was chosen from and where that range was read.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from corporeal.core.findings import Breakage, Expectation, RunAudit
+from corporeal.core.types import (
+    Film,
+    Ground,
+    Material,
+    MaterialField,
+    Particles,
+    Parts,
+    PartWords,
+    Piece,
+    Push,
+    Scene,
+    SceneObject,
+    Structure,
+    Treatment,
+    Usage,
+    Wind,
+)
+from corporeal.discretization.sizes import how_heavy, how_scaled
+from corporeal.materials.scale import fraction_of, logarithmic
+from corporeal.mpm.laws import MENU
+from corporeal.render.mass_tables import weighed
+from corporeal.render.page import cells, figure, inlined, page, safe
+from corporeal.render.subject import parts_named
+from corporeal.simulation.audit_words import breakage_words, equilibrium_words
+from corporeal.simulation.closing_words import Section, closing_words, parted
+
+UNITS = {
+    "young": ("Young's modulus E", "Pa"),
+    "poisson": ("Poisson's ratio ν", ""),
+    "density": ("density ρ", "kg/m³"),
+    "yield_stress": ("yield stress σ_y", "Pa"),
+    "friction_angle": ("friction angle φ", "rad"),
+    "cohesion": ("cohesion c", "Pa"),
+    "hardening": ("hardening modulus H", "Pa"),
+    "friction": ("surface friction μ", ""),
+    "restitution": ("restitution e", ""),
+    "loss": ("loss factor η", ""),
+    "shell_thickness": ("wall thickness", "m"),
+    "strength_local": ("local strength", "Pa"),
+    "viscosity": ("viscosity η", "Pa s"),
+    "consistency": ("consistency K_c", "Pa sⁿ"),
+    "flow_index": ("flow index n", ""),
+    "yield_shear": ("yield shear stress τ_y", "Pa"),
+}
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+WHO = {
+    "annotation": "your annotation",
+    "recording": "a recorded answer",
+    "model": "a model",
+    "metadata": "metadata of the file",
+    "unknown": "unknown: neutral material",
+}
+CHOSEN = {
+    "typical": "typical value",
+    "fallback": "typical value: no answer that could be used",
+    "model": "a model",
+    "recording": "a recorded answer",
+    "annotation": "your annotation",
+    "evidence": "a draw, to fit the estimate of its mass",
+    "field": "another method",
+    "borrowed": "ours, which the other method does not tell",
+}
+LONG_REASON = 60
+"""Letters of a reason that is not printed at every value."""
+
+
+@dataclass(frozen=True)
+class Story:
+    """Everything that the page shows."""
+
+    scene: Scene
+    parts: Parts
+    field: MaterialField
+    particles: Particles
+    film: Film
+    audit: RunAudit
+    figures: Mapping[str, Path]
+    """Caption → picture, in order."""
+    sources: Mapping[str, str]
+    """Citation key → where it was read."""
+    origin: tuple[str, ...] = ()
+    """How the scene was found in pictures, in sentences."""
+    view: str = ""
+    """The 3D view as HTML (``render.viewer_page``), or why there is none."""
+
+
+def report(story: Story, path: Path) -> None:
+    """Write the page to ``path``."""
+    audit = story.audit
+    text = page(
+        "corporeal.pipeline.stages",
+        "report.html",
+        title=safe(story.scene.name),
+        summary=_summary(story),
+        view=story.view,
+        film=inlined(story.film.path),
+        width=story.film.width,
+        caption=_caption(audit.breakage),
+        figures="".join(figure(caption, inlined(file)) for caption, file in story.figures.items()),
+        verdict=_verdict(story),
+        expectations=_expectations(audit.expectations),
+        parts="".join(_part_row(story, k) for k in range(len(story.parts.catalogue))),
+        masses=weighed(story.field.mixtures),
+        grounds="".join(_grounds(story, k) for k in range(len(story.parts.catalogue))),
+        audit=_audit_table(audit),
+        sources=_sources(story),
+        credits=_credits(story.scene),
+        settings=_settings(audit),
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+# ---------------------------------------------------------------- sentences
+
+
+def _summary(story: Story) -> str:
+    """Say in a line or two what was simulated, and in lists what to think of it, by weight."""
+    lists = "".join(_said(k, s, story) for k, s in closing_words(story.audit).items() if s)
+    return (
+        f'<p class="lead">{_lead(story)}</p>'
+        + (f'<div class="said" id="said">{lists}</div>' if lists else "")
+        + _how(story)
+    )
+
+
+def _lead(story: Story) -> str:
+    scene, field = story.scene, story.field
+    objects = ", ".join(safe(o.name.replace("_", " ")) for o in scene.objects)
+    seen = any(w.answered_by in ("model", "recording") for w in field.words)
+    counted = (
+        f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({objects}), "
+        f"{len(field.materials)} part{'s' * (len(field.materials) != 1)}, "
+        f"{scene.duration:g} s simulated with {story.particles.count:,} particles."
+    )
+    if not seen:
+        return (
+            f"{counted} No vision-language model was asked: materials come from annotations and "
+            "from metadata of the file."
+        )
+    answers = max((len(m.answers) for m in field.mixtures), default=0)
+    return f"{counted} {_looked(story.audit.questions, answers)}"
+
+
+def _said(section: Section, sentences: Sequence[str], story: Story) -> str:
+    """List the sentences of a section: what is the matter, then why, what to do, which part."""
+    rows = "".join(f"<li>{_item(sentence, story)}</li>" for sentence in sentences)
+    return f"<h3>{safe(section.head)}</h3><ul>{rows}</ul>"
+
+
+def _item(sentence: str, story: Story) -> str:
+    first, rest = parted(sentence)
+    following = f" <span>{safe(rest)}</span>" if rest else ""
+    return f"{safe(first)}{following}{_subject(sentence, story)}"
+
+
+def _how(story: Story) -> str:
+    """List how the scene came about, for whoever wants to know."""
+    scene = story.scene
+    forced = [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
+    settled = equilibrium_words(story.audit.settling)
+    told = [
+        *map(safe, story.origin),
+        *forced,
+        *map(safe, filter(None, [how_scaled(scene.objects), settled])),
+    ]
+    rows = "".join(f"<li>{sentence}</li>" for sentence in told)
+    return f"<details><summary>How it came about</summary><ul>{rows}</ul></details>" * bool(told)
+
+
+def _looked(questions: Usage, answers: int) -> str:
+    """Say who chose the materials from pictures, and how often, where more often than once."""
+    times = f", asked for {answers} answers each" if answers else ""
+    return f"Materials were recognised in pictures by {safe(_answerers(questions))}{times}."
+
+
+def _answerers(questions: Usage) -> str:
+    """Name who answered: a model, or who gave the answers that were recorded."""
+    models = ", ".join(questions.models) or "source not recorded"
+    return models if questions.calls else f"recorded answers ({models})"
+
+
+def _forced(obj: SceneObject) -> str:
+    """Say in one sentence what pushes an object and what blows on it."""
+    forces = []
+    if obj.path is not None:
+        rows = len(obj.path.time)
+        forces.append(f"follows a prescribed path of {rows} rows, whatever it meets")
+    if obj.push is not None:
+        size = math.hypot(*obj.push.acceleration)
+        forces.append(f"is accelerated by a push of {size:.3g} m/s² {_window(obj.push)}")
+    if obj.wind is not None:
+        gusts = f" with gusts of ± {obj.wind.gust:.0%}" if obj.wind.gust else ""
+        size = math.hypot(*obj.wind.velocity)
+        forces.append(f"is exposed to wind of {size:.3g} m/s{gusts} {_window(obj.wind)}")
+    return f"{safe(obj.name.replace('_', ' '))} {' and '.join(forces)}."
+
+
+def _window(force: Push | Wind) -> str:
+    until = f"until {force.end:g} s" if math.isfinite(force.end) else "until the end"
+    return f"from {force.start:g} s {until}"
+
+
+def _caption(found: Sequence[Breakage]) -> str:
+    """Say below the film what it shows whole although it may not stay so."""
+    doubted = [b for b in found if b.word != "holds"]
+    return "".join(f"<p>{safe(breakage_words(b))}</p>" for b in doubted)
+
+
+def _struck(story: Story, k: int) -> str:
+    """Say what the hardest blow does to a brittle part; "" of all others."""
+    owner = story.scene.objects[story.parts.catalogue[k].object].name
+    mine = (owner, story.field.words[k].name)
+    broken = [b for b in story.audit.breakage if (b.object, b.part) == mine]
+    return "".join(f"<br>{safe(breakage_words(b))}" for b in broken)
+
+
+def _verdict(story: Story) -> str:
+    if not story.audit.warnings:
+        return '<p class="good">The audit found no violations.</p>'
+    return '<p>What limits this result stands at the <a href="#said">top of the page</a>.</p>'
+
+
+def _subject(sentence: str, story: Story) -> str:
+    """Link a sentence to the parts that it names."""
+    named = parts_named(sentence, story.scene, story.parts)
+    links = [f'<a href="#part-{k}">{safe(story.parts.catalogue[k].name)}</a>' for k in named]
+    return f" ({', '.join(links)})" if links else ""
+
+
+def _expectations(expectations: Sequence[Expectation]) -> str:
+    if not expectations:
+        return ""
+    rows = "".join(
+        f'<tr><td class="{"yes" if e.met else "no"}">{"✓" if e.met else "✗"}</td>'
+        f"<td>{safe(e.sentence)}</td><td>{safe(e.value)}</td><td>{safe(e.target)}</td></tr>"
+        for e in expectations
+    )
+    head = "<tr><th></th><th></th><th>measured</th><th>expected</th></tr>"
+    return f'<h2>Expected outcomes of this scene</h2><table class="short">{head}{rows}</table>'
+
+
+# ---------------------------------------------------------------- tables
+
+
+def _part_row(story: Story, k: int) -> str:
+    part, material = story.parts.catalogue[k], story.field.materials[k]
+    treatment, words = story.particles.treatments[k], story.field.words[k]
+    yields = "–" if material.yield_stress is None else si(material.yield_stress, "Pa")
+    names = (story.scene.objects[part.object].name, part.name)
+    liquid = MENU[material.law].liquid
+    numbers = (
+        "–" if liquid else si(material.young, "Pa"),
+        "–" if liquid else f"{material.poisson:.3g}",
+        f"{material.density:.4g}",
+        yields,
+        how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
+    )
+    row = (
+        cells(*map(safe, names), wrap=True),
+        cells(f"<b>{safe(material.name)}</b>"),
+        cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
+        cells(*numbers),
+        cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
+        cells(simulated(treatment, liquid=liquid), wrap=True),
+    )
+    return f"<tr>{''.join(row)}</tr>"
+
+
+def built(structure: Structure) -> str:
+    """Say how a part is built, and what is in it."""
+    if structure.contents is None:
+        packed = f"packed, {structure.solidity:.0%} of it matter"
+        return packed if structure.solidity < 1 else structure.kind
+    return f"{structure.kind} with {structure.contents.name}"
+
+
+def simulated(treatment: Treatment, *, liquid: bool = False) -> str:
+    """Say which Young's modulus was simulated, and how far it is from the real one.
+
+    A liquid has none: its pressure is that of its volume, with a speed of sound of our own.
+    """
+    if treatment.kind == "rigid":
+        return "rigid"
+    if liquid:
+        return f"liquid, its sound slowed to {treatment.wave_speed:.2g} m/s"
+    ratio = treatment.young / treatment.young_real
+    factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
+    return f"{si(treatment.young, 'Pa')} ({factor})"
+
+
+def _grounds(story: Story, k: int) -> str:
+    part, field = story.parts.catalogue[k], story.field
+    material, words, structure = field.materials[k], field.words[k], field.structures[k]
+    pieces = field.pieces[k] if field.pieces else ()
+    usual = (material.shell_thickness or 0.0) * story.scene.objects[part.object].scale
+    own = _values(material, structure, _walled(story.particles, k, usual))
+    tables = "".join(_piece_grounds(p) for p in pieces) or own
+    fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
+    return (
+        f'<details id="part-{k}"><summary><b>{safe(part.name)}</b> of '
+        f"{safe(story.scene.objects[part.object].name)}: {safe(material.name)}</summary>"
+        f"<p>{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
+        f"{others(words)}<br>{safe(structure.reason)} {safe(fill)}<br>"
+        f"{safe(story.particles.treatments[k].why)}{_struck(story, k)}</p>{tables}</details>"
+    )
+
+
+def _piece_grounds(piece: Piece) -> str:
+    """Tell of one of several objects that share a part's mesh why it is as it is."""
+    words = piece.words
+    return (
+        f"<p><b>{safe(words.name)}</b>: {safe(piece.material.name)}, "
+        f"{words.volume_share:.0%} of the volume, {words.surface_share:.0%} of the surface. "
+        f"{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
+        f"{others(words)} {safe(piece.structure.reason)}</p>"
+        f"{_values(piece.material, piece.structure, piece.structure.kind != 'solid')}"
+    )
+
+
+def _walled(particles: Particles, k: int, usual: float) -> bool:
+    """Whether a wall or a sheet of a part is as thick as its material says it is here [m]."""
+    made = particles.walls[k] if particles.walls else ()
+    return any(t > 0 and math.isclose(t, usual, rel_tol=1e-6) for t in made)
+
+
+def _values(material: Material, structure: Structure, walled: bool) -> str:
+    """Lay out every value that is used with its range, who chose it, why, and its source."""
+    shown = [
+        (name, ground, "")
+        for name, ground in material.grounds.items()
+        if name in UNITS and (walled or name != "shell_thickness")
+    ]
+    inner = structure.contents
+    if inner is not None and "density" in inner.grounds:
+        shown.append(("density", inner.grounds["density"], f" of the {inner.name} in it"))
+    shared = _shared_reason([ground.reason for _, ground, _ in shown])
+    rows = "".join(_ground_row(name, ground, of, shared) for name, ground, of in shown)
+    above = f"<p>Reason where none is stated: {safe(shared)}</p>" if shared else ""
+    return (
+        f"{above}<table><tr><th>quantity</th><th>value</th><th>position in range</th>"
+        f"<th>chosen by</th><th>reason</th><th>source of range</th></tr>{rows}</table>"
+    )
+
+
+def _shared_reason(reasons: Sequence[str]) -> str:
+    """Return a long reason that several values have: it is said once, above their table."""
+    often, count = Counter(reasons).most_common(1)[0] if reasons else ("", 0)
+    return often if count > 1 and len(often) > LONG_REASON else ""
+
+
+def others(words: PartWords) -> str:
+    """Return alternatives to a part's material, and its components."""
+    maybe = [f"{name} ({p:.0%})" for name, p in words.alternatives]
+    pieces = [
+        f"{p.name}: {p.material or 'unknown'} ({p.volume_share:.0%} of the volume)"
+        for p in words.pieces
+    ]
+    rest = f" Alternatives: {', '.join(maybe)}." if maybe else ""
+    return safe(rest + (f" Components: {'; '.join(pieces)}." if pieces else ""))
+
+
+def _ground_row(name: str, ground: Ground, of: str, shared: str) -> str:
+    label, unit = UNITS[name]
+    label += safe(of)
+    low, high = ground.range.low, ground.range.high
+    place = min(max(fraction_of(ground.range, ground.value), 0), 1)
+    bar = f'<div class="bar"><i style="left:{place:.1%}"></i></div>'
+    scale = " (log)" if logarithmic(ground.range) else ""
+    return (
+        f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
+        f'<td class="place">{si(low, unit)} {bar} {si(high, unit)}{scale}</td>'
+        f"<td>{safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
+        f"<td>{'' if ground.reason == shared else safe(ground.reason)}</td>"
+        f"<td>{safe(ground.range.source)}</td></tr>"
+    )
+
+
+AUDIT_ROWS = (
+    ("momentum_residual", "momentum residual, relative", ".2g"),
+    ("mechanical_growth", "growth of kinetic and elastic energy, relative", ".2g"),
+    ("impact_loss", "energy lost in normal contact, relative", ".2g"),
+    ("impact_gain", "energy given by normal contact, relative", ".2g"),
+    ("unbooked_loss", "energy lost in transfers and not booked, relative", ".2g"),
+    ("energy_growth", "growth including dissipated energy, relative", ".2g"),
+    ("max_penetration_dx", "largest penetration [grid cells]", ".2f"),
+    ("max_penetration_m", "largest penetration [m]", ".2g"),
+    ("particles", "particles", ",d"),
+    ("steps", "time steps", ",d"),
+    ("dt_min", "smallest step [s]", ".2g"),
+    ("dt_max", "largest step [s]", ".2g"),
+    ("nan_count", "values that are not finite", "d"),
+    ("particles_out_of_domain", "particles outside the domain", "d"),
+)
+
+
+def _audit_table(audit: RunAudit) -> str:
+    return "".join(
+        f"<tr><td>{label}</td><td>{format(getattr(audit, name), spec)}</td></tr>"
+        for name, label, spec in AUDIT_ROWS
+        if getattr(audit, name) is not None
+    )
+
+
+def _sources(story: Story) -> str:
+    pieces = [p for shared in story.field.pieces for p in shared]
+    made = [*story.field.structures, *(p.structure for p in pieces)]
+    held = [s.contents for s in made if s.contents is not None]
+    known = [*story.field.materials, *(p.material for p in pieces), *held]
+    used = sorted({g.range.source for m in known for g in m.grounds.values()})
+    return "".join(f"<dt>{safe(k)}</dt><dd>{safe(story.sources.get(k, k))}</dd>" for k in used)
+
+
+def _credits(scene: Scene) -> str:
+    credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)
+    return "".join(f"<li>{safe(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
+
+
+def _settings(audit: RunAudit) -> str:
+    spent = ", ".join(f"{verb} {value:.1f} s" for verb, value in audit.seconds.items())
+    settings = ", ".join(f"{name} {safe(value)}" for name, value in audit.settings.items())
+    peak = f"Peak memory {audit.peak_memory_mb:,.0f} MB."
+    return f"{settings}.<br>Time: {spent}. {peak}{asked(audit.questions)}"
+
+
+def asked(questions: Usage) -> str:
+    """Say what the questions to models took."""
+    if not questions.questions:
+        return ""
+    who, number = safe(_answerers(questions)), questions.questions
+    if not questions.calls:
+        return f"<br>{number} questions, answered from the disk by {who}, at no cost."
+    cost = questions.dollars
+    paid = (
+        "price not known"
+        if cost is None
+        else f"about ${cost:.3f} at the list prices of {questions.prices_of}"
+    )
+    return (
+        f"<br>{number} questions to {who}: "
+        f"{questions.calls} calls, {questions.input_tokens:,} tokens in, "
+        f"{questions.output_tokens:,} out, {questions.seconds:.0f} s waited, {paid}."
+    )
+
+
+# ---------------------------------------------------------------- small functions
+
+
+def si(value: float, unit: str) -> str:
+    """Write a number with three digits, a prefix where the unit takes one, angles in degrees."""
+    if unit == "rad":
+        return f"{math.degrees(value):.3g}°"
+    if unit == "kg/m³":
+        return f"{value:.4g} {unit}"
+    if unit not in ("Pa", "m") or value == 0:
+        return f"{value:.3g} {unit}".strip()
+    for size, prefix in PREFIXES:
+        if abs(value) >= size * 0.9995:
+            return f"{value / size:.3g} {prefix}{unit}"
+    return f"{value:.3g} {unit}"

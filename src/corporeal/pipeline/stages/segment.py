@@ -1,0 +1,197 @@
+"""Segment: say of every point which object and which part it belongs to."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import KDTree
+
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
+    Cloud,
+    Inventory,
+    Note,
+    NoteKind,
+    ObjectWords,
+    Part,
+    Parts,
+    Reconstruction,
+    Scene,
+    reworded,
+)
+from corporeal.pipeline.settings.segment_config import SegmentConfig
+from corporeal.recognition.identity import identify
+from corporeal.recognition.metadata import matter_hint
+from corporeal.reconstruction.features import Reader, connect
+from corporeal.reconstruction.segment.naming import Named, name_parts, phrases
+from corporeal.reconstruction.segment.parts import PartsConfig
+
+VOTERS = 5
+"""Points nearest to a triangle that say what part it is of."""
+
+
+DEFAULT = SegmentConfig()
+UNSEEN = ("metadata", "unknown")
+"""Who says of parts what words say, and has seen none."""
+
+
+def segment(
+    scene: Scene,
+    inventory: Inventory,
+    config: SegmentConfig = DEFAULT,
+    found: Reconstruction | None = None,
+    semantic: str = "descriptor",
+) -> Parts:
+    """Give every triangle its object and part.
+
+    Points are the scene's triangles in order. What the file tells apart is exact by construction,
+    with confidence 1. An object from pictures is one surface: if its description names several
+    pieces, they are found among the points of the reconstruction.
+
+    Args:
+        scene: What was assembled.
+        inventory: What its parts are called.
+        config: How objects from pictures are taken apart.
+        found: Points with features, where the scene's objects stand now; None: from a model.
+        semantic: What the semantic features of these points are, as for ``features.connect``.
+
+    Raises:
+        UserError: The inventory describes another scene.
+
+    """
+    identity = identify(scene, matter_hint)
+    _agree(scene, inventory, [p.name for p in identity.catalogue])
+    triangles = [len(s.triangles) for s in scene.surfaces]
+    part_of_point = np.repeat(identity.part_of_surface, triangles)
+    parts = Parts(
+        object_of_point=scene.object_of_triangle,
+        part_of_point=part_of_point,
+        confidence=np.ones(len(part_of_point)),
+        catalogue=identity.catalogue,
+    )
+    if found is None:
+        return parts
+    middle = np.concatenate([s.vertices[s.triangles].mean(axis=1) for s in scene.surfaces])
+    pictured = np.unique(found.object_of_point)  # others beside them came as models
+    shown = [(number, obj) for number, obj in enumerate(inventory.objects) if number in pictured]
+    for number, obj in shown:
+        pieces = obj.parts[0].pieces if len(obj.parts) == 1 else ()
+        if len(pieces) > 1:
+            obj = replace(obj, parts=pieces)
+            cloud = _of_object(found.cloud, found.object_of_point == number)
+            vectors = _vectors(semantic, obj)
+            named = name_parts(cloud, obj, vectors, PartsConfig(config.position_weight))
+            parts = _taken_apart(parts, number, obj, named, cloud, middle)
+    return replace(parts, warnings=(*parts.warnings, *_unparted([obj for _, obj in shown])))
+
+
+def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
+    described = [part.name for obj in inventory.objects for part in obj.parts]
+    if described != names:
+        raise UserError(
+            f"The description speaks of the parts {', '.join(described) or 'none'}, but "
+            f"{scene.name!r} has {', '.join(names)}. Describe the scene again."
+        )
+
+
+# ---------------------------------------------------------------- objects from pictures
+
+
+def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
+    """Say which objects have unknown pieces: a chair from pictures may be all foam.
+
+    Where nothing is known of the matter, ``ground`` says so, and how to say it.
+    """
+    names = [
+        obj.name
+        for obj in objects
+        if not any(p.pieces or p.answered_by not in UNSEEN for p in obj.parts)
+        and any(p.answered_by != "unknown" for p in obj.parts)
+    ]
+    if not names:
+        return []
+    several = len(names) > 1
+    return [
+        Note(
+            f"{', '.join(names)}: nobody looked what {'these are' if several else 'it is'} made up "
+            f"of. {'Each is' if several else 'It is'} one material throughout; --vlm or "
+            "--annotations name pieces.",
+            NoteKind.ASSUMED,
+        )
+    ]
+
+
+def _of_object(cloud: Cloud, mine: Bool[np.ndarray, " N"]) -> Cloud:
+    return replace(
+        cloud,
+        position=cloud.position[mine],
+        colour=cloud.colour[mine],
+        semantic=cloud.semantic[mine],
+        structural=cloud.structural[mine],
+        seen=cloud.seen[mine],
+        gaussian_of_point=None,
+    )
+
+
+def _vectors(semantic: str, obj: ObjectWords) -> Float[np.ndarray, "K S"] | None:
+    """Return what the parts' names are among features; None where these know no words."""
+    encoder = connect(semantic)
+    if not isinstance(encoder, Reader):
+        return None
+    return encoder.words(phrases(obj))
+
+
+def _taken_apart(
+    parts: Parts,
+    number: int,
+    obj: ObjectWords,
+    named: Named,
+    cloud: Cloud,
+    middle: Float[np.ndarray, "T 3"],
+) -> Parts:
+    """Put the pieces that were found in the place of the object's only part."""
+    own = np.flatnonzero(parts.object_of_point == number)
+    share = _voted(middle[own], cloud.position, named, len(obj.parts))
+    best = share.argmax(axis=1)
+    kept = np.unique(best)
+    place = next(k for k, p in enumerate(parts.catalogue) if p.object == number)
+    new = [Part(obj.parts[k].name, number, named.found_by) for k in kept]
+    later = parts.part_of_point > place
+    of_point = np.where(later, parts.part_of_point + len(new) - 1, parts.part_of_point)
+    of_point[own] = place + np.searchsorted(kept, best)
+    confidence = parts.confidence.copy()
+    confidence[own] = share[np.arange(len(own)), best]
+    told = _doubts(named, obj, kept.tolist())
+    doubts = [reworded(words, f"{obj.name}: {words}") for words in told]
+    return replace(
+        parts,
+        part_of_point=of_point,
+        confidence=confidence,
+        catalogue=(*parts.catalogue[:place], *new, *parts.catalogue[place + 1 :]),
+        warnings=(*parts.warnings, *doubts),
+    )
+
+
+def _voted(
+    places: Float[np.ndarray, "T 3"],
+    points: Float[np.ndarray, "N 3"],
+    named: Named,
+    count: int,
+) -> Float[np.ndarray, "T K"]:
+    """Return how sure the nearest points are, together, that each place is of each part."""
+    near = np.asarray(KDTree(points).query(places, k=min(VOTERS, len(points)))[1])
+    near = near.reshape(len(places), -1)
+    share = np.zeros((len(places), count))
+    rows = np.arange(len(places))
+    for column in near.T:
+        share[rows, named.part_of_point[column]] += named.confidence[column] / near.shape[1]
+    return share
+
+
+def _doubts(named: Named, obj: ObjectWords, kept: Sequence[int]) -> list[str]:
+    lost = [p.name for k, p in enumerate(obj.parts) if k not in kept]
+    gone = Note(
+        f"{', '.join(lost)} has no place on its surface, and is left out.", NoteKind.LEFT_OUT
+    )
+    return [*named.warnings, *([gone] if lost and not named.warnings else [])]

@@ -1,0 +1,302 @@
+"""Simulate: step the scene through time, keep every frame as it comes, and audit the whole.
+
+Frames are written one by one and nothing holds a film in memory. A checkpoint lies beside them:
+whatever stops a simulation, the same call goes on from there exactly as if nothing had happened.
+A scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.core import registry, store
+from corporeal.core.errors import SimulationError
+from corporeal.core.findings import Settled, SettledObject
+from corporeal.core.typed import typed
+from corporeal.core.types import Break, Frame, MaterialField, Particles, Scene, Trajectory
+from corporeal.core.version import __version__
+from corporeal.discretization.problem_from_scene import Posed, pose, standing
+from corporeal.mpm.cpu.engine import CpuEngine
+from corporeal.mpm.problem import MENU, Engine, Problem
+from corporeal.pipeline.settings.simulate_config import SimulateConfig, as_kept, validate
+from corporeal.simulation.audit import audit
+from corporeal.simulation.audit_file import write_audit
+from corporeal.simulation.breaking import break_up, next_blow
+from corporeal.simulation.breaking_stage import Stage
+from corporeal.simulation.broken_books import retell
+from corporeal.simulation.checkpoint import Checkpoints, fingerprint
+from corporeal.simulation.energy_gain import EnergyWatch
+from corporeal.simulation.frames import (
+    BREAKS,
+    FOLDER,
+    Layout,
+    frame_path,
+    gather,
+    write_frame,
+    write_layout,
+)
+from corporeal.simulation.ledger_row import ledger_row
+from corporeal.simulation.static_equilibrium import Balance, Relaxation, before
+from corporeal.simulation.stress import VonMises
+
+SETTLING = "settling.json"
+"""How static equilibrium was found before time 0."""
+
+Progress = Callable[[float, str], None]
+Build = Callable[[Problem], Engine]
+Relax = Callable[[], dict[str, np.ndarray]]
+
+
+DEFAULT = SimulateConfig()
+
+
+def simulate(
+    scene: Scene,
+    particles: Particles,
+    field: MaterialField,
+    config: SimulateConfig,
+    folder: Path,
+    progress: Progress = lambda fraction, words: None,
+) -> Trajectory:
+    """Step the scene through its duration and write frames, ledger and ``audit.json``.
+
+    A folder that holds a checkpoint of the same problem is continued.
+
+    Args:
+        scene: What happens: gravity, pushes, duration, frames per second.
+        particles: The filled scene.
+        field: What every part is made of.
+        config: Engine and contact.
+        folder: Where the frames go.
+        progress: Told the fraction done and what is going on.
+
+    Raises:
+        SimulationError: The state became impossible; the frames so far are kept.
+        DiskError: The disk is full; the frames so far are kept.
+
+    """
+    validate(config)
+    posed = pose(scene, particles, field, config.contact)
+    build: Build = registry.load("engine", config.engine, MENU)
+    times = frame_times(scene)
+    lying = relaxed_first(scene, particles, posed)
+    if lying:
+        posed = replace(posed, problem=replace(posed.problem, gravity_ramp=0.0))
+    name = fingerprint(__version__, posed.problem, as_kept(config), times, lying)
+    with store.writing(folder):
+        kept, slept = Checkpoints(folder, name), Checkpoints(folder / "settling", name)
+        relax = partial(relaxed, scene, posed, lying, build, slept, progress)
+        begun = Stage.at_start(scene, particles, field, posed)
+        run = Run(build(posed.problem), begun, folder, times, kept, config.breaking)
+        run.through(progress, lying, relax)
+        trajectory = gather(folder, len(times))
+        found = typed(Settled, store.read_json(folder / SETTLING)) if lying else None
+        end = run.stage
+        write_audit(folder, audit(end.scene, end.particles, end.field, trajectory, found))
+        kept.forget()
+        slept.forget()
+    return trajectory
+
+
+# ------------------------------------------------------------------ before time 0
+
+
+def relaxed_first(scene: Scene, particles: Particles, posed: Posed) -> tuple[int, ...]:
+    """Return bodies to bring to static equilibrium: all supported ones, if any deforms."""
+    if not scene.settled or not any(scene.gravity):
+        return ()
+    carried = standing(scene, particles)
+    lying = [b for b, k in enumerate(posed.object_of_body) if int(k) in carried]
+    return tuple(lying) if not posed.rigid[lying].all() else ()
+
+
+def relaxed(
+    scene: Scene,
+    posed: Posed,
+    lying: tuple[int, ...],
+    build: Build,
+    kept: Checkpoints,
+    progress: Progress,
+) -> dict[str, np.ndarray]:
+    """Find static equilibrium, or go on with it; return the state of the engine in it."""
+    record = kept.folder.parent / SETTLING
+    state = kept.newest().state
+    if state and record.exists():
+        return state
+    hung = set(range(len(posed.problem.bodies))) - set(lying)
+    problem = before(posed.problem, hung)
+    relaxation = Relaxation(build(problem), problem, hung)
+    if state:
+        relaxation.restore(state)
+    good = {"state": relaxation.saved()}
+
+    def pause(time: float) -> None:
+        good["state"] = relaxation.saved()
+        if kept.due:
+            kept.keep(good["state"], 0)
+        progress(0.0, f"finding static equilibrium, {time:.2f} s")
+
+    try:
+        balance = relaxation.run(pause)
+    except KeyboardInterrupt:
+        kept.keep(good["state"], 0)
+        raise
+    except SimulationError as error:
+        raise SimulationError(f"While objects found their static equilibrium: {error}") from error
+    kept.keep(balance.state, 0)
+    store.write_json(record, equilibrium_found(scene, posed, balance))
+    return balance.state
+
+
+def equilibrium_found(scene: Scene, posed: Posed, balance: Balance) -> Settled:
+    """Return how equilibrium was found, by object."""
+    cell = posed.problem.cell
+    moved = zip(scene.objects, balance.moved.tolist(), balance.farthest.tolist(), strict=True)
+    objects = [
+        SettledObject(obj.name, (x, y, z), float(np.linalg.norm([x, y, z])) / cell, far)
+        for obj, (x, y, z), far in moved
+    ]
+    return Settled(balance.seconds, balance.found, tuple(objects))
+
+
+# ------------------------------------------------------------------ from time 0 on
+
+
+def frame_times(scene: Scene) -> np.ndarray:
+    """Instants of all frames [s], the start and the end included."""
+    return np.arange(round(scene.duration * scene.fps) + 1) / scene.fps
+
+
+class Run:
+    """One simulation in one folder, from its start or from a checkpoint."""
+
+    def __init__(
+        self,
+        engine: Engine,
+        stage: Stage,
+        folder: Path,
+        times: np.ndarray,
+        checkpoints: Checkpoints,
+        breaking: bool = False,
+    ) -> None:
+        self.engine, self.folder, self.breaking = engine, folder, breaking
+        self.times, self.checkpoints = times, checkpoints
+        self.breaks: tuple[Break, ...] = ()
+        self.whole: set[int] = set()
+        self._take(stage)
+
+    def _take(self, stage: Stage) -> None:
+        """Keep the books of what is simulated now."""
+        self.stage, self.posed = stage, stage.posed
+        order = stage.posed.order
+        self.place = np.empty_like(order)
+        self.place[order] = np.arange(len(order))
+        self.layout = Layout.of(stage.posed)
+        self.watch = EnergyWatch.of(stage.posed.problem)
+        self.stress = VonMises(stage.posed.problem)
+
+    def through(self, progress: Progress, lying: tuple[int, ...], relax: Relax) -> None:
+        """Step to the end, writing every frame as it comes.
+
+        Args:
+            progress: Told the fraction done and what is going on.
+            lying: Bodies that are brought to static equilibrium before time 0.
+            relax: Returns the state in it.
+
+        """
+        done = self.begin(lying, relax)
+        saved = self.engine.save()
+        try:
+            for number in range(done, len(self.times)):
+                since = self.engine.time
+                self.engine.advance(float(self.times[number]))
+                self.keep_frame(number)
+                if self.breaking:
+                    self._break(number, since, saved)
+                saved, done = self.engine.save(), number + 1
+                # From a break on a run that was cut off begins anew.
+                if self.checkpoints.due and not self.breaks:
+                    self.checkpoints.keep(saved, done)
+                progress(done / len(self.times), self.words())
+        except KeyboardInterrupt:
+            if not self.breaks:
+                self.checkpoints.keep(saved, done)
+            raise
+        except SimulationError as error:
+            raise SimulationError(
+                f"{error} {done} of {len(self.times)} frames are in {self.folder}."
+            ) from error
+
+    def _break(self, number: int, since: float, saved: dict[str, np.ndarray]) -> None:
+        """Break what was struck too hard since the last frame, and simulate from there again.
+
+        Args:
+            number: Of the frame that was written last.
+            since: Time of the one before it [s].
+            saved: The state then.
+
+        """
+        while True:
+            blow = next_blow(self.stage, self.breaks, self.whole, self.folder, number, since)
+            if blow is None:
+                return
+            self.engine.restore(saved)
+            assert isinstance(self.engine, CpuEngine)
+            broken = break_up(self.stage, self.engine, blow, self.breaks)
+            if broken is None:
+                # What cannot be cut stays whole.
+                self.whole.add(blow.object)
+            else:
+                self.checkpoints.forget()
+                retell(self.folder, number, self.stage, broken.stage, broken.breaks[-1])
+                self.engine, self.breaks = broken.engine, broken.breaks
+                self._take(broken.stage)
+                store.save(self.folder / BREAKS, self.breaks)
+                since, saved = self.engine.time, self.engine.save()
+            self.engine.advance(float(self.times[number]))
+            self.keep_frame(number)
+
+    def begin(self, lying: tuple[int, ...], relax: Relax) -> int:
+        """Go back to the newest checkpoint, or write the first frame; return how many are done."""
+        for half in self.folder.rglob(".*.part"):
+            half.unlink()  # left by a process that was killed while writing
+        newest = self.checkpoints.newest()
+        done, state = newest.done, newest.state
+        if done:
+            self.engine.restore(state)
+        elif lying:
+            self.engine.start_from(relax(), lying)
+        for frame in (self.folder / FOLDER).glob("[0-9]*.npz"):
+            if int(frame.stem) >= done:
+                frame.unlink()
+        if not done:
+            (self.folder / BREAKS).unlink(missing_ok=True)
+            write_layout(self.folder, self.layout)
+            self.keep_frame(0)
+        frame = frame_path(self.folder, 0).stat().st_size
+        store.require_room(self.folder, frame * (len(self.times) - max(done, 1)))
+        return max(done, 1)
+
+    def words(self) -> str:
+        """Where the simulation is."""
+        end = self.times[-1]
+        return f"{self.engine.time:.2f} of {end:.2f} s, {self.engine.steps.count:,} steps"
+
+    def keep_frame(self, number: int) -> None:
+        """Write the present as frame ``number``, particles in their own order."""
+        now, measure = self.engine.snapshot(), self.engine.measure()
+        rigid = self.posed.rigid[self.layout.object]
+        motion = now.motion[self.place]
+        if rigid.any():
+            # A rigid piece has turned before it was one.
+            turned = now.deformation[self.place] @ self.stage.turned[self.layout.object]
+            motion = np.where(rigid[:, None, None], turned, motion)
+        stress = self.stress.at(now)[self.place]
+        frame = Frame(now.time, now.position[self.place], motion, stress)
+        row = ledger_row(self.posed.problem, now, measure, self.engine.steps)
+        write_frame(self.folder, number, frame, self.layout, row)
+        if self.watch is not None:
+            self.watch.see(row)

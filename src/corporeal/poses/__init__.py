@@ -1,1 +1,0 @@
-"""From photographs without poses, or a film, to a COLMAP model."""

@@ -1,0 +1,1 @@
+"""What the names in files and of objects say, in any language."""

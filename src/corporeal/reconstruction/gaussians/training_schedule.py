@@ -1,0 +1,182 @@
+"""The schedule of a training: pictures in two sizes, presets, settings."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, UInt8
+
+from corporeal.core.errors import UserError
+from corporeal.core.registry import load
+from corporeal.core.types import Views
+from corporeal.multiview.lines_of_sight import LinesOfSight
+from corporeal.multiview.region import region
+from corporeal.reconstruction.gaussians import saved
+from corporeal.reconstruction.gaussians.hull import Outlines
+from corporeal.reconstruction.gaussians.kernels_project import Pinhole
+from corporeal.reconstruction.gaussians.raster import pinhole
+from corporeal.reconstruction.gaussians.start import Points, clearance
+from corporeal.reconstruction.gaussians.surfaces import Surfaces
+
+Masks = Bool[np.ndarray, "V H W"]
+
+COARSE, COARSE_WHOLE = 0.4, 0.55
+"""Share of the steps that look at pictures of half the size, with masks and without."""
+COARSE_COST = 0.4
+"""Time that such a step takes, in steps."""
+SMALLEST = 64
+"""Narrower pictures are not halved [px]."""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """How much work."""
+
+    gaussians: int
+    degree: int
+    """Of the harmonics."""
+    steps: int
+    longest: int
+    """Larger pictures are shrunk by a whole number until no side is longer [px]."""
+
+
+PRESETS = {
+    "preview": Preset(4000, 1, 300, 128),
+    "draft": Preset(20_000, 1, 1000, 256),
+    "normal": Preset(30_000, 2, 2500, 512),
+}
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How to learn Gaussians from pictures."""
+
+    preset: Literal["preview", "draft", "normal"] = "normal"
+    """preview: rough shapes in some seconds; draft: within a minute on two cores; normal: within
+    four."""
+    gaussians: int | None = None
+    """How many at most; None: as the preset says."""
+    steps: int | None = None
+    """None: as the preset says."""
+    longest: int | None = None
+    """Larger pictures are shrunk until no side is longer [px]; None: as the preset says."""
+    begin: Literal["auto", "hull", "inside"] = "auto"
+    """With masks: on their visual hull, or some Gaussians inside it, too. A seat between its arms
+    lies below the hull, and what begins on that would have to sink there; in an open bowl what
+    begins inside stays there, if that is plain. auto: what a small training finds the better; the
+    hull where views are too few to tell."""
+    held_out: int = 8
+    """Every so-many-th view is not learned from but compared with; 0: none is."""
+    seed: int = 0
+    """Of everything that is left to chance."""
+    threads: int | None = None
+    """None: one per processor. Changes no result."""
+    rasteriser: Literal["numba", "gsplat"] = "numba"
+    """Where pictures are drawn while learning: on the processor, or on a card with CUDA."""
+
+
+DEFAULT = TrainConfig()
+RASTERISERS = {
+    "numba": "corporeal.reconstruction.gaussians.raster",
+    "gsplat": "corporeal.reconstruction.gaussians.gsplat",
+}
+"""Modules with the verbs draw and back."""
+
+
+def validate(rasteriser: str) -> None:
+    """Raise UserError where there is no such rasteriser here."""
+    if rasteriser == "gsplat":
+        load(
+            "rasteriser",
+            rasteriser,
+            {"gsplat": "corporeal.reconstruction.gaussians.gsplat:present"},
+        )()
+
+
+class TrainingSchedule:
+    """What each step of a training looks at, and how: pictures in two sizes."""
+
+    def __init__(
+        self,
+        views: Views,
+        masks: Masks | None,
+        points: Points | LinesOfSight | None,
+        config: TrainConfig,
+    ) -> None:
+        check(views, masks)
+        preset = PRESETS[config.preset]
+        self.preset = replace(
+            preset,
+            gaussians=config.gaussians or preset.gaussians,
+            steps=config.steps or preset.steps,
+            longest=config.longest or preset.longest,
+        )
+        self.config = config
+        self.seed, self.rasteriser = config.seed, config.rasteriser
+        self.draw, self.back = (
+            load("rasteriser", self.rasteriser, {k: f"{m}:{do}" for k, m in RASTERISERS.items()})
+            for do in ("draw", "back")
+        )
+        self.views, self.masks, self.points = views, masks, points
+        count = len(views.cameras)
+        every = config.held_out
+        self.held_out = tuple(range(every // 2, count, every)) if every and count > every else ()
+        self.learned = [k for k in range(count) if k not in self.held_out]
+        self.radius = region(views.cameras).radius
+        self.clear = clearance(views.cameras)
+        factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
+        halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
+        self.surfaces: Surfaces | None = None
+        self.outlines: Outlines | None = None
+        self.coarse = (COARSE_WHOLE if masks is None else COARSE) * self.preset.steps
+        self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
+
+    @property
+    def name(self) -> str:
+        """What a checkpoint of this training is called."""
+        cameras = [(c.K.tolist(), c.world_from_camera.tolist()) for c in self.views.cameras]
+        p = self.points
+        begin = () if p is None else vars(p).values()
+        how = self.seed, self.held_out, self.rasteriser, self.config.begin
+        rest = cameras, self.preset, *how
+        return saved.fingerprint(self.views.rgb, self.masks, *begin, *rest)
+
+    def size(self, step: int) -> "_Size":
+        """Return the pictures that a step looks at."""
+        return self.sizes[-1] if step < self.coarse else self.sizes[0]
+
+    def cost(self, step: int) -> float:
+        """Return the time that the steps before this one take, in steps."""
+        coarse = self.coarse if len(self.sizes) > 1 else 0.0
+        return min(step, coarse) * COARSE_COST + max(0.0, step - coarse)
+
+
+class _Size:
+    """The pictures, shrunk by a whole number."""
+
+    def __init__(self, schedule: TrainingSchedule, factor: int) -> None:
+        views, masks = schedule.views, schedule.masks
+        self.rgb = {k: shrunk(views.rgb[k], factor) for k in schedule.learned}
+        full = {} if masks is None else {k: masks[k] * np.uint8(255) for k in schedule.learned}
+        self.masks = {k: shrunk(mask[..., None], factor)[..., 0] for k, mask in full.items()}
+        self.cameras: dict[int, Pinhole] = {}
+        for k, picture in self.rgb.items():
+            eye = pinhole(views.cameras[k], 1 / factor, schedule.clear[k])
+            self.cameras[k] = eye._replace(height=picture.shape[0], width=picture.shape[1])
+
+
+def shrunk(picture: UInt8[np.ndarray, "H W C"], factor: int) -> UInt8[np.ndarray, "h w C"]:
+    """Return a picture of means over squares of pixels; what is left over at the rim is cut off."""
+    if factor == 1:
+        return picture
+    h, w, c = picture.shape[0] // factor, picture.shape[1] // factor, picture.shape[2]
+    cut = picture[: h * factor, : w * factor].reshape(h, factor, w, factor, c)
+    return np.round(cut.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
+
+
+def check(views: Views, masks: Masks | None) -> None:
+    """Raise UserError where views cannot be learned from."""
+    if len(views.cameras) < 2:
+        raise UserError("One picture shows no depth. Give at least two, from several sides.")
+    if masks is not None and masks.shape != views.rgb.shape[:3]:
+        raise UserError(f"Masks are {masks.shape}, but pictures {views.rgb.shape[:3]}.")

@@ -1,0 +1,1 @@
+"""Object masks of posed photographs without a learned model."""

@@ -1,0 +1,136 @@
+"""Pixels that show the floor, lit or in shadow, told by its colour and by its plane.
+
+A shadow lies beside the object in every picture, has colours that the rest of the floor has not,
+and so is taken for a part of the object where colours alone decide. But a shadow only takes light
+away: it leaves the ratios of the channels as they are on the lit floor (Finlayson, Hordley, Lu and
+Drew 2006 build on the same). And it lies on one plane: taken to it by its homography, views from
+different sides see one colour there, which they do not of what stands above it. A floor that is
+grey has the ratios of everything grey and of every shade of it, and nothing is said.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
+
+from corporeal.core.types import Camera, Views
+from corporeal.multiview.ground_plane import Plane
+from corporeal.multiview.region import Region
+from corporeal.multiview.robust import NORMAL
+from corporeal.reconstruction.masks.floor_square import WITNESSES, Square, square, witnessed
+
+PATCH = 5
+"""Cells whose mean colour is compared."""
+SPREAD = 2.5
+"""Standard deviations of the floor's own ratios and lightness that shades may be off by."""
+LEAST = 0.03
+"""Least such deviation, in logarithms."""
+COLOURFUL = 2.0
+"""A floor is grey if no ratio of its channels is so many times farther off 1 than shades may be."""
+SHADE = 0.12
+"""Difference of lightness, and half of that of ratios, up to which views agree, in logarithms."""
+DARK = 4.0
+"""What is darker [of 255] is as dark where logarithms are compared: noise has no ratios."""
+DARKEST = -1.6
+"""Logarithm of the least share of the floor's light that a shadow leaves."""
+APART = 4
+"""Cells from one that gains and ratios are measured at to the next."""
+ROUNDS = 3
+"""Of finding the pictures' gains, by the median of all, and that median."""
+
+
+def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.ndarray, "V H W"]:
+    """Tell which pixels show the floor's own colour, or a shade of it, on the floor.
+
+    None where nobody knows the floor, or where it is grey.
+
+    Args:
+        views: The pictures.
+        floor: The plane that objects stand on, its normal up.
+        around: The ball that all look at.
+
+    """
+    nowhere = np.zeros(views.rgb.shape[:3], np.bool_)
+    if floor is None or len(views.cameras) <= WITNESSES:
+        return nowhere
+    ground = square(views.cameras, floor, around)
+    pairs = zip(views.rgb, views.cameras, strict=True)
+    colours = np.stack([colours_on(ground, rgb, c, PATCH, 1.0) for rgb, c in pairs])
+    light, ratios = parted(evened(colours))
+    like = _like_floor(light, ratios)
+    if like is None:
+        return nowhere
+
+    def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
+        with np.errstate(invalid="ignore"):
+            agreed = np.abs(light[others] - light[k]) < SHADE
+            agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * SHADE).all(axis=-1)
+        return agreed & like[k]
+
+    return witnessed(views.cameras, floor, around, agreeing, wide=True)
+
+
+def colours_on(
+    ground: Square, rgb: np.ndarray, camera: Camera, patch: int, darkest: float
+) -> Float[np.ndarray, "n n 3"]:
+    """Return the logarithm of the colour around each cell; nan: not in the picture.
+
+    Args:
+        ground: The cells.
+        rgb: A picture.
+        camera: That took it.
+        patch: Cells along each side whose mean it is.
+        darkest: Of 255; what is darker counts as that, so that noise is not a ratio.
+
+    """
+    size, at = (ground.count, ground.count), ground.seen_by(camera)
+    out = np.empty((*size, 3))
+    for k in range(3):
+        one = map_coordinates(rgb[..., k].astype(float), at, order=1, cval=np.nan).reshape(size)
+        shown = minimum_filter(np.isfinite(one), patch)
+        out[..., k] = np.where(shown, uniform_filter(np.nan_to_num(one), patch), np.nan)
+    return np.log(np.maximum(out, darkest) / 255)
+
+
+def evened(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
+    """Take every picture's own exposure and white balance off, as the floor shows them."""
+    return colour - gains(colour)[:, None, None]
+
+
+def gains(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V 3"]:
+    """Return by how much pictures differ from the median of all, in logarithms."""
+    few = colour[:, ::APART, ::APART].reshape(len(colour), -1, 3)
+    few = few[:, np.isfinite(few).all(axis=-1).sum(axis=0) >= WITNESSES]
+    gain = np.zeros((len(colour), 1, 3))
+    if not few.size:
+        return gain[:, 0]
+    for _ in range(ROUNDS):
+        usual = np.nanmedian(few - gain, axis=0)
+        away = few - usual
+        some = np.isfinite(away).any(axis=(1, 2))
+        gain[some, 0] = np.nanmedian(away[some], axis=1)
+    return gain[:, 0]
+
+
+def parted(
+    colour: Float[np.ndarray, "V n n 3"],
+) -> tuple[Float[np.ndarray, "V n n"], Float[np.ndarray, "V n n 2"]]:
+    """Return lightness, and red and blue against green, all as logarithms."""
+    return colour.mean(axis=-1), colour[..., [0, 2]] - colour[..., 1:2]
+
+
+def _like_floor(
+    light: Float[np.ndarray, "V n n"], ratios: Float[np.ndarray, "V n n 2"]
+) -> Bool[np.ndarray, "V n n"] | None:
+    """Return where the floor's own ratios are seen, no lighter than it; None: it is grey."""
+    few = np.concatenate([light[..., None], ratios], axis=-1)[:, ::APART, ::APART].reshape(-1, 3)
+    few = few[np.isfinite(few).all(axis=1)]
+    if not len(few):
+        return None
+    usual = np.median(few, axis=0)
+    spread = SPREAD * np.maximum(NORMAL * np.median(np.abs(few - usual), axis=0), LEAST)
+    if (np.abs(usual[1:]) < COLOURFUL * spread[1:]).all():
+        return None
+    with np.errstate(invalid="ignore"):
+        like = (np.abs(ratios - usual[1:]) < spread[1:]).all(axis=-1)
+        darker = light - usual[0]
+        return like & (darker > DARKEST) & (darker < spread[0])

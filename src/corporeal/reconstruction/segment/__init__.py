@@ -1,0 +1,1 @@
+"""Segmentation of Gaussians and points into objects and parts."""

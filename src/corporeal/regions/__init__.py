@@ -1,1 +1,0 @@
-"""Which points belong together: objects, and parts of objects."""

@@ -1,0 +1,1 @@
+"""Composing, settling and certifying scenes of several objects."""

@@ -1,1 +1,0 @@
-"""What a person may ask of every verb: read without what does it."""

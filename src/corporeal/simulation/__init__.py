@@ -1,0 +1,1 @@
+"""Running an engine: frames, checkpoints, fracture, conservation audit and outcome."""

@@ -1,0 +1,262 @@
+"""The audit of a finished simulation: whether it can be trusted, a sentence for every breach.
+
+Everything is computed from what lies on disk: the frames and the ledger.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.core.findings import (
+    Audit,
+    EnergyGain,
+    Expectation,
+    PartAudit,
+    Settled,
+)
+from corporeal.core.types import Ledger, MaterialField, Particles, Scene, SceneObject, Trajectory
+from corporeal.discretization.filled import acting
+from corporeal.simulation.audit_words import (
+    ALLOWED,
+    breaches,
+    equilibrium_warnings,
+    passage,
+    surface_warnings,
+)
+from corporeal.simulation.breakage import breakage
+from corporeal.simulation.energy_gain import energy_gain
+from corporeal.simulation.mesh_gaps import surface_pairs
+
+
+def audit(
+    scene: Scene,
+    particles: Particles,
+    field: MaterialField,
+    trajectory: Trajectory,
+    settling: Settled | None = None,
+) -> Audit:
+    """Check a run against the laws it must obey.
+
+    Args:
+        scene: What was simulated.
+        particles: Its material points.
+        field: What every part is made of.
+        trajectory: How they moved, with the ledger.
+        settling: How everything found its balance before time 0; None: it did not.
+
+    """
+    ledger, cell = trajectory.ledger, particles.cell
+    floor = float(ledger.plane_depth.max(initial=0.0))
+    pair = float(ledger.overlap.max(initial=0.0))
+    found = Audit(
+        particles=particles.count,
+        objects=len(scene.objects),
+        frames=len(trajectory.time),
+        cell_m=cell,
+        steps=int(ledger.steps[-1]),
+        dt_min=float(ledger.dt_min[-1]),
+        dt_max=float(ledger.dt_max[-1]),
+        nan_count=int(ledger.nan.max()) + not_finite(ledger),
+        particles_out_of_domain=int(ledger.lost.max()),
+        momentum_residual=momentum_residual(ledger, scene, cell),
+        energy_growth=energy_growth(ledger, scene, cell),
+        mechanical_growth=energy_growth(ledger, scene, cell, with_losses=False),
+        energy_gain=who_gained(ledger, scene, cell),
+        unbooked_loss=unbooked_loss(ledger, scene, cell),
+        impact_loss=impact_loss(ledger, scene, cell),
+        impact_gain=impact_gain(ledger, scene, cell),
+        surfaces=surface_pairs(scene, particles, trajectory),
+        mass_error=mass_error(particles),
+        max_penetration_m=max(floor, pair),
+        max_penetration_dx=max(floor, pair) / cell,
+        floor_penetration_m=floor,
+        pair_penetration_m=pair,
+        start_penetration_m=float(ledger.overlap[0].max(initial=0.0)),
+        parts=part_rows(scene, particles, field),
+        breakage=breakage(scene, particles, field, trajectory),
+        settling=settling,
+        warnings=(),
+    )
+    warnings = (
+        *particles.warnings,
+        *equilibrium_warnings(settling),
+        *breaches(found),
+        *surface_warnings(found.surfaces),
+    )
+    return found.noting(warnings)
+
+
+# ------------------------------------------------------------------ laws
+
+
+BOOKED = (
+    *("momentum", "angular_momentum", "kinetic", "elastic", "potential"),
+    *("external_impulse", "plane_impulse", "pair_impulse", "push_work"),
+    *("friction_loss", "impact_loss", "plastic_loss", "viscous_loss"),
+)
+"""What the ledger adds up: each is a number at any time."""
+
+
+def not_finite(ledger: Ledger) -> int:
+    """Count the booked numbers that are none: no law can be checked by them."""
+    return sum(int(np.count_nonzero(~np.isfinite(getattr(ledger, name)))) for name in BOOKED)
+
+
+def momentum_residual(ledger: Ledger, scene: Scene, cell: float) -> float:
+    """‖ΔP - impulses of gravity, pushes and walls‖ / max Σ m|v|, its largest over time [-].
+
+    Where nothing moves, Σ m|v| is taken as that of a fall through one cell.
+    """
+    gained = ledger.momentum.sum(axis=1) - ledger.momentum[0].sum(axis=0)
+    given = ledger.external_impulse.sum(axis=1) + ledger.plane_impulse.sum(axis=(1, 2))
+    residual = np.linalg.norm(gained - given, axis=1).max()
+    still = ledger.mass[0].sum() * np.sqrt(2 * float(np.linalg.norm(scene.gravity)) * cell)
+    scale = max(float(ledger.flow.sum(axis=1).max()), still)
+    return float(residual / scale) if scale > 0 else 0.0
+
+
+def energy_growth(ledger: Ledger, scene: Scene, cell: float, with_losses: bool = True) -> float:
+    """(max(E + dissipated - external work) - E₀) / max(E₀, work of gravity), relative [-].
+
+    E is kinetic (with its affine part) and elastic; gravity's work is what the potential energy
+    lost. Where neither is there to compare with, a fall through one cell is. Without the losses it
+    is the growth of what moves and is strained alone: that no booking can hide or feign.
+    """
+    balance, scale = energy_balance(ledger, scene, cell)
+    if with_losses:
+        balance = balance + dissipated(ledger)
+    growth = max(0.0, float((balance - balance[0]).max()))
+    return growth / scale if scale > 0 else 0.0
+
+
+def dissipated(ledger: Ledger) -> Float[np.ndarray, " F"]:
+    """Energy that friction, plastic flow and viscosity took [J]."""
+    return ledger.friction_loss + ledger.plastic_loss + ledger.viscous_loss
+
+
+def given(ledger: Ledger, scene: Scene, cell: float) -> float:
+    """Energy that there was in all [J]: at the start, and what gravity and pushes gave.
+
+    At least that of a fall through one cell.
+    """
+    start = float((ledger.kinetic + ledger.elastic)[0].sum())
+    fallen = float((ledger.potential[0].sum() - ledger.potential.sum(axis=1)).max())
+    small = float(ledger.mass[0].sum()) * float(np.linalg.norm(scene.gravity)) * cell
+    return max(start + fallen + max(0.0, float(ledger.push_work.max())), small)
+
+
+def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
+    """Energy that neither moves, is stored nor is booked as lost, over all that there was [-].
+
+    Transfers between particles and the grid took it, and nothing in nature.
+    """
+    balance = energy_balance(ledger, scene, cell)[0] + dissipated(ledger)
+    balance = balance + ledger.impact_loss
+    lost, whole = float((balance[0] - balance).max()), given(ledger, scene, cell)
+    return max(0.0, lost) / whole if whole > 0 else 0.0
+
+
+def impact_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
+    """Loss by normal contact over all the energy that there was [-].
+
+    Pairs that gained hide nothing of it, where it is known what each pair took.
+    """
+    whole = given(ledger, scene, cell)
+    lost = float(ledger.impact_loss[-1]) + (impact_gain(ledger, scene, cell) or 0.0) * whole
+    return lost / whole if whole > 0 else 0.0
+
+
+def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float | None:
+    """Energy that normal contact gave to pairs which have more from it than it took, relative [-].
+
+    None: a run from before it was kept by pairs.
+    """
+    taken, whole = np.triu(ledger.impact_of_pair[-1]), given(ledger, scene, cell)
+    if not np.isfinite(taken).all():
+        return None
+    return float(-taken[taken < 0.0].sum()) / whole if whole > 0 else 0.0
+
+
+def energy_balance(
+    ledger: Ledger, scene: Scene, cell: float
+) -> tuple[Float[np.ndarray, " F"], float]:
+    """Energy of motion and strain less what gravity and pushes gave, and what to compare it to [J].
+
+    See ``energy_growth``.
+    """
+    energy = (ledger.kinetic + ledger.elastic).sum(axis=1)
+    fallen = ledger.potential[0].sum() - ledger.potential.sum(axis=1)
+    small = ledger.mass[0].sum() * float(np.linalg.norm(scene.gravity)) * cell
+    scale = max(float(energy[0]), float(fallen.max()), float(ledger.push_work.max()), small)
+    return energy - ledger.push_work - fallen, scale
+
+
+def who_gained(ledger: Ledger, scene: Scene, cell: float) -> EnergyGain | None:
+    """Say which object gained energy from nowhere, if any did beyond what is allowed."""
+    balance, scale = energy_balance(ledger, scene, cell)
+    names = [thing.name for thing in scene.objects]
+    return energy_gain(ledger, names, balance, ALLOWED["mechanical_growth"] * scale)
+
+
+def believed(seen: Iterable[Expectation], found: Audit) -> tuple[Expectation, ...]:
+    """Let no expectation be met by a run that is not physics.
+
+    That is one that gained energy, or in which an object passed through another.
+    """
+    through = [pair for pair in found.surfaces if pair.passed]
+    if through:
+        doubt = f"but {passage(through[0])}"
+    elif found.mechanical_growth > ALLOWED["mechanical_growth"]:
+        doubt = f"but energy grew by {found.mechanical_growth:.1%}"
+    else:
+        return tuple(seen)
+    return tuple(replace(e, value=f"{e.value}; {doubt}", met=False) for e in seen)
+
+
+def mass_error(particles: Particles) -> float:
+    """Largest relative difference of a part's particles from its estimated mass [-]."""
+    mass = np.bincount(particles.part, particles.mass, minlength=len(particles.mass_real))
+    real = np.array(particles.mass_real)
+    return float(np.max(np.abs(mass - real) / np.where(real > 0, real, 1.0), initial=0.0))
+
+
+def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> tuple[PartAudit, ...]:
+    """One row per part: real and simulated numbers side by side."""
+    first = {int(k): int(p) for p, k in reversed(list(enumerate(particles.part)))}
+    owner = {k: scene.objects[particles.object[p]] for k, p in first.items()}
+    return tuple(
+        part_row(k, owner.get(k), particles, field) for k in range(len(particles.treatments))
+    )
+
+
+def part_row(
+    k: int, owner: SceneObject | None, particles: Particles, field: MaterialField
+) -> PartAudit:
+    """Put the numbers of one part side by side; owner: None where it has no particles."""
+    material, structure, mass = field.materials[k], field.structures[k], particles.mass_real[k]
+    treatment = particles.treatments[k]
+    acts = acting(material, structure, treatment)
+    return PartAudit(
+        name=field.words[k].name,
+        object=None if owner is None else owner.name,
+        material=material.name,
+        law=acts.law.name.lower(),
+        treatment=treatment.kind,
+        structure=structure.kind,
+        E=treatment.young_real,
+        E_sim=treatment.young,
+        nu=acts.poisson,
+        density=material.density,
+        density_sim=treatment.density,
+        yield_stress=material.yield_stress,
+        yield_stress_sim=treatment.yield_stress,
+        thickness_m=structure.thickness,
+        contents=structure.contents.name if structure.contents else None,
+        fill=structure.fill if structure.contents else None,
+        thickness_sim_m=treatment.thickness,
+        mass_kg=mass,
+        real_mass_kg=None if owner is None else mass / owner.scale**3,
+        why=treatment.why,
+    )

@@ -1,0 +1,54 @@
+"""``audit.json``: the one place where it is written and read back."""
+
+from pathlib import Path
+from typing import TypeVar
+
+from corporeal.core import store
+from corporeal.core.errors import BadFileError
+from corporeal.core.findings import Audit, RunAudit
+from corporeal.core.typed import typed
+
+AUDIT = "audit.json"
+
+A = TypeVar("A", bound=Audit)
+
+
+def write_audit(folder: Path, audit: Audit) -> None:
+    """Write an audit into a folder.
+
+    Raises:
+        DiskError: The disk refuses it.
+
+    """
+    store.write_json(folder / AUDIT, audit)
+
+
+def read_audit(folder: Path) -> Audit:
+    """Read the audit of a simulation from the folder of its frames.
+
+    Raises:
+        BadFileError: The file is absent, damaged, or of a version that had other fields.
+
+    """
+    return _read(Audit, folder, f"Simulate again: corporeal simulate {folder.parent}.")
+
+
+def read_run_audit(folder: Path) -> RunAudit:
+    """Read the audit of a finished run from the run's folder.
+
+    Raises:
+        BadFileError: The file is absent, damaged, or of a version that had other fields.
+
+    """
+    return _read(RunAudit, folder, f"Make it again: corporeal report {folder}.")
+
+
+def _read(kind: type[A], folder: Path, remedy: str) -> A:
+    path = folder / AUDIT
+    data = store.read_json(path)
+    try:
+        return typed(kind, data)
+    except (ValueError, TypeError, AttributeError) as error:
+        raise BadFileError(
+            path, f"is no audit that this version can read ({error}).", remedy
+        ) from error

@@ -1,0 +1,78 @@
+"""What is simulated at an instant of a run in which things break."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.core.types import Break, MaterialField, Particles, Scene
+from corporeal.discretization.broken import broken_field, broken_particles, broken_scene, shares
+from corporeal.discretization.problem_from_scene import Posed
+from corporeal.mpm.problem import Problem, Snapshot
+from corporeal.mpm.splitting import Split
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What is simulated now, with the pieces of what has broken."""
+
+    scene: Scene
+    particles: Particles
+    field: MaterialField
+    posed: Posed
+    turned: Float[np.ndarray, "B 3 3"]
+    """Rotation of each body when the problem's positions are those of its particles."""
+
+    @classmethod
+    def at_start(
+        cls, scene: Scene, particles: Particles, field: MaterialField, posed: Posed
+    ) -> "Stage":
+        """Return a stage on which nothing has broken."""
+        turned = np.broadcast_to(np.eye(3), (len(posed.problem.bodies), 3, 3))
+        return cls(scene, particles, field, posed, turned)
+
+    def rows(self, body: int) -> slice:
+        """Where a body's particles are in the problem's order."""
+        counts = [len(b.position) for b in self.posed.problem.bodies]
+        first = sum(counts[:body])
+        return slice(first, first + counts[body])
+
+    def with_pieces(self, one: Break, split: Split, problem: Problem, now: Snapshot) -> "Stage":
+        """Return the stage with the pieces of a body as objects.
+
+        Args:
+            one: What broke.
+            split: The same of the problem before.
+            problem: In which the pieces are bodies.
+            now: Where particles were just before.
+
+        """
+        posed, body, more = self.posed, split.body, split.count - 1
+        count = len(self.scene.objects)
+        mine = self.rows(body)
+        number = posed.order[mine]
+        order = np.concatenate(
+            [
+                posed.order[: mine.start],
+                number[one.piece == 0],
+                posed.order[mine.stop :],
+                *(number[one.piece == k] for k in range(1, split.count)),
+            ]
+        )
+        turned = np.concatenate([self.turned, np.empty((more, 3, 3))])
+        turned[[body, *range(len(self.turned), len(turned))]] = (
+            now.motion[mine][0] @ self.turned[body]
+        )
+        after = Posed(
+            problem=problem,
+            order=order,
+            rigid=np.append(posed.rigid, np.ones(more, dtype=bool)),
+            object_of_body=np.append(posed.object_of_body, count + np.arange(more)),
+        )
+        return Stage(
+            scene=broken_scene(self.scene, one, shares(one, self.particles)),
+            particles=broken_particles(self.particles, one, count),
+            field=broken_field(self.field, one),
+            posed=after,
+            turned=turned,
+        )

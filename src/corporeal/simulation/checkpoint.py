@@ -1,0 +1,133 @@
+"""Checkpoints: what a simulation that was cut off goes on from, exactly as if nothing had happened.
+
+``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the
+problem it belongs to; ``checkpoint-before.npz`` is the one before it, for when the last cannot be
+read. Each is sealed with a digest, written whole, forced to the disk and then renamed, so that a
+process or a machine that stops in the middle leaves the old ones.
+"""
+
+import hashlib
+import logging
+import time
+from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from corporeal.core.errors import BadFileError
+from corporeal.simulation.frames import frame_path, read_arrays, write_arrays
+
+LAST, BEFORE = "checkpoint.npz", "checkpoint-before.npz"
+EVERY = 10.0
+"""Least seconds of computing between two checkpoints."""
+LARGEST_SHARE = 0.05
+"""Largest share of the time that may be spent on writing them."""
+STATE = "engine."
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Saved:
+    """What a checkpoint holds."""
+
+    done: int = 0
+    """Frames before it."""
+    state: dict[str, np.ndarray] = field(default_factory=dict)
+    """As the engine saved it; empty where nothing is done."""
+
+
+class Checkpoints:
+    """The last two states of one simulation in one folder."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        """Look after the checkpoints in a folder.
+
+        Args:
+            folder: Where they are, beside the frames.
+            name: What is simulated; a checkpoint with another name is never used.
+
+        """
+        self.folder, self.name = folder, name
+        self.written, self.seconds = time.monotonic(), 0.0
+
+    @property
+    def due(self) -> bool:
+        """Whether enough was computed since the last one to write another."""
+        pause = max(EVERY, self.seconds / LARGEST_SHARE)
+        return time.monotonic() - self.written >= pause
+
+    def keep(self, saved: dict[str, np.ndarray], done: int) -> None:
+        """Write a state after ``done`` frames; the last one becomes the one before."""
+        start = time.monotonic()
+        last = self.folder / LAST
+        if last.exists():
+            last.replace(self.folder / BEFORE)
+        saved = {name: np.asarray(value) for name, value in saved.items()}
+        state = {f"{STATE}{name}": value for name, value in saved.items()}
+        about = {"done": done, "name": self.name, "seal": fingerprint(done, self.name, saved)}
+        write_arrays(last, state | {name: np.array(value) for name, value in about.items()})
+        self.written = time.monotonic()
+        self.seconds = self.written - start
+
+    def newest(self) -> Saved:
+        """Return the newest usable checkpoint; one of nothing where there is none."""
+        for path in (self.folder / LAST, self.folder / BEFORE):
+            if not path.exists():
+                continue
+            try:
+                return self._read(path)
+            except BadFileError as error:
+                log.warning("%s Looking for an earlier one, or starting again.", error)
+                path.unlink()
+        return Saved()
+
+    def _read(self, path: Path) -> Saved:
+        found = read_arrays(path)
+        state = {k.removeprefix(STATE): v for k, v in found.items() if k.startswith(STATE)}
+        try:
+            done, name, seal = int(found["done"]), str(found["name"]), str(found["seal"])
+        except KeyError as error:
+            raise BadFileError(path, f"is no checkpoint ({error} is missing).") from error
+        if seal != fingerprint(done, name, state):
+            raise BadFileError(path, "cannot be read (not what was written).")
+        if name != self.name:
+            raise BadFileError(path, "is of another scene or other settings.")
+        missing = [k for k in range(done) if not frame_path(self.folder, k).exists()]
+        if missing:
+            raise BadFileError(path, f"does not fit: frame {missing[0]} is missing.")
+        return Saved(done, state)
+
+    def forget(self) -> None:
+        """Remove them: the simulation is finished."""
+        for name in (LAST, BEFORE):
+            (self.folder / name).unlink(missing_ok=True)
+
+
+def fingerprint(*objects: Any) -> str:
+    """Name anything made of dataclasses, containers, arrays and numbers by its content."""
+    total = hashlib.sha256()
+    for obj in objects:
+        _feed(total, obj)
+    return total.hexdigest()[:20]
+
+
+def _feed(total: Any, obj: Any) -> None:
+    """Add a value to the digest, its kind and length first, so that no two values look alike."""
+    total.update(type(obj).__name__.encode())
+    if isinstance(obj, np.ndarray):
+        total.update(f"{obj.dtype.str}{obj.shape}".encode())
+        total.update(np.ascontiguousarray(obj).tobytes())
+    elif is_dataclass(obj) and not isinstance(obj, type):
+        for f in fields(obj):
+            total.update(f.name.encode())
+            _feed(total, getattr(obj, f.name))
+    elif isinstance(obj, dict):
+        _feed(total, sorted(obj.items()))
+    elif isinstance(obj, list | tuple):
+        total.update(str(len(obj)).encode())
+        for item in obj:
+            _feed(total, item)
+    else:
+        total.update(repr(obj).encode())

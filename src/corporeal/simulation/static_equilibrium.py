@@ -1,0 +1,178 @@
+"""Static equilibrium under gravity before time 0, by dynamic relaxation.
+
+Poses at rest come from rigid bodies: what is soft was never asked. Here it sinks until it bears its
+weight, and with it what lies on it. Motion is taken out by kinetic damping (Cundall 1976; Barnes
+1999, "Form finding and analysis of tension structures by dynamic relaxation"): whenever the kinetic
+energy of an object passes a maximum it lies near its balance, and is stopped there. There is no
+coefficient to choose, and what falls over falls as fast as in life. In the end nothing is damped
+for a while; only what stays by itself has found its balance.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.core.types import Keyframes, Push
+from corporeal.mpm.problem import Engine, Problem, Snapshot
+from corporeal.simulation.ledger_row import object_of_body
+
+SAMPLE = 0.1
+"""How often energies are looked at, over √(dx/g): what is let go falls 1/200 of a cell in it."""
+CALM, SLOW = 0.05, 0.02
+"""Less than so many cells within so many seconds [s, dx]: it is tried whether it stays."""
+WATCH, STILL = 0.25, 0.1
+"""It stays when, left alone so long, nothing drifts by so much [s, dx]: a fifth of what counts as
+motion (docs/rest.md)."""
+LONGEST = 4.0
+"""Gives up after so long [s]."""
+PAUSE = 10
+"""Looks between two chances to stop."""
+AT_ONCE = 1e6
+"""How much faster Maxwell branches forget here [-]: what lies has had all the time it takes."""
+
+RESTING = Keyframes((0.0,), ((0.0, 0.0, 0.0),), ((0.0, 0.0, 0.0),))
+"""What follows a path is held where it starts."""
+
+Pause = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Balance:
+    """What became of objects that were left to themselves; B objects."""
+
+    seconds: float
+    """How long it took [s]."""
+    found: bool
+    """Whether they came to rest."""
+    moved: Float[np.ndarray, "B 3"]
+    """By how much their centres of mass did [m]."""
+    farthest: Float[np.ndarray, " B"]
+    """By how much the particle did that moved most [m]."""
+    state: dict[str, np.ndarray]
+    """Of the engine: where everything lies, at rest."""
+
+
+def before(problem: Problem, hung: set[int]) -> Problem:
+    """Pose the same problem before its time 0: without motion, wind, pushes and loss.
+
+    Branches that forget at once neither bear nor lose anything: what remains is the slow modulus,
+    which alone carries what has lain for long.
+
+    Args:
+        problem: Of the film.
+        hung: Bodies that nothing carries: gravity does not pull them.
+
+    """
+    x, y, z = problem.gravity
+    bodies = [
+        replace(
+            body,
+            velocity=np.zeros_like(body.velocity),
+            vibration=AT_ONCE * body.vibration,
+            push=Push((-x, -y, -z)) if k in hung else None,
+            wind=None,
+            path=None if body.path is None else RESTING,
+        )
+        for k, body in enumerate(problem.bodies)
+    ]
+    return replace(problem, bodies=tuple(bodies), gravity_ramp=0.0)
+
+
+class Relaxation:
+    """One dynamic relaxation, from its start or from where it was left."""
+
+    def __init__(self, engine: Engine, problem: Problem, hung: set[int]) -> None:
+        """Look at the start.
+
+        Args:
+            engine: Fresh, of the problem.
+            problem: What ``before`` returned.
+            hung: Bodies that are held where they are.
+
+        """
+        self.engine, self.cell, self.hung = engine, problem.cell, hung
+        group = object_of_body(problem)
+        self.members = [np.flatnonzero(group == k).tolist() for k in range(group.max() + 1)]
+        self.bodies = range(len(group))
+        self.owner = np.repeat(group, [len(b.position) for b in problem.bodies])
+        self.sample = SAMPLE * float(np.sqrt(self.cell / np.linalg.norm(problem.gravity)))
+        self.first: Snapshot = engine.snapshot()
+        self.start, self.energy = self._look()
+        self.energy[:] = 0.0
+        self.anchor, self.since, self.count, self.watching = self.start.copy(), 0.0, 0, False
+
+    def run(self, pause: Pause) -> Balance:
+        """Go on until everything has found its balance, or for ``LONGEST``.
+
+        Args:
+            pause: Told the time [s] now and then, when the state is good to go on from.
+
+        """
+        found = False
+        while not found and self.engine.time < LONGEST:
+            if self.count % PAUSE == 0:
+                pause(self.engine.time)
+            self.count += 1
+            self.engine.advance(self.count * self.sample)
+            found = self._judge()
+        self.engine.stop(self.bodies)
+        return self._balance(found)
+
+    def _judge(self) -> bool:
+        """Stop what is to be stopped; tell whether everything stays."""
+        centre, energy = self._look()
+        self.engine.stop(self.hung)
+        drift = float(np.linalg.norm(centre - self.anchor, axis=1).max()) / self.cell
+        waited = self.engine.time - self.since
+        if self.watching:
+            if drift < STILL:
+                return waited >= WATCH
+            self._note(centre, watching=False)
+            return False
+        falling = energy < self.energy
+        self.energy = np.where(falling, 0.0, energy)
+        self.engine.stop([b for k in np.flatnonzero(falling) for b in self.members[k]])
+        if waited >= CALM:
+            self._note(centre, watching=drift < SLOW)
+        return False
+
+    def _note(self, centre: np.ndarray, watching: bool) -> None:
+        """Measure drift from now on; what is watched starts at rest."""
+        self.anchor, self.since, self.watching = centre, self.engine.time, watching
+        if watching:
+            self.engine.stop(self.bodies)
+            self.energy = np.zeros_like(self.energy)
+
+    def _look(self) -> tuple[np.ndarray, np.ndarray]:
+        """Centre of mass [m] and kinetic energy [J] of every object."""
+        now = self.engine.measure()
+        shares = [now.mass[m] / now.mass[m].sum() for m in self.members]
+        centre = [s @ now.centre[m] for s, m in zip(shares, self.members, strict=True)]
+        return np.stack(centre), np.array([now.kinetic[m].sum() for m in self.members])
+
+    def _balance(self, found: bool) -> Balance:
+        far = np.linalg.norm(self.engine.snapshot().position - self.first.position, axis=1)
+        return Balance(
+            seconds=self.engine.time,
+            found=found,
+            moved=self._look()[0] - self.start,
+            farthest=np.array([far[self.owner == k].max() for k in range(len(self.members))]),
+            state=self.engine.save(),
+        )
+
+    # ------------------------------------------------------------ going on later
+
+    def saved(self) -> dict[str, np.ndarray]:
+        """Everything needed to go on exactly as if nothing had happened."""
+        own = {"settling.anchor": self.anchor, "settling.energy": self.energy}
+        own["settling.clock"] = np.array([self.since, self.count, self.watching], float)
+        return self.engine.save() | own
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what ``saved`` returned."""
+        self.engine.restore(saved)
+        self.anchor, self.energy = saved["settling.anchor"], saved["settling.energy"]
+        since, count, watching = saved["settling.clock"].tolist()
+        self.since, self.count, self.watching = since, int(count), bool(watching)

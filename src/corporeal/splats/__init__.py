@@ -1,1 +1,0 @@
-"""Scenes made of Gaussians: drawing them, learning them from pictures, deforming them."""

@@ -1,1 +1,0 @@
-"""The verbs. One file, one function, one command, one folder of results."""

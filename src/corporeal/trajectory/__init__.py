@@ -1,1 +1,0 @@
-"""What a simulation leaves: frames, checkpoints, the audit and what happened."""

@@ -1,1 +1,0 @@
-"""How every part is treated: rigid or deformable, and with which numbers."""

@@ -1,0 +1,50 @@
+"""Exposures that differ from picture to picture are no colours of things."""
+
+from dataclasses import replace
+
+import numpy as np
+from painted_scene import FLOOR, agreement, scene
+
+from corporeal.multiview.ground_plane import Plane
+from corporeal.multiview.region import region
+from corporeal.reconstruction.masks.even_exposure import evenly_exposed
+from corporeal.reconstruction.masks.grow import ROUGH, grow
+from corporeal.reconstruction.masks.seeds import looked_at
+
+GROUND = Plane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
+BRICK, OAK = (0.55, 0.36, 0.27), (0.6, 0.45, 0.31)
+
+
+def exposed(views, spread, seed=0):
+    """The same pictures, each with an exposure and a white balance of its own."""
+    random = np.random.default_rng(seed)
+    gain = spread * random.normal(size=(len(views.rgb), 1, 1, 1))
+    gain = gain + 0.2 * spread * random.normal(size=(len(views.rgb), 1, 1, 3))
+    return replace(views, rgb=np.clip(np.round(views.rgb * np.exp(gain)), 0, 255).astype(np.uint8))
+
+
+def off(views, other):
+    """By how much each picture and channel differs from another one, in logarithms."""
+    ratios = np.log(np.maximum(views.rgb, 1) / np.maximum(other.rgb, 1))
+    return np.median(ratios, axis=(1, 2))
+
+
+def test_pictures_get_one_exposure():
+    views, _, _ = scene()
+    before = exposed(views, 0.25)
+    after = evenly_exposed(before, GROUND, region(views.cameras), ROUGH)
+    assert off(before, views).std(axis=0).min() > 0.2
+    assert off(after, views).std(axis=0).max() < 0.03
+
+
+def test_without_a_floor_they_stay_as_they_are():
+    views, _, _ = scene()
+    assert evenly_exposed(views, None, region(views.cameras), ROUGH) is views
+
+
+def test_a_thing_is_told_from_a_floor_that_is_as_brown_in_another_picture():
+    views, masks, points = scene(ball=BRICK, ground=OAK)
+    views = exposed(views, 0.25)
+    grown = grow(views, looked_at(views, points))
+    assert grown is not None
+    assert agreement(grown.inside, masks).min() > 0.9

@@ -1,0 +1,51 @@
+"""What a run says last: sentences by the kind that they were given where they were made."""
+
+import pytest
+
+from corporeal.core.types import Note, NoteKind
+from corporeal.simulation.closing_words import ASSUMED, DOUBT, LEFT_OUT, closing_words, parted
+from made_findings import run_audit
+
+PIECES = Note(
+    "can: nobody looked what it is made up of. --vlm or --annotations name pieces.",
+    NoteKind.ASSUMED,
+)
+UNKNOWN = Note(
+    "axe is of unknown material; plastics-PP stands in. Say what it is with --annotations.",
+    NoteKind.GRAVE,
+)
+DEPTH = "Objects penetrate each other by up to 2.0 grid cells: a finer --detail reduces it."
+GONE = Note(
+    "2 of 10 photographs do not fit the others and were left out: c.jpg, d.jpg.", NoteKind.LEFT_OUT
+)
+
+
+def test_the_gravest_comes_first_and_each_once():
+    warnings = (GONE, PIECES, DEPTH, UNKNOWN, PIECES)
+    said = closing_words(run_audit(warnings=warnings, hints=("Nothing moves.", PIECES)))
+    assert list(said.items()) == [
+        (DOUBT, (UNKNOWN, DEPTH)),
+        (ASSUMED, (PIECES, "Nothing moves.")),
+        (LEFT_OUT, (GONE,)),
+    ]
+
+
+@pytest.mark.parametrize("words", [str(GONE), str(PIECES), str(UNKNOWN)])
+def test_words_alone_make_no_kind(words):
+    said = closing_words(run_audit(warnings=(words,)))
+    assert said == {DOUBT: (words,), ASSUMED: (), LEFT_OUT: ()}
+
+
+@pytest.mark.parametrize(
+    ("sentences", "first"),
+    [
+        (GONE, GONE),
+        (PIECES, PIECES),
+        (UNKNOWN, "axe is of unknown material; plastics-PP stands in."),
+        ("Left out: DSC_1.jpg. Put a newspaper under it.", "Left out:"),
+        ("It is 0.5 m long.", "It is 0.5 m long."),
+    ],
+)
+def test_what_is_the_matter_is_the_first_sentence(sentences, first):
+    assert parted(sentences)[0] == first
+    assert " ".join(filter(None, parted(sentences))) == sentences
