@@ -16,21 +16,27 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.stats import norm, t
 
-from corporeal.core.types import Evidence
+from corporeal.core.types import MassEvidence
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.geometry.arrangement import life_sized
-from corporeal.lab.evaluation.mass import anonymous
-from corporeal.lab.evaluation.truth import Weighed, read_truth
-from corporeal.pipeline.mixture import DRAWS, HIGH, Scale, likelihood, quantiles
+from corporeal.geometry.scene_transforms import scale_to_life_size
+from corporeal.lab.evaluation.mass_evaluation import anonymise
+from corporeal.lab.evaluation.measured_masses import WeighedObject, read_measured_masses
+from corporeal.pipeline.mass_posterior import (
+    INTERVAL_HIGH_QUANTILE,
+    SAMPLES_PER_SCENE,
+    MassSampler,
+    mass_likelihood,
+    weighted_quantiles,
+)
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import GroundConfig
 from corporeal.pipeline.stages.segment import segment
 
 ANSWERS = 3
-MISS = 2 / (2 * (1 - HIGH))
+MISS = 2 / (2 * (1 - INTERVAL_HIGH_QUANTILE))
 """What lying outside a 90 % interval costs in its score, per unit of the logarithm."""
-AIM, WIDEST = HIGH - (1 - HIGH), 2.2
+AIM, WIDEST = INTERVAL_HIGH_QUANTILE - (1 - INTERVAL_HIGH_QUANTILE), 2.2
 """Share of masses that should lie inside, and the widest median interval (high over low)."""
 
 
@@ -42,8 +48,8 @@ class Drawn:
     """On the scales [kg]."""
     masses: Float[np.ndarray, " N"]
     """Of the draws [kg]."""
-    pooled: Evidence | None
-    own: tuple[Evidence | None, ...]
+    pooled: MassEvidence | None
+    own: tuple[MassEvidence | None, ...]
     """Of each answer."""
     placed: Float[np.ndarray, " N"] = field(default_factory=lambda: np.ones(0))
     """Of the ways of each draw, every value where it was placed [kg]."""
@@ -53,9 +59,9 @@ class Drawn:
         found = np.full(len(self.masses), 1 / len(self.masses))
         if evidence and by_its_own:
             for k, said in enumerate(self.own):
-                found[k :: len(self.own)] *= likelihood(self.masses[k :: len(self.own)], said)
+                found[k :: len(self.own)] *= mass_likelihood(self.masses[k :: len(self.own)], said)
         elif evidence:
-            found *= likelihood(self.masses, self.pooled)
+            found *= mass_likelihood(self.masses, self.pooled)
         return found / found.sum()
 
     def interval(self, weights: Float[np.ndarray, " N"], few: bool) -> tuple[float, float, float]:
@@ -65,24 +71,27 @@ class Drawn:
         deviation of the answers' medians: what the draws hold of the variance between answers is
         taken out, and what a further answer would say is put in.
         """
-        low, middle, high = quantiles(self.masses, weights)
+        low, middle, high = weighted_quantiles(self.masses, weights)
         if not few:
             return low, middle, high
         n = len(self.own)
         each = [(self.masses[k::n], weights[k::n] / weights[k::n].sum()) for k in range(n)]
-        between = float(np.var([np.log(quantiles(*one)[1]) for one in each], ddof=1))
-        wider = t.ppf(HIGH, n - 1) ** 2 * (1 + 1 / n) - norm.ppf(HIGH) ** 2 * (n - 1) / n
+        between = float(np.var([np.log(weighted_quantiles(*one)[1]) for one in each], ddof=1))
+        wider = (
+            t.ppf(INTERVAL_HIGH_QUANTILE, n - 1) ** 2 * (1 + 1 / n)
+            - norm.ppf(INTERVAL_HIGH_QUANTILE) ** 2 * (n - 1) / n
+        )
         reach = np.sqrt(between * wider)
         down, up = np.hypot(np.log(middle / low), reach), np.hypot(np.log(high / middle), reach)
         return middle * float(np.exp(-down)), middle, middle * float(np.exp(up))
 
 
-def drawn(thing: Weighed, recordings: Path, answers: int = ANSWERS) -> Drawn:
+def drawn(thing: WeighedObject, recordings: Path, answers: int = ANSWERS) -> Drawn:
     """Draw what an object may weigh by recorded answers, as ``evaluate mass`` does."""
-    scene = anonymous(life_sized(assemble([thing.file])), thing.file)
+    scene = anonymise(scale_to_life_size(assemble([thing.file])), thing.file)
     said = describe(scene, DescribeConfig(vlm=f"replay:{recordings}", answers=answers))
-    scale = Scale(scene, segment(scene, said), GroundConfig(), 0)
-    draws = [scale.draw(said, number) for number in range(DRAWS)]
+    scale = MassSampler(scene, segment(scene, said), GroundConfig(), 0)
+    draws = [scale.draw(said, number) for number in range(SAMPLES_PER_SCENE)]
     masses = np.array([draw.masses.sum() for draw in draws])
     placed = np.array([scale.mass(draw.inventory) for draw in draws])
     (words,) = said.objects
@@ -147,7 +156,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=Path, nargs="+", required=True)
     parser.add_argument("--each", action="store_true")
     asked = parser.parse_args()
-    rows = [one for one in read_truth(asked.folder, asked.truth) if one.mass is not None]
+    rows = [one for one in read_measured_masses(asked.folder, asked.truth) if one.mass is not None]
     for recordings in asked.recordings:
         things = [drawn(one, recordings) for one in rows]
         for row, thing in zip(rows, things, strict=True) if asked.each else ():

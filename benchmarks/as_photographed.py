@@ -29,7 +29,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter, uniform_filter1d
 
 from corporeal.core.types import Camera, Views
-from corporeal.io.transforms import read_views, write_views
+from corporeal.io.photos.transforms_json import read_views, write_views
 
 SWITCHES = ("wall", "clutter", "flash", "rolled", "stop", "turned")
 """Of how pictures are taken."""

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from cost.blocks import Drop, drop_of, problem_of
 
-from corporeal.mpm.constants import OUT_OF_BLOCK_SHARE
+from corporeal.mpm.constants import OUT_OF_BLOCK_FRACTION
 from corporeal.mpm.cuda import layout, particle_memory, program
 from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.cuda.layout import wp
@@ -81,12 +81,12 @@ class Adds:
 def adds(engine: CudaEngine) -> Adds:
     """Count what the next scatter adds, from where particles are."""
     a = engine.arrays
-    count = int(a.sheet.flag.numpy()[layout.TASKS])
+    count = int(a.sheet.flag.numpy()[layout.FLAG_TASKS])
     tasks = np.column_stack(
         [getattr(a.grid, f"task_{name}").numpy()[:count] for name in ("home", "first", "last")]
     )
     where = a.grid.where.numpy()
-    cell = particle_memory.rows(a.particles, "cell")
+    cell = particle_memory.read_rows(a.particles, "cell")
     corner = np.array(list(np.ndindex(3, 3, 3)))
     total = here = 0
     for home, first, last in tasks:
@@ -103,7 +103,7 @@ def adds(engine: CudaEngine) -> Adds:
 
 def words(names: str) -> list[int]:
     """Length of each channel's row [words]; a particle's block is one."""
-    return [int(np.prod(particle_memory.STATE[name][0])) for name in names.split()]
+    return [int(np.prod(particle_memory.PARTICLE_STATE[name][0])) for name in names.split()]
 
 
 def moved() -> dict[str, int]:
@@ -201,7 +201,7 @@ def report(name: str, drop: Drop) -> None:
     print(f"  launches of a sort: {len(launches(run.arrange))}")
     print(f"  adds a particle, sorted, as it starts: {fresh.kept:.1f} (before: {BEFORE})")
     print(f"  … and {STEPS} steps later: {later.kept:.1f}; with a tenth strayed: ", end="")
-    print(f"{Adds(later.kept, OUT_OF_BLOCK_SHARE).all:.1f}")
+    print(f"{Adds(later.kept, OUT_OF_BLOCK_FRACTION).all:.1f}")
 
 
 def main() -> None:
@@ -212,7 +212,7 @@ def main() -> None:
     parser.add_argument("--kernels", type=int, nargs="*", metavar="ARCHITECTURE", default=[])
     chosen = parser.parse_args()
     for architecture in chosen.kernels:
-        for one in (k for module in program.MODULES for k in kernels(module, architecture)):
+        for one in (k for module in program.KERNEL_MODULES for k in kernels(module, architecture)):
             print(f"sm_{architecture} {one.name:26s} {one.registers:4d} registers", end=" ")
             print(f"{one.stack:4d} bytes of stack")
     for name, drop in DROPS.items():

@@ -17,8 +17,8 @@ import warp as wp
 from cost.blocks import Drop, drop_of
 from cost.contest import Ours, contest
 
-from corporeal.core.machine import cores
-from corporeal.mpm.cuda import layout, planning
+from corporeal.core.process_resources import usable_cores
+from corporeal.mpm.cuda import layout, timestep
 
 SIZES = (10_000, 100_000, 1_000_000, 5_000_000)
 QUICK = SIZES[:2]
@@ -39,7 +39,7 @@ def times(drop: Drop, card: str) -> None:
     """Print what a substep takes each contestant [ns per particle], and the ratio."""
     rivals = [replace(drop, device=card)]
     if drop.particles <= 1.1 * PROCESSOR:
-        rivals += [replace(drop, threads=t) for t in (1, 4) if t <= cores()]
+        rivals += [replace(drop, threads=t) for t in (1, 4) if t <= usable_cores()]
     engines = [Ours(rival) for rival in rivals]
     found = [cost.wall for cost in contest(engines, SUBSTEPS)]
     name = f"{drop.objects} object{'s' if drop.objects > 1 else ''}, {drop.particles:,} particles"
@@ -58,11 +58,11 @@ def kernels(engine: object) -> dict[str, float]:
     """Time the kernels of a step, launched one by one [us]: the median of each launch, summed."""
     run, sheet = engine.program, engine.arrays.sheet
     spent: dict[str, list[float]] = defaultdict(list)
-    engine._set(layout.FORCED, 0.0)
+    engine._set(layout.CLOCK_FORCED, 0.0)
     for _ in range(STEPS):
-        engine._set(layout.UNTIL, engine.time + engine.stable_step())
+        engine._set(layout.CLOCK_UNTIL, engine.time + engine.stable_step())
         engine._arrange()
-        run._one_group(planning.begin, sheet, engine.arrays.rigid)
+        run._one_group(timestep.begin_frame, sheet, engine.arrays.rigid)
         wp.timing_begin(cuda_filter=wp.TIMING_KERNEL)
         run._step()
         once: dict[str, float] = defaultdict(float)
@@ -88,7 +88,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="small sizes only")
     chosen = parser.parse_args()
     for card in wp.get_cuda_devices():
-        print(f"{card.alias}: {card.name}; {cores()} cores")
+        print(f"{card.alias}: {card.name}; {usable_cores()} cores")
         for drop in drops(chosen.quick):
             times(drop, card.alias)
 

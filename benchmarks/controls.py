@@ -18,9 +18,9 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from stories import Told, tell
 
-from corporeal.core.findings import pair_name
-from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.pipeline.runner import Settings
+from corporeal.core.audit_data import pair_name
+from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.pipeline.stages.simulate import SimulateConfig
 
@@ -45,7 +45,9 @@ def dent_profile(told: Told) -> tuple[np.ndarray, np.ndarray]:
         k for k, o in enumerate(told.scene.objects) if o.name == "soda_can_0"
     )
     start = told.film.frames[0].position[can].astype(float)
-    fit = rigid_fit(start, told.film.frames[-1].position[can].astype(float), np.ones(can.sum()))
+    fit = fit_rigid_motion(
+        start, told.film.frames[-1].position[can].astype(float), np.ones(can.sum())
+    )
     shift = fit.undo(told.film.frames[-1].position[can].astype(float)) - start
     middle = start.mean(axis=0)
     outward = (start - middle) * [0.0, 1.0, 1.0]

@@ -15,13 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from corporeal.core.terminal import show_table
-from corporeal.pipeline.results import Results
-from corporeal.pipeline.runner import read_back
-from corporeal.pipeline.stages.film import reel_of
-from corporeal.render.camera import Aim, camera_of
-from corporeal.render.camera_track import track
-from corporeal.render.skin import bind
-from corporeal.simulation.moving_gaussians import fluid, granular
+from corporeal.pipeline.results import StageResults
+from corporeal.pipeline.run_pipeline import read_run
+from corporeal.pipeline.stages.video import motion_summary
+from corporeal.render.camera_placement import CameraAim, camera_from_aim
+from corporeal.render.camera_track import camera_track
+from corporeal.render.skin_binding import bind_vertices
+from corporeal.simulation.moving_gaussians import fluid_parts, granular_parts
 from corporeal.simulation.residual_shape import trusted_fit
 
 SEEN = 0.5
@@ -43,11 +43,15 @@ class Seen:
 
 def dents(run: Path, size: tuple[int, int]) -> list[Seen]:
     """Measure every dent of a run in pictures of some size [px]."""
-    results: Results = read_back(run)
+    results: StageResults = read_run(run)
     scene, trajectory, field = results.scene, results.trajectory, results.field
-    skin = bind(scene, results.parts, results.particles, granular(field), fluid(field))
+    skin = bind_vertices(
+        scene, results.parts, results.particles, granular_parts(field), fluid_parts(field)
+    )
     owner = np.repeat([s.object for s in scene.surfaces], [len(s.vertices) for s in scene.surfaces])
-    camera = track("close", reel_of(skin, scene, results.particles, trajectory), size, None)
+    camera = camera_track(
+        "close", motion_summary(skin, scene, results.particles, trajectory), size, None
+    )
     place, normal = skin.pose(trajectory.frames[-1])
     aim = camera.at(float(trajectory.time[-1]))
     facing = np.sum(normal * (np.asarray(aim.eye) - place), axis=1) > 0
@@ -65,9 +69,9 @@ def dents(run: Path, size: tuple[int, int]) -> list[Seen]:
     return found
 
 
-def on_picture(points: np.ndarray, aim: Aim) -> np.ndarray:
+def on_picture(points: np.ndarray, aim: CameraAim) -> np.ndarray:
     """Return where points (N, 3) [m] show [px]."""
-    camera = camera_of(aim)
+    camera = camera_from_aim(aim)
     local = np.linalg.inv(camera.world_from_camera) @ np.c_[points, np.ones(len(points))].T
     flat = camera.K @ local[:3]
     return (flat[:2] / flat[2]).T

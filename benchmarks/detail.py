@@ -31,11 +31,15 @@ from laws.bodies import (
 )
 from laws.watching import started
 
-from corporeal.core.machine import cores
-from corporeal.core.types import Law, Material, Structure, Treatment
-from corporeal.discretization.part import Motion, PartGeometry
-from corporeal.discretization.plan import QUALITIES, Detail, plan
-from corporeal.materials import find
+from corporeal.core.process_resources import usable_cores
+from corporeal.core.types import Discretization, Law, Material, Structure
+from corporeal.discretization.discretization_plan import (
+    QUALITY_PRESETS,
+    DetailLevel,
+    plan_discretization,
+)
+from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry
+from corporeal.materials import find_material
 from corporeal.simulation.surface_mark import surface_mark
 
 PAGE = Path(__file__).parents[1] / "docs" / "detail.md"
@@ -47,7 +51,11 @@ AIMS = {"draft": 30.0, "normal": 10.0}
 
 
 def planned(
-    material: Material, size: tuple[float, float, float], share: float, speed: float, detail: Detail
+    material: Material,
+    size: tuple[float, float, float],
+    share: float,
+    speed: float,
+    detail: DetailLevel,
 ) -> tuple[Stuff, float]:
     """Ask the policy for the numbers and the grid of one solid thing.
 
@@ -62,11 +70,11 @@ def planned(
     a, b, c = size
     area = 2 * (a * b + b * c + c * a)
     part = PartGeometry(0, material, Structure("solid"), size, share * a * b * c, share * area)
-    found = plan([part], [Motion(speed, G)], detail)
+    found = plan_discretization([part], [ExpectedMotion(speed, G)], detail)
     return stuff(material, found.treatments[0]), found.cell
 
 
-def stuff(material: Material, treatment: Treatment) -> Stuff:
+def stuff(material: Material, treatment: Discretization) -> Stuff:
     """Join what a treatment says with what it leaves as it is."""
     return Stuff(
         law=material.law,
@@ -78,7 +86,7 @@ def stuff(material: Material, treatment: Treatment) -> Stuff:
     )
 
 
-def drop(material: Material, detail: Detail, diameter: float = 0.1) -> tuple[float, float]:
+def drop(material: Material, detail: DetailLevel, diameter: float = 0.1) -> tuple[float, float]:
     """Rebound height over the fall's [-], and largest flattening [mm], of a ball."""
     speed = 2.0
     matter, cell = planned(material, (diameter,) * 3, np.pi / 6, speed, detail)
@@ -95,7 +103,7 @@ def drop(material: Material, detail: Detail, diameter: float = 0.1) -> tuple[flo
     return rebound**2, 1e3 * float(height - least)
 
 
-def collapse(detail: Detail, radius: float = 0.1) -> tuple[float]:
+def collapse(detail: DetailLevel, radius: float = 0.1) -> tuple[float]:
     """Run-out of 98 % of a sand column over its radius [-]; E = 1 MPa, φ = 30°, base .6."""
     dry = grains.SAND
     sand = Material("sand", dry.law, dry.young, dry.poisson, dry.density)
@@ -111,9 +119,9 @@ def collapse(detail: Detail, radius: float = 0.1) -> tuple[float]:
     return (float(np.quantile(far, 0.98) / radius - 1.0),)
 
 
-def imprint(density: float, speed: float, detail: Detail) -> tuple[float]:
+def imprint(density: float, speed: float, detail: DetailLevel) -> tuple[float]:
     """Depth of the mark [mm] that a roller of a density [kg/m³] leaves in mud, hit at a speed."""
-    entry = find("mud")
+    entry = find_material("mud")
     diameter, height, width = 0.09, 0.09, 0.27
     matter, cell = planned(entry.pick(entry.typical()), (height, width, width), 1.0, speed, detail)
     deep = 2 * cell
@@ -154,7 +162,7 @@ EXPERIMENTS = (
 
 def table(workers: int) -> list[tuple[str, dict[str, float]]]:
     """Do everything, what takes longest first; give each quantity by detail."""
-    details: list[Detail] = list(QUALITIES)
+    details: list[DetailLevel] = list(QUALITY_PRESETS)
     with ProcessPoolExecutor(workers) as pool:
         found = {
             (k, detail): pool.submit(one.run, *one.given, detail)
@@ -182,7 +190,7 @@ def lines(rows: list[tuple[str, dict[str, float]]]) -> list[str]:
     for name, values in rows:
         away = differences(values)
         met = all(abs(away[d]) <= aim for d, aim in AIMS.items())
-        cells = [f"{values[d]:.3g}" for d in QUALITIES] + [f"{away[d]:+.0f} %" for d in AIMS]
+        cells = [f"{values[d]:.3g}" for d in QUALITY_PRESETS] + [f"{away[d]:+.0f} %" for d in AIMS]
         text.append(f"| {name} | " + " | ".join(cells) + f" | {'met' if met else '**missed**'} |")
     return text
 
@@ -193,7 +201,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--docs", action="store_true", help="write docs/detail.md")
-    parser.add_argument("--workers", type=int, default=min(4, cores()), help="side by side")
+    parser.add_argument("--workers", type=int, default=min(4, usable_cores()), help="side by side")
     asked = parser.parse_args()
     text = lines(table(asked.workers))
     print("\n".join(text))

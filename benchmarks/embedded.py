@@ -14,7 +14,7 @@ from pathlib import Path
 from recognition.facts import FACTS, SETS, facts, judge, record
 
 from corporeal.core import store
-from corporeal.lab.evaluation import recognition as measured
+from corporeal.lab.evaluation import material_evaluation as measured
 from recognition import page
 
 DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
@@ -36,17 +36,17 @@ def main() -> None:
     rows = judge(facts())
     for group in SETS:
         mine = [r for r in rows if r.group == group]
-        s = measured.score(mine)
+        s = measured.recognition_score(mine)
         print(
             f"{group:8} {s.parts:3} parts: right {s.right:.0%}, wrong {s.wrong:.0%}, unknown "
             f"{s.unknown:.0%}; margin orders {_number(s.ordering)}"
         )
-    print(f"all: margin orders {_number(measured.ordering(rows))}")
+    print(f"all: margin orders {_number(measured.margin_roc_area(rows))}")
     for row in rows:
         if row.verdict == "wrong":
             print(f"  wrong: {row.file} / {row.part}: {row.answer} ({row.margin:.2f}) {row.reason}")
     if given.json:
-        store.write_json(given.json, measured.record(rows))
+        store.write_json(given.json, measured.recognition_record(rows))
     if given.docs:
         DOCS.write_text(page.markdown(), encoding="utf-8")
 

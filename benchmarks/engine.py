@@ -23,7 +23,7 @@ from cost.blocks import Drop, drop_of
 from cost.contest import Contestant, Ours, contest
 from cost.peer import Peer, install
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Law
 
 
@@ -68,7 +68,7 @@ WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 8, 5)
 
 def rivals(size: Size) -> list[Drop]:
     """List all drops that meet in the first contest."""
-    free = cores()
+    free = usable_cores()
     plain = drop_of(size.particles)
     laws = [replace(plain, law=law, threads=t) for law in Law for t in (1, 2, 4) if t <= free]
     heaps = [
@@ -90,7 +90,7 @@ def cuda_devices() -> list[str]:
 
 def measure(size: Size, peer: Path | None) -> list[page.Result]:
     """Hold the contest among all drops of one size, and then the one among sizes."""
-    threads = [t for t in size.peer_threads if t <= cores()]
+    threads = [t for t in size.peer_threads if t <= usable_cores()]
     plain = drop_of(size.particles)
     peers = [Peer(peer, replace(plain, threads=t)) for t in threads] if peer else []
     ours = [Ours(drop) for drop in rivals(size)]

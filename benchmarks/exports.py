@@ -26,17 +26,17 @@ import mujoco
 import numpy as np
 
 import corporeal
-from corporeal.export.mjcf import write_mjcf
-from corporeal.export.motion import motion_of_scene
+from corporeal.export.check_exports import drift_in_mujoco
+from corporeal.export.export_record import read_record
+from corporeal.export.export_target import EXPORT_WRITERS, ExportConfig, ExportRequest
+from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
+from corporeal.export.mjcf_writer import write_mjcf
 from corporeal.export.physical_scene import physical_scene
-from corporeal.export.readers import drift_in_mujoco
-from corporeal.export.record import read_record
-from corporeal.export.solids import PhysicalScene, Solid
-from corporeal.export.target import MENU, Asked, ExportConfig
-from corporeal.export.usd_scene import write_usd
-from corporeal.geometry.mesh import Mesh, joined
-from corporeal.geometry.shape import Shape
-from corporeal.pipeline.in_memory import load_scene, prepare
+from corporeal.export.scene_motion import motion_of_scene
+from corporeal.export.usd_writer import write_usd
+from corporeal.geometry.mesh import Mesh, join_meshes
+from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.pipeline.in_memory import load_scene, prepare_scene
 
 EACH, ALL, MEMORY = 15.0, 60.0, 2e9
 """Bounds: CPU seconds of a target but HDF5, of all, and bytes."""
@@ -45,7 +45,7 @@ STILL = 1e-3
 NEAR = 2e-3
 """What is no farther apart at the start touches [m]."""
 THREADS = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-Placed = tuple[np.ndarray, Shape]
+Placed = tuple[np.ndarray, QueryMesh]
 READERS = Path(__file__).parents[1] / "tests" / "export" / "programs"
 PROGRAMS = ("newton", "physx")
 
@@ -77,7 +77,7 @@ def costs(run: Path) -> list[dict]:
     """Export one target after the other, then all."""
     rows = []
     print(f"{'target':8} {'CPU s':>7} {'wall s':>7} {'peak MB':>8} {'files MB':>9}")
-    for name, targets in [*((t, (t,)) for t in MENU), ("all", tuple(MENU))]:
+    for name, targets in [*((t, (t,)) for t in EXPORT_WRITERS), ("all", tuple(EXPORT_WRITERS))]:
         row = {"target": name, **cost_of(run, targets)}
         bound = ALL if name == "all" else np.inf if name == "h5" else EACH
         row["met"] = row["cpu_s"] < bound and row["peak_bytes"] < MEMORY
@@ -128,11 +128,11 @@ def rests(asked: argparse.Namespace) -> list[dict]:
     """Export every scene and leave it alone."""
     rows = []
     for path in asked.scenes:
-        prepared = prepare(load_scene(path))
+        prepared = prepare_scene(load_scene(path))
         motion = motion_of_scene(prepared)
         scene = physical_scene(prepared, motion)
         with tempfile.TemporaryDirectory(prefix="corporeal-") as name:
-            given = Asked(scene, motion, ExportConfig(soft="none"))
+            given = ExportRequest(scene, motion, ExportConfig(soft="none"))
             write_mjcf(given, Path(name))
             model = mujoco.MjModel.from_xml_path(str(Path(name) / "scene.xml"))
             rigid = [s for s in scene.solids if s.rigid]
@@ -177,11 +177,11 @@ def held_by_what_deforms(scene: PhysicalScene) -> set[str]:
         reached |= more
 
 
-def placed(solid: Solid) -> Placed:
+def placed(solid: ExportedSolid) -> Placed:
     """Vertices of a solid in the world, and its surface."""
-    mesh = joined(list(solid.surfaces))
+    mesh = join_meshes(list(solid.surfaces))
     vertices = mesh.vertices + solid.origin
-    return vertices, Shape(Mesh(vertices, mesh.triangles))
+    return vertices, QueryMesh(Mesh(vertices, mesh.triangles))
 
 
 def near(one: Placed, other: Placed) -> bool:

@@ -21,14 +21,26 @@ from typing import Any
 import numpy as np
 from scipy.spatial import KDTree
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Camera, Views
-from corporeal.geometry.shape import sphere_directions
-from corporeal.io.transforms import read_views
-from corporeal.reconstruction.features.descriptor import descriptor, seen_from
-from corporeal.reconstruction.features.lifting import back_projection, fill, uplift, visible
-from corporeal.reconstruction.gaussians.feature_distillation import distilled
-from corporeal.reconstruction.gaussians.radiance import FieldConfig, learn, points
+from corporeal.geometry.mesh_queries import sphere_directions
+from corporeal.io.photos.transforms_json import read_views
+from corporeal.reconstruction.features.feature_lifting import (
+    back_projection,
+    fill_unseen_points,
+    uplift_features,
+    visible_points,
+)
+from corporeal.reconstruction.features.point_descriptor import (
+    mean_view_directions,
+    point_descriptor,
+)
+from corporeal.reconstruction.gaussians.feature_distillation import distil_features
+from corporeal.reconstruction.gaussians.radiance_field import (
+    RadianceFieldConfig,
+    field_surface_points,
+    train_field,
+)
 
 SIDE, FOCAL, AWAY = 256, 300.0, 3.0
 GRID = 37
@@ -93,14 +105,14 @@ def lifted_onto_a_ball(points: int, channels: int, views: int) -> None:
     maps = [one] * views
     print(f"{points} points, {channels} channels, {views} views of {GRID} x {GRID} patches")
     lifted = timed("back-projection", lambda: back_projection(position, cameras, depth, maps))
-    timed("filling what no view shows", lambda: fill(position, lifted))
+    timed("filling what no view shows", lambda: fill_unseen_points(position, lifted))
     timed("unit vectors in half precision", lifted.unit)
     weights = timed("weights of Gaussians (made up)", lambda: _weights(rng, points, views))
-    timed("uplift", lambda: uplift(weights.__getitem__, (32, 32), maps, points))
-    shown = [visible(position, c, d) for c, d in zip(cameras, depth, strict=True)]
-    towards = seen_from(position, cameras, shown)
+    timed("uplift", lambda: uplift_features(weights.__getitem__, (32, 32), maps, points))
+    shown = [visible_points(position, c, d) for c, d in zip(cameras, depth, strict=True)]
+    towards = mean_view_directions(position, cameras, shown)
     colour = rng.random((points, 3))
-    timed("descriptor", lambda: descriptor(position, colour, towards))
+    timed("descriptor", lambda: point_descriptor(position, colour, towards))
 
 
 def fields(scenes: list[Path], preset: str) -> None:
@@ -118,20 +130,23 @@ def _row(scene: Path, preset: str) -> list[str]:
     which, depth = seen.object_of_pixel, seen.depth
     if which is None or depth is None:
         raise SystemExit(f"{scene}: its views do not say where things are, and how far away.")
-    config, start = FieldConfig(preset, threads=min(CORES, cores())), time.process_time()
-    made = learn(Views(seen.rgb, seen.cameras), which >= 0, config)
+    config, start = (
+        RadianceFieldConfig(preset, threads=min(CORES, usable_cores())),
+        time.process_time(),
+    )
+    made = train_field(Views(seen.rgb, seen.cameras), which >= 0, config)
     spent = time.process_time() - start
-    found = points(made.field, seen.cameras, 100_000)
+    found = field_surface_points(made.field, seen.cameras, 100_000)
     both = (which >= 0) & np.isfinite(found.depth)
     pixels = np.abs(found.depth[both] / depth[both] - 1) * seen.cameras[0].K[0, 0]
     truth = _owners(seen, found.position)
     labels = int(which.max()) + 2
     maps = [_shares(picture, labels) for picture in which]
-    told = distilled(made.field, seen.cameras, maps).at(found.position)
+    told = distil_features(made.field, seen.cameras, maps).at(found.position)
     right = np.mean(told[:, 1:].argmax(axis=1) == truth)
     rng, start = np.random.default_rng(0), time.process_time()
     one = rng.normal(size=(GRID, GRID, 768)).astype(np.float16)
-    distilled(made.field, seen.cameras, [one] * len(seen.cameras)).at(found.position)
+    distil_features(made.field, seen.cameras, [one] * len(seen.cameras)).at(found.position)
     wide = time.process_time() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     good = made.quality

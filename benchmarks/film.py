@@ -48,18 +48,20 @@ class Set:
 
 def taken(run: Path, frames: int) -> Set:
     """Read a run and pose its surfaces as its film does, evenly over its time."""
-    from corporeal.pipeline.results import Results
-    from corporeal.pipeline.runner import read_back
-    from corporeal.pipeline.stages.film import reel_of
-    from corporeal.render.camera_track import track
-    from corporeal.render.skin import bind
-    from corporeal.simulation.moving_gaussians import granular
+    from corporeal.pipeline.results import StageResults
+    from corporeal.pipeline.run_pipeline import read_run
+    from corporeal.pipeline.stages.video import motion_summary
+    from corporeal.render.camera_track import camera_track
+    from corporeal.render.skin_binding import bind_vertices
+    from corporeal.simulation.moving_gaussians import granular_parts
 
-    results: Results = read_back(run)
+    results: StageResults = read_run(run)
     prepared, trajectory = results.prepared, results.trajectory
     scene = prepared.scene
-    skin = bind(scene, prepared.parts, prepared.particles, granular(prepared.field))
-    camera = track("wide", reel_of(skin, scene, prepared.particles, trajectory), SMALL, None)
+    skin = bind_vertices(scene, prepared.parts, prepared.particles, granular_parts(prepared.field))
+    camera = camera_track(
+        "wide", motion_summary(skin, scene, prepared.particles, trajectory), SMALL, None
+    )
     moments = [trajectory.frames[int(k)] for k in _even(frames, len(trajectory.frames))]
     return Set(
         [_plain(f) for f in scene.finishes],
@@ -82,17 +84,17 @@ def serve(root: str, file: str) -> None:
     """Answer with what a picture costs [s of CPU time]: [width, height, where kept, quality]."""
     import_from(root)
     from corporeal.render import embree
-    from corporeal.render.camera import Aim
+    from corporeal.render.camera_placement import CameraAim
 
     made: Set = pickle.loads(Path(file).read_bytes())
     stage = _stage(made)
-    embree.SAMPLING["exact"] = embree.Sampling(3, 1, 16)
+    embree.RAY_SAMPLING["exact"] = embree.RaySampling(3, 1, 16)
     casts: dict[int, Callable[..., np.ndarray]] = {}
 
     def ask(question: tuple[int, int, str, str]) -> float:
         width, height, kept, quality = question
-        aims = [_fit(Aim, {**aim, "width": width, "height": height}) for aim in made.aims]
-        exactly: Callable[..., np.ndarray] = embree.render
+        aims = [_fit(CameraAim, {**aim, "width": width, "height": height}) for aim in made.aims]
+        exactly: Callable[..., np.ndarray] = embree.render_image
         cast = exactly if quality == "exact" else casts.setdefault(width, _caster())
         start = time.process_time()
         poses = zip(made.poses, aims, strict=True)
@@ -106,24 +108,24 @@ def serve(root: str, file: str) -> None:
 
 def _stage(made: Set) -> Any:
     from corporeal.core.types import Finish, Scene, SceneObject, Surface
-    from corporeal.render.stage import Stage
+    from corporeal.render.ray_scene import RayScene
 
     surfaces = tuple(_fit(Surface, s) for s in made.surfaces)
     count = 1 + max(s.object for s in surfaces)
     objects = tuple(SceneObject(f"object_{k}", "thing", 1.0) for k in range(count))
     finishes = tuple(_fit(Finish, f) for f in made.finishes)
-    return Stage(Scene("film", "", objects, surfaces, finishes))
+    return RayScene(Scene("film", "", objects, surfaces, finishes))
 
 
 def _caster() -> Callable[..., np.ndarray]:
     """Return what casts the pictures of one film."""
     try:
-        from corporeal.render.film_picture import FilmCaster
+        from corporeal.render.video_raycaster import VideoRaycaster
     except ImportError:  # the other checkout may be older than that
-        from corporeal.render.embree import render
+        from corporeal.render.embree import render_image
 
-        return render
-    return FilmCaster().picture
+        return render_image
+    return VideoRaycaster().picture
 
 
 def _fit(kind: type, values: dict[str, Any]) -> Any:
@@ -147,16 +149,16 @@ def film_errors(run: Path, frames: int) -> list[tuple[float, float]]:
 
     Of a film of Gaussians, these are the surfaces behind them.
     """
-    from corporeal.pipeline.runner import read_back, reopen
-    from corporeal.pipeline.stages.film import moments
+    from corporeal.pipeline.run_pipeline import read_run, read_run_request
+    from corporeal.pipeline.stages.video import frame_scenes
     from corporeal.render import embree
-    from corporeal.render.film_picture import FilmCaster
+    from corporeal.render.video_raycaster import VideoRaycaster
 
-    embree.SAMPLING["exact"] = embree.Sampling(3, 1, 16)
-    results, config, caster = read_back(run), reopen(run).settings.film, FilmCaster()
-    exactly: Callable[..., np.ndarray] = embree.render
+    embree.RAY_SAMPLING["exact"] = embree.RaySampling(3, 1, 16)
+    results, config, caster = read_run(run), read_run_request(run).settings.film, VideoRaycaster()
+    exactly: Callable[..., np.ndarray] = embree.render_image
     found = []
-    for stage, aim in moments(
+    for stage, aim in frame_scenes(
         results.played, config, _even(frames, len(results.trajectory.frames))
     ):
         caster.picture(copy(stage), aim, config.quality, 1)

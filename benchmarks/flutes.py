@@ -96,7 +96,7 @@ def crush(weight: float) -> float:
 
 def main() -> None:
     """Print both for the usual weights."""
-    paper = materials.find("paper").ranges
+    paper = materials.find_material("paper").ranges
     young, density = paper["young"].typical, paper["density"].typical
     for weight in WEIGHTS:
         across = [young_across(f, young, weight / density) / 1e6 for f in FLUTES]

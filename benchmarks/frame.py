@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from corporeal.core.types import Camera, Views
-from corporeal.geometry.rotation import matrix
-from corporeal.io.transforms import read_views
-from corporeal.multiview.region import region
-from corporeal.multiview.similarity import moved_cameras, similarity
-from corporeal.multiview.upright import upright
-from corporeal.reconstruction.gaussians.intake import Intake, turned_upright
-from corporeal.reconstruction.gaussians.train import train
+from corporeal.geometry.rotation import matrix_from_quaternion
+from corporeal.io.photos.transforms_json import read_views
+from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.multiview.world_alignment import align_world
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene, turn_upright
+from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
 
 TWO = 2
@@ -41,14 +41,14 @@ def measured(scene: Path) -> dict:
     true = views.object_of_pixel >= 0
     rng = np.random.default_rng(0)
     scale = float(np.exp(rng.normal()))
-    made = similarity(matrix(rng.normal(size=4)), scale, rng.normal(size=3))
-    moved = Views(views.rgb, moved_cameras(views.cameras, made))
+    made = similarity_matrix(matrix_from_quaternion(rng.normal(size=4)), scale, rng.normal(size=3))
+    moved = Views(views.rgb, apply_similarity_to_cameras(views.cameras, made))
     start = time.process_time()
-    whole = turned_upright(_taken(moved, None))
+    whole = turn_upright(_taken(moved, None))
     spent = time.process_time() - start
-    alone = turned_upright(_taken(moved, true))
-    rolled = moved_cameras(_rolled(moved.cameras, rng), whole.world_from_file)
-    way = upright(rolled, whole.solid).world_from_file @ whole.world_from_file
+    alone = turn_upright(_taken(moved, true))
+    rolled = apply_similarity_to_cameras(_rolled(moved.cameras, rng), whole.world_from_file)
+    way = align_world(rolled, whole.solid).world_from_file @ whole.world_from_file
     assert whole.masks is not None
     both, either = (m.sum(axis=(1, 2)) for m in (whole.masks & true, whole.masks | true))
     return {
@@ -63,14 +63,16 @@ def measured(scene: Path) -> dict:
     }
 
 
-def _taken(views: Views, masks: np.ndarray | None) -> Intake:
-    learned = train(views, masks, config=TrainConfig("draft", threads=TWO))
-    return Intake(learned.gaussians, views.cameras, views, masks)
+def _taken(views: Views, masks: np.ndarray | None) -> GaussianScene:
+    learned = train_gaussians(views, masks, config=TrainConfig("draft", threads=TWO))
+    return GaussianScene(learned.gaussians, views.cameras, views, masks)
 
 
-def _height(taken: Intake, made: np.ndarray, scale: float, cameras: tuple[Camera, ...]) -> float:
+def _height(
+    taken: GaussianScene, made: np.ndarray, scale: float, cameras: tuple[Camera, ...]
+) -> float:
     """Return how high the true floor is in the frame as found, over the scene's diameter."""
-    around = region(cameras)
+    around = find_viewed_region(cameras)
     foot = made @ np.array([around.centre[0], around.centre[1], 0.0, 1.0])
     return float((taken.world_from_file @ foot)[2] / scale / (2 * around.radius))
 
@@ -86,7 +88,9 @@ def _rolled(cameras: tuple[Camera, ...], rng: np.random.Generator) -> tuple[Came
     made = []
     for camera in cameras:
         roll = np.radians(ROLL) * rng.normal()
-        turn = similarity(matrix(np.array([np.cos(roll / 2), 0, 0, np.sin(roll / 2)])))
+        turn = similarity_matrix(
+            matrix_from_quaternion(np.array([np.cos(roll / 2), 0, 0, np.sin(roll / 2)]))
+        )
         made.append(replace(camera, world_from_camera=camera.world_from_camera @ turn))
     return tuple(made)
 

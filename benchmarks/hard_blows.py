@@ -3,9 +3,10 @@
     python benchmarks/hard_blows.py [--check]
 
 Weightless balls strike a plane. What they lose, as a loss factor by the inverse of hereditary Hertz
-contact, less their own: the constant of ``discretization/hard_blows.py``. ``--check`` strikes other
-balls, at other places of the grid, with the loss factor that treatments leave them, and says how
-far their rebound is from the theory's, without that constant and with it (decision 103).
+contact, less their own: the constant of ``discretization/impact_vibration.py``. ``--check``
+strikes other balls, at other places of the grid, with the loss factor that treatments leave them,
+and says how far their rebound is from the theory's, without that constant and with it (decision
+103).
 """
 
 import argparse
@@ -18,12 +19,12 @@ from laws.bodies import Stuff, ball, problem
 from rich.console import Console
 from rich.table import Table
 
-from corporeal.core.registry import load
-from corporeal.discretization.dents import dent_of_blow
-from corporeal.discretization.hard_blows import ringing
-from corporeal.materials.rebound import loss_of, rebound
-from corporeal.mpm.constants import GRID_LOSS
-from corporeal.mpm.problem import FLOOR, MENU
+from corporeal.core.registry import load_backend
+from corporeal.discretization.hertz_indentation import hertz_dent_of_ball
+from corporeal.discretization.impact_vibration import vibration_loss
+from corporeal.materials.loss_restitution import loss_of_restitution, restitution_of_loss
+from corporeal.mpm.constants import GRID_LOSS_FACTOR
+from corporeal.mpm.problem import ENGINES, FLOOR
 
 CELLS = (8, 10, 12, 16, 20)
 HARDNESS = (0.003, 0.01, 0.03, 0.06, 0.1)
@@ -66,8 +67,8 @@ class Blow:
         velocity = (0.0, 0.0, -self.speed)
         given = {"fill": fill, "stuff": stuff, "velocity": velocity}
         thing = ball(tuple(place), self.radius, cell / 2, **given)
-        run = load("engine", "cpu", MENU)(problem(thing, cell=cell, planes=(FLOOR,)))
-        dent = dent_of_blow(young, self.poisson, self.density, self.speed) * self.radius
+        run = load_backend("engine", "cpu", ENGINES)(problem(thing, cell=cell, planes=(FLOOR,)))
+        dent = hertz_dent_of_ball(young, self.poisson, self.density, self.speed) * self.radius
         lasts, now = TOUCHES * dent / self.speed, run.measure()
         while run.time < 20.0 * lasts:
             run.advance(run.time + lasts / 20.0)
@@ -88,7 +89,7 @@ def beyond(console: Console) -> None:
             more = []
             for cells in CELLS:
                 e, _ = Blow(cells, loss, hardness, poisson).strike()
-                more.append(loss_of(e) - loss)
+                more.append(loss_of_restitution(e) - loss)
                 rows.append((cells**-2.0, hardness))
             found += more
             table.add_row(f"{hardness:g}", *(f"{m:.3f}" for m in more))
@@ -104,10 +105,12 @@ def check(console: Console) -> None:
     for poisson, hardness, loss, cells, rule in product(
         (0.3, 0.49), HARDNESS, (0.1, 0.15, 0.3, 0.6), (8, 12), (False, True)
     ):
-        taken = GRID_LOSS / cells**2 + (ringing(1.0, 1.0, 1.0 / hardness) if rule else 0.0)
+        taken = GRID_LOSS_FACTOR / cells**2 + (
+            vibration_loss(1.0, 1.0, 1.0 / hardness) if rule else 0.0
+        )
         other = {"radius": 0.12, "density": 300.0, "speed": 7.0, "seed": cells}
         e, count = Blow(cells, max(0.0, loss - taken), hardness, poisson, **other).strike()
-        off[rule].append(abs(e - rebound(loss)))
+        off[rule].append(abs(e - restitution_of_loss(loss)))
         steps[rule] += count
     table = Table("", "mean error of e", "greatest", "steps")
     for rule, name in ((False, "grid alone"), (True, "grid and vibrations")):

@@ -3,7 +3,7 @@
     python benchmarks/lenses.py FOLDER ... [--masks]
 
 Each FOLDER holds photographs with right poses, such as ``corporeal capture`` writes. Told is what
-``agreement`` doubts: + rightly, ! of right cameras, - nothing. Without --masks it is not shown any.
+``check_pose_consistency`` doubts: + rightly, ! of right cameras, - nothing. Without --masks it is not shown any.
 """
 
 import argparse
@@ -14,8 +14,8 @@ import numpy as np
 
 from corporeal.core.terminal import show_table
 from corporeal.core.types import Camera
-from corporeal.io.photographs import read_photographs
-from corporeal.multiview.agreement import agreement
+from corporeal.io.photos.posed_photos import read_posed_photos
+from corporeal.multiview.pose_consistency import check_pose_consistency
 
 WRONG = {
     "right": (1.0, 0.0, 0.0),
@@ -47,12 +47,12 @@ def main() -> None:
     asked = parser.parse_args()
     rows = []
     for folder in asked.folders:
-        shown = read_photographs(folder, LONGEST)
+        shown = read_posed_photos(folder, LONGEST)
         told, matches = [], 0
         for name, lens in WRONG.items():
             cameras = tuple(other(c, *lens) for c in shown.views.cameras)
             views = replace(shown.views, cameras=cameras)
-            found = agreement(views, shown.masks if asked.masks else None)
+            found = check_pose_consistency(views, shown.masks if asked.masks else None)
             matches = max(matches, found.matches)
             told.append("-" if found.doubt is None else "!" if name == "right" else "+")
         rows.append((folder.name, f"{len(np.unique(shown.names))}", f"{matches}", *told))

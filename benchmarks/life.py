@@ -22,11 +22,16 @@ from rich.progress import track
 from rich.table import Table
 
 from corporeal.core.errors import SimulationError
-from corporeal.core.machine import cores
-from corporeal.lab.evaluation.drop_test import Drop, drop
-from corporeal.lab.evaluation.life import Rebound, contradictory, rebounds, sources
-from corporeal.pipeline.runner import Settings
-from corporeal.recognition.lexicon import heads, tokens_of
+from corporeal.core.process_resources import usable_cores
+from corporeal.lab.evaluation.drop_test import DropResult, simulate_drop
+from corporeal.lab.evaluation.rebound_data import (
+    MeasuredRebound,
+    contradictory_rebounds,
+    measured_rebounds,
+    rebound_sources,
+)
+from corporeal.pipeline.run_pipeline import Settings
+from corporeal.recognition.lexicon import head_terms, name_tokens
 
 DOCS = Path(__file__).parents[1] / "docs"
 DETAILS, SEEDS = ("draft", "normal"), (0, 1, 2)
@@ -43,12 +48,12 @@ UNBOOKED = 0.08
 """Most that may be lost unbooked at draft, over the energy of the blow [-]."""
 
 
-def tried(row: Rebound, detail: str, seed: int) -> Drop | str:
+def tried(row: MeasuredRebound, detail: str, seed: int) -> DropResult | str:
     """Drop one thing; say in a sentence what went wrong."""
     usual = Settings()
     settings = replace(usual, fill=replace(usual.fill, detail=detail, seed=seed))
     try:
-        return drop(row, settings)
+        return simulate_drop(row, settings)
     except SimulationError as error:
         return f"{row.name}, {detail}, seed {seed}: {error}"
 
@@ -60,9 +65,9 @@ def tried(row: Rebound, detail: str, seed: int) -> Drop | str:
 class Result:
     """One thing at one detail: the mean over its seeds."""
 
-    row: Rebound
+    row: MeasuredRebound
     detail: str
-    drops: tuple[Drop, ...]
+    drops: tuple[DropResult, ...]
 
     @property
     def restitution(self) -> float:
@@ -80,7 +85,7 @@ class Result:
         return mean(d.unbooked for d in self.drops)
 
 
-def results(rows: Sequence[Rebound], drops: Iterable[Drop]) -> Iterator[Result]:
+def results(rows: Sequence[MeasuredRebound], drops: Iterable[DropResult]) -> Iterator[Result]:
     """Gather drops by thing and detail."""
     every = list(drops)
     for row in rows:
@@ -198,7 +203,7 @@ def blind(found: Sequence[Result]) -> str:
 
 def told(name: str) -> bool:
     """Tell whether a name gives the restitution that the rules of a sport ask for."""
-    terms = [term for term in heads(tokens_of(name)) if term.kind == "thing"]
+    terms = [term for term in head_terms(name_tokens(name)) if term.kind == "thing"]
     return max(terms, key=lambda term: len(term.phrase)).rebound is not None if terms else False
 
 
@@ -216,7 +221,7 @@ def foretold(found: Sequence[Result]) -> str:
 
 def contradicted(found: Sequence[Result]) -> Iterator[str]:
     """Say which rows measured the same and contradict each other: no value is in all of them."""
-    for rows in contradictory(tuple(dict.fromkeys(r.row for r in found)), LEEWAY):
+    for rows in contradictory_rebounds(tuple(dict.fromkeys(r.row for r in found)), LEEWAY):
         low, high = max(r.low for r in rows), min(r.high for r in rows)
         names = ", ".join(f"{r.name} {r.low:.2f}–{r.high:.2f}" for r in rows)
         yield (
@@ -229,7 +234,7 @@ def contradicted(found: Sequence[Result]) -> Iterator[str]:
 
 def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
     """Write the page of the documentation."""
-    cited = sources()
+    cited = rebound_sources()
     used = dict.fromkeys(r.row.source for r in found)
     number = {key: k + 1 for k, key in enumerate(used)}
     lines = [
@@ -258,14 +263,14 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
     return "\n".join(lines)
 
 
-def keep(drops: Sequence[Drop], path: Path) -> None:
+def keep(drops: Sequence[DropResult], path: Path) -> None:
     """Write drops to a file."""
     path.write_text(json.dumps([asdict(d) for d in drops], indent=1) + "\n", encoding="utf-8")
 
 
-def kept(path: Path) -> list[Drop]:
+def kept(path: Path) -> list[DropResult]:
     """Read drops from a file; none where there is no file."""
-    return [Drop(**row) for row in json.loads(path.read_text())] if path.exists() else []
+    return [DropResult(**row) for row in json.loads(path.read_text())] if path.exists() else []
 
 
 def asked_for() -> argparse.Namespace:
@@ -278,7 +283,9 @@ def asked_for() -> argparse.Namespace:
     parser.add_argument("--resume", action="store_true", help="keep the drops that it holds")
     parser.add_argument("--row", nargs="+", metavar="NAME", help="only these things")
     parser.add_argument("--docs", action="store_true", help="write docs/life.md")
-    parser.add_argument("--workers", type=int, default=min(4, cores()), help="drops side by side")
+    parser.add_argument(
+        "--workers", type=int, default=min(4, usable_cores()), help="drops side by side"
+    )
     asked = parser.parse_args()
     if asked.docs and (asked.quick or asked.row):
         parser.error("--docs needs all of it: leave out --quick and --row")
@@ -290,7 +297,7 @@ def asked_for() -> argparse.Namespace:
 def main() -> None:
     """Run what was asked."""
     asked = asked_for()
-    rows = [r for r in rebounds() if not asked.row or r.name in asked.row]
+    rows = [r for r in measured_rebounds() if not asked.row or r.name in asked.row]
     details, seeds = (DETAILS[:1], SEEDS[:1]) if asked.quick else (DETAILS, SEEDS)
     drops = kept(asked.json) if asked.resume else []
     there = {(d.name, d.detail, d.seed) for d in drops}

@@ -21,16 +21,16 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.pipeline.mixture import ground_weighed
-from corporeal.pipeline.results import Results
-from corporeal.pipeline.runner import Settings
+from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
+from corporeal.pipeline.results import StageResults
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.segment import segment
-from corporeal.showcase.scenes import SCENES, build
-from corporeal.viewer.live import Live, live_scene, threads_here
-from corporeal.viewer.orders import Order
-from corporeal.viewer.shelf import Made
+from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS, build_showcase_scene
+from corporeal.viewer.commands import Command
+from corporeal.viewer.live_simulation import LiveSimulation, engine_threads, live_editor_of
+from corporeal.viewer.run_store import LiveInput
 
 HEADS = (
     *("scene", "× real time", "simulated s per CPU s of stepping", "pictures/s", "kB"),
@@ -40,11 +40,11 @@ HEADS = (
 
 def results_of(name):
     """Prepare a scene as a run does, up to fill."""
-    scene = build(name)
+    scene = build_showcase_scene(name)
     inventory = describe(scene)
     parts = segment(scene, inventory)
-    field = ground_weighed(scene, parts, inventory, Settings().ground)
-    return Results(
+    field = ground_with_mass_posterior(scene, parts, inventory, Settings().ground)
+    return StageResults(
         assemble=scene,
         describe=inventory,
         segment=parts,
@@ -85,10 +85,10 @@ class Visitor:
 
 def measure(name, seconds, threads):
     """Let one scene run for so many seconds of wall time; return a row."""
-    live = Live(live_scene(Made(results_of(name), "draft"), threads), threads)
+    live = LiveSimulation(live_editor_of(LiveInput(results_of(name), "draft"), threads), threads)
     visitor = Visitor(live)
     live.start()
-    visitor.order(Order("play", 1))
+    visitor.order(Command("play", 1))
     time.sleep(2.0)  # until the pace is found
     begun, start, before = time.perf_counter(), live.hands.engine.time, len(visitor.sizes)
     worked = dict(live.worked)
@@ -113,12 +113,12 @@ def measure(name, seconds, threads):
 def pull(live, visitor, until):
     """Pull at the first object ten times a second; return what the thread spent."""
     place = tuple(live.hands.engine.snapshot().position[0].tolist())
-    visitor.order(Order("grab", 2, 0, place, place))
+    visitor.order(Command("grab", 2, 0, place, place))
     number, spent = 2, []
     up = (place[0], place[1], place[2] + 0.1)
     while time.perf_counter() < until:
         number += 1
-        visitor.order(Order("pull", number, to=up))
+        visitor.order(Command("pull", number, to=up))
         spent.append(dict(live.spent))
         time.sleep(0.1)
     return spent
@@ -132,24 +132,24 @@ def held():
 
 def remember(name, minutes, threads):
     """Touch one scene for so many minutes; return a row of the memory that it takes."""
-    live = Live(live_scene(Made(results_of(name), "draft"), threads), threads)
+    live = LiveSimulation(live_editor_of(LiveInput(results_of(name), "draft"), threads), threads)
     visitor = Visitor(live)
     live.start()
-    visitor.order(Order("play", 1))
+    visitor.order(Command("play", 1))
     seconds = 60.0 * minutes
     begun, early = time.perf_counter(), 0.0
     place = tuple(live.hands.engine.snapshot().position[0].tolist())
-    visitor.order(Order("grab", 2, 0, place, place))
+    visitor.order(Command("grab", 2, 0, place, place))
     number = 2
     while (passed := time.perf_counter() - begun) < seconds:
         number += 1
         if number % 600 == 0:  # what has come to rest is begun again, as a person does
-            visitor.order(Order("reset", number))
+            visitor.order(Command("reset", number))
             number += 1
-            visitor.order(Order("grab", number, 0, place, place))
+            visitor.order(Command("grab", number, 0, place, place))
         turn = 2.0 * np.pi * passed / 3.0
         away = 0.1 * np.array([np.cos(turn), np.sin(turn), 1.0])
-        visitor.order(Order("pull", number, to=tuple((np.array(place) + away).tolist())))
+        visitor.order(Command("pull", number, to=tuple((np.array(place) + away).tolist())))
         if not early and passed > seconds / 5:
             early = held()
         time.sleep(1 / 60)
@@ -168,13 +168,13 @@ def main():
     wanted = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     wanted.add_argument("scenes", nargs="*", metavar="SCENE")
     wanted.add_argument("--seconds", type=float, default=8.0)
-    wanted.add_argument("--threads", type=int, default=threads_here())
+    wanted.add_argument("--threads", type=int, default=engine_threads())
     wanted.add_argument("--memory", type=float, metavar="MINUTES")
     asked = wanted.parse_args()
     heads = MEMORY if asked.memory else HEADS
     print("|", " | ".join(heads), "|")
     print("|", " | ".join("---" for _ in heads), "|")
-    for name in asked.scenes or SCENES:
+    for name in asked.scenes or SHOWCASE_SCENE_BUILDERS:
         if asked.memory:
             row = remember(name, asked.memory, asked.threads)
         else:

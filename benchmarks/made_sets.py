@@ -27,11 +27,11 @@ from PIL import Image
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Views
-from corporeal.geometry.arrangement import boxes_of
-from corporeal.io.colmap import write_colmap
+from corporeal.geometry.scene_transforms import object_boxes
+from corporeal.io.photos.colmap import write_colmap
 from corporeal.pipeline.stages.assemble import assemble
-from corporeal.pipeline.stages.capture import pictures
-from corporeal.render.camera import Aim
+from corporeal.pipeline.stages.capture import render_views
+from corporeal.render.camera_placement import CameraAim
 
 FIELD = 48.0
 """Vertical field of view [deg]: a telephone's, held level."""
@@ -50,7 +50,7 @@ FINE = 2
 
 def way_around(
     low: np.ndarray, high: np.ndarray, asked: argparse.Namespace, rng: np.random.Generator
-) -> list[Aim]:
+) -> list[CameraAim]:
     """Return where somebody stands and looks who walks around a box (3,), (3,) [m]."""
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     away = radius / (FILLED * np.tan(np.radians(FIELD / 2)))
@@ -68,7 +68,7 @@ def way_around(
     eyes = middle + far[:, None] * where
     at = middle + AIM * away * np.stack(shaken[2:], axis=1)
     return [
-        Aim(tuple(eye.tolist()), tuple(target.tolist()), _field(asked, k), *asked.size)
+        CameraAim(tuple(eye.tolist()), tuple(target.tolist()), _field(asked, k), *asked.size)
         for k, (eye, target) in enumerate(zip(eyes, at, strict=True))
     ]
 
@@ -173,10 +173,10 @@ def main() -> None:
         scene = assemble(asked.model)
     except UserError as problem:
         parser.error(str(problem))
-    boxes = boxes_of(scene)
+    boxes = object_boxes(scene)
     low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
     aims = way_around(low, high, asked, rng)
-    views = pictures(scene, aims)
+    views = render_views(scene, aims)
     look = look_of(asked, plain=asked.plain, grid=FINE if asked.on else 1)
     options = [word for word in sys.argv[1:] if word not in map(str, (*asked.model, asked.out))]
     note = f"{', '.join(p.name for p in asked.model)}, {' '.join(options)}"

@@ -19,12 +19,17 @@ import numpy as np
 from scipy.ndimage import binary_erosion, distance_transform_edt
 
 from corporeal.core.errors import UserError
-from corporeal.io.photographs import holds_photographs, read_photographs
-from corporeal.reconstruction.masks.doubt import doubt
-from corporeal.reconstruction.masks.grow import FINE, ROUGH, Grown, grow
-from corporeal.reconstruction.masks.pointed import Spot, pointed_at
-from corporeal.reconstruction.masks.reduced import reduced
-from corporeal.reconstruction.masks.seeds import Seeds, looked_at
+from corporeal.io.photos.posed_photos import has_posed_photos, read_posed_photos
+from corporeal.reconstruction.masks.mask_prompts import PicturePrompt, seeds_from_prompt
+from corporeal.reconstruction.masks.mask_quality import mask_doubt
+from corporeal.reconstruction.masks.mask_seeds import MaskSeeds, seeds_from_cameras
+from corporeal.reconstruction.masks.reduce_views import reduce_views
+from corporeal.reconstruction.masks.region_growing import (
+    MASK_PICTURE_PX,
+    ROUND_PICTURE_PX,
+    RegionGrowingResult,
+    grow_masks,
+)
 
 ON = 128
 """Of 255: from here on a drawn mask shows an object."""
@@ -71,24 +76,27 @@ def spots(mask: np.ndarray) -> dict[str, np.ndarray]:
 
 def measured(folder: Path, pointed: int) -> dict:
     """Measure one set."""
-    shown, drawn = read_photographs(folder, FINE, bare=True), read_photographs(folder, FINE)
+    shown, drawn = (
+        read_posed_photos(folder, MASK_PICTURE_PX, bare=True),
+        read_posed_photos(folder, MASK_PICTURE_PX),
+    )
     if drawn.masks is None or drawn.masks.shape != shown.views.rgb.shape[:3]:
         raise SystemExit(f"{folder} has no mask for each of its photographs.")
     masks = drawn.masks >= ON
-    rough = reduced(shown.views, ROUGH)
+    rough = reduce_views(shown.views, ROUND_PICTURE_PX)
     small = reduced_masks(masks, rough.rgb.shape[1:3])
 
-    def grown(seeds: Seeds) -> Grown | None:
-        return grow(shown.views, seeds)
+    def grown(seeds: MaskSeeds) -> RegionGrowingResult | None:
+        return grow_masks(shown.views, seeds)
 
     begun = time.perf_counter()
-    seen = grown(looked_at(rough, shown.points))
+    seen = grown(seeds_from_cameras(rough, shown.points))
     row = {
         "set": folder.parent.name if folder.name == "views" else folder.name,
         "views": len(masks),
         "seen": None if seen is None else agreement(seen.inside, masks),
         "beyond": None if seen is None else beyond(seen.inside, masks),
-        "doubt": doubt(seen),
+        "doubt": mask_doubt(seen),
         "seconds": time.perf_counter() - begun,
         "point": [],
         "box": [],
@@ -96,7 +104,9 @@ def measured(folder: Path, pointed: int) -> dict:
     for k in np.linspace(0, len(masks) - 1, min(pointed, len(masks))).round().astype(int):
         for how, corners in spots(small[k]).items():
             try:
-                found = grown(pointed_at(rough, shown.points, Spot(int(k), corners)))
+                found = grown(
+                    seeds_from_prompt(rough, shown.points, PicturePrompt(int(k), corners))
+                )
             except UserError:
                 found = None
             row[how].append((0.0, 0.0) if found is None else agreement(found.inside, masks))
@@ -136,7 +146,7 @@ def main() -> None:
     asked.add_argument("--pointed", type=int, default=6)
     asked.add_argument("--json", type=Path)
     given = asked.parse_args()
-    folders = ([f] if holds_photographs(f) else sorted(f.iterdir()) for f in given.folders)
+    folders = ([f] if has_posed_photos(f) else sorted(f.iterdir()) for f in given.folders)
     sets = [folder for some in folders for folder in some]
     rows = []
     for folder in sets:

@@ -25,20 +25,20 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from corporeal.core.types import Inventory, MaterialField, Parts, Scene
-from corporeal.discretization.make import Make
+from corporeal.discretization.mesh_measures import MeasuredObject
 from corporeal.discretization.object_masses import (
-    implausible_masses,
-    masses_not_as_named,
-    walls_drawn_too_thick,
+    warn_of_implausible_masses,
+    warn_of_masses_not_as_named,
+    warn_of_thick_walls,
 )
-from corporeal.discretization.scene_survey import examine
-from corporeal.discretization.survey import Anatomy
-from corporeal.materials import find
+from corporeal.discretization.part_model import PartModel
+from corporeal.discretization.scene_measures import measure_objects
+from corporeal.materials import find_material
 from corporeal.pipeline.in_memory import load_scene
-from corporeal.pipeline.mixture import ground_weighed
+from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
 from corporeal.pipeline.settings.ground_config import GroundConfig
 from corporeal.pipeline.stages.describe import describe
-from corporeal.pipeline.stages.fill import composed
+from corporeal.pipeline.stages.fill import part_models
 from corporeal.pipeline.stages.segment import segment
 
 LIST = Path(__file__).parent / "recognition" / "names.toml"
@@ -83,8 +83,8 @@ class Weighed:
     """What the pipeline makes of one file."""
 
     scene: Scene
-    anatomies: list[Anatomy]
-    makes: dict[int, Make]
+    anatomies: list[MeasuredObject]
+    makes: dict[int, PartModel]
     field: MaterialField
     inventory: Inventory
     parts: Parts
@@ -102,7 +102,7 @@ class Weighed:
     @property
     def weight(self) -> list[str]:
         """What is said of how heavy it is."""
-        told = (implausible_masses, masses_not_as_named)
+        told = (warn_of_implausible_masses, warn_of_masses_not_as_named)
         return [w for tell in told for w in tell(self.scene, self.anatomies, self.masses)]
 
 
@@ -124,9 +124,12 @@ def weigh(
     scene = load_scene(path)
     inventory = describe(scene, from_pictures=[0] if from_pictures else ())
     parts = segment(scene, inventory)
-    anatomies = examine(scene, parts, 0)
-    field, leaf = ground_weighed(scene, parts, inventory, GroundConfig()), find("leaf_tissue")
-    makes = composed(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
+    anatomies = measure_objects(scene, parts, 0)
+    field, leaf = (
+        ground_with_mass_posterior(scene, parts, inventory, GroundConfig()),
+        find_material("leaf_tissue"),
+    )
+    makes = part_models(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
     return Weighed(scene, anatomies, makes, field, inventory, parts)
 
 
@@ -142,7 +145,7 @@ def look_at(row: dict, folder: Path, metres_per_unit: float = 1.0) -> Found:
     seen = weigh(shape(row["shape"]), folder / f"{row['name']}.glb", metres_per_unit)
     words, mass = seen.field.words[0], sum(seen.masses)
     weight, size = seen.weight, seen.size
-    wall = walls_drawn_too_thick(seen.scene, seen.anatomies, seen.makes, seen.field)
+    wall = warn_of_thick_walls(seen.scene, seen.anatomies, seen.makes, seen.field)
     off = _off(mass, row["kg"])
     return Found(
         row["name"],

@@ -20,12 +20,17 @@ from pathlib import Path
 
 import numpy as np
 
+from corporeal.core.deserialize import from_plain
 from corporeal.core.store import read_json, write_json
-from corporeal.core.typed import typed
-from corporeal.core.types import Cloud
-from corporeal.lab.evaluation.objects import Judged, ObjectsEvaluationConfig, ObjectsRow, judge
-from corporeal.lab.evaluation.objects_figure import draw
-from corporeal.reconstruction.segment.objects import objects
+from corporeal.core.types import FeatureCloud
+from corporeal.lab.evaluation.objects_evaluation import (
+    ObjectsEvaluationConfig,
+    ObjectsResult,
+    ObjectsRow,
+    evaluate_objects,
+)
+from corporeal.lab.evaluation.objects_figure import draw_objects
+from corporeal.reconstruction.segment.object_segmentation import segment_objects
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAIRS = {
@@ -72,16 +77,16 @@ def composed(models: list[Path], out: Path) -> None:
         subprocess.run([sys.executable, "-m", "corporeal.cli", *command], check=True)
 
 
-def segmented(out: Path, names: list[str], gaussians: bool) -> list[Judged]:
+def segmented(out: Path, names: list[str], gaussians: bool) -> list[ObjectsResult]:
     """Judge scenes one after the other; what was judged before is kept."""
     source = "gaussians" if gaussians else "surface"
     config = ObjectsEvaluationConfig(points_from=source, kept=out / "gaussians")
-    found: list[Judged] = []
+    found: list[ObjectsResult] = []
     for name in names:
         path = out / source / f"{name}.pickle"
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(pickle.dumps(judge(out / "scenes" / name, config)[0]))
+            path.write_bytes(pickle.dumps(evaluate_objects(out / "scenes" / name, config)[0]))
         found.append(pickle.loads(path.read_bytes()))
         print(line(found[-1].row), flush=True)
     return found
@@ -119,9 +124,9 @@ def timed() -> Timings:
             rows = rows + rng.normal(size=rows.shape)
             feature[k : k + 10_000] = rows / np.linalg.norm(rows, axis=1, keepdims=True)
         position = centres[owner] + 0.3 * normal
-        cloud = Cloud(position, 0 * position + 0.5, feature, feature, np.ones(count, int))
+        cloud = FeatureCloud(position, 0 * position + 0.5, feature, feature, np.ones(count, int))
         clock, spent = time.perf_counter(), time.process_time()
-        objects(cloud, 4, normal)
+        segment_objects(cloud, 4, normal)
         spent, clock = time.process_time() - spent, time.perf_counter() - clock
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
         made.append(Timing(count, spent, clock, peak))
@@ -169,10 +174,10 @@ def main() -> None:
     if not times.exists():
         write_json(times, timed())
     if asked.docs:
-        draw(shown, DOCS / "images" / "objects.png")
+        draw_objects(shown, DOCS / "images" / "objects.png")
         costs = (
             f"{t.points // 1000}k points: {t.cpu_s:.0f} s, {t.peak_gb:.1f} GB"
-            for t in typed(Timings, read_json(times)).rows
+            for t in from_plain(Timings, read_json(times)).rows
         )
         words = PAGE
         for name, text in (tables | {"times": "; ".join(costs)}).items():

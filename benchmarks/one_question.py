@@ -20,12 +20,19 @@ from pydantic import BaseModel, Field
 from corporeal import vlm
 from corporeal.core.errors import UserError
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.lab.evaluation.mass import MassConfig, compare, predict_all
-from corporeal.lab.evaluation.truth import objects
+from corporeal.lab.evaluation.mass_evaluation import MassConfig, compare_masses, predict_masses
+from corporeal.lab.evaluation.measured_masses import objects_to_weigh
 from corporeal.pipeline.stages.ground import GroundConfig
-from corporeal.vlm.answers import MaterialsAnswer, PartAnswer, Value, ValueAnswer, ValuePart, Way
-from corporeal.vlm.by_hand import ByHand
-from corporeal.vlm.words import another
+from corporeal.vlm.answer_schemas import (
+    MaterialsAnswer,
+    PartAnswer,
+    PartHypothesis,
+    PartValues,
+    QuantityValue,
+    ValueAnswer,
+)
+from corporeal.vlm.human_client import HumanClient
+from corporeal.vlm.interpret_answers import hypothesis_name
 
 VALUES = """
 
@@ -43,7 +50,7 @@ NAMES = {
 RANGE = re.compile(r"- (\w+): .*?: ([\d.e+-]+) to ([\d.e+-]+).*?; usually ([\d.e+-]+)")
 
 
-class ValuedWay(Way):
+class ValuedWay(PartHypothesis):
     """One way a part may be, with its values."""
 
     density: float = Field(gt=0, lt=1e5)
@@ -71,10 +78,10 @@ class OneQuestion:
     """Of all questions and answers about materials, and values outside their ranges."""
 
     def __init__(self, folder: str) -> None:
-        self.asked = ByHand(folder)
+        self.asked = HumanClient(folder)
         self.said: dict[str, ValuedAnswer] = {}
 
-    def ask(self, question, answer, check=vlm.nothing):
+    def ask(self, question, answer, check=vlm.no_complaints):
         """Answer a question; the one about placement from memory."""
         if question.task == "materials":
             return self._materials(question, check)
@@ -98,19 +105,21 @@ class OneQuestion:
         ways = {}
         for part in self.said[question.scene].parts:
             likeliest = sorted((w for w in part.ways if w.probability > 0), key=_unlikely)
-            ways |= {another(part.part, k): way for k, way in enumerate(likeliest)}
+            ways |= {hypothesis_name(part.part, k): way for k, way in enumerate(likeliest)}
         parts = []
         for block in question.lists["ranges"].split("\n\n"):
             name = block.partition("\n")[0].removeprefix("Part ").removesuffix(":")
             rows = [self._value(ways[name], *m.groups()) for m in RANGE.finditer(block)]
-            parts.append(ValuePart(part=name, values=rows))
+            parts.append(PartValues(part=name, values=rows))
         return ValueAnswer(parts=parts)
 
-    def _value(self, way: ValuedWay, quantity: str, low: str, high: str, usual: str) -> Value:
+    def _value(
+        self, way: ValuedWay, quantity: str, low: str, high: str, usual: str
+    ) -> QuantityValue:
         said = getattr(way, NAMES.get(quantity, ""), None)
         value = float(usual) if said is None else min(max(said, float(low)), float(high))
         self._count(outside=int(said is not None and value != said))
-        return Value(quantity=quantity, value=value, reason=way.reason)
+        return QuantityValue(quantity=quantity, value=value, reason=way.reason)
 
     @classmethod
     def _count(cls, **more: int) -> None:
@@ -121,7 +130,7 @@ def _unlikely(way: ValuedWay) -> float:
     return -way.probability
 
 
-vlm.MENU["one"] = f"{__name__}:OneQuestion"
+vlm.VLM_CLIENTS["one"] = f"{__name__}:OneQuestion"
 
 
 def main() -> None:
@@ -135,9 +144,9 @@ def main() -> None:
     asked = parser.parse_args()
     describing = DescribeConfig(vlm=f"one:{asked.answers}", sampling="value")
     config = MassConfig(anonymous=True)
-    things = objects(asked.models, asked.truth, "all")
+    things = objects_to_weigh(asked.models, asked.truth, "all")
     try:
-        result = compare(predict_all(things, describing, GroundConfig(), config))
+        result = compare_masses(predict_masses(things, describing, GroundConfig(), config))
     except UserError as waiting:
         raise SystemExit(str(waiting)) from None
     for row in result.rows:

@@ -15,7 +15,7 @@ from pathlib import Path
 from weighed import built_things, goods, household, vessels
 from weighed.piece import Prop
 
-from corporeal.io.glb_writer import write_glb
+from corporeal.io.gltf.glb_writer import write_glb
 
 PROPS = (
     goods.stool,

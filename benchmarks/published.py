@@ -24,9 +24,9 @@ import numpy as np
 from names import Weighed, weigh
 from recognition.shapes import shape
 
-from corporeal.discretization.object_masses import walls_drawn_too_thick
-from corporeal.geometry.arrangement import life_sized
-from corporeal.pipeline.mixture import Scale, weighed
+from corporeal.discretization.object_masses import warn_of_thick_walls
+from corporeal.geometry.scene_transforms import scale_to_life_size
+from corporeal.pipeline.mass_posterior import MassSampler, sample_masses
 from corporeal.pipeline.settings.ground_config import GroundConfig
 
 FOLDER = Path(__file__).parent / "recognition"
@@ -86,7 +86,7 @@ def look_at(row: dict, folder: Path, from_pictures: bool = False) -> Found:
     seen = weigh(mesh, path, from_pictures=from_pictures)
     words = seen.field.words[0]
     low, high = interval(seen)
-    wall = walls_drawn_too_thick(seen.scene, seen.anatomies, seen.makes, seen.field)
+    wall = warn_of_thick_walls(seen.scene, seen.anatomies, seen.makes, seen.field)
     built = f"{words.material or 'unknown'} {words.structure or 'solid'}"
     return Found(
         name=row["name"],
@@ -105,8 +105,8 @@ def interval(seen: Weighed) -> tuple[float, float]:
     """Return the bounds within which nine of ten draws from all ranges lie [kg]."""
     (thing,) = seen.inventory.objects
     described = replace(seen.inventory, objects=(replace(thing, parts=tuple(seen.field.words)),))
-    scale = Scale(life_sized(seen.scene), seen.parts, GroundConfig(), 0)
-    (mixture,) = weighed(scale, described, DRAWS).mixtures
+    scale = MassSampler(scale_to_life_size(seen.scene), seen.parts, GroundConfig(), 0)
+    (mixture,) = sample_masses(scale, described, DRAWS).mixtures
     return mixture.low, mixture.high
 
 

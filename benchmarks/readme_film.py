@@ -13,9 +13,9 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import FOLDERS, Settings
-from corporeal.pipeline.stages.film import FilmConfig
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import STAGE_FOLDERS, Settings
+from corporeal.pipeline.stages.video import VideoConfig
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "showcase.webp"
 PANEL = 300, 225
@@ -73,10 +73,10 @@ PANELS = (
 def stills(panel: Panel, folder: Path) -> list[Image.Image]:
     """Simulate and film a scene; return its frames as panels."""
     run = folder / f"{panel.scene}-draft"
-    scene = runner.write_showcase(panel.scene, run / "input")
-    film = FilmConfig(width=FILMED[0], height=FILMED[1], stills=True)
-    runner.run([scene], run, Settings(film=film), until="film")
-    paths = sorted((run / FOLDERS["film"] / "stills").glob("*.png"))
+    scene = run_pipeline.write_showcase(panel.scene, run / "input")
+    film = VideoConfig(width=FILMED[0], height=FILMED[1], stills=True)
+    run_pipeline.run([scene], run, Settings(film=film), until="film")
+    paths = sorted((run / STAGE_FOLDERS["film"] / "stills").glob("*.png"))
     return [panel.cut(Image.open(path).convert("RGB")) for path in paths[::EVERY]]
 
 

@@ -11,14 +11,14 @@ import trimesh
 from jaxtyping import Bool, Float
 from PIL import Image
 
-from corporeal.core.typed import typed
+from corporeal.core.deserialize import from_plain
 from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.io.colmap import ColmapModel, read_colmap
-from corporeal.io.photographs import MASKS, companion
+from corporeal.io.photos.colmap import ColmapModel, read_colmap
+from corporeal.io.photos.posed_photos import MASK_FOLDERS, find_companion_image
 from corporeal.multiview.silhouette_overlap import silhouette_overlaps
-from corporeal.multiview.similarity import parted, similarity
-from corporeal.pipeline.stages.reconstruct import Reconstructed
+from corporeal.multiview.similarity_transform import decompose_similarity, similarity_matrix
+from corporeal.pipeline.stages.reconstruct import ReconstructedScene
 
 KNOWN, FACTS = Path(__file__).parent / "real_sets.toml", "known.toml"
 GOOD_ANGLE, GOOD_PLACE = 1.5, 0.03
@@ -57,7 +57,7 @@ def known(folder: Path) -> Known:
     """Return what a set's ``known.toml``, or ``real_sets.toml``, says of it; else nothing is."""
     own = folder / FACTS
     said = tomllib.loads((own if own.exists() else KNOWN).read_text(encoding="utf-8"))
-    return typed(Known, said if own.exists() else said.get(folder.name, {}))
+    return from_plain(Known, said if own.exists() else said.get(folder.name, {}))
 
 
 def up_off(result: "Came", folder: Path, given: ColmapModel) -> dict[str, Any]:
@@ -99,7 +99,7 @@ def pose_errors(found: ColmapModel, given: ColmapModel) -> PoseErrors:
         way = _onto(a[kept, :3, 3], b[kept, :3, 3])
         off = np.linalg.norm((a @ [0, 0, 0, 1]) @ way.T - b @ [0, 0, 0, 1], axis=1) / reach
         kept = off <= max(FAR * float(np.median(off)), 1e-6)
-    between = parted(way).rotation @ a[:, :3, :3] @ np.swapaxes(b[:, :3, :3], 1, 2)
+    between = decompose_similarity(way).rotation @ a[:, :3, :3] @ np.swapaxes(b[:, :3, :3], 1, 2)
     cosine = (np.trace(between, axis1=1, axis2=2) - 1) / 2
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     right = int(((angle < GOOD_ANGLE) & (off < GOOD_PLACE)).sum())
@@ -127,7 +127,7 @@ def _onto(a: Float[np.ndarray, "N 3"], b: Float[np.ndarray, "N 3"]) -> Float[np.
     u, s, vt = np.linalg.svd(y.T @ x)
     sign = np.array([1, 1, np.sign(np.linalg.det(u @ vt))])
     turn, scale = u @ np.diag(sign) @ vt, (s * sign).sum() / np.square(x).sum()
-    return similarity(turn, scale, b.mean(axis=0) - scale * turn @ a.mean(axis=0))
+    return similarity_matrix(turn, scale, b.mean(axis=0) - scale * turn @ a.mean(axis=0))
 
 
 # ---------------------------------------------------------------- what came out
@@ -160,14 +160,14 @@ class Came:
     """The same with +z up."""
 
 
-def came(made: Reconstructed, given_from_file: Float[np.ndarray, "4 4"]) -> Came:
+def came(made: ReconstructedScene, given_from_file: Float[np.ndarray, "4 4"]) -> Came:
     """Take surfaces back to the frame in which poses were given."""
     back = given_from_file @ np.linalg.inv(made.found.world_from_file)
     surfaces = made.scene.surfaces
-    scale = parted(back).scale
+    scale = decompose_similarity(back).scale
     return Came(
         tuple(Mesh(s.vertices @ back[:3, :3].T + back[:3, 3], s.triangles) for s in surfaces),
-        parted(back).rotation[:, 2],
+        decompose_similarity(back).rotation[:, 2],
         tuple(Mesh(scale * s.vertices, s.triangles) for s in surfaces),
     )
 
@@ -207,7 +207,7 @@ def silhouettes(result: Came, folder: Path, given: ColmapModel) -> dict[str, Any
     """Compare silhouettes of all surfaces, in all given views, with masks of the set."""
     cameras, masks = [], []
     for image in given.images:
-        file = companion(folder / "images" / image.name, folder, MASKS)
+        file = find_companion_image(folder / "images" / image.name, folder, MASK_FOLDERS)
         if file is None:
             continue
         with Image.open(file) as mask:
@@ -221,7 +221,7 @@ def silhouettes(result: Came, folder: Path, given: ColmapModel) -> dict[str, Any
     return {"iou": float(np.nanmean(overlap)), "iou_worst": float(np.nanmin(overlap))}
 
 
-def held_out(made: Reconstructed) -> dict[str, Any]:
+def held_out(made: ReconstructedScene) -> dict[str, Any]:
     """Return how well photographs that were not learned from are met [dB]."""
     found = [m for s in made.found.statements if (m := AGREED.search(s))]
     if not found:

@@ -22,10 +22,10 @@ from pathlib import Path
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
-from corporeal.pipeline.in_memory import load_scene, prepare
+from corporeal.pipeline.in_memory import load_scene, prepare_scene
 from corporeal.pipeline.stages.assemble import AssembleConfig
-from corporeal.pipeline.stages.ground import doubts
-from corporeal.simulation.audit_file import AUDIT, read_run_audit
+from corporeal.pipeline.stages.ground import grounding_warnings
+from corporeal.simulation.audit_file import AUDIT_FILE, read_run_audit
 
 EXTENTS = {
     "duck": 0.13,
@@ -59,7 +59,7 @@ def run(path: Path, out: Path, size: float | None, detail: str) -> dict:
     start = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True, timeout=1800)
     row = {"object": path.stem, "seconds": time.perf_counter() - start, "exit": done.returncode}
-    if done.returncode or not (out / path.stem / AUDIT).exists():
+    if done.returncode or not (out / path.stem / AUDIT_FILE).exists():
         return row | {"error": done.stderr.strip().splitlines()[-1:]}
     audit = read_run_audit(out / path.stem)
     names = ("particles", "steps", "nan_count", "particles_out_of_domain", "momentum_residual")
@@ -68,7 +68,7 @@ def run(path: Path, out: Path, size: float | None, detail: str) -> dict:
     treatments = " + ".join(dict.fromkeys(p.treatment for p in audit.parts))
     made = {n: getattr(audit, n) for n in names} | {"materials": materials, "treatment": treatments}
     film = (out / path.stem / "film.mp4").stat().st_size
-    scene = store.load(next((out / path.stem).glob("*-assemble")) / store.DATA)
+    scene = store.load(next((out / path.stem).glob("*-assemble")) / store.DATA_FILE)
     said = {
         "mass_kg": sum(p.mass_kg for p in audit.parts),
         "extent_m": max(o.real_extent for o in scene.objects),
@@ -82,14 +82,14 @@ def weigh(path: Path, size: float | None) -> dict:
     start = time.perf_counter()
     extents = () if size is None else (f"{path.stem}={size}",)
     try:
-        made = prepare(load_scene(path, AssembleConfig(extent=extents)))
+        made = prepare_scene(load_scene(path, AssembleConfig(extent=extents)))
     except UserError as error:
         return {"object": path.stem, "exit": 2, "error": str(error)}
     groups = (
         made.scene.warnings,
         made.inventory.warnings,
         made.parts.warnings,
-        doubts(made.field, made.parts, made.scene),
+        grounding_warnings(made.field, made.parts, made.scene),
         made.particles.warnings,
     )
     return {

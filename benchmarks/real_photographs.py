@@ -34,11 +34,11 @@ import real_measures as measure
 from corporeal.core import store
 from corporeal.core.errors import UserError
 from corporeal.core.terminal import progress_bars, show_table
-from corporeal.pipeline.stages.reconstruct import Reconstructed, reconstruct
-from corporeal.reconstruction.gaussians.training_schedule import PRESETS
-from corporeal.reconstruction.picture_intake import OBJECT_POSES
+from corporeal.pipeline.stages.reconstruct import ReconstructedScene, reconstruct
+from corporeal.reconstruction.gaussian_source import OBJECT_POSES_FOLDER
+from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESETS
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.sfm.pose import POSES
+from corporeal.reconstruction.sfm.find_poses import POSES_FOLDER
 
 Case = Literal["all", "unmasked", "unposed", "bare", "film"]
 WORDS: dict[Case, str] = {
@@ -146,8 +146,8 @@ def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]
 
 def poses_in(work: Path) -> Path:
     """Return where the poses lie that a reconstruction used: of the object alone, or of all."""
-    alone = work / OBJECT_POSES
-    return alone if (alone / "sparse" / "0").is_dir() else work / POSES
+    alone = work / OBJECT_POSES_FOLDER
+    return alone if (alone / "sparse" / "0").is_dir() else work / POSES_FOLDER
 
 
 def poses_row(folder: Path, poses: Path) -> dict[str, Any]:
@@ -164,7 +164,7 @@ def poses_row(folder: Path, poses: Path) -> dict[str, Any]:
     }
 
 
-def results(made: Reconstructed, folder: Path, poses: Path | None) -> dict[str, Any]:
+def results(made: ReconstructedScene, folder: Path, poses: Path | None) -> dict[str, Any]:
     """Measure a reconstruction; poses: where those lie that were found."""
     given, facts, way = measure.model_of(folder), measure.known(folder), np.eye(4)
     row: dict[str, Any] = {"registered": len(given.images)}
@@ -259,7 +259,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", help="sets, by the names of their folders")
     parser.add_argument("--cases", nargs="*", choices=get_args(Case))
-    parser.add_argument("--training", nargs="+", choices=tuple(PRESETS), default=["draft"])
+    parser.add_argument("--training", nargs="+", choices=tuple(TRAINING_PRESETS), default=["draft"])
     parser.add_argument("--out", type=Path, default=Path("runs/real"))
     parser.add_argument("--json", type=Path, help="rows as data")
     parser.add_argument("--docs", nargs="?", const="real", choices=TITLES, help="write its page")

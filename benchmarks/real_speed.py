@@ -24,15 +24,15 @@ from PIL import Image, ImageOps
 
 from corporeal.core import store
 from corporeal.core.terminal import show_table
-from corporeal.pipeline.stages.reconstruct import TRAINED, reconstruct
-from corporeal.reconstruction.gaussians.training_schedule import PRESETS
-from corporeal.reconstruction.picture_intake import MASKED, POSED
+from corporeal.pipeline.stages.reconstruct import PROGRESS_AFTER_TRAINING, reconstruct
+from corporeal.reconstruction.gaussian_source import MASKED_PROGRESS, POSED_PROGRESS
+from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESETS
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 
 PHASES = {
-    "poses": POSED * TRAINED,
-    "masks": (POSED + MASKED) * TRAINED,
-    "training": TRAINED,
+    "poses": POSED_PROGRESS * PROGRESS_AFTER_TRAINING,
+    "masks": (POSED_PROGRESS + MASKED_PROGRESS) * PROGRESS_AFTER_TRAINING,
+    "training": PROGRESS_AFTER_TRAINING,
     "surfaces": 1.0,
 }
 """Of the work, and the fraction of it that is done after each, in order."""
@@ -90,7 +90,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--photographs", nargs="+", type=int, default=[20, 40])
     parser.add_argument("--long-side", type=int, default=640)
-    parser.add_argument("--training", choices=tuple(PRESETS), default="normal")
+    parser.add_argument("--training", choices=tuple(TRAINING_PRESETS), default="normal")
     parser.add_argument("--threads", nargs="+", type=int, default=[2])
     parser.add_argument("--out", type=Path, default=Path("runs/speed"))
     parser.add_argument("--json", type=Path, help="rows as data")

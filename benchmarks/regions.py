@@ -26,7 +26,7 @@ BATCH = 10_000
 
 def scene(points: int, channels: int):
     """Return a cloud of boxes, their words' vectors, and which point is of which box."""
-    from corporeal.core.types import Cloud
+    from corporeal.core.types import FeatureCloud
 
     rng = np.random.default_rng(0)
     part = np.sort(rng.integers(0, PARTS, points))
@@ -46,17 +46,19 @@ def scene(points: int, channels: int):
         made[name] = rows, look
     colour = rng.random((points, 3))
     structural, (semantic, words) = made["structural"][0], made["semantic"]
-    cloud = Cloud(position, colour, semantic, structural, np.ones(points, np.int64))
+    cloud = FeatureCloud(position, colour, semantic, structural, np.ones(points, np.int64))
     return cloud, words, part
 
 
 def once(points: int, channels: int) -> None:
     """Take one cloud apart, in this process, and print what it took."""
-    from corporeal.core.types import ObjectWords, PartWords
-    from corporeal.lab.evaluation.overlap import named_iou
-    from corporeal.reconstruction.segment.naming import name_parts
+    from corporeal.core.types import ObjectDescription, PartDescription
+    from corporeal.lab.evaluation.segmentation_scores import named_iou
+    from corporeal.reconstruction.segment.part_naming import name_parts
 
-    thing = ObjectWords("boxes", "boxes", tuple(PartWords(f"box {k}", None) for k in range(PARTS)))
+    thing = ObjectDescription(
+        "boxes", "boxes", tuple(PartDescription(f"box {k}", None) for k in range(PARTS))
+    )
     small, words, _ = scene(2000, channels)
     name_parts(small, thing, words)
     cloud, words, part = scene(points, channels)

@@ -26,14 +26,14 @@ import numpy as np
 from rich.console import Console
 
 from corporeal.core.errors import UserError
-from corporeal.discretization.plan import Detail
-from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.io.scene_file import SceneFile, write_scene_file
-from corporeal.pipeline.runner import Progress, Settings, opened
+from corporeal.discretization.discretization_plan import DetailLevel
+from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.io.scene_toml import SceneFile, write_scene_file
+from corporeal.pipeline.run_pipeline import Progress, Settings, open_run
 from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.simulation.audit_file import read_audit
-from corporeal.simulation.played import Played
+from corporeal.simulation.simulation_result import SimulationResult
 
 STILL = 0.5
 """Largest drift of what is at rest [dx]."""
@@ -42,7 +42,9 @@ LATE = 0.1
 """The end of the simulation, over which is measured whether a thing is still on its way [s]."""
 
 
-def measure(path: Path, out: Path, detail: Detail, seconds: float, settled: str = "said") -> dict:
+def measure(
+    path: Path, out: Path, detail: DetailLevel, seconds: float, settled: str = "said"
+) -> dict:
     """Simulate one scene; return what became of its objects, as data."""
     settings = Settings(
         assemble=AssembleConfig(duration=seconds, fps=FPS), fill=FillConfig(detail=detail)
@@ -56,7 +58,7 @@ def measure(path: Path, out: Path, detail: Detail, seconds: float, settled: str 
         write_scene_file(scene_file, said)
         path = scene_file
     try:
-        with opened([path], out / row["scene"], settings, _quietly, "simulate") as run:
+        with open_run([path], out / row["scene"], settings, _quietly, "simulate") as run:
             played = run.made.played
     except UserError as error:
         return row | {"error": str(error)}
@@ -67,7 +69,7 @@ def _quietly(verb: str) -> Progress:
     return lambda fraction, words: None
 
 
-def scene_row(played: Played) -> dict:
+def scene_row(played: SimulationResult) -> dict:
     """Measure a whole scene."""
     scene, particles = played.prepared.scene, played.prepared.particles
     objects = [object_row(b, played) for b in range(len(scene.objects))]
@@ -86,7 +88,7 @@ def scene_row(played: Played) -> dict:
     }
 
 
-def object_row(body: int, played: Played) -> dict:
+def object_row(body: int, played: SimulationResult) -> dict:
     """Measure one object."""
     prepared, trajectory = played.prepared, played.trajectory
     scene, parts, field = prepared.scene, prepared.parts, prepared.field
@@ -96,7 +98,7 @@ def object_row(body: int, played: Played) -> dict:
     late = trajectory.time >= trajectory.time[-1] - LATE - 1e-9
     mine = particles.object == body
     first, last = (trajectory.frames[k].position[mine].astype(float) for k in (0, -1))
-    turn = rigid_fit(first, last, np.ones(len(first))).rotation
+    turn = fit_rigid_motion(first, last, np.ones(len(first))).rotation
     cosine = np.clip((np.trace(turn) - 1) / 2, -1, 1)
     return {
         "object": scene.objects[body].name,
@@ -203,7 +205,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="of the scenes")
     parser.add_argument("--out", type=Path, default=Path("runs/rest"))
     parser.add_argument("--only", nargs="*", default=[], help="scenes whose names contain this")
-    parser.add_argument("--detail", choices=get_args(Detail), default="draft")
+    parser.add_argument("--detail", choices=get_args(DetailLevel), default="draft")
     parser.add_argument("--seconds", type=float, default=0.5, help="how long to watch")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--settled", choices=("said", "yes", "no"), default="said")

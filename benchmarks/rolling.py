@@ -16,9 +16,9 @@ import trimesh
 from scipy.special import ellipk
 
 import corporeal as co
-from corporeal.core.types import ROUNDING
+from corporeal.core.types import CURVATURE_COLUMNS
 from corporeal.mpm.problem import Problem
-from corporeal.mpm.state import Matter
+from corporeal.mpm.state import ParticleConstants
 
 G, SLOPE = 9.81, np.radians(5)
 LEVEL = (0.0, 0.0, -G)
@@ -50,7 +50,7 @@ def marble(speed: float = 0.0) -> co.Solid:
 def posed(*solids: co.Solid, gravity: tuple) -> Problem:
     """Make a scene's problem, with all of gravity from the start."""
     scene = co.build_scene(*solids, gravity=gravity)
-    return replace(co.pose_problem(co.prepare(scene)), gravity_ramp=0.0)
+    return replace(co.pose_problem(co.prepare_scene(scene)), gravity_ramp=0.0)
 
 
 def moved(problem: Problem, time: float) -> tuple[float, float, float]:
@@ -65,7 +65,7 @@ def moved(problem: Problem, time: float) -> tuple[float, float, float]:
 
 def unknown(problem: Problem) -> Problem:
     """Return the same problem, in which nobody knows what is round."""
-    bodies = (replace(b, rounding=np.zeros((0, ROUNDING))) for b in problem.bodies)
+    bodies = (replace(b, rounding=np.zeros((0, CURVATURE_COLUMNS))) for b in problem.bodies)
     return replace(problem, bodies=tuple(bodies))
 
 
@@ -95,7 +95,7 @@ def in_bowl(radius: float, marble: float, lean: float) -> tuple[Problem, float]:
     way = np.array([np.sin(theta), 0.0, -np.cos(theta)])
     at = np.array([0.0, 0.0, radius + wall]) + (radius - marble) * way
     problem = posed(co.ball("glass", marble, tuple(at)), hollow(radius, wall), gravity=LEVEL)
-    matter = Matter.of(problem)
+    matter = ParticleConstants.of(problem)
     share = matter.inertia[0][1, 1] / (matter.total[0] * marble**2)
     swing = 4.0 * float(ellipk(np.sin(theta / 2) ** 2))
     return problem, swing * np.sqrt((radius - marble) * (1.0 + share) / G)
@@ -147,9 +147,9 @@ def stopped(material: str, radius: float, floor: str) -> tuple[float, float, flo
     ball = co.ball(material, radius, (0.0, 0.0, radius), velocity=(0.3, 0.0, 0.0))
     settings = co.Settings()
     settings = replace(settings, ground=replace(settings.ground, floor=floor))
-    prepared = co.prepare(co.build_scene(ball), settings)
+    prepared = co.prepare_scene(co.build_scene(ball), settings)
     problem = replace(co.pose_problem(prepared, settings), gravity_ramp=0.0)
-    matter, rolling = Matter.of(problem), problem.rolling
+    matter, rolling = ParticleConstants.of(problem), problem.rolling
     if rolling is None or not problem.bodies[0].rigid:
         return float("nan"), float("nan"), float("nan")
     c, share = rolling[0, 1] / radius, matter.inertia[0][1, 1] / (matter.total[0] * radius**2)

@@ -34,25 +34,25 @@ from corporeal.core import store
 from corporeal.core.terminal import progress_bars, show_table
 from corporeal.core.types import MaterialField, Reconstruction, Scene, Views
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.discretization.anatomy import inner_share
 from corporeal.discretization.foliage import is_leafy
-from corporeal.discretization.scene_survey import examine
-from corporeal.discretization.survey import Anatomy, Member
-from corporeal.geometry.arrangement import box_of, boxes_of
-from corporeal.io.scene_file import (
+from corporeal.discretization.mesh_kind import inner_face_fraction
+from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
+from corporeal.discretization.scene_measures import measure_objects
+from corporeal.geometry.scene_transforms import object_boxes, surfaces_bounding_box
+from corporeal.io.photos.transforms_json import read_views, write_views
+from corporeal.io.scene_toml import (
     ObjectEntry,
     SceneFile,
     read_scene_file,
     write_scene_file,
 )
-from corporeal.io.transforms import read_views, write_views
-from corporeal.multiview.similarity import moved_points
-from corporeal.pipeline.results import Results
-from corporeal.pipeline.runner import Settings, opened, write_showcase
+from corporeal.multiview.similarity_transform import apply_similarity_to_points
+from corporeal.pipeline.results import StageResults
+from corporeal.pipeline.run_pipeline import Settings, open_run, write_showcase
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.showcase.scenes import SCENES
+from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS
 
 SIZE = (512, 512)
 """Of the photographs [px]."""
@@ -140,7 +140,7 @@ def settings(detail: Detail, seed: int = 0) -> Settings:
     return Settings(fill=FillConfig(detail=detail, seed=seed))
 
 
-def masses(made: Results) -> np.ndarray:
+def masses(made: StageResults) -> np.ndarray:
     """Return every object's mass [kg]."""
     parts, heavy = made.parts.catalogue, made.particles.mass_real
     total = np.zeros(len(made.scene.objects))
@@ -148,12 +148,12 @@ def masses(made: Results) -> np.ndarray:
     return total
 
 
-def ends(made: Results) -> np.ndarray:
+def ends(made: StageResults) -> np.ndarray:
     """Return where every object's centre of mass is at the end [m], in the first run's frame."""
     centre = made.trajectory.ledger.centre[-1]
     if made.reconstruct is None:
         return centre
-    return moved_points(centre, np.linalg.inv(made.reconstruct.world_from_file))
+    return apply_similarity_to_points(centre, np.linalg.inv(made.reconstruct.world_from_file))
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class Piece:
     """[m²]"""
 
 
-def as_told(made: Results, views: Views, path: Path) -> Path:
+def as_told(made: StageResults, views: Views, path: Path) -> Path:
     """Write what things are made of as a person would say it; return the file."""
     said, members = {}, {m.part: m for a in _examined(made) for m in a.members}
     for number, thing in enumerate(made.scene.objects):
@@ -180,11 +180,11 @@ def as_told(made: Results, views: Views, path: Path) -> Path:
     return path
 
 
-def _examined(made: Results) -> list[Anatomy]:
-    return examine(made.scene, made.parts, 0)
+def _examined(made: StageResults) -> list[MeasuredObject]:
+    return measure_objects(made.scene, made.parts, 0)
 
 
-def _piece(made: Results, views: Views, member: Member) -> Piece:
+def _piece(made: StageResults, views: Views, member: MeasuredPart) -> Piece:
     """Say what a piece is, how it looks, and how thick a wall is that its mesh has two sides of.
 
     Leaves are such walls, whatever their mesh.
@@ -193,7 +193,7 @@ def _piece(made: Results, views: Views, member: Member) -> Piece:
     said = _said(field, k)
     if said["structure"] in ("solid", "shell") and member.volume:
         rng = np.random.default_rng(0)
-        drawn = inner_share(member.shape, member.body, member.size[0], rng) > WALLED
+        drawn = inner_face_fraction(member.shape, member.body, member.size[0], rng) > WALLED
         if drawn or (said["structure"] == "solid" and is_leafy(field.materials[k])):
             thickness = 2e3 * member.volume / member.body_area
             said |= {"structure": "shell", "thickness_mm": thickness}
@@ -262,9 +262,9 @@ def as_begun(scene: Scene, folder: Path) -> Path:
     return path
 
 
-def put_aside(made: Results, path: Path, folder: Path, seed: int) -> Path:
+def put_aside(made: StageResults, path: Path, folder: Path, seed: int) -> Path:
     """Write the scene with each thing put aside; what stands on the floor stays on it."""
-    names, boxes = [o.name for o in made.scene.objects], boxes_of(made.scene)
+    names, boxes = [o.name for o in made.scene.objects], object_boxes(made.scene)
     rng, entries = np.random.default_rng(seed), {}
     said = SceneFile(path, path)
     if path.suffix == ".toml":
@@ -296,10 +296,14 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
     """Run a scene twice and compare; what is there already is not done again."""
     name = Path(source).resolve().parent.name if source.endswith(".toml") else Path(source).stem
     folder = out / name
-    path = write_showcase(source, folder / "input") if source in SCENES else Path(source)
+    path = (
+        write_showcase(source, folder / "input")
+        if source in SHOWCASE_SCENE_BUILDERS
+        else Path(source)
+    )
     with (
         progress_bars() as tell,
-        opened([path], folder / "mesh", settings(detail), tell, "simulate") as of,
+        open_run([path], folder / "mesh", settings(detail), tell, "simulate") as of,
     ):
         mesh = of.made
     scene, spread = mesh.scene, []
@@ -307,13 +311,13 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
         aside = put_aside(mesh, path, folder, seed)
         work = folder / aside.stem
         other = settings(detail, seed)
-        with progress_bars() as tell, opened([aside], work, other, tell, "simulate") as of:
+        with progress_bars() as tell, open_run([aside], work, other, tell, "simulate") as of:
             spread.append(apart(ends(mesh), ends(of.made), scene))
     views = folder / "views"
     if not (views / "transforms.json").exists():
         write_views(views, capture(scene, CaptureConfig(views=48, size=SIZE)))
     said, start = as_told(mesh, read_views(views), folder / "told.yaml"), as_begun(scene, folder)
-    size = [float(np.prod(np.ptp(box, axis=0))) for box in boxes_of(scene)]
+    size = [float(np.prod(np.ptp(box, axis=0))) for box in object_boxes(scene)]
     kept = folder / "order.json"
     order = np.array(store.read_json(kept)) if kept.exists() else np.argsort(size)[::-1]
     for until in ("reconstruct", "simulate"):
@@ -327,7 +331,7 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
         )
         with (
             progress_bars() as tell,
-            opened([start], folder / "pictures", again, tell, until) as of,
+            open_run([start], folder / "pictures", again, tell, until) as of,
         ):
             pictures = of.made
         order = ordered(scene, reconstructed(pictures), order)
@@ -337,11 +341,11 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
 
 def apart(one: np.ndarray, other: np.ndarray, scene: Scene) -> np.ndarray:
     """Return how far ends are from each other, over the scene's size."""
-    whole = float(np.linalg.norm(np.ptp(box_of(scene.surfaces), axis=0)))
+    whole = float(np.linalg.norm(np.ptp(surfaces_bounding_box(scene.surfaces), axis=0)))
     return np.linalg.norm(one - other, axis=1) / whole
 
 
-def reconstructed(made: Results) -> Reconstruction:
+def reconstructed(made: StageResults) -> Reconstruction:
     """Return what was reconstructed in a run from pictures."""
     assert made.reconstruct is not None
     return made.reconstruct
@@ -351,12 +355,14 @@ def ordered(scene: Scene, found: Reconstruction, order: np.ndarray) -> np.ndarra
     """Return which object is which, as a person sees it who names things of nearly one size."""
     if len(found.boxes) != len(order):
         return order
-    middles = moved_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
-    apart = cdist(middles, [box.mean(axis=0) for box in boxes_of(scene)])
+    middles = apply_similarity_to_points(
+        found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file)
+    )
+    apart = cdist(middles, [box.mean(axis=0) for box in object_boxes(scene)])
     return linear_sum_assignment(apart)[1]
 
 
-def compared(name: str, mesh: Results, pictures: Results, order: np.ndarray) -> dict:
+def compared(name: str, mesh: StageResults, pictures: StageResults, order: np.ndarray) -> dict:
     """Compare two runs; the second has its objects by size."""
     scene, found = mesh.scene, reconstructed(pictures)
     first, second = masses(mesh)[order], masses(pictures)
@@ -398,7 +404,7 @@ def write_docs(rows: list[dict], said: str) -> None:
 def main() -> None:
     """Compare all scenes asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("scenes", nargs="*", default=list(SCENES))
+    parser.add_argument("scenes", nargs="*", default=list(SHOWCASE_SCENE_BUILDERS))
     parser.add_argument("--out", type=Path, default=Path("runs/round-trip"))
     parser.add_argument("--detail", default="draft")
     parser.add_argument("--training", default="normal")

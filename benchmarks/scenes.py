@@ -21,7 +21,7 @@ import numpy as np
 
 from corporeal.core.errors import UserError
 from corporeal.pipeline.stages.compose import ComposeConfig, compose
-from corporeal.pool.index import read_pool
+from corporeal.pool.pool_index import read_pool
 
 WARM_UP = 20
 """Scenes before memory is looked at: code is loaded and compiled, pieces are cut."""

@@ -16,9 +16,13 @@ import numpy as np
 from answer_rules import Drawn, Scored, against, drawn
 from jaxtyping import Float
 
-from corporeal.lab.evaluation.truth import read_truth
-from corporeal.pipeline.mixture import quantiles
-from corporeal.vlm.outside_evidence import WRONG, likelihood, readings
+from corporeal.lab.evaluation.measured_masses import read_measured_masses
+from corporeal.pipeline.mass_posterior import weighted_quantiles
+from corporeal.vlm.mass_evidence import (
+    UNRELATED_EVIDENCE_PROBABILITY,
+    evidence_masses,
+    mass_likelihood,
+)
 
 SHARED, TOGETHER = 0.268, 0.676
 """Slope of a judgement's error over that of the ways' median, and their correlation, over 58
@@ -34,7 +38,7 @@ def weights(thing: Drawn, rule: str) -> Float[np.ndarray, " N"]:
     """Return what each draw counts by a rule; they add up to 1."""
     found = np.ones(len(thing.masses))
     if rule == "product":
-        found = likelihood(thing.masses, thing.pooled)
+        found = mass_likelihood(thing.masses, thing.pooled)
     elif rule != "without":
         found = _judged(thing, rule) * _printed(thing)
     return found / found.sum()
@@ -46,7 +50,7 @@ def _judged(thing: Drawn, rule: str) -> Float[np.ndarray, " N"]:
     Of one that errs with the ways, ln J ~ N(ln m + β (ln M - ln m), σ² (1 - ρ²)): the conditional
     of a bivariate normal distribution, M what the ways come to.
     """
-    (centre, width), *_ = readings(thing.pooled)
+    (centre, width), *_ = evidence_masses(thing.pooled)
     logs = np.log(thing.masses)
     away = np.log(centre) - logs
     if rule == "t":
@@ -55,15 +59,17 @@ def _judged(thing: Drawn, rule: str) -> Float[np.ndarray, " N"]:
     if rule == "shared within ways":
         share, together, middle = SHARED_PLACED, TOGETHER_PLACED, np.log(thing.placed)
     away = (away - share * (middle - logs)) / (width * sqrt(1 - together**2))
-    return (1 - WRONG) * np.exp(-0.5 * away**2) + WRONG
+    return (1 - UNRELATED_EVIDENCE_PROBABILITY) * np.exp(
+        -0.5 * away**2
+    ) + UNRELATED_EVIDENCE_PROBABILITY
 
 
 def _printed(thing: Drawn) -> Float[np.ndarray, " N"]:
     """Return what print says of each draw, which errs with nothing."""
     if thing.pooled is None:
         return np.ones(len(thing.masses))
-    unjudged = likelihood(thing.masses, replace(thing.pooled, printed=()))
-    return likelihood(thing.masses, thing.pooled) / unjudged
+    unjudged = mass_likelihood(thing.masses, replace(thing.pooled, printed=()))
+    return mass_likelihood(thing.masses, thing.pooled) / unjudged
 
 
 def ranked(values: Float[np.ndarray, " N"], shares: Float[np.ndarray, " N"], truth: float) -> float:
@@ -80,7 +86,7 @@ def ranked(values: Float[np.ndarray, " N"], shares: Float[np.ndarray, " N"], tru
 def report(things: Sequence[Drawn], rule: str) -> tuple[Scored, float]:
     """Score a rule's intervals, and its draws: the mean ranked score of ln m."""
     counted = [weights(one, rule) for one in things]
-    found = [quantiles(one.masses, w) for one, w in zip(things, counted, strict=True)]
+    found = [weighted_quantiles(one.masses, w) for one, w in zip(things, counted, strict=True)]
     scores = [
         ranked(np.log(one.masses), w, float(np.log(one.truth)))
         for one, w in zip(things, counted, strict=True)
@@ -98,7 +104,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=Path, nargs="+", required=True)
     parser.add_argument("--answers", type=int, default=1)
     asked = parser.parse_args()
-    rows = [one for one in read_truth(asked.folder, asked.truth) if one.mass is not None]
+    rows = [one for one in read_measured_masses(asked.folder, asked.truth) if one.mass is not None]
     for recordings in asked.recordings:
         things = [drawn(one, recordings, asked.answers) for one in rows]
         for rule in RULES:

@@ -20,15 +20,19 @@ from rich.console import Console
 from stories import Told, tell, told
 
 from corporeal.core import store
-from corporeal.core.findings import Audit
-from corporeal.core.machine import cores
-from corporeal.discretization.plan import Detail
-from corporeal.lab.evaluation.dynamics.places import OURS, reference_folder, run_folder
-from corporeal.pipeline.runner import FOLDERS, Settings
+from corporeal.core.audit_data import Audit
+from corporeal.core.process_resources import usable_cores
+from corporeal.discretization.discretization_plan import DetailLevel
+from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+    OURS_NAME,
+    reference_folder,
+    run_folder,
+)
+from corporeal.pipeline.run_pipeline import STAGE_FOLDERS, Settings
 from corporeal.pipeline.stages.fill import FillConfig
-from corporeal.showcase.expectations import EXPECTED
-from corporeal.showcase.scenes import SCENES
-from corporeal.simulation.audit_words import breaches, passage
+from corporeal.showcase.scene_expectations import SCENE_EXPECTATIONS
+from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS
+from corporeal.simulation.audit_messages import breach_messages, passage_message
 
 PAGE = Path(__file__).parents[1] / "docs" / "showcase.md"
 BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"
@@ -36,7 +40,10 @@ BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"
 
 def faults(audit: Audit) -> list[str]:
     """Say which bounds of the audit are exceeded, and who passed through whom."""
-    return [*breaches(audit), *(f"{passage(pair)}." for pair in audit.surfaces if pair.passed)]
+    return [
+        *breach_messages(audit),
+        *(f"{passage_message(pair)}." for pair in audit.surfaces if pair.passed),
+    ]
 
 
 def row(told: Told, detail: str) -> dict:
@@ -61,8 +68,8 @@ def seen_table(rows: list[dict], details: list[str]) -> str:
     heads = ("scene", "must show", "target", *details, "must fail")
     lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
     found = {(r["scene"], r["detail"]): r["expectations"] for r in rows}
-    for number, name in enumerate(SCENES, 1):
-        for k, demand in enumerate(EXPECTED[name]):
+    for number, name in enumerate(SHOWCASE_SCENE_BUILDERS, 1):
+        for k, demand in enumerate(SCENE_EXPECTATIONS[name]):
             mine = [found[name, d][k] if (name, d) in found else None for d in details]
             asked = next(e for e in mine if e is not None)
             scene = "" if k else f"{number} {name}"
@@ -100,23 +107,23 @@ def page(rows: list[dict], details: list[str]) -> None:
     before, after = text.split(BEGIN)[0], text.split(END)[1]
     tables = (
         f"Measured at detail {' and '.join(details)}, seed 0:\n\n{seen_table(rows, details)}\n\n"
-        f"What it cost, on {cores()} core{'s' if cores() > 1 else ''}:\n\n{cost_table(rows)}\n"
+        f"What it cost, on {usable_cores()} core{'s' if usable_cores() > 1 else ''}:\n\n{cost_table(rows)}\n"
     )
     PAGE.write_text(f"{before}{BEGIN}\n\n{tables}\n{END}{after}", encoding="utf-8")
 
 
-def place(folder: Path, name: str, detail: Detail) -> Path:
+def place(folder: Path, name: str, detail: DetailLevel) -> Path:
     """Return where a run lies: as an evaluation of dynamics lays out ours and its references."""
     if detail == "draft":
-        return run_folder(folder, name, OURS)
+        return run_folder(folder, name, OURS_NAME)
     return reference_folder(folder, name, detail)
 
 
-def measured(name: str, folder: Path, detail: Detail, run: bool) -> dict | None:
+def measured(name: str, folder: Path, detail: DetailLevel, run: bool) -> dict | None:
     """Measure one scene; None: it was not run yet, and is not to be."""
     if run:
         return row(tell(name, folder, Settings(fill=FillConfig(detail=detail))), detail)
-    done = (folder / FOLDERS["simulate"] / store.META).exists()
+    done = (folder / STAGE_FOLDERS["simulate"] / store.META_FILE).exists()
     return row(told(name, folder), detail) if done else None
 
 
@@ -124,7 +131,7 @@ def measured_rows(asked: argparse.Namespace) -> Iterator[dict]:
     """Measure every scene at every detail, and print it."""
     console = Console()
     for detail in asked.detail:
-        for name in asked.scene or SCENES:
+        for name in asked.scene or SHOWCASE_SCENE_BUILDERS:
             found = measured(name, place(asked.folder, name, detail), detail, not asked.no_run)
             if found is not None:
                 console.print_json(json.dumps(found), indent=None)
@@ -136,20 +143,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("scene", nargs="*", help=f"among {', '.join(SCENES)}; none: all")
-    parser.add_argument("--detail", nargs="+", choices=get_args(Detail), default=["draft"])
+    parser.add_argument(
+        "scene", nargs="*", help=f"among {', '.join(SHOWCASE_SCENE_BUILDERS)}; none: all"
+    )
+    parser.add_argument("--detail", nargs="+", choices=get_args(DetailLevel), default=["draft"])
     parser.add_argument("--folder", type=Path, default=Path("runs/showcase"), help="of the runs")
     parser.add_argument("--no-run", action="store_true", help="only what lies in the folder")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--docs", action="store_true", help=f"write the tables into {PAGE.name}")
     asked = parser.parse_args()
-    unknown = set(asked.scene) - set(SCENES)
+    unknown = set(asked.scene) - set(SHOWCASE_SCENE_BUILDERS)
     if unknown:
-        parser.error(f"no scene {sorted(unknown)[0]!r}: choose among {', '.join(SCENES)}")
+        parser.error(
+            f"no scene {sorted(unknown)[0]!r}: choose among {', '.join(SHOWCASE_SCENE_BUILDERS)}"
+        )
     if asked.docs and asked.scene:
         parser.error("--docs needs all scenes: name none")
     rows = list(measured_rows(asked))
-    if asked.docs and len([r for r in rows if r["detail"] == asked.detail[0]]) < len(SCENES):
+    if asked.docs and len([r for r in rows if r["detail"] == asked.detail[0]]) < len(
+        SHOWCASE_SCENE_BUILDERS
+    ):
         parser.error(f"--docs needs all scenes at detail {asked.detail[0]}")
     if asked.json:
         asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")

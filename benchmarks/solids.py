@@ -19,16 +19,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Gaussians, Scene, Views
-from corporeal.discretization.filling import sample_surface
-from corporeal.geometry.mesh import Mesh, joined, weld
-from corporeal.geometry.shape import Shape
-from corporeal.io.splat_ply import write_splat
-from corporeal.io.splats import read_splat
-from corporeal.io.transforms import read_views
+from corporeal.discretization.point_filling import sample_surface
+from corporeal.geometry.mesh import Mesh, join_meshes, weld_mesh
+from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.io.photos.transforms_json import read_views
+from corporeal.io.splat.load_splat import load_splat
+from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.pipeline.stages.assemble import assemble
-from corporeal.reconstruction.gaussians.solid import Solid, solids
-from corporeal.reconstruction.gaussians.train import train
+from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
+from corporeal.reconstruction.surface.closed_surface import ClosedSurface, build_closed_surfaces
 
 PAGE = Path(__file__).parents[1] / "docs" / "solids.md"
 CORES = 2
@@ -47,15 +47,17 @@ def learned(folder: Path, views: Views, preset: str, out: Path) -> Gaussians:
         if views.object_of_pixel is None:
             raise SystemExit(f"{folder}: its views do not say where things are.")
         config = TrainConfig(preset, threads=CORES)
-        made = train(Views(views.rgb, views.cameras), views.object_of_pixel >= 0, config=config)
-        write_splat(path, made.gaussians)
-    return read_splat(path, up="+z")
+        made = train_gaussians(
+            Views(views.rgb, views.cameras), views.object_of_pixel >= 0, config=config
+        )
+        write_splat_ply(path, made.gaussians)
+    return load_splat(path, up="+z")
 
 
-def clad(models: list[Shape]) -> Gaussians:
+def clad(models: list[QueryMesh]) -> Gaussians:
     """Return flat Gaussians on the surfaces of models."""
     rng = np.random.default_rng(0)
-    mesh = joined([m.mesh for m in models])
+    mesh = join_meshes([m.mesh for m in models])
     points, triangle = sample_surface(mesh, CLAD, rng)
     normal = mesh.normals[triangle]
     first = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0, 0], [0, 1.0, 0]))
@@ -71,20 +73,20 @@ def clad(models: list[Shape]) -> Gaussians:
     )
 
 
-def truth(scene: Scene) -> list[Shape]:
+def truth(scene: Scene) -> list[QueryMesh]:
     """Return every object's model."""
     shapes = []
     for k in range(len(scene.objects)):
         mine = [s for s in scene.surfaces if s.object == k]
-        whole = joined(mine)
-        shapes.append(Shape(weld(whole.vertices, whole.triangles)[0]))
+        whole = join_meshes(mine)
+        shapes.append(QueryMesh(weld_mesh(whole.vertices, whole.triangles)[0]))
     return shapes
 
 
-def compared(solid: Solid, model: Shape) -> dict:
+def compared(solid: ClosedSurface, model: QueryMesh) -> dict:
     """Return how a solid differs from the model."""
     rng, mesh = np.random.default_rng(0), Mesh(solid.vertices, solid.triangles)
-    shape = Shape(mesh)
+    shape = QueryMesh(mesh)
     corners = np.concatenate([mesh.vertices, model.mesh.vertices])
     places = rng.uniform(corners.min(axis=0), corners.max(axis=0), (PLACES, 3))
     ours, theirs = shape.inside(places), model.inside(places)
@@ -101,7 +103,7 @@ def compared(solid: Solid, model: Shape) -> dict:
     }
 
 
-def within(solids: list[Shape], k: int, cell: float) -> tuple[float, float]:
+def within(solids: list[QueryMesh], k: int, cell: float) -> tuple[float, float]:
     """Return how deep a solid's surface is in others [cells], and how much of it is theirs."""
     mesh, rng = solids[k].mesh, np.random.default_rng(0)
     points = np.concatenate([mesh.vertices, mesh.corners.mean(axis=1)])
@@ -123,10 +125,10 @@ def judged(folder: Path, preset: str | None, out: Path) -> list[str]:
     start = time.process_time()
     assert views.object_of_pixel is not None
     masks, owner = views.object_of_pixel >= 0, np.argmin(away, axis=0)
-    made = solids(gaussians, owner, views.cameras, masks, threads=CORES)
+    made = build_closed_surfaces(gaussians, owner, views.cameras, masks, threads=CORES)
     spent = (time.process_time() - start) / CORES
     rows, name = [], folder.name if preset else f"{folder.name}, clad"
-    shapes = [Shape(Mesh(s.vertices, s.triangles)) for s in made]
+    shapes = [QueryMesh(Mesh(s.vertices, s.triangles)) for s in made]
     for k, (solid, model) in enumerate(zip(made, models, strict=True)):
         c = compared(solid, model)
         deep, common = within(shapes, k, solid.cell)
@@ -172,7 +174,7 @@ HEAD = (
     "# Solids from Gaussians",
     "",
     "A Gaussian splat has no inside and no outside. To weigh, fill and simulate its objects, "
-    "`corporeal.reconstruction.gaussians.solid` extracts one closed surface per object:",
+    "`corporeal.reconstruction.surface.closed_surface` extracts one closed surface per object:",
     "",
     "    solids(gaussians, object_of_gaussian, cameras, masks) -> tuple[Solid, ...]",
     "",

@@ -22,18 +22,24 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Camera, Gaussians, Views
-from corporeal.io.transforms import read_views
-from corporeal.multiview.region import region
+from corporeal.io.photos.transforms_json import read_views
+from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians.depth_rendering import render_depth
-from corporeal.reconstruction.gaussians.exposure import differ
-from corporeal.reconstruction.gaussians.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
-from corporeal.reconstruction.gaussians.quality import quality
-from corporeal.reconstruction.gaussians.raster import back, draw, pinhole
+from corporeal.reconstruction.gaussians.exposure_gains import exposures_differ
+from corporeal.reconstruction.gaussians.gaussian_parameters import (
+    PARAM_COLOUR,
+    PARAM_MEAN,
+    PARAM_OPACITY,
+    PARAM_ROTATION,
+    PARAM_SCALE,
+)
+from corporeal.reconstruction.gaussians.heldout_quality import heldout_quality
+from corporeal.reconstruction.gaussians.rasteriser_numba import back, draw, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.train import train
-from corporeal.reconstruction.gaussians.training_schedule import PRESETS, TrainConfig
+from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
+from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESETS, TrainConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "splats.md"
 CORES = 2
@@ -50,16 +56,16 @@ def learned(scene: Path, preset: str, masked: bool) -> dict:
         raise SystemExit(f"{scene}: its views do not say where things are.")
     masks = seen.object_of_pixel >= 0
     views = Views(seen.rgb, seen.cameras)
-    config = TrainConfig(preset, threads=min(CORES, cores()))
+    config = TrainConfig(preset, threads=min(CORES, usable_cores()))
     start = time.process_time()
-    out = train(views, masks if masked else None, config=config)
+    out = train_gaussians(views, masks if masked else None, config=config)
     spent = time.process_time() - start
     if out.quality is None:
         raise SystemExit(f"{scene}: too few views to hold any out.")
     found = out.quality
     if not masked:
-        apart = differ(out.exposures)
-        found = quality(out.gaussians, views, found.views, masks, apart=apart)
+        apart = exposures_differ(out.exposures)
+        found = heldout_quality(out.gaussians, views, found.views, masks, apart=apart)
     return {
         "scene": scene.name,
         "preset": preset,
@@ -83,7 +89,7 @@ def misplaced(gaussians: Gaussians, seen: Views) -> dict:
     with ThreadPool(CORES) as pool:
         found = render_depth(gaussians, seen.cameras, pool).depth
     on = seen.object_of_pixel >= 0
-    behind = (found[on] - seen.depth[on]) / region(seen.cameras).radius
+    behind = (found[on] - seen.depth[on]) / find_viewed_region(seen.cameras).radius
     return {"deep": float((behind > OFF).mean()), "near": float((behind < -OFF).mean())}
 
 
@@ -91,14 +97,16 @@ def drawn() -> dict:
     """Draw very many Gaussians on a sphere, and go back; the best of five."""
     count, side = LARGE
     rng = np.random.default_rng(0)
-    theta = rng.normal(size=(count, COLOUR + 3 * 16)).astype(np.float32)
-    theta[:, MEAN:ROTATION] /= np.linalg.norm(theta[:, MEAN:ROTATION], axis=1)[:, None]
-    theta[:, SCALE:OPACITY] = np.log(rng.uniform(0.004, 0.012, (count, 3)))
-    theta[:, COLOUR:] *= 0.3
+    theta = rng.normal(size=(count, PARAM_COLOUR + 3 * 16)).astype(np.float32)
+    theta[:, PARAM_MEAN:PARAM_ROTATION] /= np.linalg.norm(
+        theta[:, PARAM_MEAN:PARAM_ROTATION], axis=1
+    )[:, None]
+    theta[:, PARAM_SCALE:PARAM_OPACITY] = np.log(rng.uniform(0.004, 0.012, (count, 3)))
+    theta[:, PARAM_COLOUR:] *= 0.3
     pose = np.eye(4)
     pose[2, 3] = -2.5
     K = np.array([[side, 0, side / 2], [0, side, side / 2], [0, 0, 1.0]])
-    eye = pinhole(Camera(K, pose, side, side))
+    eye = pinhole_of_camera(Camera(K, pose, side, side))
     slope = np.ones((4, side, side), np.float32)
     forward, backward = [], []
     with ThreadPool(1) as pool:
@@ -152,7 +160,9 @@ def main() -> None:
     )
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("runs/splats"))
-    parser.add_argument("--presets", nargs="+", default=list(PRESETS), choices=list(PRESETS))
+    parser.add_argument(
+        "--presets", nargs="+", default=list(TRAINING_PRESETS), choices=list(TRAINING_PRESETS)
+    )
     parser.add_argument("--sources", nargs="+", default=["masks"], choices=["masks", "pictures"])
     parser.add_argument("--docs", action="store_true", help="write docs/splats.md")
     asked = parser.parse_args()

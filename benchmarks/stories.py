@@ -8,17 +8,17 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.core.findings import Audit, Expectation, Outcome
+from corporeal.core.audit_data import Audit, Expectation, Outcome
 from corporeal.core.store import read_meta
 from corporeal.core.types import MaterialField, Particles, Scene, Trajectory
-from corporeal.mpm.constants import PARTICLE_RADIUS
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import FOLDERS, Settings
-from corporeal.showcase.expectations import expect
-from corporeal.simulation.audit import believed
+from corporeal.mpm.constants import PARTICLE_RADIUS_DX
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import STAGE_FOLDERS, Settings
+from corporeal.showcase.scene_expectations import compare_with_expectations
+from corporeal.simulation.audit import reject_expectations
 from corporeal.simulation.audit_file import read_audit
-from corporeal.simulation.frames import read_trajectory
-from corporeal.simulation.outcome import outcome
+from corporeal.simulation.outcome import measure_outcome
+from corporeal.simulation.trajectory_files import read_trajectory
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,13 @@ class Told:
     @cached_property
     def outcome(self) -> Outcome:
         """Who met whom, who was dented where, who bounced how high."""
-        return outcome(self.scene, self.particles, self.field, self.film)
+        return measure_outcome(self.scene, self.particles, self.field, self.film)
 
     def expectations(self) -> list[Expectation]:
         """Compare what happened with what must be seen."""
-        return list(believed(expect(self.name, self.outcome), self.audit))
+        return list(
+            reject_expectations(compare_with_expectations(self.name, self.outcome), self.audit)
+        )
 
     def gap(self, first: int, second: int) -> Float[np.ndarray, " F"]:
         """Distance between two objects at every frame [cells].
@@ -54,20 +56,20 @@ class Told:
             KDTree(frame.position[one]).query(frame.position[other])[0].min() / cell
             for frame in self.film.frames
         ]
-        return np.array(nearest) - 2 * PARTICLE_RADIUS
+        return np.array(nearest) - 2 * PARTICLE_RADIUS_DX
 
 
 def tell(name: str, folder: Path, settings: Settings) -> Told:
     """Simulate a scene of the showcase; what lies in ``folder`` already is used again."""
-    scene = runner.write_showcase(name, folder / "input")
-    runner.run([scene], folder, settings, runner.quiet, until="simulate")
+    scene = run_pipeline.write_showcase(name, folder / "input")
+    run_pipeline.run([scene], folder, settings, run_pipeline.no_progress_of_stage, until="simulate")
     return told(name, folder)
 
 
 def told(name: str, folder: Path) -> Told:
     """Read back a scene of the showcase that was simulated."""
-    simulated = folder / FOLDERS["simulate"]
-    prepared = runner.read_back(folder).prepared  # with what lies in vessels
+    simulated = folder / STAGE_FOLDERS["simulate"]
+    prepared = run_pipeline.read_run(folder).prepared  # with what lies in vessels
     return Told(
         name,
         prepared.scene,

@@ -22,7 +22,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -138,7 +138,7 @@ def main() -> None:
     parser.add_argument(
         "--workers",
         type=int,
-        default=min(4, cores()),
+        default=min(4, usable_cores()),
         help="cases that run side by side",
     )
     asked = parser.parse_args()

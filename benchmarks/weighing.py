@@ -17,14 +17,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from corporeal.core.errors import UserError
-from corporeal.io.glb_writer import write_glb
-from corporeal.lab.corpus.weighing import weigh
-from corporeal.pool.asset import Asset
-from corporeal.pool.index import index
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.lab.corpus.asset_mass import asset_mass_properties
+from corporeal.pool.asset_pool import PoolAsset
+from corporeal.pool.pool_index import index_pool
 from corporeal.scene.mass_properties import MassProperties
-from corporeal.showcase.models import PROPS
-from corporeal.showcase.props import prop
-from corporeal.vlm.sizes import real_extent, usual_sizes
+from corporeal.showcase.prop_models import POOL_PROP_BUILDERS
+from corporeal.showcase.prop_scene import prop_scene
+from corporeal.vlm.real_sizes import estimate_real_extent, find_class_sizes
 
 LIMIT = 10.0
 """What weighing one asset may cost [s]."""
@@ -32,21 +32,23 @@ FIRST = "rubber_ball"
 """Weighed before the clock starts."""
 
 
-def assets(folders: Sequence[Path], below: Path) -> list[Asset]:
+def assets(folders: Sequence[Path], below: Path) -> list[PoolAsset]:
     """Make a pool of the props and of what the folders hold."""
     props = below / "props"
     props.mkdir(parents=True, exist_ok=True)
-    for name in PROPS:
-        write_glb(props / f"{name}.glb", prop(name))
-    return list(index([props, *folders], below / "pool").assets)
+    for name in POOL_PROP_BUILDERS:
+        write_glb(props / f"{name}.glb", prop_scene(name))
+    return list(index_pool([props, *folders], below / "pool").assets)
 
 
-def weighed(asset: Asset) -> tuple[MassProperties, float]:
+def weighed(asset: PoolAsset) -> tuple[MassProperties, float]:
     """Weigh one asset; return also the processor time that it took [s]."""
-    known = usual_sizes([asset.class_name], "metadata")
-    extent = real_extent(asset.name, asset.class_name, asset.extent, asset.metric, known).extent
+    known = find_class_sizes([asset.class_name], "metadata")
+    extent = estimate_real_extent(
+        asset.name, asset.class_name, asset.extent, asset.metric, known
+    ).extent
     start = time.process_time()
-    return weigh(asset, extent), time.process_time() - start
+    return asset_mass_properties(asset, extent), time.process_time() - start
 
 
 def compared(found: dict, before: dict) -> dict[str, float]:

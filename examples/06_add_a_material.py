@@ -29,7 +29,7 @@ def main() -> float:
         settings = co.Settings(ground=co.GroundConfig(library=str(file)))
         mine = co.ball(co.material("my_silicone", str(file)), 0.03, (0.1, 0, 0.28), name="mine")
         rubber = co.ball("rubber", 0.03, (-0.1, 0, 0.28), name="rubber")
-        played = co.play(co.build_scene(mine, rubber, duration=0.5), settings)
+        played = co.simulate_scene(co.build_scene(mine, rubber, duration=0.5), settings)
     rise = {name: row.rebound_m for name, row in played.outcome.objects.items()}
     print(f"mine rose {rise['mine']:.3f} m, rubber {rise['rubber']:.3f} m")
     return rise["mine"] / rise["rubber"]

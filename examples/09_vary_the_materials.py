@@ -17,7 +17,7 @@ def main() -> float:
         co.write_glb(model, co.build_scene(ball, duration=0.5))
         settings = co.Settings(assemble=co.AssembleConfig(duration=0.5))
         run = co.run([model], Path(place) / "run", settings, until="simulate")
-        spread = co.ensemble(run, SAMPLES).of("ball", "rebound_ratio")
+        spread = co.simulate_ensemble(run, SAMPLES).of("ball", "rebound_ratio")
     print(f"rebound {spread.median:.2f} of the fall, from {spread.low:.2f} to {spread.high:.2f}")
     return (spread.high - spread.low) / spread.median
 

@@ -8,7 +8,7 @@ import corporeal as co
 
 SETTINGS = co.Settings(
     assemble=co.AssembleConfig(duration=0.1, fps=10),
-    film=co.FilmConfig(width=160, height=120),
+    film=co.VideoConfig(width=160, height=120),
 )
 
 
@@ -22,7 +22,7 @@ def main() -> float:
         pool = co.index_pool([models], Path(place) / "pool")
         asked = co.CorpusConfig(scenes=2, classes=2, count="1-2")
         sources = co.Sources(pool, co.ComposeConfig(), co.CaptureConfig(views=1, size=(64, 64)))
-        hands = co.local_hands(corpus)
+        hands = co.local_executor(corpus)
         co.assemble_corpus(corpus, asked, sources, hands)
         co.run_corpus(corpus, co.RunConfig(), SETTINGS, hands)
         *_, data = co.report_corpus(corpus)

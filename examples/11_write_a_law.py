@@ -20,7 +20,7 @@ def write_law(package: Path) -> None:
     """Write the law's file, its twin in C++, its number and a material that follows it."""
     shutil.copy(PARTS / f"{NAME}.py", package / "mpm/laws")
     insert(package / "mpm/formulas/laws.h", "// Who chooses", (PARTS / "laws.h").read_text())
-    insert(package / "core/types/matter.py", NEXT, f"    {NAME.upper()} = {len(Law)}\n")
+    insert(package / "core/types/material_field.py", NEXT, f"    {NAME.upper()} = {len(Law)}\n")
     insert(package / "materials/library.toml", "[gold]", (PARTS / "library.toml").read_text())
 
 

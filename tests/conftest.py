@@ -20,7 +20,7 @@ install_import_hook(
         "corporeal.core.types",
         "corporeal.mpm.problem",
         "corporeal.mpm.laws",
-        "corporeal.mpm.substance",
+        "corporeal.mpm.material_table",
         "corporeal.pipeline.stages",
         "corporeal.io",
         "corporeal.reconstruction.features",

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Gaussians
-from corporeal.geometry.harmonics import DC
+from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 
 SPACING = 0.014
 """Of Gaussians on their faces [m]."""
@@ -35,7 +35,9 @@ def box(sides, middle, colour):
         rotation=rotation.astype(np.float32),
         scale=np.tile(np.float32([0.6, 0.6, 0.1]) * np.float32(SPACING), (count, 1)),
         opacity=np.full(count, 0.98, np.float32),
-        sh=np.tile(((np.float32(colour) - np.float32(0.5)) / np.float32(DC)), (count, 1, 1)),
+        sh=np.tile(
+            ((np.float32(colour) - np.float32(0.5)) / np.float32(SH_DC_COEFFICIENT)), (count, 1, 1)
+        ),
     )
 
 

@@ -1,7 +1,7 @@
 """Outcomes and audits made by hand: what a test does not name is as in a run where all is well."""
 
-from corporeal.core.findings import ObjectOutcome, Outcome, PairOutcome, PartAudit, RunAudit
-from corporeal.core.types import NOTHING_ASKED
+from corporeal.core.audit_data import ObjectOutcome, Outcome, PairOutcome, PartAudit, RunAudit
+from corporeal.core.types import NO_USAGE
 
 
 def object_outcome(**what):
@@ -49,7 +49,7 @@ def run_audit(**what):
         "floor_penetration_m": 0.001, "pair_penetration_m": 0.002, "parts": (), "settling": None,
         "warnings": (), "outcome": outcome({}), "expectations": (),
         "seconds": {"simulate": 40.0, "total": 60.0}, "peak_memory_mb": 400.0,
-        "settings": {"detail": "draft"}, "questions": NOTHING_ASKED,
+        "settings": {"detail": "draft"}, "questions": NO_USAGE,
     }  # fmt: skip
     made = RunAudit(**said | what)
     return made.noting(made.warnings)

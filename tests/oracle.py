@@ -3,7 +3,7 @@
 import re
 from threading import Lock
 
-from corporeal.vlm import Reply, Spent, UnansweredError
+from corporeal.vlm import AnswerCost, Reply, UnansweredError
 
 SIMPLE = {"reason": "So it looks."}
 
@@ -108,7 +108,7 @@ class Oracle:
         complaints = check(said)
         if complaints:
             raise UnansweredError("; ".join(complaints))
-        return Reply(said, "model", "oracle:1", Spent(1, 1000, 100, 0.5))
+        return Reply(said, "model", "oracle:1", AnswerCost(1, 1000, 100, 0.5))
 
     def tasks(self):
         """What was asked, in order."""

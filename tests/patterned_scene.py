@@ -6,9 +6,9 @@ import numpy as np
 from PIL import Image
 
 from corporeal.core.types import Camera, Finish, Scene, SceneObject, Surface
-from corporeal.render.camera import Aim, camera_of
-from corporeal.render.embree import render
-from corporeal.render.stage import Light, Stage
+from corporeal.render.camera_placement import CameraAim, camera_from_aim
+from corporeal.render.embree import render_image
+from corporeal.render.ray_scene import RayScene, StudioLight
 
 OF_SLAB = 12
 """Triangles of the slab, which come first."""
@@ -77,7 +77,9 @@ def on_slab(block, seed=0, side=256):
 def ring(angles, size=(400, 300), height=0.35, away=0.5):
     """Aims from a circle [deg] above the slab, at the block."""
     return [
-        Aim((away * np.cos(a), away * np.sin(a), height), (0.0, 0.0, 0.04), 38.0, size[0], size[1])
+        CameraAim(
+            (away * np.cos(a), away * np.sin(a), height), (0.0, 0.0, 0.04), 38.0, size[0], size[1]
+        )
         for a in np.radians(angles)
     ]
 
@@ -85,11 +87,11 @@ def ring(angles, size=(400, 300), height=0.35, away=0.5):
 def photographs(folder: Path, aims, scene=None):
     """Write photographs into a folder, by number; return their cameras."""
     folder.mkdir(parents=True, exist_ok=True)
-    stage = Stage(scene or patterned(), Light(front=(0.0, -1.0, 0.5)))
+    stage = RayScene(scene or patterned(), StudioLight(front=(0.0, -1.0, 0.5)))
     for k, aim in enumerate(aims):
-        picture = Image.fromarray(render(stage, aim, "draft"))
+        picture = Image.fromarray(render_image(stage, aim, "draft"))
         picture.save(folder / f"photo_{k:03d}.jpg", quality=95)
-    return [camera_of(aim) for aim in aims]
+    return [camera_from_aim(aim) for aim in aims]
 
 
 def on_its_side(camera: Camera) -> Camera:

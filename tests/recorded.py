@@ -7,9 +7,9 @@ import pytest
 
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.materials.shipped import citation
+from corporeal.materials.shipped_libraries import citation
 from corporeal.pipeline.stages.describe import describe
-from corporeal.pipeline.stages.ground import UNFIT, ground
+from corporeal.pipeline.stages.ground import UNFIT_PREFIX, ground
 from corporeal.pipeline.stages.segment import segment
 
 FOLDER = Path(__file__).parent / "recordings"
@@ -102,11 +102,11 @@ def _check_placed(grounds, place):
     value = r.low * (r.high / r.low) ** f if wide else r.low + f * (r.high - r.low)
     assert grounds.value == pytest.approx(value, rel=1e-12)
     assert grounds.chosen_by == "recording"
-    assert grounds.reason.partition(f" {UNFIT}")[0] == place["reason"]
+    assert grounds.reason.partition(f" {UNFIT_PREFIX}")[0] == place["reason"]
 
 
 def _check_provenance(material):
-    measured = materials.find(material.name).ranges
+    measured = materials.find_material(material.name).ranges
     assert set(material.grounds) == set(measured)
     for name, grounds in material.grounds.items():
         assert getattr(material, name) == grounds.value

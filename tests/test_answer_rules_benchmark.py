@@ -5,7 +5,7 @@ import pytest
 from answer_rules import Drawn, Scored, each, scored, verdict
 from scipy.stats import norm, t
 
-from corporeal.core.types import Evidence
+from corporeal.core.types import MassEvidence
 
 NARROW = np.exp(1e-3 * norm.ppf((np.arange(100) + 0.5) / 100))
 """Draws of one answer [kg], about 1 kg."""
@@ -34,7 +34,7 @@ def test_answers_that_differ_are_as_wide_as_a_further_one_would_lie():
 
 
 def test_an_answer_that_contradicts_its_own_judgement_counts_less():
-    says = Evidence(0.9, 1.0, 1.1, "So it looks.")
+    says = MassEvidence(0.9, 1.0, 1.1, "So it looks.")
     one = drawn(1.0, 1.0, 9.0, own=(says, says, says))
     weights = one.weights(True, by_its_own=True)
     each = [weights[k::3].sum() for k in range(3)]

@@ -37,15 +37,15 @@ except SystemExit:
     [
         (
             HELP,
-            "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline.runner",
+            "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline.run_pipeline",
         ),
         # What a run of a model has imported when its first verb begins.
         (
-            "import corporeal.cli.validate, corporeal.pipeline.runner",
+            "import corporeal.cli.validate_settings, corporeal.pipeline.run_pipeline",
             "numba warp trimesh networkx matplotlib mujoco torch pydantic_ai embreex scipy.ndimage "
-            "corporeal.reconstruction.gaussians.train corporeal.pipeline.stages.reconstruct "
+            "corporeal.reconstruction.gaussians.train_gaussians corporeal.pipeline.stages.reconstruct "
             "corporeal.pipeline.stages.simulate "
-            "corporeal.pipeline.stages.film corporeal.pipeline.run_files corporeal.io.photographs",
+            "corporeal.pipeline.stages.video corporeal.pipeline.run_files corporeal.io.photos.posed_photos",
         ),
     ],
 )
@@ -132,13 +132,13 @@ def test_a_splat_is_not_loaded_but_reconstructed(tmp_path):
 
 
 def test_an_unknown_engine_is_refused_with_the_menu():
-    ready = co.prepare(co.build_scene(co.ball("steel", 0.05)))
+    ready = co.prepare_scene(co.build_scene(co.ball("steel", 0.05)))
     with pytest.raises(co.UserError, match=r"Unknown engine 'gpu'\. Choose one of: .*reference"):
         co.build_engine(co.pose_problem(ready), "gpu")
 
 
 def test_frames_without_a_folder_go_with_the_result():
-    played = co.play(co.build_scene(co.ball("steel", 0.05), duration=0.05, fps=20))
+    played = co.simulate_scene(co.build_scene(co.ball("steel", 0.05), duration=0.05, fps=20))
     folder = played.trajectory.folder
     assert len(played.trajectory.frames) == 2
     assert folder.exists()

@@ -10,9 +10,9 @@ from corporeal import cli
 from corporeal.core import store
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.core.version import __version__
-from corporeal.io.glb_writer import write_glb
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import Settings
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.render import figures
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -31,7 +31,7 @@ def a_box(size=0.1, substance="rubber", height=0.05, **said):
 @pytest.fixture
 def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(figures, "PANEL", (130, 98))
+    monkeypatch.setattr(figures, "PANEL_SIZE_PX", (130, 98))
     return command
 
 
@@ -63,9 +63,9 @@ def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
     assert "Young" in page
     assert json.loads((folder / "run.json").read_text())["state"] == "finished"
 
-    before = (folder / "8-simulate" / store.META).stat().st_mtime_ns
+    before = (folder / "8-simulate" / store.META_FILE).stat().st_mtime_ns
     assert typed("run", "box.glb", *SMALL)[0] == 0
-    assert (folder / "8-simulate" / store.META).stat().st_mtime_ns == before, "done twice"
+    assert (folder / "8-simulate" / store.META_FILE).stat().st_mtime_ns == before, "done twice"
 
     assert typed("film", "runs/box", "--width", "200", "--height", "150")[0] == 0
     assert not (folder / "report.html").exists(), "a stale report was left"
@@ -192,7 +192,7 @@ def test_materials_can_be_listed_and_shown(typed):
 
 
 def test_help_is_there_for_every_verb(typed):
-    for verb in cli.VERBS:
+    for verb in cli.COMMANDS:
         code, text = typed(verb, "--help")
         assert code == 0
         assert verb in text.out
@@ -216,7 +216,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
     nobody = ("--vlm", "openai:gpt-5.4")
     refused(typed("run", "box.glb", *nobody), "OPENAI_API_KEY")
     assert not (tmp_path / "runs").exists()
-    runner.run([tmp_path / "box.glb"], tmp_path / "box", Settings(), quietly, "ground")
+    run_pipeline.run([tmp_path / "box.glb"], tmp_path / "box", Settings(), quietly, "ground")
     before = (tmp_path / "box" / "run.json").read_bytes()
     wrong = [
         ("run", "box.glb", "--out", ".", *nobody),
@@ -230,7 +230,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
     for words in wrong:
         refused(typed(*words))
         assert (tmp_path / "box" / "run.json").read_bytes() == before, words
-    assert {row.state for row in runner.status(tmp_path / "box")[:4]} == {"finished"}
+    assert {row.state for row in run_pipeline.stage_states(tmp_path / "box")[:4]} == {"finished"}
     assert typed("ground", "box")[0] == 0
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from corporeal.pool.index import read_pool
-from corporeal.render.sheet import Tile, sheet
+from corporeal.pool.pool_index import read_pool
+from corporeal.render.contact_sheet import SheetTile, write_contact_sheet
 from pool_models import plain_ball
 
 
@@ -86,8 +86,8 @@ def test_an_empty_pool_says_where_the_reasons_are(typed, tmp_path):
 @pytest.mark.parametrize("count", [1, 2, 7])
 def test_a_sheet_has_a_place_for_every_tile(tmp_path, count):
     shades = np.linspace(10, 200, count).astype(np.uint8)
-    tiles = [Tile(np.full((40, 40, 3), c, np.uint8), "x" * 99, ("a",)) for c in shades]
-    sheet(tiles, tmp_path / "sheet.png", columns=3)
+    tiles = [SheetTile(np.full((40, 40, 3), c, np.uint8), "x" * 99, ("a",)) for c in shades]
+    write_contact_sheet(tiles, tmp_path / "sheet.png", columns=3)
     page = np.asarray(Image.open(tmp_path / "sheet.png"))
     down = 40 + 2 * 17 + 14 + 4
     middles = [page[14 + k // 3 * down + 20, 14 + k % 3 * 54 + 20, 0] for k in range(count)]

@@ -11,8 +11,8 @@ import pytest
 import tyro
 
 from corporeal import cli
-from corporeal.cli.help_layout import FIRST, lay_out, options_of
-from corporeal.pipeline.runner import Settings
+from corporeal.cli.help_layout import OPTIONS_BEFORE_MORE, lay_out, options_of
+from corporeal.pipeline.run_pipeline import Settings
 
 NEEDED = ("detail", "vlm", "annotations", "drop", "things", "out")
 
@@ -37,7 +37,7 @@ class Everything:
 
 def verbs_of(command):
     """Return every verb, with its second word where it has some, and its help."""
-    for verb in cli.VERBS:
+    for verb in cli.COMMANDS:
         code, said = command(verb, "--help")
         assert code == 0, said.err
         words = re.findall(rf"^  corporeal {verb} (\w+)", said.out, re.MULTILINE)
@@ -66,8 +66,8 @@ def test_no_verb_shows_more_than_six_options_before_the_others(command, monkeypa
     for words, said in seen.items():
         found = headings(said)
         before = [flag for flag, heading in found.items() if not heading.startswith("more")]
-        assert len(before) <= FIRST, words
-        assert len(before) == min(FIRST, len(found)), words
+        assert len(before) <= OPTIONS_BEFORE_MORE, words
+        assert len(before) == min(OPTIONS_BEFORE_MORE, len(found)), words
         assert list(found)[: len(before)] == before, words
 
 
@@ -166,7 +166,7 @@ HEAVY = (
     "embreex",
     "trimesh",
     "pydantic",
-    "corporeal.pipeline.runner",
+    "corporeal.pipeline.run_pipeline",
 )
 
 

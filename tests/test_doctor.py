@@ -15,7 +15,7 @@ from corporeal.cli import doctor
     ],
 )
 def test_one_core_is_no_cores_and_fewer_than_there_are_are_said(monkeypatch, used, there, said):
-    monkeypatch.setattr(doctor, "cores", lambda: used)
+    monkeypatch.setattr(doctor, "usable_cores", lambda: used)
     monkeypatch.setattr(doctor.os, "cpu_count", lambda: there)
-    (processor,) = (f for f in doctor.examine() if f.what == "processor")
+    (processor,) = (f for f in doctor.check_installation() if f.what == "processor")
     assert processor.found == said

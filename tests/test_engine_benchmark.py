@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 KEYS = {
@@ -45,7 +45,7 @@ def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
     assert all(row["ns_per_particle_substep"] > 0 for row in rows)
     kept = list(csv.DictReader((tmp_path / "history.csv").open(encoding="utf-8")))
     # A heap, the same on more threads, and a free flight are no rows of the first table.
-    more = 2 + sum(threads <= cores() for threads in (2, 4))
+    more = 2 + sum(threads <= usable_cores() for threads in (2, 4))
     assert len(kept) == len(rows) + more, "so are they in the history"
     assert kept[0]["ratio"] == "1.000"
     assert all(float(row["ratio"]) > 0 for row in kept)
@@ -58,7 +58,7 @@ def test_memory_is_counted_once(engine):
     from cost.contest import held
 
     class Window:
-        __module__ = "corporeal.mpm.cpu.window"
+        __module__ = "corporeal.mpm.cpu.field_window"
 
         def __init__(self):
             self.part = np.zeros(1000)

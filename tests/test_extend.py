@@ -43,10 +43,10 @@ def test_the_provider_answers_and_is_held_to_its_answers(tmp_path, monkeypatch):
     provider, connect, _ = blocks("python")
     (tmp_path / "my_provider.py").write_text(provider)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(vlm, "MENU", dict(vlm.MENU))
+    monkeypatch.setattr(vlm, "VLM_CLIENTS", dict(vlm.VLM_CLIENTS))
     made = {}
     exec(connect, made)
-    assert isinstance(made["model"], vlm.Vlm)
+    assert isinstance(made["model"], vlm.VlmClient)
     shape = pydantic.create_model("Size", largest_m=(float, ...))
     question = vlm.Question("size", "How large is it?", "a crate")
     reply = made["model"].ask(question, shape)

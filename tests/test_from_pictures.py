@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from corporeal.core import store
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.io.colmap import write_colmap
-from corporeal.io.transforms import write_views
-from corporeal.multiview.similarity import moved_cameras, similarity
+from corporeal.io.photos.colmap import write_colmap
+from corporeal.io.photos.transforms_json import write_views
+from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
-from corporeal.reconstruction.gaussians import train, training_schedule
+from corporeal.reconstruction.gaussians import train_gaussians, training_schedule
 from corporeal.render import figures
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0, 1)], float)
@@ -43,9 +43,11 @@ def views():
 @pytest.fixture
 def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(figures, "PANEL", (130, 98))
+    monkeypatch.setattr(figures, "PANEL_SIZE_PX", (130, 98))
     monkeypatch.setitem(
-        training_schedule.PRESETS, "draft", training_schedule.Preset(4000, 1, 300, 128)
+        training_schedule.TRAINING_PRESETS,
+        "draft",
+        training_schedule.TrainingPreset(4000, 1, 300, 128),
     )
     return command
 
@@ -58,7 +60,7 @@ def colmap(folder, views, matrix):
     for name, rgb, owner in zip(names, views.rgb, views.object_of_pixel, strict=True):
         Image.fromarray(rgb).save(folder / "images" / name)
         Image.fromarray(np.uint8(255) * (owner >= 0)).save(folder / "masks" / name)
-    write_colmap(folder / "sparse", moved_cameras(views.cameras, matrix), names)
+    write_colmap(folder / "sparse", apply_similarity_to_cameras(views.cameras, matrix), names)
     return folder
 
 
@@ -85,7 +87,7 @@ def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
 
 def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
     turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
-    moved = similarity(turn, 3.7, (5.0, -2.0, 1.0))
+    moved = similarity_matrix(turn, 3.7, (5.0, -2.0, 1.0))
     colmap(tmp_path / "scan", views, moved)
     words = ("--things", *NAMES, "--extent", "crate=0.3", *BRIEF)
     code, said = typed("run", "scan", *words, *SMALL)
@@ -103,8 +105,8 @@ def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
 def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch):
     """What comes of it to the last bit: see tests/reconstruct/gaussians/test_train.py."""
     write_views(tmp_path / "photos", views)
-    monkeypatch.setattr(train, "EVERY", 0.0)
-    steps, step = [], train._step
+    monkeypatch.setattr(train_gaussians, "CHECKPOINT_INTERVAL_S", 0.0)
+    steps, step = [], train_gaussians._step
 
     def stopping(training, *rest):
         steps.append(training.step)
@@ -112,7 +114,7 @@ def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch)
             raise KeyboardInterrupt
         return step(training, *rest)
 
-    monkeypatch.setattr(train, "_step", stopping)
+    monkeypatch.setattr(train_gaussians, "_step", stopping)
     words = ("run", "photos", "--things", *NAMES, *BRIEF, *SMALL)
     for _ in range(2):
         code, _ = typed(*words)

@@ -18,7 +18,7 @@ BY_FILE = "(c) Bo, CC-BY-SA-3.0"
 @pytest.fixture
 def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(figures, "PANEL", (130, 98))
+    monkeypatch.setattr(figures, "PANEL_SIZE_PX", (130, 98))
 
     def type_(*words):
         code, said = command(*words)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import life
 import pytest
 
-from corporeal.lab.evaluation.life import rebounds
+from corporeal.lab.evaluation.rebound_data import measured_rebounds
 
-ROWS = {row.name: row for row in rebounds()}
+ROWS = {row.name: row for row in measured_rebounds()}
 
 
 @pytest.mark.parametrize(
@@ -15,14 +15,14 @@ ROWS = {row.name: row for row in rebounds()}
 )
 def test_what_is_dropped_at_draft_comes_back_as_in_life(name):
     found = life.tried(ROWS[name], "draft", 0)
-    assert isinstance(found, life.Drop)
+    assert isinstance(found, life.DropResult)
     assert ROWS[name].off(found.restitution) <= life.LEEWAY
     assert abs(found.unbooked) < life.UNBOOKED
     assert (found.contact > 1e-3) == (found.treatment != "rigid")
 
 
 def a_drop(name, detail, restitution, unbooked=0.02):
-    return life.Drop(name, detail, 0, restitution, 3e-3, "deformable", 1.0, unbooked, 100)
+    return life.DropResult(name, detail, 0, restitution, 3e-3, "deformable", 1.0, unbooked, 100)
 
 
 def test_every_target_is_judged():

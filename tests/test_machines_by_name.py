@@ -11,11 +11,11 @@ from trimesh.creation import box
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from corporeal.discretization.scene_survey import examine
-from corporeal.materials import find
+from corporeal.discretization.scene_measures import measure_objects
+from corporeal.materials import find_material
 from corporeal.pipeline.in_memory import load_scene
 from corporeal.pipeline.stages.describe import describe
-from corporeal.pipeline.stages.fill import composed
+from corporeal.pipeline.stages.fill import part_models
 from corporeal.pipeline.stages.ground import ground
 from corporeal.pipeline.stages.segment import segment
 
@@ -94,8 +94,10 @@ def described(folder, name, parts, finishes=("material",)):
     scene = load_scene(path)
     inventory = describe(scene)
     found = segment(scene, inventory)
-    field, leaf = ground(scene, found, inventory), find("leaf_tissue")
-    makes = composed(scene, examine(scene, found, 0), field, leaf.pick(leaf.typical()), 0)
+    field, leaf = ground(scene, found, inventory), find_material("leaf_tissue")
+    makes = part_models(
+        scene, measure_objects(scene, found, 0), field, leaf.pick(leaf.typical()), 0
+    )
     return field.words, [makes[k].mass for k in range(len(found.catalogue))]
 
 

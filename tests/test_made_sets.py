@@ -10,8 +10,8 @@ from as_photographed import Look, Room, backdrop, degraded, photographed
 from grounds import GROUNDS
 from made_sets import sides_of, way_around, write_set
 
-from corporeal.io.colmap import read_colmap
-from corporeal.pipeline.stages.capture import pictures
+from corporeal.io.photos.colmap import read_colmap
+from corporeal.pipeline.stages.capture import render_views
 from patterned_scene import patterned
 
 SIDES = np.array([0.6, 0.6, 0.14])
@@ -25,7 +25,7 @@ def walked():
     plain = {"wall": False, "film": False, "zoomed": 1.0}
     asked = Namespace(pictures=8, rounds=[20.0, 45.0], size=[160, 120], **plain)
     low, high = np.array([-0.3, -0.3, -0.02]), np.array([0.3, 0.3, 0.12])
-    return pictures(patterned(), way_around(low, high, asked, np.random.default_rng(0)))
+    return render_views(patterned(), way_around(low, high, asked, np.random.default_rng(0)))
 
 
 def test_what_is_seen_is_as_large_as_the_thing(walked):

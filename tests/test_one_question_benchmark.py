@@ -6,8 +6,8 @@ import pytest
 from one_question import OneQuestion, ValuedAnswer
 
 from corporeal.vlm import Question
-from corporeal.vlm.answers import MaterialsAnswer, ValueAnswer
-from corporeal.vlm.by_hand import WaitingError
+from corporeal.vlm.answer_schemas import MaterialsAnswer, ValueAnswer
+from corporeal.vlm.human_client import PendingQuestionsError
 
 SAID = {
     "parts": [
@@ -35,7 +35,7 @@ Part cup, way 2:
 def asked(tmp_path):
     one = OneQuestion(str(tmp_path))
     question = Question("materials", "What is it made of?", "one/cup")
-    with pytest.raises(WaitingError):
+    with pytest.raises(PendingQuestionsError):
         one.ask(question, MaterialsAnswer)
     (page,) = (tmp_path / "questions").glob("*.json")
     assert "wall_mm" in page.with_suffix(".md").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ from own_props import PROPS, names, write
 from weighed import goods, vessels
 from weighed.piece import Prop, below, inset, swept, turned
 
-from corporeal.showcase import shape
+from corporeal.showcase import parametric_surfaces
 
 FACETS = 2e-3
 """How far a turned mesh of 96 sides may enclose less than the round body."""
@@ -111,5 +111,5 @@ def test_files_have_neutral_names_and_say_nothing_of_matter(tmp_path):
 
 def test_a_turned_mesh_encloses_what_its_profile_says():
     profile = np.array([[0.0, 0.0], [0.05, 0.0], [0.04, 0.1], [0.0, 0.1]])
-    mesh = shape.lathe(profile, 96)
+    mesh = parametric_surfaces.lathe_surface(profile, 96)
     assert goods.enclosed(mesh) == pytest.approx(turned(profile), rel=FACETS)

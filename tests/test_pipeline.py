@@ -6,12 +6,12 @@ import pytest
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
-from corporeal.core.types import Film, Inventory, ObjectWords
+from corporeal.core.types import Inventory, ObjectDescription, Video
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.pipeline import run_files, runner
-from corporeal.pipeline.runner import Settings, _Run, reopen, run
+from corporeal.pipeline import run_files, run_pipeline
+from corporeal.pipeline.run_pipeline import Settings, _Run, read_run_request, run
 from corporeal.pipeline.stages.fill import FillConfig
-from corporeal.recognition.typical_extents import doubt
+from corporeal.recognition.typical_extents import extent_warning
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from glb_maker import cube
 from handmade import plain, scene
@@ -27,7 +27,7 @@ def test_a_run_remembers_what_it_was_asked(tmp_path):
     )
     with pytest.raises(UserError):
         run([tmp_path / "nowhere.glb"], tmp_path / "run", wanted, silent)
-    asked = reopen(tmp_path / "run")
+    asked = read_run_request(tmp_path / "run")
     assert asked.inputs == [(tmp_path / "nowhere.glb").resolve()]
     assert asked.settings == wanted
 
@@ -44,22 +44,22 @@ def test_a_run_that_was_moved_finds_its_film(tmp_path):
     made = Path("runs/a/9-film")
     there = tmp_path / "moved"
     store.write_json(there / "run.json", {"state": "finished", "inputs": [], "settings": {}})
-    store.save(there / "9-film" / store.DATA, Film(made / "film.mp4", 30, 64, 64))
-    store.finish(there / "9-film", "key", None, 1.0)
-    assert runner.read_back(there).movie.path == there / "9-film" / "film.mp4"
+    store.save(there / "9-film" / store.DATA_FILE, Video(made / "film.mp4", 30, 64, 64))
+    store.finish_result(there / "9-film", "key", None, 1.0)
+    assert run_pipeline.read_run(there).movie.path == there / "9-film" / "film.mp4"
 
 
 def test_an_edited_annotation_makes_its_answers_stale(tmp_path):
     path = tmp_path / "said.yaml"
     path.write_text("a: steel")
-    before = runner.files_read(DescribeConfig(annotations=path))
+    before = run_pipeline.digests_of_named_files(DescribeConfig(annotations=path))
     path.write_text("a: glass")
-    assert runner.files_read(DescribeConfig(annotations=path)) != before
+    assert run_pipeline.digests_of_named_files(DescribeConfig(annotations=path)) != before
 
 
 def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do(tmp_path):
     def names(**config):
-        return runner.files_read(DescribeConfig(**config))
+        return run_pipeline.digests_of_named_files(DescribeConfig(**config))
 
     (tmp_path / "one.json").write_text("{}")
     written, read = names(record=tmp_path), names(vlm=f"replay:{tmp_path}")
@@ -71,9 +71,9 @@ def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do
 def test_other_weights_in_a_folder_make_what_they_saw_stale(tmp_path):
     (tmp_path / "model.safetensors").write_text("1")
     config = ReconstructConfig(semantic=f"clip:{tmp_path}")
-    before = runner.files_read(config)
+    before = run_pipeline.digests_of_named_files(config)
     (tmp_path / "model.safetensors").write_text("2")
-    assert before and runner.files_read(config) != before
+    assert before and run_pipeline.digests_of_named_files(config) != before
 
 
 def test_memory_is_counted_in_megabytes():
@@ -82,12 +82,12 @@ def test_memory_is_counted_in_megabytes():
 
 def test_a_size_that_a_model_has_judged_is_doubted_once():
     objects = [(name, [("mesh", plain(), {})]) for name in ("vase_0", "vase_01", "hut_0")]
-    table = [doubt(name, "vase", 9.0) for name, _ in objects]
+    table = [extent_warning(name, "vase", 9.0) for name, _ in objects]
     made = replace(scene(*objects), warnings=("vase_0 and hut_0 overlap at the start.", *table))
-    words = [ObjectWords(name, "", (), usual_extent=None) for name, _ in objects]
-    assert run_files.still_doubted(made, Inventory(tuple(words))) == made.warnings
+    words = [ObjectDescription(name, "", (), usual_extent=None) for name, _ in objects]
+    assert run_files.remaining_warnings(made, Inventory(tuple(words))) == made.warnings
     words[0] = replace(words[0], usual_extent=0.25)
-    assert run_files.still_doubted(made, Inventory(tuple(words))) == (
+    assert run_files.remaining_warnings(made, Inventory(tuple(words))) == (
         "vase_0 and hut_0 overlap at the start.",
         *table[1:],
     )
@@ -103,8 +103,8 @@ def building(monkeypatch, tmp_path):
         store.write_bytes(folder / f"{name}.glb", f"{name} as built".encode())
         return folder / f"{name}.glb"
 
-    monkeypatch.setenv(store.CACHE, str(tmp_path / "cache"))
-    monkeypatch.setattr(runner, "write_showcase", write)
+    monkeypatch.setenv(store.CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setattr(run_pipeline, "write_showcase", write)
     return tmp_path / "cache" / "scenes", built
 
 
@@ -113,12 +113,12 @@ def test_a_scene_of_our_own_is_built_once_for_each_state_of_the_code(
 ):
     kept, built = building
     for run_name in ("a", "b"):
-        path = runner.kept_showcase("duck-on-mud", tmp_path / run_name)
+        path = run_pipeline.write_cached_showcase("duck-on-mud", tmp_path / run_name)
         assert path.read_bytes() == b"duck-on-mud as built"
     assert built == ["duck-on-mud"]
-    runner.kept_showcase("duck-on-can", tmp_path / "a")
-    monkeypatch.setattr(store, "source", lambda: "edited")
-    runner.kept_showcase("duck-on-mud", tmp_path / "a")
+    run_pipeline.write_cached_showcase("duck-on-can", tmp_path / "a")
+    monkeypatch.setattr(store, "source_digest", lambda: "edited")
+    run_pipeline.write_cached_showcase("duck-on-mud", tmp_path / "a")
     assert built == ["duck-on-mud", "duck-on-can", "duck-on-mud"]
     # Of each scene only the newest is kept.
     assert len(list(kept.iterdir())) == 2
@@ -128,7 +128,7 @@ def test_a_scene_that_cannot_be_kept_is_built_each_time(building, tmp_path):
     kept, built = building
     kept.parent.write_text("in the way")
     for run_name in ("a", "b"):
-        assert runner.kept_showcase("duck-on-mud", tmp_path / run_name).exists()
+        assert run_pipeline.write_cached_showcase("duck-on-mud", tmp_path / run_name).exists()
     assert len(built) == 2
 
 

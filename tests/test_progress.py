@@ -8,14 +8,14 @@ import pytest
 from rich.console import Console
 
 from corporeal.core import terminal
-from corporeal.core.progress import within
-from corporeal.core.terminal import Doing, lasting, log_lines
+from corporeal.core.progress import subprogress
+from corporeal.core.terminal import StageProgress, duration_words, log_lines
 from corporeal.reconstruction.masks import grown_masks as module
 
 
 def test_a_part_is_told_as_of_the_whole():
     told = []
-    part = within(lambda *what: told.append(what), 0.5, 0.75, ", once more")
+    part = subprogress(lambda *what: told.append(what), 0.5, 0.75, ", once more")
     part(0.0, "growing")
     part(1.0, "drawing")
     assert told == [(0.5, "growing, once more"), (0.75, "drawing, once more")]
@@ -33,7 +33,7 @@ def test_a_part_is_told_as_of_the_whole():
     ],
 )
 def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, said):
-    verb = Doing("film", 0.0)
+    verb = StageProgress("film", 0.0)
     for fraction, when in told:
         verb.told(fraction, "drawing", when)
     assert verb.line(now) == said
@@ -43,7 +43,7 @@ def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, 
     ("seconds", "said"), [(1.4, "1 s"), (89.0, "89 s"), (90.0, "2 min"), (9000.0, "2.5 h")]
 )
 def test_times_are_said_as_people_say_them(seconds, said):
-    assert lasting(seconds) == said
+    assert duration_words(seconds) == said
 
 
 class Heard(io.StringIO):
@@ -124,11 +124,11 @@ def test_masks_that_are_grown_again_are_told_apart_and_never_go_back(monkeypatch
         grow(views, seeds, progress)
         return grown
 
-    monkeypatch.setattr(module, "grow", grow)
-    monkeypatch.setattr(module, "taken_in", taken_in)
-    monkeypatch.setattr(module, "incomplete", lambda grown: "a part")
-    monkeypatch.setattr(module, "doubt", lambda grown: None)
-    module._grown(None, None, alone=False, progress=lambda *what: told.append(what))  # type: ignore
+    monkeypatch.setattr(module, "grow_masks", grow)
+    monkeypatch.setattr(module, "merge_attachments", taken_in)
+    monkeypatch.setattr(module, "incompleteness_reason", lambda grown: "a part")
+    monkeypatch.setattr(module, "mask_doubt", lambda grown: None)
+    module._grow_and_describe(None, None, alone=False, progress=lambda *what: told.append(what))  # type: ignore
     fractions, words = zip(*told, strict=True)
-    assert (np.diff(fractions) >= 0).all() and fractions[-1] == module.THRICE
+    assert (np.diff(fractions) >= 0).all() and fractions[-1] == module.GROWN_THRICE_PROGRESS
     assert len(set(words)) == 3

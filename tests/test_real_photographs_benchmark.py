@@ -13,11 +13,11 @@ from PIL import Image
 
 from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.io.colmap import read_colmap, write_colmap
-from corporeal.multiview.similarity import moved_cameras, similarity
+from corporeal.io.photos.colmap import read_colmap, write_colmap
+from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
 from corporeal.reconstruction.gaussians import training_schedule
-from corporeal.render.embree import identify
-from corporeal.render.stage import Stage
+from corporeal.render.embree import identify_triangles
+from corporeal.render.ray_scene import RayScene
 from patterned_scene import OF_SLAB, patterned, photographs, ring
 
 COUNT = 16
@@ -31,18 +31,18 @@ def sets(tmp_path_factory):
     good, bad = folder / "block", folder / "broken"
     aims = ring(np.arange(COUNT) * 360 / COUNT, (160, 120), height=0.25, away=0.35)
     cameras = photographs(good / "images", aims)
-    stage = Stage(patterned())
+    stage = RayScene(patterned())
     for name in ("masks", "sparse/0"):
         (good / name).mkdir(parents=True)
     for k, aim in enumerate(aims):
-        mask = np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB)
+        mask = np.uint8(255) * (identify_triangles(stage, aim)[0] >= OF_SLAB)
         Image.fromarray(mask).save(good / "masks" / f"photo_{k:03d}.png")
     rng = np.random.default_rng(0)
     slab = np.concatenate([rng.uniform(-0.2, 0.2, (400, 2)), np.zeros((400, 1))], axis=1)
-    turn = similarity(np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]]), 2.0, (1.0, 2.0, 3.0))
+    turn = similarity_matrix(np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]]), 2.0, (1.0, 2.0, 3.0))
     names = tuple(f"photo_{k:03d}.jpg" for k in range(COUNT))
     seen = slab @ turn[:3, :3].T + turn[:3, 3], np.full((400, 3), 90, np.uint8)
-    write_colmap(good / "sparse" / "0", moved_cameras(cameras, turn), names, *seen)
+    write_colmap(good / "sparse" / "0", apply_similarity_to_cameras(cameras, turn), names, *seen)
     for name in ("images", "sparse/0"):
         (bad / name).mkdir(parents=True)
     (bad / "sparse" / "0" / "cameras.txt").write_text("nothing\n")
@@ -52,8 +52,8 @@ def sets(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_row_measures_what_is_known_and_is_kept(sets, tmp_path, monkeypatch):
-    small = training_schedule.Preset(3000, 1, 120, 160)
-    monkeypatch.setitem(training_schedule.PRESETS, "preview", small)
+    small = training_schedule.TrainingPreset(3000, 1, 120, 160)
+    monkeypatch.setitem(training_schedule.TRAINING_PRESETS, "preview", small)
     monkeypatch.setattr(measure, "known", lambda folder: FACTS)
     row = benchmark.row_of(sets / "block", "all", "preview", tmp_path)
     assert "why" not in row, row
@@ -79,9 +79,11 @@ def test_errors_of_poses_do_not_see_a_similarity_but_a_wrong_camera(sets, tmp_pa
     cameras = [given.lens(i) for i in given.images]
     poses = [i.world_from_camera.copy() for i in given.images]
     poses[3][:3, 3] += 0.5
-    way = similarity(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), 0.3, (4.0, 5.0, 6.0))
+    way = similarity_matrix(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), 0.3, (4.0, 5.0, 6.0))
     made = [Camera(s.K, w, s.width, s.height) for s, w in zip(cameras, poses, strict=True)]
-    write_colmap(tmp_path, moved_cameras(made, way), tuple(i.name for i in given.images))
+    write_colmap(
+        tmp_path, apply_similarity_to_cameras(made, way), tuple(i.name for i in given.images)
+    )
     found = measure.pose_errors(read_colmap(tmp_path), given)
     assert found.registered == COUNT and found.right == COUNT - 1
     assert found.angle < 1e-3 and found.place < 1e-4

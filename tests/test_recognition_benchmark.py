@@ -7,7 +7,12 @@ import pytest
 from recognition.facts import FACTS, SETS, facts, judge, read
 
 from corporeal import materials
-from corporeal.lab.evaluation.recognition import Row, bands, ordering, score
+from corporeal.lab.evaluation.material_evaluation import (
+    RecognitionRow,
+    margin_bands,
+    margin_roc_area,
+    recognition_score,
+)
 from recognition import page
 
 DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
@@ -25,38 +30,38 @@ def of(rows, group):
 
 def test_every_part_is_labelled_with_materials_of_the_library(rows):
     assert [len(of(rows, g)) for g in SETS] == [58, 21, 88, 95]
-    known = set(materials.substances())
+    known = set(materials.part_materials())
     assert all(r.accepted and set(r.accepted) <= known for r in rows)
 
 
 def test_a_wrong_answer_is_rare_and_unknown_is_normal(rows):
-    objects = score(of(rows, "objects"))
+    objects = recognition_score(of(rows, "objects"))
     assert objects.wrong <= 0.05
     assert objects.right >= 0.75
     assert objects.right + objects.wrong + objects.unknown == pytest.approx(1.0)
     for group in SETS:
-        assert score(of(rows, group)).wrong <= 0.15
-    assert score(of(rows, "unseen")).right >= 0.6
-    assert score(of(rows, "fresh")).right >= 0.4
+        assert recognition_score(of(rows, group)).wrong <= 0.15
+    assert recognition_score(of(rows, "unseen")).right >= 0.6
+    assert recognition_score(of(rows, "fresh")).right >= 0.4
 
 
 def test_the_margin_knows_right_from_wrong(rows):
-    assert ordering(rows) > 0.7
-    assert ordering(of(rows, "unseen")) > 0.8
-    shares = [band.right for band in bands(rows)]
+    assert margin_roc_area(rows) > 0.7
+    assert margin_roc_area(of(rows, "unseen")) > 0.8
+    shares = [band.right for band in margin_bands(rows)]
     assert shares[-1] > 0.9
     assert min(shares) == min(shares[:2]), "small margins are the doubtful ones"
 
 
 def test_the_order_is_measured_as_it_is_said():
     def row(answer, margin):
-        return Row("a", "b", answer, margin, ("steel",))
+        return RecognitionRow("a", "b", answer, margin, ("steel",))
 
     perfect = [row("steel", 0.8), row("steel", 0.7), row("wood", 0.3)]
-    assert ordering(perfect) == 1.0
-    assert ordering([*perfect, row("wood", 0.9)]) == 0.5
-    assert ordering([row("steel", 0.5), row("wood", 0.5)]) == 0.5
-    assert ordering([*perfect, row(None, 0.0)]) == 1.0, "unknown is no answer"
+    assert margin_roc_area(perfect) == 1.0
+    assert margin_roc_area([*perfect, row("wood", 0.9)]) == 0.5
+    assert margin_roc_area([row("steel", 0.5), row("wood", 0.5)]) == 0.5
+    assert margin_roc_area([*perfect, row(None, 0.0)]) == 1.0, "unknown is no answer"
 
 
 def test_the_page_says_what_was_measured():

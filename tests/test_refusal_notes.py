@@ -5,14 +5,14 @@ import pytest
 from PIL import Image
 
 from corporeal.cli import main
-from corporeal.core.errors import UserError, noticed
+from corporeal.core.errors import UserError, notes_on_error
 from corporeal.core.types import Gaussians
 from corporeal.pipeline.stages import reconstruct
-from corporeal.reconstruction import picture_intake
-from corporeal.reconstruction.gaussians.intake import Intake
-from corporeal.reconstruction.picture_intake import take_pictures
+from corporeal.reconstruction import gaussian_source
+from corporeal.reconstruction.gaussian_source import gaussians_from_source
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.sfm.pose import Posed
+from corporeal.reconstruction.sfm.find_poses import FoundPoses
 
 DOUBTED = "No masks were grown from what all photographs show: it reaches beyond."
 LEFT_OUT = "1 of 9 photographs do not fit the others and were left out: a.jpg."
@@ -45,27 +45,31 @@ def test_notes_follow_the_sentence_of_a_run_that_is_refused(tmp_path, monkeypatc
 
 
 def test_masks_that_are_refused_say_what_was_doubted_before(tmp_path, monkeypatch):
-    found = picture_intake._Masks(None, (), (DOUBTED,), incomplete="not all of it can be told")
-    monkeypatch.setattr(picture_intake, "_posed", lambda *_: Posed(tmp_path, (), (LEFT_OUT,)))
-    monkeypatch.setattr(picture_intake, "masks_for", lambda *_: found)
-    monkeypatch.setattr(picture_intake, "doubt_of_poses", lambda _: ())
+    found = gaussian_source._MasksFound(
+        None, (), (DOUBTED,), incomplete="not all of it can be told"
+    )
+    monkeypatch.setattr(
+        gaussian_source, "_find_source_poses", lambda *_: FoundPoses(tmp_path, (), (LEFT_OUT,))
+    )
+    monkeypatch.setattr(gaussian_source, "find_or_grow_masks", lambda *_: found)
+    monkeypatch.setattr(gaussian_source, "pose_warnings", lambda _: ())
     with pytest.raises(UserError, match="not all of it can be told") as refusal:
-        take_pictures(tmp_path, ReconstructConfig(), None, unheard)
+        gaussians_from_source(tmp_path, ReconstructConfig(), None, unheard)
     assert notes_of(refusal) == [LEFT_OUT, DOUBTED]
 
 
 def test_a_room_that_is_refused_says_why_masks_were_doubted(tmp_path, monkeypatch):
     none = np.zeros((0, 3))
     nothing = Gaussians(none, np.zeros((0, 4)), none, np.zeros(0), np.zeros((0, 1, 3)))
-    taken = Intake(nothing, warnings=(DOUBTED,))
-    room = Intake(nothing, masks=np.ones((4, 6, 8), bool))
-    monkeypatch.setattr(reconstruct, "turned_upright", lambda *_: room)
+    taken = GaussianScene(nothing, warnings=(DOUBTED,))
+    room = GaussianScene(nothing, masks=np.ones((4, 6, 8), bool))
+    monkeypatch.setattr(reconstruct, "turn_upright", lambda *_: room)
     with pytest.raises(UserError, match="go on beyond the pictures") as refusal:
-        reconstruct._upright(tmp_path, taken, ReconstructConfig(), None)
+        reconstruct._align_upright(tmp_path, taken, ReconstructConfig(), None)
     assert notes_of(refusal) == [DOUBTED]
 
 
 def test_nothing_is_added_to_mistakes_of_ours():
-    with pytest.raises(ZeroDivisionError) as mistake, noticed([DOUBTED]):
+    with pytest.raises(ZeroDivisionError) as mistake, notes_on_error([DOUBTED]):
         _ = 1 / 0
     assert not hasattr(mistake.value, "__notes__")

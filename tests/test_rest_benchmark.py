@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.io.glb_writer import write_glb
+from corporeal.io.gltf.glb_writer import write_glb
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
 

@@ -14,9 +14,9 @@ import pytest
 from corporeal.core import store
 from corporeal.core.errors import UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.io.glb_writer import write_glb
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import Settings
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import Settings
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -25,7 +25,7 @@ SIMULATE = """
 import sys
 from pathlib import Path
 from corporeal.simulation import checkpoint
-from corporeal.pipeline.runner import Settings, run
+from corporeal.pipeline.run_pipeline import Settings, run
 checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
 silent = lambda fraction, words: None
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
@@ -69,7 +69,7 @@ def ended(process: subprocess.Popen) -> None:
 
 def wait_for(process: subprocess.Popen, folder: Path, frame: int) -> None:
     """Wait until a frame is written; fails when the process ends first."""
-    file = folder / runner.FOLDERS["simulate"] / "frames" / f"{frame:05d}.npz"
+    file = folder / run_pipeline.STAGE_FOLDERS["simulate"] / "frames" / f"{frame:05d}.npz"
     patience = time.monotonic() + PATIENCE
     while not file.exists():
         assert process.poll() is None, process.communicate()[1]
@@ -86,7 +86,7 @@ def kill(process: subprocess.Popen) -> None:
 
 def told(folder: Path) -> dict[str, bytes]:
     """Every file of a simulation that follows from its inputs."""
-    simulated = folder / runner.FOLDERS["simulate"]
+    simulated = folder / run_pipeline.STAGE_FOLDERS["simulate"]
     names = [
         *sorted(simulated.glob("frames/*")),
         simulated / "ledger.npz",
@@ -109,7 +109,7 @@ def test_a_killed_run_ends_exactly_like_one_that_was_not_and_nobody_else_gets_in
 
     def here(folder):
         told = lambda verb: lambda fraction, said: words.append(said)  # noqa: E731
-        runner.run([scene], folder, Settings(), told, until="simulate")
+        run_pipeline.run([scene], folder, Settings(), told, until="simulate")
 
     broken = tmp_path / "broken"
     process = start(scene, broken)
@@ -128,7 +128,7 @@ def test_a_killed_run_ends_exactly_like_one_that_was_not_and_nobody_else_gets_in
 @pytest.mark.slow
 def test_three_kills_at_random_moments_change_nothing(tmp_path):
     scene, chance = a_scene(tmp_path / "two.glb", duration=0.3), random.Random(7)
-    runner.run([scene], tmp_path / "whole", until="simulate")
+    run_pipeline.run([scene], tmp_path / "whole", until="simulate")
     broken = tmp_path / "broken"
     for number in sorted(chance.sample(range(1, 16), 3)):
         process = start(scene, broken)
@@ -142,25 +142,25 @@ def test_three_kills_at_random_moments_change_nothing(tmp_path):
 def test_a_run_of_the_engine_that_was_called_warp_is_opened_and_not_done_again(tmp_path):
     scene, folder, said = a_scene(tmp_path / "two.glb", duration=0.05), tmp_path / "run", []
     quiet = lambda verb: lambda fraction, words: said.append(words)  # noqa: E731
-    runner.run([scene], folder, Settings(), quiet, until="simulate")
-    filled, simulated = (folder / runner.FOLDERS[verb] for verb in ("fill", "simulate"))
+    run_pipeline.run([scene], folder, Settings(), quiet, until="simulate")
+    filled, simulated = (folder / run_pipeline.STAGE_FOLDERS[verb] for verb in ("fill", "simulate"))
     former = {"engine": "warp", "contact": "multi"}
-    key = store.key("simulate", former, [store.read_json(filled / store.META)["key"]])
-    store.finish(simulated, key, former, 1.0)
-    declared = store.read_json(folder / runner.RUN)
+    key = store.result_key("simulate", former, [store.read_json(filled / store.META_FILE)["key"]])
+    store.finish_result(simulated, key, former, 1.0)
+    declared = store.read_json(folder / run_pipeline.RUN_FILE)
     declared["settings"]["simulate"] = former
-    store.write_json(folder / runner.RUN, declared)
-    asked = runner.reopen(folder)
+    store.write_json(folder / run_pipeline.RUN_FILE, declared)
+    asked = run_pipeline.read_run_request(folder)
     assert asked.settings.simulate.engine == "cpu"
     said.clear()
-    runner.run(asked.inputs, folder, asked.settings, quiet, until="simulate")
+    run_pipeline.run(asked.inputs, folder, asked.settings, quiet, until="simulate")
     assert not said, "what is done is not done again"
 
 
 def test_a_run_is_let_go_of_when_it_ends(tmp_path):
     for _ in range(2):
-        with store.alone(tmp_path), pytest.raises(UserError, match="works in"):
-            with store.alone(tmp_path):
+        with store.lock_folder(tmp_path), pytest.raises(UserError, match="works in"):
+            with store.lock_folder(tmp_path):
                 pass
 
 
@@ -168,7 +168,7 @@ def test_a_run_is_let_go_of_when_it_ends(tmp_path):
 def test_runs_that_start_at_once_on_an_empty_kernel_cache_leave_each_other_alone(tmp_path):
     scene = a_scene(tmp_path / "two.glb", duration=0.05)
     # What is simulated is the same for all; what they compile is the engine and all about it.
-    runner.run([scene], tmp_path / "killed", until="fill")
+    run_pipeline.run([scene], tmp_path / "killed", until="fill")
     for name in ("one", "two"):
         shutil.copytree(tmp_path / "killed", tmp_path / name)
     kernels = tmp_path / "kernels"

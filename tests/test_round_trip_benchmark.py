@@ -6,9 +6,9 @@ import trimesh
 import yaml
 from round_trip import ASIDE, Piece, _called, _merged, as_told, put_aside
 
-from corporeal.geometry.arrangement import boxes_of
-from corporeal.pipeline.results import Results
-from corporeal.pipeline.runner import Settings, opened
+from corporeal.geometry.scene_transforms import object_boxes
+from corporeal.pipeline.results import StageResults
+from corporeal.pipeline.run_pipeline import Settings, open_run
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
 
@@ -60,7 +60,7 @@ def drum(tmp_path):
 
 @pytest.mark.slow
 def test_a_wall_that_is_modelled_with_both_faces_is_told_as_a_wall(drum, tmp_path):
-    with opened([drum], tmp_path / "run", Settings(), lambda verb: _deaf, "ground") as done:
+    with open_run([drum], tmp_path / "run", Settings(), lambda verb: _deaf, "ground") as done:
         views = capture(done.made.scene, CaptureConfig(4, (48, 48), threads=1))
         told = yaml.safe_load(as_told(done.made, views, tmp_path / "told.yaml").read_text())
     (row,) = told.values()
@@ -74,10 +74,10 @@ def _deaf(fraction, words):
 
 def test_things_are_put_aside_by_a_hundredth_of_their_size(drum, tmp_path):
     scene = assemble([drum])
-    aside = assemble([put_aside(Results(assemble=scene), drum, tmp_path, seed=1)])
-    shift = boxes_of(aside)[0] - boxes_of(scene)[0]
+    aside = assemble([put_aside(StageResults(assemble=scene), drum, tmp_path, seed=1)])
+    shift = object_boxes(aside)[0] - object_boxes(scene)[0]
     assert np.linalg.norm(shift[0]) == pytest.approx(
-        ASIDE * np.ptp(boxes_of(scene)[0], axis=0).max()
+        ASIDE * np.ptp(object_boxes(scene)[0], axis=0).max()
     )
     np.testing.assert_allclose(shift[0], shift[1], atol=1e-9)
     assert shift[0, 2] == pytest.approx(0, abs=1e-9)  # what stands on the floor stays on it

@@ -6,14 +6,14 @@ from rich.console import Console
 from corporeal.cli import run_summary
 from corporeal.cli.run_summary import show_summary
 from corporeal.core import store
-from corporeal.core.findings import Breakage
+from corporeal.core.audit_data import PredictedBreakage
 from corporeal.core.types import Note, NoteKind
-from corporeal.simulation.audit_file import AUDIT
+from corporeal.simulation.audit_file import AUDIT_FILE
 from made_findings import run_audit
 
 
 def blow(word, ratio, pieces=0):
-    return Breakage("glass_0", "glass", "tile_0", 0.3, 3.1, 0.75, ratio, word, pieces)
+    return PredictedBreakage("glass_0", "glass", "tile_0", 0.3, 3.1, 0.75, ratio, word, pieces)
 
 
 @pytest.mark.parametrize(
@@ -27,7 +27,7 @@ def blow(word, ratio, pieces=0):
 )
 def test_what_would_break_is_said_where_the_film_shows_it_whole(tmp_path, capsys, found, told):
     """A glass that fell on a tile bounced, and only the report said that it would break."""
-    store.write_json(tmp_path / AUDIT, store.plain(run_audit(breakage=(found,))))
+    store.write_json(tmp_path / AUDIT_FILE, store.to_plain(run_audit(breakage=(found,))))
     show_summary(tmp_path)
     said = capsys.readouterr()
     text = said.out + said.err
@@ -40,7 +40,7 @@ def test_what_would_break_is_said_where_the_film_shows_it_whole(tmp_path, capsys
 )
 def test_warnings_that_are_left_out_are_counted_as_one_counts(tmp_path, capsys, count, told):
     warnings = tuple(f"Number {k}." for k in range(count))
-    store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings)))
+    store.write_json(tmp_path / AUDIT_FILE, store.to_plain(run_audit(warnings=warnings)))
     show_summary(tmp_path)
     said = capsys.readouterr()
     assert told in said.out + said.err
@@ -52,7 +52,9 @@ def test_what_a_run_says_last_is_in_order_of_weight(tmp_path, capsys):
         Note("Say more with --vlm.", NoteKind.ASSUMED),
         "It may be wrong.",
     )
-    store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings, hints=("Still.",))))
+    store.write_json(
+        tmp_path / AUDIT_FILE, store.to_plain(run_audit(warnings=warnings, hints=("Still.",)))
+    )
     show_summary(tmp_path)
     said = capsys.readouterr()
     assert (said.out + said.err).splitlines()[-4:] == [
@@ -67,7 +69,7 @@ def test_in_a_terminal_sentences_stand_beside_their_word(tmp_path, capsys, monke
     where = Console(stderr=True, force_terminal=True, width=40, color_system=None)
     monkeypatch.setattr(run_summary, "console", where)
     warnings = ("It may be wrong by a factor. Measure one of its sides by hand.",)
-    store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings)))
+    store.write_json(tmp_path / AUDIT_FILE, store.to_plain(run_audit(warnings=warnings)))
     show_summary(tmp_path)
     lines = [line.rstrip() for line in capsys.readouterr().err.splitlines()]
     begun = next(k for k, line in enumerate(lines) if line.startswith("warning: It may"))

@@ -5,7 +5,7 @@ import pytest
 from answer_rules import Drawn
 from shared_errors import SHARED, TOGETHER, ranked, weights
 
-from corporeal.core.types import Evidence, PrintedFact
+from corporeal.core.types import MassEvidence, PrintedFact
 
 RNG = np.random.default_rng(0)
 
@@ -13,7 +13,7 @@ RNG = np.random.default_rng(0)
 def bell(middle, spread, judged, printed=()):
     """Draws of a log-normal mass, whose ways are placed at its median, and one judgement."""
     masses = np.exp(np.log(middle) + spread * np.sort(RNG.normal(size=4000)))
-    said = Evidence(judged / 1.1, judged, judged * 1.1, "It looks so.", printed)
+    said = MassEvidence(judged / 1.1, judged, judged * 1.1, "It looks so.", printed)
     return Drawn(middle, masses, said, (), np.full(len(masses), middle))
 
 

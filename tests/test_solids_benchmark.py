@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.io.transforms import write_views
+from corporeal.io.photos.transforms_json import write_views
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
-from corporeal.reconstruction.gaussians import solid, training_schedule
+from corporeal.reconstruction.gaussians import training_schedule
+from corporeal.reconstruction.surface import closed_surface
 
 
 @pytest.fixture
@@ -41,8 +42,8 @@ def bench(monkeypatch):
     monkeypatch.setattr(solids, "POINTS", 2_000)
     monkeypatch.setattr(solids, "CLAD", 4_000)
     monkeypatch.setattr(solids, "CORES", 1)
-    monkeypatch.setattr(solid, "CELLS", 60_000)
-    monkeypatch.setattr(solid, "ROUGH", 20_000)
+    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 60_000)
+    monkeypatch.setattr(closed_surface, "SURVEY_GRID_CELLS", 20_000)
     return solids
 
 
@@ -78,8 +79,8 @@ def scene_of(folder):
 
 @pytest.mark.slow
 def test_pictures_of_a_crate_become_the_crate(bench, scene, tmp_path, monkeypatch):
-    small = replace(training_schedule.PRESETS["draft"], gaussians=6000, steps=500)
-    monkeypatch.setitem(training_schedule.PRESETS, "draft", small)
+    small = replace(training_schedule.TRAINING_PRESETS["draft"], gaussians=6000, steps=500)
+    monkeypatch.setitem(training_schedule.TRAINING_PRESETS, "draft", small)
     found = row(bench.judged(scene, "draft", tmp_path)[0])
     assert found["closed"] and abs(found["volume"]) < 0.1
     assert max(found["apart"]) < 1.0 and found["overlap"] > 0.85

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal.io.transforms import write_views
+from corporeal.io.photos.transforms_json import write_views
 
 HERE = Path(__file__).parent
 ROW = {"scene", "preset", "masked", "views", "size", "psnr", "psnr_things", "ssim", "deep", "near",
@@ -21,8 +21,8 @@ def bench(monkeypatch):
     monkeypatch.delitem(sys.modules, "splats", raising=False)
     import splats
 
-    small = replace(splats.PRESETS["draft"], gaussians=200, steps=15)
-    monkeypatch.setitem(splats.PRESETS, "draft", small)
+    small = replace(splats.TRAINING_PRESETS["draft"], gaussians=200, steps=15)
+    monkeypatch.setitem(splats.TRAINING_PRESETS, "draft", small)
     monkeypatch.setattr(splats, "LARGE", (500, 64))
     yield splats
     sys.modules.pop("splats", None)

@@ -16,8 +16,8 @@ from corporeal.core.types import (
     Hypothesis,
     Law,
     Material,
-    PartWords,
-    Range,
+    MeasuredRange,
+    PartDescription,
     Scene,
     SceneObject,
     Structure,
@@ -51,7 +51,7 @@ def test_enums_nothing_and_infinity_come_back(tmp_path):
 def test_what_is_filled_comes_back_with_its_contents(tmp_path):
     syrup = Material("syrup", Law.NEO_HOOKEAN, 1e4, 0.49, 1330.0)
     made = Structure("filled", 4e-4, "said", contents=syrup, fill=0.9)
-    words = PartWords(
+    words = PartDescription(
         "jar", "glass", "filled", contents="syrup", hypotheses=(Hypothesis("PET", "filled", 0.25),)
     )
     store.save(tmp_path / "x.npz", {"made": made, "words": words})
@@ -68,9 +68,11 @@ def test_what_was_kept_before_a_type_grew_is_still_read(tmp_path, monkeypatch):
         return tree
 
     monkeypatch.setattr(store, "_encode", older)
-    store.save(tmp_path / "x.npz", {"made": Structure("shell", 1e-3), "words": PartWords("a", "b")})
+    store.save(
+        tmp_path / "x.npz", {"made": Structure("shell", 1e-3), "words": PartDescription("a", "b")}
+    )
     again = store.load(tmp_path / "x.npz")
-    assert again == {"made": Structure("shell", 1e-3), "words": PartWords("a", "b")}
+    assert again == {"made": Structure("shell", 1e-3), "words": PartDescription("a", "b")}
 
 
 def test_json_never_contains_nan(tmp_path):
@@ -87,13 +89,13 @@ def test_a_damaged_result_is_named_in_one_sentence(tmp_path):
 
 
 def test_a_folder_is_finished_only_once_it_says_so(tmp_path):
-    name = store.key("fill", {"detail": "draft"}, ["abc"])
-    store.begin(tmp_path)
-    store.save(tmp_path / store.DATA, a_scene())
-    assert not store.fresh(tmp_path, name)
-    store.finish(tmp_path, name, {"detail": "draft"}, 1.0)
-    assert store.fresh(tmp_path, name)
-    assert not store.fresh(tmp_path, store.key("fill", {"detail": "fine"}, ["abc"]))
+    name = store.result_key("fill", {"detail": "draft"}, ["abc"])
+    store.begin_result(tmp_path)
+    store.save(tmp_path / store.DATA_FILE, a_scene())
+    assert not store.is_fresh(tmp_path, name)
+    store.finish_result(tmp_path, name, {"detail": "draft"}, 1.0)
+    assert store.is_fresh(tmp_path, name)
+    assert not store.is_fresh(tmp_path, store.result_key("fill", {"detail": "fine"}, ["abc"]))
 
 
 def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkeypatch):
@@ -109,26 +111,29 @@ def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkey
 def test_a_file_in_the_way_of_a_folder_is_one_clear_error(tmp_path):
     (tmp_path / "runs").write_text("")
     for folder in (tmp_path / "runs", tmp_path / "runs" / "scene"):
-        with pytest.raises(store.DiskError, match="a file is in its way"), store.alone(folder):
+        with (
+            pytest.raises(store.DiskError, match="a file is in its way"),
+            store.lock_folder(folder),
+        ):
             pass
     nowhere = Path("/proc/nowhere")
-    with pytest.raises(store.DiskError, match="no folder can be made"), store.alone(nowhere):
+    with pytest.raises(store.DiskError, match="no folder can be made"), store.lock_folder(nowhere):
         pass
 
 
 def test_a_range_knows_what_it_contains():
-    assert 2.0 in Range(1.0, 2.0, 3.0, "book")
-    assert 4.0 not in Range(1.0, 2.0, 3.0, "book")
+    assert 2.0 in MeasuredRange(1.0, 2.0, 3.0, "book")
+    assert 4.0 not in MeasuredRange(1.0, 2.0, 3.0, "book")
 
 
 def test_who_has_patience_waits_until_a_folder_is_let_go_of(tmp_path):
     with ExitStack() as held:
-        held.enter_context(store.alone(tmp_path))
-        with pytest.raises(UserError, match="works in"), store.alone(tmp_path, 0.1):
+        held.enter_context(store.lock_folder(tmp_path))
+        with pytest.raises(UserError, match="works in"), store.lock_folder(tmp_path, 0.1):
             pass
         threading.Timer(0.2, held.pop_all().close).start()
         start = time.monotonic()
-        with store.alone(tmp_path, 20.0):
+        with store.lock_folder(tmp_path, 20.0):
             assert 0.1 < time.monotonic() - start < 10.0
 
 
@@ -140,14 +145,14 @@ class OfOld:
 
 @dataclass(frozen=True)
 class OfToday(OfOld):
-    turned: float = field(default=0.0, metadata=store.LATER)
+    turned: float = field(default=0.0, metadata=store.ADDED_LATER)
 
 
 def test_a_setting_that_was_added_renames_nothing_until_it_is_used():
-    before = store.key("stage", OfOld(), ["a"])
-    assert store.key("stage", OfToday(), ["a"]) == before
-    assert store.key("stage", OfToday(turned=0.5), ["a"]) != before
-    assert store.key("stage", {"stage": OfToday()}, []) == store.key(
+    before = store.result_key("stage", OfOld(), ["a"])
+    assert store.result_key("stage", OfToday(), ["a"]) == before
+    assert store.result_key("stage", OfToday(turned=0.5), ["a"]) != before
+    assert store.result_key("stage", {"stage": OfToday()}, []) == store.result_key(
         "stage", {"stage": OfOld()}, []
     )
-    assert store.key("stage", OfToday(size=4), ["a"]) != before
+    assert store.result_key("stage", OfToday(size=4), ["a"]) != before

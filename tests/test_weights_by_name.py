@@ -5,7 +5,7 @@ from names import weigh
 from trimesh.creation import icosphere, revolve
 
 from corporeal import materials
-from corporeal.recognition.named_weights import fitting, materials_of_ways
+from corporeal.recognition.construction_from_mass import best_mass_fit, construction_materials
 
 
 def bell():
@@ -50,11 +50,11 @@ def test_a_substance_in_the_name_is_kept(tmp_path):
 
 
 def test_the_commoner_way_is_taken_where_it_fits():
-    assert fitting([11.0, 10.0], 10.0) == 0
-    assert fitting([13.0, 10.5], 10.0) == 1
-    assert fitting([30.0, 14.0], 10.0) == 1
-    assert fitting([30.0, 20.0], 10.0) == 0
+    assert best_mass_fit([11.0, 10.0], 10.0) == 0
+    assert best_mass_fit([13.0, 10.5], 10.0) == 1
+    assert best_mass_fit([30.0, 14.0], 10.0) == 1
+    assert best_mass_fit([30.0, 20.0], 10.0) == 0
 
 
 def test_ways_are_of_what_the_library_has():
-    assert materials_of_ways() <= set(materials.library())
+    assert construction_materials() <= set(materials.library())

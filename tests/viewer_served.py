@@ -14,10 +14,10 @@ pytest.importorskip("starlette", reason="the extra `viewer` is not installed")
 import uvicorn
 
 import corporeal as co
-from corporeal.io.glb_writer import write_glb
-from corporeal.pipeline.runner import Settings, run
-from corporeal.viewer.guard import Door
-from corporeal.viewer.serve import Address, listening
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.pipeline.run_pipeline import Settings, run
+from corporeal.viewer.access import AccessPolicy
+from corporeal.viewer.server import ListenAddress, open_listener
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Server:
 
 @contextmanager
 def serving(app):
-    listener = listening(Address("127.0.0.1", 0))
+    listener = open_listener(ListenAddress("127.0.0.1", 0))
     settings = uvicorn.Config(app, log_level="error", timeout_graceful_shutdown=1, ws_max_size=4096)
     server = uvicorn.Server(settings)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
@@ -78,4 +78,4 @@ def a_run(folder, name="drop", until="simulate", duration=0.2):
     return run([path], folder / "runs" / name, settings, until=until)
 
 
-LOCAL = Door()
+LOCAL = AccessPolicy()

@@ -12,13 +12,13 @@ import numpy as np
 import warp as wp
 
 from corporeal.core.types import Law
-from corporeal.mpm.laws import MENU
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from cost.blocks import Drop
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-NAMES = {law: rule.name for law, rule in MENU.items()}
+NAMES = {law: rule.name for law, rule in CONSTITUTIVE_LAWS.items()}
 BLUE, GREY, RED = "#2b6cb0", "#718096", "#c53030"
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from corporeal.mpm.constants import KEPT_STEPS
+from corporeal.mpm.constants import NORMAL_CACHE_STEPS
 from corporeal.mpm.cpu.phase_clock import PhaseClock
 from cost.blocks import Drop
 from cost.contest import ROUNDS, Ours
@@ -46,7 +46,7 @@ def table(drops: Sequence[Drop], substeps: int) -> str:
         substeps: Of one batch, at least: whole rounds of those of which one looks at all contacts.
 
     """
-    substeps = -(-substeps // KEPT_STEPS) * KEPT_STEPS
+    substeps = -(-substeps // NORMAL_CACHE_STEPS) * NORMAL_CACHE_STEPS
     watched = [Watched(drop) for drop in drops]
     for one in watched:
         one.ours.batch(substeps)

@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from corporeal.core.types import ROUNDING, Law
-from corporeal.discretization.roundness import reach_of, surrounded
+from corporeal.core.types import CURVATURE_COLUMNS, Law
+from corporeal.discretization.surface_curvature import is_surrounded, point_reach
 from corporeal.mpm.problem import Body, Plane, Problem
 
 Points = Float[np.ndarray, "N 3"]
@@ -262,14 +262,14 @@ def round_rows(
     normal: Points, along: Points, ball: float, arc: float, surface: Points
 ) -> Float[np.ndarray, "N 12"]:
     """Say how a surface curves at points on it: see ``types.ROUNDING``."""
-    rows = np.zeros((len(surface), ROUNDING))
+    rows = np.zeros((len(surface), CURVATURE_COLUMNS))
     rows[:, :3], rows[:, 3:6], rows[:, 6:8], rows[:, 8] = (
         normal,
         along,
         (ball, arc),
-        reach_of(surface),
+        point_reach(surface),
     )
-    rows[:, 9] = surrounded(rows, surface)
+    rows[:, 9] = is_surrounded(rows, surface)
     rows[:, 10] = 1.0 / (ball + arc)
     rows[:, 11] = 1.0 / ball if ball > 0.0 else 0.0
     return rows

@@ -115,12 +115,14 @@ def crowded_node(bodies: int, trials: int, sweeps: int = SWEEPS) -> NodeSolve:
     return NodeSolve(float(momentum.max()), float(kinetic.max()), float(residual.mean()))
 
 
-def _all_pairs(bodies: int, rng: np.random.Generator) -> contact_impulses.Contacts:
+def _all_pairs(bodies: int, rng: np.random.Generator) -> contact_impulses.ContactList:
     a, c = np.triu_indices(bodies, 1)
     n = len(a)
     own = contact.unit(rng.standard_normal((bodies, 3)))
     normal = contact.unit(own[a] - own[c])
-    return contact_impulses.Contacts(a, c, np.zeros((n, 3)), normal, np.zeros(n), np.full(n, 0.3))
+    return contact_impulses.ContactList(
+        a, c, np.zeros((n, 3)), normal, np.zeros(n), np.full(n, 0.3)
+    )
 
 
 def node_of_many_bodies(quick: bool = False) -> Outcome:

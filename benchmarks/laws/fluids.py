@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from corporeal.core.types import Law
 from corporeal.mpm.constants import COURANT
-from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
+from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_moduli
 from corporeal.mpm.problem import Engine, Plane, Problem
 from laws.bodies import G, Stuff, body, floor, problem, walls
 from laws.watching import started
@@ -80,7 +80,7 @@ class Tank:
         axes = [(np.arange(round(s / h)) + 0.5) * s / round(s / h) for s in size]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         given = self.liquid
-        young, poisson = elastic_numbers(bulk_modulus(given.density, self.speed))
+        young, poisson = elastic_moduli(bulk_modulus(given.density, self.speed))
         stuff = Stuff(
             law=Law.FLUID,
             young=young,

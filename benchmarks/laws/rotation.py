@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Law
-from corporeal.mpm.laws import MENU, flow, tau
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS, flow, tau
+from corporeal.mpm.laws.constitutive_law import YieldParameters, lame_parameters
 from corporeal.mpm.laws.drucker_prager import cone_slope
-from corporeal.mpm.laws.law import Numbers, lame
 from corporeal.mpm.reference.engine import ReferenceEngine
 from laws.bodies import Stuff, box, problem
 from laws.outcome import Check, Outcome, absolute
@@ -33,8 +33,8 @@ def turned_at_once(law: Law, count: int = 1000) -> Turned:
     """Turn undeformed matter by random rotations and let it flow, in double precision."""
     F = Rotation.random(count, random_state=0).as_matrix()
     one, none, numbers = np.ones(count), np.zeros(count), np.full(count, law.value)
-    mu, lam = (np.asarray(value) for value in lame(one, 0.3 * one))
-    weak = Numbers(
+    mu, lam = (np.asarray(value) for value in lame_parameters(one, 0.3 * one))
+    weak = YieldParameters(
         mu=mu,
         lam=lam,
         yield_stress=1e-9 * one,
@@ -58,7 +58,7 @@ def turning_body(law: Law, build, time: float) -> Turned:
     run.advance(time)
     F = run.snapshot().deformation
     count = np.ones(len(F))
-    mu, lam = (np.asarray(value) for value in lame(1e5 * count, 0.3 * count))
+    mu, lam = (np.asarray(value) for value in lame_parameters(1e5 * count, 0.3 * count))
     stress = tau(np.full(len(F), law.value), F, mu, lam)
     stretch = np.linalg.svd(F, compute_uv=False)
     return Turned(float(np.abs(stress).max() / 1e5), float(np.abs(stretch - 1).max()))
@@ -68,12 +68,12 @@ def rotating_body(quick: bool = False) -> Outcome:
     """Case 17: a rotation causes no stress, whatever the law."""
     checks: list[Check] = []
     time = 0.12 if quick else 0.3
-    for law in MENU:
+    for law in CONSTITUTIVE_LAWS:
         name = law.name.lower().replace("_", "-")
         checks.append(
             absolute(f"τ/E after any rotation, {name}", turned_at_once(law).stress, 0.0, 1e-6)
         )
-    for law in tuple(MENU)[1:2] if quick else MENU:
+    for law in tuple(CONSTITUTIVE_LAWS)[1:2] if quick else CONSTITUTIVE_LAWS:
         name = law.name.lower().replace("_", "-")
         found = turning_body(law, ReferenceEngine, time)
         checks.append(absolute(f"τ/E of a spinning block, {name}", found.stress, 0.0, 1e-6))

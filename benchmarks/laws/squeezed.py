@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from corporeal.mpm.physics.backing import is_quick
+from corporeal.mpm.physics.impact_support import responds_within_impact
 
 STEPS = 20
 """Steps in one radian of the quickest vibration."""
@@ -93,7 +93,9 @@ def held_alone(case: Case) -> tuple[float, float]:
 
 def by_rule(case: Case) -> tuple[float, float]:
     """Do as the engines do: hold it where it swings quickly, else in rounds."""
-    return (held if is_quick(case.stiffness, case.mass, 1.0, 0.0) else in_rounds)(case)
+    return (held if responds_within_impact(case.stiffness, case.mass, 1.0, 0.0) else in_rounds)(
+        case
+    )
 
 
 RULES = {

@@ -3,7 +3,7 @@
 import numpy as np
 
 import corporeal as co
-from corporeal.core.findings import PairSurfaces
+from corporeal.core.audit_data import SurfacePairCheck
 from corporeal.mpm.problem import Problem
 from corporeal.simulation.mesh_gaps import surface_pairs
 from laws.bodies import DOWN, Stuff, ball, ball_surface, body, box, box_surface, floor, problem
@@ -110,15 +110,15 @@ def marble_at_rest(quick: bool = False) -> Outcome:
 # ---------------------------------------------------------------- case 20
 
 
-def ball_on_plate(speed: float) -> PairSurfaces:
+def ball_on_plate(speed: float) -> SurfacePairCheck:
     """Shoot a 40 mm steel ball at a free 1 mm steel plate; what their meshes say."""
     plate = co.box("steel", size=(0.3, 0.3, 0.001), at=(0, 0, 0.3), name="plate")
     shot = co.ball("steel", 0.02, at=(0.013, 0.007, 0.35), velocity=(0, 0, -speed), name="ball")
     return _pair(min(0.04, 1.0 / speed), plate, shot)
 
 
-def _pair(duration: float, *solids: co.Solid) -> PairSurfaces:
-    played = co.play(co.build_scene(*solids, duration=duration))
+def _pair(duration: float, *solids: co.Solid) -> SurfacePairCheck:
+    played = co.simulate_scene(co.build_scene(*solids, duration=duration))
     ready = played.prepared
     (pair,) = surface_pairs(ready.scene, ready.particles, played.trajectory)
     return pair

@@ -6,7 +6,7 @@ from math import pi, sqrt
 import numpy as np
 
 from corporeal.core.types import Law
-from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
+from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_moduli
 from corporeal.mpm.problem import Engine, Problem, WettedSurface
 from laws.bodies import G, Stuff, body, floor, problem
 
@@ -56,7 +56,7 @@ class Tumbler:
         )
         levels = _between(self.base, self.base + self.level, h)
         poured = np.concatenate([_disc(inner, z, h) for z in levels])
-        young, poisson = elastic_numbers(bulk_modulus(WATER, sqrt(2 * G * self.level)))
+        young, poisson = elastic_moduli(bulk_modulus(WATER, sqrt(2 * G * self.level)))
         stuff = Stuff(
             Law.FLUID, young, poisson, WATER, yield_stress=0.0, consistency=1e-3, flow_index=1.0
         )

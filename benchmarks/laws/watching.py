@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.problem import Engine, Measure, Problem
+from corporeal.mpm.problem import Diagnostics, Engine, Problem
 from laws.asked import production
 
 
@@ -15,7 +15,7 @@ class History:
     """Measures at increasing times; T times, B bodies."""
 
     run: Engine
-    measures: list[Measure]
+    measures: list[Diagnostics]
 
     def all(self, name: str) -> np.ndarray:
         """One field of every measure, stacked."""

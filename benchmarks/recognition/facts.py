@@ -9,10 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from corporeal.core.types import Finish, Part, Scene, SceneObject, Surface
-from corporeal.lab.evaluation.recognition import Row
+from corporeal.lab.evaluation.material_evaluation import RecognitionRow
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
-from corporeal.recognition.identity import Identity, identify, words
-from corporeal.recognition.metadata import Evidence, evidence, matter_hint, recognise
+from corporeal.recognition.metadata_recognition import (
+    FileEvidence,
+    gather_file_evidence,
+    recognise_part,
+    substance_hint,
+)
+from corporeal.recognition.parts_by_name import PartsByName, identify_parts, name_words
 
 HERE = Path(__file__).parent
 FACTS = HERE / "facts.json"
@@ -37,7 +42,7 @@ class Fact:
     """Which of ``SETS``."""
     file: str
     part: str
-    evidence: Evidence
+    evidence: FileEvidence
     accepted: tuple[str, ...]
     """Materials, the likeliest first."""
 
@@ -53,19 +58,19 @@ def facts(named: bool = True) -> list[Fact]:
     found = []
     for row in json.loads(FACTS.read_text(encoding="utf-8")):
         scene, identity = _scene(row, named)
-        for part, seen in zip(row["parts"], evidence(scene, identity), strict=True):
+        for part, seen in zip(row["parts"], gather_file_evidence(scene, identity), strict=True):
             accepted = tuple(truth[row["set"]][row["file"]][part["part"]])
             found.append(Fact(row["set"], row["file"], part["part"], seen, accepted))
     return found
 
 
-def judge(recorded: Sequence[Fact]) -> list[Row]:
+def judge(recorded: Sequence[Fact]) -> list[RecognitionRow]:
     """Ask the recogniser about every part."""
     rows = []
     for fact in recorded:
-        said = recognise(fact.evidence)
+        said = recognise_part(fact.evidence)
         answer = (said.material, said.margin, fact.accepted, said.reason)
-        rows.append(Row(fact.file, fact.part, *answer, group=fact.group))
+        rows.append(RecognitionRow(fact.file, fact.part, *answer, group=fact.group))
     return rows
 
 
@@ -80,7 +85,7 @@ def record(folder: Path) -> list[dict]:
 def read(group: str, path: Path) -> dict:
     """Return what one file says of its parts."""
     scene = assemble([path], AssembleConfig(objects="one"))
-    identity = identify(scene, matter_hint)
+    identity = identify_parts(scene, substance_hint)
     parts = []
     for number, part in enumerate(identity.catalogue):
         mine = [scene.surfaces[k] for k in identity.surfaces(number)]
@@ -100,10 +105,10 @@ def _look(finish: Finish) -> dict:
     return said | rounded | {"colour": colour, "textured": finish.texture is not None}
 
 
-def _scene(row: dict, named: bool) -> tuple[Scene, Identity]:
+def _scene(row: dict, named: bool) -> tuple[Scene, PartsByName]:
     """Make a scene that has the names and looks, and no shapes."""
     stem = row["file"]
-    name, kind = row.get("name", stem), row.get("class", " ".join(words(stem)))
+    name, kind = row.get("name", stem), row.get("class", " ".join(name_words(stem)))
     thing = SceneObject(name, kind, real_extent=1.0, source=f"{stem}.glb") if named else ANYTHING
     surfaces, finishes, owner = [], [], []
     for number, part in enumerate(row["parts"]):
@@ -113,7 +118,7 @@ def _scene(row: dict, named: bool) -> tuple[Scene, Identity]:
         finishes += [_finish(said) for said in part["finishes"]]
     catalogue = tuple(Part(part["part"], 0, "recorded") for part in row["parts"])
     scene = Scene(stem, stem, (thing,), tuple(surfaces), tuple(finishes))
-    return scene, Identity(catalogue, np.array(owner))
+    return scene, PartsByName(catalogue, np.array(owner))
 
 
 def _finish(said: dict) -> Finish:

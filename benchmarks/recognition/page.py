@@ -2,7 +2,11 @@
 
 from collections.abc import Sequence
 
-from corporeal.lab.evaluation.recognition import Row, bands, score
+from corporeal.lab.evaluation.material_evaluation import (
+    RecognitionRow,
+    margin_bands,
+    recognition_score,
+)
 from recognition.facts import SETS, facts, judge
 
 HEAD = """# Recognition without a model
@@ -103,18 +107,18 @@ def markdown() -> str:
     return "\n".join([*lines, ""])
 
 
-def _line(about: str, rows: Sequence[Row]) -> str:
-    s = score(rows)
+def _line(about: str, rows: Sequence[RecognitionRow]) -> str:
+    s = recognition_score(rows)
     told = "–" if s.ordering is None else f"{s.ordering:.2f}"
     shares = (s.right, s.likeliest, s.wrong, s.unknown)
     return f"| {about} | {s.parts} | {' | '.join(f'{x:.0%}' for x in shares)} | {told} |"
 
 
-def _bands(rows: Sequence[Row]) -> list[str]:
+def _bands(rows: Sequence[RecognitionRow]) -> list[str]:
     lines = ["## Calibration of the margin", "", "All sets together, answered parts only."]
     lines += ["", "| margin | answers | mean margin | right |", "| --- | --- | --- | --- |"]
     lines += [
         f"| {b.low:.2f}–{b.high:.2f} | {b.count} | {b.margin:.2f} | {b.right:.0%} |"
-        for b in bands(rows)
+        for b in margin_bands(rows)
     ]
-    return [*lines, "", f"Over all sets, margin orders {score(rows).ordering:.2f}."]
+    return [*lines, "", f"Over all sets, margin orders {recognition_score(rows).ordering:.2f}."]

@@ -4,8 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from corporeal.showcase import paint, shape
-from corporeal.showcase.mesh import Mesh, Part, cut, pictured, union
+from corporeal.showcase import parametric_surfaces, procedural_textures
+from corporeal.showcase.prop_mesh import (
+    PropMesh,
+    PropPart,
+    mesh_difference,
+    mesh_union,
+    textured_finish,
+)
 from weighed import pictures
 from weighed.piece import Piece, Prop
 from weighed.vessels import RUBBER
@@ -17,13 +23,13 @@ def play_ball() -> Prop:
     t = np.linspace(-np.pi / 2, np.pi / 2, 49)
     profile = radius * np.stack([np.cos(t), np.sin(t)], 1)
     profile[[0, -1], 0] = 0
-    mesh = shape.lathe(profile, 96).moved(turn=(24, -18, 0))
+    mesh = parametric_surfaces.lathe_surface(profile, 96).moved(turn=(24, -18, 0))
     volume = 4 / 3 * np.pi * (radius**3 - (radius - wall) ** 3)
     source = "utility balls of 220 mm weigh 330 to 380 g: a wall of 2.1 mm"
     return Prop(
         "rubber play ball",
         "hollow",
-        (Part("ball", mesh, pictured("ball", pictures.play_ball(), 0.55), "rubber"),),
+        (PropPart("ball", mesh, textured_finish("ball", pictures.play_ball(), 0.55), "rubber"),),
         (Piece("ball", volume, RUBBER, source),),
     )
 
@@ -42,11 +48,11 @@ def stool() -> Prop:
     half = EDGE * np.stack([np.cos(t), np.sin(t)], 1)
     rim = half + np.where(t[:, None] < 0, [radius - EDGE, EDGE], [radius - EDGE, thick - EDGE])
     profile = np.concatenate([[[0.0, 0.0]], rim, [[0.0, thick]]])
-    seat = shape.lathe(profile, 96).moved((0, 0, 0.43))
+    seat = parametric_surfaces.lathe_surface(profile, 96).moved((0, 0, 0.43))
     corners = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / np.sqrt(2)
     tops, feet = corners * 0.105, corners * 0.165
     legs = [
-        shape.tube([(*top, 0.435), (*foot, 0.013)], LEG, 20)
+        parametric_surfaces.tube_surface([(*top, 0.435), (*foot, 0.013)], LEG, 20)
         for top, foot in zip(tops, feet, strict=True)
     ]
     knots = [(tops + (feet - tops) * share, z) for share, z in ((0.62, 0.173), (0.72, 0.131))]
@@ -54,9 +60,9 @@ def stool() -> Prop:
     for k in range(4):
         at, z = knots[k % 2]
         ends = [(*at[k], z), (*at[(k + 1) % 4], z)]
-        rungs.append(shape.tube(ends, 0.009, 14))
-    mesh = union([seat, *legs, *rungs])
-    grain = paint.wood(512, 7, "#b98a55", "#d3a873", "#e0bc8b")
+        rungs.append(parametric_surfaces.tube_surface(ends, 0.009, 14))
+    mesh = mesh_union([seat, *legs, *rungs])
+    grain = procedural_textures.wood_texture(512, 7, "#b98a55", "#d3a873", "#e0bc8b")
     across = np.stack([mesh.vertices[:, 0] / 0.4, mesh.vertices[:, 1] / 0.4], 1)
     upright = np.stack([mesh.vertices[:, 2] / 0.4, mesh.uv[:, 0]], 1)
     lying = np.abs(mesh.normals[:, 2:]) > 0.5
@@ -65,7 +71,7 @@ def stool() -> Prop:
     return Prop(
         "beech stool",
         "solid",
-        (Part("stool", mesh, pictured("stool", grain, 0.5), "hardwood"),),
+        (PropPart("stool", mesh, textured_finish("stool", grain, 0.5), "hardwood"),),
         (Piece("stool", enclosed(mesh), 690.0, source),),
     )
 
@@ -76,13 +82,17 @@ def dictionary() -> Prop:
     block = leaves * leaf
     thick = block + 2 * board
     size = (wide - 0.006, tall - 0.008, block)
-    pages = shape.Box(size, 0.0006, tile=0.05, grain=1).mesh().moved((0.0005, 0, thick / 2))
+    pages = (
+        parametric_surfaces.RoundedBox(size, 0.0006, tile=0.05, grain=1)
+        .mesh()
+        .moved((0.0005, 0, thick / 2))
+    )
     slabs = [
-        shape.Box((wide, tall, board), 0.001, corner=3).mesh().moved((0, 0, z))
+        parametric_surfaces.RoundedBox((wide, tall, board), 0.001, corner=3).mesh().moved((0, 0, z))
         for z in (board / 2, thick - board / 2)
     ]
-    spine = shape.Box((board, tall, thick), 0.001, corner=3).mesh()
-    cover = union([*slabs, spine.moved((-wide / 2 + board / 2, 0, thick / 2))])
+    spine = parametric_surfaces.RoundedBox((board, tall, thick), 0.001, corner=3).mesh()
+    cover = mesh_union([*slabs, spine.moved((-wide / 2 + board / 2, 0, thick / 2))])
     v, n = cover.vertices, cover.normals
     on_board = np.abs(n[:, 2:]) > 0.9
     turned_over = np.sign(n[:, 2:])
@@ -91,14 +101,21 @@ def dictionary() -> Prop:
         on_board, np.stack([0.5 + turned_over[:, 0] * (uv[:, 0] - 0.5), uv[:, 1]], 1), 0.02
     )
     cover = replace(cover, uv=uv)
-    pages = cut(pages, cover)
+    pages = mesh_difference(pages, cover)
     sheets = leaves * size[0] * size[1]
     return Prop(
         "dictionary",
         "solid",
         (
-            Part("cover", cover, pictured("cover", pictures.dictionary(), 0.7), "cardboard"),
-            Part("pages", pages, pictured("pages", paint.pages(), 0.9), "paper"),
+            PropPart(
+                "cover", cover, textured_finish("cover", pictures.dictionary(), 0.7), "cardboard"
+            ),
+            PropPart(
+                "pages",
+                pages,
+                textured_finish("pages", procedural_textures.pages_texture(), 0.9),
+                "paper",
+            ),
         ),
         (
             Piece("pages", sheets * leaf, 0.060 / leaf, "640 leaves of 60 g/m², .078 mm each"),
@@ -115,16 +132,20 @@ def dictionary() -> Prop:
 
 def cushion() -> Prop:
     """Model a sofa cushion, 45 × 30 cm, stuffed with polyester fibre."""
-    pillow = shape.Cushion((0.45, 0.30, 0.03), 0.055, 0.0145, 0.004, 24, pinch=0.06, seams=(0,))
+    pillow = parametric_surfaces.CushionShape(
+        (0.45, 0.30, 0.03), 0.055, 0.0145, 0.004, 24, pinch=0.06, seams=(0,)
+    )
     mesh = pillow.mesh()
     v = mesh.vertices
     mesh = replace(mesh, uv=np.stack([v[:, 0] / 0.45 + 0.5, v[:, 1] / 0.3 + 0.5], 1))
-    look = pictured("cushion", pictures.stripes("#284b7a", "#e9e2d0", "#8fa9c6", count=15), 0.95)
+    look = textured_finish(
+        "cushion", pictures.stripes("#284b7a", "#e9e2d0", "#8fa9c6", count=15), 0.95
+    )
     cover = 2 * 0.45 * 0.30 * 1.1
     return Prop(
         "sofa cushion",
         "filled",
-        (Part("cushion", mesh, look, "cotton"),),
+        (PropPart("cushion", mesh, look, "cotton"),),
         (
             Piece("cover", cover * 5e-4, 0.38 / 5e-4, "outer and inner cloth, 380 g/m² together"),
             Piece("fibre", enclosed(mesh), 24.0, "hollow fibre, stuffed firmly: 24 kg/m³"),
@@ -135,24 +156,32 @@ def cushion() -> Prop:
 def brick() -> Prop:
     """Model a facing brick, 240 × 115 × 71 mm, with three rows of holes."""
     size, hole = (0.240, 0.115, 0.071), 0.013
-    body = shape.Box(size, 0.0015, corner=2, tile=0.12).mesh().moved((0, 0, size[2] / 2))
+    body = (
+        parametric_surfaces.RoundedBox(size, 0.0015, corner=2, tile=0.12)
+        .mesh()
+        .moved((0, 0, size[2] / 2))
+    )
     holes = [
-        shape.lathe([(0, -0.01), (hole, -0.01), (hole, 0.09), (0, 0.09)], 40).moved((x, y, 0))
+        parametric_surfaces.lathe_surface(
+            [(0, -0.01), (hole, -0.01), (hole, 0.09), (0, 0.09)], 40
+        ).moved((x, y, 0))
         for x in np.linspace(-0.085, 0.085, 5)
         for y in (-0.031, 0.0, 0.031)
     ]
-    mesh = cut(body, *holes)
-    clay = paint.speckle(512, 61, "#7e3325", "#a24a33", "#b9644a", falloff=0.5, contrast=0.16)
+    mesh = mesh_difference(body, *holes)
+    clay = procedural_textures.speckle_texture(
+        512, 61, "#7e3325", "#a24a33", "#b9644a", falloff=0.5, contrast=0.16
+    )
     source = "fired clay of facing bricks: 1,950 kg/m³ (solid clay bricks: about 2,000)"
     return Prop(
         "brick with holes",
         "solid",
-        (Part("brick", mesh, pictured("brick", clay, 0.95), "brick"),),
+        (PropPart("brick", mesh, textured_finish("brick", clay, 0.95), "brick"),),
         (Piece("brick", enclosed(mesh), 1950.0, source),),
     )
 
 
-def enclosed(mesh: Mesh) -> float:
+def enclosed(mesh: PropMesh) -> float:
     """Return the volume that a closed surface encloses, by the divergence theorem [m³]."""
     a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
     return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6)

@@ -4,8 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from corporeal.showcase import paint, shape
-from corporeal.showcase.mesh import Part, cut, pictured, plain, union
+from corporeal.showcase import parametric_surfaces, procedural_textures
+from corporeal.showcase.prop_mesh import (
+    PropPart,
+    mesh_difference,
+    mesh_union,
+    plain_finish,
+    textured_finish,
+)
 from weighed import labels
 from weighed.goods import enclosed
 from weighed.labels import dyed
@@ -18,13 +24,15 @@ POLYPROPYLENE, SILICONE, CORK, PARAFFIN = 905.0, 1150.0, 170.0, 900.0
 
 def pear() -> Prop:
     """Model an imitation pear: a closed wall of polyethylene, and its stalk."""
-    outline = shape.soften([
+    outline = parametric_surfaces.soften_corners([
         (0.0, 0.004), (0.012, 0.001), (0.026, 0.004), (0.038, 0.022), (0.037, 0.045),
         (0.026, 0.066), (0.019, 0.082), (0.015, 0.094), (0.005, 0.099), (0.0, 0.096),
     ])  # fmt: skip
-    body = shape.lathe(outline, 96)
-    stalk = shape.tube([(0, 0, 0.090), (0.002, 0, 0.103), (0.007, 0, 0.115)], 0.0022, 12)
-    mesh = union([body, dyed(stalk, "#5b3a1e")])
+    body = parametric_surfaces.lathe_surface(outline, 96)
+    stalk = parametric_surfaces.tube_surface(
+        [(0, 0, 0.090), (0.002, 0, 0.103), (0.007, 0, 0.115)], 0.0022, 12
+    )
+    mesh = mesh_union([body, dyed(stalk, "#5b3a1e")])
     per_area = 2.8
     of = (
         "imitation fruits of the YCB set (Calli et al. 2015), by mass and size: orange 47 g, "
@@ -34,10 +42,14 @@ def pear() -> Prop:
     return Prop(
         "imitation pear",
         "hollow",
-        (Part("pear", mesh, pictured("pear", labels.pear_skin(), 0.35), "plastics-LDPE"),),
+        (
+            PropPart(
+                "pear", mesh, textured_finish("pear", labels.pear_skin(), 0.35), "plastics-LDPE"
+            ),
+        ),
         (
             Piece("wall", swept(outline) * per_area / POLYETHYLENE, POLYETHYLENE, of),
-            Piece("stalk", enclosed(cut(stalk, body)), POLYETHYLENE, "moulded with it"),
+            Piece("stalk", enclosed(mesh_difference(stalk, body)), POLYETHYLENE, "moulded with it"),
         ),
     )
 
@@ -62,10 +74,10 @@ def vacuum_flask() -> Prop:
         "vacuum flask, empty",
         "hollow",
         (
-            Part(
+            PropPart(
                 "flask",
-                by_height(shape.lathe(outside, 96)),
-                pictured("flask", labels.flask(neck / top), 0.35, 0.7),
+                by_height(parametric_surfaces.lathe_surface(outside, 96)),
+                textured_finish("flask", labels.flask(neck / top), 0.35, 0.7),
                 "stainless_steel",
             ),
         ),
@@ -87,7 +99,7 @@ def tissue_roll() -> Prop:
         [core, 0.0], [core + 0.0006, 0.0], [radius - 0.003, 0.0], [radius, 0.003],
         [radius, wide - 0.003], [radius - 0.003, wide], [core + 0.0006, wide], [core, wide],
     ])  # fmt: skip
-    mesh = shape.lathe(ring, 96, loop=True)
+    mesh = parametric_surfaces.lathe_surface(ring, 96, loop=True)
     within = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1]) < core + 0.0003
     brown = dyed(mesh, "#b09a80").colours
     mesh = mesh.tinted(np.where(within[:, None], brown, 1.0))
@@ -100,7 +112,7 @@ def tissue_roll() -> Prop:
     return Prop(
         "roll of toilet tissue",
         "solid",
-        (Part("roll", mesh, pictured("roll", labels.tissue(), 0.95), "paper"),),
+        (PropPart("roll", mesh, textured_finish("roll", labels.tissue(), 0.95), "paper"),),
         (
             Piece("tissue", room, length * wide * plies / room, of),
             Piece("core", board * 5e-4, 0.30 / 5e-4, "two plies of board of 150 g/m²"),
@@ -125,10 +137,10 @@ def wine_bottle() -> Prop:
         "bottle of wine, full",
         "filled",
         (
-            Part(
+            PropPart(
                 "bottle",
-                by_height(shape.lathe(outside, 96)),
-                pictured("bottle", labels.wine(shares), 0.15),
+                by_height(parametric_surfaces.lathe_surface(outside, 96)),
+                textured_finish("bottle", labels.wine(shares), 0.15),
                 "glass",
             ),
         ),
@@ -147,13 +159,15 @@ def candle() -> Prop:
         (0.0, 0.0), (0.0335, 0.0), (0.035, 0.0015), (0.035, 0.1375), (0.0335, 0.140),
         (0.024, 0.136), (0.012, 0.132), (0.0, 0.131),
     ]  # fmt: skip
-    body = shape.lathe(outline, 96)
-    wick = shape.tube([(0, 0, 0.125), (0, 0, 0.138), (0.002, 0, 0.144)], 0.0012, 10)
-    mesh = union([dyed(body, "#f1e6cc"), dyed(wick, "#2b2622")])
+    body = parametric_surfaces.lathe_surface(outline, 96)
+    wick = parametric_surfaces.tube_surface(
+        [(0, 0, 0.125), (0, 0, 0.138), (0.002, 0, 0.144)], 0.0012, 10
+    )
+    mesh = mesh_union([dyed(body, "#f1e6cc"), dyed(wick, "#2b2622")])
     return Prop(
         "pillar candle",
         "solid",
-        (Part("candle", mesh, plain("candle", "#ffffff", 0.5), "wax"),),
+        (PropPart("candle", mesh, plain_finish("candle", "#ffffff", 0.5), "wax"),),
         (Piece("wax", turned(np.array(outline)), PARAFFIN, "paraffin wax: 900 kg/m³"),),
     )
 
@@ -168,25 +182,27 @@ def sand_bucket() -> Prop:
     ])  # fmt: skip
     around = np.linspace(0, np.pi, 25)
     bail = [(0.152 * np.cos(a), -0.06 * np.sin(a) - 0.155 * np.sin(a), 0.285) for a in around]
-    handle = shape.tube(bail, 0.0045, 12)
-    bucket = shape.lathe(ring, 96)
-    mesh = union([dyed(bucket, "#d9dadb"), dyed(handle, "#b3261e")])
+    handle = parametric_surfaces.tube_surface(bail, 0.0045, 12)
+    bucket = parametric_surfaces.lathe_surface(ring, 96)
+    mesh = mesh_union([dyed(bucket, "#d9dadb"), dyed(handle, "#b3261e")])
     level = 0.136
     edge = 0.120 - wall + (side[1, 0] - side[0, 0]) * (level - wall) / (height - wall)
     heap = np.array([
         [0.0, wall + 1e-4], [0.120 - wall - 2e-4, wall + 1e-4], [edge - 2e-4, level],
         [0.09, level + 0.012], [0.04, level + 0.020], [0.0, level + 0.022],
     ])  # fmt: skip
-    sand = shape.lathe(heap, 96)
-    grains = paint.speckle(512, 17, "#a58a5c", "#c9b083", "#e2cfa6", falloff=0.3, contrast=0.25)
+    sand = parametric_surfaces.lathe_surface(heap, 96)
+    grains = procedural_textures.speckle_texture(
+        512, 17, "#a58a5c", "#c9b083", "#e2cfa6", falloff=0.3, contrast=0.25
+    )
     sand = replace(sand, uv=sand.vertices[:, :2] / 0.12)
     relief = "UN relief bucket of 14 l (IOM 4700000060): 300 mm high, 300 and 240 mm wide, of HDPE "
     return Prop(
         "bucket with sand",
         "filled",
         (
-            Part("bucket", mesh, plain("bucket", "#ffffff", 0.4), "plastics-HDPE"),
-            Part("sand", sand, pictured("sand", grains, 1.0), "sand"),
+            PropPart("bucket", mesh, plain_finish("bucket", "#ffffff", 0.4), "plastics-HDPE"),
+            PropPart("sand", sand, textured_finish("sand", grains, 1.0), "sand"),
         ),
         (
             Piece("bucket", turned(ring), POLYETHYLENE, relief + "600 g or more"),

@@ -4,47 +4,53 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from corporeal.geometry.srgb import linear
-from corporeal.showcase.mesh import Mesh
-from corporeal.showcase.paint import Picture, image, noise, ramp, rgb
+from corporeal.geometry.srgb import srgb_to_linear
+from corporeal.showcase.procedural_textures import (
+    TextureImage,
+    colour_ramp,
+    fractal_noise,
+    image_bytes,
+    rgb_of_hex,
+)
+from corporeal.showcase.prop_mesh import PropMesh
 from weighed.pictures import SIZE, band, blank, words
 
 
-def dyed(mesh: Mesh, colour: str) -> Mesh:
+def dyed(mesh: PropMesh, colour: str) -> PropMesh:
     """Colour a piece, so that several of one body keep their own; '#rrggbb' in sRGB."""
-    return mesh.tinted(linear(rgb(colour) / 255))
+    return mesh.tinted(srgb_to_linear(rgb_of_hex(colour) / 255))
 
 
-def pear_skin(n: int = 512) -> Picture:
+def pear_skin(n: int = 512) -> TextureImage:
     """Yellow green with a blush on one side and fine dots."""
     around = np.arange(n)[None] / n
-    blush = 0.5 + 0.5 * np.cos(2 * np.pi * (around - 0.3)) + 0.12 * noise(n, 5, 1.8)
-    skin = ramp(blush, "#9caf3a", "#b9bd48", "#cdb04a", "#c4803f")
-    return image(skin * (1 - 0.05 * (noise(n, 9, 0.2) > 2.0)[..., None]))
+    blush = 0.5 + 0.5 * np.cos(2 * np.pi * (around - 0.3)) + 0.12 * fractal_noise(n, 5, 1.8)
+    skin = colour_ramp(blush, "#9caf3a", "#b9bd48", "#cdb04a", "#c4803f")
+    return image_bytes(skin * (1 - 0.05 * (fractal_noise(n, 9, 0.2) > 2.0)[..., None]))
 
 
-def flask(neck: float) -> Picture:
+def flask(neck: float) -> TextureImage:
     """Brushed steel, a dark band below, the cup apart; ``neck`` as a share of the height."""
     picture, draw = blank("#b4b8bc")
     band(draw, 0.0, 0.05, "#2a2c30")
     band(draw, neck - 0.004, neck + 0.008, "#1c1d20")
     for turn in (0.25, 0.75):
         words(picture, "0.75 L", (turn, 0.12), (0.14, 0.025), "#40444a")
-    brushed = 1 + 0.03 * noise(SIZE, 3, 0.3, (12, 1))[..., None]
-    return image(np.asarray(picture) * brushed)
+    brushed = 1 + 0.03 * fractal_noise(SIZE, 3, 0.3, (12, 1))[..., None]
+    return image_bytes(np.asarray(picture) * brushed)
 
 
-def tissue(n: int = 1024) -> Picture:
+def tissue(n: int = 1024) -> TextureImage:
     """White embossed paper; fine lines where its windings show, by the run of the profile."""
     v = 1 - np.arange(n)[:, None] / n
     dots = np.sin(2 * np.pi * 40 * np.arange(n)[None] / n) * np.sin(2 * np.pi * 60 * v)
-    white = rgb("#f2f1ee") + 4 * dots[..., None] + 2 * noise(n, 4, 0.6)[..., None]
+    white = rgb_of_hex("#f2f1ee") + 4 * dots[..., None] + 2 * fractal_noise(n, 4, 0.6)[..., None]
     lines = 8 * np.sin(2 * np.pi * 160 * v) * np.ones((n, n))
     ends = (v < 0.14) | ((v > 0.5) & (v < 0.64))
-    return image(np.where(ends[..., None], rgb("#eceae5") + lines[..., None], white))
+    return image_bytes(np.where(ends[..., None], rgb_of_hex("#eceae5") + lines[..., None], white))
 
 
-def wine(heights: Sequence[float]) -> Picture:
+def wine(heights: Sequence[float]) -> TextureImage:
     """Dark green glass, a paper label, a capsule over the neck.
 
     Args:
@@ -65,6 +71,8 @@ def wine(heights: Sequence[float]) -> Picture:
     return np.asarray(picture)
 
 
-def crust(n: int = 512) -> Picture:
+def crust(n: int = 512) -> TextureImage:
     """Baked dough, lighter where it cracked."""
-    return image(ramp(0.5 + 0.16 * noise(n, 12, 1.3), "#a8672c", "#c98a45", "#deb071"))
+    return image_bytes(
+        colour_ramp(0.5 + 0.16 * fractal_noise(n, 12, 1.3), "#a8672c", "#c98a45", "#deb071")
+    )

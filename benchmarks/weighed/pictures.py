@@ -5,7 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal.showcase.paint import Picture, image, noise, rgb
+from corporeal.showcase.procedural_textures import (
+    TextureImage,
+    fractal_noise,
+    image_bytes,
+    rgb_of_hex,
+)
 
 SIZE = 1024
 """Width and height of a picture [px]."""
@@ -43,7 +48,7 @@ def disc(draw: Brush, at: tuple[float, float], radii: tuple[float, float], colou
     draw.ellipse([x - a, y - b, x + a, y + b], fill=colour)
 
 
-def tomato_can(height: float) -> Picture:
+def tomato_can(height: float) -> TextureImage:
     """Bare ends with ribs, a paper label with tomatoes; ``height`` of the can [m]."""
     low, high = 0.006 / height, 1 - 0.008 / height
     picture, draw = blank("#b9bcc0")
@@ -63,7 +68,7 @@ def tomato_can(height: float) -> Picture:
     return np.asarray(picture)
 
 
-def jam_jar(height: float, level: float) -> Picture:
+def jam_jar(height: float, level: float) -> TextureImage:
     """Red up to ``level`` [m] behind clear glass, and a hand-written label."""
     picture, draw = blank("#bccbc4")
     band(draw, 0.0, 0.004 / height, "#c9d6d2")
@@ -80,15 +85,15 @@ def jam_jar(height: float, level: float) -> Picture:
     return np.asarray(picture)
 
 
-def gingham(squares: int = 16) -> Picture:
+def gingham(squares: int = 16) -> TextureImage:
     """Red and white checks."""
     step = np.arange(SIZE) * squares // SIZE % 2
     sum_ = step[:, None] + step[None]
-    shades = np.stack([rgb("#f7f4ef"), rgb("#dd8080"), rgb("#b3202a")])
-    return image(shades[sum_])
+    shades = np.stack([rgb_of_hex("#f7f4ef"), rgb_of_hex("#dd8080"), rgb_of_hex("#b3202a")])
+    return image_bytes(shades[sum_])
 
 
-def cola_bottle(heights: Sequence[float]) -> Picture:
+def cola_bottle(heights: Sequence[float]) -> TextureImage:
     """Dark up to the level, pale above, a red label round the waist, a red cap.
 
     Args:
@@ -107,7 +112,7 @@ def cola_bottle(heights: Sequence[float]) -> Picture:
     return np.asarray(picture)
 
 
-def dictionary(spine: bool = False) -> Picture:
+def dictionary(spine: bool = False) -> TextureImage:
     """Dark red cloth with gold print."""
     picture, draw = blank("#6d1420")
     for inset in (0.05, 0.065):
@@ -117,19 +122,19 @@ def dictionary(spine: bool = False) -> Picture:
         words(picture, "DICTIONARY", (0.5, 0.72), (0.72, 0.10), "#d8b35a")
         words(picture, "English - French", (0.5, 0.58), (0.5, 0.05), "#d8b35a")
         words(picture, "A - Z", (0.5, 0.25), (0.22, 0.07), "#d8b35a")
-    cloth = 1 + 0.03 * noise(SIZE, 9, 0.4)[..., None]
-    return image(np.asarray(picture).astype(float) * cloth)
+    cloth = 1 + 0.03 * fractal_noise(SIZE, 9, 0.4)[..., None]
+    return image_bytes(np.asarray(picture).astype(float) * cloth)
 
 
-def stripes(*colours: str, count: int = 12) -> Picture:
+def stripes(*colours: str, count: int = 12) -> TextureImage:
     """Upright stripes of woven cloth."""
     column = np.arange(SIZE) * count // SIZE % len(colours)
-    cloth = np.stack([rgb(c) for c in colours])[column][None].repeat(SIZE, 0)
-    thread = 1 + 0.04 * noise(SIZE, 5, 0.35, (1, 8))[..., None]
-    return image(cloth * thread)
+    cloth = np.stack([rgb_of_hex(c) for c in colours])[column][None].repeat(SIZE, 0)
+    thread = 1 + 0.04 * fractal_noise(SIZE, 5, 0.35, (1, 8))[..., None]
+    return image_bytes(cloth * thread)
 
 
-def play_ball() -> Picture:
+def play_ball() -> TextureImage:
     """Red rubber with moulded rings and a valve."""
     picture, draw = blank("#b3231f")
     for v in (0.2, 0.35, 0.5, 0.65, 0.8):
@@ -138,4 +143,4 @@ def play_ball() -> Picture:
         x = u * SIZE
         draw.rectangle([x - 2, 0, x + 2, SIZE], fill="#7d1512")
     disc(draw, (0.31, 0.57), (0.012, 0.02), "#1c1a1a")
-    return image(np.asarray(picture) + 3 * noise(SIZE, 8, 0.3)[..., None])
+    return image_bytes(np.asarray(picture) + 3 * fractal_noise(SIZE, 8, 0.3)[..., None])

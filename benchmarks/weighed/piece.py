@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.types import Scene
-from corporeal.showcase.mesh import Model, Part
-from corporeal.showcase.scenes import Placed, scene_of
+from corporeal.showcase.prop_mesh import PropModel, PropPart
+from corporeal.showcase.showcase_scenes import PlacedModel, scene_of_models
 
 Profile = Float[np.ndarray, "N 2"]
 """Radius and height of a turned body, from its axis below to its axis above [m]."""
@@ -39,7 +39,7 @@ class Prop:
     """Its name, for whoever reads the results."""
     fill: str
     """solid, hollow or filled: whose errors are told apart."""
-    seen: tuple[Part, ...]
+    seen: tuple[PropPart, ...]
     """Its outside."""
     built: tuple[Piece, ...]
 
@@ -50,9 +50,9 @@ class Prop:
 
     def scene(self, name: str) -> Scene:
         """Stand it on the floor under a neutral name; nothing in it says what it is made of."""
-        model = Model(name, self.seen)
+        model = PropModel(name, self.seen)
         model = model.moved((0, 0, -model.bounds()[0, 2]))
-        made = scene_of(name, [model], [Placed(name)], duration=1.0)
+        made = scene_of_models(name, [model], [PlacedModel(name)], duration=1.0)
         surfaces = tuple(
             replace(s, name=f"surface {k}", extras={}) for k, s in enumerate(made.surfaces)
         )

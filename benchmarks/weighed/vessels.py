@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from corporeal.showcase import paint, shape
-from corporeal.showcase.mesh import Mesh, Part, pictured, plain
+from corporeal.showcase import parametric_surfaces, procedural_textures
+from corporeal.showcase.prop_mesh import PropMesh, PropPart, plain_finish, textured_finish
 from weighed import pictures
 from weighed.piece import Piece, Prop, below, inset, swept, turned
 
@@ -23,9 +23,11 @@ def flower_pot() -> Prop:
         [0.011, 0.0], [0.050, 0.0], [0.066, 0.108], [0.076, 0.110], [0.079, 0.143],
         [0.071, 0.143], [0.0685, 0.108], [0.0585, 0.105], [0.0435, 0.011], [0.011, 0.011],
     ])  # fmt: skip
-    mesh = shape.lathe(ring, 96, loop=True)
-    look = pictured(
-        "pot", paint.speckle(512, 31, "#9c4f30", "#b9653f", "#cc7d55", contrast=0.1), 0.9
+    mesh = parametric_surfaces.lathe_surface(ring, 96, loop=True)
+    look = textured_finish(
+        "pot",
+        procedural_textures.speckle_texture(512, 31, "#9c4f30", "#b9653f", "#cc7d55", contrast=0.1),
+        0.9,
     )
     volume = turned(np.concatenate([ring, ring[:1]]))
     source = (
@@ -35,7 +37,7 @@ def flower_pot() -> Prop:
     return Prop(
         "terracotta flower pot",
         "hollow",
-        (Part("pot", mesh, look, "ceramic"),),
+        (PropPart("pot", mesh, look, "ceramic"),),
         (Piece("pot", volume, 1850.0, source),),
     )
 
@@ -54,12 +56,16 @@ def tomato_can() -> Prop:
     ends = 2 * np.pi * (radius + 0.008) ** 2 * end  # each with its seam, rolled
     body = 2 * np.pi * radius * height * wall
     label = 2 * np.pi * radius * (height - 0.014)
-    look = pictured("can", pictures.tomato_can(height), 0.45)
+    look = textured_finish("can", pictures.tomato_can(height), 0.45)
     tin = "tinplate of food cans is .15 to .30 mm thick: .17 mm round, .22 mm at the ends"
     return Prop(
         "can of chopped tomatoes",
         "filled",
-        (Part("can", by_height(shape.lathe(profile, 96)), look, "steel"),),
+        (
+            PropPart(
+                "can", by_height(parametric_surfaces.lathe_surface(profile, 96)), look, "steel"
+            ),
+        ),
         (
             Piece("body", body, STEEL, tin),
             Piece("ends", ends, STEEL, tin),
@@ -88,9 +94,9 @@ def jam_jar() -> Prop:
     ])  # fmt: skip
     glass = turned(outside) - turned(inside)
     tin = (np.pi * 0.0345**2 + 2 * np.pi * 0.0345 * 0.016) * 1.15 * 0.00018
-    jar = pictured("jar", pictures.jam_jar(0.1035, level), 0.12)
-    checks = pictured("lid", pictures.gingham(), 0.3)
-    top = shape.lathe(lid, 96)
+    jar = textured_finish("jar", pictures.jam_jar(0.1035, level), 0.12)
+    checks = textured_finish("lid", pictures.gingham(), 0.3)
+    top = parametric_surfaces.lathe_surface(lid, 96)
     flat = top.vertices[:, 2] > height - 0.0015
     around = np.stack([2 * top.uv[:, 0], top.vertices[:, 2] / 0.105], 1)
     across = top.vertices[:, :2] / 0.105 + 0.5
@@ -99,8 +105,10 @@ def jam_jar() -> Prop:
         "jar of strawberry jam",
         "filled",
         (
-            Part("jar", by_height(shape.lathe(outside, 96)), jar, "glass"),
-            Part("lid", top, checks, "steel"),
+            PropPart(
+                "jar", by_height(parametric_surfaces.lathe_surface(outside, 96)), jar, "glass"
+            ),
+            PropPart("lid", top, checks, "steel"),
         ),
         (
             Piece("jar", glass, GLASS, "a jar of some 330 ml: wall 2.6 mm"),
@@ -124,11 +132,15 @@ def cola_bottle() -> Prop:
     wall = preform / PET / swept(outside)
     inside = np.concatenate([inset(outside, wall), [[0.0, cap]]])
     shares = [z / height for z in (level, low, high, cap)]
-    look = pictured("bottle", pictures.cola_bottle(shares), 0.15)
+    look = textured_finish("bottle", pictures.cola_bottle(shares), 0.15)
     return Prop(
         "bottle of cola, half full",
         "filled",
-        (Part("bottle", by_height(shape.lathe(closed, 96)), look, "PET"),),
+        (
+            PropPart(
+                "bottle", by_height(parametric_surfaces.lathe_surface(closed, 96)), look, "PET"
+            ),
+        ),
         (
             Piece("bottle", preform / PET, PET, "a preform of 39.9 g, made for 1.5 l"),
             Piece("cap", 0.0028 / POLYETHYLENE, POLYETHYLENE, "a screw cap of 2.8 g"),
@@ -151,15 +163,17 @@ def frying_pan() -> Prop:
     foot = np.array([[0.0, 0.0], [0.086, 0.0], [0.088, 0.0015]])
     closed = np.concatenate([foot, bowl[1:], inner])
     handle, grip = pan_handle()
-    metal = plain("pan", "#c3c6ca", 0.25, metallic=0.9)
-    black = plain("grip", "#151517", 0.45)
+    metal = plain_finish("pan", "#c3c6ca", 0.25, metallic=0.9)
+    black = plain_finish("grip", "#151517", 0.45)
     disc_source = "a disc of aluminium under the base, 4.8 mm (makers state 4 to 6 mm)"
     return Prop(
         "frying pan of stainless steel",
         "hollow",
         (
-            Part("pan", shape.lathe(closed, 128), metal, "stainless_steel"),
-            Part("handle", handle, black, "bakelite"),
+            PropPart(
+                "pan", parametric_surfaces.lathe_surface(closed, 128), metal, "stainless_steel"
+            ),
+            PropPart("handle", handle, black, "bakelite"),
         ),
         (
             Piece("bowl", swept(bowl) * sheet, STAINLESS, "sheet of .8 mm"),
@@ -170,12 +184,12 @@ def frying_pan() -> Prop:
     )
 
 
-def pan_handle() -> tuple[Mesh, float]:
+def pan_handle() -> tuple[PropMesh, float]:
     """Return a handle that rises from the rim, and the volume of its substance [m³]."""
     along = np.linspace(0, 1, 12)
     path = np.stack([0.116 + 0.185 * along, 0 * along, 0.040 + 0.038 * along], 1)
     radii = 0.0105 + 0.0035 * np.sin(np.pi * along) + 0.001 * along
-    mesh = shape.tube(path, radii, 24)
+    mesh = parametric_surfaces.tube_surface(path, radii, 24)
     step = np.linalg.norm(path[1] - path[0])
     a, b = radii[:-1], radii[1:]
     rods = np.pi / 3 * step * (a**2 + a * b + b**2).sum()
@@ -184,7 +198,7 @@ def pan_handle() -> tuple[Mesh, float]:
     return mesh, float(rods + ends - np.pi * 0.004**2 * 0.06)
 
 
-def by_height(mesh: Mesh) -> Mesh:
+def by_height(mesh: PropMesh) -> PropMesh:
     """Let a picture's v run with the height, not along the profile."""
     z = mesh.vertices[:, 2]
     return replace(mesh, uv=np.stack([mesh.uv[:, 0], (z - z.min()) / np.ptp(z)], 1))

@@ -2,8 +2,15 @@
 
 import numpy as np
 
-from corporeal.mpm.laws.kinematics import Matrices, Scalars, isotropic, per, stretches, transpose
-from corporeal.mpm.laws.law import ConstitutiveLaw
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw
+from corporeal.mpm.laws.kinematics import (
+    Matrices,
+    Scalars,
+    isotropic_tensors,
+    per_particle,
+    stretches,
+    transpose,
+)
 
 
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
@@ -16,7 +23,7 @@ def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = F (2μ E + λ tr E 1)."""
     E = _green(F)
-    return F @ (2.0 * per(mu) * E + isotropic(lam * np.trace(E, axis1=1, axis2=2)))
+    return F @ (2.0 * per_particle(mu) * E + isotropic_tensors(lam * np.trace(E, axis1=1, axis2=2)))
 
 
 def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:

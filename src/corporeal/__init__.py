@@ -14,46 +14,46 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.core.types import Finish, Push, Scene, Wind
     from corporeal.core.version import __version__
     from corporeal.description.describe_config import DescribeConfig
-    from corporeal.export.export import export as export_scene
-    from corporeal.export.target import ExportConfig
-    from corporeal.io.glb_writer import write_glb
-    from corporeal.io.transforms import write_views
-    from corporeal.io.usd_bodies import read_usd_physics
-    from corporeal.jobs.local import local_hands
-    from corporeal.lab.corpus.assemble import Sources, assemble_corpus
-    from corporeal.lab.corpus.plan import CorpusConfig
-    from corporeal.lab.corpus.report import report_corpus
-    from corporeal.lab.corpus.run import RunConfig, run_corpus
-    from corporeal.lab.evaluation.ensemble import ensemble
+    from corporeal.export.export_scene import export_scene as export_scene
+    from corporeal.export.export_target import ExportConfig
+    from corporeal.io.gltf.glb_writer import write_glb
+    from corporeal.io.photos.transforms_json import write_views
+    from corporeal.io.usd.usd_bodies import read_usd_physics
+    from corporeal.jobs.local_workers import local_executor
+    from corporeal.lab.corpus.assemble_corpus import Sources, assemble_corpus
+    from corporeal.lab.corpus.corpus_plan import CorpusConfig
+    from corporeal.lab.corpus.corpus_report import report_corpus
+    from corporeal.lab.corpus.run_corpus import RunConfig, run_corpus
+    from corporeal.lab.evaluation.outcome_ensemble import simulate_ensemble
     from corporeal.materials import citation, friction_between, library
-    from corporeal.materials import find as material
+    from corporeal.materials import find_material as material
+    from corporeal.mpm.problem import ENGINES as ENGINES
     from corporeal.mpm.problem import FLOOR, Body, Engine, Plane, Problem
-    from corporeal.mpm.problem import MENU as ENGINES
     from corporeal.pipeline.in_memory import (
         build_engine,
         load_scene,
-        play,
         pose_problem,
-        prepare,
+        prepare_scene,
+        simulate_scene,
     )
-    from corporeal.pipeline.runner import Settings, run
+    from corporeal.pipeline.run_pipeline import Settings, run
     from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
     from corporeal.pipeline.stages.capture import CaptureConfig, capture
     from corporeal.pipeline.stages.compose import ComposeConfig, compose
     from corporeal.pipeline.stages.describe import describe
     from corporeal.pipeline.stages.fill import FillConfig, fill
-    from corporeal.pipeline.stages.film import FilmConfig, film
     from corporeal.pipeline.stages.ground import GroundConfig, ground
     from corporeal.pipeline.stages.reconstruct import reconstruct
     from corporeal.pipeline.stages.report import report
     from corporeal.pipeline.stages.segment import SegmentConfig, segment
     from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
-    from corporeal.pool.index import index as index_pool
-    from corporeal.pool.index import read_pool
+    from corporeal.pipeline.stages.video import VideoConfig, render_video
+    from corporeal.pool.pool_index import index_pool as index_pool
+    from corporeal.pool.pool_index import read_pool
     from corporeal.reconstruction.reconstruct_config import ReconstructConfig
     from corporeal.scene.scene_building import Solid, ball, box, build_scene, cylinder, solid
-    from corporeal.showcase.scenes import build as showcase_scene
-    from corporeal.simulation.played import Played, Prepared
+    from corporeal.showcase.showcase_scenes import build_showcase_scene as showcase_scene
+    from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
 _HOME = {
     # a scene: built from nouns, or loaded
@@ -64,19 +64,19 @@ _HOME = {
     "solid": "scene.scene_building:solid",
     "build_scene": "scene.scene_building:build_scene",
     "load_scene": "pipeline.in_memory:load_scene",
-    "showcase_scene": "showcase.scenes:build",
-    "write_glb": "io.glb_writer:write_glb",
+    "showcase_scene": "showcase.showcase_scenes:build_showcase_scene",
+    "write_glb": "io.gltf.glb_writer:write_glb",
     "Scene": "core.types:Scene",
     "Push": "core.types:Push",
     "Wind": "core.types:Wind",
     "Finish": "core.types:Finish",
     # everything at once: in memory, or in a run's folder
-    "prepare": "pipeline.in_memory:prepare",
-    "Prepared": "simulation.played:Prepared",
-    "play": "pipeline.in_memory:play",
-    "Played": "simulation.played:Played",
-    "run": "pipeline.runner:run",
-    "Settings": "pipeline.runner:Settings",
+    "prepare_scene": "pipeline.in_memory:prepare_scene",
+    "PreparedScene": "simulation.simulation_result:PreparedScene",
+    "simulate_scene": "pipeline.in_memory:simulate_scene",
+    "SimulationResult": "simulation.simulation_result:SimulationResult",
+    "run": "pipeline.run_pipeline:run",
+    "Settings": "pipeline.run_pipeline:Settings",
     # the verbs one by one, and their settings
     "compose": "pipeline.stages.compose:compose",
     "ComposeConfig": "pipeline.stages.compose:ComposeConfig",
@@ -84,7 +84,7 @@ _HOME = {
     "AssembleConfig": "pipeline.stages.assemble:AssembleConfig",
     "capture": "pipeline.stages.capture:capture",
     "CaptureConfig": "pipeline.stages.capture:CaptureConfig",
-    "write_views": "io.transforms:write_views",
+    "write_views": "io.photos.transforms_json:write_views",
     "reconstruct": "pipeline.stages.reconstruct:reconstruct",
     "ReconstructConfig": "reconstruction.reconstruct_config:ReconstructConfig",
     "describe": "pipeline.stages.describe:describe",
@@ -97,17 +97,17 @@ _HOME = {
     "FillConfig": "pipeline.stages.fill:FillConfig",
     "simulate": "pipeline.stages.simulate:simulate",
     "SimulateConfig": "pipeline.stages.simulate:SimulateConfig",
-    "film": "pipeline.stages.film:film",
-    "FilmConfig": "pipeline.stages.film:FilmConfig",
+    "render_video": "pipeline.stages.video:render_video",
+    "VideoConfig": "pipeline.stages.video:VideoConfig",
     "report": "pipeline.stages.report:report",
     # out into other tools
-    "export_scene": "export.export:export",
-    "ExportConfig": "export.target:ExportConfig",
-    "read_usd_physics": "io.usd_bodies:read_usd_physics",
+    "export_scene": "export.export_scene:export_scene",
+    "ExportConfig": "export.export_target:ExportConfig",
+    "read_usd_physics": "io.usd.usd_bodies:read_usd_physics",
     # the engine
     "pose_problem": "pipeline.in_memory:pose_problem",
     "build_engine": "pipeline.in_memory:build_engine",
-    "ENGINES": "mpm.problem:MENU",
+    "ENGINES": "mpm.problem:ENGINES",
     "Engine": "mpm.problem:Engine",
     "Problem": "mpm.problem:Problem",
     "Body": "mpm.problem:Body",
@@ -115,20 +115,20 @@ _HOME = {
     "FLOOR": "mpm.problem:FLOOR",
     # the material library
     "library": "materials:library",
-    "material": "materials:find",
+    "material": "materials:find_material",
     "friction_between": "materials:friction_between",
     "citation": "materials:citation",
     # many scenes, and one scene many times
-    "ensemble": "lab.evaluation.ensemble:ensemble",
-    "index_pool": "pool.index:index",
-    "read_pool": "pool.index:read_pool",
-    "assemble_corpus": "lab.corpus.assemble:assemble_corpus",
-    "CorpusConfig": "lab.corpus.plan:CorpusConfig",
-    "Sources": "lab.corpus.assemble:Sources",
-    "local_hands": "jobs.local:local_hands",
-    "run_corpus": "lab.corpus.run:run_corpus",
-    "RunConfig": "lab.corpus.run:RunConfig",
-    "report_corpus": "lab.corpus.report:report_corpus",
+    "simulate_ensemble": "lab.evaluation.outcome_ensemble:simulate_ensemble",
+    "index_pool": "pool.pool_index:index_pool",
+    "read_pool": "pool.pool_index:read_pool",
+    "assemble_corpus": "lab.corpus.assemble_corpus:assemble_corpus",
+    "CorpusConfig": "lab.corpus.corpus_plan:CorpusConfig",
+    "Sources": "lab.corpus.assemble_corpus:Sources",
+    "local_executor": "jobs.local_workers:local_executor",
+    "run_corpus": "lab.corpus.run_corpus:run_corpus",
+    "RunConfig": "lab.corpus.run_corpus:RunConfig",
+    "report_corpus": "lab.corpus.corpus_report:report_corpus",
     # what can go wrong
     "UserError": "core.errors:UserError",
     "SimulationError": "core.errors:SimulationError",

@@ -14,16 +14,16 @@ import corporeal
 ROOT = Path(corporeal.__file__).parent
 SOURCES = sorted(ROOT.rglob("*.py"))
 NESTED = {
-    "export/read_glb_film.py": "attributes of a primitive, as glTF has them",
-    "reconstruction/segment/attributes.py": "the table of colours beside it, written by hand",
+    "export/animated_glb_reader.py": "attributes of a primitive, as glTF has them",
+    "reconstruction/segment/part_attributes.py": "the table of colours beside it, written by hand",
 }
 """Modules that may read two string keys in a row, and why."""
 FOREIGN = {
-    "viewer/orders.py": "orders of a page, of which nothing is trusted",
-    "io/sog.py": "meta.json of splats in SOG, a format of others",
+    "viewer/commands.py": "orders of a page, of which nothing is trusted",
+    "io/splat/sog.py": "meta.json of splats in SOG, a format of others",
     "materials/library.py": "libraries of materials, written by hand",
-    "materials/lint.py": "libraries of materials, whose mistakes it finds",
-    "reconstruction/segment/attributes.py": "the table of colours beside it, written by hand",
+    "materials/library_lint.py": "libraries of materials, whose mistakes it finds",
+    "reconstruction/segment/part_attributes.py": "the table of colours beside it, written by hand",
 }
 """Modules that may read the keys of files which they do not write, and why."""
 READERS, WRITERS = {"read_json", "load", "loads"}, {"write_json", "dump", "dumps"}

@@ -8,7 +8,7 @@ import pytest
 
 import corporeal as co
 from chromium import browser
-from corporeal.io.glb_writer import write_glb
+from corporeal.io.gltf.glb_writer import write_glb
 
 READY = "!!window.viewer?.stats.ready && viewer.stats.drawn > 2"
 DROP = """(() => {
@@ -29,21 +29,25 @@ def drop(tab, name, data):
 @pytest.mark.slow
 def test_from_an_upload_to_an_export_by_the_page_alone(tmp_path, monkeypatch):
     from corporeal.viewer import uploads
-    from corporeal.viewer.exports import Exports
-    from corporeal.viewer.shelf import Shelf
-    from corporeal.viewer.site import Shown, site
-    from corporeal.viewer.work import Work
+    from corporeal.viewer.run_exports import RunExports
+    from corporeal.viewer.run_requests import RunRequests
+    from corporeal.viewer.run_store import RunStore
+    from corporeal.viewer.web_app import SiteOptions, make_app
     from viewer_served import LOCAL, serving
 
-    monkeypatch.setattr(uploads, "SPARE", 0)  # the disk of who runs this may be nearly full
+    monkeypatch.setattr(
+        uploads, "MIN_FREE_DISK_BYTES", 0
+    )  # the disk of who runs this may be nearly full
     runs = tmp_path / "runs"
     runs.mkdir()
     block = co.ball("wood", radius=0.05, at=(0, 0, 0.05), name="wooden_ball")
     model = tmp_path / "ball.glb"
     write_glb(model, co.build_scene(block, duration=0.1, fps=30))
-    shelf = Shelf((), runs)
-    work = Work(shelf, runs)
-    app = site(Shown(shelf, works=True), LOCAL, (*work.routes(), *Exports(shelf).routes()))
+    shelf = RunStore((), runs)
+    work = RunRequests(shelf, runs)
+    app = make_app(
+        SiteOptions(shelf, works=True), LOCAL, (*work.routes(), *RunExports(shelf).routes())
+    )
     try:
         with serving(app) as server, browser(tmp_path) as tab:
             tab.open(server.address)

@@ -9,9 +9,9 @@ from published import MORE_WARE
 from recognition.shapes import shape
 
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.discretization.ware import Called, ware_wall
+from corporeal.discretization.open_vessel_walls import NamedObject, usual_vessel_wall
 from corporeal.pipeline.stages.describe import describe
-from corporeal.recognition.lexicon import tokens_of
+from corporeal.recognition.lexicon import name_tokens
 from handmade import plain, scene
 
 ROWS = tomllib.loads(MORE_WARE.read_text(encoding="utf-8"))["things"]
@@ -21,7 +21,7 @@ BASKET = "turned 0 0 .13 0 .15 .2 0 .2"
 
 
 def wall(name, material, extent):
-    found = ware_wall(material, Called([tokens_of(name)], extent))
+    found = usual_vessel_wall(material, NamedObject([name_tokens(name)], extent))
     assert found is not None
     return found
 

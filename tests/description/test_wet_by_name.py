@@ -3,7 +3,7 @@
 import pytest
 
 from corporeal.pipeline.stages.describe import describe
-from corporeal.pipeline.stages.ground import doubts, ground
+from corporeal.pipeline.stages.ground import ground, grounding_warnings
 from corporeal.pipeline.stages.segment import segment
 from handmade import plain, scene
 
@@ -33,7 +33,7 @@ def test_the_water_in_a_sponge_does_not_make_its_foam_doubtful():
     wet = scene(("wet sponge", [("mesh", plain(), {})]))
     inventory = describe(wet)
     parts = segment(wet, inventory)
-    assert doubts(ground(wet, parts, inventory), parts, wet) == ()
+    assert grounding_warnings(ground(wet, parts, inventory), parts, wet) == ()
 
 
 @pytest.mark.parametrize(

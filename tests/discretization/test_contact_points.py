@@ -3,7 +3,7 @@
 import numpy as np
 import trimesh
 
-from corporeal.discretization.contact_points import EXTREMES, extremes
+from corporeal.discretization.contact_points import EXTREME_DIRECTIONS_COUNT, extreme_corners
 
 
 def resting(mesh, tilt):
@@ -15,8 +15,8 @@ def resting(mesh, tilt):
 
 def test_what_is_round_keeps_all_corners_that_it_may_stand_on():
     ball = resting(trimesh.creation.icosphere(4), 1e-3)
-    assert len(ball.vertices) > 4 * EXTREMES
-    points = {tuple(p) for p in extremes(np.asarray(ball.vertices))}
+    assert len(ball.vertices) > 4 * EXTREME_DIRECTIONS_COUNT
+    points = {tuple(p) for p in extreme_corners(np.asarray(ball.vertices))}
     low = ball.vertices[ball.vertices[:, 2] < ball.vertices[:, 2].min() + 0.03]
     assert 10 < len(low)
     assert all(tuple(v) in points for v in low)
@@ -24,7 +24,7 @@ def test_what_is_round_keeps_all_corners_that_it_may_stand_on():
 
 def test_a_fine_disc_stands_on_all_sides_of_its_rim():
     disc = trimesh.creation.cylinder(1.0, 0.1, sections=2500)
-    points = extremes(np.asarray(disc.vertices))
+    points = extreme_corners(np.asarray(disc.vertices))
     low = points[points[:, 2] < -0.05 + 1e-12]
     angle = np.sort(np.arctan2(low[:, 1], low[:, 0]))
     assert np.diff(angle, append=angle[0] + 2 * np.pi).max() < np.radians(1)

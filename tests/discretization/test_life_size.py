@@ -12,26 +12,26 @@ from corporeal.core.types import (
     Law,
     Material,
     MaterialField,
-    PartWords,
-    Piece,
-    Placement,
+    PartComponent,
+    PartDescription,
+    RangePlacement,
     Scene,
     SceneObject,
     Structure,
     Surface,
     Wall,
 )
-from corporeal.discretization.foliage import swinging
-from corporeal.discretization.make import compose, weight
-from corporeal.discretization.sizes import in_scene, is_scaled
-from corporeal.discretization.survey import survey
-from corporeal.geometry.arrangement import boxes_of, life_sized, scaled
-from corporeal.materials import find
+from corporeal.discretization.foliage import leaf_frequencies
+from corporeal.discretization.mesh_measures import measure_object
+from corporeal.discretization.object_scaling import field_in_scene_scale, is_not_life_size
+from corporeal.discretization.part_model import infer_part_model, part_mass
+from corporeal.geometry.scene_transforms import object_boxes, scale_scene, scale_to_life_size
+from corporeal.materials import find_material
 
 STEEL = Material("steel", Law.VON_MISES, 2e11, 0.3, 7850.0, shell_thickness=8e-4)
 SOUP = Material("soup", Law.NEO_HOOKEAN, 300.0, 0.49, 1050.0)
-SAID = PartWords("a", "steel")
-PUT = replace(SAID, placements={"shell_thickness": Placement(0.5, "model", "It looks so.")})
+SAID = PartDescription("a", "steel")
+PUT = replace(SAID, placements={"shell_thickness": RangePlacement(0.5, "model", "It looks so.")})
 CAN = trimesh.creation.cylinder(0.03, 0.1)
 CUP = trimesh.creation.annulus(0.028, 0.03, 0.1)
 FLAG = trimesh.Trimesh(
@@ -59,15 +59,17 @@ def field_of(structure, words, pieces=()):
 def surveyed(mesh, scale):
     triangles = np.asarray(mesh.faces, dtype=np.int64)
     label, rng = np.zeros(len(triangles), dtype=np.int64), np.random.default_rng(0)
-    return survey(np.asarray(mesh.vertices) * scale, triangles, label, rng)
+    return measure_object(np.asarray(mesh.vertices) * scale, triangles, label, rng)
 
 
 def made(mesh, field, scale):
     """Make a thing of a mesh that is drawn at a scale: how it is built, and its mass [kg]."""
     anatomy = surveyed(mesh, scale)
     (member,) = anatomy.members
-    scene = in_scene(field, (scale,))
-    return compose(anatomy, member, scene, np.random.default_rng(1)), weight(member, scene, 0.0)
+    scene = field_in_scene_scale(field, (scale,))
+    return infer_part_model(anatomy, member, scene, np.random.default_rng(1)), part_mass(
+        member, scene, 0.0
+    )
 
 
 @pytest.mark.parametrize("build", BUILDS)
@@ -90,7 +92,7 @@ def test_pieces_that_share_a_mesh_are_scaled_too():
         replace(SAID, name=n, thickness=t, volume_share=0.5, surface_share=0.5)
         for n, t in (("lid", 2e-4), ("body", 9e-4))
     ]
-    pieces = tuple(Piece(w, STEEL, Structure("shell", w.thickness)) for w in halves)
+    pieces = tuple(PartComponent(w, STEEL, Structure("shell", w.thickness)) for w in halves)
     field = field_of(Structure("shell", 9e-4), SAID, (pieces,))
     life, here = (made(CAN, field, scale)[0] for scale in (1.0, 0.37))
     inside = [CAN.volume * (1 - t / 0.03) ** 2 * (1 - t / 0.05) for t in (2e-4, 9e-4)]
@@ -100,21 +102,21 @@ def test_pieces_that_share_a_mesh_are_scaled_too():
 
 def test_at_life_size_nothing_is_touched():
     field = field_of(Structure("shell", 8e-4), SAID)
-    assert in_scene(field, (1.0,)) is field
-    assert not is_scaled(1.004)
-    assert is_scaled(0.99)
+    assert field_in_scene_scale(field, (1.0,)) is field
+    assert not is_not_life_size(1.004)
+    assert is_not_life_size(0.99)
 
 
 def test_a_leaf_of_twice_the_size_swings_half_as_fast():
     """ω ~ t/L² of a cantilever whose thickness is scaled with it; long leaves are cut likewise."""
-    leaf = find("leaf_tissue")
+    leaf = find_material("leaf_tissue")
     tissue = leaf.pick(leaf.typical())
     for length in (0.05, 0.4):
         rates = []
         for scale in (1.0, 2.0):
             size = 10 * length * scale
             (member,) = surveyed(FLAG, size).members
-            rates.append(swinging(member, FLAG.vertices * size, tissue, scale))
+            rates.append(leaf_frequencies(member, FLAG.vertices * size, tissue, scale))
         np.testing.assert_allclose(rates[1], rates[0] / 2, rtol=1e-12)
 
 
@@ -133,15 +135,15 @@ def a_scene():
 
 
 def test_a_scaled_scene_has_its_walls_where_its_things_are():
-    scene = scaled(a_scene(), 2.0)
+    scene = scale_scene(a_scene(), 2.0)
     assert scene.walls == (Wall((-1.0, 0.0, 0.0), (6.0, 1.0, 0.0)),)
     assert [o.scale for o in scene.objects] == [2.0, 8.0]
     assert [o.real_extent for o in scene.objects] == [0.2, 0.05]
 
 
 def test_each_thing_is_brought_back_to_its_real_size_where_it_stands():
-    scene = life_sized(scaled(a_scene(), 2.0))
-    boxes = boxes_of(scene)
+    scene = scale_to_life_size(scale_scene(a_scene(), 2.0))
+    boxes = object_boxes(scene)
     np.testing.assert_allclose(np.ptp(boxes, axis=1).max(axis=1), [0.2, 0.05], rtol=1e-12)
     np.testing.assert_allclose(boxes[:, 0, 2], 0.0, atol=1e-15)
     np.testing.assert_allclose(boxes.mean(axis=1)[:, :2], [[2.0, 4.0], [4.0, 4.0]], rtol=1e-12)

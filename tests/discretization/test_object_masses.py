@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from corporeal.core.types import Scene, SceneObject, Surface
-from corporeal.geometry.arrangement import scaled
-from corporeal.pipeline.in_memory import prepare
+from corporeal.geometry.scene_transforms import scale_scene
+from corporeal.pipeline.in_memory import prepare_scene
 from handmade import plain
 
 
@@ -24,7 +24,7 @@ def a_bin(wall):
 
 
 def said_of(scene, words):
-    return [w for w in prepare(scene).particles.warnings if words in w]
+    return [w for w in prepare_scene(scene).particles.warnings if words in w]
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def test_a_wall_as_thick_as_such_walls_are_is_not():
 
 def test_a_wall_is_judged_as_thick_as_it_is_in_life(thick):
     """A scene may show its things larger."""
-    larger = scaled(a_bin(0.009), 10.0)
+    larger = scale_scene(a_bin(0.009), 10.0)
     assert larger.objects[0].scale == pytest.approx(10.0)
     assert said_of(larger, "draws a wall") == thick
 
@@ -58,7 +58,7 @@ def test_a_face_is_judged_as_large_as_it_is_in_life():
     (life,) = said_of(ball, "ball_0 weighs")
     assert "kg per square metre of its largest side" in life
     assert "a ball longer than 0.4 m has 0.5 to 5" in life
-    assert said_of(scaled(ball, 0.1), "ball_0 weighs") == [life]
+    assert said_of(scale_scene(ball, 0.1), "ball_0 weighs") == [life]
     golf = replace(ball.objects[0], class_name="golf ball")
     assert "cubic metre" in said_of(replace(ball, objects=(golf,)), "ball_0 weighs")[0]
 

@@ -4,16 +4,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.discretization.rods import RING, Rod, rings, rod_of
-from corporeal.discretization.survey import survey
+from corporeal.discretization.mesh_measures import measure_object
+from corporeal.discretization.rods import (
+    SECTION_RING_RADIUS_RATIO,
+    Rod,
+    find_rod,
+    rod_section_points,
+)
 
 
 def found(mesh):
     rng = np.random.default_rng(0)
-    anatomy = survey(
+    anatomy = measure_object(
         np.array(mesh.vertices), np.array(mesh.faces), np.zeros(len(mesh.faces), np.int64), rng
     )
-    return rod_of(anatomy.members[0], rng)
+    return find_rod(anatomy.members[0], rng)
 
 
 def bow(turn, radius=0.01, length=0.5):
@@ -73,7 +78,7 @@ def test_what_is_no_rod_is_left_alone(mesh):
 
 def test_rings_have_the_second_moment_of_the_disc_they_stand_for():
     rod = Rod(np.array([[0.0, 0, 0], [1.0, 0, 0]]), 0.01)
-    points = rings(rod, 0.04, 0.01)
+    points = rod_section_points(rod, 0.04, 0.01)
     assert len(points) == 600
     assert np.mean(points[:, 1] ** 2) == pytest.approx(0.04**2 / 16, rel=0.003)
-    assert np.linalg.norm(points[:, 1:], axis=1) == pytest.approx(RING * 0.04)
+    assert np.linalg.norm(points[:, 1:], axis=1) == pytest.approx(SECTION_RING_RADIUS_RATIO * 0.04)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.discretization.sizes import Sizing, scene_extents
+from corporeal.discretization.object_scaling import SceneSizing, scene_extents
 
 DUCK, CAN, LAMP, COUCH = 0.12, 0.122, 0.45, 2.1
 THINGS = (DUCK, CAN, LAMP, COUCH)
@@ -18,21 +18,21 @@ def test_a_range_of_sixteen_becomes_one_of_less_than_three():
 
 def test_the_largest_takes_up_its_fraction_of_the_working_extent():
     assert scene_extents(THINGS).max() == 0.5
-    sizing = Sizing(working_extent=3.0, fraction=0.4)
+    sizing = SceneSizing(working_extent=3.0, fraction=0.4)
     assert scene_extents(THINGS, sizing).max() == pytest.approx(1.2, rel=1e-15)
 
 
 def test_true_proportions_are_kept_without_compression():
-    extents = scene_extents(THINGS, Sizing(gamma=1.0))
+    extents = scene_extents(THINGS, SceneSizing(gamma=1.0))
     np.testing.assert_allclose(extents / extents.max(), np.array(THINGS) / COUCH, rtol=1e-15)
 
 
 def test_without_any_exponent_all_are_as_large():
-    np.testing.assert_array_equal(scene_extents(THINGS, Sizing(gamma=0.0)), 0.5)
+    np.testing.assert_array_equal(scene_extents(THINGS, SceneSizing(gamma=0.0)), 0.5)
 
 
 def test_metric_means_metres_to_the_last_bit():
-    sizing = Sizing(gamma=0.2, metric=True, working_extent=7.0)
+    sizing = SceneSizing(gamma=0.2, metric=True, working_extent=7.0)
     np.testing.assert_array_equal(scene_extents(THINGS, sizing), THINGS)
 
 
@@ -46,11 +46,11 @@ def test_the_order_of_sizes_is_kept_and_the_unit_does_not_matter():
 @pytest.mark.parametrize(
     ("sizing", "words"),
     [
-        (Sizing(gamma=-0.1), "gamma is -0.1. Give a number from 0 to 1"),
-        (Sizing(gamma=1.5), "gamma is 1.5"),
-        (Sizing(gamma=float("nan")), "gamma is nan"),
-        (Sizing(working_extent=0.0), "working extent is 0.0"),
-        (Sizing(fraction=1.2), "fraction is 1.2"),
+        (SceneSizing(gamma=-0.1), "gamma is -0.1. Give a number from 0 to 1"),
+        (SceneSizing(gamma=1.5), "gamma is 1.5"),
+        (SceneSizing(gamma=float("nan")), "gamma is nan"),
+        (SceneSizing(working_extent=0.0), "working extent is 0.0"),
+        (SceneSizing(fraction=1.2), "fraction is 1.2"),
     ],
 )
 def test_a_rule_that_makes_no_sense_is_refused(sizing, words):

@@ -5,8 +5,8 @@ import pytest
 from laws.bodies import Stuff, ball, box, floor, problem
 
 from corporeal.core.types import Law, Material, Structure
-from corporeal.discretization.part import Motion, PartGeometry
-from corporeal.discretization.plan import plan
+from corporeal.discretization.discretization_plan import plan_discretization
+from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry
 from corporeal.mpm.cpu.engine import CpuEngine
 
 RUBBER = Material("rubber", Law.NEO_HOOKEAN, 20e6, 0.4999, 1100.0)
@@ -21,7 +21,7 @@ def pressed(stiffness):
         PartGeometry(k, m, Structure("solid"), size, np.pi / 6 * DIAMETER**3, np.pi * DIAMETER**2)
         for k, m in enumerate((RUBBER, FOAM))
     ]
-    found = plan(parts, [Motion(3.0, 9.81)] * 2, "draft", stiffness)
+    found = plan_discretization(parts, [ExpectedMotion(3.0, 9.81)] * 2, "draft", stiffness)
     cell, balls, plates = found.cell, [], []
     for k, t in enumerate(found.treatments):
         stuff = Stuff(young=t.young, poisson=t.poisson, density=t.density)

@@ -6,10 +6,10 @@ import pytest
 from exported import asked_of
 
 import corporeal as co
-from corporeal.export.motion import motion_of_scene
+from corporeal.export.export_target import ExportConfig, ExportRequest
 from corporeal.export.physical_scene import physical_scene
-from corporeal.export.target import Asked, ExportConfig
-from corporeal.pipeline.runner import read_back
+from corporeal.export.scene_motion import motion_of_scene
+from corporeal.pipeline.run_pipeline import read_run
 
 TITLE = "мяч ball 1"
 """A name with a space and letters that no identifier has."""
@@ -38,7 +38,7 @@ def run_folder(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def played(run_folder):
-    return read_back(run_folder).played
+    return read_run(run_folder).played
 
 
 @pytest.fixture(scope="session")
@@ -67,6 +67,6 @@ def settled():
         co.box("steel", (0.06, 0.06, 0.05), (0.03, 0.0, 0.065), name="block"),
         co.box("wood", (0.05, 0.05, 0.05), (0.03, 0.01, 0.115), name="cube"),
     )
-    prepared = co.prepare(replace(scene, settled=True))
+    prepared = co.prepare_scene(replace(scene, settled=True))
     motion = motion_of_scene(prepared)
-    return Asked(physical_scene(prepared, motion), motion, ExportConfig())
+    return ExportRequest(physical_scene(prepared, motion), motion, ExportConfig())

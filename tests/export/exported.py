@@ -4,17 +4,17 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.export.motion import motion_of_run
+from corporeal.export.export_target import ExportConfig, ExportRequest
 from corporeal.export.physical_scene import physical_scene
-from corporeal.export.target import Asked, ExportConfig
-from corporeal.geometry.rotation import matrix
+from corporeal.export.scene_motion import motion_of_run
+from corporeal.geometry.rotation import matrix_from_quaternion
 
 
 def asked_of(played, **settings):
     """What a writer is given of a run."""
     config = ExportConfig(**settings)
     motion = motion_of_run(played, config.at)
-    return Asked(physical_scene(played.prepared, motion), motion, config, played)
+    return ExportRequest(physical_scene(played.prepared, motion), motion, config, played)
 
 
 def rigid(asked):
@@ -27,7 +27,7 @@ def soft(asked):
 
 def turned(quaternion, points):
     """Rotate points by a quaternion (w, x, y, z)."""
-    return np.asarray(points) @ matrix(np.asarray(quaternion)).T
+    return np.asarray(points) @ matrix_from_quaternion(np.asarray(quaternion)).T
 
 
 def replaced(path: Path, old: str, new: str) -> None:

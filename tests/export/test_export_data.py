@@ -6,23 +6,25 @@ import numpy as np
 import pytest
 
 from corporeal.core.types import Law
-from corporeal.export.particle_arrays import KINDS, table_of
-from corporeal.export.particle_table import write_h5, write_npz
-from corporeal.export.readers import check
-from corporeal.export.table_statistics import Statistics
-from corporeal.export.target import NothingToWriteError
+from corporeal.export.check_exports import check_target
+from corporeal.export.dataset_statistics import DatasetStatistics
+from corporeal.export.export_target import NothingToWriteError
+from corporeal.export.particle_arrays import GNS_PARTICLE_TYPES, read_particle_table
+from corporeal.export.particle_h5_npz_writer import write_h5, write_npz
 
 OBSTACLE = 3
 """What both loaders hold still."""
 
 
 def test_particles_have_the_kinds_that_the_loaders_know(asked, played):
-    table, particles = table_of(asked), played.prepared.particles
+    table, particles = read_particle_table(asked), played.prepared.particles
     laws = [m.material.law for m in asked.scene.matter]
     for k, solid in enumerate(asked.scene.solids):
         kinds = set(table.kind[particles.object == k].tolist())
-        assert kinds == ({0} if solid.rigid else {KINDS[laws[solid.heaviest]]})
-    assert KINDS[Law.DRUCKER_PRAGER] == 6 and OBSTACLE not in KINDS.values()
+        assert kinds == ({0} if solid.rigid else {GNS_PARTICLE_TYPES[laws[solid.heaviest]]})
+    assert (
+        GNS_PARTICLE_TYPES[Law.DRUCKER_PRAGER] == 6 and OBSTACLE not in GNS_PARTICLE_TYPES.values()
+    )
 
 
 def test_the_loader_of_gns_reads_positions_kinds_and_a_property(written, asked, played):
@@ -42,7 +44,7 @@ def test_the_loader_of_gns_reads_positions_kinds_and_a_property(written, asked, 
 def test_metadata_are_moments_of_what_happens_from_frame_to_frame(written, asked):
     folder = written(write_npz)
     said = json.loads((folder / "metadata.json").read_text())
-    position = table_of(asked).position.astype(float)
+    position = read_particle_table(asked).position.astype(float)
     velocity, acceleration = np.diff(position, axis=0), np.diff(position, 2, axis=0)
     np.testing.assert_allclose(said["vel_mean"], velocity.mean(axis=(0, 1)), atol=1e-9)
     np.testing.assert_allclose(said["vel_std"], velocity.std(axis=(0, 1)), rtol=1e-5)
@@ -54,10 +56,10 @@ def test_metadata_are_moments_of_what_happens_from_frame_to_frame(written, asked
 
 
 def test_two_runs_count_together(asked):
-    table, both = table_of(asked), Statistics()
+    table, both = read_particle_table(asked), DatasetStatistics()
     both.add(table)
     both.add(table)
-    one = Statistics()
+    one = DatasetStatistics()
     one.add(table)
     np.testing.assert_allclose(both.metadata()["vel_mean"], one.metadata()["vel_mean"])
     assert len(both.lengths) == 2
@@ -75,7 +77,7 @@ def test_hdf5_keeps_what_others_forget(written, asked, played):
         np.testing.assert_array_equal(run["position"][-1], last.position)
         np.testing.assert_allclose(run["deformation"][-1], last.deformation, atol=2e-3)
         assert json.loads(run.attrs["corporeal"])[0]["values"]["density"]["source"]
-    assert check("h5", folder, asked).measured == {"position_off_m": 0.0, "mass_off_kg": 0.0}
+    assert check_target("h5", folder, asked).measured == {"position_off_m": 0.0, "mass_off_kg": 0.0}
 
 
 def test_one_changed_mass_is_found(written, asked):
@@ -83,7 +85,7 @@ def test_one_changed_mass_is_found(written, asked):
     folder = written(write_h5)
     with h5py.File(folder / "train.h5", "r+") as file:
         file["00000/mass"][3] *= 2
-    assert check("h5", folder, asked).measured["mass_off_kg"] > 0
+    assert check_target("h5", folder, asked).measured["mass_off_kg"] > 0
 
 
 def test_a_still_is_no_data(settled, tmp_path):

@@ -11,19 +11,19 @@ import pytest
 from exported import asked_of, rigid
 
 import corporeal as co
-from corporeal.core.types import Cloud, Gaussians, Reconstruction
-from corporeal.export.glb_film import write_glb_film
-from corporeal.export.read_glb_film import read_film
-from corporeal.export.readers import check
-from corporeal.export.splat_film import write_splat_film
-from corporeal.export.target import NothingToWriteError
-from corporeal.io.gltf_container import pack_glb, split_glb
-from corporeal.io.splats import read_splat
-from corporeal.simulation.played import Played
+from corporeal.core.types import FeatureCloud, Gaussians, Reconstruction
+from corporeal.export.animated_glb_reader import read_animated_glb
+from corporeal.export.animated_glb_writer import write_animated_glb
+from corporeal.export.check_exports import check_target
+from corporeal.export.export_target import NothingToWriteError
+from corporeal.export.splat_sequence_writer import write_splat_sequence
+from corporeal.io.gltf.gltf_container import pack_glb, split_glb
+from corporeal.io.splat.load_splat import load_splat
+from corporeal.simulation.simulation_result import SimulationResult
 
 ROOT = Path(__file__).parents[2]
 EMPTY = np.zeros((0, 3))
-NOBODY = Cloud(EMPTY, EMPTY, EMPTY, EMPTY, np.zeros(0, dtype=np.int64))
+NOBODY = FeatureCloud(EMPTY, EMPTY, EMPTY, EMPTY, np.zeros(0, dtype=np.int64))
 
 
 def opened(path):
@@ -39,7 +39,7 @@ def node_of(solid, document):
 
 
 def test_every_vertex_is_where_it_was_within_the_tolerance(written, asked):
-    found = check("glb", written(write_glb_film), asked)
+    found = check_target("glb", written(write_animated_glb), asked)
     # Quantisation adds a sixteen-thousandth of the size of a surface.
     assert found.measured["vertex_off_m"] < asked.config.tolerance + 1e-4
 
@@ -50,8 +50,8 @@ def test_a_finer_tolerance_is_kept_with_more_modes(played, written, tmp_path):
         asked = asked_of(played, tolerance=tolerance)
         folder = tmp_path / f"{tolerance}"
         folder.mkdir()
-        said = write_glb_film(asked, folder)
-        errors.append(check("glb", folder, asked).measured["vertex_off_m"])
+        said = write_animated_glb(asked, folder)
+        errors.append(check_target("glb", folder, asked).measured["vertex_off_m"])
         modes.append(said.measured["modes"])
         assert said.measured["vertex_error_m"] <= tolerance
     assert errors[1] < errors[0] and modes[1] > modes[0]
@@ -59,7 +59,7 @@ def test_a_finer_tolerance_is_kept_with_more_modes(played, written, tmp_path):
 
 
 def test_a_changed_frame_is_found(written, asked):
-    folder = written(write_glb_film)
+    folder = written(write_animated_glb)
     document, binary = opened(folder / "film.glb")
     (block,) = rigid(asked)
     node = document["nodes"].index(node_of(block, document))
@@ -76,11 +76,11 @@ def test_a_changed_frame_is_found(written, asked):
     keys[-1, 0] += 0.01
     data[start : start + keys.nbytes] = keys.tobytes()
     (folder / "film.glb").write_bytes(pack_glb(document, bytes(data)))
-    assert check("glb", folder, asked).measured["vertex_off_m"] > 5e-3
+    assert check_target("glb", folder, asked).measured["vertex_off_m"] > 5e-3
 
 
 def test_times_begin_at_zero_and_nodes_say_what_they_are_made_of(written, asked):
-    document, _ = opened(written(write_glb_film) / "film.glb")
+    document, _ = opened(written(write_animated_glb) / "film.glb")
     times = document["accessors"][document["animations"][0]["samplers"][0]["input"]]
     assert times["min"] == [0.0] and times["max"] == pytest.approx([0.1])
     for solid in asked.scene.solids:
@@ -92,20 +92,20 @@ def test_times_begin_at_zero_and_nodes_say_what_they_are_made_of(written, asked)
 
 
 def test_weights_of_targets_need_no_clipping(written):
-    film = read_film(written(write_glb_film) / "film.glb")
+    film = read_animated_glb(written(write_animated_glb) / "film.glb")
     weights = [v for (_, path), v in film.tracks.items() if path == "weights"]
     assert weights
     assert all(w.min() >= 0 and w.max() <= 1 for w in weights)
 
 
 def test_a_scene_before_any_simulation_is_a_still(written, settled):
-    document, _ = opened(written(write_glb_film, settled) / "film.glb")
+    document, _ = opened(written(write_animated_glb, settled) / "film.glb")
     assert "animations" not in document
 
 
 def test_a_tolerance_of_nothing_is_refused(played, tmp_path):
     with pytest.raises(co.UserError, match="--tolerance is 0 m"):
-        write_glb_film(asked_of(played, tolerance=0.0), tmp_path)
+        write_animated_glb(asked_of(played, tolerance=0.0), tmp_path)
 
 
 def test_the_khronos_validator_finds_nothing(written, asked):
@@ -118,7 +118,7 @@ def test_the_khronos_validator_finds_nothing(written, asked):
         f"{asks}.validateBytes(new Uint8Array(require('fs').readFileSync(process.argv[1])))"
         ".then(r => console.log(r.issues.numErrors, r.issues.numWarnings))"
     )
-    path = written(write_glb_film) / "film.glb"
+    path = written(write_animated_glb) / "film.glb"
     said = subprocess.run(["node", "-e", script, str(path)], cwd=ROOT, capture_output=True)
     assert said.stdout.split() == [b"0", b"0"], said.stderr
 
@@ -130,10 +130,10 @@ def test_alembic_holds_every_shape(written, asked):
     pytest.importorskip("alembic3d", reason="pip install 'corporeal[export]'")
     from alembic3d import Abc, AbcGeom
 
-    from corporeal.export.alembic_film import write_alembic
+    from corporeal.export.alembic_writer import write_alembic
 
     folder = written(write_alembic)
-    assert check("abc", folder, asked).measured["vertex_off_m"] < 1e-6
+    assert check_target("abc", folder, asked).measured["vertex_off_m"] < 1e-6
     top = Abc.IArchive(str(folder / "film.abc")).getTop()
     for solid in asked.scene.solids:
         node = AbcGeom.IXform(top, solid.name)
@@ -149,7 +149,7 @@ def test_alembic_faces_turn_clockwise_seen_from_outside(written, asked):
     pytest.importorskip("alembic3d", reason="pip install 'corporeal[export]'")
     from alembic3d import Abc, AbcGeom
 
-    from corporeal.export.alembic_film import write_alembic
+    from corporeal.export.alembic_writer import write_alembic
 
     top = Abc.IArchive(str(written(write_alembic) / "film.abc")).getTop()
     (block,) = rigid(asked)
@@ -194,17 +194,17 @@ def gaussians_on(played):
 
 def test_gaussians_go_where_the_surfaces_go(played, asked, written):
     found = gaussians_on(played)
-    made = Played(played.prepared, played.trajectory, found)
-    folder = written(write_splat_film, replace(asked, played=made))
+    made = SimulationResult(played.prepared, played.trajectory, found)
+    folder = written(write_splat_sequence, replace(asked, played=made))
     files = sorted(folder.glob("frame_*.ply"))
     assert len(files) == len(asked.motion.time)
-    last = read_splat(files[-1])
+    last = load_splat(files[-1])
     moved = np.concatenate(_surfaces(asked))
     np.testing.assert_allclose(last.mean[:-1], moved, atol=2e-3)
     np.testing.assert_allclose(last.mean[-1], 1.0)
     said = json.loads((folder / "film.json").read_text())
     assert said["fps"] == asked.scene.fps and said["parts"]
-    assert check("splats", folder, asked).measured == {"frames_missing": 0.0, "counts": 1.0}
+    assert check_target("splats", folder, asked).measured == {"frames_missing": 0.0, "counts": 1.0}
 
 
 def test_usd_has_the_gaussians_of_every_object_at_every_frame(played, asked, written):
@@ -215,15 +215,15 @@ def test_usd_has_the_gaussians_of_every_object_at_every_frame(played, asked, wri
     rng = np.random.default_rng(0)  # looks that differ from side to side turn with their object
     sh = rng.normal(0, 0.3, (found.gaussians.count, 4, 3)).astype(np.float32)
     found = replace(found, gaussians=replace(found.gaussians, sh=sh))
-    of = replace(asked, played=Played(played.prepared, played.trajectory, found))
-    folder = written(write_splat_film, of)
+    of = replace(asked, played=SimulationResult(played.prepared, played.trajectory, found))
+    folder = written(write_splat_sequence, of)
     stage = Usd.Stage.Open(str(folder / "splats.usda"))
     registry = UsdValidation.ValidationRegistry()
     validators = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     assert [e.GetErrorAsString() for e in validators.Validate(stage)] == []
     assert stage.GetTimeCodesPerSecond() == asked.scene.fps
     for frame in (0, 2, 4):
-        wanted = read_splat(folder / f"frame_{frame:04d}.ply")
+        wanted = load_splat(folder / f"frame_{frame:04d}.ply")
         for solid in asked.scene.solids:
             prim = stage.GetPrimAtPath(f"/World/{solid.name}/splats")
             own = found.object_of_gaussian == solid.number
@@ -256,4 +256,4 @@ def _surfaces(asked):
 
 def test_a_scene_of_surfaces_has_no_gaussians(asked, tmp_path):
     with pytest.raises(NothingToWriteError, match="no Gaussians"):
-        write_splat_film(asked, tmp_path)
+        write_splat_sequence(asked, tmp_path)

@@ -13,7 +13,7 @@ import pytest
 
 import corporeal
 from corporeal.core import store
-from corporeal.export import export as verb
+from corporeal.export import export_scene as verb
 
 SOURCE = str(Path(corporeal.__file__).parents[1])
 ORDERS = (("usd", "mjcf"), ("mjcf", "usd"))
@@ -40,7 +40,7 @@ def files(folder):
     return {
         str(p.relative_to(folder)): p.read_bytes()
         for p in sorted(folder.rglob("*"))
-        if p.is_file() and p.name != store.LOCK
+        if p.is_file() and p.name != store.LOCK_FILE
     }
 
 
@@ -61,7 +61,7 @@ def killed_while(process, place, longest=120.0):
 def complete(run_folder, tmp_path_factory):
     """What an export holds that nobody disturbed."""
     out = tmp_path_factory.mktemp("whole") / NAME
-    verb.export(run_folder, ORDERS[0], out)
+    verb.export_scene(run_folder, ORDERS[0], out)
     return {k: v for k, v in files(out).items() if k != "export.json"}
 
 
@@ -78,14 +78,16 @@ def test_killed_at_any_time_leaves_whole_targets_or_none(run_folder, tmp_path, c
         mine = {k: v for k, v in complete.items() if k.startswith(f"{target}/")}
         assert {f"{target}/{k}": v for k, v in files(out / target).items()} == mine
     # The same command again needs no cleaning, and what it writes is what it always writes.
-    verb.export(run_folder, targets, out)
+    verb.export_scene(run_folder, targets, out)
     assert {k: v for k, v in files(out).items() if k != "export.json"} == complete
-    assert [p.name for p in out.iterdir() if p.name.startswith(".") and p.name != store.LOCK] == []
+    assert [
+        p.name for p in out.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE
+    ] == []
 
 
 def test_killed_over_an_older_export_leaves_the_older_one(run_folder, tmp_path):
     out = tmp_path / NAME
-    verb.export(run_folder, ["usd"], out)
+    verb.export_scene(run_folder, ["usd"], out)
     before = files(out)
     words = ("export", run_folder, "--to", "usd", "--at", "end", "--out", out)
     assert killed_while(started(*words), out / ".usd.part")

@@ -8,17 +8,17 @@ import pytest
 from exported import asked_of, replaced, rigid, soft
 
 import corporeal as co
-from corporeal.export.mjcf import STEP, write_mjcf
-from corporeal.export.motion import motion_of_scene
-from corporeal.export.physical_scene import physical_scene
-from corporeal.export.readers import (
-    body_off,
-    check,
+from corporeal.export.check_exports import (
+    body_mass_error,
+    check_target,
     drift_in_mujoco,
     urdf_in_mujoco,
 )
-from corporeal.export.target import Asked, ExportConfig, NothingToWriteError
-from corporeal.export.urdf import write_urdf
+from corporeal.export.export_target import ExportConfig, ExportRequest, NothingToWriteError
+from corporeal.export.mjcf_writer import TIME_STEP_S, write_mjcf
+from corporeal.export.physical_scene import physical_scene
+from corporeal.export.scene_motion import motion_of_scene
+from corporeal.export.urdf_writer import write_urdf
 
 
 def compiled(folder):
@@ -27,9 +27,9 @@ def compiled(folder):
 
 def before(scene, **settings):
     """What is asked of a scene before any simulation."""
-    prepared = co.prepare(scene)
+    prepared = co.prepare_scene(scene)
     motion = motion_of_scene(prepared)
-    return Asked(physical_scene(prepared, motion), motion, ExportConfig(**settings))
+    return ExportRequest(physical_scene(prepared, motion), motion, ExportConfig(**settings))
 
 
 def compare_bodies(model, asked):
@@ -37,7 +37,7 @@ def compare_bodies(model, asked):
     mujoco.mj_forward(model, data)
     for solid in rigid(asked):
         body = model.body(solid.name)
-        assert body_off(body, solid) < 1e-6
+        assert body_mass_error(body, solid) < 1e-6
         np.testing.assert_allclose(data.xipos[body.id], solid.origin, atol=1e-9)
         turn = data.ximat[body.id].reshape(3, 3)
         inertia = turn @ np.diag(body.inertia) @ turn.T
@@ -78,7 +78,7 @@ def test_what_was_settled_stays_where_it_is(written, settled):
 
 
 def test_the_check_measures_the_drift(written, settled):
-    found = check("mjcf", written(write_mjcf, settled), settled)
+    found = check_target("mjcf", written(write_mjcf, settled), settled)
     assert found.measured["mass_and_inertia_off"] < 1e-6
     assert max(v for k, v in found.measured.items() if k.startswith("drift_m")) < 1e-4
 
@@ -112,7 +112,7 @@ def test_a_ball_returns_the_share_of_its_speed_that_it_should(written, restituti
     table = np.full_like(asked.scene.restitution, restitution)
     asked = replace(asked, scene=replace(asked.scene, restitution=table))
     model = compiled(written(write_mjcf, asked))
-    assert model.opt.timestep == STEP
+    assert model.opt.timestep == TIME_STEP_S
     data = mujoco.MjData(model)
     down, up = 0.0, 0.0
     while data.time < 0.3:
@@ -193,14 +193,14 @@ def test_urdf_bodies_have_mass_and_inertia(written, asked):
     folder = written(write_urdf)
     (block,) = rigid(asked)
     model = urdf_in_mujoco(folder / f"{block.name}.urdf")
-    assert body_off(model.body("body"), block) < 1e-6
-    assert check("urdf", folder, asked).measured["mass_and_inertia_off"] < 1e-6
+    assert body_mass_error(model.body("body"), block) < 1e-6
+    assert check_target("urdf", folder, asked).measured["mass_and_inertia_off"] < 1e-6
 
 
 def test_one_changed_mass_of_a_urdf_is_found(written, asked):
     folder = written(write_urdf)
     replaced(folder / "block.urdf", '<mass value="', '<mass value="1')
-    assert check("urdf", folder, asked).measured["mass_and_inertia_off"] > 0.1
+    assert check_target("urdf", folder, asked).measured["mass_and_inertia_off"] > 0.1
 
 
 def test_where_a_urdf_stands_is_beside_it(written, asked):

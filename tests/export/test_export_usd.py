@@ -5,8 +5,8 @@ import pytest
 from exported import asked_of, replaced, rigid, soft, turned
 
 from corporeal.core.types import Law
-from corporeal.export.readers import check
-from corporeal.export.usd_scene import write_usd
+from corporeal.export.check_exports import check_target
+from corporeal.export.usd_writer import write_usd
 
 pxr = pytest.importorskip("pxr", reason="usd-core reads USD: pip install 'corporeal[export]'")
 from pxr import Usd, UsdGeom, UsdPhysics, UsdShade  # noqa: E402
@@ -58,7 +58,7 @@ def compare_friction(stage, asked):
 
 
 def test_openusd_finds_nothing_to_complain_of(usd, asked):
-    found = check("usd", usd, asked)
+    found = check_target("usd", usd, asked)
     assert found.doubts == ()
     assert found.measured["findings"] == 0
     assert found.measured["mass_and_inertia_off"] < 1e-6
@@ -67,7 +67,7 @@ def test_openusd_finds_nothing_to_complain_of(usd, asked):
 def test_a_finding_is_told(usd, asked):
     replaced(usd / "physics.usda", "physics:mass = ", "physics:mass = -")
     replaced(usd / "sim.usda", "metersPerUnit = 1", "")
-    found = check("usd", usd, asked)
+    found = check_target("usd", usd, asked)
     assert found.measured["findings"] > 0 or found.measured["mass_and_inertia_off"] > 1
 
 
@@ -237,13 +237,13 @@ def test_colliders_have_few_corners_where_asked(settled, tmp_path):
     from dataclasses import replace
 
     import corporeal as co
-    from corporeal.export.motion import motion_of_scene
+    from corporeal.export.export_target import ExportConfig, ExportRequest
     from corporeal.export.physical_scene import physical_scene
-    from corporeal.export.target import Asked, ExportConfig
+    from corporeal.export.scene_motion import motion_of_scene
 
-    prepared = co.prepare(co.build_scene(co.ball("steel", 0.03, (0, 0, 0.03))))
+    prepared = co.prepare_scene(co.build_scene(co.ball("steel", 0.03, (0, 0, 0.03))))
     motion = motion_of_scene(prepared)
-    of = Asked(physical_scene(prepared, motion), motion, ExportConfig())
+    of = ExportRequest(physical_scene(prepared, motion), motion, ExportConfig())
     corners = {}
     for most in (0, 64):
         folder = tmp_path / f"{most}"

@@ -10,9 +10,9 @@ import pytest
 
 import corporeal as co
 from corporeal.core import store
-from corporeal.export import export as verb
-from corporeal.export.record import read_record
-from corporeal.export.target import MENU
+from corporeal.export import export_scene as verb
+from corporeal.export.export_record import read_record
+from corporeal.export.export_target import EXPORT_WRITERS
 
 
 def contents(folder):
@@ -23,7 +23,9 @@ def contents(folder):
 
 def left(folder):
     """What lies in a folder beside what was finished."""
-    return [p.name for p in folder.iterdir() if p.name.startswith(".") and p.name != store.LOCK]
+    return [
+        p.name for p in folder.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE
+    ]
 
 
 def complaints(said):
@@ -53,22 +55,22 @@ def test_a_run_is_exported_from_the_command_line(command, run_folder, tmp_path):
 def test_without_a_place_it_goes_into_the_run(run_folder, tmp_path):
     run = tmp_path / "run"
     shutil.copytree(run_folder, run)
-    verb.export(run, ["glb"])
+    verb.export_scene(run, ["glb"])
     assert (run / "export" / "glb" / "film.glb").exists()
     # The run is none the staler for it.
-    from corporeal.pipeline.runner import status
+    from corporeal.pipeline.run_pipeline import stage_states
 
-    assert ("simulate", "finished") in {(s.verb, s.state) for s in status(run)}
+    assert ("simulate", "finished") in {(s.verb, s.state) for s in stage_states(run)}
 
 
 def test_the_same_run_gives_the_same_bytes(run_folder, tmp_path):
     for name in ("a", "b"):
-        verb.export(run_folder, ["usd", "mjcf", "urdf", "glb"], tmp_path / name)
+        verb.export_scene(run_folder, ["usd", "mjcf", "urdf", "glb"], tmp_path / name)
     files = [p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*") if p.is_file()]
     different = [
         f for f in files if (tmp_path / "a" / f).read_bytes() != (tmp_path / "b" / f).read_bytes()
     ]
-    assert [f.name for f in different if f.name != store.LOCK] == []
+    assert [f.name for f in different if f.name != store.LOCK_FILE] == []
 
 
 def test_what_has_no_word_in_a_format_is_skipped_with_a_sentence(command, run_folder, tmp_path):
@@ -118,12 +120,12 @@ def test_a_scene_can_leave_before_it_was_simulated(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scene = co.build_scene(co.box("steel", (0.1, 0.1, 0.1), (0, 0, 0.05), name="cube"))
     co.write_glb(tmp_path / "сцена.glb", scene)
-    record = verb.export("сцена.glb", ["usd", "mjcf", "glb"])
+    record = verb.export_scene("сцена.glb", ["usd", "mjcf", "glb"])
     assert not any(row.skipped for row in record.targets.values())
     assert (tmp_path / "сцена-export" / "usd" / "sim.usda").exists()
     assert not (tmp_path / "сцена-export" / "usd" / "film.usda").exists()
     with pytest.raises(co.UserError, match="only start is known"):
-        verb.export("сцена.glb", ["usd"], config=verb.ExportConfig(at="end"))
+        verb.export_scene("сцена.glb", ["usd"], config=verb.ExportConfig(at="end"))
 
 
 # ---------------------------------------------------------------- nothing half-written
@@ -142,7 +144,9 @@ def breaking(monkeypatch):
     """Let the writer of GLB fail in the middle."""
 
     def set_(error):
-        monkeypatch.setattr("corporeal.export.glb_film.write_glb_film", broken(error))
+        monkeypatch.setattr(
+            "corporeal.export.animated_glb_writer.write_animated_glb", broken(error)
+        )
 
     return set_
 
@@ -159,7 +163,7 @@ def test_a_disk_that_refuses_leaves_what_was_there(
     command, run_folder, tmp_path, breaking, number, told
 ):
     out = tmp_path / "out"
-    verb.export(run_folder, ["glb"], out)
+    verb.export_scene(run_folder, ["glb"], out)
     before = contents(out / "glb")
     breaking(OSError(number, os.strerror(number)))
     code, said = command("export", run_folder, "--to", "glb", "--out", out)
@@ -189,7 +193,7 @@ def test_a_file_in_the_way_is_told(command, run_folder, tmp_path):
 
 
 def test_what_a_killed_export_left_is_cleared_away(run_folder, tmp_path):
-    verb.export(run_folder, ["glb"], tmp_path)
+    verb.export_scene(run_folder, ["glb"], tmp_path)
     # Killed between the two renamings: the old folder is aside, the new one not yet there.
     (tmp_path / "glb").rename(tmp_path / ".glb.before")
     (tmp_path / ".glb.part").mkdir()
@@ -202,7 +206,7 @@ def test_what_a_killed_export_left_is_cleared_away(run_folder, tmp_path):
 
 
 def test_two_exports_at_once_do_not_mix(command, run_folder, tmp_path):
-    with store.alone(tmp_path):
+    with store.lock_folder(tmp_path):
         code, said = command("export", run_folder, "--to", "glb", "--out", tmp_path)
     assert code == 2 and "Another corporeal" in said.err
 
@@ -219,18 +223,18 @@ def test_a_missing_library_is_named_with_its_cure(command, run_folder, tmp_path,
 
 
 def test_earlier_targets_stay_in_the_record(run_folder, tmp_path):
-    verb.export(run_folder, ["glb"], tmp_path)
-    verb.export(run_folder, ["npz"], tmp_path)
+    verb.export_scene(run_folder, ["glb"], tmp_path)
+    verb.export_scene(run_folder, ["npz"], tmp_path)
     assert set(read_record(tmp_path / "export.json").targets) == {"glb", "npz"}
     shutil.rmtree(tmp_path / "glb")
-    verb.export(run_folder, ["npz"], tmp_path)
+    verb.export_scene(run_folder, ["npz"], tmp_path)
     assert set(read_record(tmp_path / "export.json").targets) == {"npz"}
 
 
 def test_the_menu_has_a_writer_for_every_target():
     from importlib import import_module
 
-    for place in MENU.values():
+    for place in EXPORT_WRITERS.values():
         module, _, name = place.partition(":")
         assert callable(getattr(import_module(module), name))
 
@@ -247,7 +251,7 @@ def test_a_corpus_becomes_one_data_set(run_folder, tmp_path):
     for name in ("scene_0", "scene_1"):
         shutil.copytree(run_folder, corpus / "runs" / name)
     (corpus / "runs" / "unfinished").mkdir()
-    record = verb.export(corpus, ["npz", "glb"])
+    record = verb.export_scene(corpus, ["npz", "glb"])
     assert record.targets["npz"].measured["runs"] == 2
     with np.load(corpus / "export" / "npz" / "train.npz", allow_pickle=True) as file:
         assert len(file["gns_data"]) == 2

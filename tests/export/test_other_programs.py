@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 from exported import asked_of, replaced, rigid, soft
 
-from corporeal.export.alembic_film import write_alembic
-from corporeal.export.few_corners import colliders
-from corporeal.export.glb_film import write_glb_film
-from corporeal.export.particle_table import write_h5, write_npz
-from corporeal.export.urdf import write_urdf
+from corporeal.export.alembic_writer import write_alembic
+from corporeal.export.animated_glb_writer import write_animated_glb
+from corporeal.export.particle_h5_npz_writer import write_h5, write_npz
+from corporeal.export.simplify_colliders import solid_colliders
+from corporeal.export.urdf_writer import write_urdf
 from corporeal.export.usd_geometry import named_colliders
-from corporeal.export.usd_physics import fitted
-from corporeal.export.usd_scene import write_usd
+from corporeal.export.usd_physics import fit_friction
+from corporeal.export.usd_writer import write_usd
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = Path(__file__).parent / "programs"
@@ -76,9 +76,9 @@ def compare_rigid(said, asked):
 def compare_with_newton(said, asked):
     """Also frictions, the particles' mass, and how many have which modulus."""
     compare_rigid(said, asked)
-    surfaces = fitted(asked.scene, asked.config.friction_for).coefficient
+    surfaces = fit_friction(asked.scene, asked.config.friction_for).coefficient
     for solid in rigid(asked):
-        for name, collider in zip(names_of(solid), colliders(solid), strict=True):
+        for name, collider in zip(names_of(solid), solid_colliders(solid), strict=True):
             found = said["friction"][f"/World/{solid.name}/colliders/{name}"]
             assert found == pytest.approx(surfaces[collider.part], rel=1e-6)
     masses = sum(s.grains.mass.sum() for s in soft(asked))
@@ -201,7 +201,7 @@ def largest_error(posed, asked):
     [
         (write_usd, "film.usda", 1e-5),
         (write_alembic, "film.abc", 1e-5),
-        (write_glb_film, "film.glb", 1e-3),
+        (write_animated_glb, "film.glb", 1e-3),
     ],
     ids=["usd", "alembic", "glb"],
 )

@@ -7,9 +7,9 @@ import pytest
 from exported import asked_of, rigid, soft
 
 import corporeal as co
-from corporeal.export.friction import surface_friction
-from corporeal.export.motion import frame_at
-from corporeal.export.names import identifiers
+from corporeal.export.identifiers import identifiers
+from corporeal.export.scene_motion import frame_at
+from corporeal.export.surface_friction import surface_friction
 
 
 def test_the_frame_of_a_solid_is_its_centre_of_mass(asked, played):
@@ -82,10 +82,10 @@ def test_pushes_and_winds_are_said_to_be_left_out(settled):
     scene = settled.motion.scene
     pushed = replace(scene.objects[0], push=co.Push((1.0, 0.0, 0.0)))
     blown = replace(scene.objects[1], wind=co.Wind((1.0, 0.0, 0.0)))
-    from corporeal.export.unsaid import unsaid
+    from corporeal.export.unsupported_features import unsupported_features
 
     scene = replace(scene, objects=(pushed, blown, scene.objects[2]))
-    told = unsaid(scene, settled.motion.source, settled.motion)
+    told = unsupported_features(scene, settled.motion.source, settled.motion)
     assert [s.split(" ")[0] for s in told] == ["board", "Wind"]
 
 

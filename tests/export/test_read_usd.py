@@ -11,11 +11,11 @@ pytest.importorskip("pxr", reason="usd-core reads USD: pip install 'corporeal[ex
 import corporeal as co
 from corporeal.core.errors import UserError
 from corporeal.core.types import Wall
-from corporeal.export.motion import motion_of_scene
+from corporeal.export.export_target import ExportConfig, ExportRequest
 from corporeal.export.physical_scene import physical_scene
-from corporeal.export.target import Asked, ExportConfig
-from corporeal.export.usd_scene import write_usd
-from corporeal.io.usd_bodies import read_usd_physics
+from corporeal.export.scene_motion import motion_of_scene
+from corporeal.export.usd_writer import write_usd
+from corporeal.io.usd.usd_bodies import read_usd_physics
 
 FOREIGN = """#usda 1.0
 (
@@ -100,7 +100,7 @@ def test_our_own_come_back_as_a_scene_with_all_that_they_carry(played, tmp_path)
     scene = replace(before.scene, walls=walls, gravity=(0.0, 0.3, -3.7))
     before = replace(before, scene=scene)
     motion = motion_of_scene(before)
-    write_usd(Asked(physical_scene(before, motion), motion, ExportConfig()), tmp_path)
+    write_usd(ExportRequest(physical_scene(before, motion), motion, ExportConfig()), tmp_path)
     scene = co.load_scene(tmp_path / "sim.usda")
     for old, new in zip(before.scene.objects, scene.objects, strict=True):
         assert (new.name, new.class_name) == (old.name, old.class_name)
@@ -108,7 +108,7 @@ def test_our_own_come_back_as_a_scene_with_all_that_they_carry(played, tmp_path)
         np.testing.assert_allclose(new.velocity, old.velocity, atol=1e-9)
     assert (scene.walls, scene.gravity) == (walls, (0.0, 0.3, -3.7))
     assert (scene.duration, scene.fps, scene.settled) == (0.1, 40, False)
-    after = co.prepare(scene)
+    after = co.prepare_scene(scene)
     for old, new in zip(before.field.materials, after.field.materials, strict=True):
         assert (old.name, old.law) == (new.name, new.law)
         assert old.grounds == new.grounds  # value, range, source, chooser, reason, margin

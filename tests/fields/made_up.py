@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from corporeal.geometry.mesh import joined
-from corporeal.geometry.spread import sample_surface
+from corporeal.geometry.mesh import join_meshes
+from corporeal.geometry.point_sampling import sample_surface
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.segment import segment
-from corporeal.showcase.props import prop
+from corporeal.showcase.prop_scene import prop_scene
 
 VOXELS = 64
 """Along the longest side."""
@@ -41,10 +41,10 @@ class Thing:
 
 def thing(name):
     rng = np.random.default_rng(0)
-    scene = prop(name)
+    scene = prop_scene(name)
     inventory = describe(scene)
     parts = segment(scene, inventory)
-    points, triangle = sample_surface(joined(scene.surfaces), 12_000, rng)
+    points, triangle = sample_surface(join_meshes(scene.surfaces), 12_000, rng)
     mixed = rng.permutation(len(points))  # whoever comes first has the voxel
     points, own = points[mixed], parts.part_of_point[triangle[mixed]]
     cell = np.ptp(points, axis=0).max() / VOXELS

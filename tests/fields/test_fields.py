@@ -9,14 +9,14 @@ import pytest
 
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Law
-from corporeal.fields.impose import impose
-from corporeal.fields.per_part import nearest_samples, numbers_per_part
-from corporeal.fields.registration import axis_turns, register
-from corporeal.fields.samples import checked
-from corporeal.fields.specification import asked
-from corporeal.fields.vomp import read_vomp
+from corporeal.fields.field_per_part import nearest_samples, sum_up_per_part
+from corporeal.fields.field_registration import axis_turns, register_points
+from corporeal.fields.field_specification import parse_field_specification
+from corporeal.fields.impose_field import impose_field
+from corporeal.fields.sampled_field import check_field
+from corporeal.fields.vomp_reader import read_vomp
 from corporeal.pipeline.settings.ground_config import GroundConfig, validate
-from corporeal.pipeline.stages.ground import doubts, ground
+from corporeal.pipeline.stages.ground import ground, grounding_warnings
 from fields import made_up
 
 WRITERS = {"vomp": (made_up.write_vomp, "npz"), "pixie": (made_up.write_pixie, "ply")}
@@ -51,12 +51,12 @@ def test_there_are_24_ways_to_turn_axes_into_axes():
 def test_a_field_finds_its_parts_in_any_frame(name, kind, frame, tmp_path):
     it = thing(name)
     path = written(tmp_path, kind, name, frame)
-    field = asked(f"{kind}:{path}").read(path)
-    placed = register(field.position, it.points, path)
+    field = parse_field_specification(f"{kind}:{path}").read(path)
+    placed = register_points(field.position, it.points, path)
     sample, near = nearest_samples(placed, it.points)
     assert near.mean() > 0.95
     assert (it.part_of_voxel[sample] == it.part_of_point).mean() >= 0.9
-    told = numbers_per_part(field, placed, it.points, it.part_of_point)
+    told = sum_up_per_part(field, placed, it.points, it.part_of_point)
     kept = {k: n for k, n in told.items() if not n.unfit}
     assert kept
     for k, numbers in kept.items():
@@ -67,7 +67,7 @@ def test_a_field_finds_its_parts_in_any_frame(name, kind, frame, tmp_path):
 def test_numbers_of_a_field_replace_ours_and_the_rest_is_borrowed(kind, tmp_path):
     it, before = thing("armchair"), ours("armchair")
     path = written(tmp_path, kind, "armchair", "y-up")
-    field = impose(before, it.scene, it.parts, f"{kind}:{path}")
+    field = impose_field(before, it.scene, it.parts, f"{kind}:{path}")
     replaced = [m for m in field.materials if m.grounds["young"].chosen_by == "field"]
     assert len(replaced) >= 3
     for now, then in zip(field.materials, before.materials, strict=True):
@@ -79,7 +79,7 @@ def test_numbers_of_a_field_replace_ours_and_the_rest_is_borrowed(kind, tmp_path
         assert now.yield_stress == then.yield_stress and now.friction == then.friction
         assert now.grounds["friction"].chosen_by == "borrowed"
     (note,) = field.notes
-    assert note in doubts(field, it.parts, it.scene)
+    assert note in grounding_warnings(field, it.parts, it.scene)
     assert re.search(r"outside our measured ranges, used all the same: \d+", note)
 
 
@@ -87,7 +87,7 @@ def test_a_part_that_the_field_does_not_resolve_keeps_our_numbers(tmp_path):
     """The spider that holds the lamp's shade is thinner than a voxel."""
     it, before = thing("floor_lamp"), ours("floor_lamp")
     path = written(tmp_path, "vomp", "floor_lamp")
-    field = impose(before, it.scene, it.parts, f"vomp:{path}")
+    field = impose_field(before, it.scene, it.parts, f"vomp:{path}")
     told = re.findall(r"([\w ]+) \(E spans [\d.]+ decades within it\)", field.notes[0])
     assert told
     names = [part.name for part in it.parts.catalogue]
@@ -102,7 +102,7 @@ def test_a_part_beyond_the_field_keeps_our_numbers(tmp_path):
     there = (it.part_of_voxel != leaves) | (it.voxel[:, 2] > 0.9 * it.voxel[:, 2].max())
     path = tmp_path / "field.npz"
     made_up.write_vomp(path, it.voxel[there], np.full(there.sum(), 1e6))
-    field = impose(before, it.scene, it.parts, f"vomp:{path}")
+    field = impose_field(before, it.scene, it.parts, f"vomp:{path}")
     assert field.materials[leaves] == before.materials[leaves]
     assert re.search(r"leaves \(only \d+% of it lies near a point", field.notes[0])
 
@@ -113,31 +113,31 @@ def test_pixies_kinds_choose_laws_with_what_these_need(tmp_path):
     laws[5] = Law.DRUCKER_PRAGER
     for kind, law in laws.items():
         path = written(tmp_path, "pixie", "armchair", kind=kind)
-        for material in impose(before, it.scene, it.parts, f"pixie:{path}").materials:
+        for material in impose_field(before, it.scene, it.parts, f"pixie:{path}").materials:
             if material.grounds["young"].chosen_by == "field":
                 assert material.law is law
                 assert law is not Law.VON_MISES or material.yield_stress
                 assert law is not Law.DRUCKER_PRAGER or material.friction_angle
     same = written(tmp_path, "pixie", "armchair", kind=6)  # stationary: judged like any part
     for now, then in zip(
-        impose(before, it.scene, it.parts, f"pixie:{same}").materials,
+        impose_field(before, it.scene, it.parts, f"pixie:{same}").materials,
         before.materials,
         strict=True,
     ):
         assert now.law is then.law
     fluid = written(tmp_path, "pixie", "armchair", kind=4)
     with pytest.raises(UserError, match="for a fluid"):
-        impose(before, it.scene, it.parts, f"pixie:{fluid}")
+        impose_field(before, it.scene, it.parts, f"pixie:{fluid}")
 
 
 def test_a_folder_holds_a_file_per_object_named_with_or_without_its_number(tmp_path):
     it, before = thing("armchair"), ours("armchair")
     made_up.write_vomp(tmp_path / "armchair.npz", it.voxel, it.young)
-    field = impose(before, it.scene, it.parts, f"vomp:{tmp_path}")
+    field = impose_field(before, it.scene, it.parts, f"vomp:{tmp_path}")
     assert any(m.grounds["young"].chosen_by == "field" for m in field.materials)
     (tmp_path / "armchair.npz").rename(tmp_path / "chair.npz")
     with pytest.raises(UserError, match="no file for any object of the scene: armchair_0"):
-        impose(before, it.scene, it.parts, f"vomp:{tmp_path}")
+        impose_field(before, it.scene, it.parts, f"vomp:{tmp_path}")
 
 
 def test_a_table_may_tell_density_alone(tmp_path):
@@ -145,7 +145,7 @@ def test_a_table_may_tell_density_alone(tmp_path):
     path = tmp_path / "field.csv"
     rows = [f"{x},{y},{z},1234" for x, y, z in it.voxel.tolist()]
     path.write_text("\n".join(["x,y,z,density", *rows]))
-    field = impose(before, it.scene, it.parts, f"table:{path}")
+    field = impose_field(before, it.scene, it.parts, f"table:{path}")
     for now, then in zip(field.materials, before.materials, strict=True):
         assert now.density == 1234 and now.young == then.young
         assert now.grounds["young"].chosen_by == "borrowed"
@@ -153,17 +153,17 @@ def test_a_table_may_tell_density_alone(tmp_path):
 
 def test_one_material_makes_everything_solid_and_equal():
     it, before = thing("armchair"), ours("armchair")
-    field = impose(before, it.scene, it.parts, "one")
+    field = impose_field(before, it.scene, it.parts, "one")
     numbers = {(m.law, m.young, m.poisson, m.density, m.loss) for m in field.materials}
     assert numbers == {(Law.COROTATED, 2e6, 0.4, 200.0, 0.0)}
     assert {s.kind for s in field.structures} == {"solid"}
-    said = impose(before, it.scene, it.parts, "one:E=1e5,rho=300").materials[0]
+    said = impose_field(before, it.scene, it.parts, "one:E=1e5,rho=300").materials[0]
     assert (said.young, said.poisson, said.density) == (1e5, 0.4, 300.0)
 
 
 def test_omniphysgs_keeps_laws_and_walls():
     it, before = thing("floor_lamp"), ours("floor_lamp")
-    field = impose(before, it.scene, it.parts, "omniphysgs")
+    field = impose_field(before, it.scene, it.parts, "omniphysgs")
     assert [m.law for m in field.materials] == [m.law for m in before.materials]
     assert field.structures == before.structures
     assert {(m.young, m.poisson, m.density) for m in field.materials} == {(2e6, 0.4, 1000.0)}
@@ -199,7 +199,7 @@ def test_a_specification_that_means_nothing_is_refused(spec, words):
 
 def test_an_empty_folder_is_refused(tmp_path):
     with pytest.raises(UserError, match=r"holds no \.ply file"):
-        asked(f"pixie:{tmp_path}")
+        parse_field_specification(f"pixie:{tmp_path}")
 
 
 def _pickled(folder):
@@ -296,7 +296,7 @@ def _few(folder):
 def test_a_bad_file_is_one_clean_error_that_names_it(make, words, tmp_path):
     kind, path = make(tmp_path)
     with pytest.raises(BadFileError, match=words) as caught:
-        asked(f"{kind}:{path}").read(path)
+        parse_field_specification(f"{kind}:{path}").read(path)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -304,7 +304,7 @@ def test_a_field_of_another_object_does_not_fit(tmp_path):
     it = thing("armchair")
     path = written(tmp_path, "vomp", "floor_lamp")
     with pytest.raises(BadFileError, match="points miss the surface by"):
-        impose(ours("armchair"), it.scene, it.parts, f"vomp:{path}")
+        impose_field(ours("armchair"), it.scene, it.parts, f"vomp:{path}")
 
 
 def test_what_cannot_be_computed_with_is_refused(tmp_path):
@@ -313,4 +313,4 @@ def test_what_cannot_be_computed_with_is_refused(tmp_path):
     made_up.write_vomp(path, it.voxel, it.young)
     field = read_vomp(path)
     with pytest.raises(BadFileError, match="values of poisson"):
-        checked(replace(field, values={"poisson": np.full(len(it.young), 0.5)}))
+        check_field(replace(field, values={"poisson": np.full(len(it.young), 0.5)}))

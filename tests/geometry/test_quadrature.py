@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.discretization import filling
-from corporeal.discretization.filling import Filling, fill_body
-from corporeal.geometry.mesh import weld
-from corporeal.geometry.quadrature import centred
-from corporeal.geometry.shape import Shape
+from corporeal.discretization import point_filling
+from corporeal.discretization.point_filling import PointFilling, fill_body
+from corporeal.geometry.mesh import weld_mesh
+from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.geometry.quadrature import centroidal_points
 from corporeal.mpm.physics.contact import half_space_mean
 
 SPACING, CELL = 0.05, 0.1
@@ -16,7 +16,7 @@ TILT = trimesh.transformations.rotation_matrix(0.4, (1, 2, 3))
 
 
 def shaped(mesh):
-    return Shape(weld(np.asarray(mesh.vertices), np.asarray(mesh.faces))[0])
+    return QueryMesh(weld_mesh(np.asarray(mesh.vertices), np.asarray(mesh.faces))[0])
 
 
 def filled(shape, seed=0):
@@ -34,13 +34,13 @@ def alike(monkeypatch):
 
     def fill(shape, seed=0):
         with monkeypatch.context() as patch:
-            patch.setattr(filling, "centred", equal)
+            patch.setattr(point_filling, "centroidal_points", equal)
             return filled(shape, seed)
 
     return fill
 
 
-def centre(made: Filling):
+def centre(made: PointFilling):
     return np.average(made.points, axis=0, weights=made.volumes)
 
 
@@ -59,7 +59,7 @@ def test_a_ball_has_its_volume_and_its_mass_in_the_middle(alike):
     assert np.mean(off) > 3 * np.mean(far)
 
 
-def face_as_nodes_see_it(made: Filling, above: float):
+def face_as_nodes_see_it(made: PointFilling, above: float):
     """Mean offset of a tilted cube's matter from nodes near its top face, and its share [dx]."""
     rng, offset, share = np.random.default_rng(3), [], []
     for across in rng.uniform(-0.3, 0.3, (200, 2)):
@@ -93,14 +93,14 @@ def test_points_whose_centroid_is_in_the_open_stay():
     ring = shaped(wall)
     turn = np.linspace(0, 2 * np.pi, 6, endpoint=False)
     points = 0.99 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    moved, volumes = centred(points, ring, 0.1, np.zeros(6, bool))
+    moved, volumes = centroidal_points(points, ring, 0.1, np.zeros(6, bool))
     assert ring.inside(moved).all()
     assert volumes.sum() == pytest.approx(wall.volume, rel=0.03)
 
 
 def test_nothing_is_divided_among_nobody():
     ball = shaped(trimesh.creation.icosphere(1))
-    points, volumes = centred(np.zeros((0, 3)), ball, 0.1, np.zeros(0, bool))
+    points, volumes = centroidal_points(np.zeros((0, 3)), ball, 0.1, np.zeros(0, bool))
     assert points.shape == (0, 3) and volumes.shape == (0,)
 
 

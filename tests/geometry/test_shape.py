@@ -4,13 +4,15 @@ import numpy as np
 import trimesh
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.shape import Shape
+from corporeal.geometry.mesh_queries import QueryMesh
 
 
 def ball(turned=False):
     made = trimesh.creation.icosphere(4)
     faces = np.asarray(made.faces, dtype=np.int64)
-    return Shape(Mesh(np.asarray(made.vertices, dtype=float), faces[:, ::-1] if turned else faces))
+    return QueryMesh(
+        Mesh(np.asarray(made.vertices, dtype=float), faces[:, ::-1] if turned else faces)
+    )
 
 
 def test_a_way_through_a_ball_goes_in_and_out_where_the_ball_begins_and_ends(rng):

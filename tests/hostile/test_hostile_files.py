@@ -9,7 +9,7 @@ import pytest
 
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Scene
-from corporeal.io.glb import read_glb
+from corporeal.io.gltf.gltf_reader import read_glb
 from corporeal.pipeline.stages.assemble import assemble
 
 NOT_TO_BE_READ = (

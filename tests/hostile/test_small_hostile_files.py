@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import BadFileError
-from corporeal.io.glb import read_glb
+from corporeal.io.gltf.gltf_reader import read_glb
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube, pack
 
 

@@ -16,10 +16,10 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.io import gltf_assets
-from corporeal.io.glb import read_glb, read_model
-from corporeal.io.glb_merge import Member, merge
-from corporeal.io.gltf_document import Document
+from corporeal.io.gltf import gltf_copy
+from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
+from corporeal.io.gltf.gltf_document import GltfDocument
+from corporeal.io.gltf.gltf_reader import read_glb, read_gltf_model
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube, pack
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
@@ -28,17 +28,17 @@ GRAVITY = {"gravity_m_s2": [0.0, 0.0, -9.81], "duration_s": 1.5, "fps": 25}
 
 
 def member(file, name="box_0", position=HERE, quaternion=UPRIGHT, scale=1.0, **extras):
-    return Member(file, name, position, quaternion, scale, {"class": "box"} | extras)
+    return MergeMember(file, name, position, quaternion, scale, {"class": "box"} | extras)
 
 
 def merged(tmp_path, *members, **extras):
     path = tmp_path / "scene.glb"
-    merge(path, members, "scene", GRAVITY | extras)
+    merge_glb_files(path, members, "scene", GRAVITY | extras)
     return path
 
 
 def json_of(path):
-    return Document(path).root.value
+    return GltfDocument(path).root.value
 
 
 def placed(vertices, m):
@@ -49,7 +49,7 @@ def placed(vertices, m):
 
 def pictures(path):
     """SHA-256 of every picture's bytes, in the file's order."""
-    document = Document(path)
+    document = GltfDocument(path)
     found = []
     for image in document.entries("images"):
         view = image.refer("bufferView", "bufferViews")
@@ -142,9 +142,9 @@ def test_a_file_reads_back_as_one_of_ours(tmp_path):
         "licence": "CC-BY-4.0",
         "attribution": "A. Person",
     }
-    first = Member(file, "cardboard_box_0", HERE, UPRIGHT, 1.0, said)
+    first = MergeMember(file, "cardboard_box_0", HERE, UPRIGHT, 1.0, said)
     path = merged(tmp_path, first, member(file, "box_1"))
-    model = read_model(path)
+    model = read_gltf_model(path)
     first, second = model.scene.objects
     assert model.ours
     assert (first.name, second.name) == ("cardboard_box_0", "box_1")
@@ -264,7 +264,7 @@ def test_meshes_in_any_packing_keep_their_shapes(tmp_path, make):
     ]
     for accessor in moved:
         view = written["bufferViews"][written["accessors"][accessor]["bufferView"]]
-        chunk = Document(path).chunk[view["byteOffset"] :][: view["byteLength"]]
+        chunk = GltfDocument(path).chunk[view["byteOffset"] :][: view["byteLength"]]
         assert bytes(chunk) == np.ones((8, 3), np.float32).tobytes()
     assert len(moved) == (make is not packed)
 
@@ -316,7 +316,7 @@ def test_animations_and_cameras_go_with_all_that_points_to_them(tmp_path):
     made.json["animations"] = [{"channels": [], "samplers": [{"input": times, "output": times}]}]
     file = made.save(tmp_path / "a.glb")
     path = tmp_path / "scene.glb"
-    told = merge(path, [member(file)], "scene", {})
+    told = merge_glb_files(path, [member(file)], "scene", {})
     assert told == ("a.glb: its animations are left out.", "a.glb: its cameras are left out.")
     after = json_of(path)
     assert not {"cameras", "animations"} & after.keys()
@@ -401,7 +401,7 @@ def test_what_is_nested_too_deeply_is_left_out_or_refused(tmp_path):
     made = dressed()
     made.json["materials"][0]["extensions"]["ACME_maze"] = nested(600)
     path = tmp_path / "scene.glb"
-    (told,) = merge(path, [member(made.save(tmp_path / "a.glb"))], "scene", {})
+    (told,) = merge_glb_files(path, [member(made.save(tmp_path / "a.glb"))], "scene", {})
     assert "nested too deeply" in told
     assert len(read_glb(path).surfaces[0].triangles) == 12
     with pytest.raises(UserError, match="nested too deeply"):
@@ -428,7 +428,7 @@ def test_nothing_two_of_one_name_and_too_much_are_refused(tmp_path, monkeypatch)
         merged(tmp_path)
     with pytest.raises(UserError, match="Two objects are named 'box_0'"):
         merged(tmp_path, member(file), member(file))
-    monkeypatch.setattr(gltf_assets, "MAX_FILE", 100)
+    monkeypatch.setattr(gltf_copy, "MAX_MODEL_FILE_BYTES", 100)
     with pytest.raises(UserError, match="The merged file would be larger"):
         merged(tmp_path, member(file))
 
@@ -459,7 +459,7 @@ def test_a_missing_picture_is_told_and_left_out(tmp_path):
     made = dressed()
     made.json["images"] = [{"uri": "gone.png"}]
     path = tmp_path / "scene.glb"
-    (told,) = merge(path, [member(made.save(tmp_path / "a.glb"))], "scene", {})
+    (told,) = merge_glb_files(path, [member(made.save(tmp_path / "a.glb"))], "scene", {})
     assert "gone.png" in told
     assert read_glb(path).finishes[0].texture is None
 

@@ -14,10 +14,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 from test_glb_merge import HERE, UPRIGHT, dressed, pictures, skinned
 
-from corporeal.io.glb import read_glb
-from corporeal.io.glb_merge import Member, merge
-from corporeal.io.glb_writer import write_glb
-from corporeal.showcase.scenes import build
+from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.io.gltf.gltf_reader import read_glb
+from corporeal.showcase.showcase_scenes import build_showcase_scene
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
@@ -73,9 +73,9 @@ def with_bounds(made):
 def test_merged_files_are_valid(judge, tmp_path):
     made = with_bounds(dressed()), with_bounds(skinned())
     files = [m.save(tmp_path / f"{k}.glb") for k, m in enumerate(made)]
-    members = [Member(f, f"m_{k}", HERE, UPRIGHT, 2.0, {}) for k, f in enumerate(files * 2)]
+    members = [MergeMember(f, f"m_{k}", HERE, UPRIGHT, 2.0, {}) for k, f in enumerate(files * 2)]
     path = tmp_path / "scene.glb"
-    merge(path, members, "scene", {"gravity_m_s2": [0, 0, -9.81]})
+    merge_glb_files(path, members, "scene", {"gravity_m_s2": [0, 0, -9.81]})
     (found,) = judge(path)
     # Below its object, a skinned mesh is no root; its place is its skeleton's all the same.
     assert set(found) <= {
@@ -93,7 +93,7 @@ def test_the_validator_is_asked(judge, tmp_path):
 
 @pytest.mark.slow
 def test_the_showcase_is_valid(judge, tmp_path):
-    write_glb(tmp_path / "scene.glb", build("duck-on-mud"))
+    write_glb(tmp_path / "scene.glb", build_showcase_scene("duck-on-mud"))
     (found,) = judge(tmp_path / "scene.glb")
     assert not found
 
@@ -112,7 +112,7 @@ def scattered(files):
     places = random.uniform(-1, 1, (len(files), 3)).tolist()
     turns = random.normal(size=(len(files), 4)).tolist()
     return [
-        Member(file, f"thing_{k}", tuple(place), tuple(turn), 0.5 + k, {"class": "thing"})
+        MergeMember(file, f"thing_{k}", tuple(place), tuple(turn), 0.5 + k, {"class": "thing"})
         for k, (file, place, turn) in enumerate(zip(files, places, turns, strict=True))
     ]
 
@@ -128,7 +128,7 @@ def test_real_models_keep_their_shapes_and_looks(shared_assets, tmp_path):
     for files in groups(shared_assets):
         members = scattered(files)
         path = tmp_path / "scene.glb"
-        merge(path, members, "scene", {})
+        merge_glb_files(path, members, "scene", {})
         after = read_glb(path)
         assert set(pictures(path)) <= {s for f in files for s in pictures(f)}
         for k, m in enumerate(members):
@@ -156,7 +156,7 @@ def test_real_models_merge_without_new_errors(judge, shared_assets, tmp_path):
     for size in (2, 4):
         for k, files in enumerate(groups(shared_assets, size)):
             paths.append(tmp_path / f"{size}-{k}.glb")
-            merge(paths[-1], scattered(files), "scene", {})
+            merge_glb_files(paths[-1], scattered(files), "scene", {})
     inputs = [f for files in groups(shared_assets) for f in files]
     known = {kind for found in judge(*inputs) for kind in found}
     for path, found in zip(paths, judge(*paths), strict=True):

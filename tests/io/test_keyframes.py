@@ -7,9 +7,9 @@ import pytest
 
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Keyframes
-from corporeal.io.glb import read_glb
-from corporeal.io.glb_writer import write_glb
-from corporeal.io.scene_file import read_scene_file, write_scene_file
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.io.gltf.gltf_reader import read_glb
+from corporeal.io.scene_toml import read_scene_file, write_scene_file
 from corporeal.scene.scene_building import box, build_scene
 
 HEAD = '[[object]]\nfile = "a.glb"\n'

@@ -11,12 +11,12 @@ import trimesh
 from PIL import Image
 
 from corporeal.core.errors import BadFileError
-from corporeal.geometry.srgb import linear
-from corporeal.io import meshes
-from corporeal.io.gltf_finishes import PLAIN
-from corporeal.io.mesh_raw import MOST_PIECES
-from corporeal.io.mesh_suffixes import MESHES, kind_of_ply
-from corporeal.io.meshes import companions, read_mesh
+from corporeal.geometry.srgb import srgb_to_linear
+from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
+from corporeal.io.mesh import mesh_loader
+from corporeal.io.mesh.mesh_loader import load_mesh, mesh_companions
+from corporeal.io.mesh.mesh_suffixes import MESH_SUFFIXES, kind_of_ply
+from corporeal.io.mesh.raw_mesh import MAX_PIECES
 
 CORNERS = "v 0 0 0\nv 1 0 0\nv 1 2 0\nv 0 2 0\nv 0 0 3\n"
 FACES = "f 1 2 3 4\nf 1/1 2/2 5/3\n"
@@ -132,11 +132,11 @@ def written(kind, folder):
     return path
 
 
-@pytest.mark.parametrize("kind", MESHES)
+@pytest.mark.parametrize("kind", MESH_SUFFIXES)
 def test_one_block_has_the_same_extents_as_every_kind_of_file(kind, tmp_path):
     if kind.startswith(".usd"):
         pytest.importorskip("pxr")
-    read = read_mesh(written(kind, tmp_path))
+    read = load_mesh(written(kind, tmp_path))
     assert read.metric == (kind in (".3mf", ".dae", ".usd", ".usda", ".usdc", ".usdz"))
     unit = 1.0 if read.metric else MM
     places = unit * np.concatenate([s.vertices for s in read.scene.surfaces])
@@ -164,7 +164,7 @@ def test_nodes_and_materials_of_a_collada_keep_their_names(tmp_path, geometry):
     node = text[start:end].replace('id="n"', 'id="{0}" name="{0}"')
     nodes = "".join(node.format(name) for name in ("Table", "Bench"))
     path.write_text(f'{text[:start]}<node id="all" name="All">{nodes}</node>{text[end:]}')
-    scene = read_mesh(path, "nodes").scene
+    scene = load_mesh(path, "nodes").scene
     assert [o.class_name for o in scene.objects] == ["table", "bench"]
     assert [s.name for s in scene.surfaces] == ["Table", "Bench"]
     assert {scene.finishes[s.finish].name for s in scene.surfaces} == {"Oak"}
@@ -185,7 +185,7 @@ def test_components_of_a_collada_give_their_names_to_nodes_that_are_but_counted(
     text = f'{text[:start]}<node id="all" name="SketchUp">{places}</node>{text[end:]}'
     library = f"<library_nodes>{component}</library_nodes><library_visual_scenes>"
     path.write_text(text.replace("<library_visual_scenes>", library))
-    scene = read_mesh(path, "nodes").scene
+    scene = load_mesh(path, "nodes").scene
     assert [o.class_name for o in scene.objects] == ["chair", "chair", "garden chair"]
 
 
@@ -201,7 +201,7 @@ def test_materials_tell_pieces_of_one_node_of_a_collada_apart(tmp_path):
     text = text.replace('<material id="m"><instance_effect url="#e"/></material>', "")
     bound = '<instance_material symbol="t" target="#m2"/>'
     path.write_text(text.replace('target="#m"/>', f'target="#m"/>{bound}'))
-    scene = read_mesh(path).scene
+    scene = load_mesh(path).scene
     assert [o.class_name for o in scene.objects] == ["chair"]
     assert [s.name for s in scene.surfaces] == ["Oak", "Leather"]
     assert [scene.finishes[s.finish].name for s in scene.surfaces] == ["Oak", "Leather"]
@@ -210,13 +210,13 @@ def test_materials_tell_pieces_of_one_node_of_a_collada_apart(tmp_path):
 @pytest.mark.parametrize("kind", [".dae", ".usda"])
 def test_plain_colours_come_along(kind, tmp_path):
     pytest.importorskip("pxr" if kind == ".usda" else "collada")
-    (finish,) = read_mesh(written(kind, tmp_path)).scene.finishes
+    (finish,) = load_mesh(written(kind, tmp_path)).scene.finishes
     np.testing.assert_allclose(finish.colour, (0.2, 0.4, 0.6, 1), atol=2 / 255)
 
 
 def test_axes_can_be_told_otherwise(tmp_path):
     path = written(".stl", tmp_path)
-    corners = np.concatenate([s.vertices for s in read_mesh(path, up="-y").scene.surfaces])
+    corners = np.concatenate([s.vertices for s in load_mesh(path, up="-y").scene.surfaces])
     # The file's -y points up: its z becomes y, and its y points down.
     np.testing.assert_allclose(corners.min(axis=0), (0, 0, -20), atol=1e-9)
     np.testing.assert_allclose(corners.max(axis=0), (10, 45, 0), atol=1e-9)
@@ -226,16 +226,16 @@ def test_colours_of_vertices_are_kept_as_linear_light(tmp_path):
     mesh = block()
     mesh.visual.vertex_colors = np.tile(np.array([255, 128, 0, 255], np.uint8), (8, 1))
     (tmp_path / "a.ply").write_bytes(mesh.export(file_type="ply"))
-    (surface,) = read_mesh(tmp_path / "a.ply").scene.surfaces
-    wanted = [*linear(np.array([1, 128 / 255, 0])), 1]
+    (surface,) = load_mesh(tmp_path / "a.ply").scene.surfaces
+    wanted = [*srgb_to_linear(np.array([1, 128 / 255, 0])), 1]
     np.testing.assert_allclose(surface.colours, np.tile(wanted, (24, 1)), atol=1e-6)
 
 
 def test_named_things_are_objects_where_asked(tmp_path):
     text = f"o chair_1\n{CORNERS}f 1 2 3 4\no cup\nf 1 2 5\n"
     (tmp_path / "room.obj").write_text(text)
-    assert len(read_mesh(tmp_path / "room.obj").scene.objects) == 1
-    scene = read_mesh(tmp_path / "room.obj", "nodes").scene
+    assert len(load_mesh(tmp_path / "room.obj").scene.objects) == 1
+    scene = load_mesh(tmp_path / "room.obj", "nodes").scene
     assert {o.class_name for o in scene.objects} == {"chair", "cup"}
     assert sorted(len(s.triangles) for s in scene.surfaces) == [1, 2]
     assert {s.object for s in scene.surfaces} == {0, 1}
@@ -246,16 +246,16 @@ def test_groups_are_things_where_an_obj_has_no_objects(tmp_path, order):
     faces = zip(("chair_1", "cup"), ("f 1 2 3 4", "f 1 2 5"), strict=True)
     text = CORNERS + "".join(f"{order.format(name)}\n{face}\n" for name, face in faces)
     (tmp_path / "room.obj").write_text(text)
-    scene = read_mesh(tmp_path / "room.obj", "nodes").scene
+    scene = load_mesh(tmp_path / "room.obj", "nodes").scene
     assert {o.class_name for o in scene.objects} == {"chair", "cup"}
     (tmp_path / "one.obj").write_text(f"o room\n{text}")
-    assert len(read_mesh(tmp_path / "one.obj", "nodes").scene.objects) == 1
+    assert len(load_mesh(tmp_path / "one.obj", "nodes").scene.objects) == 1
 
 
 def test_patches_of_a_surface_are_no_things(tmp_path):
-    groups = "".join(f"g patch{k}\nf 1 2 3\n" for k in range(MOST_PIECES + 1))
+    groups = "".join(f"g patch{k}\nf 1 2 3\n" for k in range(MAX_PIECES + 1))
     (tmp_path / "scan.obj").write_text(CORNERS + groups)
-    assert len(read_mesh(tmp_path / "scan.obj").scene.surfaces) == 1
+    assert len(load_mesh(tmp_path / "scan.obj").scene.surfaces) == 1
 
 
 def test_a_splat_a_mesh_and_points_are_told_by_the_header(tmp_path):
@@ -277,7 +277,7 @@ def test_a_splat_a_mesh_and_points_are_told_by_the_header(tmp_path):
 
 
 def test_shape_and_look_are_read_with_z_up(chair):
-    scene = read_mesh(chair).scene
+    scene = load_mesh(chair).scene
     assert scene.objects[0].class_name == "old chair"
     assert scene.objects[0].real_extent == 3
     finishes = {f.name: f for f in scene.finishes}
@@ -291,7 +291,7 @@ def test_shape_and_look_are_read_with_z_up(chair):
 
 
 def test_texture_coordinates_run_down_as_in_gltf(chair):
-    scene = read_mesh(chair).scene
+    scene = load_mesh(chair).scene
     (blue,) = (s for s in scene.surfaces if scene.finishes[s.finish].name == "blue")
     high = blue.vertices[:, 1].argmin()  # 3 up OBJ's z is 3 along our -y
     np.testing.assert_allclose(blue.uv[high], (0, 0))
@@ -299,35 +299,35 @@ def test_texture_coordinates_run_down_as_in_gltf(chair):
 
 
 def test_companions_are_named_and_come_from_the_same_folder_only(chair, tmp_path):
-    assert [p.name for p in companions(chair)] == ["look.mtl", "half blue.png"]
+    assert [p.name for p in mesh_companions(chair)] == ["look.mtl", "half blue.png"]
     (tmp_path / "below").mkdir()
     inner = tmp_path / "below" / "x.obj"
     inner.write_text(f"mtllib ../look.mtl\n{CORNERS}usemtl red\n{FACES}")
-    assert companions(inner) == []
-    assert read_mesh(inner).scene.finishes[0].colour != (1, 0, 0, 1)
+    assert mesh_companions(inner) == []
+    assert load_mesh(inner).scene.finishes[0].colour != (1, 0, 0, 1)
 
 
 def test_materials_keep_their_names_without_their_library(chair):
     (chair.parent / "look.mtl").unlink()
-    scene = read_mesh(chair).scene
+    scene = load_mesh(chair).scene
     assert {f.name for f in scene.finishes} == {"red", "blue"}
-    assert {f.colour for f in scene.finishes} == {PLAIN.colour}
+    assert {f.colour for f in scene.finishes} == {DEFAULT_FINISH.colour}
     assert "colours and pictures ('look.mtl' is not there" in scene.warnings[0]
 
 
 def test_a_material_that_its_library_has_not_keeps_its_name(chair):
     (chair.parent / "look.mtl").write_text("newmtl red\nKd 1 0 0\n")
-    scene = read_mesh(chair).scene
+    scene = load_mesh(chair).scene
     assert {f.name: f.colour for f in scene.finishes} == {
         "red": (1, 0, 0, 1),
-        "blue": PLAIN.colour,
+        "blue": DEFAULT_FINISH.colour,
     }
     assert not scene.warnings
 
 
 def test_a_missing_or_broken_picture_leaves_a_plain_colour(chair, tmp_path):
     (tmp_path / "pics" / "half blue.png").write_bytes(b"no picture")
-    finishes = {f.name: f for f in read_mesh(chair).scene.finishes}
+    finishes = {f.name: f for f in load_mesh(chair).scene.finishes}
     assert finishes["blue"].texture is None
 
 
@@ -355,15 +355,15 @@ def test_a_picture_comes_from_the_files_own_folder_only(tmp_path):
         (tmp_path / "own" / "a.usda").write_text(
             usd_text(block(), 1.0, "Z", text).replace("(0.2, 0.4, 0.6)", "(1, 1, 1)")
         )
-        read = read_mesh(tmp_path / "own" / "a.usda")
+        read = load_mesh(tmp_path / "own" / "a.usda")
         return read.scene.finishes[0].texture, read.scene.warnings
 
     assert look("./inside.png")[0].shape == (4, 4, 3)
-    assert [p.name for p in companions(tmp_path / "own" / "a.usda")] == ["inside.png"]
+    assert [p.name for p in mesh_companions(tmp_path / "own" / "a.usda")] == ["inside.png"]
     for elsewhere in ("../outside.png", str(tmp_path / "outside.png")):
         texture, told = look(elsewhere)
         assert texture is None and "pictures that are not there" in told[0]
-        assert companions(tmp_path / "own" / "a.usda") == []
+        assert mesh_companions(tmp_path / "own" / "a.usda") == []
 
 
 def test_a_layer_from_elsewhere_is_refused_before_it_is_opened(tmp_path):
@@ -374,7 +374,7 @@ def test_a_layer_from_elsewhere_is_refused_before_it_is_opened(tmp_path):
         inner = "" if "sub" in reference else 'def "a" (references = @../secret.usda@</world>) {}'
         (tmp_path / "own" / "a.usda").write_text(f"#usda 1.0\n({reference})\n{inner}\n")
         with pytest.raises(BadFileError, match=r"'../secret.usda', which lies outside its folder"):
-            read_mesh(tmp_path / "own" / "a.usda")
+            load_mesh(tmp_path / "own" / "a.usda")
 
 
 @pytest.mark.slow
@@ -388,10 +388,10 @@ def test_instances_of_instances_end_at_the_deadline(tmp_path, monkeypatch):
         )
         lines.append(f'class "c{level}" {{\n{inner}\n}}\n')
     (tmp_path / "a.usda").write_text("".join(lines) + 'def "a" (references = </c8>) {}\n')
-    monkeypatch.setattr(meshes, "MOST_SECONDS", 12)
+    monkeypatch.setattr(mesh_loader, "MAX_MESH_READ_S", 12)
     start = time.monotonic()
     with pytest.raises(BadFileError, match="is not read within 12 s"):
-        read_mesh(tmp_path / "a.usda")
+        load_mesh(tmp_path / "a.usda")
     assert time.monotonic() - start < 20
 
 
@@ -416,7 +416,7 @@ def test_what_is_broken_is_refused_by_name(tmp_path, text, said):
     path = tmp_path / "bad.obj"
     path.write_bytes(text.encode("latin-1"))
     with pytest.raises(BadFileError, match=said) as error:
-        read_mesh(path)
+        load_mesh(path)
     assert "bad.obj" in str(error.value) and "\n" not in str(error.value)
 
 
@@ -502,14 +502,14 @@ def test_a_hostile_file_ends_in_one_sentence(tmp_path, name):
     path.write_bytes(make())
     start = time.monotonic()
     with pytest.raises(BadFileError, match=said) as error:
-        read_mesh(path)
+        load_mesh(path)
     assert time.monotonic() - start < 30
     assert name in str(error.value) and "\n" not in str(error.value)
     assert len(str(error.value)) < len(str(path)) + 250
 
 
 def test_the_readers_of_meshes_may_be_absent(tmp_path, monkeypatch):
-    from corporeal.io import mesh_trimesh
+    from corporeal.io.mesh import mesh_trimesh
 
     monkeypatch.setattr(mesh_trimesh, "find_spec", lambda name: None)
     with pytest.raises(BadFileError, match=r"needs lxml and networkx.*'corporeal\[meshes\]'"):
@@ -527,7 +527,7 @@ def test_an_obj_may_count_corners_back_from_where_they_stand(tmp_path):
         lines += [f"v {x} {y} {z}" for x, y, z in triangle]
         lines += ["f -3/-1 -2/-1 \\", " -1/-1"]
     path.write_text("\r\n".join(lines))
-    surface = read_mesh(path, up="+z").scene.surfaces[0]
+    surface = load_mesh(path, up="+z").scene.surfaces[0]
     made = trimesh.Trimesh(surface.vertices, surface.triangles)
     assert np.allclose(np.ptp(surface.vertices, axis=0), SIZE)
     assert made.volume == pytest.approx(SIZE.prod())
@@ -550,11 +550,11 @@ def test_a_ply_in_bytes_may_mix_triangles_and_quads(tmp_path, order, mixed, flag
     for face in written:
         body += struct.pack(f"{order}B{len(face)}I", len(face), *face) + b"\7" * flagged
     path.write_bytes(("\n".join(head) + "\nend_header\n").encode() + body)
-    made = read_mesh(path)
+    made = load_mesh(path)
     surface = made.scene.surfaces[0]
     shape = trimesh.Trimesh(surface.vertices, surface.triangles)
     assert np.allclose(np.ptp(surface.vertices, axis=0), (2, 3, 4))
     assert shape.area == pytest.approx(52)
     path.write_bytes(path.read_bytes()[:-9])
     with pytest.raises(BadFileError, match=r"PLY|faces"):
-        read_mesh(path)
+        load_mesh(path)

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("pxr", reason="usd-core reads USD: pip install 'corporeal[usd]'")
 
 import corporeal as co
-from corporeal.pipeline.stages.ground import doubts
+from corporeal.pipeline.stages.ground import grounding_warnings
 
 KITCHEN = """#usda 1.0
 (
@@ -113,7 +113,7 @@ def test_bodies_are_objects_and_so_is_what_they_stand_on(kitchen):
 
 def test_what_is_stated_is_simulated_and_says_who_stated_it(kitchen):
     scene = kitchen()
-    prepared = co.prepare(scene)
+    prepared = co.prepare_scene(scene)
     mug, block, _ = (prepared.parts.catalogue[k].object for k in range(3))
     mass = np.bincount(prepared.particles.object, prepared.particles.mass)
     assert mass[mug] == pytest.approx(0.25, rel=1e-6)
@@ -135,9 +135,11 @@ def _warnings(prepared):
 
 def test_what_no_such_material_has_is_believed_and_doubted(kitchen):
     scene = kitchen("5")
-    prepared = co.prepare(scene)
+    prepared = co.prepare_scene(scene)
     assert prepared.field.materials[1].density == pytest.approx(5000)
-    (told,) = (d for d in doubts(prepared.field, prepared.parts, scene) if "density" in d)
+    (told,) = (
+        d for d in grounding_warnings(prepared.field, prepared.parts, scene) if "density" in d
+    )
     assert "measured values are" in told and told.startswith("block: ")
 
 
@@ -153,13 +155,13 @@ def test_what_no_matter_has_is_one_sentence(tmp_path, density, mass, said):
     text = KITCHEN.replace("DENSITY", density)
     path.write_text(text.replace("physics:mass = 250", f"physics:mass = {mass}"))
     with pytest.raises(co.UserError, match=said):
-        co.prepare(co.load_scene(path))
+        co.prepare_scene(co.load_scene(path))
 
 
 def test_one_changed_density_is_another_mass(kitchen):
     masses = [
         np.bincount(p.object, p.mass)[1]
-        for p in (co.prepare(kitchen(d)).particles for d in ("0.6", "0.75"))
+        for p in (co.prepare_scene(kitchen(d)).particles for d in ("0.6", "0.75"))
     ]
     assert masses[1] / masses[0] == pytest.approx(0.75 / 0.6, rel=1e-5)
 
@@ -191,7 +193,7 @@ SHAPES = {
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("kind", SHAPES)
 def test_shapes_that_are_stated_by_numbers_have_their_volume(tmp_path, kind, mirrored):
-    from corporeal.io.mesh_usd import read_usd
+    from corporeal.io.usd.usd_meshes import read_usd
 
     numbers, volume, size = SHAPES[kind]
     turn = 'double3 xformOp:scale = (-1, 1, 1)\nuniform token[] xformOpOrder = ["xformOp:scale"]'
@@ -212,10 +214,10 @@ def test_shapes_that_are_stated_by_numbers_have_their_volume(tmp_path, kind, mir
 
 def test_a_run_begins_with_what_is_stated(kitchen, tmp_path):
     """`corporeal run kitchen.usda`: through the verbs of a run's folder."""
-    from corporeal.pipeline.runner import read_back
+    from corporeal.pipeline.run_pipeline import read_run
 
     kitchen()
-    made = read_back(co.run([tmp_path / "kitchen.usda"], tmp_path / "runs", until="ground"))
+    made = read_run(co.run([tmp_path / "kitchen.usda"], tmp_path / "runs", until="ground"))
     assert made.scene.objects[0].mass == pytest.approx(0.25)
     wood = made.field.materials[1]
     assert wood.grounds["density"].range.source == "stated by UsdPhysics in kitchen.usda"

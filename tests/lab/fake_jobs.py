@@ -9,9 +9,9 @@ from pathlib import Path
 import fake_jobs  # itself: what runs as a program has no name that a worker could import
 
 from corporeal.core.errors import UserError
-from corporeal.jobs.carry_out import Hands, carry_out
-from corporeal.jobs.jobs import Job
-from corporeal.jobs.local import local
+from corporeal.jobs.executor import Executor, execute_jobs
+from corporeal.jobs.job import Job
+from corporeal.jobs.local_workers import local_worker_pool
 
 STEPS = 10
 
@@ -76,8 +76,8 @@ def silent(*words):
 
 def do(folder, jobs, slots=2, say=silent):
     """Carry jobs out on this machine."""
-    hands = Hands(lambda: local(slots, 1, folder / "logs"), silent, say)
-    return carry_out(folder, "run", jobs, hands)
+    hands = Executor(lambda: local_worker_pool(slots, 1, folder / "logs"), silent, say)
+    return execute_jobs(folder, "run", jobs, hands)
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from corporeal.core.findings import Expectation
-from corporeal.lab.evaluation.dynamics.run_numbers import Body, RunNumbers
+from corporeal.core.audit_data import Expectation
+from corporeal.lab.evaluation.dynamics.run_measures import ObjectMeasures, RunMeasures
 from made_findings import object_outcome, outcome, pair_outcome
 
 FPS = 60
@@ -16,7 +16,7 @@ def body(name="ball_0", velocity=(0.0, 0.0, 0.0), **what):
     path = tuple(tuple(v * t for v in velocity) for t in times)
     said = {"diagonal": 1.0, "young": 1e6, "restitution": 0.5}
     said |= {"groups": ("elastomer",), "laws": ("neo hookean",)}
-    return Body(name=name, path=path, **said | what)
+    return ObjectMeasures(name=name, path=path, **said | what)
 
 
 def pair(first=None, separated=None, start=2.0):
@@ -35,7 +35,7 @@ def run(bodies=None, objects=None, pairs=None, **what):
         "faults": (), "growth": 0.0, "overlap_dx": 0.2, "expectations": (), "seconds": 1.0,
         "particles": 1000, "steps": 100,
     }  # fmt: skip
-    return RunNumbers(**said | what)
+    return RunMeasures(**said | what)
 
 
 def expecting(numbers, *met):

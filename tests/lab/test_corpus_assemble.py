@@ -10,21 +10,26 @@ from fake_jobs import silent
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
-from corporeal.discretization.sizes import Sizing
-from corporeal.jobs.carry_out import Hands
-from corporeal.jobs.jobs import Job
-from corporeal.jobs.local import local
-from corporeal.lab.corpus.assemble import Sources, assemble_corpus, assembly, ways
-from corporeal.lab.corpus.plan import CorpusConfig, plan, read_plan
-from corporeal.lab.corpus.report import report_corpus
-from corporeal.lab.corpus.run import RunConfig, forget, run_corpus, run_scene
-from corporeal.pipeline.runner import Settings
+from corporeal.discretization.object_scaling import SceneSizing
+from corporeal.jobs.executor import Executor
+from corporeal.jobs.job import Job
+from corporeal.jobs.local_workers import local_worker_pool
+from corporeal.lab.corpus.assemble_corpus import (
+    Sources,
+    assemble_corpus,
+    assembly_jobs,
+    fallback_compose_configs,
+)
+from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan_corpus, read_plan
+from corporeal.lab.corpus.corpus_report import report_corpus
+from corporeal.lab.corpus.run_corpus import RunConfig, forget_runs, run_corpus, run_scene
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.pipeline.stages.capture import CaptureConfig
 from corporeal.pipeline.stages.compose import ComposeConfig
-from corporeal.pipeline.stages.film import FilmConfig
-from corporeal.pool.asset import Asset, Pool
-from corporeal.scene.interactions import STANDING
+from corporeal.pipeline.stages.video import VideoConfig
+from corporeal.pool.asset_pool import AssetPool, PoolAsset
+from corporeal.scene.interactions import ARRANGEMENTS_OF_KIND
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker
 
 CLASSES = {"brick": (2, 1, 1), "box": (1, 1, 1), "wood block": (1, 1, 2), "book": (2, 1, 3)}
@@ -36,7 +41,7 @@ CONFIG = CorpusConfig(scenes=5, count="1-3", seed=3)
 @pytest.fixture(scope="module")
 def pool(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pool")
-    return Pool(folder, tuple(_asset(folder, *known) for known in CLASSES.items()))
+    return AssetPool(folder, tuple(_asset(folder, *known) for known in CLASSES.items()))
 
 
 def _asset(folder, name, sides):
@@ -45,12 +50,12 @@ def _asset(folder, name, sides):
     maker.node(mesh=maker.mesh(CUBE * sides, CUBE_TRIANGLES))
     path = maker.save(folder / f"{name}.glb")
     extent = float(sides.max())
-    return Asset(name, name, path, "here", name * 4, "CC0", "me", extent, True, 12, 0.0, 0)
+    return PoolAsset(name, name, path, "here", name * 4, "CC0", "me", extent, True, 12, 0.0, 0)
 
 
 def keys(pool, folder="c", config=CONFIG, composing=ComposeConfig(), capturing=SMALL):  # noqa: B008
-    made = plan(pool.assets, config)
-    jobs = assembly(Path(folder), made, Sources(pool, composing, capturing))
+    made = plan_corpus(pool.assets, config)
+    jobs = assembly_jobs(Path(folder), made, Sources(pool, composing, capturing))
     return {job.name: job.key for job in jobs}
 
 
@@ -61,14 +66,14 @@ def test_an_id_covers_settings_seed_and_bytes_and_nothing_else(pool):
     assert keys(pool, capturing=replace(SMALL, threads=4)) == known
     assert keys(pool, composing=ComposeConfig(record=Path("answers"))) == known
     others = [
-        keys(pool, composing=ComposeConfig(sizing=Sizing(metric=True))),
+        keys(pool, composing=ComposeConfig(sizing=SceneSizing(metric=True))),
         keys(pool, capturing=replace(SMALL, views=2)),
         keys(pool, config=replace(CONFIG, seed=4)),
     ]
     assert not any(set(other.values()) & set(known.values()) for other in others)
     changed = [replace(a, sha256="other") if a.name == "box" else a for a in pool.assets]
-    other = keys(Pool(pool.folder, tuple(changed)))
-    used = {s.name: "box" in s.assets for s in plan(pool.assets, CONFIG).scenes}
+    other = keys(AssetPool(pool.folder, tuple(changed)))
+    used = {s.name: "box" in s.assets for s in plan_corpus(pool.assets, CONFIG).scenes}
     assert {name: other[name] != known[name] for name in known} == used
 
 
@@ -76,34 +81,34 @@ def test_a_scene_is_tried_as_planned_first_and_keeps_its_interaction_whatever_is
     config = ComposeConfig(
         assets=("a", "b"), seed=9, arrangement="stack", interaction="fall", count="2"
     )
-    tried = ways(config)
-    assert tried[0] == config and tried == ways(config)
+    tried = fallback_compose_configs(config)
+    assert tried[0] == config and tried == fallback_compose_configs(config)
     assert {w.interaction for w in tried} == {"fall"} and len({w.seed for w in tried}) == 3
-    assert {w.arrangement for w in tried} == set(STANDING["fall"])
-    alone = ways(replace(config, assets=("a",), arrangement="scatter"))
+    assert {w.arrangement for w in tried} == set(ARRANGEMENTS_OF_KIND["fall"])
+    alone = fallback_compose_configs(replace(config, assets=("a",), arrangement="scatter"))
     assert {w.arrangement for w in alone} == {"scatter"}
 
 
 def test_a_pool_that_lost_what_was_planned_is_refused(pool):
-    made = plan(pool.assets, CONFIG)
-    fewer = Pool(pool.folder, pool.assets[1:])
+    made = plan_corpus(pool.assets, CONFIG)
+    fewer = AssetPool(pool.folder, pool.assets[1:])
     with pytest.raises(UserError, match=f"no longer has {pool.assets[0].name}"):
-        assembly(Path("c"), made, Sources(fewer, ComposeConfig(), SMALL))
+        assembly_jobs(Path("c"), made, Sources(fewer, ComposeConfig(), SMALL))
 
 
 def test_nothing_assembled_is_nothing_to_run(tmp_path, pool):
-    hands = Hands(lambda: local(1, 1, tmp_path / "logs"), silent, silent)
+    hands = Executor(lambda: local_worker_pool(1, 1, tmp_path / "logs"), silent, silent)
     with pytest.raises(UserError, match="not a corpus"):
         run_corpus(tmp_path, RunConfig(), Settings(), hands)
     with pytest.raises(UserError, match="no usable asset"):
-        empty = Sources(Pool(tmp_path, ()), ComposeConfig(), SMALL)
+        empty = Sources(AssetPool(tmp_path, ()), ComposeConfig(), SMALL)
         assemble_corpus(tmp_path, CONFIG, empty, hands)
 
 
 @pytest.mark.slow
 def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path, pool):
     few, sources, said = replace(CONFIG, scenes=3), Sources(pool, ComposeConfig(), SMALL), []
-    hands = Hands(lambda: local(2, 1, tmp_path / "logs"), silent, said.append)
+    hands = Executor(lambda: local_worker_pool(2, 1, tmp_path / "logs"), silent, said.append)
     rows = assemble_corpus(tmp_path, few, sources, hands)
     assert {r.status for r in rows.values()} == {"finished"}, rows
     for scene in read_plan(tmp_path).scenes:
@@ -116,10 +121,12 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
         assert (place / "views" / "transforms.json").exists()
     with pytest.raises(UserError, match="planned with other settings"):
         assemble_corpus(tmp_path, replace(few, seed=8), sources, hands)
-    more = Sources(Pool(pool.folder, (*pool.assets, replace(pool.assets[0], name="new"))),
+    more = Sources(AssetPool(pool.folder, (*pool.assets, replace(pool.assets[0], name="new"))),
                    ComposeConfig(), SMALL)  # fmt: skip
     assert assemble_corpus(tmp_path, few, more, hands) == rows, "a plan is kept"
-    settings = Settings(assemble=AssembleConfig(duration=0.1), film=FilmConfig(width=64, height=48))
+    settings = Settings(
+        assemble=AssembleConfig(duration=0.1), film=VideoConfig(width=64, height=48)
+    )
     ran = run_corpus(tmp_path, RunConfig(first=1), settings, hands)
     assert [r.status for r in ran.values()] == ["finished"], ran
     said.clear()
@@ -132,10 +139,10 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
 def test_beginning_anew_forgets_what_was_finished_and_begun(tmp_path):
     run = tmp_path / "a"
     for folder in (run, run / "7-fill", run / "8-simulate"):
-        store.finish(folder, "k", {}, 1.0)
+        store.finish_result(folder, "k", {}, 1.0)
     (run / "8-simulate" / "checkpoint.npz").touch()
     job = Job("a", run_scene, run, "k")
     assert job.done
-    forget([job, Job("b", run_scene, tmp_path / "b", "k")])
+    forget_runs([job, Job("b", run_scene, tmp_path / "b", "k")])
     assert not job.done and not (run / "8-simulate").exists()
-    assert not store.fresh(run / "7-fill", "k") and not (tmp_path / "b").exists()
+    assert not store.is_fresh(run / "7-fill", "k") and not (tmp_path / "b").exists()

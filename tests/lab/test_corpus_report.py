@@ -11,22 +11,22 @@ from PIL import Image
 from test_plan import pool
 
 from corporeal.core import store
+from corporeal.core.audit_data import Expectation
 from corporeal.core.errors import UserError
-from corporeal.core.findings import Expectation
-from corporeal.jobs.manifest import Row
-from corporeal.lab.corpus.breakdown import breakdowns, credits, total
-from corporeal.lab.corpus.collect import RIGID, collect, measures
-from corporeal.lab.corpus.plan import CorpusConfig, plan, write_plan
-from corporeal.lab.corpus.report import report_corpus
-from corporeal.lab.corpus.report_docs import write_docs
-from corporeal.scene.certificate import Certificate
-from corporeal.scene.composition import (
+from corporeal.jobs.job_manifest import ManifestRow
+from corporeal.lab.corpus.collect_results import RIGID_BODY_LAW, collect_results, scene_measures
+from corporeal.lab.corpus.corpus_breakdown import asset_credits, breakdowns, total_line
+from corporeal.lab.corpus.corpus_docs_page import write_corpus_page
+from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan_corpus, write_plan
+from corporeal.lab.corpus.corpus_report import report_corpus
+from corporeal.scene.rest_certificate import RestCertificate
+from corporeal.scene.rigid_preview import impact_hops
+from corporeal.scene.scene_composition import (
     ComposedObject,
-    Composition,
+    SceneComposition,
     write_certificate,
     write_composition,
 )
-from corporeal.scene.rehearsal import hops
 from corporeal.simulation.audit_file import write_audit
 from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
@@ -67,31 +67,31 @@ def composed(scene):
         ComposedObject(a, c, a, "somewhere", "", "CC-BY-4.0", f"<b>{a}'s maker</b>", 0.1, "", "", 1)
         for a, c in zip(scene.assets, scene.classes, strict=True)
     )
-    return Composition(
+    return SceneComposition(
         scene.seed, scene.arrangement, "mujoco", scene.interaction, "it <falls>", objects
     )
 
 
 def a_corpus(folder, audits, failed=()):
     """Write a corpus with so many runs; return its plan."""
-    made = plan(pool(4), CorpusConfig(scenes=len(audits) + len(failed), seed=2))
+    made = plan_corpus(pool(4), CorpusConfig(scenes=len(audits) + len(failed), seed=2))
     write_plan(folder, made)
     rows = {"assemble": {}, "run": {}}
     for scene, found in zip(made.scenes, [*audits, *failed], strict=True):
         place = folder / "scenes" / scene.name
-        write_certificate(place, Certificate(1e-5, 1e-4, 0.5, 1, 1, 2.0, scene.count))
+        write_certificate(place, RestCertificate(1e-5, 1e-4, 0.5, 1, 1, 2.0, scene.count))
         write_composition(place, composed(scene))
-        store.finish(place, "k", {}, 2.0)
-        rows["assemble"][scene.name] = Row("finished", 2.0, "", 1, "k")
+        store.finish_result(place, "k", {}, 2.0)
+        rows["assemble"][scene.name] = ManifestRow("finished", 2.0, "", 1, "k")
         if isinstance(found, str):
-            rows["run"][scene.name] = Row("failed", None, found, 2, "k")
+            rows["run"][scene.name] = ManifestRow("failed", None, found, 2, "k")
             continue
         run = folder / "runs" / scene.name
         write_audit(run, found)
         store.write_json(run / "run.json", {"inputs": [], "settings": SETTINGS})
         Image.new("RGB", (600, 80), (200, 60, 60)).save(run / "strip.png")
-        store.finish(run, "k", {}, 61.0)
-        rows["run"][scene.name] = Row("finished", 61.0, "", 1, "k")
+        store.finish_result(run, "k", {}, 61.0)
+        rows["run"][scene.name] = ManifestRow("finished", 61.0, "", 1, "k")
     store.write_json(folder / "manifest.json", rows)
     return made
 
@@ -101,7 +101,7 @@ def silent(*words):
 
 
 def test_numbers_of_a_scene_are_those_of_its_audit():
-    found = measures(audit(), "collision")
+    found = scene_measures(audit(), "collision")
     assert found.clean and found.seen and found.breaches == ()
     assert (found.objects, found.at_rest) == (2, 1)
     assert found.impacts == 2, "the two met, and one came down; the other stood from the start"
@@ -119,7 +119,7 @@ def test_numbers_of_a_scene_are_those_of_its_audit():
     ],
 )
 def test_a_broken_bound_is_no_clean_audit(wrong, words):
-    found = measures(audit(**wrong), "fall")
+    found = scene_measures(audit(**wrong), "fall")
     assert not found.clean and len(found.breaches) == 1 and words in found.breaches[0]
 
 
@@ -127,41 +127,47 @@ def test_what_an_interaction_promises_must_have_happened():
     stood = {"a_0|floor": pair_outcome(first_contact_s=0.0)}
     quiet = audit(outcome=replace(HAPPENED, order=(), pairs=stood))
     for kind in ("fall", "fall-onto", "collision", "chain", "wind"):
-        assert not measures(quiet, kind, ["a_0"]).seen, kind
+        assert not scene_measures(quiet, kind, ["a_0"]).seen, kind
     for kind, seen in (("fall", True), ("fall-onto", True), ("collision", True), ("chain", False)):
-        assert measures(audit(), kind, ["a_0"]).seen is seen, kind
+        assert scene_measures(audit(), kind, ["a_0"]).seen is seen, kind
     swayed = HAPPENED.objects | {"b_0": object_outcome(deepest_squeeze_m=2e-3)}
-    assert measures(audit(outcome=replace(HAPPENED, objects=swayed)), "wind").seen
-    assert not measures(audit(), "wind").seen
+    assert scene_measures(audit(outcome=replace(HAPPENED, objects=swayed)), "wind").seen
+    assert not scene_measures(audit(), "wind").seen
 
 
 def test_a_chain_is_one_only_when_what_was_struck_strikes_a_third():
-    assert hops([("a", "b"), ("b", "c")], ["a"]) == {"a": 0, "b": 1, "c": 2}
-    assert hops([("b", "a"), ("c", "b"), ("d", "c")], ["a"])["d"] == 3
-    assert hops([("a", "b"), ("c", "a")], ["a"])["c"] == 1, "the first one struck both"
-    assert "c" not in hops([("b", "c"), ("a", "b")], ["a"]), "they met before they were reached"
-    assert hops([], ["a"]) == {"a": 0} and hops([("a", "b")], []) == {}
+    assert impact_hops([("a", "b"), ("b", "c")], ["a"]) == {"a": 0, "b": 1, "c": 2}
+    assert impact_hops([("b", "a"), ("c", "b"), ("d", "c")], ["a"])["d"] == 3
+    assert impact_hops([("a", "b"), ("c", "a")], ["a"])["c"] == 1, "the first one struck both"
+    assert "c" not in impact_hops([("b", "c"), ("a", "b")], ["a"]), (
+        "they met before they were reached"
+    )
+    assert impact_hops([], ["a"]) == {"a": 0} and impact_hops([("a", "b")], []) == {}
 
 
 def test_the_showcase_is_judged_by_its_own_expectations():
     wanted = tuple(Expectation("It falls", "", "", met) for met in (True, False))
-    found = measures(audit(expectations=wanted), "collision")
+    found = scene_measures(audit(expectations=wanted), "collision")
     assert not found.seen and (found.expected_met, found.expected) == (1, 2)
 
 
 def test_groups_count_scenes_and_objects_and_give_median_and_worst(tmp_path):
     deep = [0.1, 0.2, 0.9, 1.5]
     a_corpus(tmp_path, [audit(max_penetration_dx=d) for d in deep])
-    corpus = collect(tmp_path)
-    whole, groups = total(corpus), breakdowns(corpus)
+    corpus = collect_results(tmp_path)
+    whole, groups = total_line(corpus), breakdowns(corpus)
     assert whole is not None
     assert (whole.scenes, whole.objects, whole.clean, whole.at_rest) == (4, 8, 3, 4)
     assert whole.penetration_median == pytest.approx(0.55) and whole.penetration_worst == 1.5
     assert sum(line.scenes for line in groups["interaction"]) == 4
     assert sum(line.scenes for line in groups["objects"]) == 4
     law = {line.group: line for line in groups["law"]}
-    assert set(law) == {RIGID, "Neo-Hookean"}, "no law acts in what is rigid"
-    assert (law[RIGID].objects, law[RIGID].at_rest, law["Neo-Hookean"].at_rest) == (4, 4, 0)
+    assert set(law) == {RIGID_BODY_LAW, "Neo-Hookean"}, "no law acts in what is rigid"
+    assert (
+        law[RIGID_BODY_LAW].objects,
+        law[RIGID_BODY_LAW].at_rest,
+        law["Neo-Hookean"].at_rest,
+    ) == (4, 4, 0)
     group = {line.group: line for line in groups["material class"]}
     assert {name: line.objects for name, line in group.items()} == {"metal": 4, "elastomer": 4}
     assert group["metal"].materials == ("steel",), "only of the parts that are metal"
@@ -198,9 +204,9 @@ def test_the_page_for_the_documentation_names_what_went_wrong_and_what_was_not_r
     made = a_corpus(
         tmp_path, [audit(), audit(max_penetration_dx=1.7), audit()], failed=["the grid is too wide"]
     )
-    (tmp_path / "runs" / made.scenes[2].name / store.META).unlink()
+    (tmp_path / "runs" / made.scenes[2].name / store.META_FILE).unlink()
     page = tmp_path / "page.md"
-    write_docs(collect(tmp_path), page)
+    write_corpus_page(collect_results(tmp_path), page)
     text = page.read_text()
     assert "4 scenes, 4 assembled, 2 run at detail draft. 1 of 2 have a clean audit" in text
     wrong = text.split("## What went wrong")[1].split("##")[0]
@@ -216,28 +222,28 @@ def test_the_page_for_the_documentation_names_who_touched_before_anything_happen
     expected = (Expectation("It falls", "", "", False),)
     quiet = audit(outcome=replace(HAPPENED, order=(), pairs=together), expectations=expected)
     a_corpus(tmp_path, [quiet])
-    write_docs(collect(tmp_path), tmp_path / "page.md")
+    write_corpus_page(collect_results(tmp_path), tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert "what was planned did not happen: a_0 and b_0 touched from the start." in text
 
 
 def test_the_page_for_the_documentation_says_where_nothing_was_run(tmp_path):
-    write_plan(tmp_path, plan(pool(4), CorpusConfig(scenes=3)))
-    write_docs(collect(tmp_path), tmp_path / "page.md")
+    write_plan(tmp_path, plan_corpus(pool(4), CorpusConfig(scenes=3)))
+    write_corpus_page(collect_results(tmp_path), tmp_path / "page.md")
     text = (tmp_path / "page.md").read_text()
     assert "3 scenes, 0 assembled, 0 run." in text and "Every scene" not in text
 
 
 def test_every_model_that_was_used_is_credited_once(tmp_path):
     made = a_corpus(tmp_path, [audit()] * 6)
-    found = credits(collect(tmp_path).scenes)
+    found = asset_credits(collect_results(tmp_path).scenes)
     used = [a for s in made.scenes for a in s.assets]
     assert [c.asset.asset for c in found] == sorted(set(used))
     assert sum(c.scenes for c in found) == len(used)
 
 
 def test_a_report_of_what_was_not_run_yet_says_so_and_the_same_data_gives_the_same_page(tmp_path):
-    write_plan(tmp_path, plan(pool(4), CorpusConfig(scenes=3)))
+    write_plan(tmp_path, plan_corpus(pool(4), CorpusConfig(scenes=3)))
     report_corpus(tmp_path, silent)
     page = (tmp_path / "report.html").read_text()
     assert "Nothing was run yet" in page and "not begun" in page
@@ -247,10 +253,10 @@ def test_a_report_of_what_was_not_run_yet_says_so_and_the_same_data_gives_the_sa
 
 def test_a_run_that_was_begun_again_is_not_taken_for_finished(tmp_path):
     made = a_corpus(tmp_path, [audit(), audit()])
-    (tmp_path / "runs" / made.scenes[0].name / store.META).unlink()
-    assert [s.numbers is None for s in collect(tmp_path).scenes] == [True, False]
+    (tmp_path / "runs" / made.scenes[0].name / store.META_FILE).unlink()
+    assert [s.numbers is None for s in collect_results(tmp_path).scenes] == [True, False]
     (tmp_path / "runs" / made.scenes[1].name / "audit.json").unlink()
-    assert collect(tmp_path).run == []
+    assert collect_results(tmp_path).run == []
 
 
 def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_to_ours(tmp_path):
@@ -260,7 +266,7 @@ def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_
     run = tmp_path / "runs" / made.scenes[0].name
     store.write_json(run / "run.json", {"inputs": [], "settings": settings})
     with pytest.raises(UserError, match=rf"{made.scenes[0].name} was run with .*own\.toml.* back"):
-        collect(tmp_path)
+        collect_results(tmp_path)
     own.write_text(
         '[steel]\ngroup = "mineral"\nlaw = "von_mises"\n'
         'young_GPa = { low = 200, typical = 207, high = 216, source = "elastic-tables" }\n'
@@ -268,7 +274,7 @@ def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_
         'density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "elastic-tables" }\n'
         'yield_MPa = { low = 250, typical = 300, high = 400, source = "elastic-tables" }\n'
     )
-    (scene,) = collect(tmp_path).scenes
+    (scene,) = collect_results(tmp_path).scenes
     assert [p.group for p in scene.parts] == ["mineral", "elastomer"]
 
 

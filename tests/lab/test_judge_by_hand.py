@@ -5,8 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from corporeal.lab.evaluation.judge.subquestions import Verdict, catalogue
-from corporeal.lab.evaluation.judge.telling import believed, film_verdict, mark_of, tellings
+from corporeal.lab.evaluation.judge.detectability import (
+    measure_detectability,
+    method_mark,
+    trusted_questions,
+    video_verdict,
+)
+from corporeal.lab.evaluation.judge.subquestions import Verdict, question_catalogue
 
 FOLDER = Path(__file__).parents[1] / "recordings" / "dynamics"
 KEY = {
@@ -87,7 +92,7 @@ def films():
     rows = [json.loads(path.read_text()) for path in FOLDER.glob("*.json")]
     scene_of = {film: scene for scene, of in KEY.items() for film in of}
     return [
-        film_verdict(
+        video_verdict(
             scene_of[r["scene"]],
             KEY[scene_of[r["scene"]]][r["scene"]],
             [Verdict.model_validate(r["answer"])],
@@ -98,7 +103,7 @@ def films():
 
 @pytest.fixture(scope="module")
 def rows(films):
-    return tellings(films, "ours", {c.id: c.id for c in catalogue().control})
+    return measure_detectability(films, "ours", {c.id: c.id for c in question_catalogue().control})
 
 
 def test_every_film_was_answered_once(films):
@@ -136,7 +141,7 @@ def test_which_questions_tell_a_control_they_are_meant_for(rows):
 
 
 def test_five_of_seven_laws_are_believed(rows):
-    laws = {law for law, questions in believed(rows).items() if questions}
+    laws = {law for law, questions in trusted_questions(rows).items() if questions}
     assert laws == {"gravity", "inertia", "impenetrability", "material", "friction"}
 
 
@@ -168,8 +173,8 @@ def test_what_is_not_told_everywhere_by_the_question_meant_for_it(
     ],
 )
 def test_marks_of_baselines_by_laws_that_are_believed(films, rows, method, law, scenes, mark):
-    theirs = mark_of(films, method, law, believed(rows)[law])
-    ours = mark_of(films, "ours", law, believed(rows)[law])
+    theirs = method_mark(films, method, law, trusted_questions(rows)[law])
+    ours = method_mark(films, "ours", law, trusted_questions(rows)[law])
     assert theirs is not None
     assert ours is not None
     assert (theirs.scenes, round(theirs.mark, 2)) == (scenes, mark)

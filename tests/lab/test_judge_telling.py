@@ -5,25 +5,27 @@ from fractions import Fraction
 
 import pytest
 
-from corporeal.lab.evaluation.judge.subquestions import Verdict, catalogue
-from corporeal.lab.evaluation.judge.telling import (
-    believed,
-    film_verdict,
-    jeffreys,
-    mark_of,
-    resampled,
-    tellings,
+from corporeal.lab.evaluation.judge.detectability import (
+    bootstrap_interval,
+    jeffreys_interval,
+    measure_detectability,
+    method_mark,
+    trusted_questions,
+    video_verdict,
 )
+from corporeal.lab.evaluation.judge.subquestions import Verdict, question_catalogue
 
 OURS = "ours"
-FAULT = {c.id: c.questions[0] for c in catalogue().control}
+FAULT = {c.id: c.questions[0] for c in question_catalogue().control}
 """The one question by which an oracle reports each control."""
 SCENES = [f"scene-{k}" for k in range(8)]
 
 
 def answers(alarms=(), also=()):
     """Report a violation by some questions; ``also`` says other answers outright."""
-    said = {q.id: q.violation if q.id in alarms else opposite(q) for q in catalogue().question}
+    said = {
+        q.id: q.violation if q.id in alarms else opposite(q) for q in question_catalogue().question
+    }
     return said | dict(also)
 
 
@@ -46,17 +48,17 @@ def kind(condition):
 
 
 def stern(condition):
-    return verdict([q.id for q in catalogue().question], 1)
+    return verdict([q.id for q in question_catalogue().question], 1)
 
 
 def coin(dice):
-    every = [q.id for q in catalogue().question]
+    every = [q.id for q in question_catalogue().question]
     return lambda condition: verdict([q for q in every if dice.random() < 0.5], dice.randint(1, 5))
 
 
 def rows_of(judge, scenes=SCENES):
-    films = [film_verdict(s, c, [judge(c)]) for s in scenes for c in (OURS, *FAULT)]
-    return tellings(films, OURS, {c: c for c in FAULT})
+    films = [video_verdict(s, c, [judge(c)]) for s in scenes for c in (OURS, *FAULT)]
+    return measure_detectability(films, OURS, {c: c for c in FAULT})
 
 
 def told(rows):
@@ -64,21 +66,23 @@ def told(rows):
 
 
 def test_there_are_thirteen_questions_and_ten_controls_each_told_by_questions_that_exist():
-    known = {q.id for q in catalogue().question}
+    known = {q.id for q in question_catalogue().question}
     assert len(known) == 13 and len(FAULT) == 10
-    assert all(known.issuperset(c.questions) and c.questions for c in catalogue().control)
-    assert {c.questions[0] for c in catalogue().control} <= known
+    assert all(known.issuperset(c.questions) and c.questions for c in question_catalogue().control)
+    assert {c.questions[0] for c in question_catalogue().control} <= known
 
 
 def test_an_oracle_tells_each_control_by_its_own_question_only():
     rows = rows_of(oracle)
     assert told(rows) == set(FAULT.items())
-    assert all(law for law in believed(rows).values() if law)
+    assert all(law for law in trusted_questions(rows).values() if law)
 
 
 def test_an_oracle_is_believed_of_every_law_that_its_questions_are_about():
-    about = {q.law for q in catalogue().question if q.id in FAULT.values()}
-    assert {law for law, questions in believed(rows_of(oracle)).items() if questions} == about
+    about = {q.law for q in question_catalogue().question if q.id in FAULT.values()}
+    assert {
+        law for law, questions in trusted_questions(rows_of(oracle)).items() if questions
+    } == about
 
 
 def test_an_oracle_on_two_scenes_is_not_yet_believed_and_on_three_it_is():
@@ -90,7 +94,7 @@ def test_an_oracle_on_two_scenes_is_not_yet_believed_and_on_three_it_is():
 def test_who_likes_everything_and_who_likes_nothing_is_believed_of_no_law(judge):
     rows = rows_of(judge)
     assert told(rows) == set()
-    assert not any(believed(rows).values())
+    assert not any(trusted_questions(rows).values())
 
 
 def test_a_coin_is_seldom_believed():
@@ -101,7 +105,7 @@ def test_a_coin_is_seldom_believed():
 
 
 def test_one_coin_of_a_fixed_seed_is_believed_of_no_law():
-    assert not any(believed(rows_of(coin(random.Random(3)))).values())
+    assert not any(trusted_questions(rows_of(coin(random.Random(3)))).values())
 
 
 def test_an_alarm_on_the_reference_too_is_no_hit():
@@ -112,11 +116,11 @@ def test_an_alarm_on_the_reference_too_is_no_hit():
 
 
 def test_unclear_raises_no_alarm_and_what_applies_in_no_look_is_not_counted():
-    said = film_verdict("a", OURS, [verdict(also={"hover": "unclear", "rest": "na"})])
+    said = video_verdict("a", OURS, [verdict(also={"hover": "unclear", "rest": "na"})])
     assert said.alarm["hover"] == 0.0 and "rest" not in said.alarm
-    both = film_verdict("a", OURS, [verdict(["rest"], 1), verdict(also={"rest": "na"})])
+    both = video_verdict("a", OURS, [verdict(["rest"], 1), verdict(also={"rest": "na"})])
     assert both.alarm["rest"] == 1.0
-    assert film_verdict("a", OURS, [verdict(["rest"], 1), verdict()]).alarm["rest"] == 0.5
+    assert video_verdict("a", OURS, [verdict(["rest"], 1), verdict()]).alarm["rest"] == 0.5
     assert both.whole == 3.0
 
 
@@ -128,25 +132,25 @@ def test_unclear_raises_no_alarm_and_what_applies_in_no_look_is_not_counted():
     ],
 )  # fmt: skip
 def test_what_is_beyond_chance(wins, count, told):
-    interval = jeffreys(wins, count)
+    interval = jeffreys_interval(wins, count)
     assert interval.low < Fraction(wins) / count < interval.high or wins == count
     assert (interval.low > 0.5) == told
 
 
 def test_a_mark_is_the_share_of_believed_questions_without_an_alarm():
-    films = [film_verdict(s, "single", [verdict(["stick"], 2)]) for s in SCENES]
-    assert mark_of(films, "single", "contact", ["stick", "react"]).mark == 0.5
-    assert mark_of(films, "single", "gravity", ["pace"]).mark == 1.0
-    assert mark_of(films, "capped", "gravity", ["pace"]) is None
-    na = [film_verdict(s, "single", [verdict(also={"pace": "na"})]) for s in SCENES]
-    assert mark_of(na, "single", "gravity", ["pace"]) is None
+    films = [video_verdict(s, "single", [verdict(["stick"], 2)]) for s in SCENES]
+    assert method_mark(films, "single", "contact", ["stick", "react"]).mark == 0.5
+    assert method_mark(films, "single", "gravity", ["pace"]).mark == 1.0
+    assert method_mark(films, "capped", "gravity", ["pace"]) is None
+    na = [video_verdict(s, "single", [verdict(also={"pace": "na"})]) for s in SCENES]
+    assert method_mark(na, "single", "gravity", ["pace"]) is None
 
 
 def test_the_interval_of_a_mean_is_repeatable_and_narrows_with_scenes():
-    few, many = resampled([0.0, 1.0] * 2), resampled([0.0, 1.0] * 50)
-    assert few == resampled([0.0, 1.0] * 2)
+    few, many = bootstrap_interval([0.0, 1.0] * 2), bootstrap_interval([0.0, 1.0] * 50)
+    assert few == bootstrap_interval([0.0, 1.0] * 2)
     assert many.high - many.low < few.high - few.low
-    assert resampled([0.7]) == resampled([0.7, 0.7])
+    assert bootstrap_interval([0.7]) == bootstrap_interval([0.7, 0.7])
 
 
 @pytest.mark.parametrize(

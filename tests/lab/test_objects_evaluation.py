@@ -4,7 +4,7 @@ from PIL import Image
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.lab.evaluation import objects, objects_figure
+from corporeal.lab.evaluation import objects_evaluation, objects_figure
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 FACES = np.array(
@@ -31,44 +31,47 @@ def scene():
 
 
 def test_things_that_stand_apart_are_pushed_until_they_touch(scene):
-    near = objects.closed_up(scene)
+    near = objects_evaluation.bring_together(scene)
     low, tall = near.surfaces[1].vertices, near.surfaces[0].vertices
     gap = low[:, 0].min() - tall[:, 0].max()
     assert 0 <= gap < 0.003
     np.testing.assert_array_equal(tall, scene.surfaces[0].vertices)
     np.testing.assert_allclose(low[:, 2], scene.surfaces[1].vertices[:, 2])
-    again = objects.closed_up(near)
+    again = objects_evaluation.bring_together(near)
     np.testing.assert_array_equal(again.surfaces[1].vertices, low)
 
 
 def test_a_scene_is_judged_by_what_its_pictures_show(scene, tmp_path):
-    how = objects.ObjectsEvaluationConfig(surface_points=3000, pictures=8, picture_size=64)
-    taken = objects.photographed("two", scene, how)
+    how = objects_evaluation.ObjectsEvaluationConfig(
+        surface_points=3000, pictures=8, picture_size=64
+    )
+    taken = objects_evaluation.touching_from_photographs("two", scene, how)
     assert taken.cloud.count == 3000 and taken.masks.shape == (8, 3000)
     truth = taken.object_of_point
     assert (taken.cloud.colour[truth == 1, 0] > taken.cloud.colour[truth == 1, 2]).mean() > 0.95
     under = taken.cloud.position[:, 2] < 1e-9
-    for k, own in enumerate(objects.closed_up(scene).surfaces):
+    for k, own in enumerate(objects_evaluation.bring_together(scene).surfaces):
         bottom = taken.cloud.position[under & (truth == k), :2]
         corners = own.vertices[:, :2].min(0), own.vertices[:, :2].max(0)
         inward = np.minimum(bottom - corners[0], corners[1] - bottom).min(axis=1)
         assert (inward < 0.03).all()  # two pixels
-    judged = objects.judged("two", taken)
+    judged = objects_evaluation.evaluate_scene("two", taken)
     row = judged.row
     assert row.identity == 1 and row.ours > 0.95 and row.with_masks > 0.95
     assert row.components < 0.6 and row.things == ("tall", "low")
-    objects_figure.draw([judged], tmp_path / "figure.png")
+    objects_figure.draw_objects([judged], tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     with Image.open(tmp_path / "figure.png") as drawn:
         assert drawn.mode == "P", "a byte for each pixel: the page's picture was 1.1 MB"
-    objects_figure.draw([judged], tmp_path / "figure.svg")
+    objects_figure.draw_objects([judged], tmp_path / "figure.svg")
     assert "<svg" in (tmp_path / "figure.svg").read_text(encoding="utf-8")
-    table = objects.tables([row])[0]
+    table = objects_evaluation.objects_tables([row])[0]
     assert (
-        len(table.heads) == len(table.rows[0]) and objects.record([row])["rows"][0]["identity"] == 1
+        len(table.heads) == len(table.rows[0])
+        and objects_evaluation.objects_record([row])["rows"][0]["identity"] == 1
     )
 
 
 def test_a_folder_without_scenes_is_refused(tmp_path):
     with pytest.raises(UserError, match="no scene of several objects"):
-        objects.judge(tmp_path)
+        objects_evaluation.evaluate_objects(tmp_path)

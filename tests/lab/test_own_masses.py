@@ -9,8 +9,13 @@ import pytest
 from own_props import write
 
 from corporeal.core import store
-from corporeal.lab.evaluation.mass import Comparison, MassConfig, compare, predict_all
-from corporeal.lab.evaluation.truth import read_truth
+from corporeal.lab.evaluation.mass_evaluation import (
+    MassComparison,
+    MassConfig,
+    compare_masses,
+    predict_masses,
+)
+from corporeal.lab.evaluation.measured_masses import read_measured_masses
 from corporeal.pipeline.stages.describe import DescribeConfig
 from corporeal.pipeline.stages.ground import GroundConfig
 
@@ -21,17 +26,17 @@ SCATTER = 0.01
 
 
 @pytest.fixture(scope="module", params=SETS)
-def on_the_scales(request, tmp_path_factory) -> Comparison:
+def on_the_scales(request, tmp_path_factory) -> MassComparison:
     folder = tmp_path_factory.mktemp("things")
     write(folder)
-    things = read_truth(folder / "models", folder / "truth" / "masses.csv")
+    things = read_measured_masses(folder / "models", folder / "truth" / "masses.csv")
     recorded = {p.read_text(encoding="utf-8") for p in (RECORDINGS / request.param).glob("*.json")}
-    names = [f"object-{store.digest(t.file)[:6]}" for t in things]
+    names = [f"object-{store.path_digest(t.file)[:6]}" for t in things]
     if not all(any(name in text for text in recorded) for name in names):
         pytest.skip("other versions of what draws and joins meshes made files of other bytes here")
     answered = DescribeConfig(vlm=f"replay:{RECORDINGS / request.param}")
     config = MassConfig(anonymous=True)
-    return compare(predict_all(things, answered, GroundConfig(), config))
+    return compare_masses(predict_masses(things, answered, GroundConfig(), config))
 
 
 @pytest.mark.slow

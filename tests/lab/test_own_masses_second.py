@@ -10,8 +10,13 @@ import pytest
 from own_props import write
 
 from corporeal.core import store
-from corporeal.lab.evaluation.mass import Comparison, MassConfig, compare, predict_all
-from corporeal.lab.evaluation.truth import read_truth
+from corporeal.lab.evaluation.mass_evaluation import (
+    MassComparison,
+    MassConfig,
+    compare_masses,
+    predict_masses,
+)
+from corporeal.lab.evaluation.measured_masses import read_measured_masses
 from corporeal.pipeline.stages.describe import DescribeConfig
 from corporeal.pipeline.stages.ground import GroundConfig
 
@@ -22,16 +27,18 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def on_the_scales(tmp_path_factory) -> Comparison:
+def on_the_scales(tmp_path_factory) -> MassComparison:
     folder = tmp_path_factory.mktemp("things")
     write(folder, batch=2)
-    things = read_truth(folder / "models", folder / "truth" / "masses.csv")
+    things = read_measured_masses(folder / "models", folder / "truth" / "masses.csv")
     recorded = {path.read_text(encoding="utf-8") for path in RECORDINGS.glob("*.json")}
-    names = [f"object-{store.digest(t.file)[:6]}" for t in things]
+    names = [f"object-{store.path_digest(t.file)[:6]}" for t in things]
     if not all(any(name in text for text in recorded) for name in names):
         pytest.skip("other versions of what draws and joins meshes made files of other bytes here")
     answered = DescribeConfig(vlm=f"replay:{RECORDINGS}", answers=3)
-    return compare(predict_all(things, answered, GroundConfig(), MassConfig(anonymous=True)))
+    return compare_masses(
+        predict_masses(things, answered, GroundConfig(), MassConfig(anonymous=True))
+    )
 
 
 def test_of_what_hides_how_it_is_built_grounded_is_no_worse_than_asked_directly(on_the_scales):

@@ -12,23 +12,29 @@ import pytest
 from corporeal import cli
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.io.glb_writer import write_glb
-from corporeal.lab.evaluation.overlap import best_names, iou, matched_iou, named_iou, roc_area
-from corporeal.lab.evaluation.parts import (
-    SHOWCASE,
-    Judging,
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.lab.evaluation.parts_evaluation import (
+    SHOWCASE_MODELS,
     PartsEvaluationConfig,
-    judge,
-    lookers,
+    PartsMethod,
+    evaluate_parts,
+    feature_models,
+    parts_tables,
     read_names,
-    tables,
 )
-from corporeal.showcase.scenes import alone
+from corporeal.lab.evaluation.segmentation_scores import (
+    iou_matrix,
+    majority_names,
+    matched_iou,
+    named_iou,
+    roc_area,
+)
+from corporeal.showcase.showcase_scenes import build_single_prop_scene
 from glb_maker import CUBE, CUBE_TRIANGLES
 
 ROOT = Path(__file__).parents[2]
 FEW = ["--points", "2500", "--photographs", "6", "--photograph-size", "64"]
-CHEAP = Judging(PartsEvaluationConfig(points=2500, photographs=6, photograph_size=64))
+CHEAP = PartsMethod(PartsEvaluationConfig(points=2500, photographs=6, photograph_size=64))
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +42,7 @@ def folder(tmp_path_factory):
     """A box on a box, whose parts have names, and a ball, which is one part."""
     made = tmp_path_factory.mktemp("models")
     write_glb(made / "boxes.glb", boxes())
-    write_glb(made / "steel_ball.glb", alone("steel_ball"))
+    write_glb(made / "steel_ball.glb", build_single_prop_scene("steel_ball"))
     return made
 
 
@@ -54,13 +60,13 @@ def boxes():
 
 @pytest.fixture(scope="module")
 def judged_boxes(folder):
-    (judged,) = judge(folder, {}, CHEAP)
+    (judged,) = evaluate_parts(folder, {}, CHEAP)
     return judged
 
 
 def test_iou_is_shared_points_over_all_points_of_either():
     truth, found = np.array([0, 0, 0, 1, 1, -1]), np.array([0, 0, 1, 1, -1, 1])
-    np.testing.assert_allclose(iou(truth, found, 2, 3), [[2 / 3, 1 / 5, 0], [0, 1 / 4, 0]])
+    np.testing.assert_allclose(iou_matrix(truth, found, 2, 3), [[2 / 3, 1 / 5, 0], [0, 1 / 4, 0]])
 
 
 def test_clusters_are_paired_one_to_one_and_a_part_without_one_counts_nothing():
@@ -79,7 +85,7 @@ def test_named_parts_are_compared_with_their_own_only():
 
 def test_the_best_names_are_what_most_of_a_cluster_is():
     truth, found = np.array([0, 0, 1, 1, 1]), np.array([0, 0, 0, 1, 1])
-    np.testing.assert_array_equal(best_names(truth, found), [0, 0, 0, 1, 1])
+    np.testing.assert_array_equal(majority_names(truth, found), [0, 0, 0, 1, 1])
 
 
 def test_the_roc_area_counts_pairs_and_halves_ties():
@@ -109,7 +115,7 @@ def test_a_person_types_it_and_gets_a_table_data_and_a_picture(folder, monkeypat
 
 
 def test_the_same_seed_gives_the_same_numbers(folder, judged_boxes):
-    first, second = judged_boxes, judge(folder, {}, CHEAP)[0]
+    first, second = judged_boxes, evaluate_parts(folder, {}, CHEAP)[0]
     assert first.row.named_iou == second.row.named_iou
     assert first.row.clusters == second.row.clusters
     np.testing.assert_array_equal(first.part_of_point, second.part_of_point)
@@ -123,18 +129,18 @@ def test_what_is_called_the_same_is_one_part(folder, tmp_path):
     three = replace(made, surfaces=(*made.surfaces, feet), finishes=(*made.finishes, red))
     write_glb(tmp_path / "three.glb", three)
     names = {"three": {"base": "wooden thing", "foot": "wooden thing"}}
-    (apart,) = judge(tmp_path, {}, CHEAP)
-    (together,) = judge(tmp_path, names, CHEAP)
+    (apart,) = evaluate_parts(tmp_path, {}, CHEAP)
+    (together,) = evaluate_parts(tmp_path, names, CHEAP)
     assert apart.row.parts == ("base", "top", "foot")
     assert together.row.parts == ("wooden thing", "top")
     assert set(np.unique(together.truth)) == {0, 1}
     with pytest.raises(UserError, match="two parts"):
-        judge(tmp_path, {"three": dict.fromkeys(apart.row.parts, "thing")}, CHEAP)
+        evaluate_parts(tmp_path, {"three": dict.fromkeys(apart.row.parts, "thing")}, CHEAP)
 
 
 def test_models_are_laid_on_their_side(folder, judged_boxes):
     look = replace(CHEAP.look, lying=True)
-    (judged,) = judge(folder, {}, replace(CHEAP, look=look))
+    (judged,) = evaluate_parts(folder, {}, replace(CHEAP, look=look))
     place = judged.taken.cloud.position
     middle = [place[judged.truth == k].mean(axis=0) for k in range(2)]
     assert place[:, 2].min() > -1e-6 and abs(middle[1][2] - middle[0][2]) < 0.1
@@ -150,17 +156,17 @@ def test_only_what_pictures_show_is_asked_for(judged_boxes):
 
 def test_a_folder_without_models_or_without_parts_is_told(tmp_path, folder):
     with pytest.raises(UserError, match="no models"):
-        judge(tmp_path, {}, CHEAP)
+        evaluate_parts(tmp_path, {}, CHEAP)
     one = tmp_path / "one"
     one.mkdir()
     (one / "ball.glb").write_bytes((folder / "steel_ball.glb").read_bytes())
     with pytest.raises(UserError, match="two parts"):
-        judge(one, {}, CHEAP)
+        evaluate_parts(one, {}, CHEAP)
 
 
 def test_who_does_not_know_words_cannot_name():
     with pytest.raises(UserError, match="does not compare points with words"):
-        lookers(PartsEvaluationConfig(semantic="descriptor"))
+        feature_models(PartsEvaluationConfig(semantic="descriptor"))
 
 
 @pytest.mark.parametrize("text", ["[duck", "duck = 3", "[duck]\nbody = 7", "[duck]\nbody = ''"])
@@ -174,8 +180,8 @@ def test_names_that_are_no_names_are_told(tmp_path, text):
 @pytest.mark.slow
 def test_the_names_of_the_documentation_are_those_of_the_showcase():
     tables = [read_names(ROOT / "benchmarks" / f"parts_{k}.toml") for k in ("each", "asked")]
-    for name in SHOWCASE:
-        own = {surface.name for surface in alone(name).surfaces}
+    for name in SHOWCASE_MODELS:
+        own = {surface.name for surface in build_single_prop_scene(name).surfaces}
         assert all(set(names[name]) == own for names in tables)
 
 
@@ -194,7 +200,7 @@ def test_models_that_look_are_asked_for_pixels_and_words(folder, tmp_path):
         structural=f"dinov2:{dinov2}",
         semantic=f"clip:{clip}",
     )
-    (judged,) = judge(folder, {}, Judging(look))
+    (judged,) = evaluate_parts(folder, {}, PartsMethod(look))
     cloud = judged.taken.cloud
     assert cloud.semantic.shape == (cloud.count, 24) and cloud.structural.shape[1] == 48
     np.testing.assert_allclose(np.linalg.norm(cloud.semantic.astype(float), axis=1), 1, atol=2e-3)
@@ -202,7 +208,7 @@ def test_models_that_look_are_asked_for_pixels_and_words(folder, tmp_path):
 
 
 def test_the_table_ends_with_the_mean(judged_boxes):
-    (table,) = tables([judged_boxes.row, judged_boxes.row])
+    (table,) = parts_tables([judged_boxes.row, judged_boxes.row])
     heads, cells = table.heads, table.rows
     assert len(cells) == 3 and cells[-1][0] == "mean" and len(cells[-1]) == len(heads)
     assert cells[-1][3:] == cells[0][3:]

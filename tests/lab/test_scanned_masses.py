@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.lab.evaluation.mass import MassConfig, compare, predict_all
-from corporeal.lab.evaluation.truth import read_truth
+from corporeal.lab.evaluation.mass_evaluation import MassConfig, compare_masses, predict_masses
+from corporeal.lab.evaluation.measured_masses import read_measured_masses
 from corporeal.pipeline.stages.ground import GroundConfig
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
@@ -65,10 +65,10 @@ SETS = [
 @pytest.mark.slow
 @pytest.mark.parametrize("measured", SETS, ids=[one.recordings for one in SETS])
 def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets, measured):
-    things = read_truth(shared_assets / "ycb", shared_assets / "mass_truth.csv")
+    things = read_measured_masses(shared_assets / "ycb", shared_assets / "mass_truth.csv")
     answered = DescribeConfig(vlm=f"replay:{RECORDINGS / measured.recordings}")
     config = MassConfig(anonymous=True)
-    result = compare(predict_all(things, answered, GroundConfig(), config))
+    result = compare_masses(predict_masses(things, answered, GroundConfig(), config))
     every = result.metrics["all"]
     assert every["mass"].count == 19
     errors = [every[step].alde for step in measured.ladder]

@@ -10,19 +10,25 @@ from corporeal.core.types import (
     Hypothesis,
     Inventory,
     MaterialField,
-    ObjectWords,
-    PartWords,
-    Piece,
-    Placement,
+    ObjectDescription,
+    PartComponent,
+    PartDescription,
+    RangePlacement,
     Structure,
-    in_way,
+    apply_hypothesis,
 )
-from corporeal.materials.ensemble import NAMED_WALLS, _shares, otherwise, sample, triangle
-from corporeal.materials.inflated import sealed_air
+from corporeal.materials.pressurised_ball import sealed_air_material
+from corporeal.materials.value_sampling import (
+    NAMED_WALL_LOG_STD,
+    _draw_shares,
+    draw_hypotheses,
+    sample_material_field,
+    triangular_quantile,
+)
 
 
 def usual(name):
-    entry = materials.find(name)
+    entry = materials.find_material(name)
     return entry.pick(entry.typical())
 
 
@@ -33,7 +39,9 @@ def field_of(*names, structures=None, words=None, pieces=()):
     friction = np.array(
         [
             [
-                materials.friction_between(materials.find(a), materials.find(b)).sliding.typical
+                materials.friction_between(
+                    materials.find_material(a), materials.find_material(b)
+                ).sliding.typical
                 for b in floor
             ]
             for a in floor
@@ -42,7 +50,7 @@ def field_of(*names, structures=None, words=None, pieces=()):
     return MaterialField(
         materials=made,
         structures=structures or (Structure("solid"),) * len(made),
-        words=words or tuple(PartWords(n, n) for n in names),
+        words=words or tuple(PartDescription(n, n) for n in names),
         friction=friction,
         restitution=np.full((count, count), 0.5),
         pieces=pieces,
@@ -50,7 +58,7 @@ def field_of(*names, structures=None, words=None, pieces=()):
 
 
 def draws(field, owners, count=150):
-    return [sample(field, owners, np.random.default_rng(k)) for k in range(count)]
+    return [sample_material_field(field, owners, np.random.default_rng(k)) for k in range(count)]
 
 
 @pytest.mark.parametrize(
@@ -58,7 +66,7 @@ def draws(field, owners, count=150):
 )
 def test_a_triangle_is_a_distribution_on_its_support(low, peak, high):
     quantiles = (np.arange(20_000) + 0.5) / 20_000
-    drawn = np.array([triangle(q, low, peak, high) for q in quantiles])
+    drawn = np.array([triangular_quantile(q, low, peak, high) for q in quantiles])
     assert drawn.min() >= low
     assert drawn.max() <= high
     assert drawn.mean() == pytest.approx((low + peak + high) / 3, abs=1e-3)
@@ -95,7 +103,7 @@ def test_what_moves_together_in_life_moves_together_here():
 
 
 def test_one_object_has_one_grade_of_a_material():
-    drawn = sample(
+    drawn = sample_material_field(
         field_of("hardwood", "hardwood", "hardwood"), [0, 0, 1], np.random.default_rng(3)
     )
     legs, other = drawn.materials[:2], drawn.materials[2]
@@ -121,10 +129,11 @@ def test_walls_contents_and_shares_are_drawn_too():
     soup = usual("sauce")
     can = Structure("filled", 4e-4, contents=soup, fill=0.9, loose=True)
     halves = tuple(
-        PartWords(n, n, volume_share=s, surface_share=s) for n, s in (("steel", 0.3), ("ABS", 0.7))
+        PartDescription(n, n, volume_share=s, surface_share=s)
+        for n, s in (("steel", 0.3), ("ABS", 0.7))
     )
-    words = PartWords("can", "steel", "filled", contents="sauce", pieces=halves)
-    pieces = (tuple(Piece(w, usual(w.name), Structure("solid")) for w in halves),)
+    words = PartDescription("can", "steel", "filled", contents="sauce", pieces=halves)
+    pieces = (tuple(PartComponent(w, usual(w.name), Structure("solid")) for w in halves),)
     field = field_of("steel", structures=(can,), words=(words,), pieces=pieces)
     found = draws(field, [0])
     made = [f.structures[0] for f in found]
@@ -145,8 +154,8 @@ def test_walls_contents_and_shares_are_drawn_too():
 
 def test_sealed_air_is_as_it_was_asked_for_in_every_draw():
     """Every interval of a mass that had a basketball in it ended the run."""
-    air = Structure("filled", 0.004, contents=sealed_air(55e3), fill=1.0, inflated=True)
-    field = field_of("rubber", structures=(air,), words=(PartWords("ball", "rubber"),))
+    air = Structure("filled", 0.004, contents=sealed_air_material(55e3), fill=1.0, inflated=True)
+    field = field_of("rubber", structures=(air,), words=(PartDescription("ball", "rubber"),))
     drawn = draws(field, (0,), 20)
     assert all(d.structures[0] == air for d in drawn)
     assert len({d.materials[0].density for d in drawn}) > 1
@@ -154,8 +163,12 @@ def test_sealed_air_is_as_it_was_asked_for_in_every_draw():
 
 def test_what_is_blown_up_by_mouth_may_have_another_wall_and_a_ball_of_rules_not():
     def walls(kpa):
-        air = Structure("filled", 3e-4, contents=sealed_air(1e3 * kpa), fill=1.0, inflated=True)
-        words = PartWords("x", "soft_PVC", thickness=3e-4, wall_usual=True, inflation=1e3 * kpa)
+        air = Structure(
+            "filled", 3e-4, contents=sealed_air_material(1e3 * kpa), fill=1.0, inflated=True
+        )
+        words = PartDescription(
+            "x", "soft_PVC", thickness=3e-4, wall_usual=True, inflation=1e3 * kpa
+        )
         field = field_of("soft_PVC", structures=(air,), words=(words,))
         return {d.structures[0].thickness for d in draws(field, (0,), 20)}
 
@@ -167,7 +180,7 @@ def test_friction_stays_within_what_was_published():
     field = field_of("rubber", "steel")
     found = draws(field, [0, 1], 100)
     published = materials.friction_between(
-        materials.find("rubber"), materials.find("concrete")
+        materials.find_material("rubber"), materials.find_material("concrete")
     ).sliding
     drawn = np.array([f.friction[0, 2] for f in found])
     assert published.low <= drawn.min() < drawn.max() <= published.high
@@ -183,17 +196,21 @@ def test_measured_restitution_stays_within_what_was_published():
 
 
 def inventory(words):
-    return Inventory((ObjectWords("thing", "thing", (words,)),))
+    return Inventory((ObjectDescription("thing", "thing", (words,)),))
 
 
 def names(words, count=2000):
-    drawn = (otherwise(inventory(words), np.random.default_rng(k), "default") for k in range(count))
+    drawn = (
+        draw_hypotheses(inventory(words), np.random.default_rng(k), "default") for k in range(count)
+    )
     return [d.objects[0].parts[0].material for d in drawn]
 
 
 def test_alternatives_come_as_often_as_they_were_stated():
     others = (Hypothesis("glass", None, 0.25), Hypothesis("ABS", None, 0.1))
-    words = PartWords("cup", "porcelain", hypotheses=(Hypothesis("porcelain", None, 0.65), *others))
+    words = PartDescription(
+        "cup", "porcelain", hypotheses=(Hypothesis("porcelain", None, 0.65), *others)
+    )
     found = names(words)
     assert found.count("glass") / len(found) == pytest.approx(0.25, abs=0.03)
     assert found.count("ABS") / len(found) == pytest.approx(0.1, abs=0.02)
@@ -201,12 +218,12 @@ def test_alternatives_come_as_often_as_they_were_stated():
 
 
 def test_a_way_is_drawn_as_a_whole_and_needs_walls():
-    place = {"shell_thickness": Placement(0.9, "model", "")}
+    place = {"shell_thickness": RangePlacement(0.9, "model", "")}
     real = Hypothesis("apple", "solid", 0.5)
     toy = Hypothesis("polystyrene", "hollow", 0.5, placements=place, reason="Too shiny.")
-    fruit = replace(in_way(PartWords("fruit", None), real), hypotheses=(real, toy))
+    fruit = replace(apply_hypothesis(PartDescription("fruit", None), real), hypotheses=(real, toy))
     drawn = [
-        otherwise(inventory(fruit), np.random.default_rng(k), "default").objects[0].parts[0]
+        draw_hypotheses(inventory(fruit), np.random.default_rng(k), "default").objects[0].parts[0]
         for k in range(40)
     ]
     assert {(p.material, p.structure, tuple(p.placements)) for p in drawn} == {
@@ -217,7 +234,7 @@ def test_a_way_is_drawn_as_a_whole_and_needs_walls():
         e.name for e in materials.library().values() if "shell_thickness" not in e.ranges
     )
     odd = Hypothesis(wall_less, "hollow", 1.0)
-    assert set(names(PartWords("cup", "porcelain", "shell", hypotheses=(odd,)), 20)) == {
+    assert set(names(PartDescription("cup", "porcelain", "shell", hypotheses=(odd,)), 20)) == {
         "porcelain"
     }
 
@@ -228,14 +245,14 @@ def test_ways_of_one_reading_are_drawn_together():
             Hypothesis(real, "solid", 0.5, reading="real"),
             Hypothesis(toy, "hollow", 0.5, reading="toy"),
         )
-        return replace(in_way(PartWords(name, None), ways[0]), hypotheses=ways)
+        return replace(apply_hypothesis(PartDescription(name, None), ways[0]), hypotheses=ways)
 
     parts = (piece("peel", "leather", "soft_PVC"), piece("flesh", "apple", "polystyrene"))
     whole = replace(parts[0], name="fruit", pieces=parts)
     met = {
         tuple(
             p.material
-            for p in otherwise(inventory(whole), np.random.default_rng(k), "default")
+            for p in draw_hypotheses(inventory(whole), np.random.default_rng(k), "default")
             .objects[0]
             .parts[0]
             .pieces
@@ -246,36 +263,36 @@ def test_ways_of_one_reading_are_drawn_together():
 
 
 def test_shares_of_what_is_nested_stay_possible():
-    cover = PartWords("cover", "leather", "sheet", volume_share=1.0, surface_share=1.0)
-    core = PartWords("core", "cork", volume_share=0.95, surface_share=0.9, inside="cover")
-    words = PartWords("ball", "cork", pieces=(replace(cover, inner_share=0.95), core))
+    cover = PartDescription("cover", "leather", "sheet", volume_share=1.0, surface_share=1.0)
+    core = PartDescription("core", "cork", volume_share=0.95, surface_share=0.9, inside="cover")
+    words = PartDescription("ball", "cork", pieces=(replace(cover, inner_share=0.95), core))
     for k in range(50):
-        drawn = _shares(words, np.random.default_rng(k)).pieces
+        drawn = _draw_shares(words, np.random.default_rng(k)).pieces
         assert drawn[0].inner_share == drawn[1].volume_share
         assert drawn[1].volume_share <= 0.99 * drawn[0].volume_share
         assert drawn[0].volume_share == pytest.approx(1.0)
 
 
 def test_what_is_unknown_may_be_anything():
-    assert len(set(names(PartWords("it", None), 300))) > 40
+    assert len(set(names(PartDescription("it", None), 300))) > 40
 
 
 def test_a_small_library_can_be_drawn_from_too():
-    entry = materials.find("steel", "reference")
+    entry = materials.find_material("steel", "reference")
     tin = entry.pick(entry.typical())
     can = Structure("filled", 4e-4, contents=usual("granules"), fill=0.9, loose=True)
-    words = (PartWords("can", "steel", "filled", thickness=4e-4, contents="granules"),)
+    words = (PartDescription("can", "steel", "filled", thickness=4e-4, contents="granules"),)
     field = replace(field_of("steel", structures=(can,), words=words), materials=(tin,))
-    drawn = sample(field, [0], np.random.default_rng(1), "reference", "concrete")
+    drawn = sample_material_field(field, [0], np.random.default_rng(1), "reference", "concrete")
     assert drawn.structures[0].contents.density != can.contents.density
     assert drawn.materials[0].density in entry.ranges["density"]
-    odd = PartWords("cup", "steel", hypotheses=(Hypothesis("phlogiston", None, 1.0),))
-    kept = otherwise(inventory(odd), np.random.default_rng(0), "reference")
+    odd = PartDescription("cup", "steel", hypotheses=(Hypothesis("phlogiston", None, 1.0),))
+    kept = draw_hypotheses(inventory(odd), np.random.default_rng(0), "reference")
     assert kept.objects[0].parts[0].material == "steel"
 
 
 def test_a_wall_that_is_only_usual_of_a_name_is_drawn_and_a_stated_one_is_not():
-    shell = PartWords("safe", "steel", "shell", thickness=0.005, wall_usual=True)
+    shell = PartDescription("safe", "steel", "shell", thickness=0.005, wall_usual=True)
     stated = replace(shell, wall_usual=False)
     ball = replace(shell, inflation=80e3)
 
@@ -285,7 +302,7 @@ def test_a_wall_that_is_only_usual_of_a_name_is_drawn_and_a_stated_one_is_not():
         assert all(d.words[0].thickness == d.structures[0].thickness for d in drawn)
         return np.log([d.structures[0].thickness / 0.005 for d in drawn])
 
-    assert walls(shell).std() == pytest.approx(NAMED_WALLS, rel=0.2)
+    assert walls(shell).std() == pytest.approx(NAMED_WALL_LOG_STD, rel=0.2)
     assert np.median(walls(shell)) == pytest.approx(0.0, abs=0.1)
     assert not walls(stated).any()
     assert not walls(ball).any()

@@ -6,17 +6,17 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from corporeal.materials import find
-from corporeal.materials.inflated import (
-    SQUEEZE,
-    SealedBall,
-    air_bears,
-    pressed,
-    sealed_air,
-    sealed_ball,
-    struck,
+from corporeal.materials import find_material
+from corporeal.materials.loss_restitution import restitution_of_loss
+from corporeal.materials.pressurised_ball import (
+    REFERENCE_SQUEEZE_RATIO,
+    InflatedBall,
+    equivalent_solid,
+    inflated_ball_material,
+    is_carried_by_air,
+    pressed_gauge_pressure,
+    sealed_air_material,
 )
-from corporeal.materials.rebound import rebound
 
 
 def limp_force(gauge, radius, depth):
@@ -43,14 +43,14 @@ def hertz(material, radius):
 
 @pytest.mark.parametrize("gauge", [0.0, 3e3, 30e3, 80e3])
 def test_solid_and_limp_ball_press_alike_at_a_fifth_of_the_radius(gauge):
-    air, radius = sealed_air(gauge), 0.11
-    depth = SQUEEZE * radius
+    air, radius = sealed_air_material(gauge), 0.11
+    depth = REFERENCE_SQUEEZE_RATIO * radius
     assert hertz(air, radius)(depth) == pytest.approx(limp_force(gauge, radius, depth), rel=0.05)
 
 
 @pytest.mark.parametrize("speed", [6.0, 10.0, 19.0])
 def test_a_football_touches_as_long_as_a_limp_one(speed):
-    air, radius, mass = sealed_air(80e3), 0.11, 0.43
+    air, radius, mass = sealed_air_material(80e3), 0.11, 0.43
     limp = contact_time(lambda x: limp_force(80e3, radius, max(x, 0.0)), mass, speed)
     solid = contact_time(hertz(air, radius), mass, speed)
     assert solid == pytest.approx(limp, rel=0.15)
@@ -59,7 +59,7 @@ def test_a_football_touches_as_long_as_a_limp_one(speed):
 
 
 def test_air_without_gauge_pressure_resists_and_what_is_inflated_resists_more():
-    pressures = [pressed(p) for p in (0.0, 1e3, 1e4, 1e5)]
+    pressures = [pressed_gauge_pressure(p) for p in (0.0, 1e3, 1e4, 1e5)]
     assert pressures[0] > 3e3
     assert np.all(np.diff(pressures) > 0)
 
@@ -76,21 +76,21 @@ def test_air_without_gauge_pressure_resists_and_what_is_inflated_resists_more():
     ],
 )
 def test_air_carries_where_it_is_stiffer_than_the_skin(skin, thickness, radius, gauge, bears):
-    material = find(skin).pick(find(skin).typical())
-    assert air_bears(gauge, material, thickness, radius) is bears
+    material = find_material(skin).pick(find_material(skin).typical())
+    assert is_carried_by_air(gauge, material, thickness, radius) is bears
 
 
 def test_the_loss_is_that_of_the_restitution_and_every_number_has_its_range():
-    air = sealed_air(55e3)
-    assert rebound(air.loss) == pytest.approx(air.restitution)
+    air = sealed_air_material(55e3)
+    assert restitution_of_loss(air.loss) == pytest.approx(air.restitution)
     for name, ground in air.grounds.items():
         assert ground.value in ground.range
         assert getattr(air, name) == ground.value
 
 
 def racquetball(gauge=0.0):
-    rubber = find("rubber").pick(find("rubber").typical())
-    return SealedBall(gauge, rubber, 0.0036, 0.0286)
+    rubber = find_material("rubber").pick(find_material("rubber").typical())
+    return InflatedBall(gauge, rubber, 0.0036, 0.0286)
 
 
 def test_a_blow_is_stored_in_wall_and_air_where_a_ball_turns():
@@ -106,13 +106,13 @@ def test_a_blow_is_stored_in_wall_and_air_where_a_ball_turns():
         x += dt * v
     energy = 0.5 * mass * speed**2
     assert ball.squeeze(energy) == pytest.approx(x / ball.radius, rel=0.01)
-    solid = replace(sealed_ball(ball), young=struck(ball, energy).young)
+    solid = replace(inflated_ball_material(ball), young=equivalent_solid(ball, energy).young)
     assert hertz(solid, ball.radius)(x) == pytest.approx(force(x), rel=0.02)
 
 
 def test_the_harder_a_sealed_ball_is_struck_the_more_the_air_bears_which_loses_nothing():
     ball = racquetball()
-    losses = [struck(ball, energy).loss for energy in (0.0, 0.3, 1.0, 3.0)]
+    losses = [equivalent_solid(ball, energy).loss for energy in (0.0, 0.3, 1.0, 3.0)]
     assert losses[0] < ball.skin.loss
     assert np.all(np.diff(losses) < 0)
     assert losses[-1] > 0.3 * ball.skin.loss
@@ -120,6 +120,6 @@ def test_the_harder_a_sealed_ball_is_struck_the_more_the_air_bears_which_loses_n
 
 def test_a_thick_wall_is_dented_no_less_than_a_solid_ball():
     rubber = racquetball().skin
-    solid = SealedBall(0.0, rubber, 0.0286, 0.0286)
-    depth = SQUEEZE * solid.radius
+    solid = InflatedBall(0.0, rubber, 0.0286, 0.0286)
+    depth = REFERENCE_SQUEEZE_RATIO * solid.radius
     assert solid.spring * depth < 1.05 * hertz(rubber, solid.radius)(depth)

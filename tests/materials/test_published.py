@@ -6,8 +6,8 @@ import pytest
 
 from corporeal import materials
 from corporeal.core.errors import UserError
-from corporeal.core.types import Ground, Law
-from corporeal.materials.shipped import source_table
+from corporeal.core.types import Law, Provenance
+from corporeal.materials.shipped_libraries import source_table
 
 PUBLISHED = """
 gold           1 4 77.2       .42-.44   19.29     120
@@ -120,16 +120,16 @@ def test_an_error_of_the_published_table_is_corrected_with_a_source(why):
 
 
 def test_what_annealed_copper_and_hard_aluminium_reach_lies_inside():
-    assert 33e6 in materials.find("copper").ranges["yield_stress"]
-    assert 450e6 in materials.find("aluminium").ranges["yield_stress"]
-    assert 1500e6 in materials.find("hardened steel").ranges["yield_stress"]
-    assert materials.find("snow").ranges["cohesion"].typical > 0
+    assert 33e6 in materials.find_material("copper").ranges["yield_stress"]
+    assert 450e6 in materials.find_material("aluminium").ranges["yield_stress"]
+    assert 1500e6 in materials.find_material("hardened steel").ranges["yield_stress"]
+    assert materials.find_material("snow").ranges["cohesion"].typical > 0
 
 
 def test_the_published_poissons_ratio_of_one_half_is_refused_where_it_is_chosen():
     clay = materials.library("reference")["soil_clay"]
     grounds = clay.typical()
-    half = Ground(0.5, clay.ranges["poisson"], "model", "")
+    half = Provenance(0.5, clay.ranges["poisson"], "model", "")
     with pytest.raises(UserError, match=r"0.5 for soil_clay .* no finite Lamé constant"):
         clay.pick(grounds | {"poisson": half})
     assert clay.pick(grounds).poisson == pytest.approx(0.4)

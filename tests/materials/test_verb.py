@@ -1,7 +1,7 @@
 """`corporeal materials` as a person types it."""
 
 import pytest
-from test_lint import PLANTED, SOFT, SOUND  # type: ignore[import-not-found]
+from test_library_lint import PLANTED, SOFT, SOUND  # type: ignore[import-not-found]
 
 
 @pytest.fixture

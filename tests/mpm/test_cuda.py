@@ -13,7 +13,7 @@ from corporeal.core.types import Law, Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda import program
 from corporeal.mpm.cuda.engine import CudaEngine
-from corporeal.mpm.problem import MENU, Problem
+from corporeal.mpm.problem import ENGINES, Problem
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 ARCHITECTURES = [86, 90, 120]
@@ -234,7 +234,7 @@ def test_without_a_card_it_says_what_to_do():
         pytest.skip("there is a card")
     with pytest.raises(UserError, match="--engine cpu"):
         CudaEngine(problem(body(ball((0, 0, 0.1)))))
-    assert MENU["cuda"] == "corporeal.mpm.cuda.engine:CudaEngine"
+    assert ENGINES["cuda"] == "corporeal.mpm.cuda.engine:CudaEngine"
 
 
 def test_what_it_cannot_do_it_names():
@@ -270,7 +270,7 @@ def test_rigid_inclusions_compile_for_cards_without_one(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", program.MODULES, ids=lambda m: m.__name__.split(".")[-1])
+@pytest.mark.parametrize("module", program.KERNEL_MODULES, ids=lambda m: m.__name__.split(".")[-1])
 def test_every_kernel_compiles_for_cards_without_one(module, tmp_path):
     """For the oldest card, which has the fewest instructions; the transfers for all of them."""
     everywhere = module in (program.kernels, program.scatter)

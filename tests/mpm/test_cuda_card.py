@@ -10,13 +10,13 @@ from point_bodies import CELL, ball, body, problem
 from test_cuda import fall
 
 from corporeal.core.types import Push
-from corporeal.mpm.constants import OUT_OF_BLOCK_SHARE
-from corporeal.mpm.cuda import arena, layout, particle_memory, scatter, step
+from corporeal.mpm.constants import OUT_OF_BLOCK_FRACTION
+from corporeal.mpm.cuda import block_arena, gather, layout, particle_memory, scatter
 from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.cuda.layout import wp
 
 OBJECT, HEAP = drop_of(4_000), drop_of(4_000, objects=8, heap=True)
-STATE = particle_memory.STATE
+STATE = particle_memory.PARTICLE_STATE
 
 
 def engine_of(drop):
@@ -32,7 +32,7 @@ def flag(engine, which):
 
 
 def kept(engine):
-    return {name: particle_memory.rows(engine.arrays.particles, name) for name in STATE}
+    return {name: particle_memory.read_rows(engine.arrays.particles, name) for name in STATE}
 
 
 # ---------------------------------------------------------------- launches
@@ -60,7 +60,7 @@ def test_a_particle_adds_a_few_numbers_to_memory_where_it_added_216(drop, most):
     """Whole blocks of 8 a cell would be 216 nodes of 7 sums for 512 particles: 2.95."""
     fresh = card.adds(engine_of(drop))
     assert fresh.strays == 0.0 and 2.9 < fresh.all < most
-    assert card.Adds(fresh.kept, OUT_OF_BLOCK_SHARE).all < 30.0
+    assert card.Adds(fresh.kept, OUT_OF_BLOCK_FRACTION).all < 30.0
 
 
 def test_the_sums_of_a_node_are_seven_and_none_is_a_zero_that_is_added(tmp_path):
@@ -72,7 +72,7 @@ def test_the_sums_of_a_node_are_seven_and_none_is_a_zero_that_is_added(tmp_path)
     text = next(path for path in made if path.suffix == ".ptx").read_text()
     added = re.findall(r"\b(?:red|atom)\.(?:\w+\.)*?(global|shared)\.add\.f32", text)
     each = 27 * layout.ARENA_SUMS
-    assert added.count("shared") == arena.SUMS == each / 3
+    assert added.count("shared") == block_arena.LAYER_SUMS == each / 3
     assert added.count("global") == each + layout.ARENA_SUMS + 27
     assert ".local" not in text
 
@@ -88,7 +88,7 @@ def shaken(engine, names, kernel):
     for other in (False, True):
         for name, rows in before.items():
             values = rows + 3 if other and name in names.split() else rows
-            particle_memory.put(engine.arrays.particles, name, values)
+            particle_memory.write_rows(engine.arrays.particles, name, values)
         engine.arrays.grid.sum.zero_()
         kernel(engine)
         found.append((kept(engine), engine.arrays.grid.sum.numpy().copy()))
@@ -103,7 +103,7 @@ def scattered(engine, lanes=1):
 
 def gathered(engine, lanes=1):
     a = engine.arrays
-    grouped(step.gather, lanes, a.particles, a.grid, a.loads, a.sheet)
+    grouped(gather.gather, lanes, a.particles, a.grid, a.loads, a.sheet)
 
 
 def grouped(kernel, lanes, *inputs):
@@ -193,14 +193,14 @@ def test_groups_of_threads_simulate_what_one_thread_does(monkeypatch, scene):
 def in_task(engine):
     """Which particles are in the block of the task they belong to; each is in one task."""
     a = engine.arrays
-    count = flag(engine, layout.TASKS)
+    count = flag(engine, layout.FLAG_TASKS)
     home, first, last = (
         getattr(a.grid, f"task_{name}").numpy()[:count] for name in ("home", "first", "last")
     )
     task = np.repeat(np.arange(count), last - first)
     order = np.concatenate([np.arange(*pair) for pair in zip(first, last, strict=True)])
     assert sorted(order) == list(range(a.particles.count)) and (last - first).max() <= layout.TASK
-    cell = particle_memory.rows(a.particles, "cell")[order]
+    cell = particle_memory.read_rows(a.particles, "cell")[order]
     return (cell >> 2 == a.grid.where.numpy()[home[task]]).all(axis=1)
 
 
@@ -211,8 +211,8 @@ def test_particles_are_sorted_within_a_frame_when_a_tenth_has_strayed():
     engine.advance(0.1)
     assert engine.snapshot().position[:, 0].mean() > 39 * CELL
     away = ~in_task(engine)
-    assert flag(engine, layout.STRAYS) == away.sum()
-    assert away.mean() <= OUT_OF_BLOCK_SHARE + 0.05
+    assert flag(engine, layout.FLAG_STRAYS) == away.sum()
+    assert away.mean() <= OUT_OF_BLOCK_FRACTION + 0.05
 
 
 def test_sorting_what_is_sorted_changes_nothing():

@@ -9,7 +9,7 @@ from test_cuda import CELL, ball, body, problem, side_by_side
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Law, Push, Wind
-from corporeal.mpm.problem import Faces, Interactive, Joint, Tether
+from corporeal.mpm.problem import InteractiveEngine, Joint, Tether, WindFaces
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 STORM = Wind((20.0, 3.0, 0.0), gust=0.4, start=0.002, end=1.0)
@@ -26,7 +26,7 @@ def sailing(points, **more):
     far = np.linalg.norm(out, axis=1)
     skin = np.flatnonzero(far > far.max() - 0.6 * CELL)
     area = out[skin] / far[skin, None] * 1e-4
-    return body(points, wind=STORM, faces=Faces(area, skin), **more)
+    return body(points, wind=STORM, faces=WindFaces(area, skin), **more)
 
 
 def compared(given, steps, position=2e-6):
@@ -88,7 +88,7 @@ def test_a_rigid_frame_holds_its_cushion_as_in_the_reference():
 def test_blows_and_drags_reach_a_body_as_in_the_reference(rigid):
     given = problem(body(ball((0, 0, 0.3)), rigid=rigid, young=3e4))
     ours, sure = on_device(given), ReferenceEngine(given)
-    assert isinstance(ours, Interactive)
+    assert isinstance(ours, InteractiveEngine)
     start = ours.measure().potential.sum()
     for engine in (ours, sure):
         for step in range(36):

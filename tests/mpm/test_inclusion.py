@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
-from corporeal.core.registry import load
-from corporeal.discretization.problem_from_scene import clusters, frames_of
-from corporeal.mpm.physics.rigid import mass_of
-from corporeal.mpm.problem import MENU
-from corporeal.mpm.reference.inclusions import join
+from corporeal.core.registry import load_backend
+from corporeal.discretization.build_model import label_clusters, label_rigid_frames
+from corporeal.mpm.physics.rigid import mass_and_inertia
+from corporeal.mpm.problem import ENGINES
+from corporeal.mpm.reference.inclusions import join_bodies
 from corporeal.simulation.ledger_row import ledger_row
 
 CELL = 0.05
@@ -39,7 +39,7 @@ def block(cell=CELL, offset=0.3, velocity=(0.0, 0.0, -1.0), gap=0.5):
 
 @pytest.fixture(params=["reference", "cpu"])
 def engine(request):
-    chosen = load("engine", request.param, MENU)
+    chosen = load_backend("engine", request.param, ENGINES)
     chosen.round_off = {"reference": 1e-12, "cpu": 1e-5}[request.param]
     return chosen
 
@@ -56,11 +56,11 @@ def test_a_frame_joined_to_points_keeps_momentum_and_inertia_to_round_off():
     x, m = rng.normal(size=(40, 3)), rng.uniform(1.0, 2.0, 40)
     v, spin = np.array([1.0, -2.0, 0.5]), np.array([0.3, 1.0, -2.0])
     none = np.zeros(40)
-    own = mass_of(x[:25], m[:25], none[:25])
+    own = mass_and_inertia(x[:25], m[:25], none[:25])
     u = v + np.cross(spin, x)
     speed, moment = m[:25] @ u[:25] / own.total, own.inertia @ spin
-    whole, common, total = join(own, (speed, moment), m[25:], x[25:], u[25:])
-    everything = mass_of(x, m, none)
+    whole, common, total = join_bodies(own, (speed, moment), m[25:], x[25:], u[25:])
+    everything = mass_and_inertia(x, m, none)
     assert whole.centre == pytest.approx(everything.centre, rel=1e-12)
     assert whole.inertia == pytest.approx(everything.inertia, rel=1e-12)
     assert common == pytest.approx(m @ u / m.sum(), rel=1e-12)
@@ -106,7 +106,7 @@ def test_a_ball_on_the_arm_of_a_chair_bounces_off_wood():
     centre = (0.1 + 0.3 * CELL, 0.1 + 0.3 * CELL, top + 0.05 + 0.2 * CELL)
     stone = box(centre, (0.1,) * 3, CELL / 2, stuff=WOOD, rigid=True, velocity=(0.0, 0.0, -1.0))
     given = problem(frame, beside, stone, cell=CELL, bonds=((0, 1),), restitution=0.5)
-    run = load("engine", "reference", MENU)(given)
+    run = load_backend("engine", "reference", ENGINES)(given)
     run.advance(0.03)
     speed = run.measure().momentum[:, 2] / run.measure().mass
     assert speed[2] - speed[0] == pytest.approx(0.5, abs=0.1)
@@ -149,7 +149,7 @@ def test_a_frame_as_thin_as_foil_holds_what_is_soft_around_it(engine):
 def test_the_ledger_adds_up_what_belongs_to_one_object():
     frame, cushion = chair()
     given = problem(cushion, frame, block(), cell=CELL, bonds=((1, 0),), planes=[floor()])
-    run = load("engine", "cpu", MENU)(given)
+    run = load_backend("engine", "cpu", ENGINES)(given)
     run.advance(0.03)
     row = ledger_row(given, run.snapshot(), run.measure(), run.steps)
     whole = run.measure()
@@ -164,7 +164,7 @@ def test_the_ledger_adds_up_what_belongs_to_one_object():
 def test_particles_that_hang_together_make_one_frame():
     rng = np.random.default_rng(3)
     legs = [np.add(rng.uniform(0.0, 0.05, (200, 3)), (x, 0.0, 0.0)) for x in (0.0, 0.5)]
-    label = clusters(np.concatenate(legs), 0.03)
+    label = label_clusters(np.concatenate(legs), 0.03)
     assert len(np.unique(label)) == 2
     assert np.unique(label[:200]).size == np.unique(label[200:]).size == 1
 
@@ -173,7 +173,7 @@ def test_a_wire_with_few_particles_is_still_one_frame():
     particles = np.array([[0.0, 0, 0], [1.0, 0, 0], [5.0, 0, 0]])
     wire = np.stack([np.linspace(0, 1, 21), np.zeros(21), np.zeros(21)], 1)
     bare = np.array([[9.0, 0, 0]])
-    found = frames_of(particles, np.concatenate([wire, bare]), 0.1)
+    found = label_rigid_frames(particles, np.concatenate([wire, bare]), 0.1)
     assert found.of_particle.tolist() == [0, 0, 1]
     owner = found.of_point.tolist()
     assert owner == [0] * 21 + [1], "a surface without matter goes with the nearest"
@@ -190,7 +190,7 @@ def test_a_block_sinks_into_a_cushion_on_a_frame_as_into_one_on_a_fine_grid(offs
         frame, cushion, load_, cell=cell, bonds=((0, 1),), friction=0.5,
         planes=[floor(offset * cell)], gravity=(0.0, 0.0, -9.81),
     )  # fmt: skip
-    run = load("engine", "cpu", MENU)(given)
+    run = load_backend("engine", "cpu", ENGINES)(given)
     start, deepest = run.measure().centre, 0.0
     for k in range(40):
         run.advance(0.06 + 0.0005 * k)

@@ -9,7 +9,7 @@ import corporeal as co
 from corporeal.core.errors import UserError
 from corporeal.core.types import Wind
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.interaction import Interaction
+from corporeal.mpm.engine_interaction import EngineInteraction
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 ENGINES = (CpuEngine, ReferenceEngine)
@@ -24,7 +24,7 @@ def problem():
     hard = co.ball("granite", radius=0.05, at=(0.5, 0, 2.0))
     scene = co.build_scene(soft, hard)
     return co.pose_problem(
-        co.prepare(replace(scene, objects=tuple(replace(o, wind=air) for o in scene.objects)))
+        co.prepare_scene(replace(scene, objects=tuple(replace(o, wind=air) for o in scene.objects)))
     )
 
 
@@ -83,6 +83,6 @@ def test_what_cannot_be_is_refused_in_a_sentence(problem):
         engine.blow(7, (1.0, 0.0, 0.0))
     scene = co.build_scene(co.ball("granite", radius=0.05, at=(0, 0, 1.0)))
     with pytest.raises(UserError, match="without faces"):
-        CpuEngine(co.pose_problem(co.prepare(scene))).blow(0, (1.0, 0.0, 0.0))
+        CpuEngine(co.pose_problem(co.prepare_scene(scene))).blow(0, (1.0, 0.0, 0.0))
     with pytest.raises(UserError, match="Use the engine cpu"):
-        Interaction._take_loads(engine)
+        EngineInteraction._take_loads(engine)

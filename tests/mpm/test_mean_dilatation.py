@@ -8,10 +8,16 @@ from laws.bodies import Stuff, ball, box, floor, problem
 
 from corporeal.core.types import Law
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.physics.spline import stencil
+from corporeal.mpm.physics.grid_spline import stencil
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.mpm.reference.mean_dilatation import clusters
-from corporeal.mpm.state import Matter, State, elastic_stress, mean_pressure, strain_energy
+from corporeal.mpm.reference.mean_dilatation import group_clusters
+from corporeal.mpm.state import (
+    ParticleConstants,
+    State,
+    elastic_stress,
+    mean_pressure,
+    strain_energy,
+)
 
 ELASTIC = [Law.NEO_HOOKEAN, Law.COROTATED, Law.HENCKY]
 
@@ -38,9 +44,9 @@ def test_both_engines_squeeze_rubber_alike(law):
 def test_the_force_of_the_mean_pressure_is_the_slope_of_the_stored_energy(law):
     stuff = Stuff(law=law, young=2e5, poisson=0.49)
     given = problem(box((0, 0, 0), (0.08, 0.08, 0.08), 0.01, stuff=stuff), cell=0.02)
-    matter, rng = Matter.of(given), np.random.default_rng(2)
+    matter, rng = ParticleConstants.of(given), np.random.default_rng(2)
     start = State.start(given, matter)
-    groups = clusters(matter, start, matter.body, given.cell)
+    groups = group_clusters(matter, start, matter.body, given.cell)
     assert 4 < groups.of.max() + 1 < len(start.F) / 8
     grid = stencil(start.position, matter.body, given.cell)
     rough = np.eye(3) + 1e-3 * rng.standard_normal(start.F.shape)

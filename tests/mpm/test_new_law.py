@@ -24,7 +24,7 @@ PLACES = {
     "materials/library.toml",
     "mpm/formulas/laws.h",
     f"mpm/laws/{NAME}.py",
-    "core/types/matter.py",
+    "core/types/material_field.py",
 }
 SWING = """
 import json, sys
@@ -40,7 +40,7 @@ print(json.dumps([swing.swing(name, build) for name in sys.argv[2:]]))
 CARDS = """
 import sys
 from corporeal.mpm.cuda import step
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 made = wp.compile_aot_module(step, arch=[86, 90, 120], module_dir=sys.argv[1])
 print(*(path.name for path in made if path.stat().st_size > 10_000))
 """
@@ -142,7 +142,7 @@ def test_it_compiles_for_cards_without_one(larger, tmp_path):
     {
         f"mpm/laws/{NAME}.py": f"there is no mpm/laws/{NAME}.py",
         "mpm/formulas/laws.h": f"laws.h has no struct Rule<{NAME.upper()}, R>",
-        "core/types/matter.py": f"KeyError: '{NAME.upper()}'",
+        "core/types/material_field.py": f"KeyError: '{NAME.upper()}'",
         "materials/library.toml": f"Unknown material '{MATERIAL}'",
     }.items(),
 )

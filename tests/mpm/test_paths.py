@@ -14,12 +14,12 @@ from corporeal.core.types import Keyframes, Push
 from corporeal.mpm import formulas
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.formulas import one_lane
-from corporeal.mpm.physics import prescribed, rigid
+from corporeal.mpm.physics import prescribed_motion, rigid
 from corporeal.mpm.problem import Joint
+from corporeal.mpm.quiet_warp import wp
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.mpm.warp_start import wp
 
-wp.set_module_options(formulas.options())
+wp.set_module_options(formulas.formula_options())
 
 STILL = (0.0, 0.0, 0.0)
 WAVY = Keyframes(
@@ -36,29 +36,35 @@ def mover(**more):
 
 
 def test_a_path_passes_through_its_rows_and_rests_before_and_after():
-    rows, frame = prescribed.rows_of(WAVY, PIVOT), np.eye(3)
+    rows, frame = prescribed_motion.path_rows(WAVY, PIVOT), np.eye(3)
     for time, shift, turn in zip(WAVY.time, WAVY.shift, WAVY.turn, strict=True):
-        frame = rigid.rotation(np.array(turn)) @ frame
-        found = prescribed.pose(rows, time)
+        frame = rigid.rotation_matrix(np.array(turn)) @ frame
+        found = prescribed_motion.path_pose(rows, time)
         np.testing.assert_allclose(found.place, np.array(PIVOT) + shift, atol=1e-12)
         np.testing.assert_allclose(found.rotation, frame, atol=1e-12)
     for outside, row in ((0.0, 0.1), (2.0, 0.9)):
-        for a, b in zip(prescribed.pose(rows, outside), prescribed.pose(rows, row), strict=True):
+        for a, b in zip(
+            prescribed_motion.path_pose(rows, outside),
+            prescribed_motion.path_pose(rows, row),
+            strict=True,
+        ):
             np.testing.assert_allclose(a, b, atol=1e-12)
 
 
 def test_what_is_told_to_rest_rests():
     """A monotone cubic overshoots nowhere; an ordinary spline would."""
-    rows = prescribed.rows_of(WAVY, PIVOT)
+    rows = prescribed_motion.path_rows(WAVY, PIVOT)
     for time in np.linspace(0.3, 0.4, 11):
-        assert prescribed.pose(rows, time).place[0] == pytest.approx(PIVOT[0] + 0.1, abs=1e-12)
+        assert prescribed_motion.path_pose(rows, time).place[0] == pytest.approx(
+            PIVOT[0] + 0.1, abs=1e-12
+        )
 
 
 def test_speeds_of_a_path_are_smooth_and_no_larger_than_said():
-    guide = prescribed.Guide.of(mover())
+    guide = prescribed_motion.PathFollower.of(mover())
     centre = np.array([0.25, -0.1, 0.45])
     h = 1e-5
-    poses = [prescribed.pose(guide.rows, t) for t in np.arange(0.0, 1.0, h)]
+    poses = [prescribed_motion.path_pose(guide.rows, t) for t in np.arange(0.0, 1.0, h)]
     middle = np.array([p.place + p.rotation @ guide.arm for p in poses])
     speed = np.linalg.norm(np.diff(middle, axis=0), axis=1) / h
     assert speed.max() < guide.fastest
@@ -78,7 +84,7 @@ def follow(
     end: Doubles,
     x: wp.array(dtype=wp.vec3d),
     R: wp.array(dtype=wp.mat33d),
-    out: wp.array(dtype=one_lane.Guided),
+    out: wp.array(dtype=one_lane.PathMotion),
 ):
     i = wp.tid()
     rows = path.shape[0] - 1
@@ -86,9 +92,9 @@ def follow(
 
 
 def test_a_path_in_c_is_the_one_in_numpy():
-    rng, guide, count = np.random.default_rng(3), prescribed.Guide.of(mover()), 200
+    rng, guide, count = np.random.default_rng(3), prescribed_motion.PathFollower.of(mover()), 200
     end = rng.uniform(-0.1, 1.1, count)
-    before = [prescribed.pose(guide.rows, t - 0.01) for t in end]
+    before = [prescribed_motion.path_pose(guide.rows, t - 0.01) for t in end]
     R = np.stack([p.rotation for p in before])
     x = np.stack([p.place for p in before]) + R @ guide.arm
     padded = np.concatenate([np.full((1, guide.rows.shape[1]), np.nan), guide.rows])
@@ -96,7 +102,7 @@ def test_a_path_in_c_is_the_one_in_numpy():
     sent = [
         wp.array(a, dtype=k, device="cpu") for a, k in zip((padded, end, x, R), kinds, strict=True)
     ]
-    out = wp.zeros(count, dtype=one_lane.Guided, device="cpu")
+    out = wp.zeros(count, dtype=one_lane.PathMotion, device="cpu")
     arm = wp.vec3d(*guide.arm.tolist())
     wp.launch(follow, count, [sent[0], arm, *sent[1:], out], device="cpu")
     for k, found in enumerate(out.numpy()):

@@ -15,7 +15,7 @@ def test_cubes_stacked_to_a_block_have_the_inertia_of_the_block_exactly():
     size, density = np.array([0.3, 0.2, 0.1]), 700.0
     points = bricks(size, (6, 4, 2)) + np.array([1.0, 2.0, 3.0])
     volume = np.full(len(points), size.prod() / len(points))
-    mass = rigid.mass_of(points, density * volume, volume)
+    mass = rigid.mass_and_inertia(points, density * volume, volume)
     whole = density * size.prod()
     expected = whole / 12 * (np.sum(size**2) * np.eye(3) - np.diag(size**2))
     assert mass.total == pytest.approx(whole)
@@ -24,12 +24,14 @@ def test_cubes_stacked_to_a_block_have_the_inertia_of_the_block_exactly():
 
 
 def test_a_rotation_turns_by_its_angle_about_its_axis():
-    R = rigid.rotation(np.array([0.0, 0.0, np.pi / 2]))
+    R = rigid.rotation_matrix(np.array([0.0, 0.0, np.pi / 2]))
     assert R @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
     tiny = np.array([1e-9, 2e-9, -1e-9])
-    assert rigid.rotation(tiny) == pytest.approx(np.eye(3) + rigid.cross_matrix(tiny), abs=1e-17)
+    assert rigid.rotation_matrix(tiny) == pytest.approx(
+        np.eye(3) + rigid.cross_matrix(tiny), abs=1e-17
+    )
     for turn in np.random.default_rng(0).normal(0, 2, (20, 3)):
-        R = rigid.rotation(turn)
+        R = rigid.rotation_matrix(turn)
         assert R @ R.T == pytest.approx(np.eye(3), abs=1e-14)
         assert np.linalg.det(R) == pytest.approx(1.0)
         assert R @ turn == pytest.approx(turn, abs=1e-14)
@@ -39,7 +41,7 @@ def test_a_free_spin_keeps_its_energy_and_stays_a_rotation():
     inertia, momentum = np.diag([1.0, 2.0, 3.0]), np.array([0.1, 4.0, 0.2])
     R, energies = np.eye(3), []
     for _ in range(2000):
-        R = rigid.turned(R, inertia, momentum, 0.01)
+        R = rigid.integrate_rotation(R, inertia, momentum, 0.01)
         spin = rigid.world_inverse_inertia(R, inertia) @ momentum
         energies.append(0.5 * spin @ momentum)
     assert R @ R.T == pytest.approx(np.eye(3), abs=1e-13)
@@ -50,7 +52,7 @@ def test_rigidly_moving_particles_are_fitted_exactly():
     rng = np.random.default_rng(1)
     points = rng.normal(0, 1, (30, 3))
     particle_mass, volume = rng.uniform(0.1, 2.0, 30), np.full(30, 1e-3)
-    mass = rigid.mass_of(points, particle_mass, volume)
+    mass = rigid.mass_and_inertia(points, particle_mass, volume)
     V, w = np.array([1.0, -2.0, 0.5]), np.array([0.3, 0.1, -0.7])
     velocity = V + np.cross(w, points - mass.centre)
     linear, angular = rigid.fit_motion(mass, points, particle_mass, velocity)

@@ -10,12 +10,12 @@ from point_bodies import CELL, SIZE, board, problem, round_body, step_together
 from corporeal.core.types import Keyframes, Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda.layout import wp
-from corporeal.mpm.formulas import one_lane, options
-from corporeal.mpm.physics.rolling import RollingSide, brake
+from corporeal.mpm.formulas import formula_options, one_lane
+from corporeal.mpm.physics.rolling_friction import RollingSide, brake_roll
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.mpm.state import Matter
+from corporeal.mpm.state import ParticleConstants
 
-wp.set_module_options(options())
+wp.set_module_options(formula_options())
 COUNT, RADIUS, G = 100, 0.05, 9.81
 ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": on_device}
 
@@ -29,10 +29,10 @@ def brakes(
     n: wp.array(dtype=wp.vec3d),
     J: wp.array(dtype=wp.vec3d),
     bounds: wp.array(dtype=wp.vec2d),
-    out: wp.array(dtype=one_lane.Brake),
+    out: wp.array(dtype=one_lane.BrakeVector),
 ):
     i = wp.tid()
-    out[i] = one_lane.brake(
+    out[i] = one_lane.rolling_brake(
         light[i][0],
         inertia[i, 0],
         arm[i, 0],
@@ -66,11 +66,11 @@ def test_the_fast_engines_brake_as_numpy_does():
     light, inertia, arm, spin, n, J, bounds = given = some()
     kinds = (wp.vec2d, wp.mat33d, wp.vec3d, wp.vec3d, wp.vec3d, wp.vec3d, wp.vec2d)
     arrays = [wp.array(x, dtype=k, device="cpu") for x, k in zip(given, kinds, strict=True)]
-    out = wp.zeros(COUNT, dtype=one_lane.Brake, device="cpu")
+    out = wp.zeros(COUNT, dtype=one_lane.BrakeVector, device="cpu")
     wp.launch(brakes, COUNT, inputs=[*arrays, out], device="cpu")
     for i, row in enumerate(out.numpy()):
         a, c = (RollingSide(light[i, k], inertia[i, k], arm[i, k]) for k in (0, 1))
-        sure = brake(a, c, spin[i], n[i], J[i], (bounds[i, 0], bounds[i, 1]))
+        sure = brake_roll(a, c, spin[i], n[i], J[i], (bounds[i, 0], bounds[i, 1]))
         assert row == pytest.approx([*sure.moment, *sure.impulse, sure.energy], rel=1e-10)
 
 
@@ -78,7 +78,7 @@ def test_a_brake_takes_spin_never_gives_it_and_keeps_to_its_bounds():
     stopped = 0
     for light, inertia, arm, spin, n, J, bounds in zip(*some(), strict=True):
         a, c = (RollingSide(light[k], inertia[k], arm[k]) for k in (0, 1))
-        done = brake(a, c, spin, n, J, tuple(bounds))
+        done = brake_roll(a, c, spin, n, J, tuple(bounds))
         assert np.linalg.norm(done.moment) <= bounds[1] * (1 + 1e-12)
         assert done.energy > 0
         assert done.moment @ n == pytest.approx(0, abs=1e-12)
@@ -101,7 +101,7 @@ def test_a_ball_stops_where_rolling_friction_has_taken_its_energy():
     """½ (m + I/r²) v² = c/r m g s, by the inertia of its particles; 7/10 m v² of a solid ball."""
     c = 5e-3
     given = rolling(c)
-    matter = Matter.of(given)
+    matter = ParticleConstants.of(given)
     share = matter.inertia[0][1, 1] / (matter.total[0] * RADIUS**2)
     engine = CpuEngine(given, threads=1)
     engine.advance(0.05)  # it slides first

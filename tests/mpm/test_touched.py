@@ -12,7 +12,7 @@ from corporeal.mpm.formulas import one_lane_contact
 from corporeal.mpm.physics import contact
 from corporeal.mpm.reference.engine import ReferenceEngine
 
-wp.set_module_options(formulas.options())
+wp.set_module_options(formulas.formula_options())
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -23,7 +23,7 @@ def edge(far, towards):
 
 
 def touched(first, second):
-    return contact.touched(first[None], second[None], UP[None], 1.0)[0]
+    return contact.touching_offset(first[None], second[None], UP[None], 1.0)[0]
 
 
 @pytest.mark.parametrize("far", [0.1, 0.5, 1.0, 1.4])
@@ -78,7 +78,7 @@ def touched_in_single(
     out: wp.array(dtype=wp.vec3d),
 ):
     i = wp.tid()
-    out[i] = one_lane_contact.touched(table, a[i], c[i], n[i])
+    out[i] = one_lane_contact.touching_offset(table, a[i], c[i], n[i])
 
 
 @wp.func_native("""
@@ -113,7 +113,7 @@ def test_places_are_those_of_numpy_in_either_precision(dtype):
     normal = contact.unit(rng.normal(size=(count, 3)))
     # As far aside as fields are felt, and at an angle: what is nearly parallel amplifies rounding.
     one, other = (rng.uniform(-0.85, 0.85, (count, 3)) for _ in range(2))
-    exact = contact.touched(one, other, normal, 1.0)
+    exact = contact.touching_offset(one, other, normal, 1.0)
     kernel, kind = {
         np.float32: (touched_in_single, wp.float32),
         np.float64: (touched_in_double, wp.float64),

@@ -6,9 +6,9 @@ from scipy.ndimage import binary_dilation
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Camera
-from corporeal.multiview.silhouette_outliers import filled_by_others
-from corporeal.multiview.silhouettes import coherence
-from corporeal.render.camera import Aim, camera_of
+from corporeal.multiview.silhouette_coherence import silhouette_coherence
+from corporeal.multiview.silhouette_outliers import median_fill_by_others
+from corporeal.render.camera_placement import CameraAim, camera_from_aim
 
 COUNT = 20
 
@@ -32,7 +32,9 @@ def seen(points, camera):
 def around():
     turn = 2 * np.pi * np.arange(COUNT) / COUNT
     eyes = np.stack([2.2 * np.cos(turn), 2.2 * np.sin(turn), np.full(COUNT, 1.4)], axis=1)
-    return [camera_of(Aim(tuple(e), (0.0, 0.0, 0.5), 48.0, 320, 240)) for e in eyes.tolist()]
+    return [
+        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.5), 48.0, 320, 240)) for e in eyes.tolist()
+    ]
 
 
 def shaken(camera, rng):
@@ -53,5 +55,5 @@ def test_a_thin_thing_is_filled_unless_it_was_turned(turned):
     shown = [other if turned and k % 2 else points for k in range(COUNT)]
     masks = np.stack([seen(p, c) for p, c in zip(shown, cameras, strict=True)])
     found = tuple(shaken(c, rng) for c in cameras)
-    filled = coherence(masks, found), filled_by_others(masks, found)
+    filled = silhouette_coherence(masks, found), median_fill_by_others(masks, found)
     assert (max(filled) < 0.9) == turned, filled

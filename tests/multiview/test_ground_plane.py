@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corporeal.multiview.ground_plane import Search, ground_plane
+from corporeal.multiview.ground_plane import GroundSearch, find_ground_plane
 
 
 @pytest.fixture
@@ -23,19 +23,19 @@ def room(rng):
 
 def looked_at(rng):
     eyes = rng.uniform([-2, -2.5, 1], [2, -2, 1.5], (20, 3))
-    return Search(np.array([0, 0, 1.0]), np.radians(60), 0.75, eyes, np.array([0, 0, 0.4]))
+    return GroundSearch(np.array([0, 0, 1.0]), np.radians(60), 0.75, eyes, np.array([0, 0, 0.4]))
 
 
 def test_a_wall_beside_the_floor_does_not_hide_it(rng):
     points, search = room(rng), looked_at(rng)
-    found = ground_plane(points, search, np.random.default_rng(0))
+    found = find_ground_plane(points, search, np.random.default_rng(0))
     assert found is not None
     assert abs(found.offset) < 0.01 and found.normal[2] > np.cos(np.radians(1))
-    anywhere = ground_plane(points, replace(search, middle=None), np.random.default_rng(0))
+    anywhere = find_ground_plane(points, replace(search, middle=None), np.random.default_rng(0))
     assert anywhere is None, "nobody knows what objects are about"
 
 
 def test_a_patch_beside_the_thing_is_no_ground(rng):
     points, search = room(rng), looked_at(rng)
     beside = replace(search, middle=np.array([0, 0.9, 0.9]), radius=0.5)
-    assert ground_plane(points, beside, np.random.default_rng(0)) is None
+    assert find_ground_plane(points, beside, np.random.default_rng(0)) is None

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from corporeal.multiview.lens import Lens, as_photographed, bent, straightened, unbent
+from corporeal.multiview.lens_distortion import (
+    Lens,
+    distort_directions,
+    redistort_image,
+    undistort_image,
+    undistort_points,
+)
 
 
 @pytest.mark.parametrize("radial", [(), (-0.2,), (0.15, -0.05)])
@@ -13,8 +19,8 @@ def test_bending_undoes_straightening(radial):
     lens = Lens(K, 100, 76, radial, (0.002, -0.001) if radial else (0.0, 0.0))
     smooth = gaussian_filter(np.random.default_rng(0).random((76, 100)), 5)
     picture = np.round(255 * (smooth - smooth.min()) / np.ptp(smooth)).astype(np.uint8)
-    straight = straightened(picture[..., None], lens)[0][..., 0].astype(np.float32)
-    back = as_photographed(straight, lens)
+    straight = undistort_image(picture[..., None], lens)[0][..., 0].astype(np.float32)
+    back = redistort_image(straight, lens)
     middle = np.s_[12:-12, 15:-15]
     assert np.abs(back[middle] - picture[middle]).max() < 4
 
@@ -23,5 +29,7 @@ def test_directions_are_unbent():
     lens = Lens(np.array([[80.0, 0, 50], [0, 80.0, 40], [0, 0, 1]]), 100, 80, (-0.2, 0.03))
     points = np.array([[50.0, 40.0], [5.0, 70.0], [95.0, 12.0]])
     np.testing.assert_allclose(
-        bent(lens, unbent(lens, points)) @ lens.K[:2, :2].T + lens.K[:2, 2], points, atol=1e-6
+        distort_directions(lens, undistort_points(lens, points)) @ lens.K[:2, :2].T + lens.K[:2, 2],
+        points,
+        atol=1e-6,
     )

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.multiview.silhouette_overlap import sampled, silhouette_overlaps
-from corporeal.render.camera import camera_of
-from corporeal.render.embree import identify
-from corporeal.render.stage import Stage
+from corporeal.multiview.silhouette_overlap import sample_meshes, silhouette_overlaps
+from corporeal.render.camera_placement import camera_from_aim
+from corporeal.render.embree import identify_triangles
+from corporeal.render.ray_scene import RayScene
 from patterned_scene import OF_SLAB, box, patterned, ring
 
 
 @pytest.fixture(scope="module")
 def seen():
-    stage, aims = Stage(patterned()), ring(np.arange(6) * 60, (320, 240))
-    masks = [np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB) for aim in aims]
-    return masks, tuple(camera_of(aim) for aim in aims)
+    stage, aims = RayScene(patterned()), ring(np.arange(6) * 60, (320, 240))
+    masks = [np.uint8(255) * (identify_triangles(stage, aim)[0] >= OF_SLAB) for aim in aims]
+    return masks, tuple(camera_from_aim(aim) for aim in aims)
 
 
 def block(scale=1.0):
@@ -46,7 +46,7 @@ def test_an_empty_mask_is_no_number(seen):
 
 
 def test_points_fall_evenly_on_surfaces():
-    points = sampled([block()], 60_000, np.random.default_rng(0))
+    points = sample_meshes([block()], 60_000, np.random.default_rng(0))
     top = points[:, 2] > 0.12 - 1e-9
     assert top.mean() == pytest.approx(0.008 / (2 * (0.008 + 0.012 + 0.0096)), rel=0.05)
     assert points[top][:, 0].mean() == pytest.approx(0, abs=1e-3)

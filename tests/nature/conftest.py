@@ -7,8 +7,8 @@ import pytest
 from laws.asked import CARD, on_device
 from laws.suite import CASES
 
-from corporeal.core.registry import load
-from corporeal.mpm.problem import MENU
+from corporeal.core.registry import load_backend
+from corporeal.mpm.problem import ENGINES
 
 ROUND_OFF = {"reference": 1e-12, "cpu": 1e-5, "cuda": 1e-5}
 SLOW = () if CARD else (pytest.mark.slow,)
@@ -29,7 +29,7 @@ def unchecked():
 @cache
 def built(name):
     """Give a function that builds an engine; the one for cards is on the processor, or on CARD."""
-    chosen = load("engine", name, MENU)
+    chosen = load_backend("engine", name, ENGINES)
     chosen.round_off = ROUND_OFF[name]
     if name != "cuda":
         return chosen

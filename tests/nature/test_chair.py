@@ -9,15 +9,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from corporeal.core.store import DATA, load
-from corporeal.discretization import plan
-from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import FOLDERS, Settings
+from corporeal.core.store import DATA_FILE, load
+from corporeal.discretization import discretization_plan
+from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import STAGE_FOLDERS, Settings
 from corporeal.pipeline.stages.fill import FillConfig
-from corporeal.showcase import scenes
-from corporeal.simulation.frames import read_trajectory
-from corporeal.simulation.residual_shape import diagonal, largest
+from corporeal.showcase import showcase_scenes
+from corporeal.simulation.residual_shape import box_diagonal, mean_of_largest
+from corporeal.simulation.trajectory_files import read_trajectory
 
 SCENE = "ball-on-armchair"
 FEW = 5_000
@@ -28,22 +28,26 @@ FEW = 5_000
 def thrown(tmp_path_factory):
     """Throw the ball once for each rule; give how every part changed its shape."""
     patch = pytest.MonkeyPatch()
-    ball = scenes.Placed("steel_ball", (0.06, 0.0, 0.55), velocity=(0.0, 0.0, -2.5))
-    chair = scenes.Placed("armchair", without=("back_cushion",))
-    told = scenes.Composition("", (chair, ball), view=(1.0, -1.0, 0.4), duration=0.2)
-    patch.setitem(scenes.SCENES, SCENE, lambda: told)
+    ball = showcase_scenes.PlacedModel("steel_ball", (0.06, 0.0, 0.55), velocity=(0.0, 0.0, -2.5))
+    chair = showcase_scenes.PlacedModel("armchair", without=("back_cushion",))
+    told = showcase_scenes.ShowcaseComposition(
+        "", (chair, ball), view=(1.0, -1.0, 0.4), duration=0.2
+    )
+    patch.setitem(showcase_scenes.SHOWCASE_SCENE_BUILDERS, SCENE, lambda: told)
 
     @cache
     def shapes(stiffness, particles=FEW):
-        coarse = replace(plan.QUALITIES["draft"], particles=particles)
-        patch.setitem(plan.QUALITIES, "draft", coarse)
+        coarse = replace(discretization_plan.QUALITY_PRESETS["draft"], particles=particles)
+        patch.setitem(discretization_plan.QUALITY_PRESETS, "draft", coarse)
         folder = tmp_path_factory.mktemp(stiffness)
-        file = runner.write_showcase(SCENE, folder / "input")
+        file = run_pipeline.write_showcase(SCENE, folder / "input")
         settings = Settings(fill=FillConfig(stiffness=stiffness))
         silent = lambda verb: lambda fraction, words: None  # noqa: E731
-        runner.run([file], folder, settings, silent, until="simulate")
-        parts, particles = (load(folder / FOLDERS[v] / DATA) for v in ("segment", "fill"))
-        film = read_trajectory(folder / FOLDERS["simulate"])
+        run_pipeline.run([file], folder, settings, silent, until="simulate")
+        parts, particles = (
+            load(folder / STAGE_FOLDERS[v] / DATA_FILE) for v in ("segment", "fill")
+        )
+        film = read_trajectory(folder / STAGE_FOLDERS["simulate"])
         names = [entry.name for entry in parts.catalogue]
         return {name: changes(film, particles.part == k) for k, name in enumerate(names)}
 
@@ -57,9 +61,11 @@ def changes(film, mine):
     error, squeeze = [], []
     for frame in film.frames:
         now = frame.position[mine].astype(float)
-        shift = np.linalg.norm(rigid_fit(start, now, np.ones(len(now))).undo(now) - start, axis=1)
-        error.append(np.sqrt(np.mean(shift**2)) / diagonal(start))
-        squeeze.append(largest(shift))
+        shift = np.linalg.norm(
+            fit_rigid_motion(start, now, np.ones(len(now))).undo(now) - start, axis=1
+        )
+        error.append(np.sqrt(np.mean(shift**2)) / box_diagonal(start))
+        squeeze.append(mean_of_largest(shift))
     return max(error), max(squeeze)
 
 

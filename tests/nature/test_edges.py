@@ -8,7 +8,7 @@ import trimesh
 
 import corporeal as co
 from corporeal.core.types import Keyframes
-from corporeal.mpm.state import Matter
+from corporeal.mpm.state import ParticleConstants
 
 G = 9.81
 SIDE, TOP = 0.04, 0.06
@@ -28,7 +28,7 @@ def box(size, at, degrees=0.0, about=(0, 0, 1)):
 
 def run_of(*solids, gravity=(0.0, 0.0, -G), time=0.4):
     """Let a scene go; its engine, and how far the last body has come [m]."""
-    posed = co.pose_problem(co.prepare(co.build_scene(*solids, gravity=gravity)))
+    posed = co.pose_problem(co.prepare_scene(co.build_scene(*solids, gravity=gravity)))
     engine = co.build_engine(replace(posed, gravity_ramp=0.0))
     start = engine.measure().centre[-1].copy()
     engine.advance(time)
@@ -72,7 +72,7 @@ def test_a_ball_rolls_down_a_gutter_slower_than_on_a_plane():
     ball.apply_translation((0.0, -0.12, 0.015 + np.sqrt(2) * radius + 1e-5))
     solids = solid("softwood", gutter(), "gutter"), solid("steel", ball, "ball")
     engine, way = run_of(*solids, gravity=gravity, time=time)
-    matter = Matter.of(engine.problem)
+    matter = ParticleConstants.of(engine.problem)
     share = matter.inertia[1][0, 0] / (matter.total[1] * radius**2)
     ideal = 0.5 * G * np.sin(slope) * time**2 / (1.0 + 2.0 * share)
     assert way[1] == pytest.approx(ideal, rel=0.02)
@@ -89,7 +89,7 @@ def test_a_board_pulled_away_drags_a_cube_by_friction_alone(thick):
     board = box((0.4, 0.2, thick), (0.0, 0.0, thick / 2))
     cube = box((side,) * 3, (0.0, 0.0, thick + side / 2 + 1e-4))
     solids = solid("softwood", board, "board"), solid("steel", cube, "cube")
-    posed = co.pose_problem(co.prepare(co.build_scene(*solids)))
+    posed = co.pose_problem(co.prepare_scene(co.build_scene(*solids)))
     still, way = (0.0, 0.0, 0.0), (2 * speed * time, 0.0, 0.0)
     pulled = replace(posed.bodies[0], path=Keyframes((0.0, 2 * time), (still, way), (still, still)))
     given = replace(posed, bodies=(pulled, posed.bodies[1]), gravity_ramp=0.0)

@@ -16,7 +16,7 @@ from laws.fluids import (
 )
 
 from corporeal.core.types import Law
-from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
+from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_moduli
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 G = 9.81
@@ -64,7 +64,7 @@ def test_the_step_does_not_see_the_viscosity(engine, viscosity):
 @pytest.mark.parametrize(("yield_shear", "index"), [(0.0, 1.0), (20.0, 1.0), (10.0, 0.5)])
 def test_engines_agree_on_how_a_liquid_flows(engine, yield_shear, index):
     """A lump that spins apart: what it loses is the reference's, momentum stays."""
-    young, poisson = elastic_numbers(bulk_modulus(1000.0, 1.0))
+    young, poisson = elastic_moduli(bulk_modulus(1000.0, 1.0))
     stuff = Stuff(
         law=Law.FLUID,
         young=young,
@@ -105,7 +105,7 @@ def test_water_is_not_a_solid(fast_engine):
 
 def falling_sheet(place, *, cell=0.008):
     """Water one particle thick that slides at .8 m/s and falls onto a floor; place in cells."""
-    young, poisson = elastic_numbers(bulk_modulus(1000.0, 0.8))
+    young, poisson = elastic_moduli(bulk_modulus(1000.0, 0.8))
     stuff = Stuff(
         law=Law.FLUID,
         young=young,

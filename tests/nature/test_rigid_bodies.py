@@ -9,8 +9,8 @@ from laws import touching
 from laws.bodies import Stuff, ball, ball_rounding, ball_surface, box, box_surface, floor, problem
 
 import corporeal as co
-from corporeal.core.types import ROUNDING
-from corporeal.mpm.physics import backing
+from corporeal.core.types import CURVATURE_COLUMNS
+from corporeal.mpm.physics import impact_support
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)
@@ -56,7 +56,7 @@ def test_each_rise_has_the_restitution_of_its_own_blow(patient_engine, law):
     before = run.measure()
     struck = np.sqrt(speed**2 + 2 * G * 0.001)
     for _ in range(3):
-        expected = backing.bounce_at(e, np.array(law), struck) * struck
+        expected = impact_support.restitution_at_speed(e, np.array(law), struck) * struck
         while run.measure().momentum[0, 2] <= 0.0:
             run.advance(run.time + 2e-3)
         while (now := run.measure()).momentum[0, 2] > 0.0:
@@ -229,7 +229,7 @@ def rolled_share(engine, rounded, points=300, time=0.8):
     angle = np.radians(5)
     start = (0.003, 0.002, RADIUS)
     surface = ball_surface(start, RADIUS, points)
-    rows = ball_rounding(start, RADIUS, surface) if rounded else np.zeros((0, ROUNDING))
+    rows = ball_rounding(start, RADIUS, surface) if rounded else np.zeros((0, CURVATURE_COLUMNS))
     given = problem(
         steel_ball(start, surface=surface, rounding=rows),
         cell=CELL,
@@ -263,7 +263,7 @@ def test_a_cube_that_is_let_go_on_its_edge_falls_flat():
     cube.apply_translation((0.013, 0.004, top - cube.bounds[0][2] + 0.001))
     slab = co.box("wood", (0.3, 0.3, top), name="slab")
     one = co.solid("ice", np.array(cube.vertices), cube.faces, name="cube")
-    given = co.pose_problem(co.prepare(co.build_scene(slab, one)))
+    given = co.pose_problem(co.prepare_scene(co.build_scene(slab, one)))
     assert 2.5 < size / given.cell < 4.5
     run = co.build_engine(given)
     run.advance(0.25)

@@ -8,8 +8,8 @@ import trimesh
 from scipy.special import ellipk
 
 import corporeal as co
-from corporeal.core.types import ROUNDING
-from corporeal.mpm.state import Matter
+from corporeal.core.types import CURVATURE_COLUMNS
+from corporeal.mpm.state import ParticleConstants
 
 SLOPE, G = np.radians(5), 9.81
 DOWN_SLOPE = (G * np.sin(SLOPE), 0.0, -G * np.cos(SLOPE))
@@ -19,10 +19,10 @@ BOARD = co.box("steel", (0.5, 0.1, THICK))
 
 def posed(*solids, gravity=(0.0, 0.0, -G), known=True):
     """Make a scene's problem; the control does not know what is round."""
-    problem = co.pose_problem(co.prepare(co.build_scene(*solids, gravity=gravity)))
+    problem = co.pose_problem(co.prepare_scene(co.build_scene(*solids, gravity=gravity)))
     bodies = problem.bodies
     if not known:
-        bodies = tuple(replace(b, rounding=np.zeros((0, ROUNDING))) for b in bodies)
+        bodies = tuple(replace(b, rounding=np.zeros((0, CURVATURE_COLUMNS))) for b in bodies)
     return replace(problem, bodies=bodies, gravity_ramp=0.0)
 
 
@@ -37,7 +37,7 @@ def moved(problem, time):
 
 def ideal(problem, radius, time):
     """½ g sin θ t²/(1 + I/(m r²)) [m], with the inertia that the particles have."""
-    matter = Matter.of(problem)
+    matter = ParticleConstants.of(problem)
     share = matter.inertia[0][1, 1] / (matter.total[0] * radius**2)
     return 0.5 * G * np.sin(SLOPE) * time**2 / (1 + share)
 
@@ -65,7 +65,7 @@ def test_a_marble_that_rolls_slowly_over_a_board_goes_on():
     marble = co.ball("glass", RADIUS, (-0.2, 0.0, THICK + RADIUS), velocity=(0.3, 0.0, 0.0))
     problem = posed(marble, BOARD)
     way, speed = moved(problem, 0.9)
-    matter = Matter.of(problem)
+    matter = ParticleConstants.of(problem)
     rolling = 0.3 / (1 + matter.inertia[0][1, 1] / (matter.total[0] * RADIUS**2))
     assert speed[0] == pytest.approx(rolling, rel=0.005)
     assert way[0] > 0.17
@@ -154,7 +154,7 @@ def test_a_marble_swings_in_a_bowl_as_a_pendulum_does():
     way = np.array([np.sin(lean), 0.0, -np.cos(lean)])
     at = np.array([0.0, 0.0, R + wall]) + (R - MARBLE) * way
     problem = posed(co.ball("glass", MARBLE, tuple(at)), hollow(R, 0.025, wall))
-    matter = Matter.of(problem)
+    matter = ParticleConstants.of(problem)
     share = matter.inertia[0][1, 1] / (matter.total[0] * MARBLE**2)
     period = 4 * ellipk(np.sin(lean / 2) ** 2) * np.sqrt((R - MARBLE) * (1 + share) / G)
     engine = co.build_engine(problem)
@@ -178,7 +178,7 @@ def test_a_marble_rolls_off_a_dome():
     at = (R + MARBLE) * np.array([np.sin(start), 0.0, np.cos(start)])
     solid = co.solid("steel", np.array(dome.vertices), dome.faces)
     problem = posed(co.ball("glass", MARBLE, tuple(at)), solid)
-    matter = Matter.of(problem)
+    matter = ParticleConstants.of(problem)
     share = matter.inertia[0][1, 1] / (matter.total[0] * MARBLE**2)
     square = G / ((R + MARBLE) * (1 + share))
     time, theta, speed = 0.22, start, 0.0

@@ -8,11 +8,11 @@ import pytest
 from laws.bodies import Stuff, ball, box, problem
 
 from corporeal.core.types import Law, Material
-from corporeal.discretization.blow_frequency import MIDDLE
-from corporeal.discretization.dents import contact_time
-from corporeal.discretization.lossy_partners import loss_for_both
-from corporeal.discretization.part import Motion, Partner
-from corporeal.materials.rebound import rebound
+from corporeal.discretization.hertz_indentation import hertz_contact_time
+from corporeal.discretization.impact_frequency import LOSS_BAND_MIDDLE_RATIO
+from corporeal.discretization.pair_damping import pair_loss_factor_of_parts
+from corporeal.discretization.part_geometry import ExpectedMotion, ImpactPartner
+from corporeal.materials.loss_restitution import restitution_of_loss
 from corporeal.mpm.problem import FLOOR
 
 YOUNG, DENSITY, POISSON, CELL = 60e3, 60.0, 0.2, 0.0125
@@ -33,10 +33,12 @@ def series(soft, other):
 def falls_on(engine, loss):
     """Speed of a rigid ball after a block of foam threw it back, over that before; no weight."""
     mass = 4 / 3 * np.pi * RADIUS**3 * BALL
-    lasts = contact_time(mass, RADIUS, SPEED, YOUNG / (1 - POISSON**2), HEIGHT)
+    lasts = hertz_contact_time(mass, RADIUS, SPEED, YOUNG / (1 - POISSON**2), HEIGHT)
     foam = Stuff(young=YOUNG, poisson=POISSON, density=DENSITY, loss=loss)
     block = box((0.0, 0.0, HEIGHT / 2), (SIDE, SIDE, HEIGHT), CELL / 2, stuff=foam)
-    block = replace(block, vibration=np.full(len(block.loss), np.pi / lasts / MIDDLE))
+    block = replace(
+        block, vibration=np.full(len(block.loss), np.pi / lasts / LOSS_BAND_MIDDLE_RATIO)
+    )
     start, down = (0.0, 0.0, HEIGHT + RADIUS + CELL / 10), (0.0, 0.0, -SPEED)
     hard = Stuff(density=BALL)
     thing = ball(start, RADIUS, CELL / 2, stuff=hard, velocity=down, rigid=True)
@@ -50,10 +52,12 @@ def falls_on(engine, loss):
 def test_a_rigid_ball_loses_its_share_of_the_compliance(fast_engine, ratio, loss):
     """Whichever loses more: a composite of two lossy half-spaces, at three ratios of moduli."""
     rigid = Material("cork", Law.NEO_HOOKEAN, ratio * YOUNG, 0.1, BALL, loss=loss)
-    struck = loss_for_both(SOFT, Motion(SPEED, 0.0, partners=(Partner(rigid, 1.0),)))
+    struck = pair_loss_factor_of_parts(
+        SOFT, ExpectedMotion(SPEED, 0.0, partners=(ImpactPartner(rigid, 1.0),))
+    )
     theory = series(SOFT, rigid)
     assert struck == pytest.approx(theory, rel=0.1)
     kept = falls_on(fast_engine, struck) / falls_on(fast_engine, 0.0)
-    assert kept == pytest.approx(rebound(theory), abs=0.03)
+    assert kept == pytest.approx(restitution_of_loss(theory), abs=0.03)
     # What deforms alone loses otherwise.
-    assert abs(kept - rebound(SOFT.loss)) > 0.05
+    assert abs(kept - restitution_of_loss(SOFT.loss)) > 0.05

@@ -7,7 +7,7 @@ import pytest
 from laws.bodies import Stuff, body, problem
 
 from corporeal.core.types import Law
-from corporeal.discretization.rods import Rod, rings
+from corporeal.discretization.rods import Rod, rod_section_points
 
 LENGTH, DIAMETER, CELL = 1.0, 0.012, 0.02
 ROOT = 4.7300407
@@ -20,7 +20,7 @@ def a_rod(tilt):
     line = np.outer(np.linspace(-LENGTH / 2, LENGTH / 2, 42), along) + np.array([0, 0.005, 0.005])
     r = DIAMETER / (2 * CELL)
     stuff = Stuff(Law.COROTATED, young=1e8 * r**4, density=1000.0 * r**2)
-    points = rings(Rod(line, DIAMETER), 2 * CELL, CELL / 2)
+    points = rod_section_points(Rod(line, DIAMETER), 2 * CELL, CELL / 2)
     return body(points, np.pi * CELL**2 * LENGTH, stuff), along
 
 

@@ -8,7 +8,7 @@ import trimesh
 
 import corporeal as co
 from corporeal.mpm.physics import rigid
-from corporeal.mpm.state import rounding_of
+from corporeal.mpm.state import surface_curvature
 
 HIGH, GAP = 0.25, 0.02
 FAR = co.box("wood", (0.3, 0.3, 0.2), at=(1.0, 0.0, 0.1), name="far")
@@ -41,7 +41,7 @@ def block(wall=None):
 
 
 def posed(*solids):
-    problem = co.pose_problem(co.prepare(co.build_scene(*solids, duration=0.35)))
+    problem = co.pose_problem(co.prepare_scene(co.build_scene(*solids, duration=0.35)))
     return replace(problem, gravity_ramp=0.0)
 
 
@@ -76,6 +76,6 @@ def test_what_lies_in_a_crate_is_not_held_by_its_lid():
 )
 def test_what_has_thin_walls_is_told_by_its_surface(solid, thin):
     (body,) = posed(solid).bodies
-    normal = rounding_of(body)[:, :3]
+    normal = surface_curvature(body)[:, :3]
     assert rigid.thinness(body.surface, normal, 0.015) == thin
     assert rigid.thinness(body.surface, 0.0 * normal, 0.015) == 0

@@ -9,7 +9,7 @@ from laws.fluids import Film, Liquid, Tank, film_flow, moved
 from laws.vessels import Tumbler
 
 from corporeal.core.types import Law
-from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
+from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_moduli
 
 HONEY = Liquid(1400.0, 10.0)
 PASTE = Liquid(1100.0, 12.0, 25.0, 0.5)
@@ -17,7 +17,7 @@ PASTE = Liquid(1100.0, 12.0, 25.0, 0.5)
 
 def layer(liquid, *, speed=0.0, place=0.0, gravity=DOWN, cell=0.01, cells=3):
     """A layer on a floor that it sticks to, ``place`` cells above a node; it slides along x."""
-    young, poisson = elastic_numbers(bulk_modulus(liquid.density, 1.0))
+    young, poisson = elastic_moduli(bulk_modulus(liquid.density, 1.0))
     stuff = Stuff(
         law=Law.FLUID,
         young=young,

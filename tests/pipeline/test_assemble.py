@@ -6,9 +6,9 @@ import pytest
 import trimesh
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.geometry.arrangement import boxes_of, moved
-from corporeal.geometry.placing import overlapping
-from corporeal.io.glb_writer import write_glb
+from corporeal.geometry.box_placement import overlapping_boxes
+from corporeal.geometry.scene_transforms import move_scene, object_boxes
+from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
 from glb_maker import Maker, cube
 
@@ -31,22 +31,22 @@ def toml(folder, text):
 
 def test_a_single_object_is_put_on_the_floor(models):
     scene = assemble(models[:1])
-    assert np.allclose(boxes_of(scene), [[[-0.05, -0.05, 0], [0.05, 0.05, 0.1]]])
+    assert np.allclose(object_boxes(scene), [[[-0.05, -0.05, 0], [0.05, 0.05, 0.1]]])
     assert scene.objects[0].real_extent == pytest.approx(0.1)
     assert scene.warnings == ()
 
 
 def test_several_files_stand_side_by_side_apart(models):
     scene = assemble(models)
-    boxes = boxes_of(scene)
+    boxes = object_boxes(scene)
     assert [o.name for o in scene.objects] == ["duck_0", "soda_can_0", "ball_0"]
     assert np.allclose(boxes[:, 0, 2], 0)
-    assert overlapping(boxes) == []
+    assert overlapping_boxes(boxes) == []
     assert (boxes[1:, 0, 0] - boxes[:-1, 1, 0] < 0.1).all()
 
 
 def test_files_are_stacked_in_the_order_given(models):
-    boxes = boxes_of(assemble(models, AssembleConfig(stack=True)))
+    boxes = object_boxes(assemble(models, AssembleConfig(stack=True)))
     assert boxes[0, 0, 2] == 0
     gaps = boxes[1:, 0, 2] - boxes[:-1, 1, 2]
     assert (gaps > 0).all() and (gaps < 0.01).all()
@@ -55,7 +55,7 @@ def test_files_are_stacked_in_the_order_given(models):
 
 def test_drop_lifts_by_a_part_of_the_size(models):
     scene = assemble(models, AssembleConfig(drop=0.2))
-    assert boxes_of(scene)[:, 0, 2] == pytest.approx([0.02, 0.024, 0.04])
+    assert object_boxes(scene)[:, 0, 2] == pytest.approx([0.02, 0.024, 0.04])
 
 
 def test_the_same_file_twice_is_two_objects(models):
@@ -73,7 +73,7 @@ def test_a_folder_means_the_models_in_it(models):
 @pytest.mark.parametrize("name", ["duck=0.5", "duck_0=0.5"])
 def test_an_extent_gives_an_object_its_real_size(models, name):
     scene = assemble(models, AssembleConfig(extent=(name,)))
-    sizes = np.diff(boxes_of(scene), axis=1).max(axis=(1, 2))
+    sizes = np.diff(object_boxes(scene), axis=1).max(axis=(1, 2))
     assert sizes == pytest.approx([0.5, 0.12, 0.2])
     assert (scene.objects[0].real_extent, scene.objects[0].scale) == (0.5, 1.0)
 
@@ -104,7 +104,7 @@ def test_artist_units_are_doubted_and_a_size_proposed(tmp_path):
 
 def test_a_working_extent_scales_the_scene_but_not_the_real_things(models):
     scene = assemble(models, AssembleConfig(working_extent=1.0))
-    boxes = boxes_of(scene)
+    boxes = object_boxes(scene)
     assert (boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max() == pytest.approx(1)
     for thing, box in zip(scene.objects, boxes, strict=True):
         assert np.ptp(box, axis=0).max() == pytest.approx(thing.real_extent * thing.scale)
@@ -131,9 +131,9 @@ def test_a_scene_file_places_and_pushes_objects(models):
     assert (scene.gravity, scene.duration, scene.fps) == ((0, 0, -1.62), 1.25, 24)
     assert (quack.name, quack.velocity, quack.real_extent) == ("quack", (0, 0, -2), 0.3)
     assert ball.push is not None and ball.push.acceleration == (3, 0, 0)
-    assert np.allclose(boxes_of(scene)[0], [[0.85, 1.85, 0.4], [1.15, 2.15, 0.7]])
-    assert boxes_of(scene)[1, 0, 2] == 0
-    assert overlapping(boxes_of(scene)) == []
+    assert np.allclose(object_boxes(scene)[0], [[0.85, 1.85, 0.4], [1.15, 2.15, 0.7]])
+    assert object_boxes(scene)[1, 0, 2] == 0
+    assert overlapping_boxes(object_boxes(scene)) == []
 
 
 def test_a_scene_file_can_speak_of_objects_within_its_file(tmp_path):
@@ -147,7 +147,7 @@ def test_a_scene_file_can_speak_of_objects_within_its_file(tmp_path):
     """
     chair, lamp = assemble([toml(tmp_path, text)]).objects
     assert (chair.velocity, lamp.velocity) == ((0, 0, 0), (1, 0, 0))
-    boxes = boxes_of(assemble([tmp_path / "scene.toml"]))
+    boxes = object_boxes(assemble([tmp_path / "scene.toml"]))
     assert boxes[:, 0, 2] == pytest.approx([0, 2])
     with pytest.raises(BadFileError, match=r"no object 'sofa'\. Choose one of: chair_0, lamp_0"):
         assemble([toml(tmp_path, 'file = "room.glb"\n[[object]]\nname = "sofa"')])
@@ -163,7 +163,7 @@ def room(folder):
 
 def test_several_objects_of_one_file_keep_their_places(tmp_path):
     scene = assemble([room(tmp_path)])
-    assert boxes_of(scene)[:, 0, 2] == pytest.approx([0, 2])
+    assert object_boxes(scene)[:, 0, 2] == pytest.approx([0, 2])
     assert len(assemble([tmp_path / "room.glb"], AssembleConfig(objects="one")).objects) == 1
 
 
@@ -181,12 +181,12 @@ def test_whether_things_had_come_to_rest_is_said_by_our_file_or_the_scene_file(
 
 
 def test_our_own_file_keeps_its_gravity_duration_and_height(models, tmp_path):
-    scene = moved(assemble(models, AssembleConfig(duration=2.5, fps=25)), (0.0, 0.0, 1.0))
+    scene = move_scene(assemble(models, AssembleConfig(duration=2.5, fps=25)), (0.0, 0.0, 1.0))
     (tmp_path / "ours").mkdir()
     write_glb(tmp_path / "ours" / "own.glb", scene)
     again = assemble([tmp_path / "ours" / "own.glb"])
     assert (again.duration, again.fps, again.gravity) == (2.5, 25, scene.gravity)
-    assert np.allclose(boxes_of(again), boxes_of(scene), atol=1e-6)
+    assert np.allclose(object_boxes(again), object_boxes(scene), atol=1e-6)
     assert assemble([tmp_path / "ours" / "own.glb"], AssembleConfig(duration=1.5)).duration == 1.5
 
 
@@ -281,7 +281,7 @@ def test_real_objects_collide_with_nothing_at_the_start(shared_assets):
     ]
     for stack in (False, True):
         scene = assemble(files, AssembleConfig(stack=stack, drop=0.2))
-        assert overlapping(boxes_of(scene)) == []
+        assert overlapping_boxes(object_boxes(scene)) == []
         assert scene.warnings == ()
         assert [o.class_name for o in scene.objects] == ["vase", "ball", "soda can coke"]
 
@@ -331,7 +331,7 @@ def stl(path, extent):
 def test_a_mesh_without_a_unit_is_as_large_as_such_things_are(tmp_path, name, size, metres, said):
     scene = assemble([stl(tmp_path / name, size)])
     assert scene.objects[0].real_extent == pytest.approx(metres)
-    assert np.ptp(boxes_of(scene)[0], axis=0).max() == pytest.approx(metres)
+    assert np.ptp(object_boxes(scene)[0], axis=0).max() == pytest.approx(metres)
     told = [w for w in scene.warnings if "states no unit" in w]
     assert len(told) == 1 and said in told[0] and "--unit or --extent" in told[0]
 
@@ -397,7 +397,9 @@ def test_a_mesh_of_no_likely_size_asks_for_its_unit(tmp_path):
 
 def test_a_mesh_may_be_told_which_axis_is_up(tmp_path):
     path = stl(tmp_path / "bracket.stl", 60.0)
-    heights = [np.ptp(boxes_of(assemble([path], up=up))[0], axis=0)[2] for up in (None, "+x", "-y")]
+    heights = [
+        np.ptp(object_boxes(assemble([path], up=up))[0], axis=0)[2] for up in (None, "+x", "-y")
+    ]
     assert heights == pytest.approx([0.02, 0.06, 0.03])
 
 

@@ -8,7 +8,7 @@ import trimesh
 from test_fill import CLAY, SOIL, inputs, thing  # type: ignore[import-not-found]
 
 from corporeal.core.types import Law, Material, Structure
-from corporeal.pipeline.mixture import Scale
+from corporeal.pipeline.mass_posterior import MassSampler
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.ground import GroundConfig
 
@@ -122,5 +122,5 @@ def test_a_sheet_of_sand_on_a_table_stays_one_and_is_told_of():
 
 def test_a_scene_is_weighed_with_what_fills_its_pots():
     scene, parts, field = inputs(thing((turned(POT), CLAY, WALL), (turned(SHEET), SOIL)))
-    heavy = Scale(scene, parts, GroundConfig(), 0).of(field)
+    heavy = MassSampler(scene, parts, GroundConfig(), 0).of(field)
     assert heavy[0] == pytest.approx(sum(fill(scene, parts, field).mass_real), rel=1e-6)

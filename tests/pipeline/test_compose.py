@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UnknownChoiceError, UserError
-from corporeal.discretization.sizes import Sizing
-from corporeal.geometry.arrangement import boxes_of, intersecting
-from corporeal.io.glb import read_glb
+from corporeal.discretization.object_scaling import SceneSizing
+from corporeal.geometry.scene_transforms import object_boxes, overlapping_objects
+from corporeal.io.gltf.gltf_reader import read_glb
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.compose import ComposeConfig, compose
-from corporeal.pool.asset import Asset, Pool
-from corporeal.scene.interactions import KINDS, NEEDS
+from corporeal.pool.asset_pool import AssetPool, PoolAsset
+from corporeal.scene.interactions import INTERACTION_KINDS, MIN_OBJECTS_OF_KIND
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker
 
 CLASSES = {"box": (1, 1, 1), "plank": (4, 0.5, 1), "brick": (2, 1, 1), "tower": (1, 3, 1)}
@@ -33,7 +33,7 @@ def pool(tmp_path_factory):
         maker.node(mesh=maker.mesh(CUBE * np.array(sides, np.float32), CUBE_TRIANGLES))
         path = maker.save(folder / f"{name}.glb")
         assets.append(
-            Asset(
+            PoolAsset(
                 name=f"{name}_a",
                 class_name=name,
                 file=path,
@@ -48,25 +48,25 @@ def pool(tmp_path_factory):
                 texture=0,
             )
         )
-    return Pool(folder, tuple(assets))
+    return AssetPool(folder, tuple(assets))
 
 
 def composed(pool, folder, **said):
     return compose(pool, folder, replace(ComposeConfig(count="3"), **said))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", INTERACTION_KINDS)
 def test_every_interaction_begins_from_a_certified_rest_and_free_of_overlap(pool, tmp_path, kind):
     made = composed(pool, tmp_path, interaction=kind)
     certificate = json.loads((tmp_path / "certificate.json").read_text())
     assert certificate["drift_m"] < 1e-3 * certificate["extent_m"]
-    assert certificate["objects"] == len(made.names) >= NEEDS[kind]
+    assert certificate["objects"] == len(made.names) >= MIN_OBJECTS_OF_KIND[kind]
     assert made.action.kind == kind
     rest, start = read_glb(tmp_path / "scene.glb"), assemble([tmp_path / "scene.toml"])
     assert rest.settled and start.settled
     assert [o.name for o in start.objects] == list(made.names)
-    assert not intersecting(start) and not start.warnings
-    still = np.abs(boxes_of(start) - boxes_of(rest)).max(axis=(1, 2)) < 1e-5
+    assert not overlapping_objects(start) and not start.warnings
+    still = np.abs(object_boxes(start) - object_boxes(rest)).max(axis=(1, 2)) < 1e-5
     acting = [o.velocity != (0, 0, 0) or o.wind is not None for o in start.objects]
     assert any(~still | np.array(acting))
 
@@ -97,7 +97,7 @@ def test_sizes_are_compressed_and_the_real_ones_are_kept(pool, tmp_path):
 
 
 def test_metric_scenes_keep_true_metres(pool, tmp_path):
-    composed(pool, tmp_path, assets=("tower_a", "box_a"), sizing=Sizing(metric=True))
+    composed(pool, tmp_path, assets=("tower_a", "box_a"), sizing=SceneSizing(metric=True))
     scene = read_glb(tmp_path / "scene.glb")
     assert [o.scale for o in scene.objects] == pytest.approx([1, 1], abs=1e-9)
     corners = scene.surfaces[0].vertices
@@ -140,4 +140,4 @@ def test_what_the_pool_lacks_is_said_in_one_sentence(pool, tmp_path, said, error
 
 def test_an_empty_pool_says_where_to_look(tmp_path):
     with pytest.raises(UserError, match="assets list --rejected"):
-        compose(Pool(Path("nowhere"), ()), tmp_path)
+        compose(AssetPool(Path("nowhere"), ()), tmp_path)

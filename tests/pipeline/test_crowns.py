@@ -11,17 +11,22 @@ from skimage.measure import marching_cubes
 from test_fill import LEAVES, SOLID, WOOD, a_potted_plant, inputs, put, thing
 
 from corporeal.core.types import Structure
-from corporeal.discretization.foliage import in_leaves, root_of, rooted, swinging
-from corporeal.discretization.make import compose
-from corporeal.discretization.scene_survey import examine
+from corporeal.discretization.foliage import (
+    find_rooted_wood,
+    leaf_frequencies,
+    root_joint,
+    weigh_bulk_foliage,
+)
+from corporeal.discretization.part_model import infer_part_model
+from corporeal.discretization.scene_measures import measure_objects
 from corporeal.geometry.mesh import Mesh
-from corporeal.materials import find
+from corporeal.materials import find_material
 from corporeal.pipeline.stages.fill import fill
 
 CELL, LEAF, COUNT = 0.0125, 0.08, 40
 ONE_FACE = COUNT * LEAF**2
 """Area of all leaves, which are squares [m²]."""
-TISSUE = find("leaf_tissue").pick(find("leaf_tissue").typical())
+TISSUE = find_material("leaf_tissue").pick(find_material("leaf_tissue").typical())
 
 
 @cache
@@ -48,13 +53,13 @@ def a_sapling(built=SOLID):
 @cache
 def anatomy():
     scene, parts, _ = a_sapling()
-    return examine(scene, parts, 0)[0]
+    return measure_objects(scene, parts, 0)[0]
 
 
 def crown(whole, field, scale=1.0):
     leaves = whole.members[-1]
-    made = compose(whole, leaves, field, np.random.default_rng(0))
-    return in_leaves(made, whole, leaves, field, TISSUE, scale)
+    made = infer_part_model(whole, leaves, field, np.random.default_rng(0))
+    return weigh_bulk_foliage(made, whole, leaves, field, TISSUE, scale)
 
 
 def test_a_crown_weighs_what_its_leaves_weigh_and_each_swings_as_a_usual_one_does():
@@ -93,8 +98,8 @@ def test_a_scrap_of_leaf_swings_no_faster_than_can_be_seen():
     scrap = trimesh.Trimesh([[0, 0, 0], [4e-3, 0, 0], [0, 3e-3, 0]], [[0, 1, 2]], process=False)
     stem = put(trimesh.creation.cylinder(0.012, 0.5, sections=12), 0.0)
     scene, parts, _ = inputs(thing((stem, WOOD), (scrap, LEAVES)))
-    member = examine(scene, parts, 0)[0].members[1]
-    np.testing.assert_allclose(swinging(member, np.zeros((1, 3)), TISSUE, 1.0), 300.0)
+    member = measure_objects(scene, parts, 0)[0].members[1]
+    np.testing.assert_allclose(leaf_frequencies(member, np.zeros((1, 3)), TISSUE, 1.0), 300.0)
 
 
 def above(stem, height):
@@ -105,19 +110,19 @@ def above(stem, height):
 
 def test_a_potted_stem_whose_foot_nobody_saw_reaches_halfway_down():
     scene, parts, field = a_potted_plant()
-    whole = examine(scene, parts, 0)[0]
+    whole = measure_objects(scene, parts, 0)[0]
     pot, soil, stem, leaves = whole.members
-    seen = rooted(whole, field.materials)
+    seen = find_rooted_wood(whole, field.materials)
     assert (seen.wood, seen.soil) == (2, 1)
     assert (seen.foot, seen.top) == pytest.approx((0.11, 0.19))
     top = replace(soil, body=soil.body.only(soil.body.normals[:, 2] > 0.9), closed=False)
     pictured = replace(whole, members=(pot, top, above(stem, 0.19), leaves))
-    found = rooted(pictured, field.materials)
+    found = find_rooted_wood(pictured, field.materials)
     assert (found.wood, found.soil) == (2, 1)
     assert (found.foot, found.top) == pytest.approx((0.095, 0.19))
     assert seen.seen and not found.seen and "0.095 m, halfway down" in found.doubt
-    root = root_of(found, pictured, 0, field.materials, lambda wood, point: 1.0)
+    root = root_joint(found, pictured, 0, field.materials, lambda wood, point: 1.0)
     assert root.stiffness == pytest.approx(0.34 * 3e5 * 0.095**3)
     assert root.point[2] == pytest.approx(0.095 + 0.4 * 0.095)
     hung = replace(whole, members=(pot, top, above(stem, 0.4), leaves))
-    assert rooted(hung, field.materials) is None
+    assert find_rooted_wood(hung, field.materials) is None

@@ -9,14 +9,14 @@ from recognition.facts import facts, judge
 from corporeal import materials
 from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.io.glb import read_glb
+from corporeal.io.gltf.gltf_reader import read_glb
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import ground
 from corporeal.pipeline.stages.segment import segment
-from corporeal.recognition.identity import identify
-from corporeal.recognition.metadata import matter_hint
-from corporeal.render.portrait import portraits
-from corporeal.vlm.recordings import Recorder
+from corporeal.recognition.metadata_recognition import substance_hint
+from corporeal.recognition.parts_by_name import identify_parts
+from corporeal.render.object_portrait import render_portraits
+from corporeal.vlm.recordings import RecordingClient
 from handmade import plain, scene
 from oracle import Oracle, decomposed, everywhere, part, sizes, weighs, whole
 
@@ -126,7 +126,7 @@ def test_unknown_is_a_normal_answer():
 
 def test_objects_are_in_the_scenes_order_and_parts_in_the_catalogues():
     made = scene(DUCK, VASE)
-    inventory, identity = describe(made), identify(made, matter_hint)
+    inventory, identity = describe(made), identify_parts(made, substance_hint)
     assert [o.name for o in inventory.objects] == ["duck_0", "vase_0"]
     assert [p.name for o in inventory.objects for p in o.parts] == [
         p.name for p in identity.catalogue
@@ -193,10 +193,10 @@ def ask(monkeypatch):
         settings = DescribeConfig(**({"vlm": "oracle:1", "view_size": 32} | config))
 
         def connected(spec, record):
-            return Recorder(oracle, record) if record else oracle
+            return RecordingClient(oracle, record) if record else oracle
 
         with monkeypatch.context() as patched:
-            patched.setattr("corporeal.pipeline.stages.describe.connect", connected)
+            patched.setattr("corporeal.pipeline.stages.describe.connect_vlm", connected)
             return describe(scene(*objects, name=name), settings, library)
 
     return asked
@@ -540,7 +540,8 @@ def test_a_recording_outlives_a_longer_library_and_not_a_word_that_is_gone(
     ask(Oracle(materials=made_of(part("vase", "porcelain"))), VASE, record=tmp_path)
     replayed = replay(tmp_path)
     monkeypatch.setattr(
-        "corporeal.description.asking.substances_offered", lambda library: "- new: unobtainium"
+        "corporeal.description.query_scene.part_materials_text",
+        lambda library: "- new: unobtainium",
     )
     assert words(describe(scene(VASE), replayed))[("vase_0", "vase")].material == "porcelain"
     with pytest.raises(UserError, match="'porcelain' is not in the list of materials"):
@@ -560,9 +561,9 @@ def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path, monk
 
     def counted(*args):
         taken.append(args)
-        return portraits(*args)
+        return render_portraits(*args)
 
-    monkeypatch.setattr("corporeal.description.asking.portraits", counted)
+    monkeypatch.setattr("corporeal.description.query_scene.render_portraits", counted)
     rounds = 0
     while rounds < 6:
         rounds += 1

@@ -13,7 +13,7 @@ from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import ground
 from corporeal.pipeline.stages.segment import segment
-from corporeal.showcase.scenes import build
+from corporeal.showcase.showcase_scenes import build_showcase_scene
 from oracle import decomposed, part, weighs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "vlm"))
@@ -139,7 +139,7 @@ def test_pictures_go_out_only_with_the_questions_that_need_them(described):
 
 def test_our_own_armchair_is_described_by_a_model_too(tmp_path, monkeypatch):
     monkeypatch.setenv("CORPOREAL_CACHE", str(tmp_path))
-    scene = build("vase-ball-armchair")
+    scene = build_showcase_scene("vase-ball-armchair")
     with FakeServer(answers) as server:
         config = DescribeConfig(vlm=f"openai:gpt-5.4@{server.url}", view_size=32)
         inventory = describe(scene, config)

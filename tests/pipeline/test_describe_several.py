@@ -7,7 +7,7 @@ import pytest
 from corporeal.core.errors import UserError
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
-from corporeal.vlm.recordings import NUMBER, Recorder
+from corporeal.vlm.recordings import ANSWER_NUMBER_KEY, RecordingClient
 from handmade import plain, scene
 from oracle import Oracle, everywhere, offered, part, weighs, whole
 
@@ -21,10 +21,10 @@ def asked(monkeypatch, oracle, record=None, **config):
     settings = DescribeConfig(vlm="oracle:1", view_size=32, record=record, **config)
 
     def connected(spec, record):
-        return Recorder(oracle, record) if record else oracle
+        return RecordingClient(oracle, record) if record else oracle
 
     with monkeypatch.context() as patched:
-        patched.setattr("corporeal.pipeline.stages.describe.connect", connected)
+        patched.setattr("corporeal.pipeline.stages.describe.connect_vlm", connected)
         return describe(scene(VASE), settings)
 
 
@@ -64,7 +64,7 @@ def test_one_answer_is_recorded_as_ever_and_is_the_first_of_several(monkeypatch,
     described = asked(monkeypatch, several, three, answers=3)
     for file in one.iterdir():
         assert (three / file.name).read_bytes() == file.read_bytes()
-        assert NUMBER not in json.loads(file.read_text())
+        assert ANSWER_NUMBER_KEY not in json.loads(file.read_text())
     assert len(list(three.iterdir())) == len(list(one.iterdir())) + 6
     assert [o.answers for o in alone.objects] == [()]
     assert words_of(replay(three, 3)) == words_of(described)

@@ -14,11 +14,11 @@ from corporeal.core.types import (
     Material,
     MaterialField,
     Part,
+    PartComponent,
+    PartDescription,
     Parts,
-    PartWords,
-    Piece,
-    Placement,
     Push,
+    RangePlacement,
     Scene,
     SceneObject,
     Structure,
@@ -26,12 +26,12 @@ from corporeal.core.types import (
     Wall,
     Wind,
 )
-from corporeal.discretization.impact_speeds import motions
-from corporeal.discretization.problem_from_scene import pose
-from corporeal.discretization.scene_survey import examine
-from corporeal.materials import find
+from corporeal.discretization.build_model import build_model
+from corporeal.discretization.impact_speeds import expected_motions
+from corporeal.discretization.scene_measures import measure_objects
+from corporeal.materials import find_material
 from corporeal.mpm.problem import Plane
-from corporeal.pipeline.stages.fill import FillConfig, by_name, fill
+from corporeal.pipeline.stages.fill import FillConfig, fill, name_objects
 from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
 from corporeal.simulation.ledger_row import object_of_body
 
@@ -68,7 +68,7 @@ def inputs(*things):
         MaterialField(
             tuple(materials),
             tuple(structures),
-            tuple(PartWords(m.name, m.name) for m in materials),
+            tuple(PartDescription(m.name, m.name) for m in materials),
             np.full((k, k), 0.5),
             np.full((k, k), 0.5),
         ),
@@ -262,7 +262,7 @@ def test_a_fall_gives_its_speed_and_a_standing_thing_expects_what_falls_on_it():
         thing((ball(0.1, bottom=0.0, x=3.0), RUBBER), push=Push((3.0, 0.0, 0.0), 0.0, 0.5)),
     )
 
-    found = motions(scene, examine(scene, parts, 0), [1.0, 1.0, 1.0], 0)
+    found = expected_motions(scene, measure_objects(scene, parts, 0), [1.0, 1.0, 1.0], 0)
     falling = np.sqrt(2 * 9.81 * 1.0)
     assert found[1].impact_speed == pytest.approx(np.hypot(falling, 1.5), rel=1e-3)
     assert found[0].impact_speed == pytest.approx(falling, rel=1e-3)
@@ -328,8 +328,8 @@ def test_what_stands_in_the_wind_shows_its_whole_surface_to_it():
 
 def test_a_wind_counts_as_an_acceleration_and_carries_nothing_faster_than_itself():
     scene, parts, _ = inputs(thing((ball(0.1, bottom=0.0), RUBBER), wind=Wind((5.0, 0.0, 0.0))))
-    anatomies = examine(scene, parts, 0)
-    heavy, light = (motions(scene, anatomies, [mass], 0)[0] for mass in (10.0, 1e-3))
+    anatomies = measure_objects(scene, parts, 0)
+    heavy, light = (expected_motions(scene, anatomies, [mass], 0)[0] for mass in (10.0, 1e-3))
     force = 0.5 * 1.2 * 1.17 * np.pi * 0.01 * 25
     assert heavy.acceleration == pytest.approx(9.81 + force / 10.0, rel=0.01)
     assert heavy.impact_speed == pytest.approx(2.0 * force / 10.0, rel=0.01)
@@ -387,7 +387,7 @@ def test_a_plant_is_a_rigid_stem_on_a_spring_with_leaves_on_stalks():
 
 def test_a_plant_becomes_bodies_that_hold_together_and_never_touch():
     scene, parts, field = a_potted_plant()
-    posed = pose(scene, fill(scene, parts, field), field)
+    posed = build_model(scene, fill(scene, parts, field), field)
     problem = posed.problem
     assert [b.rigid for b in problem.bodies] == [True, True, False]
     assert problem.joints[0].first == 0 and problem.joints[0].second == 1
@@ -429,7 +429,7 @@ def test_what_stands_in_a_wall_is_named_and_walls_are_planes():
     with pytest.raises(UserError, match=r"'thing_0' reaches 0\.15 m into wall 1"):
         fill(inside, parts, field)
     beside = replace(scene, walls=(Wall((1.0, 0.0, 0.0), (-0.2, 0.0, 0.0)),))
-    problem = pose(beside, fill(beside, parts, field), field).problem
+    problem = build_model(beside, fill(beside, parts, field), field).problem
     assert problem.planes[1] == Plane((1.0, 0.0, 0.0), -0.2)
     assert problem.friction.shape == (3, 3)
     assert problem.friction[0, 1] == problem.friction[0, 2] == problem.friction[2, 0]
@@ -493,7 +493,7 @@ def test_what_flows_lies_at_the_bottom_of_a_half_full_can(contents):
 
 
 def test_an_egg_that_falls_is_no_soft_ball():
-    shell, inside = (e.pick(e.typical()) for e in map(find, ("eggshell", "packed_food")))
+    shell, inside = (e.pick(e.typical()) for e in map(find_material, ("eggshell", "packed_food")))
     made = filled(inside, 0.97, 3.6e-4, loose=False)
     egg = put(trimesh.creation.icosphere(3, 0.025), 0.3)
     particles = fill(*inputs(thing((egg, shell, made))))
@@ -519,7 +519,7 @@ def test_a_pillow_is_as_soft_as_its_stuffing_and_as_heavy_as_all_of_it():
     core = middle & (np.abs(particles.position[:, 2] - 0.4) < 0.05)
     assert particles.density[core] == pytest.approx(30 * inside / (30 * pillow.volume), rel=0.01)
     assert particles.density.max() > 1.3 * particles.density[core].max()  # the cover
-    body = pose(scene, particles, field).problem.bodies[0]
+    body = build_model(scene, particles, field).problem.bodies[0]
     assert set(body.law) == {Law.NEO_HOOKEAN.value}
     assert body.young == pytest.approx(treatment.young)
 
@@ -542,7 +542,7 @@ def test_who_looked_at_a_thin_wall_knows_it_better_than_the_mesh(chosen_by, thic
     outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
     cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)
     scene, parts, field = inputs(thing((cup, STEEL, Structure("shell", 1e-3))))
-    placed = {"shell_thickness": Placement(0.1, chosen_by, "It looks thin.")}
+    placed = {"shell_thickness": RangePlacement(0.1, chosen_by, "It looks thin.")}
     words = (replace(field.words[0], structure="shell", placements=placed),)
     particles = fill(scene, parts, replace(field, words=words))
     said = "1 mm thick as a recorded answer says (its mesh draws 3.93 mm)"
@@ -604,9 +604,14 @@ def test_what_a_soft_cup_holds_is_as_light_as_it_is():
 
 def test_pieces_of_one_mesh_weigh_by_their_shares():
     scene, parts, field = inputs(thing((ball(0.05), STEEL)))
-    blade = PartWords("blade", "steel", "solid", volume_share=0.25, surface_share=0.5)
-    handle = PartWords("handle", "rubber", "shell", 1e-3, volume_share=0.75, surface_share=0.5)
-    pieces = (Piece(blade, STEEL, SOLID), Piece(handle, RUBBER, Structure("shell", 1e-3)))
+    blade = PartDescription("blade", "steel", "solid", volume_share=0.25, surface_share=0.5)
+    handle = PartDescription(
+        "handle", "rubber", "shell", 1e-3, volume_share=0.75, surface_share=0.5
+    )
+    pieces = (
+        PartComponent(blade, STEEL, SOLID),
+        PartComponent(handle, RUBBER, Structure("shell", 1e-3)),
+    )
     particles = fill(scene, parts, replace(field, pieces=(pieces,)))
     mesh = ball(0.05)
     wall = mesh.volume * (1 - (0.049 / 0.05) ** 3)
@@ -632,5 +637,5 @@ def test_what_is_filled_falls_as_one_and_its_audit_is_clean(tmp_path):
 
 def test_what_the_treatment_counts_is_warned_of_by_name():
     scene, _, _ = inputs(thing((ball(), STEEL)), thing((ball(), STEEL), name="sheet"))
-    said = by_name(["Object 2 of the scene is only 0.5 cells across.", "All is well."], scene)
+    said = name_objects(["Object 2 of the scene is only 0.5 cells across.", "All is well."], scene)
     assert said == ("sheet_1 is only 0.5 cells across.", "All is well.")

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import (
-    Cloud,
+    FeatureCloud,
     Finish,
     Frame,
     Gaussians,
@@ -21,9 +21,9 @@ from corporeal.core.types import (
     Material,
     MaterialField,
     Part,
+    PartDescription,
     Particles,
     Parts,
-    PartWords,
     Reconstruction,
     Scene,
     SceneObject,
@@ -31,18 +31,18 @@ from corporeal.core.types import (
     Surface,
     Trajectory,
 )
-from corporeal.geometry.harmonics import DC
-from corporeal.pipeline.stages import film as stage
-from corporeal.pipeline.stages.film import FilmConfig, film
-from corporeal.reconstruction.gaussians import raster
-from corporeal.render import colours, video
-from corporeal.render.camera import Aim, camera_of
-from corporeal.simulation.played import Played, Prepared
+from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
+from corporeal.pipeline.stages import video as stage
+from corporeal.pipeline.stages.video import VideoConfig, render_video
+from corporeal.reconstruction.gaussians import rasteriser_numba
+from corporeal.render import colours, video_file
+from corporeal.render.camera_placement import CameraAim, camera_from_aim
+from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 from made_ledger import ledger
 
-SMALL = FilmConfig(width=128, height=96, quality="draft", stills=True)
+SMALL = VideoConfig(width=128, height=96, quality="draft", stills=True)
 TURN = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
-EYE = camera_of(Aim((4.0, -3.0, 2.0), (0.5, 0.0, 0.5), 30.0, 96, 80))
+EYE = camera_from_aim(CameraAim((4.0, -3.0, 2.0), (0.5, 0.0, 0.5), 30.0, 96, 80))
 
 
 def cube(k):
@@ -54,7 +54,7 @@ def clad(k, count=1500, degree=3, colour=(0.8, 0.1, 0.1)):
     rng = np.random.default_rng(k)
     points, _ = trimesh.sample.sample_surface(cube(k), count, seed=k)
     sh = 0.02 * rng.normal(size=(count, (degree + 1) ** 2, 3))
-    sh[:, 0] = (np.array(colour) - 0.5) / DC
+    sh[:, 0] = (np.array(colour) - 0.5) / SH_DC_COEFFICIENT
     q = rng.normal(size=(count, 4))
     return Gaussians(
         mean=np.asarray(points),
@@ -112,7 +112,7 @@ def play(F=TURN, shift=(0.0, 0.0, 0.3), count=3):
         Material("rubber", Law.NEO_HOOKEAN, 1e6, 0.45, 1e3),
         Material("steel", Law.COROTATED, 2e11, 0.3, 7850.0),
     )
-    pair, words = np.full((3, 3), 0.5), PartWords("thing", "rubber")
+    pair, words = np.full((3, 3), 0.5), PartDescription("thing", "rubber")
     field = MaterialField(made, (Structure("solid"),) * 2, (words,) * 2, pair, pair)
     trajectory = Trajectory(
         Path("nowhere"),
@@ -120,13 +120,15 @@ def play(F=TURN, shift=(0.0, 0.0, 0.3), count=3):
         ledger(np.arange(count) / 60),
         Frames(particles, F, shift, count),
     )
-    return Played(Prepared(scene, Inventory(()), parts, field, particles), trajectory)
+    return SimulationResult(
+        PreparedScene(scene, Inventory(()), parts, field, particles), trajectory
+    )
 
 
 def made_of(played, gaussians, owner):
     """Say that a scene was made of Gaussians."""
     none = np.zeros((0, 3))
-    cloud = Cloud(none, none, none, none, np.zeros(0, int))
+    cloud = FeatureCloud(none, none, none, none, np.zeros(0, int))
     boxes = np.array([mesh.bounds for mesh in (cube(0), cube(1))])
     names = tuple(o.name for o in played.prepared.scene.objects)
     found = Reconstruction(gaussians, owner, cloud, np.zeros(0, int), names, boxes, 1.0, np.eye(4))
@@ -134,7 +136,7 @@ def made_of(played, gaussians, owner):
 
 
 def puppet(gaussians, owner, played):
-    return stage._puppet(SMALL, made_of(played, gaussians, owner))
+    return stage._gaussian_deformer(SMALL, made_of(played, gaussians, owner))
 
 
 def test_things_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
@@ -145,12 +147,14 @@ def test_things_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
     back = np.eye(4)
     back[:3, :3], back[:3, 3] = TURN, (0.0, 0.0, 0.3)
     there = replace(EYE, world_from_camera=np.linalg.inv(back) @ EYE.world_from_camera)
-    one, two = raster.render(after, EYE), raster.render(only, there)
+    one, two = rasteriser_numba.render(after, EYE), rasteriser_numba.render(only, there)
     assert one.alpha.mean() > 0.03
     np.testing.assert_allclose(one.rgb, two.rgb, atol=5e-6)
     np.testing.assert_allclose(one.alpha, two.alpha, atol=5e-6)
     wrong = replace(after, sh=only.sh)
-    assert np.abs(raster.render(wrong, EYE).rgb - two.rgb).max() > 5e-3, "colours must turn too"
+    assert np.abs(rasteriser_numba.render(wrong, EYE).rgb - two.rgb).max() > 5e-3, (
+        "colours must turn too"
+    )
 
 
 def test_gaussians_follow_particles_of_their_own_object_and_the_rest_stands_still():
@@ -191,9 +195,9 @@ def greenish(picture):
 def films(tmp_path_factory):
     folder = tmp_path_factory.mktemp("films")
     played = made_of(play(np.eye(3), (0.0, 0.0, 0.6)), *together(clad(0), clad(1)))
-    made = film(played, SMALL, folder / "gaussians")
-    film(played, replace(SMALL, look="surfaces"), folder / "surfaces")
-    assert len(video.pictures(made.path, [0, 1, 2])) == 3
+    made = render_video(played, SMALL, folder / "gaussians")
+    render_video(played, replace(SMALL, look="surfaces"), folder / "surfaces")
+    assert len(video_file.read_frames(made.path, [0, 1, 2])) == 3
     return folder
 
 
@@ -225,28 +229,28 @@ def test_what_stands_still_is_carried_and_lit_once(tmp_path, monkeypatch):
         stage.MovingGaussians, "at", lambda *given: carried.append(1) or carry(*given)
     )
     played = made_of(play(np.eye(3), (0.0, 0.0, 0.0), 5), *together(clad(0), clad(1)))
-    film(played, SMALL, tmp_path / "still")
+    render_video(played, SMALL, tmp_path / "still")
     assert len(carried) == 1
     np.testing.assert_array_equal(still(tmp_path / "still", 0), still(tmp_path / "still", 4))
     played = made_of(play(np.eye(3), (0.0, 0.0, 0.6), 3), *together(clad(0), clad(1)))
-    film(played, SMALL, tmp_path / "lifted")
+    render_video(played, SMALL, tmp_path / "lifted")
     assert len(carried) == 3, "once before it moves, and once after"
 
 
 def test_colours_can_tell_what_things_are(tmp_path):
     played = made_of(play(), *together(clad(0), clad(1)))
-    film(played, replace(SMALL, colour_by="object"), tmp_path)
+    render_video(played, replace(SMALL, colour_by="object"), tmp_path)
     picture = still(tmp_path, 0)
     for k in (0, 1):
-        wanted = 255 * np.array(colours.of_hex(colours.OBJECTS[k]))
+        wanted = 255 * np.array(colours.colour_from_hex(colours.OBJECT_COLOURS[k]))
         assert (np.abs(picture - wanted).max(axis=-1) < 4).sum() > 300
-    film(played, replace(SMALL, colour_by="speed"), tmp_path)
-    slow = 255 * colours.ramp(np.zeros(1))[0]
+    render_video(played, replace(SMALL, colour_by="speed"), tmp_path)
+    slow = 255 * colours.ramp_colours(np.zeros(1))[0]
     assert (np.abs(still(tmp_path, 0) - slow).max(axis=-1) < 4).sum() > 300
 
 
 def test_surfaces_can_be_coloured_too(tmp_path):
-    film(play(), replace(SMALL, colour_by="young"), tmp_path)
+    render_video(play(), replace(SMALL, colour_by="young"), tmp_path)
     picture = still(tmp_path, 0)
     soft = picture[..., 2] > 1.3 * picture[..., 0]
     stiff = picture[..., 0] > 1.3 * picture[..., 2]
@@ -255,4 +259,4 @@ def test_surfaces_can_be_coloured_too(tmp_path):
 
 def test_gaussians_that_are_not_there_cannot_be_filmed(tmp_path):
     with pytest.raises(UserError, match="look 'surfaces'"):
-        film(play(), replace(SMALL, look="gaussians"), tmp_path)
+        render_video(play(), replace(SMALL, look="gaussians"), tmp_path)

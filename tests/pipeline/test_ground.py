@@ -6,10 +6,10 @@ import pytest
 
 from corporeal import materials
 from corporeal.core.errors import OutOfRangeError, UserError
-from corporeal.core.types import Law, PartWords, Placement
+from corporeal.core.types import Law, PartDescription, RangePlacement
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
-from corporeal.pipeline.stages.ground import GroundConfig, doubts, ground
+from corporeal.pipeline.stages.ground import GroundConfig, ground, grounding_warnings
 from corporeal.pipeline.stages.segment import segment
 from handmade import plain, scene
 
@@ -64,10 +64,10 @@ def test_an_unknown_part_gets_a_stated_stand_in_and_a_warning():
     assert field.words[0].material is None
     assert {g.chosen_by for g in field.materials[0].grounds.values()} == {"fallback"}
     assert "Nobody knows" in field.materials[0].grounds["young"].reason
-    (warning,) = doubts(field, parts, made)
+    (warning,) = grounding_warnings(field, parts, made)
     assert warning.startswith("riddle_0: riddle is of unknown material")
     named = replace(made, objects=tuple(replace(o, name="riddle") for o in made.objects))
-    (warning,) = doubts(field, parts, named)
+    (warning,) = grounding_warnings(field, parts, named)
     assert warning.startswith("riddle is of unknown material"), "not twice by one name"
 
 
@@ -103,7 +103,7 @@ def test_friction_and_restitution_are_between_two_and_the_floor_is_one_of_them()
 def test_stated_friction_outranks_a_measured_pair(tmp_path):
     (tmp_path / "a.yaml").write_text("block_0: { values: { friction: 0.32 } }")
     field, _, _ = grounded(BLOCK, annotations=tmp_path / "a.yaml")
-    floor = materials.find("concrete").ranges["friction"].typical
+    floor = materials.find_material("concrete").ranges["friction"].typical
     assert field.friction[0, 1] == pytest.approx((0.32 * floor) ** 0.5)
 
 
@@ -153,7 +153,7 @@ def test_the_record_is_plain_data_with_resolved_citations():
 
 
 def placed(**fractions):
-    return {f: Placement(x, "model", f"{f} so.") for f, x in fractions.items()}
+    return {f: RangePlacement(x, "model", f"{f} so.") for f, x in fractions.items()}
 
 
 def spoken(thing, words, library="default"):
@@ -165,11 +165,11 @@ def spoken(thing, words, library="default"):
     told = replace(told, objects=(replace(known, parts=(words,)),))
     parts = segment(made, told)
     field = ground(made, parts, told, GroundConfig(library=library))
-    return field, doubts(field, parts, made)
+    return field, grounding_warnings(field, parts, made)
 
 
 def test_values_are_where_a_model_placed_them_and_say_so():
-    words = PartWords(
+    words = PartDescription(
         "", "soft_PVC", "shell", margin=0.6, placements=placed(young=0.25, shell_thickness=0.5)
     )
     field, said = spoken(RIDDLE, words)
@@ -184,12 +184,14 @@ def test_values_are_where_a_model_placed_them_and_say_so():
 
 
 def test_a_wide_range_is_placed_in_factors():
-    (foam,) = spoken(RIDDLE, PartWords("", "seat_foam", placements=placed(young=0.5)))[0].materials
+    (foam,) = spoken(RIDDLE, PartDescription("", "seat_foam", placements=placed(young=0.5)))[
+        0
+    ].materials
     assert foam.young == pytest.approx((10e3 * 150e3) ** 0.5)
 
 
 def test_what_is_inside_is_as_dense_as_it_was_placed():
-    words = PartWords("", "aluminium_can_sheet", "filled", contents="water", fill=0.9)
+    words = PartDescription("", "aluminium_can_sheet", "filled", contents="water", fill=0.9)
     words = replace(words, placements=placed(contents_density=1.0))
     (structure,) = spoken(RIDDLE, words)[0].structures
     water = materials.library()["water"].ranges["density"]
@@ -198,7 +200,7 @@ def test_what_is_inside_is_as_dense_as_it_was_placed():
 
 
 def test_values_that_do_not_fit_each_other_are_flagged_where_they_stand_and_in_a_warning():
-    words = PartWords("", "plasticine", placements=placed(young=1.0, yield_stress=0.0))
+    words = PartDescription("", "plasticine", placements=placed(young=1.0, yield_stress=0.0))
     field, said = spoken(RIDDLE, words)
     reason = field.materials[0].grounds["yield_stress"].reason
     assert reason.startswith("yield_stress so. It does not fit the others: stiff but weak")
@@ -206,14 +208,16 @@ def test_values_that_do_not_fit_each_other_are_flagged_where_they_stand_and_in_a
 
 
 def test_what_a_person_stated_outranks_what_a_model_placed():
-    words = PartWords("", "steel", placements=placed(young=0.0), values={"young": 2.1e11})
+    words = PartDescription("", "steel", placements=placed(young=0.0), values={"young": 2.1e11})
     (steel,) = spoken(RIDDLE, words)[0].materials
     assert (steel.young, steel.grounds["young"].chosen_by) == (2.1e11, "annotation")
     assert steel.grounds["young"].margin == 1.0
 
 
 def test_a_place_that_nobody_could_choose_is_marked():
-    words = PartWords("", "steel", placements={"young": Placement(0.4, "fallback", "No answer.")})
+    words = PartDescription(
+        "", "steel", placements={"young": RangePlacement(0.4, "fallback", "No answer.")}
+    )
     (steel,) = spoken(RIDDLE, words)[0].materials
     assert steel.grounds["young"].chosen_by == "fallback"
 
@@ -244,7 +248,7 @@ def test_what_is_filled_has_contents_from_the_library(tmp_path):
     field, _, _ = grounded(BLOCK, PLANK, annotations=path)
     can, pillow = field.structures
     assert (can.kind, can.thickness, can.fill, can.loose) == ("filled", 2e-4, 0.9, True)
-    sauce = materials.find("sauce")
+    sauce = materials.find_material("sauce")
     assert can.contents.name == "sauce"
     assert can.contents.density == sauce.ranges["density"].typical
     assert can.contents.grounds["density"].range.source == "porous-foods+ketchup-grades"
@@ -279,7 +283,7 @@ def test_an_object_of_its_own_can_be_a_liquid(tmp_path):
     field, _, _ = grounded(BLOCK, annotations=said(tmp_path, "block_0: honey"))
     honey = field.materials[0]
     assert honey.law == Law.FLUID
-    assert honey.thickness_of_flow == materials.find("honey").ranges["viscosity"].typical
+    assert honey.thickness_of_flow == materials.find_material("honey").ranges["viscosity"].typical
     assert honey.flow_index == 1.0
 
 
@@ -287,20 +291,23 @@ def test_pieces_are_grounded_each_for_itself():
     made = scene(BLOCK)
     words = describe(made, DescribeConfig())
     (thing,) = words.objects
-    shaft = PartWords("shaft", "steel", "solid", volume_share=0.2, surface_share=0.3)
-    grip = PartWords("grip", "ABS", "shell", volume_share=0.8, surface_share=0.7)
+    shaft = PartDescription("shaft", "steel", "solid", volume_share=0.2, surface_share=0.3)
+    grip = PartDescription("grip", "ABS", "shell", volume_share=0.8, surface_share=0.7)
     whole = replace(thing.parts[0], pieces=(shaft, grip))
     told = replace(words, objects=(replace(thing, parts=(whole,)),))
     field = ground(made, segment(made, told), told)
     ((first, second),) = field.pieces
     assert (first.material.name, first.structure.kind) == ("steel", "solid")
-    assert second.structure.thickness == materials.find("ABS").ranges["shell_thickness"].typical
+    assert (
+        second.structure.thickness
+        == materials.find_material("ABS").ranges["shell_thickness"].typical
+    )
     assert second.words.volume_share == 0.8
 
 
 def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
-    shaft = PartWords("shaft", "steel", "solid", volume_share=0.2, reason="It shines.")
-    grip = PartWords("grip", None, "solid", volume_share=0.8, placements=placed(density=0.5))
+    shaft = PartDescription("shaft", "steel", "solid", volume_share=0.2, reason="It shines.")
+    grip = PartDescription("grip", None, "solid", volume_share=0.8, placements=placed(density=0.5))
     made = scene(BLOCK, PLANK)
     told = describe(made)
     whole = replace(told.objects[0].parts[0], pieces=(shaft, grip))
@@ -314,7 +321,7 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
     assert first["values"]["density"]["range"] == [7800, 7900]
     assert len(first["values"]["density"]["source"]) > 20
     assert (second["recognised"], second["material"]) == (None, "plastics-PP")
-    (warning,) = doubts(field, parts, made)
+    (warning,) = grounding_warnings(field, parts, made)
     assert warning.startswith("block_0: block: grip is of unknown material; plastics-PP stands in")
 
 
@@ -328,16 +335,18 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
     ],
 )
 def test_who_said_how_a_part_is_built_is_named(built_by, who):
-    (solid,) = spoken(RIDDLE, PartWords("", "steel", "solid", built_by=built_by))[0].structures
+    (solid,) = spoken(RIDDLE, PartDescription("", "steel", "solid", built_by=built_by))[
+        0
+    ].structures
     assert solid.reason == f"{who} that it is solid."
-    shell = PartWords("", "terracotta", "shell", built_by=built_by)
+    shell = PartDescription("", "terracotta", "shell", built_by=built_by)
     (usual,) = spoken(RIDDLE, shell)[0].structures
     wall = f"{who} that it has a wall."
     assert usual.reason == (
         f"{wall} Its thickness, unless its mesh shows it, is the usual 7 mm, in the range of "
         "terracotta: 4 to 15 mm."
     )
-    put = replace(shell, placements={"shell_thickness": Placement(1.0, "model", "Thick.")})
+    put = replace(shell, placements={"shell_thickness": RangePlacement(1.0, "model", "Thick.")})
     (here,) = spoken(RIDDLE, put)[0].structures
     assert here.reason == (
         f"{wall} A model puts its thickness at 15 mm, in the range of terracotta: 4 to 15 mm."
@@ -347,7 +356,7 @@ def test_who_said_how_a_part_is_built_is_named(built_by, who):
 
 
 def test_a_wall_of_unknown_material_is_as_thick_as_the_stand_ins_where_those_are_known():
-    words = PartWords("", None, "shell", reason="Painted.")
+    words = PartDescription("", None, "shell", reason="Painted.")
     (structure,) = spoken(RIDDLE, words)[0].structures
     assert (structure.kind, structure.thickness) == ("shell", pytest.approx(0.0015))
     (structure,) = spoken(RIDDLE, words, "reference")[0].structures

@@ -7,15 +7,15 @@ import pytest
 
 import corporeal as co
 from corporeal.core.errors import UserError
-from corporeal.discretization.dents import dent_of_wall
-from corporeal.discretization.hard_blows import ringing
-from corporeal.lab.evaluation.drop_test import drop
-from corporeal.lab.evaluation.life import rebounds
-from corporeal.materials import find
-from corporeal.materials.inflated import RESTITUTION
-from corporeal.materials.rebound import loss_of
-from corporeal.mpm.constants import FEWEST_CELLS, GRID_LOSS
-from corporeal.pipeline.runner import Settings
+from corporeal.discretization.hertz_indentation import dent_of_hollow_ball
+from corporeal.discretization.impact_vibration import vibration_loss
+from corporeal.lab.evaluation.drop_test import simulate_drop
+from corporeal.lab.evaluation.rebound_data import measured_rebounds
+from corporeal.materials import find_material
+from corporeal.materials.loss_restitution import loss_of_restitution
+from corporeal.materials.pressurised_ball import INFLATED_BALL_RESTITUTION
+from corporeal.mpm.constants import GRID_LOSS_FACTOR, MIN_CELLS_FOR_GRID_LOSS
+from corporeal.pipeline.run_pipeline import Settings
 
 RADIUS = 0.11
 
@@ -27,7 +27,7 @@ def named(name, **extras):
 
 
 def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
-    ready = co.prepare(named("football"))
+    ready = co.prepare_scene(named("football"))
     structure, particles = ready.field.structures[0], ready.particles
     assert structure.inflated
     assert structure.contents is not None
@@ -51,20 +51,22 @@ def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
 )
 def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
     """Struck hard, too: a red ball's wall bears more than its air."""
-    ready = co.prepare(named(name))
+    ready = co.prepare_scene(named(name))
     contents = ready.field.structures[0].contents
     assert contents is not None
-    assert contents.restitution == pytest.approx(rebound or RESTITUTION)
-    assert contents.loss == pytest.approx(loss_of(rebound or RESTITUTION))
+    assert contents.restitution == pytest.approx(rebound or INFLATED_BALL_RESTITUTION)
+    assert contents.loss == pytest.approx(loss_of_restitution(rebound or INFLATED_BALL_RESTITUTION))
     made = ready.particles.treatments[0]
-    grid = GRID_LOSS / FEWEST_CELLS**2 + ringing(made.density, 6.0, made.young)
+    grid = GRID_LOSS_FACTOR / MIN_CELLS_FOR_GRID_LOSS**2 + vibration_loss(
+        made.density, 6.0, made.young
+    )
     assert made.loss == pytest.approx(contents.loss - grid, abs=0.006)
 
 
 def test_a_solid_ball_rebounds_as_its_rules_ask_and_loses_in_its_bulk_what_it_did():
     """From 60 inches a croquet ball comes back to 30 to 45, whatever plastic it is of."""
-    field = co.prepare(named("croquet ball")).field
-    nylon = find("nylon").ranges["loss"].typical
+    field = co.prepare_scene(named("croquet ball")).field
+    nylon = find_material("nylon").ranges["loss"].typical
     assert field.materials[0].restitution == pytest.approx(0.79)
     assert field.materials[0].loss == nylon
     assert field.structures[0].kind == "solid"
@@ -72,13 +74,13 @@ def test_a_solid_ball_rebounds_as_its_rules_ask_and_loses_in_its_bulk_what_it_di
 
 def test_a_file_states_its_pressure_and_what_is_not_sealed_stays_a_wall():
     asked = {"substance": "rubber", "shell_thickness_m": 0.003}
-    blown = co.prepare(named("thing", **asked, inflation_kPa=40)).field.structures[0]
+    blown = co.prepare_scene(named("thing", **asked, inflation_kPa=40)).field.structures[0]
     assert blown.contents is not None
     assert blown.contents.name == "air at 40 kPa"
     for extras in ({}, {"inflation_kPa": "much"}, {"inflation_kPa": -3}):
-        open_one = co.prepare(named("thing", **asked, **extras)).field.structures[0]
+        open_one = co.prepare_scene(named("thing", **asked, **extras)).field.structures[0]
         assert (open_one.kind, open_one.contents) == ("shell", None)
-    duck = co.prepare(named("rubber duck")).field.structures[0]
+    duck = co.prepare_scene(named("rubber duck")).field.structures[0]
     assert (duck.kind, duck.contents) == ("shell", None)
 
 
@@ -86,7 +88,7 @@ def annotated(tmp_path, text, name="thing"):
     (tmp_path / "said.yaml").write_text(text)
     usual = Settings()
     describe = replace(usual.describe, annotations=tmp_path / "said.yaml")
-    return co.prepare(named(name), replace(usual, describe=describe)).field.structures[0]
+    return co.prepare_scene(named(name), replace(usual, describe=describe)).field.structures[0]
 
 
 def test_an_annotation_inflates_a_ball_and_lets_the_air_out_of_one(tmp_path):
@@ -114,7 +116,7 @@ def test_what_cannot_be_inflated_so_is_said(tmp_path, text, message):
 
 def test_it_bounces_as_its_rules_ask_and_touches_as_long_as_measured():
     """Published contact times of footballs are 8 to 10 ms at 6 m/s."""
-    problem = co.pose_problem(co.prepare(named("football")))
+    problem = co.pose_problem(co.prepare_scene(named("football")))
     engine = co.build_engine(problem)
     while not (engine.time > 0.02 and engine.measure().momentum[0, 2] > 0 and left(engine)):
         engine.advance(engine.time + 1e-3)
@@ -132,8 +134,8 @@ def left(engine):
 
 def test_a_sealed_ball_with_a_stiff_wall_bounces_on_wall_and_air():
     """As a hollow shell a racquetball buckled and came back with .70 of its speed (.82-.88)."""
-    row = next(r for r in rebounds() if r.name == "racquetball")
-    found = drop(row, Settings())
+    row = next(r for r in measured_rebounds() if r.name == "racquetball")
+    found = simulate_drop(row, Settings())
     assert found.treatment == "deformable"
     assert found.restitution == pytest.approx(0.85, abs=0.04)
     assert found.unbooked < 0.08
@@ -141,7 +143,7 @@ def test_a_sealed_ball_with_a_stiff_wall_bounces_on_wall_and_air():
 
 def test_what_flows_when_it_is_dented_stays_a_wall():
     asked = {"substance": "ABS", "shell_thickness_m": 0.0004}
-    structure = co.prepare(named("thing", **asked, inflation_kPa=0)).field.structures[0]
+    structure = co.prepare_scene(named("thing", **asked, inflation_kPa=0)).field.structures[0]
     assert (structure.kind, structure.contents, structure.gauge) == ("shell", None, None)
 
 
@@ -150,24 +152,26 @@ def test_a_sealed_wall_that_the_budget_would_let_be_crushed_is_rigid():
     settings = Settings()
     draft = replace(settings, fill=replace(settings.fill, detail="draft"))
     for name in ("table tennis ball", "table tennis ball on a table"):
-        row = next(r for r in rebounds() if r.name == name)
-        found = drop(row, draft)
+        row = next(r for r in measured_rebounds() if r.name == name)
+        found = simulate_drop(row, draft)
         assert found.treatment == "rigid"
         assert row.off(found.restitution) < 0.03
 
 
 def test_reissners_dent_of_a_table_tennis_ball():
-    assert dent_of_wall(2.2e9, 0.38, 1050, 4e-4, 0.02, 2.44) == pytest.approx(0.027, abs=0.001)
-    assert dent_of_wall(1e5, 0.38, 1050, 4e-4, 0.02, 2.44) == 1.0
+    assert dent_of_hollow_ball(2.2e9, 0.38, 1050, 4e-4, 0.02, 2.44) == pytest.approx(
+        0.027, abs=0.001
+    )
+    assert dent_of_hollow_ball(1e5, 0.38, 1050, 4e-4, 0.02, 2.44) == 1.0
 
 
 @pytest.mark.parametrize("speed", [0.4, 0.8])
 def test_a_sealed_wall_that_is_struck_too_lightly_to_flex_bounces_no_less(speed):
     """It is rigid then: a table tennis ball had .65 from below 5 cm, and .9 from above."""
-    row = next(r for r in rebounds() if r.name == "table tennis ball")
+    row = next(r for r in measured_rebounds() if r.name == "table tennis ball")
     settings = Settings()
     draft = replace(settings, fill=replace(settings.fill, detail="draft"))
-    found = drop(replace(row, speed=speed), draft)
+    found = simulate_drop(replace(row, speed=speed), draft)
     assert found.treatment == "rigid"
     assert row.low - 0.03 < found.restitution < row.high + 0.03
 
@@ -185,5 +189,5 @@ def test_a_sealed_wall_that_is_struck_too_lightly_to_flex_bounces_no_less(speed)
     ],
 )
 def test_names_tell_what_balls_of_sports_are_made_of(name, material, sealed):
-    field = co.prepare(named(name)).field
+    field = co.prepare_scene(named(name)).field
     assert (field.materials[0].name, field.structures[0].inflated) == (material, sealed)

@@ -12,7 +12,7 @@ from test_planted_faults import ASKED_AGAIN, JAR, TASKS, says, sound, task_of, w
 
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
-from corporeal.vlm.patience import Patience
+from corporeal.vlm.retry import RetryPolicy
 from handmade import scene
 from oracle import weighs
 
@@ -27,7 +27,7 @@ FAULTS |= {
 }
 
 
-CORRECTIONS = Patience().corrections
+CORRECTIONS = RetryPolicy().corrections
 STAYING = ("density in g/cm3", "probabilities in per cent", "a mass of 0", "prose alone")
 
 

@@ -3,8 +3,8 @@
 import pytest
 
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
-from corporeal.recognition.identity import identify
-from corporeal.recognition.metadata import matter_hint
+from corporeal.recognition.metadata_recognition import substance_hint
+from corporeal.recognition.parts_by_name import identify_parts
 from recorded import check_answered, check_chosen, grounded, rows
 
 NAMES = (
@@ -33,7 +33,7 @@ def described(shared_assets):
 def test_a_real_object_is_grounded_from_recordings_and_every_number_says_why(described, name):
     scene, inventory, field = described[name]
     check_answered(scene, inventory)
-    check_chosen(scene, field, identify(scene, matter_hint).catalogue, "real")
+    check_chosen(scene, field, identify_parts(scene, substance_hint).catalogue, "real")
 
 
 def test_every_recording_is_of_one_of_these_objects():

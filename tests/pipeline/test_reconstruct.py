@@ -6,21 +6,22 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.geometry.arrangement import moved
-from corporeal.geometry.gaussians import placed
+from corporeal.geometry.gaussian_transforms import transform_gaussians
 from corporeal.geometry.mesh import Mesh, signed_volume
-from corporeal.io.glb import read_glb
-from corporeal.io.glb_writer import write_glb
-from corporeal.io.splat_ply import write_splat
-from corporeal.multiview.similarity import moved_points
-from corporeal.pipeline.results import Results
+from corporeal.geometry.scene_transforms import move_scene
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.io.gltf.gltf_reader import read_glb
+from corporeal.io.splat.splat_ply import write_splat_ply
+from corporeal.multiview.similarity_transform import apply_similarity_to_points
+from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.pipeline.stages.reconstruct import reconstruct
-from corporeal.reconstruction.features import clouds
-from corporeal.reconstruction.gaussians import hull, radiance, solid
+from corporeal.reconstruction.features import point_features
+from corporeal.reconstruction.gaussians import radiance_field, visual_hull
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.scene.followed import followed
-from corporeal.vlm.seen_objects import SeenObject, Viewer
+from corporeal.reconstruction.surface import closed_surface
+from corporeal.scene.repose_reconstruction import repose_reconstruction
+from corporeal.vlm.photographed_objects import PhotoInterview, SeenObject
 from gaussian_boxes import DOWN, box, together
 
 RED, BLUE = (0.8, 0.1, 0.1), (0.1, 0.2, 0.8)
@@ -33,9 +34,9 @@ MIDDLES = ((0.0, 0.0, 0.1), (0.45, 0.1, 0.15))
 def fewer_cameras():
     """Look at splats in fewer and smaller pictures, and carve more coarsely, than for people."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stage, "OWN_VIEWS", 16)
-        patch.setattr(stage, "OWN_SIZE", (160, 160))
-        patch.setattr(solid, "CELLS", 250_000)
+        patch.setattr(stage, "RENDERED_VIEWS", 16)
+        patch.setattr(stage, "RENDERED_SIZE_PX", (160, 160))
+        patch.setattr(closed_surface, "OBJECT_GRID_CELLS", 250_000)
         yield
 
 
@@ -44,7 +45,7 @@ def splat(tmp_path_factory):
     """Two boxes in a file whose -y is up and whose unit is half a metre."""
     path = tmp_path_factory.mktemp("splat") / "boxes.ply"
     scene = together(box(SIDES[0], MIDDLES[0], RED), box(SIDES[1], MIDDLES[1], BLUE))
-    write_splat(path, placed(scene, DOWN, 2.0, (0.3, -0.2, 5.0)))
+    write_splat_ply(path, transform_gaussians(scene, DOWN, 2.0, (0.3, -0.2, 5.0)))
     return path
 
 
@@ -66,7 +67,9 @@ def test_things_come_out_in_metres_on_the_floor(made):
         volume = signed_volume(Mesh(surface.vertices, surface.triangles))
         assert volume == pytest.approx(np.prod(sides), rel=0.15)  # their edges are cut off
         assert surface.vertices[:, 2].min() == pytest.approx(0, abs=0.01)
-    back = moved_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
+    back = apply_similarity_to_points(
+        found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file)
+    )
     expected = 2 * np.array(MIDDLES) @ DOWN.T + (0.3, -0.2, 5.0)
     np.testing.assert_allclose(back, expected, atol=0.04)
     between = found.boxes.mean(axis=1)
@@ -104,12 +107,12 @@ def test_the_scene_is_a_glb_like_any_other(made, tmp_path):
 
 def test_gaussians_follow_their_objects(made):
     found, scene = made.found, made.scene
-    there = followed(found, moved(scene, (0.0, 0.0, 1.0), 1))
+    there = repose_reconstruction(found, move_scene(scene, (0.0, 0.0, 1.0), 1))
     shift = there.gaussians.mean - found.gaussians.mean
     up = (found.object_of_gaussian == 1)[:, None] * np.array([0.0, 0.0, 1.0])
     np.testing.assert_allclose(shift, up, atol=1e-5)
     with pytest.raises(UserError, match="Reconstruct it again"):
-        followed(found, replace(scene, objects=scene.objects[:1]))
+        repose_reconstruction(found, replace(scene, objects=scene.objects[:1]))
 
 
 def test_gaussians_follow_their_objects_beside_others(made):
@@ -117,7 +120,7 @@ def test_gaussians_follow_their_objects_beside_others(made):
     ball = replace(scene.objects[0], name="ball")
     surfaces = [replace(s, object=s.object + 1) for s in scene.surfaces]
     more = replace(scene, objects=(ball, *scene.objects), surfaces=(scene.surfaces[0], *surfaces))
-    there = followed(found, moved(more, (0.0, 0.0, 1.0), 2))
+    there = repose_reconstruction(found, move_scene(more, (0.0, 0.0, 1.0), 2))
     np.testing.assert_array_equal(
         there.object_of_gaussian,
         np.where(found.object_of_gaussian < 0, -1, found.object_of_gaussian + 1),
@@ -125,10 +128,10 @@ def test_gaussians_follow_their_objects_beside_others(made):
     np.testing.assert_array_equal(there.object_of_point, found.object_of_point + 1)
     shift = there.gaussians.mean - found.gaussians.mean
     np.testing.assert_allclose(shift[:, 2], found.object_of_gaussian == 1, atol=1e-5)
-    results = Results(reconstruct=found, assemble=more)
+    results = StageResults(reconstruct=found, assemble=more)
     assert results.reconstruction is not None
     assert results.filmed is None, "the ball has no Gaussians"
-    assert Results(reconstruct=found, assemble=scene).filmed is not None
+    assert StageResults(reconstruct=found, assemble=scene).filmed is not None
 
 
 def test_the_report_is_told_how_it_came_about(made):
@@ -139,7 +142,7 @@ def test_the_report_is_told_how_it_came_about(made):
     assert "the command line" in told
 
 
-class Seer(Viewer):
+class Seer(PhotoInterview):
     """Somebody who sees two things, and which region is which."""
 
     def __init__(self):
@@ -187,10 +190,10 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
         raise Enough(cloud)
 
     monkeypatch.setattr(stage, "assign_instances", stopped)
-    monkeypatch.setattr(clouds, "connect", lambda spec, folder: Colours())
-    monkeypatch.setattr(hull, "CELLS", 100_000)
-    monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(100, 160))
-    monkeypatch.setattr(radiance, "RAYS", 2048)
+    monkeypatch.setattr(point_features, "connect_encoder", lambda spec, folder: Colours())
+    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 100_000)
+    monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", radiance_field.FieldPreset(100, 160))
+    monkeypatch.setattr(radiance_field, "RAYS_PER_STEP", 2048)
     config = ReconstructConfig(things=("a", "b"), training="draft", lifting=lifting)
     with pytest.raises(Enough) as caught:
         reconstruct(splat, config)
@@ -228,6 +231,6 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
 def test_options_that_make_no_sense_are_refused_before_anything_is_done(
     splat, config, extents, told, monkeypatch
 ):
-    monkeypatch.setattr(stage, "turned_upright", None)
+    monkeypatch.setattr(stage, "turn_upright", None)
     with pytest.raises(UserError, match=told):
         reconstruct(splat, ReconstructConfig(**config), extents)

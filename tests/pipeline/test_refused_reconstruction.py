@@ -8,16 +8,16 @@ import pytest
 import trimesh
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import Cloud, Gaussians, Reconstruction, Views
-from corporeal.pipeline.run_files import doubts_first
+from corporeal.core.types import FeatureCloud, Gaussians, Reconstruction, Views
+from corporeal.pipeline.run_files import sort_warnings
 from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.reconstruction.found_objects import FoundObjects
-from corporeal.reconstruction.gaussians.closed import Closed
-from corporeal.reconstruction.gaussians.intake import Intake
-from corporeal.reconstruction.gaussians.solid import Solid
-from corporeal.reconstruction.masks.grown_masks import lying_in
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
+from corporeal.reconstruction.masks.grown_masks import describe_masks_in
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.render.camera import cameras_around
+from corporeal.reconstruction.surface.closed_surface import ClosedSurface
+from corporeal.reconstruction.surface.object_surfaces import ObjectSurfaces
+from corporeal.render.camera_placement import cameras_around
 
 ONE = Gaussians(
     np.zeros((1, 3), np.float32),
@@ -28,16 +28,16 @@ ONE = Gaussians(
 )
 
 NONE = np.zeros((0, 3))
-NOTHING = Cloud(NONE, NONE, NONE, NONE, np.zeros(0, int))
+NOTHING = FeatureCloud(NONE, NONE, NONE, NONE, np.zeros(0, int))
 
 
 @pytest.mark.parametrize("doubted", [True, False])
 def test_who_must_give_masks_hears_where_doubted_ones_lie(tmp_path, monkeypatch, doubted):
     """Of a bottle hung before shelves these had .91 of the true masks, and nobody was told."""
-    taken = Intake(ONE)
+    taken = GaussianScene(ONE)
     room = np.ones((4, 6, 8), np.bool_)
-    monkeypatch.setattr(stage, "take_pictures", lambda *_: (taken, False))
-    monkeypatch.setattr(stage, "turned_upright", lambda *_: replace(taken, masks=room))
+    monkeypatch.setattr(stage, "gaussians_from_source", lambda *_: (taken, False))
+    monkeypatch.setattr(stage, "turn_upright", lambda *_: replace(taken, masks=room))
     if doubted:
         (tmp_path / "doubted" / "masks").mkdir(parents=True)
     with pytest.raises(UserError, match="would go on beyond the pictures") as said:
@@ -48,12 +48,14 @@ def test_who_must_give_masks_hears_where_doubted_ones_lie(tmp_path, monkeypatch,
 
 
 def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
-    assert lying_in(None) == lying_in(tmp_path) == ""
+    assert describe_masks_in(None) == describe_masks_in(tmp_path) == ""
     (tmp_path / "doubted" / "masks").mkdir(parents=True)
-    assert f"not believed, lie in {tmp_path / 'doubted' / 'masks'}" in lying_in(tmp_path)
+    assert f"not believed, lie in {tmp_path / 'doubted' / 'masks'}" in describe_masks_in(tmp_path)
     (tmp_path / "masks").mkdir()
-    assert f"colours lie in {tmp_path / 'masks'}" in lying_in(tmp_path), "those that were used"
-    assert lying_in(tmp_path).endswith(f"--masks {tmp_path}.")
+    assert f"colours lie in {tmp_path / 'masks'}" in describe_masks_in(tmp_path), (
+        "those that were used"
+    )
+    assert describe_masks_in(tmp_path).endswith(f"--masks {tmp_path}.")
 
 
 def test_where_shapes_are_made_up_is_read_first_and_said_before_a_refusal(tmp_path, monkeypatch):
@@ -64,13 +66,13 @@ def test_where_shapes_are_made_up_is_read_first_and_said_before_a_refusal(tmp_pa
         warnings=("It has no size.", half), doubts=(half,),
     )  # fmt: skip
     others = ("What is it?", *doubted.warnings)
-    assert doubts_first(doubted, others) == (half, "What is it?", "It has no size.")
-    assert doubts_first(None, others[:1]) == others[:1]
+    assert sort_warnings(doubted, others) == (half, "What is it?", "It has no size.")
+    assert sort_warnings(None, others[:1]) == others[:1]
 
-    taken = replace(Intake(ONE), doubts=(half,))
+    taken = replace(GaussianScene(ONE), doubts=(half,))
     room = replace(taken, masks=np.ones((4, 6, 8), np.bool_))
-    monkeypatch.setattr(stage, "take_pictures", lambda *_: (taken, False))
-    monkeypatch.setattr(stage, "turned_upright", lambda *_: room)
+    monkeypatch.setattr(stage, "gaussians_from_source", lambda *_: (taken, False))
+    monkeypatch.setattr(stage, "turn_upright", lambda *_: room)
     with pytest.raises(UserError, match="would go on beyond") as said:
         stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
     assert half in said.value.__notes__
@@ -81,10 +83,10 @@ def test_who_goes_on_without_masks_hears_where_doubted_ones_lie(tmp_path, monkey
     cut = np.zeros((4, 60, 80), np.bool_)
     cut[:, 20:40, 30:50] = True
     views = Views(np.zeros((*cut.shape, 3), np.uint8), ())
-    room = Intake(ONE, views=views, masks=cut, coloured=cut)
+    room = GaussianScene(ONE, views=views, masks=cut, coloured=cut)
     (tmp_path / "doubted" / "masks").mkdir(parents=True)
-    monkeypatch.setattr(stage, "take_pictures", lambda *_: (Intake(ONE), False))
-    monkeypatch.setattr(stage, "turned_upright", lambda *_: room)
+    monkeypatch.setattr(stage, "gaussians_from_source", lambda *_: (GaussianScene(ONE), False))
+    monkeypatch.setattr(stage, "turn_upright", lambda *_: room)
     monkeypatch.setattr(stage, "cameras_around", lambda *_: ())
     went_on = []
     monkeypatch.setattr(stage, "foreground_of", lambda _, taken: went_on.append(taken) or 1 / 0)
@@ -101,13 +103,18 @@ def test_two_pieces_seen_from_one_side_are_believed_if_somebody_said_two(
     """Apart from each other, either may be a piece of the wall behind."""
     views = cameras_around(np.eye(3), 20, (8, 6))[:10]
     mesh = trimesh.creation.box()
-    solid = Solid(
+    solid = ClosedSurface(
         np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((8, 3)), np.zeros(8, int), 0.1
     )
-    taken = Intake(ONE, masks=np.ones((len(views), 6, 8), np.bool_))
-    found = FoundObjects(taken, NOTHING, Closed((solid, solid), np.zeros(1, int), np.zeros(0, int)))
+    taken = GaussianScene(ONE, masks=np.ones((len(views), 6, 8), np.bool_))
+    found = FoundObjects(
+        taken, NOTHING, ObjectSurfaces((solid, solid), np.zeros(1, int), np.zeros(0, int))
+    )
     for other in ("not_worth", "unlike_masks"):
         monkeypatch.setattr(stage, other, lambda *_, **__: None)
-    monkeypatch.setattr("corporeal.reconstruction.gaussians.worth.mostly_unseen", lambda _: 200.0)
-    assert (stage._why_not(found, views, False, count) is not None) == refused
-    assert stage._why_not(found, views, True, None) is None, "somebody gave masks"
+    monkeypatch.setattr(
+        "corporeal.reconstruction.surface.reconstruction_acceptance.widest_unseen_angle",
+        lambda _: 200.0,
+    )
+    assert (stage._reason_not_worth(found, views, False, count) is not None) == refused
+    assert stage._reason_not_worth(found, views, True, None) is None, "somebody gave masks"

@@ -5,24 +5,32 @@ import pytest
 
 from corporeal import materials
 from corporeal.core.types import (
-    NOTHING_ASKED,
-    Film,
+    NO_USAGE,
+    Discretization,
     Hypothesis,
     Law,
     Material,
+    ModelUsage,
     Note,
     NoteKind,
-    ObjectWords,
-    PartWords,
-    Placement,
+    ObjectDescription,
+    PartDescription,
+    RangePlacement,
     Structure,
-    Treatment,
-    Usage,
+    Video,
 )
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.ground import ground
-from corporeal.pipeline.stages.report import Story, asked, built, others, report, si, simulated
+from corporeal.pipeline.stages.report import (
+    ReportContent,
+    alternative_words,
+    report,
+    si_text,
+    stiffness_words,
+    structure_words,
+    usage_words,
+)
 from corporeal.pipeline.stages.segment import segment
 from handmade import plain, scene
 from made_findings import run_audit
@@ -42,59 +50,59 @@ from made_findings import run_audit
     ],
 )
 def test_a_number_is_written_as_a_person_would(value, unit, said):
-    assert si(value, unit) == said
+    assert si_text(value, unit) == said
 
 
 def treated(kind, young):
     numbers = {"poisson": 0.3, "density": 1.0, "yield_stress": None, "thickness": None}
     numbers |= {"strain": 0.0, "impact_speed": 0.0, "wave_speed": 1.0, "step": 1.0, "why": ""}
-    return Treatment(kind=kind, young_real=1e9, young=young, **numbers)
+    return Discretization(kind=kind, young_real=1e9, young=young, **numbers)
 
 
 def test_the_real_stiffness_stands_beside_the_simulated_one():
-    assert simulated(treated("rigid", 1e9)) == "rigid"
-    assert simulated(treated("deformable", 1e9)) == "1 GPa (as measured)"
-    assert simulated(treated("shell", 1e6)) == "1 MPa (0.001 × measured)"
+    assert stiffness_words(treated("rigid", 1e9)) == "rigid"
+    assert stiffness_words(treated("deformable", 1e9)) == "1 GPa (as measured)"
+    assert stiffness_words(treated("shell", 1e6)) == "1 MPa (0.001 × measured)"
 
 
 def test_a_liquid_has_no_modulus_to_compare():
     """Water of 300 Pa was simulated with "67.9 kPa (as measured)"."""
-    said = simulated(replace(treated("deformable", 6e4), wave_speed=47.3), liquid=True)
+    said = stiffness_words(replace(treated("deformable", 6e4), wave_speed=47.3), liquid=True)
     assert said == "liquid, its sound slowed to 47 m/s"
 
 
 def test_what_is_inside_is_told_with_how_it_is_built():
     soup = Material("soup", Law.NEO_HOOKEAN, 300.0, 0.49, 1050.0)
-    assert built(Structure("filled", 2e-4, contents=soup, fill=0.9)) == "filled with soup"
-    assert built(Structure("shell", 2e-4)) == "shell"
+    assert structure_words(Structure("filled", 2e-4, contents=soup, fill=0.9)) == "filled with soup"
+    assert structure_words(Structure("shell", 2e-4)) == "shell"
 
 
 def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
-    head = PartWords("head", "steel", volume_share=0.25)
-    words = PartWords(
+    head = PartDescription("head", "steel", volume_share=0.25)
+    words = PartDescription(
         "hammer", "hardwood", hypotheses=(Hypothesis("ABS", "solid", 0.3),), pieces=(head,)
     )
-    assert others(words) == (
+    assert alternative_words(words) == (
         " Alternatives: ABS (30%). Components: head: steel (25% of the volume)."
     )
-    assert others(PartWords("hammer", "hardwood")) == ""
+    assert alternative_words(PartDescription("hammer", "hardwood")) == ""
 
 
-TOOK = Usage(("openai:x",), 9, 11, 20500, 1200, 43.2, 0.0693, "2026-11-21")
+TOOK = ModelUsage(("openai:x",), 9, 11, 20500, 1200, 43.2, 0.0693, "2026-11-21")
 
 
 def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unknown():
-    assert asked(TOOK) == (
+    assert usage_words(TOOK) == (
         "<br>9 questions to openai:x: 11 calls, 20,500 tokens in, 1,200 out, 43 s waited, "
         "about $0.069 at the list prices of 2026-11-21."
     )
-    assert "price not known" in asked(replace(TOOK, dollars=None))
+    assert "price not known" in usage_words(replace(TOOK, dollars=None))
     by_hand = replace(TOOK, calls=0, models=("by hand, from the sheets",))
-    assert asked(by_hand) == (
+    assert usage_words(by_hand) == (
         "<br>9 questions, answered from the disk by recorded answers (by hand, from the sheets), "
         "at no cost."
     )
-    assert asked(NOTHING_ASKED) == ""
+    assert usage_words(NO_USAGE) == ""
 
 
 # ---------------------------------------------------------------- the whole page
@@ -108,14 +116,23 @@ def page(tmp_path):
         made = scene(("thing_0", [("mesh", plain(), {})]))
         told = describe(made)
         words = replace(words, name=told.objects[0].parts[0].name)
-        told = replace(told, objects=(ObjectWords("thing_0", "thing", (words,)),))
+        told = replace(told, objects=(ObjectDescription("thing_0", "thing", (words,)),))
         parts = segment(made, told)
         field = ground(made, parts, told)
-        film = Film(tmp_path / "film.mp4", 24, 64, 64)
+        film = Video(tmp_path / "film.mp4", 24, 64, 64)
         film.path.write_bytes(b"")
         particles = fill(made, parts, field)
         report(
-            Story(made, parts, field, particles, film, run_audit(**audit), {}, materials.sources()),
+            ReportContent(
+                made,
+                parts,
+                field,
+                particles,
+                film,
+                run_audit(**audit),
+                {},
+                materials.cited_sources(),
+            ),
             tmp_path / "report.html",
         )
         return (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -124,19 +141,21 @@ def page(tmp_path):
 
 
 def test_every_piece_of_a_mesh_has_its_values_with_range_source_and_reason(page):
-    low = {"density": Placement(0.25, "model", "A dense grade.")}
-    head = PartWords("head", "steel", "solid", reason="It shines.", volume_share=0.25)
-    grip = PartWords("grip", "ABS", "shell", volume_share=0.75, placements=low)
-    told = page(PartWords("", "ABS", "shell", answered_by="model", pieces=(head, grip)))
+    low = {"density": RangePlacement(0.25, "model", "A dense grade.")}
+    head = PartDescription("head", "steel", "solid", reason="It shines.", volume_share=0.25)
+    grip = PartDescription("grip", "ABS", "shell", volume_share=0.75, placements=low)
+    told = page(PartDescription("", "ABS", "shell", answered_by="model", pieces=(head, grip)))
     assert "<b>head</b>: steel, 25% of the volume" in told
     assert "It shines." in told and "A dense grade." in told
     assert told.count("<td>density ρ</td>") == 2
-    sources = {r.source for m in ("steel", "ABS") for r in materials.find(m).ranges.values()}
+    sources = {
+        r.source for m in ("steel", "ABS") for r in materials.find_material(m).ranges.values()
+    }
     assert sources <= set(re.findall("<dt>([^<]*)</dt>", told))
 
 
 def test_who_looked_at_the_pictures_is_named(page):
-    words = PartWords("", "ABS", "solid", answered_by="recording")
+    words = PartDescription("", "ABS", "solid", answered_by="recording")
     took = replace(TOOK, models=("by hand, from the sheets",), calls=0)
     told = page(words, questions=took)
     assert "in pictures by recorded answers (by hand, from the sheets)." in told
@@ -146,13 +165,13 @@ def test_who_looked_at_the_pictures_is_named(page):
 
 
 def test_a_wall_thickness_stands_only_where_a_wall_has_it(page):
-    assert "wall thickness" not in page(PartWords("", "steel", "solid"))
-    assert "<td>wall thickness</td><td>700 µm</td>" in page(PartWords("", "steel", "shell"))
-    assert "<td>wall thickness" not in page(PartWords("", "steel", "shell", 0.002))
+    assert "wall thickness" not in page(PartDescription("", "steel", "solid"))
+    assert "<td>wall thickness</td><td>700 µm</td>" in page(PartDescription("", "steel", "shell"))
+    assert "<td>wall thickness" not in page(PartDescription("", "steel", "shell", 0.002))
 
 
 def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
-    told = page(PartWords("", "steel", "shell"))
+    told = page(PartDescription("", "steel", "shell"))
     assert "Margin: confidence in the material, from 0 (a guess) to 1 (stated)." in told
     (wall,) = re.findall("<tr><td>wall thickness.*?</tr>", told)
     assert "the usual value in the estimated range" in wall
@@ -161,11 +180,11 @@ def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
 
 
 def test_a_long_reason_that_all_values_share_is_said_once(page):
-    told = page(PartWords("", None))
+    told = page(PartDescription("", None))
     reason = "Nobody knows what this part is made of"
     assert told.count(f"Reason where none is stated: {reason}") == 1
     assert told.count(reason) == 1
-    usual = page(PartWords("", "steel", answered_by="metadata"))
+    usual = page(PartDescription("", "steel", answered_by="metadata"))
     assert "Reason where none" not in usual and usual.count("the usual value in the") > 3
 
 
@@ -176,7 +195,7 @@ def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
         Note("thing_0: nobody looked into it. With --vlm somebody does.", NoteKind.ASSUMED),
         Note("The scale may be wrong. Measure it.", NoteKind.GRAVE),
     )
-    told = page(PartWords("", "steel", "solid"), warnings=warnings, hints=("Nothing moves.",))
+    told = page(PartDescription("", "steel", "solid"), warnings=warnings, hints=("Nothing moves.",))
     above = told[: told.index("<video")]
     heads = re.findall("<h3>(.*?)</h3>", above)
     assert heads == [
@@ -189,5 +208,5 @@ def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
 
 
 def test_a_page_of_which_nothing_is_to_be_said_has_no_lists(page):
-    told = page(PartWords("", "steel", "solid"))
+    told = page(PartDescription("", "steel", "solid"))
     assert "<h3>What" not in told and "The audit found no violations." in told

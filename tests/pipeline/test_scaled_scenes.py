@@ -8,25 +8,30 @@ import pytest
 import trimesh
 
 from corporeal import materials
-from corporeal.core.types import Film, Law, Material, Scene, SceneObject, Structure, Surface
+from corporeal.core.types import Law, Material, Scene, SceneObject, Structure, Surface, Video
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.discretization.make import compose
-from corporeal.discretization.part import Motion, PartGeometry, life_sized
-from corporeal.discretization.plan import plan
-from corporeal.discretization.scene_survey import examine
-from corporeal.discretization.sizes import how_heavy, how_scaled, in_scene, scale_of_part
-from corporeal.geometry.arrangement import scaled
-from corporeal.io.glb_merge import Member, merge
-from corporeal.io.glb_writer import write_glb
-from corporeal.lab.evaluation.mass import MassConfig, predict
-from corporeal.lab.evaluation.truth import Weighed
+from corporeal.discretization.discretization_plan import plan_discretization
+from corporeal.discretization.object_scaling import (
+    describe_mass,
+    describe_scales,
+    field_in_scene_scale,
+    part_scales,
+)
+from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry, part_at_life_size
+from corporeal.discretization.part_model import infer_part_model
+from corporeal.discretization.scene_measures import measure_objects
+from corporeal.geometry.scene_transforms import scale_scene
+from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.lab.evaluation.mass_evaluation import MassConfig, predict_mass
+from corporeal.lab.evaluation.measured_masses import WeighedObject
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.ground import GroundConfig, ground
-from corporeal.pipeline.stages.report import Story, report
+from corporeal.pipeline.stages.report import ReportContent, report
 from corporeal.pipeline.stages.segment import segment
-from corporeal.showcase.scenes import build
+from corporeal.showcase.showcase_scenes import build_showcase_scene
 from corporeal.simulation.audit import part_rows
 from handmade import plain
 from made_findings import run_audit
@@ -59,7 +64,7 @@ def life():
 
 @pytest.fixture(scope="module")
 def large():
-    return through(scaled(a_can("a recorded answer"), 5.0))
+    return through(scale_scene(a_can("a recorded answer"), 5.0))
 
 
 def test_words_and_materials_are_those_of_the_real_thing(life, large):
@@ -80,9 +85,9 @@ def test_particles_weigh_with_the_cube_of_the_scale(life, large):
 
 def test_both_masses_stand_side_by_side(life, large, tmp_path):
     real = life[3].mass_real[0]
-    told = page(scaled(a_can("a recorded answer"), 5.0), large, tmp_path)
-    assert f">{how_heavy(125 * real, 5.0)}<" in told
-    assert f"{125 * real:.3g} ({real:.3g} in life)" == how_heavy(125 * real, 5.0)
+    told = page(scale_scene(a_can("a recorded answer"), 5.0), large, tmp_path)
+    assert f">{describe_mass(125 * real, 5.0)}<" in told
+    assert f"{125 * real:.3g} ({real:.3g} in life)" == describe_mass(125 * real, 5.0)
     assert (
         "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with "
         "their object"
@@ -99,7 +104,7 @@ def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):
     can = a_can()
     usual = replace(can.surfaces[0], extras={"substance": "aluminium_can_sheet"})
     for k in (1.0, 5.0):
-        scene = scaled(replace(can, surfaces=(usual,)), k)
+        scene = scale_scene(replace(can, surfaces=(usual,)), k)
         said = describe(scene)
         words = replace(said.objects[0].parts[0], structure="shell")
         said = replace(said, objects=(replace(said.objects[0], parts=(words,)),))
@@ -111,9 +116,11 @@ def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):
 
 def page(scene, made, folder):
     _, parts, field, particles = made
-    film = Film(folder / "film.mp4", 24, 64, 64)
+    film = Video(folder / "film.mp4", 24, 64, 64)
     film.path.write_bytes(b"")
-    story = Story(scene, parts, field, particles, film, run_audit(), {}, materials.sources())
+    story = ReportContent(
+        scene, parts, field, particles, film, run_audit(), {}, materials.cited_sources()
+    )
     report(story, folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")
 
@@ -124,8 +131,8 @@ def test_a_merged_and_tilted_thing_keeps_its_scale_wherever_it_lies(life, tmp_pa
     said = {"class": "can", "real_extent_m": 0.1, "scale": 5.0, "sized_by": "the table"}
     half = np.pi / 8
     tilt = (float(np.cos(half)), float(np.sin(half)), 0.0, 0.0)
-    member = Member(tmp_path / "can.glb", "can_0", (0.0, 0.0, 0.4), tilt, 5.0, said)
-    merge(tmp_path / "scene.glb", [member], "scene", {})
+    member = MergeMember(tmp_path / "can.glb", "can_0", (0.0, 0.0, 0.4), tilt, 5.0, said)
+    merge_glb_files(tmp_path / "scene.glb", [member], "scene", {})
     scene = assemble([tmp_path / "scene.glb"])
     (can,) = scene.objects
     assert (can.real_extent, can.scale, can.sized_by) == (0.1, 5.0, "the table")
@@ -136,8 +143,8 @@ def test_a_merged_and_tilted_thing_keeps_its_scale_wherever_it_lies(life, tmp_pa
 
 def test_both_masses_are_data(large):
     _, parts, field, particles = large
-    scene = scaled(a_can(), 5.0)
-    heavy = particles.mass_real, scale_of_part(scene, parts)
+    scene = scale_scene(a_can(), 5.0)
+    heavy = particles.mass_real, part_scales(scene, parts)
     (row,) = materials.materials_json(field, parts, *heavy)["parts"]
     assert (row["scale"], row["mass_kg"]) == (5.0, particles.mass_real[0])
     assert row["real_mass_kg"] == pytest.approx(particles.mass_real[0] / 125, rel=1e-12)
@@ -149,12 +156,12 @@ def test_both_masses_are_data(large):
 
 def test_a_sentence_tells_only_what_is_not_life_size():
     things = (SceneObject("duck_0", "duck", 0.12, 1.85), SceneObject("couch_0", "couch", 2.1, 0.24))
-    told = how_scaled((*things, SceneObject("vase_0", "vase", 0.3, 1.001)))
+    told = describe_scales((*things, SceneObject("vase_0", "vase", 0.3, 1.001)))
     assert told.startswith(
         "Not life-size: duck 0 at 1.85 times its real 12 cm; couch 0 at 0.24 times its real 2.1 m."
     )
     assert "vase" not in told
-    assert how_scaled([SceneObject("vase_0", "vase", 0.3)]) == ""
+    assert describe_scales([SceneObject("vase_0", "vase", 0.3)]) == ""
 
 
 def test_masses_are_compared_with_the_scales_at_real_size(tmp_path):
@@ -163,9 +170,9 @@ def test_masses_are_compared_with_the_scales_at_real_size(tmp_path):
     for k in (1.0, 5.0):
         path = tmp_path / str(k) / "can.glb"
         path.parent.mkdir()
-        write_glb(path, scaled(a_can(), k))
-        thing = Weighed("can", path, None, "all")
-        row = predict(thing, DescribeConfig(), GroundConfig(), MassConfig(samples=5))
+        write_glb(path, scale_scene(a_can(), k))
+        thing = WeighedObject("can", path, None, "all")
+        row = predict_mass(thing, DescribeConfig(), GroundConfig(), MassConfig(samples=5))
         found.append((row.mass, row.low, row.high, row.volume_m3, row.hull_m3, row.solid_usual))
     assert found[1] == pytest.approx(found[0], rel=1e-5)
 
@@ -184,7 +191,7 @@ def test_the_real_thing_is_the_same_with_all_its_lengths_over_the_scale():
         diameter=0.04,
         scale=4.0,
     )
-    back = life_sized(here)
+    back = part_at_life_size(here)
     assert back.size == pytest.approx(real.size, rel=1e-12)
     assert (back.volume, back.area) == pytest.approx((real.volume, real.area), rel=1e-12)
     assert (back.diameter, back.structure.thickness) == pytest.approx((0.01, 4e-4), rel=1e-12)
@@ -196,22 +203,25 @@ def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
     gel = Material("stiff gel", Law.HENCKY, 1e8, 0.38, 700.0)
     size, volume, area = (0.15, 0.15, 1.0), 0.15**2, 4 * 0.15
     stick = PartGeometry(0, gel, Structure("solid"), size, volume, area, scale=5.0)
-    gentle = Motion(impact_speed=0.3, acceleration=9.81)
-    (treated,) = plan([stick], [gentle], "fine").treatments
+    gentle = ExpectedMotion(impact_speed=0.3, acceleration=9.81)
+    (treated,) = plan_discretization([stick], [gentle], "fine").treatments
     assert treated.kind == "deformable"
     assert "At its real size, 0.2 times this one, it would be judged otherwise" in treated.why
-    assert "otherwise" not in plan([replace(stick, scale=1.0)], [gentle], "fine").treatments[0].why
+    assert (
+        "otherwise"
+        not in plan_discretization([replace(stick, scale=1.0)], [gentle], "fine").treatments[0].why
+    )
     stiff = replace(stick, material=replace(gel, young=1e11))
-    assert "otherwise" not in plan([stiff], [gentle], "fine").treatments[0].why
+    assert "otherwise" not in plan_discretization([stiff], [gentle], "fine").treatments[0].why
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "k"), [("duck-on-can", 0.37), ("ficus-pushed", 2.0)])
 def test_a_scene_of_the_showcase_at_another_scale_has_the_same_answers(name, k):
     """The questions are the same words, so recorded answers fit; masses go with the cube."""
-    scene = build(name)
+    scene = build_showcase_scene(name)
     said, _, field, particles = through(scene, REPLAY)
-    other = through(scaled(scene, k), REPLAY)
+    other = through(scale_scene(scene, k), REPLAY)
     assert other[0] == said
     assert other[2].materials == field.materials
     assert other[2].structures == field.structures
@@ -235,11 +245,11 @@ def test_real_objects_weigh_with_the_cube_of_their_scale(shared_assets, name, no
     parts = segment(scene, said)
     weighed = []
     for factor in (1.0, k):
-        other = scaled(scene, factor)
+        other = scale_scene(scene, factor)
         assert describe(other) == said
-        field = in_scene(ground(other, parts, said), scale_of_part(other, parts))
-        members = [(a, m) for a in examine(other, parts, 0) for m in a.members]
+        field = field_in_scene_scale(ground(other, parts, said), part_scales(other, parts))
+        members = [(a, m) for a in measure_objects(other, parts, 0) for m in a.members]
         rng = np.random.default_rng(0)
-        weighed.append({m.part: compose(a, m, field, rng).mass for a, m in members})
+        weighed.append({m.part: infer_part_model(a, m, field, rng).mass for a, m in members})
     life, here = weighed
     assert here == pytest.approx({part: mass * k**3 for part, mass in life.items()}, rel=noise)

@@ -4,11 +4,11 @@ import trimesh
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import (
-    Cloud,
+    FeatureCloud,
     Gaussians,
     Inventory,
-    ObjectWords,
-    PartWords,
+    ObjectDescription,
+    PartDescription,
     Reconstruction,
     Scene,
     SceneObject,
@@ -17,8 +17,8 @@ from corporeal.core.types import (
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import ground
 from corporeal.pipeline.stages.segment import segment
-from corporeal.reconstruction.features.descriptor import descriptor
-from corporeal.reconstruction.segment.naming import Named
+from corporeal.reconstruction.features.point_descriptor import point_descriptor
+from corporeal.reconstruction.segment.part_naming import NamedParts
 from handmade import plain, scene
 
 CHAIR = (
@@ -72,8 +72,8 @@ def seen(made, green):
     colour = np.tile([0.7, 0.2, 0.15], (len(position), 1))
     colour[: len(green)][green] = (0.2, 0.5, 0.15)
     middle = np.array([[0, 0, 0.1], [0.5, 0, 0]])[owner]
-    look = descriptor(position, colour, position - middle)
-    cloud = Cloud(position, colour, look, look, np.ones(len(position), int))
+    look = point_descriptor(position, colour, position - middle)
+    cloud = FeatureCloud(position, colour, look, look, np.ones(len(position), int))
     empty = np.zeros((0, 3), np.float32)
     splat = Gaussians(empty, np.zeros((0, 4)), empty, np.zeros(0), np.zeros((0, 1, 3)))
     boxes = np.zeros((2, 2, 3))
@@ -82,9 +82,13 @@ def seen(made, green):
 
 
 def told(*pieces, vase_by="annotation"):
-    words = PartWords("plant", "ceramic", pieces=tuple(PartWords(n, m) for n, m in pieces))
-    vase = ObjectWords("vase", "vase", (PartWords("vase", "ceramic", answered_by=vase_by),))
-    return Inventory((ObjectWords("plant", "plant", (words,)), vase))
+    words = PartDescription(
+        "plant", "ceramic", pieces=tuple(PartDescription(n, m) for n, m in pieces)
+    )
+    vase = ObjectDescription(
+        "vase", "vase", (PartDescription("vase", "ceramic", answered_by=vase_by),)
+    )
+    return Inventory((ObjectDescription("plant", "plant", (words,)), vase))
 
 
 def test_pieces_of_an_object_from_pictures_are_found_on_it():
@@ -112,7 +116,7 @@ def test_without_a_reconstruction_pieces_share_a_surface():
 
 def test_a_piece_that_shows_nowhere_is_left_out_and_told():
     made, green = potted()
-    named = Named(np.zeros(len(green), int), np.ones(len(green)), "attributes", ("None.",))
+    named = NamedParts(np.zeros(len(green), int), np.ones(len(green)), "attributes", ("None.",))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("corporeal.pipeline.stages.segment.name_parts", lambda *_: named)
         words = told(("red pot", "ceramic"), ("root", "wood"))

@@ -5,27 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corporeal.core.findings import Settled, SettledObject
+from corporeal.core.audit_data import SettledObjectOutcome, SettlingOutcome
 from corporeal.core.types import (
+    Discretization,
     Law,
     Material,
     MaterialField,
+    PartDescription,
     Particles,
-    PartWords,
     Push,
     Scene,
     SceneObject,
     Structure,
-    Treatment,
     Wind,
 )
-from corporeal.discretization.problem_from_scene import pose
+from corporeal.discretization.build_model import build_model
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.pipeline.stages.simulate import SETTLING, SimulateConfig, simulate
+from corporeal.pipeline.stages.simulate import SETTLING_FILE, SimulateConfig, simulate
 from corporeal.simulation import checkpoint
 from corporeal.simulation.audit_file import read_audit
-from corporeal.simulation.audit_words import equilibrium_warnings, equilibrium_words
-from corporeal.simulation.static_equilibrium import before
+from corporeal.simulation.audit_messages import equilibrium_message, equilibrium_warnings
+from corporeal.simulation.static_equilibrium import settling_problem
 
 CELL, SIZE = 0.02, 0.08
 FOAM = Material("foam", Law.NEO_HOOKEAN, 8e3, 0.3, 500.0, loss=0.1)
@@ -41,7 +41,7 @@ def cube(height):
 
 def treated(material):
     stiff = material is STONE
-    return Treatment(
+    return Discretization(
         "rigid" if stiff else "deformable", material.young, material.young, material.poisson,
         material.density, None, None, 0.1, 1.0, 0.0 if stiff else 5.0, 1e-3, "As it is.",
         material.loss,
@@ -76,7 +76,7 @@ def scene_of(heights, materials, velocity=(0.0, 0.0, 0.0), settled=True, **last)
     field = MaterialField(
         materials=tuple(materials),
         structures=(Structure("solid"),) * count,
-        words=tuple(PartWords(m.name, m.name) for m in materials),
+        words=tuple(PartDescription(m.name, m.name) for m in materials),
         friction=table,
         restitution=table,
     )
@@ -102,7 +102,7 @@ def test_what_had_come_to_rest_stays_and_the_control_does_not(tmp_path):
     control = simulate(replace(asked[0], settled=False), *asked[1:], ASKED, tmp_path / "not")
     assert drift(control).min() > 0.25
     np.testing.assert_allclose(control.frames[0].position, start, atol=1e-6)
-    assert not (tmp_path / "not" / SETTLING).exists()
+    assert not (tmp_path / "not" / SETTLING_FILE).exists()
     assert read_audit(tmp_path / "not").settling is None
 
 
@@ -126,18 +126,18 @@ def test_the_audit_says_how_long_it_took_and_what_sank(tmp_path):
 
 def test_the_words_say_who_sank_by_how_much_and_whether_it_ended():
     rows = [
-        SettledObject(name, (0.0, 0.0, -sunk * 0.01), sunk, 0.05)
+        SettledObjectOutcome(name, (0.0, 0.0, -sunk * 0.01), sunk, 0.05)
         for name, sunk in (("quilt_0", 4.2), ("toy_0", 0.5), ("vase_0", 0.01))
     ]
-    said = Settled(0.5512, True, tuple(rows))
-    words = equilibrium_words(said)
+    said = SettlingOutcome(0.5512, True, tuple(rows))
+    words = equilibrium_message(said)
     assert "for 0.55 s: quilt_0 moved by 42 mm (4.2 cells), toy_0 moved by 5 mm" in words
     assert "vase_0" not in words
     (warning,) = equilibrium_warnings(said)
     assert warning.startswith("quilt_0 moved by 42 mm")
     *_, last = equilibrium_warnings(replace(said, found=False))
     assert "equilibrium was not reached" in last
-    assert equilibrium_words(None) == "" and equilibrium_warnings(None) == []
+    assert equilibrium_message(None) == "" and equilibrium_warnings(None) == []
 
 
 def test_what_hangs_is_held_and_falls_from_time_0(tmp_path):
@@ -171,15 +171,15 @@ def test_what_moves_things_begins_at_time_0(tmp_path, kind):
 
 def test_what_is_all_rigid_begins_at_once(tmp_path):
     trajectory = simulate(*scene_of((0.0, SIZE), (STONE, STONE)), ASKED, tmp_path)
-    assert not (tmp_path / SETTLING).exists()
+    assert not (tmp_path / SETTLING_FILE).exists()
     assert trajectory.ledger.centre[0, 1, 2] == pytest.approx(1.5 * SIZE, abs=1e-9)
 
 
 def test_a_settling_that_was_cut_off_goes_on_to_the_last_bit(tmp_path, monkeypatch):
     asked = scene_of((0.0, SIZE), (FOAM, STONE))
     whole = simulate(*asked, ASKED, tmp_path / "whole")
-    monkeypatch.setattr(checkpoint, "EVERY", 0.0)
-    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", np.inf)
+    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
 
     class KilledError(BaseException):
         pass
@@ -224,9 +224,9 @@ def test_what_is_lossy_sinks_as_far_as_what_is_not(tmp_path):
 
 def test_equilibrium_is_sought_without_loss_and_the_film_has_it():
     scene, particles, field = scene_of((0.0,), (replace(FOAM, loss=0.6),))
-    problem = pose(scene, particles, field).problem
+    problem = build_model(scene, particles, field).problem
     lost = []
-    for asked in (problem, before(problem, set())):
+    for asked in (problem, settling_problem(problem, set())):
         engine = CpuEngine(asked)
         engine.advance(0.05)
         lost.append(float(engine.measure().viscous_loss))

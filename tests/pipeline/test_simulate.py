@@ -13,24 +13,24 @@ from corporeal.core import store
 from corporeal.core.errors import SimulationError
 from corporeal.core.store import DiskError
 from corporeal.core.types import (
+    Discretization,
     Law,
     Material,
     MaterialField,
+    PartDescription,
     Particles,
-    PartWords,
     Push,
     Scene,
     SceneObject,
     Structure,
-    Treatment,
 )
 from corporeal.mpm import problem as contract
-from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
+from corporeal.mpm.problem import Diagnostics, Problem, Snapshot, StepStatistics
 from corporeal.pipeline.stages import simulate as stage
 from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
 from corporeal.simulation import checkpoint
-from corporeal.simulation import frames as disk
-from corporeal.simulation.frames import read_trajectory
+from corporeal.simulation import trajectory_files as disk
+from corporeal.simulation.trajectory_files import read_trajectory
 
 RUBBER = Material("rubber", Law.NEO_HOOKEAN, 1e6, 0.4, 1000.0, loss=0.1)
 CELL = 0.02
@@ -43,7 +43,7 @@ class Ballistic:
     interrupt_at = np.inf
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.steps, self.time = problem, Steps(), 0.0
+        self.problem, self.steps, self.time = problem, StepStatistics(), 0.0
         self.x = np.concatenate([b.position for b in problem.bodies])
         self.v = np.concatenate([b.velocity for b in problem.bodies])
         self.owner = np.repeat(
@@ -68,7 +68,7 @@ class Ballistic:
         eye = np.broadcast_to(np.eye(3), (len(self.x), 3, 3)).copy()
         return Snapshot(self.time, self.x.copy(), self.v.copy(), eye, eye, np.zeros(len(self.x)))
 
-    def measure(self) -> Measure:
+    def measure(self) -> Diagnostics:
         p, count = self.problem, len(self.problem.bodies)
         mass = np.concatenate([b.volume * b.density for b in p.bodies])
         g = np.array(p.gravity)
@@ -78,7 +78,7 @@ class Ballistic:
             return np.stack([np.bincount(self.owner, mass * column) for column in values.T], axis=1)
 
         everything = count + len(p.planes)
-        return Measure(
+        return Diagnostics(
             time=self.time,
             mass=total,
             centre=added(self.x) / total[:, None],
@@ -119,7 +119,7 @@ class Ballistic:
 
 @pytest.fixture(autouse=True)
 def ballistic(monkeypatch):
-    monkeypatch.setitem(contract.MENU, "cpu", f"{__name__}:Ballistic")
+    monkeypatch.setitem(contract.ENGINES, "cpu", f"{__name__}:Ballistic")
     monkeypatch.setattr(Ballistic, "explode_at", np.inf)
     monkeypatch.setattr(Ballistic, "interrupt_at", np.inf)
 
@@ -130,7 +130,7 @@ def lattice(low, high):
 
 
 def treated(material=RUBBER, kind="deformable"):
-    return Treatment(
+    return Discretization(
         kind, material.young, material.young, material.poisson, material.density,
         material.yield_stress, None, 0.1, 1.0, 38.0, 2e-4, "Deformable.", material.loss,
     )  # fmt: skip
@@ -165,7 +165,7 @@ def scene_of(heights=(0.1, 0.5), velocity=(0.0, 0.0, 0.0), push=None, duration=0
     field = MaterialField(
         materials=(RUBBER,) * kinds,
         structures=(Structure("solid"),) * kinds,
-        words=tuple(PartWords(f"part_{k}", "rubber") for k in range(kinds)),
+        words=tuple(PartDescription(f"part_{k}", "rubber") for k in range(kinds)),
         friction=table,
         restitution=table,
     )
@@ -180,7 +180,7 @@ def test_frames_come_back_in_the_order_of_the_particles(tmp_path):
     fallen = particles.position - [0, 0, 0.5 * 9.81 * 0.2**2]
     np.testing.assert_allclose(trajectory.frames[-1].position, fallen, atol=1e-6)
     assert len(read_trajectory(tmp_path).frames) == 11
-    assert not (tmp_path / checkpoint.LAST).exists()
+    assert not (tmp_path / checkpoint.CHECKPOINT_FILE).exists()
 
 
 def test_the_audit_names_every_field_and_finds_the_hole_in_the_floor(tmp_path):
@@ -223,8 +223,8 @@ def test_an_interrupted_simulation_goes_on_as_if_nothing_had_happened(tmp_path, 
 
 def test_a_killed_simulation_goes_on_from_its_last_checkpoint(tmp_path, monkeypatch):
     asked = scene_of()
-    monkeypatch.setattr(checkpoint, "EVERY", 0.0)
-    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", np.inf)
+    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
 
     class KilledError(BaseException):
         pass
@@ -235,7 +235,7 @@ def test_a_killed_simulation_goes_on_from_its_last_checkpoint(tmp_path, monkeypa
 
     with pytest.raises(KilledError):
         simulate(*asked, SimulateConfig(), tmp_path, kill)
-    assert (tmp_path / checkpoint.LAST).exists()
+    assert (tmp_path / checkpoint.CHECKPOINT_FILE).exists()
     told = []
     trajectory = simulate(*asked, SimulateConfig(), tmp_path, lambda f, w: told.append(f))
     assert told[0] > 0.6
@@ -324,7 +324,7 @@ def test_friction_with_the_floor_is_that_of_the_part_that_stands_on_it(tmp_path,
         field,
         materials=(RUBBER,) * 2,
         structures=(Structure("solid"),) * 2,
-        words=(PartWords("lid", "rubber"), PartWords("foot", "rubber")),
+        words=(PartDescription("lid", "rubber"), PartDescription("foot", "rubber")),
         friction=friction,
         restitution=friction,
     )

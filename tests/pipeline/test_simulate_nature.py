@@ -10,21 +10,25 @@ from corporeal.core.types import (
     Law,
     Material,
     MaterialField,
+    PartDescription,
     Particles,
-    PartWords,
     Scene,
     SceneObject,
     Structure,
 )
-from corporeal.discretization.filling import fill_body
-from corporeal.discretization.plan import Motion, PartGeometry, plan
+from corporeal.discretization.discretization_plan import (
+    ExpectedMotion,
+    PartGeometry,
+    plan_discretization,
+)
+from corporeal.discretization.point_filling import fill_body
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.shape import Shape
+from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
 from corporeal.simulation import checkpoint
 from corporeal.simulation.audit_file import read_audit
-from corporeal.simulation.frames import read_trajectory
-from corporeal.simulation.outcome import outcome
+from corporeal.simulation.outcome import measure_outcome
+from corporeal.simulation.trajectory_files import read_trajectory
 
 JELLY = Material("jelly", Law.NEO_HOOKEAN, 1e5, 0.4, 1000.0)
 RUBBER = Material("rubber", Law.NEO_HOOKEAN, 3e6, 0.48, 1100.0)
@@ -58,7 +62,7 @@ def balls(materials, heights, velocities=None, duration=0.5):
         PartGeometry(k, m, Structure("solid"), (SIZE,) * 3, volume, np.pi * SIZE**2)
         for k, m in enumerate(materials)
     ]
-    chosen = plan(parts, [Motion(speed, 9.81)] * count, "draft")
+    chosen = plan_discretization(parts, [ExpectedMotion(speed, 9.81)] * count, "draft")
     one = ball(chosen.cell / 2)
     skin = SIZE / 2 * golden_sphere(1000)
     at = [np.array([0.0, 0.0, h + SIZE / 2]) for h in heights]
@@ -87,7 +91,7 @@ def balls(materials, heights, velocities=None, duration=0.5):
     field = MaterialField(
         materials=tuple(materials),
         structures=(Structure("solid"),) * count,
-        words=tuple(PartWords(f"ball {k}", m.name) for k, m in enumerate(materials)),
+        words=tuple(PartDescription(f"ball {k}", m.name) for k, m in enumerate(materials)),
         friction=table,
         restitution=table,
     )
@@ -103,7 +107,7 @@ def bounce(tmp_path_factory):
 
 def test_a_jelly_ball_bounces_and_is_round_again(bounce):
     (scene, particles, field), trajectory, _ = bounce
-    row = outcome(scene, particles, field, trajectory).objects["ball_0"]
+    row = measure_outcome(scene, particles, field, trajectory).objects["ball_0"]
     assert row.fall_m == pytest.approx(FALL, abs=0.3 * particles.cell)
     assert 0.6 < row.rebound_ratio < 1.0
     assert row.shape_error_max > 0.008
@@ -125,7 +129,7 @@ def test_its_audit_has_nothing_to_complain_about(bounce):
 def test_a_steel_ball_rebounds_by_its_coefficient_of_restitution(tmp_path):
     scene, particles, field = balls([STEEL], [FALL], duration=0.4)
     moved = simulate(scene, particles, field, SimulateConfig(), tmp_path)
-    row = outcome(scene, particles, field, moved).objects["ball_0"]
+    row = measure_outcome(scene, particles, field, moved).objects["ball_0"]
     assert particles.treatments[0].kind == "rigid"
     assert row.rebound_ratio == pytest.approx(0.36, abs=0.04)
     assert row.shape_error_max < 1e-6
@@ -135,7 +139,7 @@ def test_a_steel_ball_rebounds_by_its_coefficient_of_restitution(tmp_path):
 def test_a_ball_dropped_upright_bounces_upright(tmp_path):
     """Its middle is where its mass is; with points that all weigh alike it goes aside."""
     sphere = trimesh.creation.icosphere(4, SIZE / 2)
-    shape = Shape(Mesh(np.asarray(sphere.vertices), np.asarray(sphere.faces)))
+    shape = QueryMesh(Mesh(np.asarray(sphere.vertices), np.asarray(sphere.faces)))
     aside = {"cells": [], "alike": []}
     for seed in range(3):
         scene, particles, field = balls([RUBBER], [3 * FALL], duration=0.4)
@@ -167,15 +171,15 @@ def test_two_balls_that_meet_part_again_and_one_field_glues_them(tmp_path):
     pairs = {}
     for contact in ("multi", "single"):
         trajectory = simulate(*asked, SimulateConfig(contact=contact), tmp_path / contact)
-        pairs[contact] = outcome(*asked, trajectory).pair("ball_0", "ball_1")
+        pairs[contact] = measure_outcome(*asked, trajectory).pair("ball_0", "ball_1")
     assert pairs["multi"].separated
     assert not pairs["single"].separated
 
 
 def test_a_run_that_was_cut_off_ends_exactly_like_one_that_was_not(bounce, tmp_path, monkeypatch):
     asked, whole, _ = bounce
-    monkeypatch.setattr(checkpoint, "EVERY", 0.0)
-    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", np.inf)
+    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
 
     def cut(fraction, words):
         if fraction > 0.4:

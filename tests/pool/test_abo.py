@@ -9,8 +9,8 @@ import pytest
 
 from corporeal.core.errors import UserError
 from corporeal.pool import abo
-from corporeal.pool.index import IndexConfig, index
-from corporeal.pool.origins import OriginConfig
+from corporeal.pool.candidate_origins import OriginConfig
+from corporeal.pool.pool_index import IndexConfig, index_pool
 from pool_models import plain_ball
 
 COLUMNS = (
@@ -62,7 +62,7 @@ def root(tmp_path):
 
 
 def test_models_become_assets_with_product_types_and_attribution(root, tmp_path):
-    pool = index([root], tmp_path / "pool", IndexConfig(OriginConfig("abo")))
+    pool = index_pool([root], tmp_path / "pool", IndexConfig(OriginConfig("abo")))
     assert pool.rejections == ()
     said = {a.name: (a.class_name, a.source, a.licence, a.metric) for a in pool.assets}
     assert said == {
@@ -79,13 +79,13 @@ def test_models_become_assets_with_product_types_and_attribution(root, tmp_path)
 
 def test_a_mesh_that_is_not_as_large_as_the_table_says_is_not_in_metres(root):
     (root / "3dmodels" / "original" / "0" / "B01.glb").write_bytes(plain_ball(40.0))
-    pool = index([root], root / "pool", IndexConfig(OriginConfig("abo")))
+    pool = index_pool([root], root / "pool", IndexConfig(OriginConfig("abo")))
     assert not pool.asset("abo_B01").metric
 
 
 def test_copies_from_before_the_terms_were_eased_say_so(root):
     (root / "LICENSE-CC-BY-NC-4.0.txt").touch()
-    assert {c.declared.licence for c in abo.candidates(root)} == {"CC-BY-NC-4.0"}
+    assert {c.declared.licence for c in abo.abo_candidates(root)} == {"CC-BY-NC-4.0"}
 
 
 def test_what_was_not_unpacked_is_passed_over_and_a_path_leads_nowhere_else(root, tmp_path):
@@ -93,7 +93,7 @@ def test_what_was_not_unpacked_is_passed_over_and_a_path_leads_nowhere_else(root
     path = root / "3dmodels" / "metadata" / "3dmodels.csv.gz"
     text = gzip.decompress(path.read_bytes()).decode().replace("3/B09.glb", "../../../outside.glb")
     path.write_bytes(gzip.compress(text.encode()))
-    assert [c.name for c in abo.candidates(root)] == ["abo_B01", "abo_B02", "abo_B03"]
+    assert [c.name for c in abo.abo_candidates(root)] == ["abo_B01", "abo_B02", "abo_B03"]
 
 
 @pytest.mark.parametrize(
@@ -116,10 +116,10 @@ def test_what_was_not_unpacked_is_passed_over_and_a_path_leads_nowhere_else(root
 def test_a_broken_table_is_named(root, file, data, said):
     (root / file).write_bytes(data)
     with pytest.raises(UserError, match=said) as error:
-        abo.candidates(root)
+        abo.abo_candidates(root)
     assert file.rsplit("/", 1)[1] in str(error.value)
 
 
 def test_a_folder_of_another_layout_is_refused(tmp_path):
     with pytest.raises(UserError, match="abo-3dmodels"):
-        abo.candidates(tmp_path)
+        abo.abo_candidates(tmp_path)

@@ -7,10 +7,10 @@ import random
 import numpy as np
 import pytest
 
-from corporeal.io.glb import read_glb
-from corporeal.pool import gate
-from corporeal.pool.index import IndexConfig, index
-from corporeal.pool.origins import OriginConfig
+from corporeal.io.gltf.gltf_reader import read_glb
+from corporeal.pool import quality_gate
+from corporeal.pool.candidate_origins import OriginConfig
+from corporeal.pool.pool_index import IndexConfig, index_pool
 from glb_maker import CUBE, CUBE_TRIANGLES
 from pool_models import ball, checks, glb, plain_ball
 
@@ -55,7 +55,7 @@ def test_a_third_of_the_files_is_broken_and_the_rest_comes_out(tmp_path):
         put(tmp_path / "in", **{f"good{k}": plain_ball(0.05 + 0.001 * k)})
     for k in range(30):
         put(tmp_path / "in", **{f"bad{k}": hostile(k % 6, plain_ball(0.2 + 0.001 * k), rng)})
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert {a.name for a in pool.assets} == {f"good{k}" for k in range(70)}
     said = reasons(pool)
     assert set(said) == {f"bad{k}" for k in range(30)}
@@ -71,14 +71,14 @@ def test_any_single_byte_may_be_wrong(tmp_path):
         data = bytearray(whole)
         data[rng.randrange(len(data))] = rng.randrange(256)
         put(tmp_path / "in", **{f"x{k}": bytes(data)})
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert len(pool.assets) + len(pool.rejections) == 80
     assert not [r for r in pool.rejections if "mistake of ours" in r.reason]
 
 
 def test_real_hostile_files_get_a_reason_or_get_in(shared_assets, tmp_path):
     folder = shared_assets / "hostile" / "gltf_validator"
-    pool = index([folder], tmp_path / "pool")
+    pool = index_pool([folder], tmp_path / "pool")
     assert len(pool.rejections) > 100
     assert not [r for r in pool.rejections if "mistake of ours" in r.reason or not r.reason]
 
@@ -88,17 +88,17 @@ def test_the_same_mesh_comes_in_once_unless_both_class_and_look_differ(tmp_path)
     plain, dressed = glb(vertices, triangles), glb(vertices, triangles, uv, checks(512, 512))
     put(tmp_path / "in" / "rubber ball", a=plain, b=dressed, c=glb(vertices * 1.01, triangles))
     put(tmp_path / "in" / "steel ball", d=plain + b"\0\0\0\0", e=dressed)
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert [a.name for a in pool.assets] == ["rubber_ball_a", "rubber_ball_c", "steel_ball_e"]
     assert reasons(pool) == dict.fromkeys("bd", "has the same mesh as rubber_ball_a")
     put(tmp_path / "more" / "steel ball", f=plain)
-    pool = index([tmp_path / "more"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "more"], tmp_path / "pool")
     assert reasons(pool)["f"] == "has the same mesh as steel_ball_e", "what came earlier counts too"
 
 
 def test_hostile_words_do_not_harm_the_index(tmp_path):
     put(tmp_path / "in", a=plain_ball(copyright="x\ud800\u0000y", extras={"license": "\udfff"}))
-    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
     assert (asset.attribution, asset.licence) == ("x? y", "?")
 
 
@@ -108,20 +108,20 @@ def test_a_file_whose_name_is_no_text_gets_a_reason(tmp_path):
         (tmp_path / "in" / os.fsdecode(b"caf\xe9.glb")).write_bytes(plain_ball(0.2))
     except OSError:
         pytest.skip("this file system has names in UTF-8 only")
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert [a.name for a in pool.assets] == ["good"]
     assert reasons(pool) == {"caf?": "its path is not plain text in UTF-8: rename it"}
 
 
 def test_a_pool_of_one_class_is_a_pool(tmp_path):
     put(tmp_path / "in" / "ball", a=plain_ball(0.1), b=plain_ball(0.11), c=plain_ball(0.12))
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert list(pool.classes) == ["ball"] and len(pool.classes["ball"]) == 3
 
 
 def test_when_nothing_is_good_the_pool_is_empty_and_says_why(tmp_path):
     put(tmp_path / "in", a=b"", b=b"{}")
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert pool.assets == () and set(reasons(pool)) == {"a", "b"}
 
 
@@ -130,7 +130,7 @@ def test_what_is_said_to_be_in_metres_and_is_a_kilometre_large_stays_outside(tmp
     table = tmp_path / "said.csv"
     rows = "in/chair.glb,chair,yes\nin/thing.glb,gizmo,yes\nin/sofa.glb,sofa,no\n"
     table.write_text(f"file,class,metric\n{rows}")
-    pool = index([tmp_path / "in"], tmp_path / "pool", IndexConfig(OriginConfig(csv=table)))
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool", IndexConfig(OriginConfig(csv=table)))
     assert [a.name for a in pool.assets] == ["sofa"], "of which only the shape counts"
     assert not pool.assets[0].metric
     said = reasons(pool)
@@ -143,14 +143,14 @@ def test_what_is_said_to_be_in_metres_and_is_a_kilometre_large_stays_outside(tmp
 )
 def test_sizes_that_single_precision_cannot_place_stay_outside(tmp_path, size, said):
     put(tmp_path / "in", x=plain_ball(size))
-    assert said in reasons(index([tmp_path / "in"], tmp_path / "pool"))["x"]
+    assert said in reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["x"]
 
 
 def test_numbers_that_are_none_are_named(tmp_path):
     vertices, triangles, _ = ball()
     vertices[100] = np.nan
     put(tmp_path / "in", x=glb(vertices, triangles))
-    assert "(nan, nan, nan)" in reasons(index([tmp_path / "in"], tmp_path / "pool"))["x"]
+    assert "(nan, nan, nan)" in reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["x"]
 
 
 def soup(count, size, rng):
@@ -161,7 +161,7 @@ def soup(count, size, rng):
 
 def test_a_soup_of_crumbs_stays_outside(tmp_path):
     put(tmp_path / "in", soup=glb(*soup(2000, 0.02, np.random.default_rng(0))))
-    assert "crumbs" in reasons(index([tmp_path / "in"], tmp_path / "pool"))["soup"]
+    assert "crumbs" in reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["soup"]
 
 
 def test_a_non_manifold_tangle_is_measured_like_any_other(tmp_path):
@@ -169,7 +169,7 @@ def test_a_non_manifold_tangle_is_measured_like_any_other(tmp_path):
     rng = np.random.default_rng(0)
     tangle = rng.integers(0, 60, (800, 3))
     put(tmp_path / "in", tangle=glb(rng.random((60, 3)), tangle))
-    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
     assert 0 < asset.open_edges < 1
 
 
@@ -180,7 +180,7 @@ def test_what_stands_apart_is_several_things(tmp_path, gap, things):
     shift = 2 * 0.1 * (1 + gap / (1 - gap))
     both = np.concatenate([vertices, vertices + np.array([shift, 0, 0])])
     put(tmp_path / "in", pair=glb(both, np.concatenate([triangles, triangles + len(vertices)])))
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert len(pool.assets) == (things == 1)
     if things == 2:
         assert "holds 2 objects that stand apart; the largest has 50% of" in reasons(pool)["pair"]
@@ -190,7 +190,7 @@ def test_open_edges_are_counted(tmp_path):
     vertices, triangles, _ = ball(10)
     upper = (vertices[triangles, 2] > -1e-9).all(axis=1)
     put(tmp_path / "in", half=glb(vertices, triangles[upper]))
-    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
     edges = (3 * asset.triangles + 20) / 2  # the rim has 20 edges, of one triangle each
     assert asset.open_edges == pytest.approx(20 / edges, abs=1e-6)
 
@@ -203,7 +203,7 @@ def test_a_placeholder_is_told_from_a_simple_thing_by_its_picture(tmp_path):
         cube=glb(2 * CUBE, CUBE_TRIANGLES),
         sheet=glb(3 * CUBE, CUBE_TRIANGLES[:2], spread, checks(512, 512)),
     )
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert [a.name for a in pool.assets] == ["box"]
     assert reasons(pool)["cube"] == "has 12 triangles and no picture: a placeholder (at least 100)"
     assert reasons(pool)["sheet"] == "has 2 triangles: a placeholder (at least 12)"
@@ -224,7 +224,7 @@ def test_a_coarse_picture_stays_outside_unless_it_repeats_or_is_a_palette(tmp_pa
         palette=dressed(coarse // 64 * 64),
         dots=dressed(coarse, 0.0),
     )
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert sorted(a.name for a in pool.assets) == ["dots", "palette", "tiled"]
     assert reasons(pool)["coarse"].startswith("its finest base-colour picture is 128 px across")
     assert pool.asset("tiled").texture == pytest.approx(640, rel=0.05)
@@ -242,7 +242,7 @@ def degenerate(share):
 @pytest.mark.parametrize(("share", "copied"), [(0.005, False), (0.05, True), (0.4, True)])
 def test_triangles_without_area_are_cleaned_away(tmp_path, share, copied):
     put(tmp_path / "in", x=glb(*degenerate(share)))
-    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
     assert asset.file.is_relative_to(tmp_path / "pool") is copied
     (left,) = read_glb(asset.file).surfaces
     assert (len(left.triangles) == len(ball()[1])) is copied
@@ -250,29 +250,29 @@ def test_triangles_without_area_are_cleaned_away(tmp_path, share, copied):
 
 def test_what_is_mostly_degenerate_stays_outside(tmp_path):
     put(tmp_path / "in", x=glb(*degenerate(0.6)))
-    said = reasons(index([tmp_path / "in"], tmp_path / "pool"))["x"]
+    said = reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["x"]
     assert said == "60% of its triangles have no area"
 
 
 def test_a_mistake_of_ours_ends_one_file_only(tmp_path, monkeypatch):
     put(tmp_path / "in", a=plain_ball(0.1), b=plain_ball(0.2))
-    real = gate.open_edges
+    real = quality_gate.open_edge_fraction
     calls = []
 
     def once(mesh):
         calls.append(mesh)
         return real(mesh) if len(calls) > 1 else 1 / 0
 
-    monkeypatch.setattr(gate, "open_edges", once)
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    monkeypatch.setattr(quality_gate, "open_edge_fraction", once)
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert [a.name for a in pool.assets] == ["b"]
     assert "mistake of ours (ZeroDivisionError" in reasons(pool)["a"]
 
 
 def test_too_many_triangles_to_decimate_are_refused_at_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(gate, "MOST_READ", 2000)
+    monkeypatch.setattr(quality_gate, "MAX_READ_TRIANGLES", 2000)
     put(tmp_path / "in", x=plain_ball())
-    said = reasons(index([tmp_path / "in"], tmp_path / "pool"))["x"]
+    said = reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["x"]
     assert said == "has 2,208 triangles; at most 2,000 are decimated"
 
 
@@ -281,7 +281,7 @@ def test_a_million_triangles_become_two_hundred_thousand(tmp_path):
     vertices, triangles, uv = ball(502, 0.1, bumps=0.05)
     assert len(triangles) > 1_000_000
     put(tmp_path / "in", big=glb(vertices, triangles, uv, checks(1024, 512)))
-    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
     assert 150_000 < asset.triangles <= 200_000
     (surface,) = read_glb(asset.file).surfaces
     assert len(surface.triangles) == asset.triangles
@@ -290,7 +290,7 @@ def test_a_million_triangles_become_two_hundred_thousand(tmp_path):
 
 def test_every_rejection_is_in_the_index_with_its_class(tmp_path):
     put(tmp_path / "in" / "lamp", broken=b"glTF", tiny=glb(CUBE, CUBE_TRIANGLES))
-    index([tmp_path / "in"], tmp_path / "pool")
+    index_pool([tmp_path / "in"], tmp_path / "pool")
     kept = json.loads((tmp_path / "pool" / "pool.json").read_text())["rejections"]
     assert [r["class_name"] for r in kept] == ["lamp", "lamp"]
     assert all(r["reason"] for r in kept)

@@ -10,9 +10,9 @@ import pytest
 
 from corporeal.core.errors import UserError
 from corporeal.pool import objaverse
-from corporeal.pool.index import IndexConfig, index
-from corporeal.pool.objaverse import Wanted
-from corporeal.pool.origins import OriginConfig
+from corporeal.pool.candidate_origins import OriginConfig
+from corporeal.pool.objaverse import WantedModels
+from corporeal.pool.pool_index import IndexConfig, index_pool
 from pool_models import plain_ball
 
 MUG, VASE, LOOSE, ABSENT = "8476c4170df2", "8ff7f1f24653", "c786b97d08b9", "139331da7445"
@@ -55,11 +55,11 @@ def cache(tmp_path):
 
 
 def config(**wanted):
-    return IndexConfig(OriginConfig("objaverse", wanted=Wanted(**wanted)))
+    return IndexConfig(OriginConfig("objaverse", wanted=WantedModels(**wanted)))
 
 
 def test_what_lies_in_the_cache_becomes_assets_with_class_licence_and_maker(cache, tmp_path):
-    pool = index([cache], tmp_path / "pool", config())
+    pool = index_pool([cache], tmp_path / "pool", config())
     assert pool.rejections == ()
     mug, vase = pool.classes["mug"][0], pool.classes["vase"][0]
     assert mug.name == f"mug_{MUG[:8]}"
@@ -73,15 +73,15 @@ def test_what_lies_in_the_cache_becomes_assets_with_class_licence_and_maker(cach
 
 
 def test_only_the_wanted_categories_are_indexed(cache, tmp_path):
-    pool = index([cache], tmp_path / "pool", config(classes=("vase",)))
+    pool = index_pool([cache], tmp_path / "pool", config(classes=("vase",)))
     assert list(pool.classes) == ["vase"] and len(pool.assets) == 1
 
 
 def test_categories_are_chosen_in_words(cache):
-    assert objaverse.choose(LVIS, Wanted(("Mug", "vase"), 1)) == [ABSENT, VASE]
-    assert objaverse.choose(LVIS, Wanted(("mouse (computer equipment)",))) == []
+    assert objaverse.choose_models(LVIS, WantedModels(("Mug", "vase"), 1)) == [ABSENT, VASE]
+    assert objaverse.choose_models(LVIS, WantedModels(("mouse (computer equipment)",))) == []
     with pytest.raises(UserError, match=r"'mouse'\. Did you mean: mouse \(computer equipment\)"):
-        objaverse.choose(LVIS, Wanted(("mouse",)))
+        objaverse.choose_models(LVIS, WantedModels(("mouse",)))
 
 
 def fake_package(monkeypatch, cache, calls, fail=False):
@@ -98,13 +98,13 @@ def fake_package(monkeypatch, cache, calls, fail=False):
     module.load_annotations = lambda uids: calls.append("annotations")
     module.load_objects = load_objects
     monkeypatch.setitem(sys.modules, "objaverse", module)
-    monkeypatch.setattr(objaverse, "CACHE", cache)
+    monkeypatch.setattr(objaverse, "OBJAVERSE_CACHE", cache)
 
 
 def test_what_is_wanted_is_downloaded_by_the_package(cache, tmp_path, monkeypatch):
     calls = []
     fake_package(monkeypatch, cache, calls)
-    pool = index([], tmp_path / "pool", config(classes=("mug",), per_class=2))
+    pool = index_pool([], tmp_path / "pool", config(classes=("mug",), per_class=2))
     assert calls == ["annotations", sorted([MUG, ABSENT])]
     assert len(pool.classes["mug"]) == 2 and len(pool.assets) == 2
 
@@ -112,18 +112,18 @@ def test_what_is_wanted_is_downloaded_by_the_package(cache, tmp_path, monkeypatc
 def test_without_network_one_line_says_what_can_be_done(cache, tmp_path, monkeypatch):
     fake_package(monkeypatch, cache, [], fail=True)
     with pytest.raises(UserError, match=r"no route to host.*index what is there"):
-        index([], tmp_path / "pool", config(classes=("mug",)))
+        index_pool([], tmp_path / "pool", config(classes=("mug",)))
 
 
 def test_without_the_package_one_line_says_how_to_install_it(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "objaverse", None)
     with pytest.raises(UserError, match=r"pip install 'corporeal\[objaverse\]'"):
-        index([], tmp_path / "pool", config(classes=("mug",)))
+        index_pool([], tmp_path / "pool", config(classes=("mug",)))
 
 
 def test_without_a_cache_one_line_says_how_to_get_one(tmp_path):
     with pytest.raises(UserError, match=r"object-paths\.json\.gz is not there"):
-        index([tmp_path], tmp_path / "pool", config())
+        index_pool([tmp_path], tmp_path / "pool", config())
 
 
 def test_the_package_itself_reads_this_layout(cache, monkeypatch):

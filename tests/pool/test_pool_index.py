@@ -10,12 +10,12 @@ from PIL import Image
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
-from corporeal.io.glb import read_glb
-from corporeal.io.glb_writer import write_glb
-from corporeal.pool import verdict
-from corporeal.pool.gate import GateConfig
-from corporeal.pool.index import IndexConfig, index, read_pool
-from corporeal.pool.origins import OriginConfig
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.io.gltf.gltf_reader import read_glb
+from corporeal.pool import gate_verdicts
+from corporeal.pool.candidate_origins import OriginConfig
+from corporeal.pool.pool_index import IndexConfig, index_pool, read_pool
+from corporeal.pool.quality_gate import GateConfig
 from pool_models import ball, checks, glb, plain_ball, scene
 
 
@@ -32,7 +32,7 @@ def with_table(path):
 @pytest.mark.slow
 def test_every_real_object_is_let_in_but_those_that_are_several(shared_assets, tmp_path):
     folders = [shared_assets / "objects", shared_assets / "ycb"]
-    pool = index(folders, tmp_path / "pool")
+    pool = index_pool(folders, tmp_path / "pool")
     reasons = {Path(r.source).stem: r.reason for r in pool.rejections}
     assert set(reasons) == {"tea_set_polyhaven", "pillow_smallhouse"}
     assert "8 objects" in reasons["tea_set_polyhaven"]
@@ -51,7 +51,7 @@ def test_every_real_object_is_let_in_but_those_that_are_several(shared_assets, t
 def test_what_a_file_says_of_itself_is_measured_and_kept(tmp_path):
     data = plain_ball(0.035, copyright="CC BY 4.0, (c) 2021 Ada")
     path = save(tmp_path / "in" / "Orange_LP.glb", data)
-    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
     assert (asset.name, asset.class_name) == ("Orange_LP", "orange")
     assert (asset.file, asset.source) == (path.resolve(), str(path))
     assert asset.sha256 == hashlib.sha256(data).hexdigest()
@@ -69,7 +69,7 @@ def test_the_class_is_the_tables_then_the_folders_then_the_files(tmp_path):
     table.write_text(
         "file, class, licence, attribution, metric\nin/mug/x2.glb, Soda_Can, MIT, Bo, no\n"
     )
-    pool = index([tmp_path / "in"], tmp_path / "pool", with_table(table))
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool", with_table(table))
     classes = {a.name: a.class_name for a in pool.assets}
     assert classes == {"mug_x1": "mug", "mug_x2": "soda can", "tea_pot": "tea pot"}
     assert pool.asset("mug_x2").licence == "MIT" and pool.asset("mug_x2").attribution == "Bo"
@@ -80,7 +80,7 @@ def test_the_class_is_the_tables_then_the_folders_then_the_files(tmp_path):
 def test_folders_that_say_nothing_are_passed_over_and_models_called_model_take_their_name(tmp_path):
     save(tmp_path / "in" / "objects" / "Garden Chair" / "model.glb", plain_ball(0.5))
     save(tmp_path / "in" / "Duck" / "glTF-Binary" / "Duck.glb", plain_ball(0.05))
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     classes = {a.name: a.class_name for a in pool.assets}
     assert classes == {"Garden_Chair_model": "garden chair", "Duck": "duck"}
 
@@ -89,7 +89,7 @@ def test_what_a_table_names_and_is_not_there_is_told(tmp_path):
     save(tmp_path / "in" / "x.glb", plain_ball())
     table = tmp_path / "said.csv"
     table.write_text("file,class\nin/x.glb,ball\nin/y.glb,mug\n")
-    pool = index([tmp_path / "in"], tmp_path / "pool", with_table(table))
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool", with_table(table))
     assert len(pool.assets) == 1
     (told,) = pool.rejections
     assert (told.source, told.class_name) == (str(tmp_path / "in" / "y.glb"), "mug")
@@ -101,10 +101,10 @@ def test_a_manifest_in_the_folder_or_above_it_is_picked_up(tmp_path):
     columns = "file,category,licence,attribution,max_extent_m,metric_scale"
     row = 'objects/x.glb,rubber ball,CC0-1.0,"Kay, Bo",0.1,no (artist units)'
     (tmp_path / "all" / "manifest.csv").write_text(f"{columns}\n{row}\n")
-    (asset,) = index([tmp_path / "all" / "objects"], tmp_path / "pool").assets
+    (asset,) = index_pool([tmp_path / "all" / "objects"], tmp_path / "pool").assets
     assert (asset.class_name, asset.licence) == ("rubber ball", "CC0-1.0")
     assert asset.attribution == "Kay, Bo" and not asset.metric
-    assert index([tmp_path / "all"], tmp_path / "other").assets[0].class_name == "rubber ball"
+    assert index_pool([tmp_path / "all"], tmp_path / "other").assets[0].class_name == "rubber ball"
 
 
 @pytest.mark.parametrize(
@@ -123,15 +123,15 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(tmp_path, text, said
     table = tmp_path / "said.csv"
     table.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(UserError, match=said):
-        index([tmp_path / "in"], tmp_path / "pool", with_table(table))
+        index_pool([tmp_path / "in"], tmp_path / "pool", with_table(table))
 
 
 def test_folders_without_models_are_refused(tmp_path):
     with pytest.raises(UserError, match="no such folder"):
-        index([tmp_path / "absent"], tmp_path / "pool")
+        index_pool([tmp_path / "absent"], tmp_path / "pool")
     (tmp_path / "empty").mkdir()
     with pytest.raises(UserError, match="no model"):
-        index([tmp_path / "empty"], tmp_path / "pool")
+        index_pool([tmp_path / "empty"], tmp_path / "pool")
     with pytest.raises(UserError, match="no asset pool"):
         read_pool(tmp_path / "nowhere")
 
@@ -139,7 +139,7 @@ def test_folders_without_models_are_refused(tmp_path):
 def test_metres_are_believed_where_the_size_is_usual(tmp_path):
     save(tmp_path / "in" / "mug.glb", plain_ball(0.05))
     save(tmp_path / "in" / "cup.glb", plain_ball(50.0))
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert pool.asset("mug").metric and not pool.asset("cup").metric
 
 
@@ -148,39 +148,41 @@ def test_a_stated_extent_that_the_mesh_has_not_puts_its_units_in_doubt(tmp_path)
     table = tmp_path / "said.csv"
     for extent, metric in (("0.1", True), ("0.15", False)):
         table.write_text(f"file,class,metric,extent_m\nin/mug.glb,mug,yes,{extent}\n")
-        (asset,) = index([tmp_path / "in"], tmp_path / "pool", with_table(table)).assets
+        (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool", with_table(table)).assets
         assert asset.metric is metric
 
 
 def test_names_are_made_unique(tmp_path):
     for k in range(3):
         save(tmp_path / "in" / f"set{k}" / "ball.glb", plain_ball(0.1 + 0.01 * k))
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert sorted(a.name for a in pool.assets) == ["ball", "ball_1", "ball_2"]
 
 
 def test_nothing_is_judged_twice_and_what_changed_is_judged_again(tmp_path, monkeypatch):
     judged = []
-    real = verdict.judge
-    monkeypatch.setattr(verdict, "judge", lambda f, *a: judged.append(f.name) or real(f, *a))
+    real = gate_verdicts.judge_file
+    monkeypatch.setattr(
+        gate_verdicts, "judge_file", lambda f, *a: judged.append(f.name) or real(f, *a)
+    )
     for k in range(3):
         save(tmp_path / "in" / f"ball{k}.glb", plain_ball(0.1 + 0.01 * k))
     save(tmp_path / "in" / "bad.glb", b"glTF")
-    first = index([tmp_path / "in"], tmp_path / "pool")
+    first = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert len(judged) == 4
-    assert index([tmp_path / "in"], tmp_path / "pool") == first
+    assert index_pool([tmp_path / "in"], tmp_path / "pool") == first
     assert len(judged) == 4
     save(tmp_path / "in" / "ball1.glb", plain_ball(0.2))
-    index([tmp_path / "in"], tmp_path / "pool")
+    index_pool([tmp_path / "in"], tmp_path / "pool")
     assert judged[4:] == ["ball1.glb"]
     strict = IndexConfig(gate=GateConfig(least_plain=10_000))
-    assert not index([tmp_path / "in"], tmp_path / "pool", strict).assets
+    assert not index_pool([tmp_path / "in"], tmp_path / "pool", strict).assets
     assert len(judged) == 9, "another gate judges anew"
 
 
 def test_an_interrupted_run_goes_on_where_it_was(tmp_path, monkeypatch):
     judged = []
-    real = verdict.judge
+    real = gate_verdicts.judge_file
 
     def judge(file, *more):
         if len(judged) == 2:
@@ -190,16 +192,18 @@ def test_an_interrupted_run_goes_on_where_it_was(tmp_path, monkeypatch):
 
     for k in range(4):
         save(tmp_path / "in" / f"ball{k}.glb", plain_ball(0.1 + 0.01 * k))
-    monkeypatch.setattr(verdict, "judge", judge)
+    monkeypatch.setattr(gate_verdicts, "judge_file", judge)
     with pytest.raises(KeyboardInterrupt):
-        index([tmp_path / "in"], tmp_path / "pool")
-    log = tmp_path / "pool" / verdict.VERDICTS
+        index_pool([tmp_path / "in"], tmp_path / "pool")
+    log = tmp_path / "pool" / gate_verdicts.VERDICTS_FILE
     log.write_bytes(log.read_bytes()[:-10])  # killed while it wrote
-    monkeypatch.setattr(verdict, "judge", lambda f, *a: judged.append(f.name) or real(f, *a))
-    pool = index([tmp_path / "in"], tmp_path / "pool")
+    monkeypatch.setattr(
+        gate_verdicts, "judge_file", lambda f, *a: judged.append(f.name) or real(f, *a)
+    )
+    pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert judged == [f"ball{k}.glb" for k in (0, 1, 1, 2, 3)]
     assert len(pool.assets) == 4
-    assert index([tmp_path / "in"], tmp_path / "pool") == pool
+    assert index_pool([tmp_path / "in"], tmp_path / "pool") == pool
     assert len(judged) == 5, "the torn line did not swallow the verdict written after it"
 
 
@@ -207,11 +211,11 @@ def test_another_folder_adds_to_the_pool_and_what_is_gone_leaves_it(tmp_path):
     first = save(tmp_path / "a" / "ball.glb", plain_ball(0.1))
     save(tmp_path / "b" / "ball.glb", plain_ball(0.11))
     save(tmp_path / "b" / "bad.glb", b"nothing")
-    index([tmp_path / "a"], tmp_path / "pool")
-    pool = index([tmp_path / "b"], tmp_path / "pool")
+    index_pool([tmp_path / "a"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "b"], tmp_path / "pool")
     assert [a.name for a in pool.assets] == ["ball", "ball_1"]
     first.unlink()
-    pool = index([tmp_path / "b"], tmp_path / "pool")
+    pool = index_pool([tmp_path / "b"], tmp_path / "pool")
     assert [a.name for a in pool.assets] == ["ball"]
     assert len(pool.rejections) == 1
 
@@ -220,13 +224,13 @@ def test_a_copy_that_was_deleted_is_made_again(tmp_path):
     vertices, triangles, uv = ball(40)
     write_glb(tmp_path / "ball.glb", scene(vertices, triangles, uv, checks(512, 512)))
     config = IndexConfig(gate=GateConfig(most_triangles=1000))
-    pool = index([tmp_path], tmp_path / "pool", config)
+    pool = index_pool([tmp_path], tmp_path / "pool", config)
     (asset,) = pool.assets
     assert asset.file.parent == tmp_path / "pool" / "models"
     data = asset.file.read_bytes()
     assert hashlib.sha256(data).hexdigest() == asset.sha256
     asset.file.unlink()
-    assert index([tmp_path], tmp_path / "pool", config) == pool
+    assert index_pool([tmp_path], tmp_path / "pool", config) == pool
     assert asset.file.read_bytes() == data
 
 
@@ -234,7 +238,7 @@ def test_a_pool_can_be_moved_with_its_copies(tmp_path):
     vertices, triangles, _ = ball(40)
     save(tmp_path / "in" / "ball.glb", glb(vertices, triangles))
     config = IndexConfig(gate=GateConfig(most_triangles=1000))
-    index([tmp_path / "in"], tmp_path / "pool", config)
+    index_pool([tmp_path / "in"], tmp_path / "pool", config)
     (tmp_path / "pool").rename(tmp_path / "moved")
     (asset,) = read_pool(tmp_path / "moved").assets
     read = read_glb(asset.file)
@@ -262,7 +266,7 @@ def test_companions_count_as_content_and_a_gltf_becomes_a_glb(tmp_path):
         "scenes": [{"nodes": [0]}],
     }
     save(folder / "ball.gltf", json.dumps(document).encode())
-    (asset,) = index([folder], tmp_path / "pool").assets
+    (asset,) = index_pool([folder], tmp_path / "pool").assets
     assert asset.file.suffix == ".glb" and asset.class_name == "ball"
     (read,) = read_glb(asset.file).surfaces
     np.testing.assert_allclose(np.ptp(read.vertices, axis=0).max(), 0.2, rtol=1e-6)
@@ -270,7 +274,7 @@ def test_companions_count_as_content_and_a_gltf_becomes_a_glb(tmp_path):
         folder / "ball.bin",
         (2 * vertices).astype("<f4").tobytes() + triangles.astype("<u4").tobytes(),
     )
-    assert index([folder], tmp_path / "pool").assets[0].extent == pytest.approx(0.4)
+    assert index_pool([folder], tmp_path / "pool").assets[0].extent == pytest.approx(0.4)
 
 
 def test_an_obj_becomes_a_glb_and_its_picture_counts_as_content(tmp_path):
@@ -283,7 +287,7 @@ def test_an_obj_becomes_a_glb_and_its_picture_counts_as_content(tmp_path):
     picture = tmp_path / "in" / "toy" / "ball.png"
     for k in (512, 1024):
         Image.fromarray(checks(k, k)).save(picture)
-        (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+        (asset,) = index_pool([tmp_path / "in"], tmp_path / "pool").assets
         assert (asset.class_name, asset.texture, asset.triangles) == ("toy", k, len(triangles))
     scene = read_glb(asset.file)
     assert np.array_equal(scene.finishes[0].texture, checks(k, k))
@@ -296,13 +300,15 @@ def test_the_progress_names_every_file(tmp_path):
     for k in range(4):
         save(tmp_path / "in" / f"ball{k}.glb", plain_ball(0.1 + 0.01 * k))
     told = []
-    index([tmp_path / "in"], tmp_path / "pool", progress=lambda f, words: told.append((f, words)))
+    index_pool(
+        [tmp_path / "in"], tmp_path / "pool", progress=lambda f, words: told.append((f, words))
+    )
     assert told == [(k / 4, f"ball{k}.glb") for k in range(4)] + [(1.0, "")]
 
 
 def test_a_damaged_index_is_said_in_one_line(tmp_path):
     save(tmp_path / "in" / "ball.glb", plain_ball())
-    index([tmp_path / "in"], tmp_path / "pool")
+    index_pool([tmp_path / "in"], tmp_path / "pool")
     path = tmp_path / "pool" / "pool.json"
     for text in ("{", "[]", '{"assets": [{}], "rejections": []}'):
         path.write_text(text)
@@ -312,5 +318,5 @@ def test_a_damaged_index_is_said_in_one_line(tmp_path):
 
 def test_two_processes_do_not_write_one_pool(tmp_path):
     save(tmp_path / "in" / "ball.glb", plain_ball())
-    with store.alone(tmp_path / "pool"), pytest.raises(UserError, match="works in"):
-        index([tmp_path / "in"], tmp_path / "pool")
+    with store.lock_folder(tmp_path / "pool"), pytest.raises(UserError, match="works in"):
+        index_pool([tmp_path / "in"], tmp_path / "pool")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from corporeal.recognition.lexicon import lexicon
-from corporeal.recognition.typical_bulk import doubt_mass, typical_bulk
-from corporeal.recognition.typical_extents import doubt, typical_extent
+from corporeal.recognition.lexicon import lexicon_terms
+from corporeal.recognition.typical_bulk_density import mass_warning, typical_bulk_density
+from corporeal.recognition.typical_extents import extent_warning, typical_extent
 
 
 @pytest.mark.parametrize(
@@ -29,13 +29,13 @@ def test_a_compound_is_found_by_its_words(said, words):
 
 def test_a_file_in_artists_units_is_said_to_be_implausible():
     """The two that went through without a word."""
-    golf = doubt("golfball_0", "golfball", 1.8)
+    golf = extent_warning("golfball_0", "golfball", 1.8)
     assert golf is not None
     assert "1.8 m large" in golf
     assert "--extent golfball_0=0.043" in golf
-    assert doubt("dumpster_0", "dumpster", 190.0) is not None
-    assert doubt("golfball_0", "golfball", 0.0427) is None
-    assert doubt("dumpster_0", "dumpster", 1.9) is None
+    assert extent_warning("dumpster_0", "dumpster", 190.0) is not None
+    assert extent_warning("golfball_0", "golfball", 0.0427) is None
+    assert extent_warning("dumpster_0", "dumpster", 1.9) is None
 
 
 SOLID = [
@@ -159,12 +159,12 @@ LIGHT = [
 
 @pytest.mark.parametrize(("what", "mass", "sides"), LIGHT)
 def test_what_lacks_most_of_its_mass_is_doubted(what, mass, sides):
-    assert doubt_mass("it_0", what, mass, sides) is not None
+    assert mass_warning("it_0", what, mass, sides) is not None
 
 
 @pytest.mark.parametrize(("what", "mass", "sides"), SOLID)
 def test_what_is_solid_where_such_things_are_hollow_is_doubted(what, mass, sides):
-    said = doubt_mass("it_0", what, mass, sides)
+    said = mass_warning("it_0", what, mass, sides)
     assert said is not None
     assert said.startswith("it_0 weighs")
     assert "--extent" in said
@@ -172,15 +172,15 @@ def test_what_is_solid_where_such_things_are_hollow_is_doubted(what, mass, sides
 
 @pytest.mark.parametrize(("what", "mass", "sides"), TRUE)
 def test_nothing_that_is_true_is_doubted(what, mass, sides):
-    assert doubt_mass("it_0", what, mass, sides) is None
+    assert mass_warning("it_0", what, mass, sides) is None
 
 
 def test_a_sheet_has_no_box_to_weigh_it_by():
-    assert doubt_mass("it_0", "book", 1.0, (0.0, 0.2, 0.3)) is None
+    assert mass_warning("it_0", "book", 1.0, (0.0, 0.2, 0.3)) is None
 
 
 def test_a_thing_that_is_too_light_is_doubted_too():
-    said = doubt_mass("it_0", "bowling ball", 0.1, (0.216, 0.216, 0.216))
+    said = mass_warning("it_0", "bowling ball", 0.1, (0.216, 0.216, 0.216))
     assert said is not None
     assert "a bowling ball has 250 to 800" in said
 
@@ -189,16 +189,16 @@ def test_the_doubt_does_not_depend_on_the_size_that_a_scene_shows_things_in():
     """Masses follow the cube of the size, and so does the box."""
     for factor in (0.01, 1.0, 100.0):
         sides = (0.3 * factor, 0.3 * factor, 0.6 * factor)
-        assert doubt_mass("it_0", "trash can", 50.0 * factor**3, sides) is not None
-        assert doubt_mass("it_0", "trash can", 3.0 * factor**3, sides) is None
+        assert mass_warning("it_0", "trash can", 50.0 * factor**3, sides) is not None
+        assert mass_warning("it_0", "trash can", 3.0 * factor**3, sides) is None
 
 
 def test_every_row_is_a_range_of_this_world():
     for words in ("ball", "car", "anvil", "pillow"):
-        known = typical_bulk(words, 0.3)
+        known = typical_bulk_density(words, 0.3)
         assert known is not None
         assert 0.5 < known.low < known.high < 1e4
-    assert np.isfinite(typical_bulk("statue", 0.3).high)  # pyright: ignore[reportOptionalMemberAccess]
+    assert np.isfinite(typical_bulk_density("statue", 0.3).high)  # pyright: ignore[reportOptionalMemberAccess]
 
 
 PIECES = """branch nail bolt screw rebar blinker engine motor gearbox transmission pump compressor
@@ -209,9 +209,9 @@ sprocket crankshaft weathervane railing pulley sail scissor plier""".split()
 
 def test_what_is_known_by_its_name_has_a_usual_mass_and_size():
     """A name that becomes known must not go unchecked: 429 of 1,098 had no mass."""
-    things = {" ".join(t.phrase) for t in lexicon() if t.kind == "thing"}
+    things = {" ".join(t.phrase) for t in lexicon_terms() if t.kind == "thing"}
     things -= {"scissor", "plier"}  # the lexicon's singular of what has none
-    light = {name for name in things if typical_bulk(name, 5.0) is None}
+    light = {name for name in things if typical_bulk_density(name, 5.0) is None}
     assert light == set()
     unsized = {name for name in things if typical_extent(name) is None}
     assert {name for name in unsized if name.split()[-1] not in PIECES} == set()
@@ -234,6 +234,6 @@ def test_slips_compounds_and_matter_behind_the_noun(said, words):
 
 
 def test_what_stands_for_one_thing_in_the_plural_is_said_so():
-    said = doubt("jeans_0", "jeans", 90.0)
+    said = extent_warning("jeans_0", "jeans", 90.0)
     assert said is not None
     assert "but jeans are usually" in said

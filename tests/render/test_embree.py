@@ -3,9 +3,9 @@ import pytest
 import trimesh
 
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.render.camera import Aim, axes, place
-from corporeal.render.embree import identify, render
-from corporeal.render.stage import Stage
+from corporeal.render.camera_placement import CameraAim, camera_axes, fit_camera
+from corporeal.render.embree import identify_triangles, render_image
+from corporeal.render.ray_scene import RayScene
 
 SIZE = (96, 72)
 RED = Finish("red", (0.8, 0.05, 0.05, 1.0), roughness=0.5)
@@ -32,17 +32,17 @@ def scene(surfaces, finishes=(RED,)):
 
 
 def front(z=0.5, distance=3.0):
-    return Aim((0.0, -distance, z + 0.3), (0.0, 0.0, z), 30.0, *SIZE)
+    return CameraAim((0.0, -distance, z + 0.3), (0.0, 0.0, z), 30.0, *SIZE)
 
 
 def look(s, camera=None, quality="draft", **kwargs):
-    return render(Stage(s), camera or front(), quality, threads=2, **kwargs).astype(int)
+    return render_image(RayScene(s), camera or front(), quality, threads=2, **kwargs).astype(int)
 
 
 def test_the_same_scene_gives_the_same_bytes_with_any_number_of_threads():
-    s = Stage(scene([ball()]))
+    s = RayScene(scene([ball()]))
     assert np.array_equal(
-        render(s, front(), "draft", threads=1), render(s, front(), "draft", threads=3)
+        render_image(s, front(), "draft", threads=1), render_image(s, front(), "draft", threads=3)
     )
 
 
@@ -61,13 +61,13 @@ def test_a_scene_looks_the_same_at_any_size_and_place():
         b = ball()
         moved = Surface(b.name, 0, 0, b.vertices * factor + shift, b.triangles, b.normals)
         eye, target = (np.array(x) * factor + shift for x in (front().eye, front().target))
-        there = look(scene([moved]), Aim(tuple(eye), tuple(target), 30.0, *SIZE))
+        there = look(scene([moved]), CameraAim(tuple(eye), tuple(target), 30.0, *SIZE))
         assert np.percentile(np.abs(there - here), 99) <= 4
 
 
 def test_a_floating_thing_without_normals_is_smooth_and_an_edge_stays_sharp():
-    stage = Stage(scene([ball(normals=False)]))
-    smooth = render(stage, front(), "draft").astype(int)
+    stage = RayScene(scene([ball(normals=False)]))
+    smooth = render_image(stage, front(), "draft").astype(int)
     assert np.abs(smooth - look(scene([ball()]))).mean() < 0.5
     box = trimesh.creation.box((0.6, 0.6, 0.6))
     v = np.asarray(box.vertices) + np.array([0, 0, 0.5])
@@ -129,10 +129,10 @@ def test_no_triangle_breaks_the_picture():
 
 
 def test_moved_vertices_move_the_picture():
-    stage = Stage(scene([ball()]))
-    before, _ = identify(stage, front())
+    stage = RayScene(scene([ball()]))
+    before, _ = identify_triangles(stage, front())
     there = stage.posed(stage.vertices + stage.origin + np.array([0.3, 0, 0]), stage.normals)
-    after, _ = identify(there, front())
+    after, _ = identify_triangles(there, front())
     shift = np.nonzero(after >= 0)[1].mean() - np.nonzero(before >= 0)[1].mean()
     assert 10 < shift < 25
 
@@ -143,10 +143,10 @@ def test_the_camera_sees_everything_large_and_from_above_the_floor(scale, size):
     rng = np.random.default_rng(int(scale * 100))
     low = rng.random((6, 2, 3)) * scale
     boxes = np.stack([low, low + rng.random((6, 2, 3)) * scale], axis=2)
-    camera = place(boxes, size)
+    camera = fit_camera(boxes, size)
     assert camera.eye[2] > 0
     p = boxes.reshape(-1, 3) - camera.eye
-    local = p @ axes(np.subtract(camera.eye, camera.target)).T
+    local = p @ camera_axes(np.subtract(camera.eye, camera.target)).T
     flat = local[:, :2] / -local[:, 2:] / np.tan(np.radians(15)) / [size[0] / size[1], 1]
     assert (local[:, 2] < 0).all()
     assert np.abs(flat).max() < 0.9
@@ -155,13 +155,13 @@ def test_the_camera_sees_everything_large_and_from_above_the_floor(scale, size):
 
 def test_the_camera_stands_where_it_is_asked_to_but_never_under_the_floor():
     boxes = np.array([[[[-1, -1, 0], [1, 1, 1]]]], float)
-    camera = place(boxes, (640, 480), view=(0.0, -1.0, -3.0))
+    camera = fit_camera(boxes, (640, 480), view=(0.0, -1.0, -3.0))
     assert camera.eye[2] > 0 and camera.eye[1] < -1
 
 
 def test_things_in_a_row_are_not_seen_one_behind_the_other():
     low = np.array([[0.0, 0, 0], [0.8, -0.62, 0], [1.6, -1.24, 0]])
     boxes = np.stack([low, low + 0.5], axis=1)[None]
-    camera = place(boxes, (640, 480))
+    camera = fit_camera(boxes, (640, 480))
     back = np.subtract(camera.eye, camera.target)
     assert abs(np.dot(back[:2], (0.8, -0.62))) / np.linalg.norm(back[:2]) < 0.97

@@ -10,22 +10,22 @@ from PIL import Image
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import (
-    Film,
     Finish,
     Law,
     Material,
     MaterialField,
     Part,
+    PartDescription,
     Parts,
-    PartWords,
     Scene,
     SceneObject,
     Structure,
     Surface,
+    Video,
 )
-from corporeal.render import colours, figures, video
-from corporeal.render.figures import fields_figure, si, strip
-from corporeal.render.glyphs import drawable
+from corporeal.render import colours, figures, video_file
+from corporeal.render.figures import fields_figure, si_prefix_text, write_filmstrip
+from corporeal.render.glyphs import drawable_name
 
 STEEL = (0.4409, 0.8171, 0.681)
 """Its colour in every figure ever printed."""
@@ -45,7 +45,7 @@ def row_of_blocks(count, names=None):
     part = np.repeat(np.arange(count), [len(s.triangles) for s in surfaces])
     catalogue = tuple(Part(f"block_{k}", 0, "node") for k in range(count))
     parts = Parts(part * 0, part, np.ones(len(part)), catalogue)
-    words = tuple(PartWords(m.name, m.name) for m in made)
+    words = tuple(PartDescription(m.name, m.name) for m in made)
     pair = np.full((count + 1, count + 1), 0.5)
     solid = (Structure("solid"),) * count
     return scene, parts, MaterialField(tuple(made), solid, words, pair, pair)
@@ -54,7 +54,7 @@ def row_of_blocks(count, names=None):
 @pytest.fixture
 def coarse(monkeypatch):
     """Draw small pictures into the panels: the layout of the page does not depend on them."""
-    monkeypatch.setattr(figures, "PANEL", (130, 98))
+    monkeypatch.setattr(figures, "PANEL_SIZE_PX", (130, 98))
 
 
 @pytest.mark.parametrize("count", [1, 30])
@@ -73,12 +73,14 @@ def apart(one, other):
 
 @pytest.mark.parametrize("count", [1, 2, 30])
 def test_no_label_covers_another(tmp_path, monkeypatch, coarse, count):
-    drawn, place = [], figures.key_of
+    drawn, place = [], figures.panel_legend
     monkeypatch.setattr(
-        figures, "key_of", lambda *asked: drawn.append((asked[2], place(*asked))) or drawn[-1][1]
+        figures,
+        "panel_legend",
+        lambda *asked: drawn.append((asked[2], place(*asked))) or drawn[-1][1],
     )
     fields_figure(*row_of_blocks(count), tmp_path / "fields.png")
-    wide, high = figures.SHOWN
+    wide, high = figures.SHEET_PANEL_SIZE_PX
     pictures = [(x, y, x + wide, y + high) for (x, y), _ in drawn]
     labels = [line.box() for _, key in drawn for line in key.lines]
     swatches = [(*s.corner, *np.add(s.corner, s.size)) for _, key in drawn for s in key.swatches]
@@ -89,12 +91,12 @@ def test_no_label_covers_another(tmp_path, monkeypatch, coarse, count):
         assert apart(a, b)
     for left, top, right, bottom in labels + swatches + pictures:
         assert 0 <= left and 0 <= top
-        assert right <= figures.SHEET[0] and bottom <= figures.SHEET[1]
+        assert right <= figures.SHEET_SIZE_PX[0] and bottom <= figures.SHEET_SIZE_PX[1]
 
 
 def test_what_is_seen_most_leads_its_legend_beside_its_colour():
-    panel = figures.Names("Material", ["a", "b", "c"], [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
-    key = figures.key_of(panel, np.array([1, 9, 4]), (0, 0))
+    panel = figures.CategoryPanel("Material", ["a", "b", "c"], [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    key = figures.panel_legend(panel, np.array([1, 9, 4]), (0, 0))
     title, *names = key.lines
     assert title.text == "Material" and [line.text for line in names] == ["b", "c", "a"]
     assert [s.colour.argmax() for s in key.swatches] == [1, 2, 0]
@@ -104,31 +106,34 @@ def test_what_is_seen_most_leads_its_legend_beside_its_colour():
 
 
 def test_a_scale_says_its_ends_and_on_a_logarithmic_one_the_middle_of_the_decades():
-    panel = figures.Numbers("E", "Pa", [1e3, 1e9], log=True)
-    key = figures.key_of(panel, np.zeros(2), (0, 0))
+    panel = figures.NumericPanel("E", "Pa", [1e3, 1e9], log=True)
+    key = figures.panel_legend(panel, np.zeros(2), (0, 0))
     assert [line.text for line in key.lines[1:]] == ["1 kPa", "1 MPa", "1 GPa"]
     bar = key.swatches[0]
     assert key.lines[2].place[0] == bar.corner[0] + bar.size[0] / 2
     assert bar.colour[0, 2] > bar.colour[0, 0] and bar.colour[-1, 0] > bar.colour[-1, 2]
-    one = figures.key_of(figures.Numbers("ν", "", [0.3, 0.3]), np.zeros(2), (0, 0))
+    one = figures.panel_legend(figures.NumericPanel("ν", "", [0.3, 0.3]), np.zeros(2), (0, 0))
     assert [line.text for line in one.lines] == ["ν", "0.3"]
 
 
 def test_colours_of_a_scale_are_those_of_matplotlib():
     share = np.linspace(0, 1, 1001)
     theirs = matplotlib.colormaps["turbo"](0.04 + 0.92 * share)[:, :3]
-    assert np.array_equal(colours.ramp(share), theirs)
+    assert np.array_equal(colours.ramp_colours(share), theirs)
 
 
 def test_a_material_has_the_same_colour_in_every_scene():
-    assert np.allclose(colours.of_material("steel"), STEEL, atol=2e-3)
+    assert np.allclose(colours.material_colour("steel"), STEEL, atol=2e-3)
     # Hardwood and paper are two blues by themselves; the later one gives way.
-    wood, paper, again = colours.apart(["hardwood", "paper", "hardwood"])
-    assert wood == again == colours.of_material("hardwood") and paper != wood
+    wood, paper, again = colours.distinct_colours(["hardwood", "paper", "hardwood"])
+    assert wood == again == colours.material_colour("hardwood") and paper != wood
     assert np.linalg.norm(np.subtract(wood, paper)) > 0.3
     names = ("steel", "rubber", "hardwood", "glass", "mud", "ceramic")
     for a, b in itertools.combinations(names, 2):
-        assert np.linalg.norm(np.subtract(colours.of_material(a), colours.of_material(b))) > 0.08
+        assert (
+            np.linalg.norm(np.subtract(colours.material_colour(a), colours.material_colour(b)))
+            > 0.08
+        )
 
 
 def test_turbo_runs_from_the_lowest_to_the_highest_on_a_logarithmic_scale():
@@ -141,18 +146,18 @@ def test_turbo_runs_from_the_lowest_to_the_highest_on_a_logarithmic_scale():
 
 
 def test_numbers_are_written_as_people_read_them():
-    assert si(2.07e11, "Pa") == "207 GPa"
-    assert si(5e3, "Pa") == "5 kPa"
-    assert si(7850, "kg/m³") == "7850 kg/m³"
-    assert si(0.37, "") == "0.37"
+    assert si_prefix_text(2.07e11, "Pa") == "207 GPa"
+    assert si_prefix_text(5e3, "Pa") == "5 kPa"
+    assert si_prefix_text(7850, "kg/m³") == "7850 kg/m³"
+    assert si_prefix_text(0.37, "") == "0.37"
 
 
 def test_a_strip_shows_the_film_from_first_to_last_frame(tmp_path):
     path = tmp_path / "film.mp4"
-    with video.reel(path, 10, (64, 48)) as reel:
+    with video_file.open_video(path, 10, (64, 48)) as reel:
         for k in range(11):
             reel.add(np.full((48, 64, 3), 20 * k, np.uint8))
-    strip(Film(path, 10, 64, 48), tmp_path / "strip.png", count=6, width=64)
+    write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png", count=6, width=64)
     picture = np.asarray(Image.open(tmp_path / "strip.png").convert("RGB")).astype(int)
     centres = picture[24, 32 :: 64 + 6].mean(axis=1)
     assert len(centres) == 6
@@ -162,23 +167,23 @@ def test_a_strip_shows_the_film_from_first_to_last_frame(tmp_path):
 
 def test_a_short_film_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_path):
     path = tmp_path / "film.mp4"
-    with video.reel(path, 10, (64, 48)) as reel:
+    with video_file.open_video(path, 10, (64, 48)) as reel:
         reel.add(np.zeros((48, 64, 3), np.uint8))
-    strip(Film(path, 10, 64, 48), tmp_path / "strip.png", width=64)
+    write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png", width=64)
     assert Image.open(tmp_path / "strip.png").size[0] == 64
     path.write_bytes(b"not a film")
     with pytest.raises(UserError, match="Make it again"):
-        strip(Film(path, 10, 64, 48), tmp_path / "strip.png")
+        write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png")
 
 
 def test_a_name_that_the_font_cannot_write_is_a_number():
-    assert drawable("мяч 0", "object 1") == "мяч 0"
-    assert drawable("椅子 0", "object 2") == "object 2"
+    assert drawable_name("мяч 0", "object 1") == "мяч 0"
+    assert drawable_name("椅子 0", "object 2") == "object 2"
 
 
 def test_letters_that_are_drawn_are_those_of_the_font():
     here = FT2Font(font_manager.findfont(font_manager.FontProperties())).get_charmap()
     letters = [chr(code) for code in (*range(0xA1, 0x5F5, 3), *range(0x4E00, 0x4E40))]
-    told = [drawable(letter, "") == letter for letter in letters]
+    told = [drawable_name(letter, "") == letter for letter in letters]
     assert told == [ord(letter) in here for letter in letters]
     assert any(told) and not all(told)

@@ -5,20 +5,20 @@ from functools import lru_cache
 import numpy as np
 import trimesh
 
-from corporeal.geometry.convex_decompose import decompose
-from corporeal.geometry.convex_hull import hull_of
-from corporeal.scene.body import Body
+from corporeal.geometry.convex_decomposition import decompose_convex
+from corporeal.geometry.convex_hull import convex_hull_of
+from corporeal.scene.settling_body import SettlingBody
 
 
 def body(mesh, name="body", **more):
     vertices, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
-    return Body(name, vertices, triangles, decompose(vertices, triangles), **more)
+    return SettlingBody(name, vertices, triangles, decompose_convex(vertices, triangles), **more)
 
 
 def convex(mesh, name):
     """A body that is its own hull: there is nothing to cut."""
     vertices, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
-    return Body(name, vertices, triangles, (hull_of(vertices, 0.0),))
+    return SettlingBody(name, vertices, triangles, (convex_hull_of(vertices, 0.0),))
 
 
 @lru_cache

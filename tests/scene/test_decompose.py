@@ -8,8 +8,12 @@ import trimesh
 from bodies import body, bowl, table
 
 from corporeal.core.errors import UserError
-from corporeal.geometry import convex_decompose as room
-from corporeal.geometry.convex_decompose import cut, decompose, hull_volume
+from corporeal.geometry import convex_decomposition as room
+from corporeal.geometry.convex_decomposition import (
+    cells_hull_volume,
+    cut_by_plane,
+    decompose_convex,
+)
 
 
 def ring():
@@ -68,14 +72,14 @@ def test_a_table_has_its_volume_and_room_below():
 
 def test_an_open_sheet_gets_a_thickness():
     v = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    (piece,) = decompose(np.array(v, float), np.array([[0, 1, 2], [0, 2, 3]]))
-    assert piece.volume == pytest.approx(room.THIN, rel=1e-3)
+    (piece,) = decompose_convex(np.array(v, float), np.array([[0, 1, 2], [0, 2, 3]]))
+    assert piece.volume == pytest.approx(room.SHEET_THICKNESS_FRACTION, rel=1e-3)
 
 
 def test_size_and_place_do_not_matter():
     mesh = ring()
     near = ring_body().pieces
-    far = decompose(mesh.vertices * 1000 + [5, 6, 7], mesh.faces)
+    far = decompose_convex(mesh.vertices * 1000 + [5, 6, 7], mesh.faces)
     assert len(near) == len(far) > 5
     for a, b in zip(near, far, strict=True):
         assert np.allclose(a.vertices * 1000 + [5, 6, 7], b.vertices, atol=1e-6)
@@ -83,11 +87,11 @@ def test_size_and_place_do_not_matter():
 
 def test_kept_pieces_are_the_same_bits(tmp_path, monkeypatch):
     mesh = ring()
-    cold = decompose(mesh.vertices, mesh.faces, tmp_path)
+    cold = decompose_convex(mesh.vertices, mesh.faces, tmp_path)
     assert len(list(tmp_path.iterdir())) == 1
     never = ring_body().pieces
-    monkeypatch.setattr(room, "_cut", lambda *_: pytest.fail("pieces were not kept"))
-    warm = decompose(mesh.vertices * 2, mesh.faces, tmp_path)
+    monkeypatch.setattr(room, "_cut_convex", lambda *_: pytest.fail("pieces were not kept"))
+    warm = decompose_convex(mesh.vertices * 2, mesh.faces, tmp_path)
     for a, b, c in zip(cold, warm, never, strict=True):
         assert np.array_equal(2 * a.vertices, b.vertices)
         assert np.array_equal(a.vertices, c.vertices)
@@ -96,10 +100,10 @@ def test_kept_pieces_are_the_same_bits(tmp_path, monkeypatch):
 
 def test_damaged_keepings_are_made_anew(tmp_path):
     mesh = trimesh.creation.box()
-    decompose(mesh.vertices, mesh.faces, tmp_path)
+    decompose_convex(mesh.vertices, mesh.faces, tmp_path)
     (path,) = tmp_path.iterdir()
     path.write_bytes(b"half a file")
-    assert len(decompose(mesh.vertices, mesh.faces, tmp_path)) == 1
+    assert len(decompose_convex(mesh.vertices, mesh.faces, tmp_path)) == 1
 
 
 @pytest.mark.parametrize(
@@ -113,20 +117,20 @@ def test_damaged_keepings_are_made_anew(tmp_path):
 )
 def test_what_has_no_surface_is_refused(vertices, triangles, words):
     with pytest.raises(UserError, match=words):
-        decompose(vertices, triangles)
+        decompose_convex(vertices, triangles)
 
 
 @pytest.mark.slow
 def test_soup_is_cut_too():
     rng = np.random.default_rng(0)
     corners = rng.uniform(size=(20, 1, 3)) + 0.1 * rng.normal(size=(20, 3, 3))
-    pieces = decompose(corners.reshape(-1, 3), np.arange(60).reshape(-1, 3))
+    pieces = decompose_convex(corners.reshape(-1, 3), np.arange(60).reshape(-1, 3))
     assert held(pieces, corners.mean(axis=1)).all()
 
 
 def test_cutting_triangles_keeps_their_area():
     sphere = trimesh.creation.icosphere(2)
-    below, above = cut(sphere.triangles, 1, 0.3)
+    below, above = cut_by_plane(sphere.triangles, 1, 0.3)
     area = [
         0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum()
         for t in (below, above)
@@ -138,10 +142,10 @@ def test_cutting_triangles_keeps_their_area():
 def test_the_volume_of_a_hull_of_cells_is_exact():
     cells = np.zeros((5, 4, 3), dtype=bool)
     cells[0, 0, 0] = cells[4, 0, 0] = True
-    assert hull_volume(cells) == pytest.approx(5, rel=1e-12)
+    assert cells_hull_volume(cells) == pytest.approx(5, rel=1e-12)
     cells[0, 3, 2] = True
     corners = [p + np.array(c) for p in np.argwhere(cells) for c in np.ndindex(2, 2, 2)]
-    assert hull_volume(cells) == pytest.approx(trimesh.PointCloud(corners).convex_hull.volume)
+    assert cells_hull_volume(cells) == pytest.approx(trimesh.PointCloud(corners).convex_hull.volume)
 
 
 def test_a_pieced_body_weighs_what_it_holds():

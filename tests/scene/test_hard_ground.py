@@ -8,17 +8,17 @@ import trimesh
 from bodies import ball, box
 
 from corporeal.core.errors import UserError
-from corporeal.geometry.convex_hull import hull_of
-from corporeal.scene import mujoco
-from corporeal.scene.body import Body, Pose
-from corporeal.scene.mujoco import DropConfig, drop
-from corporeal.scene.rest import at_rest
+from corporeal.geometry.convex_hull import convex_hull_of
+from corporeal.scene import settle_mujoco
+from corporeal.scene.settle_bodies import settle_bodies
+from corporeal.scene.settle_mujoco import DropConfig, drop_in_mujoco
+from corporeal.scene.settling_body import BodyPose, SettlingBody
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_what_is_round_rests_flat_on_a_face(seed):
     thing = ball(0.2)
-    (pose,), certificate = at_rest([thing], "scatter", seed, 1e-3)
+    (pose,), certificate = settle_bodies([thing], "scatter", seed, 1e-3)
     height = np.sort(pose.world(thing.vertices)[:, 2])
     assert abs(height[0]) < 1e-5
     assert height[2] - height[0] < 1e-5
@@ -28,17 +28,17 @@ def test_what_is_round_rests_flat_on_a_face(seed):
 
 def test_what_is_stacked_hardly_sinks():
     things = [box(0.5, 0.4, 0.2), box(0.3, 0.3, 0.2)]
-    _, certificate = at_rest(things, "stack", 0, 1e-5)
+    _, certificate = settle_bodies(things, "stack", 0, 1e-5)
     assert certificate.penetration_m < 5e-6
 
 
 def test_what_chatters_when_time_is_up_is_left_to_the_certificate():
     """Some things never lie quite still on hard ground; what moves for good is no such thing."""
     thing = box(0.3, 0.2, 0.1)
-    start = [Pose((0.0, 0.0, 0.06))]
+    start = [BodyPose((0.0, 0.0, 0.06))]
     never = DropConfig(shift=0.0, longest=1.0, roll=0.3, firm=0.3)
-    assert drop([thing], start, never).quiet
-    assert not drop([thing], start, replace(never, chatter=0.0)).quiet
+    assert drop_in_mujoco([thing], start, never).quiet
+    assert not drop_in_mujoco([thing], start, replace(never, chatter=0.0)).quiet
 
 
 def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
@@ -51,14 +51,14 @@ def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
         for y in middle
     ]
     whole = trimesh.util.concatenate(studs)
-    pieces = tuple(hull_of(np.asarray(stud.vertices), 0.0) for stud in studs)
-    brush = Body("brush", np.asarray(whole.vertices), np.asarray(whole.faces), pieces)
-    poses = [Pose((0.0, 0.0, 0.05)), Pose((0.0, 0.0, 0.1249))]
-    engine = mujoco.Engine([plate, brush], poses, DropConfig.step)
+    pieces = tuple(convex_hull_of(np.asarray(stud.vertices), 0.0) for stud in studs)
+    brush = SettlingBody("brush", np.asarray(whole.vertices), np.asarray(whole.faces), pieces)
+    poses = [BodyPose((0.0, 0.0, 0.05)), BodyPose((0.0, 0.0, 0.1249))]
+    engine = settle_mujoco.MujocoScene([plate, brush], poses, DropConfig.step)
     for _ in range(3):
         engine.step()
     assert engine.data.ncon > 300 and engine.data.nefc == 6 * engine.data.ncon
-    monkeypatch.setattr(mujoco, "MEMORY", 1 << 22)
-    cramped = mujoco.Engine([plate, brush], poses, DropConfig.step)
+    monkeypatch.setattr(settle_mujoco, "CONTACT_MEMORY_BYTES", 1 << 22)
+    cramped = settle_mujoco.MujocoScene([plate, brush], poses, DropConfig.step)
     with pytest.raises(UserError, match="more places"):
         cramped.step()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.geometry.convex_hull import Piece
-from corporeal.scene.body import Body
-from corporeal.scene.mass_properties import MassProperties, mass_properties
-from corporeal.scene.rest import at_rest
+from corporeal.geometry.convex_hull import ConvexPiece
+from corporeal.scene.mass_properties import MassProperties, cubes_mass_properties
+from corporeal.scene.settle_bodies import settle_bodies
+from corporeal.scene.settling_body import SettlingBody
 
 
 def roll(inertial=None):
@@ -17,7 +17,9 @@ def roll(inertial=None):
     mesh = trimesh.creation.cylinder(0.1, 0.4, sections=36)
     mesh.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
     vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    return Body("roll", vertices, triangles, (Piece(vertices, triangles),), inertial=inertial)
+    return SettlingBody(
+        "roll", vertices, triangles, (ConvexPiece(vertices, triangles),), inertial=inertial
+    )
 
 
 def test_cubes_add_up_to_a_box():
@@ -25,7 +27,9 @@ def test_cubes_add_up_to_a_box():
     axes = [side * (np.arange(n) + 0.5 - n / 2) for n in (10, 20, 30)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     mass = np.full(len(points), 2.0 / len(points))
-    made = mass_properties(points + np.array([1.0, 2.0, 3.0]), mass, np.full(len(points), side))
+    made = cubes_mass_properties(
+        points + np.array([1.0, 2.0, 3.0]), mass, np.full(len(points), side)
+    )
     assert made.mass == pytest.approx(2.0)
     assert np.allclose(made.centre, [1.0, 2.0, 3.0])
     square = np.square([0.1, 0.2, 0.3])
@@ -45,7 +49,7 @@ def test_a_roll_lies_with_its_heavy_side_down():
     """To within a face of 36: another face is no rest for a centre off the axis."""
     off = np.array([0.0, 0.03, 0.0])
     body = roll(MassProperties(1.0, off, np.diag([0.005, 0.016, 0.016])))
-    (pose,), _ = at_rest([body], "scatter", 1, 1e-3)
+    (pose,), _ = settle_bodies([body], "scatter", 1, 1e-3)
     assert abs(pose.rotation[2, 0]) < 1e-4, "it lies"
     heavy = pose.rotation @ off
     assert heavy[2] < -0.03 * np.cos(np.radians(10.0))
@@ -56,5 +60,5 @@ def test_what_matter_is_uniform_changes_nothing():
     mass = body.mass
     tall, wide = mass * (3 * 0.01 + 0.16) / 12, mass * 0.01 / 2
     same = replace(body, inertial=MassProperties(mass, np.zeros(3), np.diag([wide, tall, tall])))
-    rests = [at_rest([b], "scatter", 3, 1e-3)[0][0] for b in (body, same)]
+    rests = [settle_bodies([b], "scatter", 3, 1e-3)[0][0] for b in (body, same)]
     assert np.allclose(rests[0].rotation, rests[1].rotation, atol=0.02)

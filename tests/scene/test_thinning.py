@@ -5,12 +5,12 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from corporeal.geometry.convex_hull import hull_of
-from corporeal.geometry.convex_thinning import thinned
+from corporeal.geometry.convex_hull import convex_hull_of
+from corporeal.geometry.convex_simplification import simplify_convex
 
 
 def hull(mesh):
-    return hull_of(np.asarray(mesh.vertices, float), 0.0)
+    return convex_hull_of(np.asarray(mesh.vertices, float), 0.0)
 
 
 ROUND = {
@@ -24,7 +24,7 @@ ROUND = {
 @pytest.mark.parametrize("name", ROUND)
 def test_nothing_of_the_original_sticks_out(name, most):
     original = hull(ROUND[name])
-    few = thinned(original, most)
+    few = simplify_convex(original, most)
     assert 8 <= len(few.vertices) <= most < len(original.vertices)
     planes = ConvexHull(few.vertices).equations
     assert (original.vertices @ planes[:, :3].T + planes[:, 3]).max() < 1e-7
@@ -38,7 +38,7 @@ def test_nothing_of_the_original_sticks_out(name, most):
 
 def test_more_corners_are_closer():
     original = hull(ROUND["ball"])
-    excess = [thinned(original, most).volume / original.volume - 1 for most in (16, 32, 64)]
+    excess = [simplify_convex(original, most).volume / original.volume - 1 for most in (16, 32, 64)]
     assert excess[0] > excess[1] > excess[2]
     # A dodecahedron about a sphere is 32.5 % larger, and the excess goes as one over the faces:
     # 64 corners, three faces at each, have 34.
@@ -51,8 +51,8 @@ def test_a_flat_face_stays_where_it_was():
     x, y = 0.1 * np.cos(angle), 0.1 * np.sin(angle)
     low, high = np.zeros_like(x), 0.05 + 0.2 * x
     rings = [np.column_stack([x, y, z]) for z in (low, high)]
-    original = hull_of(np.concatenate(rings), 0.0)
-    few = thinned(original, 40)
+    original = convex_hull_of(np.concatenate(rings), 0.0)
+    few = simplify_convex(original, 40)
     normal = np.array([-0.2, 0, 1]) / np.hypot(0.2, 1)
     tops = [(h.vertices @ normal).max() for h in (original, few)]
     assert tops[1] == pytest.approx(tops[0], abs=1e-7)
@@ -60,4 +60,4 @@ def test_a_flat_face_stays_where_it_was():
 
 def test_what_has_few_corners_already_stays_as_it_is():
     original = hull(trimesh.creation.box((1, 2, 3)))
-    assert thinned(original, 64) is original
+    assert simplify_convex(original, 64) is original

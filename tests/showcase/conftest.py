@@ -5,12 +5,12 @@ import fcntl
 import pytest
 from spoiled_runs import sound_run
 
-from corporeal.showcase.models import MODELS
+from corporeal.showcase.prop_models import PROP_BUILDERS
 
 
 @pytest.fixture(scope="session")
 def models():
-    return {name: make() for name, make in MODELS.items()}
+    return {name: make() for name, make in PROP_BUILDERS.items()}
 
 
 @pytest.fixture(scope="session")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED, simulate_control
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import Settings
-from corporeal.simulation.played import Played
+from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import Settings
+from corporeal.simulation.simulation_result import SimulationResult
 
 HEIGHT_LEFT = 0.7
 ASIDE = 0.1
@@ -32,21 +32,21 @@ class Changed(Sequence):
 
 def sound_run(name: str, folder: Path) -> Path:
     """Simulate a scene as it should be."""
-    scene = runner.write_showcase(name, folder / "input")
-    runner.run([scene], folder / "ours", Settings(), until="simulate")
+    scene = run_pipeline.write_showcase(name, folder / "input")
+    run_pipeline.run([scene], folder / "ours", Settings(), until="simulate")
     return folder / "ours"
 
 
-def spoiled(fault: str, ours: Path) -> Played:
+def spoiled(fault: str, ours: Path) -> SimulationResult:
     """Return a run with one fault of ``expectations.SPOILERS``."""
-    if fault in SIMULATED:
+    if fault in SIMULATED_CONTROLS:
         made = simulate_control(fault, ours, ours.parent / fault)
         assert made is not None, f"{fault} has no place in {ours}"
         return made
-    return PLANTED[fault](runner.read_back(ours).played)
+    return PLANTED[fault](run_pipeline.read_run(ours).played)
 
 
-def frozen(played: Played) -> Played:
+def frozen(played: SimulationResult) -> SimulationResult:
     """Let nothing move and nothing touch."""
     ledger = played.trajectory.ledger
     never = np.full_like(ledger.first_contact, np.nan)
@@ -56,7 +56,7 @@ def frozen(played: Played) -> Played:
     return with_frames(played, lambda k, x: first, changed)
 
 
-def squashed(played: Played) -> Played:
+def squashed(played: SimulationResult) -> SimulationResult:
     """Press every object down to seven tenths of its height in the second half."""
     return at_the_end(played, lambda x: squash(x))
 
@@ -66,13 +66,13 @@ def squash(x):
     return np.column_stack([x[:, :2], low + HEIGHT_LEFT * (x[:, 2] - low)]).astype(x.dtype)
 
 
-def toppled(played: Played) -> Played:
+def toppled(played: SimulationResult) -> SimulationResult:
     """Lay every object on its side in the second half."""
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     return at_the_end(played, lambda x: ((x - x.mean(0)) @ turn.T + x.mean(0)).astype(x.dtype))
 
 
-def shifted(played: Played) -> Played:
+def shifted(played: SimulationResult) -> SimulationResult:
     """Move every object aside in the second half; its centre in the ledger, too."""
     first = played.trajectory.frames[0].position
     of = played.prepared.particles.object
@@ -99,15 +99,15 @@ def at_the_end(played, change):
     return with_frames(played, changed, played.trajectory.ledger)
 
 
-def with_frames(played, change, ledger) -> Played:
+def with_frames(played, change, ledger) -> SimulationResult:
     frames = Changed(played.trajectory.frames, change)
     trajectory = replace(played.trajectory, frames=frames, ledger=ledger)
-    return Played(played.prepared, trajectory)
+    return SimulationResult(played.prepared, trajectory)
 
 
 PLANTED = {"frozen": frozen, "squashed": squashed, "toppled": toppled, "shifted": shifted}
 
 
-def happened(played: Played):
+def happened(played: SimulationResult):
     """Measure what happened."""
     return played.outcome

@@ -4,11 +4,11 @@ from functools import partial
 
 import pytest
 
-from corporeal.pipeline.runner import write_showcase
+from corporeal.pipeline.run_pipeline import write_showcase
 from corporeal.pipeline.stages.assemble import assemble
-from corporeal.recognition.identity import identify
-from corporeal.recognition.metadata import matter_hint
-from corporeal.showcase import scenes
+from corporeal.recognition.metadata_recognition import substance_hint
+from corporeal.recognition.parts_by_name import identify_parts
+from corporeal.showcase import showcase_scenes
 from recorded import FOLDER, check_answered, check_chosen, grounded, rows
 
 MACHINE = ("/work", "/tmp", "/home", "/Users", "C:\\")
@@ -19,8 +19,13 @@ def written(models, tmp_path_factory):
     """Every scene as its own GLB says it: name → scene."""
     folder = tmp_path_factory.mktemp("showcase")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(scenes, "MODELS", {name: partial(models.get, name) for name in models})
-        return {name: assemble([write_showcase(name, folder)]) for name in scenes.SCENES}
+        patched.setattr(
+            showcase_scenes, "PROP_BUILDERS", {name: partial(models.get, name) for name in models}
+        )
+        return {
+            name: assemble([write_showcase(name, folder)])
+            for name in showcase_scenes.SHOWCASE_SCENE_BUILDERS
+        }
 
 
 @pytest.fixture(scope="module")
@@ -31,20 +36,20 @@ def described(written):
         raise AssertionError("a replay takes no pictures")
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("corporeal.description.asking.portraits", refused)
+        patched.setattr("corporeal.description.query_scene.render_portraits", refused)
         return {name: (s, *grounded(s, "showcase")) for name, s in written.items()}
 
 
-@pytest.mark.parametrize("name", list(scenes.SCENES))
+@pytest.mark.parametrize("name", list(showcase_scenes.SHOWCASE_SCENE_BUILDERS))
 def test_every_question_is_answered_from_recordings(described, name):
     scene, inventory, _ = described[name]
     check_answered(scene, inventory)
 
 
-@pytest.mark.parametrize("name", list(scenes.SCENES))
+@pytest.mark.parametrize("name", list(showcase_scenes.SHOWCASE_SCENE_BUILDERS))
 def test_what_was_answered_is_what_is_simulated_and_every_number_says_why(described, name):
     scene, _, field = described[name]
-    check_chosen(scene, field, identify(scene, matter_hint).catalogue, "showcase")
+    check_chosen(scene, field, identify_parts(scene, substance_hint).catalogue, "showcase")
 
 
 def test_no_recording_is_left_over(described):

@@ -7,26 +7,32 @@ themselves are tried in scenes of some seconds; `corporeal evaluate judge` makes
 import pytest
 from spoiled_runs import PLANTED, happened, spoiled
 
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED
-from corporeal.pipeline import runner
-from corporeal.showcase.expectations import EXPECTED, SPOILERS, expect
+from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS
+from corporeal.pipeline import run_pipeline
+from corporeal.showcase.scene_expectations import (
+    FAULTY_RUNS,
+    SCENE_EXPECTATIONS,
+    compare_with_expectations,
+)
 
 SHORT = ("steel-and-rubber", "ketchup-stops", "honey-poured")
 
 
 def test_faults_are_simulated_or_planted():
-    assert set(PLANTED) | set(SIMULATED) >= {d.spoiled_by for row in EXPECTED.values() for d in row}
-    assert set(PLANTED) < set(SPOILERS)
+    assert set(PLANTED) | set(SIMULATED_CONTROLS) >= {
+        d.spoiled_by for row in SCENE_EXPECTATIONS.values() for d in row
+    }
+    assert set(PLANTED) < set(FAULTY_RUNS)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", EXPECTED)
+@pytest.mark.parametrize("name", SCENE_EXPECTATIONS)
 def test_a_sound_run_meets_all_and_each_fault_fails_what_it_must(sound, name):
     ours = sound(name)
-    seen = expect(name, happened(runner.read_back(ours).played))
+    seen = compare_with_expectations(name, happened(run_pipeline.read_run(ours).played))
     assert [e for e in seen if not e.met] == []
-    for fault in {d.spoiled_by for d in EXPECTED[name]}:
+    for fault in {d.spoiled_by for d in SCENE_EXPECTATIONS[name]}:
         if fault in PLANTED or name in SHORT:
-            seen = expect(name, happened(spoiled(fault, ours)))
-            for demand, found in zip(EXPECTED[name], seen, strict=True):
+            seen = compare_with_expectations(name, happened(spoiled(fault, ours)))
+            for demand, found in zip(SCENE_EXPECTATIONS[name], seen, strict=True):
                 assert demand.spoiled_by != fault or not found.met, (fault, found)

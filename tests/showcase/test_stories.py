@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from stories import tell, told
 
-from corporeal.pipeline.runner import Settings
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.pipeline.stages.simulate import SimulateConfig
-from corporeal.showcase.expectations import dent_from_impact
+from corporeal.showcase.scene_expectations import dent_from_impact
 
 pytestmark = pytest.mark.slow
 CELL_APART = 1.0

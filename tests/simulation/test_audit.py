@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from corporeal.core.types import (
+    Discretization,
     Frame,
     Law,
     Ledger,
     Material,
     MaterialField,
     NoteKind,
+    PartDescription,
     Particles,
-    PartWords,
     Scene,
     SceneObject,
     Structure,
-    Treatment,
-    kind_of,
+    note_kind,
 )
 from corporeal.simulation.audit import (
     audit,
@@ -29,9 +29,14 @@ from corporeal.simulation.audit import (
     momentum_residual,
     unbooked_loss,
 )
-from corporeal.simulation.audit_words import breaches
-from corporeal.simulation.frames import Layout, gather, write_frame, write_layout
-from corporeal.simulation.outcome import outcome
+from corporeal.simulation.audit_messages import breach_messages
+from corporeal.simulation.outcome import measure_outcome
+from corporeal.simulation.trajectory_files import (
+    FrameLayout,
+    gather_ledgers,
+    write_frame,
+    write_layout,
+)
 
 CELL, FPS, STEPS = 0.01, 50, 41
 SCENE = Scene(
@@ -45,7 +50,7 @@ SCENE = Scene(
     duration=(STEPS - 1) / FPS,
 )
 CLAY = Material("clay", Law.VON_MISES, 5e6, 0.4, 1700.0, yield_stress=1e5)
-TREATMENT = Treatment(
+TREATMENT = Discretization(
     "deformable", 5e6, 5e6, 0.4, 1700.0, 1e5, None, 0.1, 1.0, 60.0, 1e-4, "Deformable."
 )
 HIT = 0.2
@@ -124,7 +129,7 @@ def story(tmp_path_factory):
     folder = tmp_path_factory.mktemp("story")
     counts = [len(CLAY_START), len(STONE_START)]
     owner = np.repeat([0, 1], counts)
-    layout = Layout(object=owner, rigid=np.array([False, True]))
+    layout = FrameLayout(object=owner, rigid=np.array([False, True]))
     write_layout(folder, layout)
     still = np.broadcast_to(np.eye(3), (sum(counts), 3, 3))
     for k in range(STEPS):
@@ -147,16 +152,16 @@ def story(tmp_path_factory):
     field = MaterialField(
         (CLAY, CLAY),
         (Structure("solid"),) * 2,
-        (PartWords("lump", "clay"), PartWords("pebble", "clay")),
+        (PartDescription("lump", "clay"), PartDescription("pebble", "clay")),
         np.full((3, 3), 0.5),
         np.full((3, 3), 0.5),
     )
-    return SCENE, particles, field, gather(folder, STEPS)
+    return SCENE, particles, field, gather_ledgers(folder, STEPS)
 
 
 @pytest.fixture(scope="module")
 def seen(story):
-    return outcome(*story)
+    return measure_outcome(*story)
 
 
 def test_the_imprint_is_where_the_stone_struck(seen):
@@ -171,9 +176,9 @@ def test_the_imprint_is_where_the_stone_struck(seen):
 def test_the_same_imprint_in_sand_is_measured_at_its_surface(story, seen):
     scene, particles, field, trajectory = story
     sand = replace(CLAY, law=Law.DRUCKER_PRAGER, yield_stress=None, friction_angle=0.6)
-    lump = outcome(scene, particles, replace(field, materials=(sand, CLAY)), trajectory).objects[
-        "clay_0"
-    ]
+    lump = measure_outcome(
+        scene, particles, replace(field, materials=(sand, CLAY)), trajectory
+    ).objects["clay_0"]
     assert lump.dent_depth_m == pytest.approx(0.02, rel=0.05)
     np.testing.assert_allclose(lump.dent_place[:2], [0.02, 0.02], atol=0.003)
     assert lump.rim_height_m == pytest.approx(0.0, abs=1e-3)
@@ -201,7 +206,7 @@ def test_what_meets_before_the_second_frame_was_apart_if_there_was_a_gap(story, 
     ledger.first_contact[-1, 0, 1] = 0.4 / FPS
     ledger.contact_point[-1, 0, 1] = 0.0
     ledger.gap[0, 0, 1] = gap * CELL
-    seen = outcome(scene, particles, field, replace(trajectory, ledger=ledger))
+    seen = measure_outcome(scene, particles, field, replace(trajectory, ledger=ledger))
     assert seen.order == order
     assert seen.pair("clay_0", "stone_0").gap_start_dx == pytest.approx(gap)
 
@@ -254,11 +259,11 @@ def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(sto
 )
 def test_every_breach_is_said_in_plain_words(story, key, value, word):
     found = replace(audit(*story), **{key: value})
-    (sentence,) = breaches(found)
+    (sentence,) = breach_messages(found)
     assert word in sentence
     assert sentence.endswith(".")
     wrong = key in ("nan_count", "momentum_residual", "mass_error")
-    assert kind_of(sentence) is (NoteKind.GRAVE if wrong else NoteKind.DOUBT)
+    assert note_kind(sentence) is (NoteKind.GRAVE if wrong else NoteKind.DOUBT)
 
 
 @pytest.mark.parametrize(("begun", "word"), [(0.0173, "at the start"), (0.002, "--detail")])
@@ -267,7 +272,7 @@ def test_detail_is_not_proposed_for_what_the_scene_puts_into_each_other(story, b
     deep = np.full((STEPS, 2, 2), 0.0174)
     deep[0] = begun
     found = audit(scene, particles, field, replace(told, ledger=replace(told.ledger, overlap=deep)))
-    (sentence,) = breaches(found)
+    (sentence,) = breach_messages(found)
     assert sentence.startswith("Objects penetrate each other by up to 1.7 grid cells (17 mm)")
     assert word in sentence
 
@@ -281,7 +286,7 @@ def test_what_is_one_particle_has_no_shape_that_could_change(story):
         replace(f, position=f.position[alone], deformation=f.deformation[alone])
         for f in told.frames
     ]
-    seen = outcome(scene, few, field, replace(told, frames=frames))
+    seen = measure_outcome(scene, few, field, replace(told, frames=frames))
     assert seen.objects["stone_0"].shape_error_max == 0.0
 
 

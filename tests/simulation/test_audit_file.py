@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 
 from corporeal.core import store
+from corporeal.core.audit_data import Expectation, SettledObjectOutcome, SettlingOutcome
+from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
-from corporeal.core.findings import Expectation, Settled, SettledObject
-from corporeal.core.typed import typed
-from corporeal.core.types import NOTHING_ASKED, Inventory, Note, NoteKind, Usage
-from corporeal.simulation.audit_file import AUDIT, read_audit, read_run_audit, write_audit
+from corporeal.core.types import NO_USAGE, Inventory, ModelUsage, Note, NoteKind
+from corporeal.simulation.audit_file import AUDIT_FILE, read_audit, read_run_audit, write_audit
 from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
 WHOLE = run_audit(
     parts=(part_audit(), part_audit(object=None, real_mass_kg=None)),
-    settling=Settled(0.5, True, (SettledObject("a_0", (0.0, 0.0, -0.01), 1.0, 0.02),)),
+    settling=SettlingOutcome(
+        0.5, True, (SettledObjectOutcome("a_0", (0.0, 0.0, -0.01), 1.0, 0.02),)
+    ),
     warnings=("Objects sink.", Note("a.jpg was left out.", NoteKind.LEFT_OUT)),
     outcome=outcome(
         {"a_0": object_outcome(dent_place=(0.0, 1.0, 2.0), dent_from_contact_m={"floor": None})},
@@ -24,7 +26,7 @@ WHOLE = run_audit(
         [("a_0", "b_0")],
     ),
     expectations=(Expectation("It falls", "2 mm", "above 1 mm", True),),
-    questions=Usage(("openai:x",), 9, 11, 20500, 1200, 43.2, None, "2026-11-21"),
+    questions=ModelUsage(("openai:x",), 9, 11, 20500, 1200, 43.2, None, "2026-11-21"),
 )
 BEFORE = {
     "particles": 4, "objects": 1, "frames": 2, "cell_m": 0.01, "steps": 7, "dt_min": 0.001,
@@ -66,27 +68,29 @@ def test_an_audit_is_read_back_as_it_was(tmp_path):
     assert read_run_audit(tmp_path) == WHOLE
     assert read_audit(tmp_path).settling == WHOLE.settling
     assert [n.kind for n in read_run_audit(tmp_path).notes] == [NoteKind.DOUBT, NoteKind.LEFT_OUT]
-    plain = json.loads((tmp_path / AUDIT).read_text())
+    plain = json.loads((tmp_path / AUDIT_FILE).read_text())
     assert plain["warnings"] == ["Objects sink.", "a.jpg was left out."]
     assert plain["kind_of_warning"] == ["doubt", "left_out"]
 
 
 def test_a_kind_that_there_is_not_is_refused(tmp_path):
-    store.write_json(tmp_path / AUDIT, store.plain(WHOLE) | {"kind_of_warning": ["dire", "doubt"]})
+    store.write_json(
+        tmp_path / AUDIT_FILE, store.to_plain(WHOLE) | {"kind_of_warning": ["dire", "doubt"]}
+    )
     with pytest.raises(BadFileError, match="'dire' is no NoteKind"):
         read_run_audit(tmp_path)
 
 
 def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
-    store.write_json(tmp_path / AUDIT, BEFORE)
+    store.write_json(tmp_path / AUDIT_FILE, BEFORE)
     found = read_run_audit(tmp_path)
     assert found.parts[0].E == 2e11 and found.parts[0].contents == "soup"
     assert found.outcome.pair("floor", "can_0").contact_point == (0.0, 0.0, 0.0)
     assert found.outcome.objects["can_0"].moved_m == (0.0, 0.0, -0.1)
-    assert found.questions == NOTHING_ASKED
+    assert found.questions == NO_USAGE
     assert [(str(n), n.kind) for n in found.notes] == [("It sinks.", NoteKind.DOUBT)]
     write_audit(tmp_path, found)
-    again = json.loads((tmp_path / AUDIT).read_text())
+    again = json.loads((tmp_path / AUDIT_FILE).read_text())
     assert again.pop("questions")["models"] == []
     since = "energy_gain unbooked_loss impact_loss impact_gain start_penetration_m".split()
     for kept_since in since:
@@ -106,11 +110,11 @@ def test_the_answers_of_a_run_from_before_open(tmp_path):
     none = {"list": [], "tuple": True}
     tree = {"type": "Inventory", "fields": {"objects": none, "usage": {"dict": took}}}
     kept = np.frombuffer(json.dumps(tree).encode(), np.uint8)
-    np.savez(tmp_path / store.DATA, **{store.TREE: kept})
-    made = store.load(tmp_path / store.DATA)
-    assert made == Inventory((), usage=Usage(("openai:x",), calls=1))
-    store.save(tmp_path / store.DATA, made)
-    assert store.load(tmp_path / store.DATA) == made
+    np.savez(tmp_path / store.DATA_FILE, **{store.TREE_ARRAY: kept})
+    made = store.load(tmp_path / store.DATA_FILE)
+    assert made == Inventory((), usage=ModelUsage(("openai:x",), calls=1))
+    store.save(tmp_path / store.DATA_FILE, made)
+    assert store.load(tmp_path / store.DATA_FILE) == made
 
 
 def test_what_is_not_finite_comes_back_as_not_a_number(tmp_path):
@@ -122,7 +126,7 @@ def test_what_is_not_finite_comes_back_as_not_a_number(tmp_path):
 @pytest.mark.parametrize("harm", [{"steps": ...}, {"parts": 3}, {"settling": {"seconds": 1.0}}])
 def test_what_cannot_be_read_says_how_to_make_it_again(tmp_path, harm):
     data = {key: value for key, value in (BEFORE | harm).items() if value is not ...}
-    (tmp_path / AUDIT).write_text(json.dumps(data))
+    (tmp_path / AUDIT_FILE).write_text(json.dumps(data))
     with pytest.raises(BadFileError, match=r"audit\.json.*corporeal report"):
         read_run_audit(tmp_path)
     with pytest.raises(BadFileError, match=r"audit\.json.*corporeal simulate"):
@@ -130,5 +134,7 @@ def test_what_cannot_be_read_says_how_to_make_it_again(tmp_path, harm):
 
 
 def test_keys_of_a_newer_version_are_passed_over():
-    thing = {f.name: getattr(WHOLE.settling.objects[0], f.name) for f in fields(SettledObject)}
-    assert typed(SettledObject, thing | {"colour": "red"}) == WHOLE.settling.objects[0]
+    thing = {
+        f.name: getattr(WHOLE.settling.objects[0], f.name) for f in fields(SettledObjectOutcome)
+    }
+    assert from_plain(SettledObjectOutcome, thing | {"colour": "red"}) == WHOLE.settling.objects[0]

@@ -8,22 +8,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from corporeal.simulation import checkpoint, frames
-from corporeal.simulation.checkpoint import BEFORE, LAST, Checkpoints, fingerprint
+from corporeal.simulation import checkpoint, trajectory_files
+from corporeal.simulation.checkpoint import (
+    CHECKPOINT_FILE,
+    PREVIOUS_CHECKPOINT_FILE,
+    Checkpoints,
+    fingerprint,
+)
 
 STATE = {"place": np.arange(12.0).reshape(4, 3), "clock": np.float64(0.5)}
 
 
 @pytest.fixture(autouse=True)
 def often(monkeypatch):
-    monkeypatch.setattr(checkpoint, "EVERY", 0.0)
-    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", np.inf)
+    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
 
 
 def a_folder(path, done):
     """A run with ``done`` frames."""
     for number in range(done):
-        frames.write_arrays(frames.frame_path(path, number), {"time": np.float64(number)})
+        trajectory_files.write_arrays(
+            trajectory_files.frame_path(path, number), {"time": np.float64(number)}
+        )
     return path
 
 
@@ -46,7 +53,9 @@ def test_the_newest_state_comes_back_bit_by_bit(tmp_path):
 
 def test_there_are_never_more_than_two_and_none_at_the_end(tmp_path):
     found = kept(tmp_path, 1, 2, 3, 4)
-    assert sorted(p.name for p in tmp_path.glob("*.npz")) == sorted([LAST, BEFORE])
+    assert sorted(p.name for p in tmp_path.glob("*.npz")) == sorted(
+        [CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE]
+    )
     found.forget()
     assert not list(tmp_path.glob("*.npz"))
 
@@ -54,23 +63,25 @@ def test_there_are_never_more_than_two_and_none_at_the_end(tmp_path):
 @pytest.mark.parametrize("harm", ["half", "empty", "flipped"])
 def test_a_damaged_one_is_named_and_the_one_before_is_used(tmp_path, caplog, harm):
     found = kept(tmp_path, 2, 5)
-    data = bytearray((tmp_path / LAST).read_bytes())
+    data = bytearray((tmp_path / CHECKPOINT_FILE).read_bytes())
     if harm == "flipped":
         data[data.index(STATE["place"].tobytes()) + 9] ^= 0x01
-    (tmp_path / LAST).write_bytes({"half": data[: len(data) // 2], "empty": b""}.get(harm, data))
+    (tmp_path / CHECKPOINT_FILE).write_bytes(
+        {"half": data[: len(data) // 2], "empty": b""}.get(harm, data)
+    )
     newest = found.newest()
     done, state = newest.done, newest.state
     assert done == 2
     assert state["done_too"] == 2
-    assert LAST in caplog.text
+    assert CHECKPOINT_FILE in caplog.text
     assert "cannot be read" in caplog.text
 
 
 def test_without_a_usable_one_it_begins_again_and_says_so(tmp_path, caplog):
     found = kept(tmp_path, 2, 5)
-    for name in (LAST, BEFORE):
+    for name in (CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE):
         (tmp_path / name).write_bytes(b"not a checkpoint")
-    assert found.newest() == checkpoint.Saved()
+    assert found.newest() == checkpoint.CheckpointState()
     assert len(caplog.records) == 2
     assert "starting again" in caplog.text
 
@@ -81,11 +92,11 @@ def test_no_damage_is_taken_for_a_state(tmp_path_factory, data):
     logging.getLogger("corporeal.simulation.checkpoint").disabled = True
     path = tmp_path_factory.mktemp("harmed")
     found = kept(path, 1)
-    whole = (path / LAST).read_bytes()
+    whole = (path / CHECKPOINT_FILE).read_bytes()
     place = data.draw(st.integers(0, len(whole) - 1))
     harmed = bytearray(whole)
     harmed[place] ^= data.draw(st.integers(1, 255))
-    (path / LAST).write_bytes(harmed)
+    (path / CHECKPOINT_FILE).write_bytes(harmed)
     newest = found.newest()
     done, state = newest.done, newest.state
     if done:  # a byte that nobody reads
@@ -96,13 +107,13 @@ def test_no_damage_is_taken_for_a_state(tmp_path_factory, data):
 
 def test_one_of_other_inputs_is_not_used(tmp_path, caplog):
     kept(tmp_path, 3)
-    assert Checkpoints(tmp_path, "another scene").newest() == checkpoint.Saved()
+    assert Checkpoints(tmp_path, "another scene").newest() == checkpoint.CheckpointState()
     assert "another scene or other settings" in caplog.text
 
 
 def test_one_whose_frames_are_gone_is_not_used(tmp_path, caplog):
     found = kept(tmp_path, 2, 5)
-    frames.frame_path(tmp_path, 3).unlink()
+    trajectory_files.frame_path(tmp_path, 3).unlink()
     assert found.newest().done == 2
     assert "frame 3 is missing" in caplog.text
 
@@ -110,8 +121,8 @@ def test_one_whose_frames_are_gone_is_not_used(tmp_path, caplog):
 def test_writing_them_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
     clock = [0.0]
     monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(checkpoint, "EVERY", 10.0)
-    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", 0.05)
+    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 10.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", 0.05)
 
     def slow(*_):
         clock[0] += 4.0

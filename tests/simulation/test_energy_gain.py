@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, ball, box, floor, problem
 
+from corporeal.core.audit_data import EnergyGain, Expectation
 from corporeal.core.errors import SimulationError
-from corporeal.core.findings import EnergyGain, Expectation
 from corporeal.core.types import Ledger
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.simulation.audit import believed
-from corporeal.simulation.audit_words import breaches
+from corporeal.simulation.audit import reject_expectations
+from corporeal.simulation.audit_messages import breach_messages
 from corporeal.simulation.energy_gain import EnergyWatch, energy_gain
 from corporeal.simulation.ledger_row import ledger_row
 from made_findings import run_audit
@@ -102,10 +102,10 @@ def test_the_audit_says_who_gained_and_from_when_on():
 def test_no_expectation_is_met_by_a_run_that_gained_energy():
     sound = run_audit()
     wanted = Expectation("It bounces", "40 %", "above 10 %", True)
-    assert believed([wanted], sound) == (wanted,)
+    assert reject_expectations([wanted], sound) == (wanted,)
     grown = replace(sound, mechanical_growth=46.8, energy_gain=EnergyGain("ball_0", 36, 0.6))
-    (doubted,) = believed([wanted], grown)
+    (doubted,) = reject_expectations([wanted], grown)
     assert not doubted.met and doubted.value == "40 %; but energy grew by 4680.0%"
-    (said,) = breaches(grown)
+    (said,) = breach_messages(grown)
     assert "energy grew by 4680.0%" in said
     assert "in ball_0, from 0.60 s on" in said

@@ -10,10 +10,15 @@ from test_audit import CELL, TREATMENT, row
 
 from corporeal.core.types import Finish, Frame, Particles, Scene, SceneObject, Surface
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.shape import Shape
-from corporeal.simulation.audit_words import surface_warnings
-from corporeal.simulation.frames import Layout, gather, write_frame, write_layout
-from corporeal.simulation.mesh_gaps import distance_within, finer, surface_pairs
+from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.simulation.audit_messages import surface_warnings
+from corporeal.simulation.mesh_gaps import distance_within, refine_mesh, surface_pairs
+from corporeal.simulation.trajectory_files import (
+    FrameLayout,
+    gather_ledgers,
+    write_frame,
+    write_layout,
+)
 
 THICK = 0.002
 """Of the plate [m]: a fifth of a cell."""
@@ -78,7 +83,7 @@ def film(tmp_path):
             fps=FPS,
             duration=(len(way) - 1) / FPS,
         )
-        layout = Layout(owner, np.array([not bend, True]))
+        layout = FrameLayout(owner, np.array([not bend, True]))
         write_layout(tmp_path, layout)
         for k, place in enumerate(way):
             target = points[0] if bend is None else bend(points[0], k)
@@ -90,7 +95,7 @@ def film(tmp_path):
                 row(0.0), time=np.array(k / FPS), centre=np.stack([target.mean(0), place]), gap=gap
             )
             write_frame(tmp_path, k, Frame(k / FPS, now, F), layout, book)
-        return surface_pairs(scene, particles, gather(tmp_path, len(way)))
+        return surface_pairs(scene, particles, gather_ledgers(tmp_path, len(way)))
 
     return shoot
 
@@ -152,7 +157,7 @@ def test_distances_are_those_of_the_meshes(film):
 
 def test_long_triangles_are_halved_and_stay_one_surface():
     box = trimesh.creation.box((1.0, 0.6, 0.1))
-    fine = finer(Mesh(np.array(box.vertices), np.array(box.faces)), 0.07)
+    fine = refine_mesh(Mesh(np.array(box.vertices), np.array(box.faces)), 0.07)
     again = trimesh.Trimesh(fine.vertices, fine.triangles, process=False)
     assert again.is_watertight and again.volume == pytest.approx(0.06)
     assert again.edges_unique_length.max() <= 0.07
@@ -161,7 +166,7 @@ def test_long_triangles_are_halved_and_stay_one_surface():
 @pytest.mark.parametrize(("shift", "reach"), [(1.02, 0.05), (0.95, 0.05), (0.3, 0.05), (2.0, 0.1)])
 def test_triangles_in_reach_alone_give_the_same_least_distance(shift, reach):
     made = trimesh.creation.icosphere(4, 1.0)
-    shape = Shape(Mesh(np.array(made.vertices, float), np.array(made.faces, np.int64)))
+    shape = QueryMesh(Mesh(np.array(made.vertices, float), np.array(made.faces, np.int64)))
     points = np.random.default_rng(3).normal(0.0, 0.02, (40, 3)) + np.array([shift, 0, 0])
     within = shape.inside(points)
     found = distance_within(points, shape, within, reach)

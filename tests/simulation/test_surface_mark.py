@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from corporeal.core.types import Law, Material
-from corporeal.simulation.residual_shape import dent
-from corporeal.simulation.surface_mark import COLUMN, marked_at_its_surface, surface_mark
+from corporeal.simulation.residual_shape import residual_dent
+from corporeal.simulation.surface_mark import COLUMN_WIDTH_DX, keeps_surface_mark, surface_mark
 
 CELL = 0.01
 DEPTH, RADIUS = 0.03, 0.07
@@ -73,7 +73,9 @@ def test_grains_that_splashed_far_make_no_deeper_mark_as_they_make_a_deeper_dent
     """A quarter of a percent of the grains end .1 to .2 m away, as in the showcase's heap."""
     points = splashed(stamped(BED), 0.0025)
     assert mark_of(points).depth == pytest.approx(DEPTH, abs=0.3 * CELL)
-    assert dent(BED, [points], CELL).depth > 4 * DEPTH, "the control: it follows the grains"
+    assert residual_dent(BED, [points], CELL).depth > 4 * DEPTH, (
+        "the control: it follows the grains"
+    )
 
 
 def test_grains_in_the_air_above_a_bowl_neither_fill_it_nor_are_a_rim():
@@ -100,7 +102,7 @@ def test_a_rim_is_as_high_as_it_was_raised():
 def test_a_hole_through_a_bed_is_as_deep_as_the_bed():
     points = BED.copy()
     points[np.hypot(BED[:, 0], BED[:, 1]) < 2 * CELL, 0] += 3.0
-    assert mark_of(points).depth == pytest.approx(THICK, abs=COLUMN * CELL)
+    assert mark_of(points).depth == pytest.approx(THICK, abs=COLUMN_WIDTH_DX * CELL)
 
 
 def test_what_slides_as_a_whole_is_not_marked():
@@ -142,4 +144,4 @@ def test_a_pinch_of_grains_has_no_surface():
 def test_grains_and_pastes_are_measured_at_their_surface_and_plasticine_by_its_matter(
     changes, marked
 ):
-    assert marked_at_its_surface(replace(SAND, **changes)) is marked
+    assert keeps_surface_mark(replace(SAND, **changes)) is marked

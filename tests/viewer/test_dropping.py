@@ -6,12 +6,18 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.viewer.hands import JOIN, Hands
-from corporeal.viewer.live import Live, live_scene
-from corporeal.viewer.orders import Order, parsed
-from corporeal.viewer.shelf import Shelf
-from corporeal.viewer.things import Things
-from corporeal.viewer.touches import Record, dropped, read_record, takes, write_record
+from corporeal.viewer.commands import Command, parse_command
+from corporeal.viewer.interaction_controller import RECORDED_ADD, InteractionController
+from corporeal.viewer.live_assets import LiveAssets
+from corporeal.viewer.live_simulation import LiveSimulation, live_editor_of
+from corporeal.viewer.replay import (
+    InteractionRecord,
+    drop_events,
+    read_record,
+    write_record,
+    write_replays,
+)
+from corporeal.viewer.run_store import RunStore
 
 BALL, STONE, NEW = 0, 1, 2
 SPOT = (0.7, 0.0, 0.05)
@@ -22,17 +28,17 @@ THING = "drop/ball"
 
 @pytest.fixture(scope="module")
 def shelf(small_run):
-    return Shelf((), small_run.parent)
+    return RunStore((), small_run.parent)
 
 
 @pytest.fixture(scope="module")
 def live(shelf):
     """The foam ball once more, onto the stone; the control beside."""
-    live = Live(live_scene(shelf.made("drop"), 1, Things(shelf).find), 1)
+    live = LiveSimulation(live_editor_of(shelf.made("drop"), 1, LiveAssets(shelf).find), 1)
     live.begin(single=False, twin=True)
     for _ in range(3):
         live._both(1 / 60)
-    live._do(Order("add", thing=THING, point=SPOT, to=(0.0, 0.0, 0.05)))
+    live._do(Command("add", thing=THING, point=SPOT, to=(0.0, 0.0, 0.05)))
     for _ in range(8):
         live._both(1 / 60)
     return live
@@ -66,7 +72,7 @@ def test_the_control_beside_has_it_too(live):
 
 
 def test_what_was_done_is_done_again_bit_for_bit(live):
-    again = Hands(live.posed, live.posed.problem, 1, live.growth)
+    again = InteractionController(live.posed, live.posed.problem, 1, live.growth)
     again.replay(live.hands.touches)
     now, then = live.hands.engine.snapshot(), again.engine.snapshot()
     np.testing.assert_array_equal(now.position, then.position)
@@ -87,14 +93,14 @@ def test_pictures_and_the_honest_line_know_it(live):
 
 
 def test_a_hand_that_holds_something_goes_on_holding_it(shelf):
-    live = Live(live_scene(shelf.made("drop"), 1, Things(shelf).find), 1)
+    live = LiveSimulation(live_editor_of(shelf.made("drop"), 1, LiveAssets(shelf).find), 1)
     place = tuple(live.hands.start[0].tolist())
     high = (place[0], place[1], place[2] + 0.1)
-    live._do(Order("grab", object=BALL, point=place, to=high))
-    live._do(Order("gravity", to=(0.0, 0.0, -1.0)))
+    live._do(Command("grab", object=BALL, point=place, to=high))
+    live._do(Command("gravity", to=(0.0, 0.0, -1.0)))
     live._both(1 / 60)
     held = live.hands.grip(live.hands.engine.snapshot().position)
-    live._do(Order("add", thing="corporeal/steel_ball", point=(0.3, 0.3, 0.0), to=(0, 0, 0.3)))
+    live._do(Command("add", thing="corporeal/steel_ball", point=(0.3, 0.3, 0.0), to=(0, 0, 0.3)))
     now = live.hands.engine.snapshot().position
     assert held is not None
     np.testing.assert_allclose(live.hands.grip(now), held, atol=1e-6)
@@ -103,17 +109,19 @@ def test_a_hand_that_holds_something_goes_on_holding_it(shelf):
     speed = live.hands.engine.measure()
     assert speed.momentum[NEW, 2] / speed.mass[NEW] == pytest.approx(-1.0 / 60, rel=0.05)
     # Beginning again takes it away.
-    live._do(Order("reset"))
+    live._do(Command("reset"))
     assert live.face is live.bare and len(live.hands.engine.problem.bodies) == 2
 
 
 def test_a_replay_at_draft_drops_it_at_the_same_time(small_run, live, tmp_path):
-    done = Record("drop", tuple(live.hands.touches))
+    done = InteractionRecord("drop", tuple(live.hands.touches))
     write_record(tmp_path / "touches.json", done)
     assert read_record(tmp_path / "touches.json") == done
-    ((when, one),) = dropped(done)
+    ((when, one),) = drop_events(done)
     assert when == pytest.approx(3 / 60) and one.thing == THING
-    takes(tmp_path, lambda share, words: None, small_run, tmp_path / "touches.json", [small_run])
+    write_replays(
+        tmp_path, lambda share, words: None, small_run, tmp_path / "touches.json", [small_run]
+    )
     for contact in ("multi", "single"):
         data = (tmp_path / f"{contact}.take").read_bytes()
         header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
@@ -122,7 +130,7 @@ def test_a_replay_at_draft_drops_it_at_the_same_time(small_run, live, tmp_path):
 
 
 def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
-    live = Live(live_scene(shelf.made("drop"), 1, Things(shelf).find), 1)
+    live = LiveSimulation(live_editor_of(shelf.made("drop"), 1, LiveAssets(shelf).find), 1)
     for thing, word in (
         ("corporeal/whale", "no 'corporeal/whale'"),
         ("nothing", "RUN/OBJECT"),
@@ -130,12 +138,14 @@ def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
         ("corporeal/couch", "Drop something smaller|too large"),
     ):
         with pytest.raises(UserError, match=word):
-            live._do(Order("add", thing=thing, point=SPOT, to=(0.0, 0.0, 0.1)))
+            live._do(Command("add", thing=thing, point=SPOT, to=(0.0, 0.0, 0.1)))
     with pytest.raises(UserError, match="no room"):
-        live.hands.obey(Order(JOIN, thing=THING, point=(0.7, 0.0, 0.03), to=(0.0, 0.0, 0.1)))
+        live.hands.obey(
+            Command(RECORDED_ADD, thing=THING, point=(0.7, 0.0, 0.03), to=(0.0, 0.0, 0.1))
+        )
     assert len(live.hands.engine.problem.bodies) == 2 and live.hands.touches == []
     live._both(1 / 60)
     with pytest.raises(UserError):
-        parsed(json.dumps({"do": JOIN}))
+        parse_command(json.dumps({"do": RECORDED_ADD}))
     with pytest.raises(UserError, match="no name"):
-        parsed(json.dumps({"do": "add", "thing": 3}))
+        parse_command(json.dumps({"do": "add", "thing": 3}))

@@ -3,13 +3,13 @@
 import pytest
 
 from corporeal.pipeline import run_files
-from corporeal.pipeline.runner import read_back
+from corporeal.pipeline.run_pipeline import read_run
 from made_findings import run_audit
 
 
 @pytest.fixture(scope="module")
 def made(small_run):
-    return read_back(small_run)
+    return read_run(small_run)
 
 
 def view(made):
@@ -19,11 +19,11 @@ def view(made):
 
 def test_what_is_too_large_has_half_the_pictures_and_then_none(made, monkeypatch):
     whole = len(view(made))
-    assert whole < run_files.LARGEST
-    monkeypatch.setattr(run_files, "LARGEST", whole - 1)
+    assert whole < run_files.MAX_VIEW_BYTES
+    monkeypatch.setattr(run_files, "MAX_VIEW_BYTES", whole - 1)
     thin = view(made)
     assert 0 < len(thin) < whole and "<script" in thin
-    monkeypatch.setattr(run_files, "LARGEST", 1000)
+    monkeypatch.setattr(run_files, "MAX_VIEW_BYTES", 1000)
     said = view(made)
     assert "would take more than" in said and "corporeal view RUN" in said
 

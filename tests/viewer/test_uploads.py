@@ -8,12 +8,12 @@ import zipfile
 import pytest
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.viewer import unpack as unpacking
 from corporeal.viewer import uploads
-from corporeal.viewer.shelf import Shelf
-from corporeal.viewer.site import Shown, site
-from corporeal.viewer.unpack import unpack
-from corporeal.viewer.uploads import INBOX, Inbox, upload_route
+from corporeal.viewer import zip_unpack as unpacking
+from corporeal.viewer.run_store import RunStore
+from corporeal.viewer.uploads import INBOX_FOLDER, UploadInbox, upload_route
+from corporeal.viewer.web_app import SiteOptions, make_app
+from corporeal.viewer.zip_unpack import unpack_zip
 from viewer_served import LOCAL, serving
 
 
@@ -54,7 +54,7 @@ BAD = {
     "program": packed(("run.sh", b"#!/bin/sh")),
     "hidden": packed((".ssh/a.txt", b"x")),
     "too deep": packed(("a/b/c/d/e/f.jpg", b"x")),
-    "too many": packed(*((f"{k}.txt", b"") for k in range(unpacking.ENTRIES + 1))),
+    "too many": packed(*((f"{k}.txt", b"") for k in range(unpacking.MAX_ZIP_ENTRIES + 1))),
     "no name": packed(("images/\x01.jpg", b"x")),
     "twice": packed(("a.jpg", b"x"), ("a.jpg", b"y")),
     "lying size": lying_size(),
@@ -70,7 +70,7 @@ def test_a_hostile_zip_is_refused_and_nothing_lies_outside(name, tmp_path):
     inside.mkdir()
     source.write_bytes(BAD[name])
     with pytest.raises(BadFileError, match=r"^photos.zip: .*\.$"):
-        unpack(source, inside / "photos", most=64 << 20)
+        unpack_zip(source, inside / "photos", most=64 << 20)
     assert {p.name for p in tmp_path.iterdir()} == {"photos.zip", "in"}
     assert {p.name for p in inside.iterdir()} <= {"photos"}
     held = sum(p.stat().st_size for p in inside.rglob("*") if p.is_file())
@@ -81,18 +81,22 @@ def test_a_hostile_zip_is_refused_and_nothing_lies_outside(name, tmp_path):
 def test_photographs_with_their_poses_come_out_as_they_went_in(tmp_path):
     files = (PHOTO, ("transforms.json", b"{}"), ("sparse/0/cameras.bin", b"\1\2"))
     (tmp_path / "a.zip").write_bytes(packed(*files))
-    assert unpack(tmp_path / "a.zip", tmp_path / "photos") == 3
+    assert unpack_zip(tmp_path / "a.zip", tmp_path / "photos") == 3
     for name, content in files:
         assert (tmp_path / "photos" / name).read_bytes() == content
 
 
 @pytest.fixture
 def server(tmp_path, monkeypatch):
-    monkeypatch.setattr(uploads, "SPARE", 0)  # the disk of who runs this may be nearly full
+    monkeypatch.setattr(
+        uploads, "MIN_FREE_DISK_BYTES", 0
+    )  # the disk of who runs this may be nearly full
     runs = tmp_path / "runs"
     runs.mkdir()
-    inbox = Inbox(runs)
-    with serving(site(Shown(Shelf((), runs), works=True), LOCAL, (upload_route(inbox),))) as made:
+    inbox = UploadInbox(runs)
+    with serving(
+        make_app(SiteOptions(RunStore((), runs), works=True), LOCAL, (upload_route(inbox),))
+    ) as made:
         made.runs = runs
         yield made
 
@@ -102,7 +106,7 @@ def put(server, data):
 
 
 def left(server):
-    return sorted(p.name for p in server.runs.glob(f"{INBOX}/*/*"))
+    return sorted(p.name for p in server.runs.glob(f"{INBOX_FOLDER}/*/*"))
 
 
 def test_an_upload_is_known_by_its_first_bytes_and_gets_a_name_of_ours(server):
@@ -125,7 +129,7 @@ def test_what_is_not_understood_is_refused_in_a_sentence_and_leaves_nothing(serv
 
 
 def test_a_file_is_counted_while_it_comes_whatever_it_says_of_itself(server, monkeypatch):
-    monkeypatch.setattr(uploads, "LARGEST", 10_000)
+    monkeypatch.setattr(uploads, "MAX_FILE_BYTES", 10_000)
     answer = put(server, b"glTF" + bytes(20_000))
     assert answer.status == 400 and "the most that a page takes" in answer.json["error"]
     assert left(server) == []
@@ -153,7 +157,7 @@ def test_a_lying_length_harms_nobody(server, said):
 
 
 def test_the_disk_keeps_its_spare_room(server, monkeypatch):
-    monkeypatch.setattr(uploads, "SPARE", 1 << 60)
+    monkeypatch.setattr(uploads, "MIN_FREE_DISK_BYTES", 1 << 60)
     answer = put(server, b"glTF")
     assert answer.status == 400 and answer.json["error"].startswith("The disk is nearly full: ")
     assert left(server) == []
@@ -168,12 +172,12 @@ def test_every_hostile_file_is_taken_in_or_refused_and_the_server_lives(server, 
         assert answer.status in (200, 400), path
         assert answer.status == 200 or answer.json["error"], path
     assert server.ask("/runs").status == 200
-    kept = {p.name for p in server.runs.glob(f"{INBOX}/*/*")}
+    kept = {p.name for p in server.runs.glob(f"{INBOX_FOLDER}/*/*")}
     assert kept <= {"scene.glb", "splat.ply", "photos"}
 
 
 def test_only_uploads_are_found_in_the_inbox(tmp_path):
-    inbox = Inbox(tmp_path)
+    inbox = UploadInbox(tmp_path)
     for name in ("", "..", "../x", "0" * 16, "/etc", "0123456789abcdeg"):
         with pytest.raises(UserError, match="no such upload"):
             inbox.find(name)

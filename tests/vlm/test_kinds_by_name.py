@@ -4,10 +4,14 @@ import pytest
 
 from corporeal.core.types import SceneObject
 from corporeal.pipeline.stages.describe import describe
-from corporeal.recognition.metadata import Evidence, hollowed, recognise
-from corporeal.recognition.stated import walled
-from corporeal.vlm.annotation import Annotation
-from corporeal.vlm.annotation import built as annotated
+from corporeal.recognition.metadata_recognition import (
+    FileEvidence,
+    infer_hollow_structure,
+    recognise_part,
+)
+from corporeal.recognition.stated_properties import apply_stated_wall
+from corporeal.vlm.annotation_file import PartAnnotation
+from corporeal.vlm.annotation_file import apply_structure_annotation as annotated
 from handmade import plain, scene
 
 
@@ -18,14 +22,14 @@ class Named:
 
 def built(name, extent=1.0, surface="mesh"):
     """Return what a thing of one part and such a name becomes."""
-    known = Evidence(
+    known = FileEvidence(
         surfaces=[Named(surface)],  # type: ignore[list-item]
         finishes=[plain()],
         thing=SceneObject(f"{name}_0", name, extent),
         alone=True,
         metallic_means_something=False,
     )
-    return hollowed(recognise(known), known, lambda _: True)
+    return infer_hollow_structure(recognise_part(known), known, lambda _: True)
 
 
 @pytest.mark.parametrize("name", ["bean bag", "juggling bean bag", "beanbag_red"])
@@ -121,10 +125,10 @@ def test_the_wall_of_a_name_is_usual_and_not_stated():
     assert built("mailbox").wall_usual
     assert built("plastic garden chair").wall_usual
     assert not built("brick").wall_usual
-    assert not walled(built("mailbox"), 0.003).wall_usual
-    thin = Annotation(None, thickness=0.003)
+    assert not apply_stated_wall(built("mailbox"), 0.003).wall_usual
+    thin = PartAnnotation(None, thickness=0.003)
     assert not annotated(thin, built("mailbox")).wall_usual
-    assert annotated(Annotation("steel"), built("mailbox")).wall_usual
+    assert annotated(PartAnnotation("steel"), built("mailbox")).wall_usual
 
 
 def test_a_tank_is_hollow_and_how_large_a_safe_is_tells_its_wall():

@@ -4,13 +4,19 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.geometry.gaussians import placed
-from corporeal.io.splat_ply import write_splat
+from corporeal.geometry.gaussian_transforms import transform_gaussians
+from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.pipeline.stages.reconstruct import reconstruct
-from corporeal.reconstruction.gaussians import solid
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.vlm.seen_objects import check_extents, metres, of_name, telling, usual
+from corporeal.reconstruction.surface import closed_surface
+from corporeal.vlm.photographed_objects import (
+    check_stated_extents,
+    decide_metric_scale,
+    object_from_name,
+    object_of_usual_size,
+    telling_words,
+)
 from gaussian_boxes import DOWN, box
 
 SIDES = (0.4, 0.2, 0.2)
@@ -19,15 +25,15 @@ SIDES = (0.4, 0.2, 0.2)
 @pytest.fixture(autouse=True)
 def fewer_cameras(monkeypatch):
     """Look at splats in fewer and smaller pictures, and carve more coarsely, than for people."""
-    monkeypatch.setattr(stage, "OWN_VIEWS", 16)
-    monkeypatch.setattr(stage, "OWN_SIZE", (96, 96))
-    monkeypatch.setattr(solid, "CELLS", 60_000)
+    monkeypatch.setattr(stage, "RENDERED_VIEWS", 16)
+    monkeypatch.setattr(stage, "RENDERED_SIZE_PX", (96, 96))
+    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 60_000)
 
 
 def made(folder, name, extents=(), **settings):
     """Reconstruct one box of a file that is called so."""
     scene = box(SIDES, (0.0, 0.0, 0.1), (0.7, 0.6, 0.1))
-    write_splat(folder / f"{name}.ply", placed(scene, DOWN, 2.0, (0.0, 0.0, 5.0)))
+    write_splat_ply(folder / f"{name}.ply", transform_gaussians(scene, DOWN, 2.0, (0.0, 0.0, 5.0)))
     return reconstruct(folder / f"{name}.ply", ReconstructConfig(**settings), extents)
 
 
@@ -48,9 +54,9 @@ def made(folder, name, extents=(), **settings):
     ],
 )
 def test_a_name_says_what_is_shown_unless_it_is_of_the_photographs(name, class_name):
-    found = of_name(name)
+    found = object_from_name(name)
     assert (found and found.class_name) == class_name
-    assert found is None or found.extent == usual(class_name).extent
+    assert found is None or found.extent == object_of_usual_size(class_name).extent
 
 
 def test_a_lone_thing_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
@@ -85,18 +91,23 @@ def test_a_folder_of_photographs_makes_nothing_one_of_paper(tmp_path):
     (thing,) = came.scene.objects
     assert thing.name == "object"
     assert thing.stem == "object"
-    assert telling("old teapot photos") == "old teapot"
+    assert telling_words("old teapot photos") == "old teapot"
     first, *_ = came.found.warnings
     assert "0.5 m" in first, "what a person can state comes first"
     assert not any("0.5 m" in s for s in came.found.statements), "said once"
 
 
 def test_sizes_of_what_nobody_named_can_be_stated():
-    check_extents(["banana=0.2"], [], "banana")
-    check_extents(["object=0.2"], [], "banana")
+    check_stated_extents(["banana=0.2"], [], "banana")
+    check_stated_extents(["object=0.2"], [], "banana")
     with pytest.raises(UserError, match="no object 'duck'"):
-        check_extents(["duck=0.2"], [], "banana")
-    assert metres({"axe": 2.0}, [usual("axe")], ["object=0.5"]).metres_per_unit == 0.25
+        check_stated_extents(["duck=0.2"], [], "banana")
+    assert (
+        decide_metric_scale(
+            {"axe": 2.0}, [object_of_usual_size("axe")], ["object=0.5"]
+        ).metres_per_unit
+        == 0.25
+    )
 
 
 def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):

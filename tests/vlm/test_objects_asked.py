@@ -7,8 +7,8 @@ import pytest
 from fake_server import FakeServer
 
 from corporeal.vlm.answer_checks import regions_complaints, things_complaints
-from corporeal.vlm.answers import PaintedRegion, RegionsAnswer, ThingsAnswer
-from corporeal.vlm.seen_objects import SeenObject, Viewer
+from corporeal.vlm.answer_schemas import ObjectsAnswer, PaintedRegion, RegionsAnswer
+from corporeal.vlm.photographed_objects import PhotoInterview, SeenObject
 
 DUCK = {"class_name": "rubber duck", "look": "yellow, in front", "metres": 0.1}
 CAN = {"class_name": "soda can", "look": "red, lying", "metres": 0.12}
@@ -25,7 +25,7 @@ def answer(**said):
 
 
 def test_without_a_model_nobody_says_anything():
-    nobody = Viewer("desk", "metadata")
+    nobody = PhotoInterview("desk", "metadata")
     assert nobody.objects(PICTURES) == []
     assert nobody.regions(PICTURES, ["red"], [SeenObject("duck")]) is None
     assert nobody.asked().transcript == ()
@@ -34,7 +34,7 @@ def test_without_a_model_nobody_says_anything():
 def test_a_model_names_things_and_then_the_painted_regions(tmp_path):
     regions = [{"colour": "red", "thing": 2}, {"colour": "blue", "thing": None}]
     with FakeServer(answer(things=[DUCK, CAN]), answer(regions=regions)) as server:
-        viewer = Viewer("desk", f"openai:fake-model@{server.url}", tmp_path / "kept")
+        viewer = PhotoInterview("desk", f"openai:fake-model@{server.url}", tmp_path / "kept")
         things = viewer.objects(PICTURES)
         found = viewer.regions([*PICTURES, *PICTURES], ["red", "blue"], things)
     assert [(t.class_name, t.extent) for t in things] == [("rubber duck", 0.1), ("soda can", 0.12)]
@@ -43,7 +43,7 @@ def test_a_model_names_things_and_then_the_painted_regions(tmp_path):
     assert [request.pictures for request in server.requests] == [2, 4]
     assert "2. soda can: red, lying" in server.requests[1].text
     assert [row["task"] for row in viewer.asked().transcript] == ["things", "regions"]
-    replayed = Viewer("desk", f"replay:{tmp_path / 'kept'}")
+    replayed = PhotoInterview("desk", f"replay:{tmp_path / 'kept'}")
     again = replayed.objects(PICTURES)
     assert [(t.class_name, t.extent) for t in again] == [(t.class_name, t.extent) for t in things]
     assert replayed.regions([*PICTURES, *PICTURES], ["red", "blue"], again) == [1, None]
@@ -66,5 +66,5 @@ def test_what_is_wrong_with_an_answer_is_told(regions, told):
 
 
 def test_a_scene_shows_something_and_not_too_much():
-    assert things_complaints(ThingsAnswer(things=[])) == ["Name 1 to 12 things; you named 0."]
-    assert things_complaints(ThingsAnswer(things=[DUCK])) == []
+    assert things_complaints(ObjectsAnswer(things=[])) == ["Name 1 to 12 things; you named 0."]
+    assert things_complaints(ObjectsAnswer(things=[DUCK])) == []

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from corporeal.vlm.answers import MaterialsAnswer, PartsAnswer
-from corporeal.vlm.interview import NO_SHARES, SHARES
+from corporeal.vlm.answer_schemas import MaterialsAnswer, PartsAnswer
+from corporeal.vlm.interview import NO_SHARES_INSTRUCTION, SHARES_INSTRUCTION
 
 OLD = Path(__file__).parent / "wording_2026_11"
 TASKS = ("parts", "ranking", "materials", "placement")
@@ -44,7 +44,7 @@ def new():
     prompts = {p.name.removesuffix(".md"): p.read_text(encoding="utf-8") for p in found}
     shapes = {"PartsAnswer": PartsAnswer, "MaterialsAnswer": MaterialsAnswer}
     schemas = {name: shape.model_json_schema() for name, shape in shapes.items()}
-    return Wording(prompts, SHARES + NO_SHARES, schemas)
+    return Wording(prompts, SHARES_INSTRUCTION + NO_SHARES_INSTRUCTION, schemas)
 
 
 def inner_shells_have_area(w):

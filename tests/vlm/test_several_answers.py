@@ -9,13 +9,13 @@ from fake_server import FakeServer
 from pydantic import BaseModel
 
 from corporeal.core.errors import UserError
-from corporeal.vlm import Question, Spent, Turn
-from corporeal.vlm.cache import Cached
-from corporeal.vlm.patience import Patience
-from corporeal.vlm.provider import Anthropic, OpenAI
-from corporeal.vlm.recordings import Recorder, Recordings, record
+from corporeal.vlm import AnswerCost, AnswerNumber, Question
+from corporeal.vlm.answer_cache import CachingClient
+from corporeal.vlm.api_clients import AnthropicClient, OpenAIClient
+from corporeal.vlm.recordings import RecordingClient, ReplayClient, write_recording
+from corporeal.vlm.retry import RetryPolicy
 
-QUICK = Patience(tries=4, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
+QUICK = RetryPolicy(tries=4, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
 ASKED = Question("materials", "How heavy?", "s/chair", "1", (np.full((8, 8, 3), 100, np.uint8),))
 
 
@@ -32,7 +32,7 @@ def check(answer):
 
 
 def asked(number, of=3, alike=True):
-    return replace(ASKED, turn=Turn(number, of, alike))
+    return replace(ASKED, turn=AnswerNumber(number, of, alike))
 
 
 def told(model, of=3, alike=True):
@@ -56,17 +56,17 @@ def counting():
 
 def test_a_server_that_knows_n_is_asked_once_and_sees_each_picture_once():
     with FakeServer(several) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK))
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK))
     assert numbers(replies) == [1, 2, 3]
     (request,) = server.requests
     assert (request.body["n"], request.body["temperature"], request.pictures) == (3, 0.7, 1)
     assert [r.spent.calls for r in replies] == [1, 0, 0]
-    assert [r.spent for r in replies[1:]] == [Spent(), Spent()]
+    assert [r.spent for r in replies[1:]] == [AnswerCost(), AnswerCost()]
 
 
 def test_a_server_that_ignores_n_is_asked_as_often_and_not_for_n_again():
     with FakeServer(*counting()) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK))
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK))
     assert numbers(replies) == [1, 2, 3]
     assert [r.body.get("n") for r in server.requests] == [3, None, None]
     assert {r.body["temperature"] for r in server.requests} == {0.7}
@@ -78,7 +78,7 @@ def test_a_server_that_refuses_the_settings_is_asked_without_them():
         return {"status": 400} if "n" in request.body else {"content": said(2)}
 
     with FakeServer(strict) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK))
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK))
     assert numbers(replies) == [2, 2, 2]
     assert ["response_format" in r.body for r in server.requests] == [True] * 4
     assert [r.body.get("temperature") for r in server.requests] == [0.7, None, None, None]
@@ -89,7 +89,7 @@ def test_a_server_that_refuses_the_schema_still_gives_several():
         return {"status": 400} if "response_format" in request.body else several(request)
 
     with FakeServer(wordy) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK))
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK))
     assert numbers(replies) == [1, 2, 3]
     assert [r.body.get("n") for r in server.requests] == [3, None, 3]
 
@@ -98,7 +98,7 @@ def test_a_server_that_refuses_the_schema_still_gives_several():
 def test_one_broken_of_three_is_asked_for_anew(broken):
     first = {"content": said(1), "more": [broken, said(3)]}
     with FakeServer(first, {"content": said(4)}) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK))
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK))
     assert numbers(replies) == [1, 3, 4]
     assert [r.body.get("n") for r in server.requests] == [3, None]
 
@@ -106,27 +106,27 @@ def test_one_broken_of_three_is_asked_for_anew(broken):
 def test_a_correction_asks_for_one_answer():
     first = {"content": said(-1), "more": [said(2), said(3)]}
     with FakeServer(first, {"content": said(1)}) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK))
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK))
     assert numbers(replies) == [1, 2, 3]
     assert [r.body.get("n") for r in server.requests] == [3, None]
 
 
 def test_what_hangs_on_an_earlier_answer_is_asked_for_one_by_one():
     with FakeServer(*counting()) as server:
-        replies = told(OpenAI(f"fake-model@{server.url}", QUICK), alike=False)
+        replies = told(OpenAIClient(f"fake-model@{server.url}", QUICK), alike=False)
     assert numbers(replies) == [1, 2, 3]
     assert [(r.body.get("n"), r.body["temperature"]) for r in server.requests] == [(None, 0.7)] * 3
 
 
 def test_one_answer_is_asked_for_as_ever():
     with FakeServer(several) as server:
-        OpenAI(f"fake-model@{server.url}", QUICK).ask(ASKED, Heavy, check)
+        OpenAIClient(f"fake-model@{server.url}", QUICK).ask(ASKED, Heavy, check)
     assert not {"n", "temperature"} & server.requests[0].body.keys()
 
 
 def test_a_format_without_n_is_asked_as_often():
     with FakeServer(*counting()) as server:
-        replies = told(Anthropic(f"fake-model@{server.root}", QUICK))
+        replies = told(AnthropicClient(f"fake-model@{server.root}", QUICK))
     assert numbers(replies) == [1, 2, 3]
     assert ["n" in r.body for r in server.requests] == [False] * 3
 
@@ -135,7 +135,9 @@ def test_each_answer_is_paid_for_once_and_the_first_is_that_of_one(tmp_path):
     with FakeServer(several) as server:
 
         def model():
-            return Cached(OpenAI(f"fake-model@{server.url}", QUICK), "fake", {}, tmp_path)
+            return CachingClient(
+                OpenAIClient(f"fake-model@{server.url}", QUICK), "fake", {}, tmp_path
+            )
 
         assert numbers([model().ask(ASKED, Heavy, check)]) == [1]
         more = model()
@@ -146,12 +148,12 @@ def test_each_answer_is_paid_for_once_and_the_first_is_that_of_one(tmp_path):
 
 def test_recordings_keep_each_answer_and_the_first_under_the_name_of_one(tmp_path):
     with FakeServer(several) as server:
-        model = OpenAI(f"fake-model@{server.url}", QUICK)
-        told(Recorder(model, tmp_path / "three"))
-    replayed = Recordings(str(tmp_path / "three"))
+        model = OpenAIClient(f"fake-model@{server.url}", QUICK)
+        told(RecordingClient(model, tmp_path / "three"))
+    replayed = ReplayClient(str(tmp_path / "three"))
     assert numbers(told(replayed)) == [1, 2, 3]
     assert replayed.ask(ASKED, Heavy).answer.kilograms == 1
-    one = record(tmp_path / "one", ASKED, Heavy(kilograms=1), model.address.spec)
+    one = write_recording(tmp_path / "one", ASKED, Heavy(kilograms=1), model.address.spec)
     assert (tmp_path / "three" / one.name).read_bytes() == one.read_bytes()
     with pytest.raises(UserError, match="is answer 4 to 'materials' about 's/chair'; it holds 3"):
         replayed.ask(asked(4), Heavy)

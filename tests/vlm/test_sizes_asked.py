@@ -9,13 +9,19 @@ import pytest
 from fake_server import FakeServer
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.core.types import NOTHING_ASKED
+from corporeal.core.types import NO_USAGE
 from corporeal.recognition.typical_extents import typical_extent
 from corporeal.vlm.answer_checks import size_complaints
-from corporeal.vlm.answers import SizeAnswer
-from corporeal.vlm.by_hand import WaitingError
+from corporeal.vlm.answer_schemas import SizeAnswer
+from corporeal.vlm.human_client import PendingQuestionsError
+from corporeal.vlm.real_sizes import (
+    UNKNOWN_EXTENT_M,
+    ClassSize,
+    ClassSizes,
+    estimate_real_extent,
+    find_class_sizes,
+)
 from corporeal.vlm.recordings import schema_digest
-from corporeal.vlm.sizes import NEUTRAL, Sizes, UsualSize, real_extent, usual_sizes
 
 RECORDED = Path(__file__).parents[1] / "recordings" / "sizes"
 COUCH = {"smallest": 1.3, "usual": 2.1, "largest": 3.2, "reason": "Three people sit on it."}
@@ -31,18 +37,18 @@ def answer(**changed):
 
 
 def ask(server, *classes, record=None):
-    return usual_sizes(classes, f"openai:fake-model@{server.url}", record)
+    return find_class_sizes(classes, f"openai:fake-model@{server.url}", record)
 
 
 # ---------------------------------------------------------------- who says it
 
 
 def test_without_a_model_the_table_says_it():
-    sizes = usual_sizes(["soda can", "widget", "soda can"])
+    sizes = find_class_sizes(["soda can", "widget", "soda can"])
     assert list(sizes.usual) == ["soda can"]
     can = sizes.usual["soda can"]
     assert (can.low, can.usual, can.high, can.said_by) == (0.08, 0.12, 0.16, "table")
-    assert (sizes.transcript, sizes.usage, sizes.warnings) == ((), NOTHING_ASKED, ())
+    assert (sizes.transcript, sizes.usage, sizes.warnings) == ((), NO_USAGE, ())
 
 
 def test_a_model_is_asked_about_each_class_once_in_words_alone():
@@ -65,7 +71,7 @@ def test_a_model_is_asked_about_each_class_once_in_words_alone():
 def test_what_was_recorded_is_replayed_without_anybody(tmp_path):
     with FakeServer(answer()) as server:
         live = ask(server, "couch", "sofa", record=tmp_path / "kept")
-    replayed = usual_sizes(["sofa"], f"replay:{tmp_path / 'kept'}").usual["sofa"]
+    replayed = find_class_sizes(["sofa"], f"replay:{tmp_path / 'kept'}").usual["sofa"]
     assert (replayed.said_by, replayed.who) == ("recording", live.usual["sofa"].who)
     assert (replayed.low, replayed.usual, replayed.high) == (1.3, 2.1, 3.2)
 
@@ -74,7 +80,7 @@ def test_a_class_that_was_not_recorded_is_told(tmp_path):
     with FakeServer(answer()) as server:
         ask(server, "couch", record=tmp_path / "kept")
     with pytest.raises(UserError, match=r"No recording in .* answers 'sizes' about 'vase'"):
-        usual_sizes(["couch", "vase"], f"replay:{tmp_path / 'kept'}")
+        find_class_sizes(["couch", "vase"], f"replay:{tmp_path / 'kept'}")
 
 
 def test_a_question_that_stays_open_leaves_the_table_and_a_warning():
@@ -87,11 +93,11 @@ def test_a_question_that_stays_open_leaves_the_table_and_a_warning():
 
 
 def test_questions_can_wait_for_a_person(tmp_path):
-    with pytest.raises(WaitingError, match="2 questions wait"):
-        usual_sizes(["couch", "vase"], f"ask:{tmp_path}")
+    with pytest.raises(PendingQuestionsError, match="2 questions wait"):
+        find_class_sizes(["couch", "vase"], f"ask:{tmp_path}")
     for page in (tmp_path / "questions").glob("*.json"):
         page.write_text(json.dumps(COUCH))
-    sizes = usual_sizes(["couch", "vase"], f"ask:{tmp_path}")
+    sizes = find_class_sizes(["couch", "vase"], f"ask:{tmp_path}")
     assert {s.who for s in sizes.usual.values()} == {"by hand"}
     assert sorted(p.name[:5] for p in tmp_path.glob("*.json")) == ["sizes", "sizes"]
 
@@ -139,22 +145,24 @@ def test_a_recording_is_checked_like_a_model(tmp_path):
     said["answer"]["usual"] = 2100.0
     (tmp_path / row.name).write_text(json.dumps(said))
     with pytest.raises(BadFileError, match=r"between 0\.001 and 100 metres"):
-        usual_sizes(["couch"], f"replay:{tmp_path}")
+        find_class_sizes(["couch"], f"replay:{tmp_path}")
 
 
 # ---------------------------------------------------------------- file, class, or nobody
 
 
-DUCKS = Sizes({"duck": UsualSize("duck", 0.05, 0.12, 0.6, "recording", "by hand", "A bath toy.")})
+DUCKS = ClassSizes(
+    {"duck": ClassSize("duck", 0.05, 0.12, 0.6, "recording", "by hand", "A bath toy.")}
+)
 
 
 def test_a_file_in_metres_is_believed():
-    real = real_extent("duck_khronos", "duck", 0.3, True, DUCKS)
+    real = estimate_real_extent("duck_khronos", "duck", 0.3, True, DUCKS)
     assert (real.extent, real.said_by, real.warnings) == (0.3, "file", ())
 
 
 def test_a_file_in_metres_is_doubted_and_yet_believed():
-    real = real_extent("duck_khronos", "duck", 1.65, True, DUCKS)
+    real = estimate_real_extent("duck_khronos", "duck", 1.65, True, DUCKS)
     assert (real.extent, real.said_by) == (1.65, "file")
     (warning,) = real.warnings
     assert "duck_khronos is 1.65 m large in its file" in warning
@@ -163,16 +171,16 @@ def test_a_file_in_metres_is_doubted_and_yet_believed():
 
 def test_a_file_in_other_units_says_nothing_of_its_size():
     for extent in (1.65, 112.0):
-        real = real_extent("duck_khronos", "duck", extent, False, DUCKS)
+        real = estimate_real_extent("duck_khronos", "duck", extent, False, DUCKS)
         assert (real.extent, real.said_by, real.warnings) == (0.12, "recording", ())
         assert (real.by, real.reason) == ("a recorded answer (by hand)", "A bath toy.")
 
 
 def test_what_nobody_knows_gets_a_stand_in_and_a_warning():
-    real = real_extent("thing_7", "widget", 41.0, False, DUCKS)
-    assert (real.extent, real.said_by) == (NEUTRAL, "nobody")
+    real = estimate_real_extent("thing_7", "widget", 41.0, False, DUCKS)
+    assert (real.extent, real.said_by) == (UNKNOWN_EXTENT_M, "nobody")
     assert "Nobody knows how large thing_7 (widget) is" in real.warnings[0]
-    metric = real_extent("thing_7", "widget", 0.7, True, DUCKS)
+    metric = estimate_real_extent("thing_7", "widget", 0.7, True, DUCKS)
     assert (metric.extent, metric.said_by, metric.warnings) == (0.7, "file", ())
 
 
@@ -183,7 +191,7 @@ def test_the_recorded_answers_fit_the_question_of_today():
     rows = [json.loads(p.read_text(encoding="utf-8")) for p in RECORDED.glob("*.json")]
     assert {row["schema"] for row in rows} == {schema_digest(SizeAnswer)}
     classes = [row["scene"] for row in rows]
-    sizes = usual_sizes(classes, f"replay:{RECORDED}")
+    sizes = find_class_sizes(classes, f"replay:{RECORDED}")
     assert sorted(sizes.usual) == sorted(classes)
     assert sizes.warnings == ()
     assert {(s.said_by, s.who) for s in sizes.usual.values()} == {("recording", "by hand")}
@@ -198,7 +206,9 @@ def test_the_table_knows_every_class_of_the_real_assets(shared_assets):
         known = typical_extent(row["category"])
         assert known is not None, row["category"]
         if row["metric_scale"].startswith("yes"):
-            size = UsualSize("", known.low, known.usual, known.high, "table", "", "")
-            sizes = Sizes({row["category"]: size})
-            real = real_extent("x", row["category"], float(row["max_extent_m"]), True, sizes)
+            size = ClassSize("", known.low, known.usual, known.high, "table", "", "")
+            sizes = ClassSizes({row["category"]: size})
+            real = estimate_real_extent(
+                "x", row["category"], float(row["max_extent_m"]), True, sizes
+            )
             assert real.warnings == (), row["file"]

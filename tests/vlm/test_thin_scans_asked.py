@@ -12,21 +12,21 @@ import pytest
 import trimesh
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import Finish, PartWords, Scene, SceneObject, Surface
+from corporeal.core.types import Finish, PartDescription, Scene, SceneObject, Surface
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.discretization.drawn import NOTHING, drawn
+from corporeal.discretization.drawn_thickness import NO_DRAWN_SHAPE, measure_drawn_shape
 from corporeal.pipeline.stages.describe import describe
 from corporeal.vlm import Reply
 from corporeal.vlm.answer_checks import thickness_complaints
-from corporeal.vlm.answers import MaterialsAnswer, ThicknessAnswer, Vocabulary
-from corporeal.vlm.interview import NO_SHARES, Interview, Subject
-from corporeal.vlm.recordings import Recordings, record
-from corporeal.vlm.words import millimetres, strange_shares, swollen
+from corporeal.vlm.answer_schemas import AllowedNames, MaterialsAnswer, ThicknessAnswer
+from corporeal.vlm.interpret_answers import apply_real_shares, millimetres_text, strange_share_notes
+from corporeal.vlm.interview import NO_SHARES_INSTRUCTION, Interview, InterviewSubject
+from corporeal.vlm.recordings import ReplayClient, write_recording
 
 OLD = Path(__file__).parent / "wording_2026_11b" / "materials.md"
 NEW = files("corporeal.description").joinpath("prompts", "materials.md")
 FACTS = {"count": "4", "name": "thing", "class_name": "object", "sides": "9 × 9 × 9 cm"}
-NAMES = Vocabulary(str, str, bool)
+NAMES = AllowedNames(str, str, bool)
 HALF = {"part": "blade", "low": 0.4, "likely": 0.5, "high": 0.6, "reason": "1 mm, drawn as 2."}
 
 
@@ -59,7 +59,9 @@ class Noting:
 def about_materials(drawing, text):
     """The question about materials as it is put of what a mesh draws."""
     model = Noting({"parts": []})
-    subject = Subject("s", FACTS["name"], FACTS["class_name"], FACTS["sides"], drawn=drawing)
+    subject = InterviewSubject(
+        "s", FACTS["name"], FACTS["class_name"], FACTS["sides"], drawn=drawing
+    )
     prompts = {"materials": text.read_text(encoding="utf-8")}
     Interview(model, model, prompts, replace(subject, count=4)).materials(
         {"thing": ""}, NAMES, {}, shared=False
@@ -68,7 +70,7 @@ def about_materials(drawing, text):
 
 
 def test_holes_that_the_mesh_shows_are_not_counted_again():
-    shown = drawn([surface(tube())])
+    shown = measure_drawn_shape([surface(tube())])
     assert shown.hollowed
     asked = about_materials(shown, NEW)
     assert "holes, gaps and hollows that the pictures show are modelled: they are already" in asked
@@ -77,27 +79,27 @@ def test_holes_that_the_mesh_shows_are_not_counted_again():
 
 
 def test_of_what_shows_no_holes_nothing_else_is_asked_than_before():
-    assert drawn([surface(trimesh.creation.icosphere(3, 0.05))]) == NOTHING
-    assert about_materials(NOTHING, NEW) == about_materials(NOTHING, OLD)
-    assert NO_SHARES in about_materials(NOTHING, NEW)
+    assert measure_drawn_shape([surface(trimesh.creation.icosphere(3, 0.05))]) == NO_DRAWN_SHAPE
+    assert about_materials(NO_DRAWN_SHAPE, NEW) == about_materials(NO_DRAWN_SHAPE, OLD)
+    assert NO_SHARES_INSTRUCTION in about_materials(NO_DRAWN_SHAPE, NEW)
 
 
 def test_an_open_mesh_encloses_nothing_and_shows_no_holes():
     mesh = tube()
     mesh.update_faces(mesh.triangles_center[:, 2] < 0.02)
-    assert drawn([surface(mesh)]) == NOTHING
+    assert measure_drawn_shape([surface(mesh)]) == NO_DRAWN_SHAPE
 
 
 def test_only_a_thin_scan_is_thin():
-    thin = drawn([surface(blade())], scale=2.0).thin
+    thin = measure_drawn_shape([surface(blade())], scale=2.0).thin
     edge = np.median(blade().edges_unique_length)
     assert thin is not None
     assert thin.edge == pytest.approx(edge / 2, rel=0.05)
     assert 0 < thin.behind[0] < thin.behind[1] < thin.behind[2] <= 0.005 * (1 + 1e-9)
     assert thin.doubt > 0.1
-    assert drawn([surface(blade(1.0))]).thin is None, "a ball is thick"
+    assert measure_drawn_shape([surface(blade(1.0))]).thin is None, "a ball is thick"
     coarse = trimesh.creation.icosphere(3, 0.05).apply_scale((1, 1, 0.1))
-    assert drawn([surface(coarse)]).thin is None, "1,280 triangles are no scan"
+    assert measure_drawn_shape([surface(coarse)]).thin is None, "1,280 triangles are no scan"
 
 
 class Looking(Noting):
@@ -126,7 +128,7 @@ def asked_about(mesh, model, monkeypatch):
     things = (SceneObject("blade_0", "blade", 0.1),)
     scene = Scene("one", "", things, (surface(mesh),), (Finish("plain"),))
     scene = replace(scene, surfaces=(replace(scene.surfaces[0], name="blade"),))
-    monkeypatch.setattr("corporeal.pipeline.stages.describe.connect", lambda *a: model)
+    monkeypatch.setattr("corporeal.pipeline.stages.describe.connect_vlm", lambda *a: model)
     with pytest.raises(UserError, match="stop here"):
         describe(scene, DescribeConfig(vlm="noting:x"))
     return [q for q in model.asked if q.task == "thickness"]
@@ -136,7 +138,7 @@ def test_how_thick_a_thin_scan_really_is_is_asked_of_what_fills_it(monkeypatch):
     (question,) = asked_about(blade(), Looking(), monkeypatch)
     assert "It was found to be: a blade." in question.prompt
     assert "Parts: blade (flat)" in question.prompt
-    edge = millimetres(float(np.median(blade().edges_unique_length)))
+    edge = millimetres_text(float(np.median(blade().edges_unique_length)))
     assert f"triangles with sides of about {edge}." in question.prompt
     assert not asked_about(blade(1.0), Looking(), monkeypatch)
     assert not asked_about(blade(), Looking("sheet"), monkeypatch)
@@ -159,34 +161,36 @@ def test_an_absurd_share_is_asked_for_again(change, told):
 
 def test_a_share_far_from_what_a_fine_scan_draws_is_told():
     said = ThicknessAnswer.model_validate({"parts": [HALF]})
-    (warning,) = strange_shares(said, 0.02)
+    (warning,) = strange_share_notes(said, 0.02)
     assert "50%" in warning
     assert "2%" in warning
-    assert not strange_shares(said, 0.3)
+    assert not strange_share_notes(said, 0.3)
 
 
 def test_a_share_goes_to_its_part_and_to_the_piece_that_matters_most():
     said = ThicknessAnswer.model_validate({"parts": [HALF]})
     pieces = (
-        PartWords("handle", "nylon", volume_share=0.6),
-        PartWords("blade", "steel", volume_share=0.4),
+        PartDescription("handle", "nylon", volume_share=0.6),
+        PartDescription("blade", "steel", volume_share=0.4),
     )
-    whole = swollen(PartWords("scissors", "nylon", pieces=pieces), said, "recording")
+    whole = apply_real_shares(
+        PartDescription("scissors", "nylon", pieces=pieces), said, "recording"
+    )
     assert whole.swelling is None
     assert [p.swelling and p.swelling.likely for p in whole.pieces] == [None, 0.5]
-    alone = swollen(PartWords("blade", "steel"), said, "recording").swelling
+    alone = apply_real_shares(PartDescription("blade", "steel"), said, "recording").swelling
     assert alone is not None
     assert (alone.low, alone.likely, alone.high, alone.answered_by) == (0.4, 0.5, 0.6, "recording")
 
 
 def test_an_answer_to_the_old_wording_is_refused_with_one_sentence(tmp_path):
     model = Noting({"parts": []})
-    shown = replace(NOTHING, hollowed=True)
-    subject = Subject("s", "thing", "object", "9 × 9 × 9 cm", drawn=shown)
+    shown = replace(NO_DRAWN_SHAPE, hollowed=True)
+    subject = InterviewSubject("s", "thing", "object", "9 × 9 × 9 cm", drawn=shown)
     for text in (OLD, NEW):
         prompts = {"materials": text.read_text(encoding="utf-8")}
         Interview(model, model, prompts, subject).materials({"thing": ""}, NAMES, {}, shared=False)
     old, new = model.asked
-    record(tmp_path, old, MaterialsAnswer(parts=[]), "nobody")
+    write_recording(tmp_path, old, MaterialsAnswer(parts=[]), "nobody")
     with pytest.raises(UserError, match="are to another wording of the questions"):
-        Recordings(str(tmp_path)).ask(new, MaterialsAnswer)
+        ReplayClient(str(tmp_path)).ask(new, MaterialsAnswer)

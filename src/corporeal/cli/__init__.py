@@ -16,17 +16,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import tyro
 
-from corporeal.cli.assets import verb_assets
-from corporeal.cli.capture import verb_capture
-from corporeal.cli.corpus import verb_corpus
-from corporeal.cli.evaluate import verb_evaluate
-from corporeal.cli.export import verb_export
-from corporeal.cli.grow_masks import verb_masks
+from corporeal.cli.assets_command import command_assets
+from corporeal.cli.capture_command import command_capture
+from corporeal.cli.corpus_command import command_corpus
+from corporeal.cli.evaluate_command import command_evaluate
+from corporeal.cli.export_command import command_export
+from corporeal.cli.masks_command import command_masks
 from corporeal.cli.parse import parse
 from corporeal.cli.run_summary import show_summary
-from corporeal.cli.view import verb_view
+from corporeal.cli.view_command import command_view
 from corporeal.core.errors import UserError
-from corporeal.core.machine import collect_seldom, keep_freed_memory
+from corporeal.core.process_resources import keep_freed_memory, relax_garbage_collection
 from corporeal.core.terminal import console, progress_bars, show_table
 from corporeal.core.version import __version__
 
@@ -44,7 +44,7 @@ MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FI
 
 
 @dataclass(frozen=True)
-class Where:
+class RunFolder:
     """Folder of the run."""
 
     out: Path = Path("runs")
@@ -55,7 +55,7 @@ class Where:
     """Continue an interrupted simulation from its checkpoint instead of starting it again."""
 
 
-def verb_run() -> None:
+def command_run() -> None:
     """Run all verbs on a scene: from files to a film and a report.
 
     SCENE is a model (GLB, glTF, OBJ, PLY, STL, OFF, 3MF, DAE, USD), several of them (each one
@@ -64,67 +64,69 @@ def verb_run() -> None:
     Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
     Results that are up to date are reused.
     """
-    from corporeal.pipeline.settings.all_verbs import Settings
+    from corporeal.pipeline.settings.settings import Settings
 
     @dataclass(frozen=True)
     class Run:
         inputs: Inputs
-        where: Where = Where()
+        where: RunFolder = RunFolder()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
     first = ("detail", "vlm", "annotations", "drop", "things", "out")
-    asked = parse(Run, "run", verb_run.__doc__, first=first)
-    _go(list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where)
+    asked = parse(Run, "run", command_run.__doc__, first=first)
+    _run_stages(
+        list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where
+    )
 
 
-def verb_demo() -> None:
+def command_demo() -> None:
     """Run one of the showcase scenes, end to end; needs no files, no key, no GPU.
 
     The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a
     GLB, and then run like any other.
     """
-    from corporeal.pipeline.settings.all_verbs import Settings
-    from corporeal.showcase.scenes import SCENES, view
+    from corporeal.pipeline.settings.settings import Settings
+    from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS, view_direction
 
-    first = next(iter(SCENES))
+    first = next(iter(SHOWCASE_SCENE_BUILDERS))
 
     @dataclass(frozen=True)
     class Demo:
         scene: tyro.conf.Positional[str] = first
-        where: Where = Where()
+        where: RunFolder = RunFolder()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
     first_options = ("detail", "duration", "quality", "view", "name", "out")
-    words = f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}."
+    words = f"{command_demo.__doc__}\nScenes: {', '.join(SHOWCASE_SCENE_BUILDERS)}."
     asked = parse(Demo, "demo", words, first=first_options)
-    from corporeal.pipeline.runner import kept_showcase
+    from corporeal.pipeline.run_pipeline import write_cached_showcase
 
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
     with console.status("building the scene"):
-        path = kept_showcase(asked.scene, folder / "input")
+        path = write_cached_showcase(asked.scene, folder / "input")
     settings = asked.settings
     if settings.film.view is None:
-        settings = replace(settings, film=replace(settings.film, view=view(asked.scene)))
-    _go([path], folder, settings, where)
+        settings = replace(settings, film=replace(settings.film, view=view_direction(asked.scene)))
+    _run_stages([path], folder, settings, where)
 
 
-def verb_status() -> None:
+def command_status() -> None:
     """Show which verbs of a run are finished, and the time that each took."""
-    from corporeal.pipeline.runner import status
+    from corporeal.pipeline.run_pipeline import stage_states
 
     @dataclass(frozen=True)
     class Status:
         run: Folder
 
-    rows = status(parse(Status, "status", verb_status.__doc__).run)
+    rows = stage_states(parse(Status, "status", command_status.__doc__).run)
     show_table(
         ("verb", "state", "seconds"),
         [(r.verb, r.state, "" if r.seconds is None else f"{r.seconds:.1f}") for r in rows],
     )
 
 
-def verb_materials() -> None:
+def command_materials() -> None:
     """Show the measured library: `materials`, `materials show NAME`, `materials check FILE`."""
     from corporeal import materials
 
@@ -135,13 +137,13 @@ def verb_materials() -> None:
         """"default", "reference" (the 22 materials as first published), or the path of a TOML
         file."""
 
-    asked = parse(Menu, "materials", verb_materials.__doc__)
+    asked = parse(Menu, "materials", command_materials.__doc__)
     if not asked.words:
-        print(materials.menu(asked.library))
+        print(materials.list_materials(asked.library))
     elif asked.words[0] == "show" and len(asked.words) == 2:
-        print(materials.show(asked.words[1], asked.library))
+        print(materials.describe_material(asked.words[1], asked.library))
     elif asked.words[0] == "check" and len(asked.words) == 2:
-        problems = materials.check(Path(asked.words[1]))
+        problems = materials.check_library(Path(asked.words[1]))
         if problems:
             count = "a mistake" if len(problems) == 1 else f"{len(problems)} mistakes"
             lines = [f"{asked.words[1]} has {count}:", *map(str, problems)]
@@ -151,23 +153,23 @@ def verb_materials() -> None:
         raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
 
 
-def verb_doctor() -> None:
+def command_doctor() -> None:
     """Check engines, libraries, encoder and keys on this machine, with advice."""
-    from corporeal.cli.doctor import examine
+    from corporeal.cli.doctor import check_installation
 
-    parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
+    parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", command_doctor.__doc__)
     show_table(
         ("", "", "found", "advice"),
-        [("✓" if f.works else "–", f.what, f.found, f.advice) for f in examine()],
+        [("✓" if f.works else "–", f.what, f.found, f.advice) for f in check_installation()],
     )
 
 
-def _again(verb: str) -> Callable[[], None]:
+def _redo_command(verb: str) -> Callable[[], None]:
     def redo() -> None:
-        from corporeal.pipeline.runner import Settings, reopen
+        from corporeal.pipeline.run_pipeline import Settings, read_run_request
 
         known = verb in Settings.__dataclass_fields__
-        kept = reopen(Path(sys.argv[2])).settings if _names_a_run() else Settings()
+        kept = read_run_request(Path(sys.argv[2])).settings if _names_a_run() else Settings()
         config: Any = getattr(kept, verb, None)
 
         @dataclass(frozen=True)
@@ -184,35 +186,39 @@ def _again(verb: str) -> Callable[[], None]:
                 )
             )
         words = f"Redo `{verb}` of a run with other settings, and all verbs after it."
-        asked = parse(shape, verb, words, first=FIRST.get(verb, ()))
-        before = reopen(asked.run)
+        asked = parse(shape, verb, words, first=FIRST_OPTIONS.get(verb, ()))
+        before = read_run_request(asked.run)
         settings = before.settings
         if known:
             settings = replace(settings, **{verb: asked.config})
-        _go(before.inputs, asked.run, settings, Where(), verb, again=True)
+        _run_stages(before.inputs, asked.run, settings, RunFolder(), verb, again=True)
 
     redo.__doc__ = f"Redo `{verb}` of a run with other settings."
     return redo
 
 
-def verb_assemble() -> None:
+def command_assemble() -> None:
     """Compose a scene at rest from a pool of models, or redo `assemble` of a run."""
-    from corporeal.cli.assemble import compose_from_pool
+    from corporeal.cli.assemble_command import compose_from_pool
 
-    return _again("assemble")() if _names_a_run() else compose_from_pool()
+    return _redo_command("assemble")() if _names_a_run() else compose_from_pool()
 
 
-def verb_simulate() -> None:
+def command_simulate() -> None:
     """Redo `simulate` of a run with other settings, or over the ranges: --samples N.
 
     With --samples N an ensemble is simulated beside the run's own simulation: N sets of values are
     drawn from the measured ranges and the stated alternatives. ensemble.json and ensemble.png in
     the run's folder hold the spread of rebounds, dents and displacements.
     """
-    from corporeal.pipeline.runner import reopen
+    from corporeal.pipeline.run_pipeline import read_run_request
     from corporeal.pipeline.stages.simulate import SimulateConfig
 
-    known = reopen(Path(sys.argv[2])).settings.simulate if _names_a_run() else SimulateConfig()
+    known = (
+        read_run_request(Path(sys.argv[2])).settings.simulate
+        if _names_a_run()
+        else SimulateConfig()
+    )
 
     @dataclass(frozen=True)
     class Simulate:
@@ -223,89 +229,98 @@ def verb_simulate() -> None:
         """Seed of the ensemble."""
         config: SimulateConfig = known
 
-    asked = parse(Simulate, "simulate", verb_simulate.__doc__)
+    asked = parse(Simulate, "simulate", command_simulate.__doc__)
     if asked.samples is not None:
         return _spread(asked)
-    before = reopen(asked.run)
+    before = read_run_request(asked.run)
     settings = replace(before.settings, simulate=asked.config)
-    _go(before.inputs, asked.run, settings, Where(), "simulate", again=True)
+    _run_stages(before.inputs, asked.run, settings, RunFolder(), "simulate", again=True)
 
 
 def _spread(asked: Any) -> None:
     """Simulate an ensemble, and show the spread of its outcomes."""
-    from corporeal.lab.evaluation import spread_report
-    from corporeal.lab.evaluation.ensemble import ensemble
+    from corporeal.lab.evaluation import ensemble_report
+    from corporeal.lab.evaluation.outcome_ensemble import simulate_ensemble
 
     with progress_bars() as tell:
-        result = ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
-    show_table(spread_report.HEADS, spread_report.rows(result))
-    spread_report.spread_figure(result, asked.run / "ensemble.png")
+        result = simulate_ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
+    show_table(ensemble_report.SPREAD_HEADS, ensemble_report.spread_rows(result))
+    ensemble_report.spread_figure(result, asked.run / "ensemble.png")
     written = (asked.run / name for name in ("ensemble.json", "ensemble.png"))
-    print(*spread_report.failures(result), *written, sep="\n")
+    print(*ensemble_report.failed_members(result), *written, sep="\n")
 
 
 def _names_a_run() -> bool:
     return len(sys.argv) > 2 and (Path(sys.argv[2]) / "run.json").exists()
 
 
-VERBS: dict[str, Callable[[], None]] = {
-    "demo": verb_demo,
-    "run": verb_run,
-    "view": verb_view,
-    "status": verb_status,
-    "materials": verb_materials,
-    "assets": verb_assets,
-    "capture": verb_capture,
-    "masks": verb_masks,
-    "export": verb_export,
-    "corpus": verb_corpus,
-    "evaluate": verb_evaluate,
-    "doctor": verb_doctor,
+COMMANDS: dict[str, Callable[[], None]] = {
+    "demo": command_demo,
+    "run": command_run,
+    "view": command_view,
+    "status": command_status,
+    "materials": command_materials,
+    "assets": command_assets,
+    "capture": command_capture,
+    "masks": command_masks,
+    "export": command_export,
+    "corpus": command_corpus,
+    "evaluate": command_evaluate,
+    "doctor": command_doctor,
 }
-FIRST = {
+FIRST_OPTIONS = {
     "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
     "assemble": ("drop", "lift", "velocity", "extent", "stack", "duration"),
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
     "film": ("quality", "width", "height", "speed", "view", "colour-by"),
 }
 """Options of a verb that come first in its help; of few options all do."""
-REDO = ("reconstruct", "assemble", "describe", "segment", "ground", "fill", "simulate", "film")
-REDO = (*REDO, "report")
-VERBS |= {verb: _again(verb) for verb in REDO}
-VERBS |= {"assemble": verb_assemble, "simulate": verb_simulate}
+REDO_COMMANDS = (
+    "reconstruct",
+    "assemble",
+    "describe",
+    "segment",
+    "ground",
+    "fill",
+    "simulate",
+    "film",
+)
+REDO_COMMANDS = (*REDO_COMMANDS, "report")
+COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
+COMMANDS |= {"assemble": command_assemble, "simulate": command_simulate}
 
 
 # ---------------------------------------------------------------- how a verb is done
 
 
-def _folder(where: Where, inputs: list[Path]) -> Path:
-    return where.out / (where.name or "-".join(map(_called, inputs[:3])) or "scene")
+def _folder(where: RunFolder, inputs: list[Path]) -> Path:
+    return where.out / (where.name or "-".join(map(_scene_name, inputs[:3])) or "scene")
 
 
-def _called(path: Path) -> str:
+def _scene_name(path: Path) -> str:
     """Return a scene's name: a file's own, but of the many that are scene.toml their folder's."""
-    from corporeal.io.sources import called
+    from corporeal.io.input_files import scene_name
 
-    return path.resolve().parent.name if path.name == "scene.toml" else called(path)
+    return path.resolve().parent.name if path.name == "scene.toml" else scene_name(path)
 
 
-def _go(
+def _run_stages(
     inputs: list[Path],
     folder: Path,
     settings: Any,
-    where: Where,
+    where: RunFolder,
     until: str = "report",
     again: bool = False,
 ) -> None:
     """Do every verb up to ``until``, that one ``again`` even where its settings are the same."""
-    from corporeal.cli.validate import validate
-    from corporeal.pipeline.runner import forget_simulation, outdate, run
+    from corporeal.cli.validate_settings import validate_settings
+    from corporeal.pipeline.run_pipeline import delete_simulation, invalidate_stage, run
 
-    validate(folder, settings)
+    validate_settings(folder, settings)
     if again:
-        outdate(folder, until)
+        invalidate_stage(folder, until)
     if not where.resume:
-        forget_simulation(folder)
+        delete_simulation(folder)
     with progress_bars() as tell:
         run(inputs, folder, settings, tell, until)
     if until == "report":
@@ -321,7 +336,7 @@ def _usage() -> str:
         f"corporeal {__version__}: measured materials for 3D scenes, and their simulation.",
         "",
     ]
-    for name, verb in VERBS.items():
+    for name, verb in COMMANDS.items():
         first = (verb.__doc__ or "").strip().splitlines()[0]
         lines.append(f"  corporeal {name:10} {first}")
     return "\n".join([*lines, "", "Options of a verb: corporeal VERB --help"])
@@ -334,34 +349,34 @@ def main() -> None:
         print(_usage())
     elif verb == "--version":
         print(__version__)
-    elif verb not in VERBS:
-        sys.exit(_complain(f"Unknown verb {verb!r}. Choose one of: {', '.join(VERBS)}."))
+    elif verb not in COMMANDS:
+        sys.exit(_report_error(f"Unknown verb {verb!r}. Choose one of: {', '.join(COMMANDS)}."))
     else:
-        sys.exit(_do(VERBS[verb]))
+        sys.exit(_run_command(COMMANDS[verb]))
 
 
-def _do(verb: Callable[[], None]) -> int:
+def _run_command(verb: Callable[[], None]) -> int:
     """Return the exit code: 0, 1 a mistake of ours, 2 the person's, 130 stopped."""
     keep_freed_memory()
-    collect_seldom()
+    relax_garbage_collection()
     try:
         verb()
         return 0
     except UserError as error:
-        return _complain(str(error), getattr(error, "__notes__", ()))
+        return _report_error(str(error), getattr(error, "__notes__", ()))
     except KeyboardInterrupt:
-        _complain("Stopped. What was finished is kept: the same command goes on from there.")
+        _report_error("Stopped. What was finished is kept: the same command goes on from there.")
         return 130
     except BrokenPipeError:  # `corporeal materials | head`: nobody listens any more
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except MemoryError:
-        return _complain("Out of memory. Use --detail draft, or a smaller scene.")
+        return _report_error("Out of memory. Use --detail draft, or a smaller scene.")
     except Exception as error:  # our own mistake: the details go to a file, not to the person
-        return _confess(error)
+        return _report_crash(error)
 
 
-def _complain(message: str, notes: Sequence[str] = ()) -> int:
+def _report_error(message: str, notes: Sequence[str] = ()) -> int:
     """Print what went wrong in a line, and in one each what was noticed before."""
     print(f"corporeal: {message}", file=sys.stderr)
     for note in dict.fromkeys(notes):
@@ -369,7 +384,7 @@ def _complain(message: str, notes: Sequence[str] = ()) -> int:
     return 2
 
 
-def _confess(error: Exception) -> int:
+def _report_crash(error: Exception) -> int:
     path = Path("corporeal-crash.txt")
     path.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
     print(

@@ -9,11 +9,11 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 from corporeal.core.version import __version__
 
-KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
-LIBRARIES = {
+API_KEY_VARIABLES = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
+LIBRARY_USES = {
     "embreex": "films and pictures",
     "igl": "filling of meshes",
     "DracoPy": "Draco files",
@@ -22,11 +22,11 @@ LIBRARIES = {
     "lxml": "meshes in 3MF and DAE",
     "collada": "meshes in DAE",
 }
-PACKAGES = {"igl": "libigl", "pxr": "usd-core", "collada": "pycollada"}
+PACKAGE_OF_MODULE = {"igl": "libigl", "pxr": "usd-core", "collada": "pycollada"}
 
 
 @dataclass(frozen=True)
-class Finding:
+class CheckResult:
     """One line of the examination."""
 
     what: str
@@ -36,19 +36,27 @@ class Finding:
     """What to do, or what would be gained; empty when there is nothing to say."""
 
 
-def examine() -> list[Finding]:
+def check_installation() -> list[CheckResult]:
     """Look at everything; a broken piece is a finding, never an exception."""
-    checks: list[Callable[[], list[Finding]]] = [_machine, _engines, _libraries, _encoder, _keys]
+    checks: list[Callable[[], list[CheckResult]]] = [
+        _machine,
+        _engines,
+        _libraries,
+        _encoder,
+        _keys,
+    ]
     return [finding for check in checks for finding in check()]
 
 
-def _machine() -> list[Finding]:
+def _machine() -> list[CheckResult]:
     system = f"corporeal {__version__}, Python {platform.python_version()}, {platform.platform()}"
     free = shutil.disk_usage(".").free / 1e9
     return [
-        Finding("system", True, system),
-        Finding("processor", True, _cores(cores(), os.cpu_count() or 1)),
-        Finding("disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."),
+        CheckResult("system", True, system),
+        CheckResult("processor", True, _cores(usable_cores(), os.cpu_count() or 1)),
+        CheckResult(
+            "disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."
+        ),
     ]
 
 
@@ -58,50 +66,50 @@ def _cores(used: int, all_of_them: int) -> str:
     return said if used >= all_of_them else f"{said} of the {all_of_them} that the machine has"
 
 
-def _engines() -> list[Finding]:
+def _engines() -> list[CheckResult]:
     try:
         from corporeal.mpm.cpu.program import wp  # started without its word about cards on stderr
 
-        cards = [_card(device) for device in wp.get_cuda_devices()]
+        cards = [_gpu(device) for device in wp.get_cuda_devices()]
     except Exception as error:  # whatever is broken in a native library belongs in the table
-        return [Finding("cpu engine", False, str(error), "Reinstall: pip install warp-lang.")]
+        return [CheckResult("cpu engine", False, str(error), "Reinstall: pip install warp-lang.")]
     gpu = ", ".join(cards) or "no CUDA card: simulations run on the processor"
     use = "Simulate on it with --engine cuda." if cards else "Not needed."
     return [
-        Finding("cpu engine", True, f"Warp {version('warp-lang')}, on the processor"),
-        Finding("GPU", bool(cards), gpu, use),
-        Finding("reference engine", True, "NumPy, slow: for checking"),
+        CheckResult("cpu engine", True, f"Warp {version('warp-lang')}, on the processor"),
+        CheckResult("GPU", bool(cards), gpu, use),
+        CheckResult("reference engine", True, "NumPy, slow: for checking"),
     ]
 
 
-def _card(device: Any) -> str:
+def _gpu(device: Any) -> str:
     return f"{device.name} (sm_{device.arch}, {device.total_memory / 2**30:.0f} GB)"
 
 
-def _libraries() -> list[Finding]:
-    return [_library(module, use) for module, use in LIBRARIES.items()]
+def _libraries() -> list[CheckResult]:
+    return [_library(module, use) for module, use in LIBRARY_USES.items()]
 
 
-def _library(module: str, use: str) -> Finding:
-    package = PACKAGES.get(module, module)
+def _library(module: str, use: str) -> CheckResult:
+    package = PACKAGE_OF_MODULE.get(module, module)
     try:
-        return Finding(package, find_spec(module) is not None, f"{version(package)}, for {use}")
+        return CheckResult(package, find_spec(module) is not None, f"{version(package)}, for {use}")
     except PackageNotFoundError:
-        return Finding(package, False, "missing", f"pip install {package} (for {use}).")
+        return CheckResult(package, False, "missing", f"pip install {package} (for {use}).")
 
 
-def _encoder() -> list[Finding]:
+def _encoder() -> list[CheckResult]:
     try:
         import imageio_ffmpeg
 
         path = imageio_ffmpeg.get_ffmpeg_version()
     except Exception as error:  # as above
-        return [Finding("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
-    return [Finding("ffmpeg", True, f"{path}, a separate program, for films")]
+        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
+    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for films")]
 
 
-def _keys() -> list[Finding]:
-    present = [name for name in KEYS if os.environ.get(name)]
+def _keys() -> list[CheckResult]:
+    present = [name for name in API_KEY_VARIABLES if os.environ.get(name)]
     found = ", ".join(present) or "no API key in the environment"
     advice = (
         "Only to ask a model what objects are made of (--vlm openai:MODEL). Without one there are "
@@ -114,6 +122,6 @@ def _keys() -> list[Finding]:
         "" if installed else "pip install 'corporeal[models]', to ask models over the network."
     )
     return [
-        Finding("model client", installed, client, install),
-        Finding("model keys", bool(present), found, "" if present else advice),
+        CheckResult("model client", installed, client, install),
+        CheckResult("model keys", bool(present), found, "" if present else advice),
     ]

@@ -14,7 +14,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
-FIRST = 6
+OPTIONS_BEFORE_MORE = 6
 """So many options stand before the others."""
 
 
@@ -44,7 +44,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Layout:
+class HelpLayout:
     """Headings of the help, and the way back from what was typed to the settings."""
 
     shape: Any
@@ -69,7 +69,7 @@ class Layout:
         return kind(**values)
 
 
-def lay_out(kind: type, first: Sequence[str] = ()) -> Layout:
+def lay_out(kind: type, first: Sequence[str] = ()) -> HelpLayout:
     """Deal out options to headings.
 
     Args:
@@ -83,9 +83,9 @@ def lay_out(kind: type, first: Sequence[str] = ()) -> Layout:
     """
     options = options_of(kind)
     named = {option.name: option for option in options if not option.positional}
-    if len(named) <= FIRST:
+    if len(named) <= OPTIONS_BEFORE_MORE:
         first = list(named)
-    elif not 0 < len(first) <= FIRST or not set(first) <= set(named):
+    elif not 0 < len(first) <= OPTIONS_BEFORE_MORE or not set(first) <= set(named):
         raise ValueError(f"{kind.__name__}: of {sorted(named)}, {list(first)} cannot come first.")
     top = [option for option in options if option.positional] + [named[name] for name in first]
     slots = {option.path: (option.path[-1],) for option in top}
@@ -99,7 +99,7 @@ def lay_out(kind: type, first: Sequence[str] = ()) -> Layout:
             heading = "_".join(("more", *path))
             slots |= {option.path: (heading, option.path[-1]) for option in group}
             rows.append(_heading(heading, path, group))
-    return Layout(make_dataclass(kind.__name__, rows, frozen=True), kind, slots)
+    return HelpLayout(make_dataclass(kind.__name__, rows, frozen=True), kind, slots)
 
 
 def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> list[Option]:
@@ -136,7 +136,7 @@ def _heading(name: str, path: tuple[str, ...], group: list[Option]) -> tuple[str
 
 def _row(option: Option) -> tuple[Any, ...]:
     """Return an option as a field with its help."""
-    words = documented(option.kind).get(option.path[-1], "")
+    words = field_docstrings(option.kind).get(option.path[-1], "")
     annotation = option.annotation
     if words:
         annotation = Annotated[annotation, tyro.conf.arg(help=words)]
@@ -145,7 +145,7 @@ def _row(option: Option) -> tuple[Any, ...]:
     return option.path[-1], annotation, field(default_factory=lambda: option.default)
 
 
-def documented(kind: type) -> dict[str, str]:
+def field_docstrings(kind: type) -> dict[str, str]:
     """Return the strings that stand below the fields of a dataclass in its source."""
     found: dict[str, str] = {}
     for one in reversed(kind.__mro__[:-1]):

@@ -34,7 +34,7 @@ def parse(
     return layout.settings(typed)
 
 
-def do_second_word(verb: str, verbs: Mapping[str, Callable[[], None]]) -> None:
+def run_subcommand(verb: str, verbs: Mapping[str, Callable[[], None]]) -> None:
     """Do what the second word of the command line says, or list the words there are.
 
     Raises:

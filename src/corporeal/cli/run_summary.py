@@ -6,40 +6,46 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from corporeal.core.findings import Breakage, PartAudit
+from corporeal.core.audit_data import PartAudit, PredictedBreakage
 from corporeal.core.terminal import console, print_line, print_table
 from corporeal.simulation.audit_file import read_run_audit
-from corporeal.simulation.audit_words import breakage_words
-from corporeal.simulation.closing_words import DOUBT, LEFT_OUT, Section, closing_words, parted
+from corporeal.simulation.audit_messages import breakage_message
+from corporeal.simulation.summary_text import (
+    LEFT_OUT_SECTION,
+    WARNINGS_SECTION,
+    SummarySection,
+    split_advice,
+    summary_sections,
+)
 
-MOST_PARTS = 12
+MAX_PART_ROWS = 12
 """Rows of the table; a scene of more parts is in the report."""
-MOST_WARNINGS = 5
+MAX_SENTENCES_PER_SECTION = 5
 """Sentences of a section that are printed whole."""
-MOST_BLOWS = 3
+MAX_LISTED_IMPACTS = 3
 """Blows that may break something and are printed."""
-HEADS = ("object", "part", "material", "mass", "simulated as")
+TABLE_HEADS = ("object", "part", "material", "mass", "simulated as")
 
 
 def show_summary(folder: Path) -> None:
     """Print what the parts of a finished run were taken for, and what it says last, by weight."""
     audit = read_run_audit(folder)
     rows = [_row(part) for part in audit.parts]
-    print_table(HEADS, rows[:MOST_PARTS], console)
-    if len(rows) > MOST_PARTS:
-        print_line(f"and {len(rows) - MOST_PARTS} parts more: see the report.")
-    for section, sentences in closing_words(audit).items():
+    print_table(TABLE_HEADS, rows[:MAX_PART_ROWS], console)
+    if len(rows) > MAX_PART_ROWS:
+        print_line(f"and {len(rows) - MAX_PART_ROWS} parts more: see the report.")
+    for section, sentences in summary_sections(audit).items():
         _listed(section, sentences)
-    _breaking(audit.breakage)
+    _breakage_sentences(audit.breakage)
 
 
-def _breaking(found: Sequence[Breakage]) -> None:
+def _breakage_sentences(found: Sequence[PredictedBreakage]) -> None:
     """Say what the film shows whole although it would break, and how to see it break."""
     doubted = [b for b in found if b.word != "holds" and not b.pieces]
-    for blow in doubted[:MOST_BLOWS]:
-        _say("hint", breakage_words(blow))
-    if len(doubted) > MOST_BLOWS:
-        print_line(f"and {len(doubted) - MOST_BLOWS} more that may break: see the report.")
+    for blow in doubted[:MAX_LISTED_IMPACTS]:
+        _say("hint", breakage_message(blow))
+    if len(doubted) > MAX_LISTED_IMPACTS:
+        print_line(f"and {len(doubted) - MAX_LISTED_IMPACTS} more that may break: see the report.")
     if any(b.word == "would break" for b in doubted):
         _say("hint", "with --breaking what would break falls into pieces.")
 
@@ -48,13 +54,13 @@ def _row(part: PartAudit) -> tuple[str, ...]:
     return (part.object or "", part.name, part.material, f"{part.mass_kg:.3g} kg", part.treatment)
 
 
-def _listed(section: Section, sentences: Sequence[str]) -> None:
-    for sentence in sentences[:MOST_WARNINGS]:
+def _listed(section: SummarySection, sentences: Sequence[str]) -> None:
+    for sentence in sentences[:MAX_SENTENCES_PER_SECTION]:
         _say(section.word, sentence)
-    more = len(sentences) - MOST_WARNINGS
+    more = len(sentences) - MAX_SENTENCES_PER_SECTION
     if more > 0:
         what = section.word if more == 1 else section.several
-        what = f"more {what}" if section is LEFT_OUT else f"{what} more"
+        what = f"more {what}" if section is LEFT_OUT_SECTION else f"{what} more"
         print_line(f"and {more} {what}: see the report.")
 
 
@@ -63,8 +69,8 @@ def _say(word: str, sentences: str) -> None:
     if not console.is_terminal:
         print_line(f"{word}: {sentences}")
         return
-    first, rest = parted(sentences)
+    first, rest = split_advice(sentences)
     row = Table.grid(padding=(0, 1))
-    style = "bold yellow" if word == DOUBT.word else "bold"
+    style = "bold yellow" if word == WARNINGS_SECTION.word else "bold"
     row.add_row(Text(f"{word}:", style), Text.assemble(first, " ", (rest, "dim")))
     console.print(row)

@@ -13,7 +13,7 @@ class UserError(Exception):
 
 
 @contextmanager
-def noticed(before: Iterable[str]) -> Iterator[None]:
+def notes_on_error(before: Iterable[str]) -> Iterator[None]:
     """Add what was noticed before, in sentences, to an error of the user's that ends the block."""
     try:
         yield
@@ -29,7 +29,7 @@ def with_notes(error: UserError, before: Iterable[str]) -> UserError:
     return error
 
 
-NEAR = 3
+MAX_SUGGESTED_CHOICES = 3
 """Most choices that are named as what may have been meant."""
 
 
@@ -37,7 +37,7 @@ class UnknownChoiceError(UserError):
     """A name that is not on the menu."""
 
     def __init__(self, kind: str, given: str, menu: list[str], near: Sequence[str] = ()) -> None:
-        near = near or get_close_matches(given, menu, NEAR)
+        near = near or get_close_matches(given, menu, MAX_SUGGESTED_CHOICES)
         meant = f" Did you mean {' or '.join(near)}?" if near else ""
         every = f"Choose one of: {', '.join(sorted(menu))}."
         super().__init__(f"Unknown {kind} {given!r}. {every}{meant}")

@@ -6,7 +6,7 @@ Progress = Callable[[float, str], None]
 """Told the fraction done and what is being done."""
 
 
-def within(progress: Progress, begin: float, end: float, what: str = "") -> Progress:
+def subprogress(progress: Progress, begin: float, end: float, what: str = "") -> Progress:
     """Tell of a part of the work as of the whole.
 
     Args:

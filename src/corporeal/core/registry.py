@@ -7,7 +7,7 @@ from typing import Any
 from corporeal.core.errors import UnknownChoiceError, UserError
 
 
-def load(kind: str, name: str, menu: Mapping[str, str]) -> Any:
+def load_backend(kind: str, name: str, menu: Mapping[str, str]) -> Any:
     """Return the class or function that ``menu`` lists under ``name``.
 
     Args:

@@ -25,18 +25,18 @@ from typing import IO, Any, get_type_hints
 import numpy as np
 
 from corporeal.core import types
+from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.core.typed import typed
 from corporeal.core.types import Note, NoteKind
 from corporeal.core.version import __version__
 
-META = "meta.json"
-DATA = "data.npz"
-TREE = "tree"
-LOCK = ".lock"
-CACHE = "CORPOREAL_CACHE"
+META_FILE = "meta.json"
+DATA_FILE = "data.npz"
+TREE_ARRAY = "tree"
+LOCK_FILE = ".lock"
+CACHE_VARIABLE = "CORPOREAL_CACHE"
 """Environment variable that names the folder of what is kept outside of runs."""
-KNOWN: dict[str, Any] = {
+STORABLE_TYPES: dict[str, Any] = {
     name: kind
     for name, kind in vars(types).items()
     if isinstance(kind, type) and kind.__module__.startswith(f"{types.__name__}.")
@@ -48,7 +48,7 @@ class DiskError(UserError):
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def disk_errors(path: Path) -> Iterator[None]:
     """Turn a failure to write below ``path`` into one clear sentence.
 
     Raises:
@@ -77,7 +77,7 @@ def writing(path: Path) -> Iterator[None]:
         ) from error
 
 
-def require_room(folder: Path, needed: int) -> None:
+def require_disk_space(folder: Path, needed: int) -> None:
     """Refuse to begin what the disk cannot hold.
 
     Args:
@@ -102,7 +102,7 @@ def _megabytes(size: int) -> str:
 
 
 @contextmanager
-def alone(folder: Path, patience: float = 0.0) -> Iterator[None]:
+def lock_folder(folder: Path, patience: float = 0.0) -> Iterator[None]:
     """Keep other processes out of a run's folder; a process that dies lets go of it.
 
     Args:
@@ -114,9 +114,9 @@ def alone(folder: Path, patience: float = 0.0) -> Iterator[None]:
 
     """
     try:
-        with writing(folder):
+        with disk_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
-            lock = (folder / LOCK).open("a+", encoding="utf-8")
+            lock = (folder / LOCK_FILE).open("a+", encoding="utf-8")
     except FileNotFoundError as error:
         what = "no folder can be made there. Choose another one with --out"
         raise DiskError(f"Cannot write {folder}: {what}.") from error
@@ -127,7 +127,7 @@ def alone(folder: Path, patience: float = 0.0) -> Iterator[None]:
                 f"Another corporeal (process {lock.read().strip() or 'unknown'}) works in {folder}."
                 " Wait until it is done, or choose another folder with --name or --out."
             )
-        with writing(folder):
+        with disk_errors(folder):
             lock.truncate(0)
             lock.write(str(os.getpid()))
             lock.flush()
@@ -148,7 +148,7 @@ def _locked(lock: IO[str], patience: float) -> bool:
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file so that it is either whole or absent."""
-    with writing(path):
+    with disk_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
@@ -165,8 +165,8 @@ def write_bytes(path: Path, data: bytes) -> None:
 def whole_folder(folder: Path) -> Iterator[Path]:
     """Fill a folder that appears whole or not at all; what was there before goes only then.
 
-    The caller keeps others out of the folder above (``alone``): what a killed process left there is
-    removed.
+    The caller keeps others out of the folder above (``lock_folder``): what a killed process left
+    there is removed.
 
     Yields:
         An empty folder to write into.
@@ -174,7 +174,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
     """
     partial = folder.with_name(f".{folder.name}.part")
     before = folder.with_name(f".{folder.name}.before")
-    with writing(folder):
+    with disk_errors(folder):
         if before.exists() and not folder.exists():
             before.rename(folder)  # killed between the two renamings below
         for left in (partial, before):
@@ -192,7 +192,7 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 
 def write_json(path: Path, value: Any) -> None:
     """Write JSON that any parser reads: no NaN, no infinity."""
-    text = json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(to_plain(value), indent=1, ensure_ascii=False, allow_nan=False)
     write_bytes(path, text.encode())
 
 
@@ -209,24 +209,24 @@ def read_json(path: Path) -> Any:
         raise BadFileError(path, f"cannot be read as JSON ({error}).", "Delete it.") from error
 
 
-def plain(value: Any) -> Any:
+def to_plain(value: Any) -> Any:
     """Turn arrays, enums, paths and dataclasses into what JSON knows; not finite becomes null."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+        return {f.name: to_plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
+        return {str(k): to_plain(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(v) for v in value]
-    return _plain_leaf(value)
+        return [to_plain(v) for v in value]
+    return _to_plain_leaf(value)
 
 
-def _plain_leaf(value: Any) -> Any:
+def _to_plain_leaf(value: Any) -> Any:
     if isinstance(value, Enum):
         return value.name.lower()
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, np.ndarray):
-        return plain(value.tolist())
+        return to_plain(value.tolist())
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not np.isfinite(value):
@@ -241,11 +241,11 @@ def save(path: Path, value: Any) -> None:
     """Save any value made of the types in ``types``, containers, arrays and numbers."""
     arrays: dict[str, Any] = {}
     tree = json.dumps(_encode(value, arrays), allow_nan=True)
-    with writing(path):
+    with disk_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{os.getpid()}.part.npz")
         try:
-            np.savez(partial, **{TREE: np.frombuffer(tree.encode(), np.uint8)}, **arrays)
+            np.savez(partial, **{TREE_ARRAY: np.frombuffer(tree.encode(), np.uint8)}, **arrays)
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)
@@ -260,7 +260,7 @@ def load(path: Path) -> Any:
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            tree = json.loads(bytes(file[TREE]).decode())
+            tree = json.loads(bytes(file[TREE_ARRAY]).decode())
             return _decode(tree, file)
     except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
         raise BadFileError(
@@ -305,13 +305,13 @@ def _decode(tree: dict, arrays: Any) -> Any:
         return Path(tree["path"])
     if "note" in tree:
         return Note(tree["note"], NoteKind[tree["kind"]], tree["size_of"])
-    kind = KNOWN[tree["type"]]
+    kind = STORABLE_TYPES[tree["type"]]
     if "member" in tree:
         return kind[tree["member"]]
-    return _built(kind, {k: _decode(v, arrays) for k, v in tree["fields"].items()})
+    return _build_dataclass(kind, {k: _decode(v, arrays) for k, v in tree["fields"].items()})
 
 
-def _built(kind: type, given: dict[str, Any]) -> Any:
+def _build_dataclass(kind: type, given: dict[str, Any]) -> Any:
     """Make a dataclass; where an older version kept a dictionary, make what it is now.
 
     What a type no longer has is left out.
@@ -319,7 +319,7 @@ def _built(kind: type, given: dict[str, Any]) -> Any:
     hints = get_type_hints(kind)
     given = {name: value for name, value in given.items() if name in hints}
     now = {
-        name: typed(hints[name], value)
+        name: from_plain(hints[name], value)
         for name, value in given.items()
         if isinstance(value, dict) and is_dataclass(hints.get(name))
     }
@@ -329,36 +329,36 @@ def _built(kind: type, given: dict[str, Any]) -> Any:
 # ---------------------------------------------------------------- stage folders
 
 
-LATER = {"later": True}
+ADDED_LATER = {"later": True}
 """Metadata of a setting that was added when results were already kept under names."""
 
 
-def kept(config: Any) -> Any:
+def settings_for_key(config: Any) -> Any:
     """Return settings as results are named by them.
 
-    What was added ``LATER`` is left out at its default: results from before keep their names.
+    What was added ``ADDED_LATER`` is left out at its default: results from before keep their names.
     """
     if is_dataclass(config) and not isinstance(config, type):
         told = [(f, getattr(config, f.name)) for f in fields(config)]
         return {
-            f.name: kept(value)
+            f.name: settings_for_key(value)
             for f, value in told
             if "later" not in f.metadata or value != f.default
         }
     if isinstance(config, Mapping):
-        return {str(k): kept(v) for k, v in config.items()}
+        return {str(k): settings_for_key(v) for k, v in config.items()}
     if isinstance(config, list | tuple):
-        return [kept(v) for v in config]
-    return plain(config)
+        return [settings_for_key(v) for v in config]
+    return to_plain(config)
 
 
-def key(stage: str, config: Any, inputs: list[str]) -> str:
+def result_key(stage: str, config: Any, inputs: list[str]) -> str:
     """Name a result by all it depends on: the stage, its configuration, what came before."""
-    text = json.dumps([__version__, stage, kept(config), inputs], sort_keys=True)
+    text = json.dumps([__version__, stage, settings_for_key(config), inputs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
-def digest(path: Path) -> str:
+def path_digest(path: Path) -> str:
     """Name a file, or a folder's files, by content."""
     files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
     total = hashlib.sha256()
@@ -371,8 +371,8 @@ def digest(path: Path) -> str:
 
 
 def cache_folder(kind: str) -> Path:
-    """Return where things of a kind are kept for all runs: as ``CACHE`` says, or the system's."""
-    chosen = os.environ.get(CACHE)
+    """Return where things of a kind are kept for all runs: as ``CACHE_VARIABLE`` says, or the system's."""
+    chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen).expanduser() / kind
     if sys.platform == "darwin":
@@ -385,7 +385,7 @@ def cache_folder(kind: str) -> Path:
 
 
 @dataclass(frozen=True)
-class Meta:
+class ResultMeta:
     """What stands beside a finished result."""
 
     key: str = ""
@@ -400,43 +400,45 @@ class Meta:
     """Names the state of the package's code that made it; empty: older than this entry."""
 
 
-def read_meta(folder: Path) -> Meta:
+def read_meta(folder: Path) -> ResultMeta:
     """Read what stands beside the finished result in ``folder``.
 
     Raises:
         BadFileError: The folder holds no finished result, or the file is damaged.
 
     """
-    data = read_json(folder / META)
+    data = read_json(folder / META_FILE)
     if not isinstance(data, dict):
-        raise BadFileError(folder / META, "is no description of a result.", "Remove the folder.")
-    return typed(Meta, data)
+        raise BadFileError(
+            folder / META_FILE, "is no description of a result.", "Remove the folder."
+        )
+    return from_plain(ResultMeta, data)
 
 
-def fresh(folder: Path, wanted: str) -> bool:
+def is_fresh(folder: Path, wanted: str) -> bool:
     """Whether ``folder`` holds the finished result named ``wanted``."""
-    return (folder / META).exists() and read_meta(folder).key == wanted
+    return (folder / META_FILE).exists() and read_meta(folder).key == wanted
 
 
-def finish(folder: Path, wanted: str, config: Any, seconds: float) -> None:
+def finish_result(folder: Path, wanted: str, config: Any, seconds: float) -> None:
     """Declare the folder finished."""
-    made = Meta(wanted, config, round(seconds, 3), __version__, source())
-    write_json(folder / META, made)
+    made = ResultMeta(wanted, config, round(seconds, 3), __version__, source_digest())
+    write_json(folder / META_FILE, made)
 
 
 @cache
-def source() -> str:
+def source_digest() -> str:
     """Name the state of this package's code: a digest of all of its files, kernels and data."""
     package = Path(__file__).parents[1]
     total = hashlib.sha256()
     for file in sorted(p for p in package.rglob("*") if p.is_file()):
         if "__pycache__" not in file.parts:
-            total.update(f"{file.relative_to(package)}\n{digest(file)}\n".encode())
+            total.update(f"{file.relative_to(package)}\n{path_digest(file)}\n".encode())
     return total.hexdigest()[:20]
 
 
-def begin(folder: Path) -> None:
+def begin_result(folder: Path) -> None:
     """Declare the folder unfinished."""
-    with writing(folder):
+    with disk_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / META).unlink(missing_ok=True)
+        (folder / META_FILE).unlink(missing_ok=True)

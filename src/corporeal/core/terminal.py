@@ -13,17 +13,17 @@ from rich.table import Table
 
 console = Console(stderr=True)
 
-Tell = Callable[[str], Callable[[float, str], None]]
+ProgressOfStage = Callable[[str], Callable[[float, str], None]]
 """Given a verb, returns whom to tell the fraction done and what is being done."""
 
-EVERY = 30.0
+LOG_INTERVAL_S = 30.0
 """Seconds between two lines of a log on one verb [s]."""
-SOON = 2.0
+LOG_START_DELAY_S = 2.0
 """Seconds after which a log says that a verb began: what is over before then is not worth a line,
 and an error stands alone [s]."""
-TELLS = 0.05
+MIN_FRACTION_FOR_ESTIMATE = 0.05
 """Share of a verb that has to be done while somebody looks before its time left is told [-]."""
-MINUTE, HOUR, BRIEF = 60.0, 3600.0, 90.0
+MINUTE_S, HOUR_S, SHORT_DURATION_S = 60.0, 3600.0, 90.0
 """[s]; what is brief is told in seconds."""
 
 
@@ -53,14 +53,14 @@ def print_line(line: str, where: Console = console) -> None:
 
 
 @contextmanager
-def progress_bars() -> Iterator[Tell]:
+def progress_bars() -> Iterator[ProgressOfStage]:
     """Draw one bar per verb, with the time left; where nobody watches, say it in lines of a log."""
     with _bars() if console.is_terminal else log_lines(console) as tell:
         yield tell
 
 
 @contextmanager
-def _bars() -> Iterator[Tell]:
+def _bars() -> Iterator[ProgressOfStage]:
     columns = (
         TextColumn("[bold]{task.fields[verb]:>9}"),
         BarColumn(30),
@@ -86,7 +86,7 @@ def _bars() -> Iterator[Tell]:
 
 
 @dataclass
-class Doing:
+class StageProgress:
     """How far a verb is."""
 
     verb: str
@@ -105,36 +105,38 @@ class Doing:
 
     def line(self, now: float) -> str:
         """Say how far it is, and how long it will last if it goes on as it did."""
-        left = f", about {lasting(self._left(now))} left" if self._speed(now) > 0 else ""
+        left = f", about {duration_words(self._left(now))} left" if self._speed(now) > 0 else ""
         words = f": {self.words}" if self.words else ""
-        return f"{self.verb} {self.fraction:.0%} after {lasting(now - self.begun)}{left}{words}"
+        return (
+            f"{self.verb} {self.fraction:.0%} after {duration_words(now - self.begun)}{left}{words}"
+        )
 
     def _speed(self, now: float) -> float:
         """Return the share that is done in a second; 0: nobody knows yet [1/s]."""
         since, begun = self.first or (now, 0.0)
         done = self.fraction - begun
-        return done / (now - since) if done >= TELLS and now > since else 0.0
+        return done / (now - since) if done >= MIN_FRACTION_FOR_ESTIMATE and now > since else 0.0
 
     def _left(self, now: float) -> float:
         return (1 - self.fraction) / self._speed(now)
 
 
-def lasting(seconds: float) -> str:
+def duration_words(seconds: float) -> str:
     """Say how long something lasts, as people do."""
-    if seconds < BRIEF:
+    if seconds < SHORT_DURATION_S:
         return f"{seconds:.0f} s"
-    if seconds < BRIEF * MINUTE:
-        return f"{seconds / MINUTE:.0f} min"
-    return f"{seconds / HOUR:.1f} h"
+    if seconds < SHORT_DURATION_S * MINUTE_S:
+        return f"{seconds / MINUTE_S:.0f} min"
+    return f"{seconds / HOUR_S:.1f} h"
 
 
 @contextmanager
 def log_lines(
     where: Console,
-    every: float = EVERY,
+    every: float = LOG_INTERVAL_S,
     now: Callable[[], float] = time.monotonic,
-    soon: float = SOON,
-) -> Iterator[Tell]:
+    soon: float = LOG_START_DELAY_S,
+) -> Iterator[ProgressOfStage]:
     """Say when a verb that lasts begins and ends, and every so often how far it is.
 
     Args:
@@ -144,20 +146,20 @@ def log_lines(
         soon: Seconds that it takes for a verb to be said to begin [s].
 
     """
-    watched: list[_Watched] = []  # the one that goes on
+    watched: list[_LoggedStage] = []  # the one that goes on
 
     def ended() -> None:
         for one in watched:
             one.leave()
             if one.lasts:
-                lasted = lasting(now() - one.doing.begun)
+                lasted = duration_words(now() - one.doing.begun)
                 print_line(f"{one.doing.verb} done in {lasted}", where)
         watched.clear()
 
     def tell(verb: str) -> Callable[[float, str], None]:
         ended()
-        doing = Doing(verb, now())
-        watched.append(_Watched(doing, lambda line: print_line(line, where), now, soon, every))
+        doing = StageProgress(verb, now())
+        watched.append(_LoggedStage(doing, lambda line: print_line(line, where), now, soon, every))
         return lambda fraction, words: doing.told(fraction, words, now())
 
     try:
@@ -168,12 +170,12 @@ def log_lines(
             one.leave()
 
 
-class _Watched:
+class _LoggedStage:
     """A verb of which something is said every so often, whether or not it tells anything."""
 
     def __init__(
         self,
-        doing: Doing,
+        doing: StageProgress,
         say: Callable[[str], None],
         now: Callable[[], float],
         soon: float,

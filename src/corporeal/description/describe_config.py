@@ -7,7 +7,7 @@ from typing import Literal
 from corporeal.core import store
 from corporeal.core.errors import check_range
 
-MOST_ANSWERS = 40
+MAX_ANSWERS = 40
 """To one question: Wang et al. (2022) sampled so many."""
 
 
@@ -37,24 +37,26 @@ class DescribeConfig:
     direct: bool = True
     """Also ask a model, without the library, what is printed on each object and what it weighs.
     This reweights the ways it may be, and sets no value."""
-    answers: int = field(default=1, metadata=store.LATER)
+    answers: int = field(default=1, metadata=store.ADDED_LATER)
     """Number of answers to each question about materials, values and mass (self-consistency). What
     an object may weigh is pooled over them, each with the same weight; parts are asked for once."""
     parallel: int = 4
     """Number of objects that a model is asked about at the same time."""
 
 
-DEFAULT = DescribeConfig()
+DEFAULT_DESCRIBE_CONFIG = DescribeConfig()
 
 
 def validate(config: DescribeConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
-    from corporeal.render.portrait import DIRECTIONS  # with all that draws, which help needs not
+    from corporeal.render.object_portrait import (
+        DIRECTION_COUNT,  # with all that draws, which help needs not
+    )
 
     for name, value, low, high in (
-        ("--views", config.views, 1, DIRECTIONS),
+        ("--views", config.views, 1, DIRECTION_COUNT),
         ("--view-size", config.view_size, 16, 2048),
-        ("--answers", config.answers, 1, MOST_ANSWERS),
+        ("--answers", config.answers, 1, MAX_ANSWERS),
         ("--parallel", config.parallel, 1, 64),
     ):
         check_range(name, value, low, high)

@@ -7,21 +7,21 @@ from jaxtyping import Float
 
 from corporeal.core.types import Keyframes, Vector
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.shape import Shape
-from corporeal.geometry.spread import sample_surface
-from corporeal.mpm.physics.prescribed import pose, rows_of
+from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.geometry.point_sampling import sample_surface
+from corporeal.mpm.physics.prescribed_motion import path_pose, path_rows
 
-POINTS = 300
+CLEARANCE_POINTS_COUNT = 300
 """Corners that lie foremost, and as many points spread over the surface, that are asked."""
-INWARD = 0.02
+RAY_START_DEPTH_FRACTION = 0.02
 """Rays begin so much of an object's extent inside, so that what it overlaps a little is met."""
 
 
 @dataclass(frozen=True)
-class Thing:
+class SampledObject:
     """An object in its place at the start, with points on it."""
 
-    shape: Shape
+    shape: QueryMesh
     corners: Float[np.ndarray, "V 3"]
     """Corners of its triangles [m]."""
     looks: Float[np.ndarray, "V 3"]
@@ -32,12 +32,12 @@ class Thing:
     """Unit normal at each of those."""
 
     @classmethod
-    def of(cls, mesh: Mesh, rng: np.random.Generator) -> "Thing":
+    def of(cls, mesh: Mesh, rng: np.random.Generator) -> "SampledObject":
         """Choose points."""
         used = np.unique(mesh.triangles)
-        spread, triangle = sample_surface(mesh, POINTS, rng)
+        spread, triangle = sample_surface(mesh, CLEARANCE_POINTS_COUNT, rng)
         looks = mesh.vertex_normals[used]
-        return cls(Shape(mesh), mesh.vertices[used], looks, spread, mesh.normals[triangle])
+        return cls(QueryMesh(mesh), mesh.vertices[used], looks, spread, mesh.normals[triangle])
 
     @property
     def middle(self) -> Float[np.ndarray, "3"]:
@@ -49,12 +49,12 @@ class Thing:
         corners, spread = self.corners, self.spread
         if self.shape.closed:
             corners, spread = corners[self.looks @ along > 0.0], spread[self.faces @ along > 0.0]
-        foremost = np.argsort(-corners @ along)[:POINTS]
+        foremost = np.argsort(-corners @ along)[:CLEARANCE_POINTS_COUNT]
         return np.concatenate([corners[foremost], spread])
 
     def inward(self, along: Float[np.ndarray, "3"]) -> float:
         """How far inside a ray along a unit vector begins [m]; an open mesh has no inside."""
-        return INWARD * self.length(along) if self.shape.closed else 0.0
+        return RAY_START_DEPTH_FRACTION * self.length(along) if self.shape.closed else 0.0
 
     def length(self, along: Float[np.ndarray, "3"]) -> float:
         """Extent along a unit vector [m]."""
@@ -62,16 +62,16 @@ class Thing:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedObject:
     """A thing that has moved: a point x of it is at place + rotation (x - origin)."""
 
-    thing: Thing
+    thing: SampledObject
     place: Float[np.ndarray, "3"]
     rotation: Float[np.ndarray, "3 3"]
     origin: Float[np.ndarray, "3"]
 
     @classmethod
-    def at_start(cls, thing: Thing) -> "Placed":
+    def at_start(cls, thing: SampledObject) -> "PlacedObject":
         """Where it is at the start."""
         return cls(thing, np.zeros(3), np.eye(3), np.zeros(3))
 
@@ -95,7 +95,9 @@ class Placed:
         return self.out(self.thing.points(along @ self.rotation))
 
 
-def placed_along(thing: Thing, path: Keyframes, pivot: Vector, times: np.ndarray) -> list[Placed]:
+def place_along_path(
+    thing: SampledObject, path: Keyframes, pivot: Vector, times: np.ndarray
+) -> list[PlacedObject]:
     """Say where a thing with a path is at some times [s].
 
     Args:
@@ -105,9 +107,9 @@ def placed_along(thing: Thing, path: Keyframes, pivot: Vector, times: np.ndarray
         times: [s]
 
     """
-    rows, origin = rows_of(path, pivot), np.array(pivot)
-    poses = [pose(rows, float(t)) for t in times]
-    return [Placed(thing, p.place, p.rotation, origin) for p in poses]
+    rows, origin = path_rows(path, pivot), np.array(pivot)
+    poses = [path_pose(rows, float(t)) for t in times]
+    return [PlacedObject(thing, p.place, p.rotation, origin) for p in poses]
 
 
 @dataclass(frozen=True)
@@ -120,13 +122,15 @@ class Clearance:
     """Where they would touch, on the upper one [m]."""
 
 
-def clearance(lower: Placed, upper: Placed, along: Float[np.ndarray, "3"]) -> Clearance:
+def measure_clearance(
+    lower: PlacedObject, upper: PlacedObject, along: Float[np.ndarray, "3"]
+) -> Clearance:
     """Measure how far ``lower`` can go along a unit vector until it touches ``upper``."""
     best = Clearance(np.inf, np.zeros(3))
     for one, other, way in ((lower, upper, along), (upper, lower, -along)):
         points = one.points(way)
         inward = one.thing.inward(way @ one.rotation)
-        far = one_way(points, other, way, inward)
+        far = one_way_distances(points, other, way, inward)
         if not len(far):
             continue
         k = int(np.argmin(far))
@@ -136,14 +140,17 @@ def clearance(lower: Placed, upper: Placed, along: Float[np.ndarray, "3"]) -> Cl
     return best
 
 
-def one_way(
-    points: Float[np.ndarray, "P 3"], other: Placed, way: Float[np.ndarray, "3"], inward: float
+def one_way_distances(
+    points: Float[np.ndarray, "P 3"],
+    other: PlacedObject,
+    way: Float[np.ndarray, "3"],
+    inward: float,
 ) -> Float[np.ndarray, " P"]:
     """Distance from points to another thing [m], asked from a little inside."""
     return other.reach(points - inward * way, way) - inward
 
 
-def overshadows(upper: Placed, lower: Placed, along: Float[np.ndarray, "3"]) -> bool:
+def overlap_along(upper: PlacedObject, lower: PlacedObject, along: Float[np.ndarray, "3"]) -> bool:
     """Tell whether a line along a unit vector goes through both things."""
     points = lower.points(along)
     apart = np.linalg.norm(upper.out(upper.thing.middle) - lower.out(lower.thing.middle))

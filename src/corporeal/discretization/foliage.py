@@ -11,50 +11,50 @@ from corporeal.core.types import (
     Material,
     MaterialField,
     Particles,
-    Root,
+    PlantRoot,
     Scene,
     Structure,
     Vector,
 )
-from corporeal.discretization.anatomy import pieces
-from corporeal.discretization.make import Make
-from corporeal.discretization.survey import Anatomy, Member
+from corporeal.discretization.mesh_kind import connected_pieces
+from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
+from corporeal.discretization.part_model import PartModel
 from corporeal.geometry.mesh import Mesh
-from corporeal.mpm.laws import MENU
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
-Inertia = Callable[[int, Vector], float]
+InertiaAbout = Callable[[int, Vector], float]
 
-LEAFY = ("leaves-flowers", "leaf_tissue")
+LEAF_MATERIALS = ("leaves-flowers", "leaf_tissue")
 """Materials that leaves are made of."""
-WOODY = ("wood", "hardwood", "softwood", "bamboo")
+WOOD_MATERIALS = ("wood", "hardwood", "softwood", "bamboo")
 """Materials that trunks and stems are made of."""
-LONGEST_LEAF = 0.15
+MAX_LEAF_LENGTH_M = 0.15
 """A longer piece stands for many leaves [m]."""
-USUAL_LEAF = 0.08
+USUAL_LEAF_LENGTH_M = 0.08
 """Length of a leaf on the border of Webb's (1959) microphylls and notophylls, 20 cm² [m]."""
-THICKEST_LEAF = 3e-3
+MAX_LEAF_THICKNESS_M = 3e-3
 """What is thicker in the mean is more than one leaf, even as leaves are drawn [m]."""
-SHOWN = 0.75
+LEAF_AREA_PER_CROWN_SURFACE = 0.75
 """Area of leaves over that of the surface that pictures make of a crown: half where a leaf shows
 both its faces, all where it covers others."""
-FASTEST = 300.0
+MAX_LEAF_FREQUENCY_RAD_S = 300.0
 """Springs are no stiffer [rad/s]: a leaf's own weight moves them by a tenth of a millimetre."""
-CENTROID = 0.4
+LEAF_CENTRE_SHIFT_RATIO = 0.4
 """Shift of a leaf's centre over that of its tip."""
-ROCKING = 0.34
+ROOT_STIFFNESS_COEFFICIENT = 0.34
 """k_θ/(E h³) of a stem in soil to a depth h (measured on resolved soil, at one geometry)."""
-FAR = 0.1
+MAX_WOOD_GAP_FRACTION = 0.1
 """Wood begins no farther above its soil, of its height above it."""
-PIVOT = 0.4
+ROCKING_PIVOT_DEPTH_RATIO = 0.4
 """Height above its foot about which a stem rocks, over its depth in the soil."""
 
 
 def is_leafy(material: Material) -> bool:
     """Whether leaves are made of it."""
-    return material.name in LEAFY
+    return material.name in LEAF_MATERIALS
 
 
-def leaves_of(member: Member, material: Material, made: Make, scale: float) -> int:
+def count_leaves(member: MeasuredPart, material: Material, made: PartModel, scale: float) -> int:
     """How many leaves a part is; 0: it is no foliage.
 
     Pieces of its mesh; of a crown in bulk, leaves of the usual size, L²/3, that have its area.
@@ -62,11 +62,13 @@ def leaves_of(member: Member, material: Material, made: Make, scale: float) -> i
     if not is_leafy(material):
         return 0
     if made.leaves:
-        return round(made.leaves / ((USUAL_LEAF * scale) ** 2 / 3))
-    return sum(int(pieces(m).max()) + 1 for m in (member.body, member.sheet) if len(m.triangles))
+        return round(made.leaves / ((USUAL_LEAF_LENGTH_M * scale) ** 2 / 3))
+    return sum(
+        int(connected_pieces(m).max()) + 1 for m in (member.body, member.sheet) if len(m.triangles)
+    )
 
 
-def in_bulk(member: Member, scale: float) -> bool:
+def is_bulk_foliage(member: MeasuredPart, scale: float) -> bool:
     """Whether foliage's surface does not show one leaf from another.
 
     Pictures, and coarse models, show a crown as one body of thickened and joined leaves: most of
@@ -74,20 +76,20 @@ def in_bulk(member: Member, scale: float) -> bool:
     """
     if not len(member.body.triangles):
         return False
-    if 2 * member.volume < THICKEST_LEAF * scale * member.body_area:
+    if 2 * member.volume < MAX_LEAF_THICKNESS_M * scale * member.body_area:
         return False
-    long = lengths_of_pieces(member.body) > LONGEST_LEAF * scale
+    long = mesh_piece_lengths(member.body) > MAX_LEAF_LENGTH_M * scale
     return float(member.body.areas @ long) > 0.5 * member.body_area
 
 
-def in_leaves(
-    made: Make,
-    anatomy: Anatomy,
-    member: Member,
+def weigh_bulk_foliage(
+    made: PartModel,
+    anatomy: MeasuredObject,
+    member: MeasuredPart,
     field: MaterialField,
     tissue: Material,
     scale: float,
-) -> Make:
+) -> PartModel:
     """Weigh a crown in bulk by the area of its leaves, m = ρ t A, and not by its volume.
 
     A is three quarters of its surface: half of it where every leaf shows both its faces, all where
@@ -106,13 +108,13 @@ def in_leaves(
     material, k = field.materials[member.part], member.part
     borne = not all(is_leafy(field.materials[m.part]) for m in anatomy.members)
     alone = borne and is_leafy(material) and not made.pieces and not made.held
-    if not alone or not in_bulk(member, scale):
+    if not alone or not is_bulk_foliage(member, scale):
         return made
     assert tissue.shell_thickness is not None
     thick = field.words[k].thickness or field.structures[k].thickness or material.shell_thickness
     density = material.density if thick else tissue.density
     thick = thick or tissue.shell_thickness * scale
-    area = SHOWN * member.body_area
+    area = LEAF_AREA_PER_CROWN_SURFACE * member.body_area
     mass, open_mass = density * thick * area, density * thick * member.sheet_area
     return replace(
         made,
@@ -128,8 +130,8 @@ def in_leaves(
     )
 
 
-def swinging(
-    member: Member, points: Float[np.ndarray, "N 3"], tissue: Material, scale: float
+def leaf_frequencies(
+    member: MeasuredPart, points: Float[np.ndarray, "N 3"], tissue: Material, scale: float
 ) -> Float[np.ndarray, " N"]:
     """Natural angular frequency of the leaf that each point belongs to [rad/s].
 
@@ -149,19 +151,19 @@ def swinging(
     for mesh in (member.body, member.sheet):
         if len(mesh.triangles):
             middles.append(mesh.corners.mean(axis=1))
-            lengths.append(lengths_of_pieces(mesh))
+            lengths.append(mesh_piece_lengths(mesh))
     nearest = KDTree(np.concatenate(middles)).query(points)[1]
-    length = np.minimum(np.concatenate(lengths)[nearest], LONGEST_LEAF * scale)
-    if in_bulk(member, scale):
-        length[:] = USUAL_LEAF * scale
+    length = np.minimum(np.concatenate(lengths)[nearest], MAX_LEAF_LENGTH_M * scale)
+    if is_bulk_foliage(member, scale):
+        length[:] = USUAL_LEAF_LENGTH_M * scale
     stiffness = tissue.young * (tissue.shell_thickness * scale) ** 2
-    rate = np.sqrt(stiffness / (1.5 * CENTROID * tissue.density)) / length**2
-    return np.minimum(rate, FASTEST)
+    rate = np.sqrt(stiffness / (1.5 * LEAF_CENTRE_SHIFT_RATIO * tissue.density)) / length**2
+    return np.minimum(rate, MAX_LEAF_FREQUENCY_RAD_S)
 
 
-def lengths_of_pieces(mesh: Mesh) -> Float[np.ndarray, " T"]:
+def mesh_piece_lengths(mesh: Mesh) -> Float[np.ndarray, " T"]:
     """Length of the piece that each triangle belongs to [m], from end to end."""
-    label = np.repeat(pieces(mesh), 3)
+    label = np.repeat(connected_pieces(mesh), 3)
     corner = mesh.corners.reshape(-1, 3)
     count = np.bincount(label)
     middle = np.stack([np.bincount(label, x) / count for x in corner.T], axis=1)
@@ -179,7 +181,7 @@ def crown_volume(points: Float[np.ndarray, "N 3"], cell: float) -> float:
 
 
 @dataclass(frozen=True)
-class Rooted:
+class RootedWood:
     """Wood that stands in soil of its own object."""
 
     wood: int
@@ -202,33 +204,33 @@ class Rooted:
         )
 
 
-def rooted(anatomy: Anatomy, materials: tuple[Material, ...]) -> Rooted | None:
+def find_rooted_wood(anatomy: MeasuredObject, materials: tuple[Material, ...]) -> RootedWood | None:
     """Return which wood stands in which soil; None: nothing stands in soil.
 
     The wood's foot is in the soil, and it rises above it. Where the surface of either ends, as what
     pictures show does, the foot is taken to reach halfway down from where most of the soil shows to
     the object's lowest point.
     """
-    soils = [m for m in anatomy.members if MENU[materials[m.part].law].granular]
+    soils = [m for m in anatomy.members if CONSTITUTIVE_LAWS[materials[m.part].law].granular]
     for soil in soils:
-        low, high = span(soil)
+        low, high = height_range(soil)
         for member in anatomy.members:
-            foot, top = span(member)
+            foot, top = height_range(member)
             wood = member is not soil and not is_leafy(materials[member.part])
             if wood and member.closed and low < foot < high < top:
-                return Rooted(member.part, soil.part, foot, high, seen=True)
+                return RootedWood(member.part, soil.part, foot, high, seen=True)
     for soil in (m for m in soils if m.drawn is not None or not m.closed):
-        level = _level(soil)
+        level = _median_height(soil)
         for member in anatomy.members:
-            low, high = span(member)
-            open_wood = materials[member.part].name in WOODY and not member.closed
-            if open_wood and low < level + FAR * (high - level):
+            low, high = height_range(member)
+            open_wood = materials[member.part].name in WOOD_MATERIALS and not member.closed
+            if open_wood and low < level + MAX_WOOD_GAP_FRACTION * (high - level):
                 foot = 0.5 * (level + float(anatomy.vertices[:, 2].min()))
-                return Rooted(member.part, soil.part, foot, level, seen=False)
+                return RootedWood(member.part, soil.part, foot, level, seen=False)
     return None
 
 
-def _level(soil: Member) -> float:
+def _median_height(soil: MeasuredPart) -> float:
     """Height below and above which half of a surface lies [m]."""
     mesh = soil.drawn or (soil.body if len(soil.body.triangles) else soil.sheet)
     middle, areas = mesh.corners.mean(axis=1)[:, 2], mesh.areas
@@ -237,19 +239,19 @@ def _level(soil: Member) -> float:
     return float(middle[order[half]])
 
 
-def span(member: Member) -> tuple[float, float]:
+def height_range(member: MeasuredPart) -> tuple[float, float]:
     """Lowest and highest point [m]."""
     z = np.concatenate([m.corners.reshape(-1, 3)[:, 2] for m in (member.body, member.sheet)])
     return float(z.min()), float(z.max())
 
 
-def root_of(
-    found: Rooted,
-    anatomy: Anatomy,
+def root_joint(
+    found: RootedWood,
+    anatomy: MeasuredObject,
     number: int,
     materials: tuple[Material, ...],
-    inertia_about: Inertia,
-) -> Root:
+    inertia_about: InertiaAbout,
+) -> PlantRoot:
     """Return the sprung joint of a plant in its soil.
 
     k_θ = .34 E h³ with the depth h of the foot in the soil; the damper takes the soil's loss
@@ -268,17 +270,17 @@ def root_of(
     corner = np.concatenate([member.body.corners, member.sheet.corners]).reshape(-1, 3)
     low = corner[:, 2] < max(found.top, corner[:, 2].min() + depth)
     x, y = corner[low, :2].mean(axis=0)
-    point = (float(x), float(y), found.foot + PIVOT * depth)
+    point = (float(x), float(y), found.foot + ROCKING_PIVOT_DEPTH_RATIO * depth)
     soil = materials[found.soil]
-    stiffness = ROCKING * soil.young * depth**3
+    stiffness = ROOT_STIFFNESS_COEFFICIENT * soil.young * depth**3
     damping = soil.loss * float(np.sqrt(stiffness * inertia_about(found.wood, point)))
-    return Root(number, found.wood, point, stiffness, damping)
+    return PlantRoot(number, found.wood, point, stiffness, damping)
 
 
-def planted(
+def with_plant_springs(
     scene: Scene,
     particles: Particles,
-    anatomies: list[Anatomy],
+    anatomies: list[MeasuredObject],
     field: MaterialField,
     tissue: Material,
 ) -> Particles:
@@ -292,18 +294,18 @@ def planted(
         for member in crowns:
             own = particles.part == member.part
             scale = scene.objects[number].scale
-            rate[own] = swinging(member, particles.position[own], tissue, scale)
-        found = rooted(anatomy, field.materials) if crowns else None
+            rate[own] = leaf_frequencies(member, particles.position[own], tissue, scale)
+        found = find_rooted_wood(anatomy, field.materials) if crowns else None
         if found is not None:
-            swing = Swing(particles, [m.part for m in crowns])
-            roots.append(root_of(found, anatomy, number, field.materials, swing))
+            swing = RockingPlant(particles, [m.part for m in crowns])
+            roots.append(root_joint(found, anatomy, number, field.materials, swing))
             doubts += [] if found.seen else [f"{scene.objects[number].name}: {found.doubt}"]
     warnings = (*particles.warnings, *doubts)
     return replace(particles, rate=rate, roots=tuple(roots), warnings=warnings)
 
 
 @dataclass(frozen=True)
-class Swing:
+class RockingPlant:
     """What rocks on a root: the wood and the leaves."""
 
     particles: Particles

@@ -8,16 +8,16 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.types import Scene, SceneObject
-from corporeal.discretization.falls import falls
-from corporeal.discretization.outer_skin import cross_section
-from corporeal.discretization.part import Landing, Motion
-from corporeal.discretization.survey import Anatomy
-from corporeal.mpm.physics.prescribed import fastest_velocity
-from corporeal.mpm.physics.wind import greatest_acceleration
+from corporeal.discretization.exposed_surface import cross_section_area
+from corporeal.discretization.fall_heights import fall_heights
+from corporeal.discretization.mesh_measures import MeasuredObject
+from corporeal.discretization.part_geometry import ExpectedMotion, ObjectLanding
+from corporeal.mpm.physics.prescribed_motion import fastest_velocity
+from corporeal.mpm.physics.wind_pressure import largest_wind_acceleration
 
 
 @dataclass(frozen=True)
-class Drive:
+class ExternalDrive:
     """What a push, wind or a prescribed path does to an object."""
 
     velocity: Float[np.ndarray, " 3"]
@@ -26,13 +26,13 @@ class Drive:
     """Largest [m/s²]."""
 
 
-def motions(
+def expected_motions(
     scene: Scene,
-    anatomies: list[Anatomy],
+    anatomies: list[MeasuredObject],
     masses: list[float],
     seed: int,
     vessels: Mapping[int, int] = MappingProxyType({}),
-) -> list[Motion]:
+) -> list[ExpectedMotion]:
     """Estimate every object's speed at impact.
 
     Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add
@@ -48,13 +48,14 @@ def motions(
 
     """
     gravity = float(np.linalg.norm(scene.gravity))
-    drops = falls([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
+    drops = fall_heights([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
     # Each object by itself.
     horizontal, fall, forced = [], [], []
     single = [
-        driven(obj, anatomies[k], masses[k], scene.duration) for k, obj in enumerate(scene.objects)
+        drive_of_object(obj, anatomies[k], masses[k], scene.duration)
+        for k, obj in enumerate(scene.objects)
     ]
-    drives = carried(single, masses, vessels)
+    drives = share_vessel_drives(single, masses, vessels)
     for obj, height, drive in zip(scene.objects, drops.height, drives, strict=True):
         velocity = np.array(obj.velocity) + drive.velocity
         horizontal.append(velocity[:2])
@@ -69,14 +70,14 @@ def motions(
             if j != i:
                 closing = np.linalg.norm(horizontal[i] - horizontal[j])
                 speeds.append(float(np.hypot(max(fall[i], fall[j]), closing)))
-        lands = Landing(int(drops.onto[i]), float(fall[i]), masses[i])
-        result.append(Motion(max(speeds), gravity + forced[i], forced[i], lands))
+        lands = ObjectLanding(int(drops.onto[i]), float(fall[i]), masses[i])
+        result.append(ExpectedMotion(max(speeds), gravity + forced[i], forced[i], lands))
     return result
 
 
-def carried(
-    drives: Sequence[Drive], masses: Sequence[float], vessels: Mapping[int, int]
-) -> list[Drive]:
+def share_vessel_drives(
+    drives: Sequence[ExternalDrive], masses: Sequence[float], vessels: Mapping[int, int]
+) -> list[ExternalDrive]:
     """Share what drives a vessel with what lies loose in it, which it carries along.
 
     Args:
@@ -91,11 +92,13 @@ def carried(
         share = masses[vessel] / (masses[vessel] + sum(masses[k] for k in load))
         drive = drives[vessel]
         for k in (vessel, *load):
-            found[k] = Drive(share * drive.velocity, share * drive.acceleration)
+            found[k] = ExternalDrive(share * drive.velocity, share * drive.acceleration)
     return found
 
 
-def driven(obj: SceneObject, anatomy: Anatomy, mass: float, duration: float) -> Drive:
+def drive_of_object(
+    obj: SceneObject, anatomy: MeasuredObject, mass: float, duration: float
+) -> ExternalDrive:
     """Estimate what push and wind do to an object: wind makes it no faster than the air.
 
     Args:
@@ -108,16 +111,16 @@ def driven(obj: SceneObject, anatomy: Anatomy, mass: float, duration: float) -> 
     gained, strongest = np.zeros(3), 0.0
     if obj.path is not None:
         reach = float(np.ptp(anatomy.everything.vertices, axis=0).max())
-        return Drive(fastest_velocity(obj.path, reach), 0.0)
+        return ExternalDrive(fastest_velocity(obj.path, reach), 0.0)
     if obj.push is not None:
         push = np.array(obj.push.acceleration)
         gained += push * max(0.0, min(obj.push.end, duration) - obj.push.start)
         strongest += float(np.linalg.norm(push))
     if obj.wind is not None:
         air = np.array(obj.wind.velocity) * (1.0 + obj.wind.gust)
-        shown = cross_section(anatomy, obj.wind.velocity)
-        blown = greatest_acceleration(obj.wind, shown, mass)
+        shown = cross_section_area(anatomy, obj.wind.velocity)
+        blown = largest_wind_acceleration(obj.wind, shown, mass)
         lasts = max(0.0, min(obj.wind.end, duration) - obj.wind.start)
         gained += air * min(1.0, blown * lasts / max(float(np.linalg.norm(air)), 1e-30))
         strongest += blown
-    return Drive(gained, strongest)
+    return ExternalDrive(gained, strongest)

@@ -4,37 +4,39 @@ from dataclasses import replace
 
 import numpy as np
 
-from corporeal.core.types import Contents, MaterialField, Particles, Parts, Scene
-from corporeal.discretization.bedded import all_bedded
-from corporeal.discretization.hollowed import all_hollowed
-from corporeal.discretization.poured import moving, pour
-from corporeal.discretization.resolution import Bodies
-from corporeal.discretization.scene_survey import examine
-from corporeal.discretization.sizes import in_scene, scale_of_part
-from corporeal.discretization.wetted import wetted_points
-from corporeal.mpm.laws import MENU
+from corporeal.core.types import MaterialField, Particles, Parts, Scene, VesselContents
+from corporeal.discretization.choose_resolution import MeasuredScene
+from corporeal.discretization.granular_bed_objects import fill_all_beds
+from corporeal.discretization.mobile_contents import mobile_content_parts, pour_contents
+from corporeal.discretization.object_scaling import field_in_scene_scale, part_scales
+from corporeal.discretization.scene_measures import measure_objects
+from corporeal.discretization.vessel_shell import hollow_all_vessels
+from corporeal.discretization.wetted_surface import sample_wetted_points
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 
-def pour_out(scene: Scene, parts: Parts, field: MaterialField, seed: int) -> tuple[Contents, ...]:
+def pour_loose_contents(
+    scene: Scene, parts: Parts, field: MaterialField, seed: int
+) -> tuple[VesselContents, ...]:
     """Return what moves in vessels that it does not fill; the field's lengths are real ones."""
-    if not moving(field):
+    if not mobile_content_parts(field):
         return ()
-    life = in_scene(field, scale_of_part(scene, parts))
-    anatomies = all_bedded(all_hollowed(examine(scene, parts, seed), life), life)
-    return pour(scene, parts, life, anatomies, seed)
+    life = field_in_scene_scale(field, part_scales(scene, parts))
+    anatomies = fill_all_beds(hollow_all_vessels(measure_objects(scene, parts, seed), life), life)
+    return pour_contents(scene, parts, life, anatomies, seed)
 
 
-def in_vessels(parts: Parts, field: MaterialField) -> set[tuple[int, int]]:
+def vessels_with_contents(parts: Parts, field: MaterialField) -> set[tuple[int, int]]:
     """Objects that hold something, each with every object that may be that."""
     owners = [part.object for part in parts.catalogue]
     held = [owners[k] for k, s in enumerate(field.structures) if s.holds]
-    loose = [owners[k] for k, m in enumerate(field.materials) if MENU[m.law].loose]
+    loose = [owners[k] for k, m in enumerate(field.materials) if CONSTITUTIVE_LAWS[m.law].loose]
     return {(min(a, b), max(a, b)) for a in held for b in loose}
 
 
-def wetted(particles: Particles, bodies: Bodies, seed: int) -> Particles:
+def add_wetted_points(particles: Particles, bodies: MeasuredScene, seed: int) -> Particles:
     """Cover rigid objects with points where liquids touch them, if there is a liquid."""
-    if not any(MENU[m.law].liquid for m in bodies.field.materials):
+    if not any(CONSTITUTIVE_LAWS[m.law].liquid for m in bodies.field.materials):
         return particles
     points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
     owner = [np.zeros(0, np.int64)]
@@ -42,7 +44,7 @@ def wetted(particles: Particles, bodies: Bodies, seed: int) -> Particles:
         if any(particles.treatments[m.part].kind != "rigid" for m in anatomy.members):
             continue
         rng = np.random.default_rng([seed, number, 7])
-        found, normal = wetted_points(anatomy, bodies.makes, particles.cell, rng)
+        found, normal = sample_wetted_points(anatomy, bodies.makes, particles.cell, rng)
         points.append(found)
         normals.append(normal)
         owner.append(np.full(len(found), number))

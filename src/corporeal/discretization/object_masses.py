@@ -8,32 +8,32 @@ from corporeal.core.types import (
     MaterialField,
     Note,
     NoteKind,
-    PartWords,
+    PartDescription,
     Scene,
     SceneObject,
 )
-from corporeal.discretization.extent import oriented_size
-from corporeal.discretization.make import DRAWN, Make, heavier
-from corporeal.discretization.survey import Anatomy
+from corporeal.discretization.mesh_measures import MeasuredObject
+from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.discretization.part_model import THICKNESS_FROM_MESH, PartModel, scale_part_mass
 from corporeal.materials.quantities import QUANTITIES
-from corporeal.recognition.said_mass import doubt_said_mass
-from corporeal.recognition.typical_bulk import doubt_mass
+from corporeal.recognition.mass_from_name import mass_from_name_warning
+from corporeal.recognition.typical_bulk_density import mass_warning
 
-NOTABLE = 0.01
+NOTABLE_MASS_DIFFERENCE_FRACTION = 0.01
 """Relative difference between a stated mass and the computed one that is reported."""
-THICK = 1.5
+THICK_WALL_RATIO = 1.5
 """A wall that is drawn thicker than the thickest of its material, times this, is reported."""
-SHEETS = ("leather", "synthetic_leather", "aluminium_can_sheet")
+SHEET_ONLY_MATERIALS = ("leather", "synthetic_leather", "aluminium_can_sheet")
 """Materials that come in sheets alone."""
-LAYERS = 8.0
+MAX_PLAUSIBLE_SHEET_LAYERS = 8.0
 """So many of the thickest sheets on one another are reported."""
-UNSEEN = ("metadata", "unknown")
+UNSEEN_MATERIAL_SOURCES = ("metadata", "unknown")
 """Who recognises a material without having looked at the object."""
 
 
-def as_heavy_as_stated(
-    scene: Scene, anatomies: Sequence[Anatomy], makes: Mapping[int, Make]
-) -> tuple[dict[int, Make], tuple[str, ...]]:
+def scale_to_stated_masses(
+    scene: Scene, anatomies: Sequence[MeasuredObject], makes: Mapping[int, PartModel]
+) -> tuple[dict[int, PartModel], tuple[str, ...]]:
     """Let objects weigh what their file states: all parts of one object by the same factor.
 
     Args:
@@ -55,7 +55,7 @@ def as_heavy_as_stated(
         usual = sum(makes[k].mass for k in own)
         if obj.mass is None or usual <= 0:
             continue
-        made |= {k: heavier(makes[k], obj.mass / usual) for k in own}
+        made |= {k: scale_part_mass(makes[k], obj.mass / usual) for k in own}
         possible = QUANTITIES["density"]
         for row in (made[k] for k in own):
             if not possible.low <= row.density <= possible.high:
@@ -64,7 +64,7 @@ def as_heavy_as_stated(
                     f"have {row.density:.3g} kg/m³; no material has less than {possible.low:g} or "
                     f"more than {possible.high:g}. Correct the file, or its unit of mass."
                 )
-        if abs(obj.mass / usual - 1) > NOTABLE:
+        if abs(obj.mass / usual - 1) > NOTABLE_MASS_DIFFERENCE_FRACTION:
             warnings.append(
                 f"{obj.name} weighs {obj.mass:.3g} kg, as its file states; its materials and "
                 f"its shape would give {usual:.3g} kg."
@@ -72,8 +72,8 @@ def as_heavy_as_stated(
     return made, tuple(warnings)
 
 
-def implausible_masses(
-    scene: Scene, anatomies: Sequence[Anatomy], masses: Sequence[float]
+def warn_of_implausible_masses(
+    scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
 ) -> list[str]:
     """Say which objects are too heavy or too light for the room that they take.
 
@@ -84,19 +84,19 @@ def implausible_masses(
 
     """
     doubts = (
-        doubt_mass(
+        mass_warning(
             obj.name,
             obj.class_name or obj.name,
             sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
-            _real(oriented_size(anatomy.vertices), obj.scale),
+            _real_lengths(oriented_box_size(anatomy.vertices), obj.scale),
         )
         for obj, anatomy in zip(scene.objects, anatomies, strict=True)
     )
     return [sentence for sentence in doubts if sentence]
 
 
-def masses_not_as_named(
-    scene: Scene, anatomies: Sequence[Anatomy], masses: Sequence[float]
+def warn_of_masses_not_as_named(
+    scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
 ) -> list[str]:
     """Say which objects do not weigh what their names say ("dumbbell_5kg").
 
@@ -107,7 +107,7 @@ def masses_not_as_named(
 
     """
     doubts = (
-        doubt_said_mass(
+        mass_from_name_warning(
             obj.name,
             sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
             obj.name,
@@ -118,14 +118,17 @@ def masses_not_as_named(
     return [sentence for sentence in doubts if sentence]
 
 
-def _real(sides: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
+def _real_lengths(sides: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
     """Return lengths in the scene as they are in life [m]."""
     a, b, c = sides
     return a / scale, b / scale, c / scale
 
 
-def walls_drawn_too_thick(
-    scene: Scene, anatomies: Sequence[Anatomy], makes: Mapping[int, Make], field: MaterialField
+def warn_of_thick_walls(
+    scene: Scene,
+    anatomies: Sequence[MeasuredObject],
+    makes: Mapping[int, PartModel],
+    field: MaterialField,
 ) -> list[str]:
     """Say which walls weigh too much, because nobody but the mesh said how thick they are.
 
@@ -140,24 +143,26 @@ def walls_drawn_too_thick(
 
     """
     doubts = (
-        _thick_wall(obj, makes[m.part], field.words[m.part], field.materials[m.part])
+        _thick_wall_text(obj, makes[m.part], field.words[m.part], field.materials[m.part])
         for obj, anatomy in zip(scene.objects, anatomies, strict=True)
         for m in anatomy.members
     )
     return [sentence for sentence in doubts if sentence]
 
 
-def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Material) -> str:
+def _thick_wall_text(
+    obj: SceneObject, made: PartModel, words: PartDescription, material: Material
+) -> str:
     """Say that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
     ground = material.grounds.get("shell_thickness")
-    if ground is None or words.answered_by not in UNSEEN:
+    if ground is None or words.answered_by not in UNSEEN_MATERIAL_SOURCES:
         return ""
-    if material.name in SHEETS and made.thickness == 0:
-        return _thick_block(obj, made, words, ground.range.high)
-    if made.whose != DRAWN:
+    if material.name in SHEET_ONLY_MATERIALS and made.thickness == 0:
+        return _thick_block_text(obj, made, words, ground.range.high)
+    if made.whose != THICKNESS_FROM_MESH:
         return ""
     drawn, usual = made.thickness / obj.scale, ground.range
-    if drawn <= usual.high * THICK:
+    if drawn <= usual.high * THICK_WALL_RATIO:
         return ""
     low, typical, high = (f"{1e3 * x:.2g}" for x in (usual.low, usual.typical, usual.high))
     return Note(
@@ -168,10 +173,12 @@ def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Materi
     )
 
 
-def _thick_block(obj: SceneObject, made: Make, words: PartWords, thickest: float) -> str:
+def _thick_block_text(
+    obj: SceneObject, made: PartModel, words: PartDescription, thickest: float
+) -> str:
     """Say that what comes in sheets is a block; "": it may be some sheets on one another."""
     through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
-    if through <= LAYERS * thickest:
+    if through <= MAX_PLAUSIBLE_SHEET_LAYERS * thickest:
         return ""
     return Note(
         f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, "

@@ -3,22 +3,25 @@
 from math import inf, sqrt
 
 from corporeal.core.types import Material
-from corporeal.discretization.bending import INVISIBLE_STRAIN, tip_shift
-from corporeal.discretization.filled import judge_filled
-from corporeal.discretization.part import (
-    Motion,
-    PartGeometry,
-    Verdict,
-    tube,
-    wall_factors,
-    wall_ratio,
-    width,
+from corporeal.discretization.cantilever_bending import (
+    MAX_INVISIBLE_STRAIN,
+    cantilever_tip_deflection_ratio,
 )
-from corporeal.mpm.laws import MENU
-from corporeal.mpm.physics.stability import bounded_poisson, p_wave_speed, yield_speed
+from corporeal.discretization.filled_shells import judge_filled_shell
+from corporeal.discretization.part_geometry import (
+    ExpectedMotion,
+    PartGeometry,
+    RigidityVerdict,
+    part_width,
+    tube_diameter,
+    wall_factors,
+    wall_thickening_ratio,
+)
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
+from corporeal.mpm.physics.time_step_limits import bounded_poisson, p_wave_speed, yield_speed
 
 
-def judge(part: PartGeometry, motion: Motion) -> Verdict:
+def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdict:
     """Say whether a part would yield or visibly flex.
 
     ε = max(v/c, ρ a L/E, tip shift of a cantilever / L, what prescribed motion presses it by) and
@@ -28,62 +31,64 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     what presses it. A tube is judged as the bar that it is.
     """
     if part.prescribed:
-        return Verdict(0.0, inf, True, "the motion of its object is prescribed, as one rigid body")
+        return RigidityVerdict(
+            0.0, inf, True, "the motion of its object is prescribed, as one rigid body"
+        )
     if part.structure.holds:
         reason = f"what lies in it, {part.structure.holds}, moves by itself and its wall holds it"
-        return Verdict(0.0, inf, True, reason)
-    if MENU[part.material.law].liquid:
-        return Verdict(1.0, 0.0, False, "it flows", 1.0, 1.0)
+        return RigidityVerdict(0.0, inf, True, reason)
+    if CONSTITUTIVE_LAWS[part.material.law].liquid:
+        return RigidityVerdict(1.0, 0.0, False, "it flows", 1.0, 1.0)
     if part.structure.contents is not None:
-        return judge_filled(part, motion, judge)
+        return judge_filled_shell(part, motion, judge_rigidity)
     material, speed = part.material, motion.impact_speed
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density
-    ratio = 1.0 if tube(part) else wall_ratio(part, width(part) / 10)
+    ratio = 1.0 if tube_diameter(part) else wall_thickening_ratio(part, part_width(part) / 10)
     stiffer, _, denser = wall_factors(part, ratio, speed)
     real = p_wave_speed(young, poisson, density)
     mapped = stiffer / denser
     weight = max(
         density * motion.acceleration * part.size[2] / (young * mapped),
         # The shape of a plant has its own weight and its leaves' in it already.
-        sag(part, motion.driven if part.burden else motion.acceleration),
+        cantilever_sag(part, motion.driven if part.burden else motion.acceleration),
     )
     impact = speed / (real * sqrt(mapped))
     by_itself = max(impact, weight)
     strain = max(by_itself, part.pressed)
-    yields_at = yield_speed(resistance(material), real, density)
-    rigid = strain < INVISIBLE_STRAIN and speed < yields_at
-    reason = explain(by_itself, speed, yields_at)
-    if part.pressed > max(by_itself, INVISIBLE_STRAIN):
+    yields_at = yield_speed(flow_resistance(material), real, density)
+    rigid = strain < MAX_INVISIBLE_STRAIN and speed < yields_at
+    reason = explain_rigidity(by_itself, speed, yields_at)
+    if part.pressed > max(by_itself, MAX_INVISIBLE_STRAIN):
         reason = f"prescribed motion presses it by about {part.pressed:.2g} of its thickness"
-    return Verdict(strain, yields_at, rigid, reason, weight, impact, part.pressed)
+    return RigidityVerdict(strain, yields_at, rigid, reason, weight, impact, part.pressed)
 
 
-def explain(strain: float, speed: float, yields_at: float) -> str:
+def explain_rigidity(strain: float, speed: float, yields_at: float) -> str:
     """Give the verdict in words."""
-    if strain >= INVISIBLE_STRAIN:
+    if strain >= MAX_INVISIBLE_STRAIN:
         return f"it would visibly flex: a strain of about {strain:.2g} is expected"
     if speed >= yields_at:
         return f"it would yield: {speed:.2g} m/s exceeds its yield speed of {yields_at:.2g} m/s"
     return f"it would neither yield nor visibly flex: a strain of about {strain:.1g} is expected"
 
 
-def resistance(material: Material) -> float | None:
+def flow_resistance(material: Material) -> float | None:
     """Stress [Pa] that the material bears before it flows; None: it does not flow."""
-    if MENU[material.law].granular:
+    if CONSTITUTIVE_LAWS[material.law].granular:
         return material.cohesion or 0.0
     return material.yield_stress
 
 
-def sag(part: PartGeometry, acceleration: float) -> float:
+def cantilever_sag(part: PartGeometry, acceleration: float) -> float:
     """Tip shift over length of the part as a cantilever in a uniform acceleration [-].
 
     The second moment of a thin tube, A d²/8, is that of a solid bar with the depth h = √1.5 d.
     """
-    length, depth = part.size[2], sqrt(1.5) * tube(part) or 2 / 3 * width(part)
+    length, depth = part.size[2], sqrt(1.5) * tube_diameter(part) or 2 / 3 * part_width(part)
     if depth <= 0 or length < 4 * depth:
         return 0.0
     density, young = part.material.density, part.material.young
     # A load at the tip bends 8/3 as much as one spread along.
     loaded = 1.0 + 8 / 3 * part.burden
-    return tip_shift(loaded * density * acceleration, young, length, depth)
+    return cantilever_tip_deflection_ratio(loaded * density * acceleration, young, length, depth)

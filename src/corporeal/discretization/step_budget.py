@@ -12,93 +12,100 @@ from math import sqrt
 
 from scipy.optimize import brentq
 
-from corporeal.core.types import Treatment
-from corporeal.discretization.bending import INVISIBLE_STRAIN
-from corporeal.discretization.dents import dent_of_blow, dent_of_wall, mark_of_blow
-from corporeal.discretization.part import (
-    COMPACT,
-    Motion,
-    PartGeometry,
-    Verdict,
-    is_flat_wall,
-    is_trinket,
+from corporeal.core.types import Discretization
+from corporeal.discretization.cantilever_bending import MAX_INVISIBLE_STRAIN
+from corporeal.discretization.hertz_indentation import (
+    dent_of_hollow_ball,
+    hertz_dent_of_ball,
+    yield_mark_of_ball,
 )
-from corporeal.mpm.constants import COURANT, POISSON_FLOOR
-from corporeal.mpm.laws import MENU
-from corporeal.mpm.physics.branches import stiffening
-from corporeal.mpm.physics.stability import (
+from corporeal.discretization.part_geometry import (
+    MIN_COMPACT_SIDE_RATIO,
+    ExpectedMotion,
+    PartGeometry,
+    RigidityVerdict,
+    is_flat_wall,
+    is_subgrid_part,
+)
+from corporeal.mpm.constants import COURANT, MIN_REDUCED_POISSON_RATIO
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
+from corporeal.mpm.physics.maxwell_branches import stiffening
+from corporeal.mpm.physics.time_step_limits import (
     capped_young,
     compress_young,
-    compression,
+    fit_young_compression,
     p_wave_speed,
     stable_step,
 )
 
 
-def calm_trinkets(
-    parts: Sequence[PartGeometry], treatments: Sequence[Treatment], cell: float
-) -> list[Treatment]:
+def slow_subgrid_parts(
+    parts: Sequence[PartGeometry], treatments: Sequence[Discretization], cell: float
+) -> list[Discretization]:
     """Give parts that the grid cannot show the stiffness of the fastest part that they sit on.
 
     A can's tab or a duck's eye would otherwise set the time step of the whole scene.
     """
-    small = [is_trinket(p, cell) for p in parts]
+    small = [is_subgrid_part(p, cell) for p in parts]
     fastest = dict.fromkeys((p.object for p in parts), 0.0)
     for part, treatment, trinket in zip(parts, treatments, small, strict=True):
         if not trinket:
             fastest[part.object] = max(fastest[part.object], treatment.wave_speed)
     because = "Too small for the grid to show its own stiffness, it is slowed to what it sits on"
     return [
-        compress(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
+        slow_waves(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
         for p, t, trinket in zip(parts, treatments, small, strict=True)
     ]
 
 
 @dataclass(frozen=True)
-class Fitted:
+class BudgetedTreatments:
     """Treatments that keep within a step budget."""
 
-    treatments: list[Treatment]
+    treatments: list[Discretization]
     warnings: tuple[str, ...] = ()
 
 
-STIFFENED = 1.6
+MAX_LOSS_STEP_FACTOR = 1.6
 """How many times more steps than without loss lossy matter may take [-], before stiffness pays."""
 
 
-OUTRUN = 10.0
+MIN_WAVE_SPEED_RATIO = 10.0
 """How many times faster than anything moves a wave is, whatever the budget [-]."""
 
 
-def counted(treatment: Treatment) -> float:
+def counted_wave_speed(treatment: Discretization) -> float:
     """Wave speed that the step budget counts [m/s].
 
     Loss stiffens: up to a loss factor of 0.3 the steps that it takes are given, beyond that waves
     are slowed for it.
     """
     free = sqrt(stiffening(treatment.loss, treatment.poisson))
-    return treatment.wave_speed / min(STIFFENED, free)
+    return treatment.wave_speed / min(MAX_LOSS_STEP_FACTOR, free)
 
 
-def fit_budget(
-    treatments: Sequence[Treatment], cell: float, steps: float, outrun: float = OUTRUN
-) -> Fitted:
+def fit_step_budget(
+    treatments: Sequence[Discretization],
+    cell: float,
+    steps: float,
+    outrun: float = MIN_WAVE_SPEED_RATIO,
+) -> BudgetedTreatments:
     """Compress stiffness where the step budget would be exceeded; its order is kept.
 
     σ_y falls with √(E_sim/E), which keeps the impact speed at which a part yields.
     """
     motion = max((t.impact_speed for t in treatments), default=0.0)
     limit = max(COURANT * cell * steps - motion, outrun * motion)
-    treatments = [soften_bulk(t, limit, cell) for t in treatments]
-    fastest = max(map(counted, treatments), default=0.0)
+    treatments = [lower_poisson_ratio(t, limit, cell) for t in treatments]
+    fastest = max(map(counted_wave_speed, treatments), default=0.0)
     # A part whose bulk gave way runs at the limit, but for rounding.
     if fastest <= limit * (1 + 1e-9):
-        return Fitted(treatments)
+        return BudgetedTreatments(treatments)
     because = "The step budget slows its waves"
-    bends = [(t.young, counted(t)) for t in treatments if t.wave_speed > 0]
-    knee, power = compression(bends, limit)
+    bends = [(t.young, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
+    knee, power = fit_young_compression(bends, limit)
     fitted = [
-        compress(
+        slow_waves(
             t, t.wave_speed * sqrt(compress_young(t.young, knee, power) / t.young), cell, because
         )
         if t.wave_speed > 0
@@ -113,10 +120,10 @@ def fit_budget(
         f"{changed} of {len(fitted)} parts {softer}, to stay within {steps:,.0f} steps per second; "
         "what is stiffer stays stiffer. A finer --detail has a larger budget."
     )
-    return Fitted(fitted, (warning,))
+    return BudgetedTreatments(fitted, (warning,))
 
 
-def soften_bulk(treatment: Treatment, limit: float, cell: float) -> Treatment:
+def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) -> Discretization:
     """Lower Poisson's ratio of what is nearly incompressible until its waves keep to a limit.
 
     E stays, and with it the order of stiffness: from ν = 0.49 to 0.41 Hertz's force falls by 9 %,
@@ -128,21 +135,21 @@ def soften_bulk(treatment: Treatment, limit: float, cell: float) -> Treatment:
         cell: dx [m].
 
     """
-    if counted(treatment) <= limit or treatment.poisson <= POISSON_FLOOR:
+    if counted_wave_speed(treatment) <= limit or treatment.poisson <= MIN_REDUCED_POISSON_RATIO:
         return treatment
 
-    def at(poisson: float) -> Treatment:
+    def at(poisson: float) -> Discretization:
         wave = wave_speed(treatment.young, poisson, treatment.density, treatment.loss)
         step = stable_step(wave, treatment.impact_speed, cell)
         return replace(treatment, poisson=poisson, wave_speed=wave, step=step)
 
     def excess(poisson: float) -> float:
-        return counted(at(poisson)) - limit
+        return counted_wave_speed(at(poisson)) - limit
 
-    enough = excess(POISSON_FLOOR) < 0
-    lower = POISSON_FLOOR
+    enough = excess(MIN_REDUCED_POISSON_RATIO) < 0
+    lower = MIN_REDUCED_POISSON_RATIO
     if enough:
-        lower = float(brentq(excess, POISSON_FLOOR, treatment.poisson))  # pyright: ignore[reportArgumentType]
+        lower = float(brentq(excess, MIN_REDUCED_POISSON_RATIO, treatment.poisson))  # pyright: ignore[reportArgumentType]
     return replace(
         at(lower),
         why=f"{treatment.why} The step budget lowers its Poisson's ratio from "
@@ -166,12 +173,12 @@ def wave_speed(young: float, poisson: float, density: float, loss: float) -> flo
 # ------------------------------------------------------------------ better rigid
 
 
-def nearer_rigid(
+def parts_nearer_to_rigid(
     parts: Sequence[PartGeometry],
-    motions: Sequence[Motion],
-    verdicts: Sequence[Verdict],
-    unslowed: Sequence[Treatment],
-    slowed: Sequence[Treatment],
+    motions: Sequence[ExpectedMotion],
+    verdicts: Sequence[RigidityVerdict],
+    unslowed: Sequence[Discretization],
+    slowed: Sequence[Discretization],
 ) -> dict[int, str]:
     """Say which parts would be simulated so much too soft that rigid is nearer to the truth.
 
@@ -187,22 +194,26 @@ def nearer_rigid(
     found = {}
     for k, (true, soft) in enumerate(zip(unslowed, slowed, strict=True)):
         part, verdict = parts[k], verdicts[k]
-        flows = MENU[part.material.law].loose
+        flows = CONSTITUTIVE_LAWS[part.material.law].loose
         if verdict.rigid or flows or true.wave_speed == 0:
             continue
-        why = _too_soft(part, motions[part.object], verdict, true, soft)
+        why = _too_soft_reason(part, motions[part.object], verdict, true, soft)
         if why:
             found[k] = why
     return found
 
 
-def _too_soft(
-    part: PartGeometry, motion: Motion, verdict: Verdict, true: Treatment, soft: Treatment
+def _too_soft_reason(
+    part: PartGeometry,
+    motion: ExpectedMotion,
+    verdict: RigidityVerdict,
+    true: Discretization,
+    soft: Discretization,
 ) -> str:
     """Say why rigid is nearer to the truth than as soft as a part would be simulated; "": no."""
     if true.impact_speed >= verdict.yield_speed:
-        dents = _marks(part, true, soft)
-    elif verdict.impact < INVISIBLE_STRAIN:
+        dents = _yield_marks(part, true, soft)
+    elif verdict.impact < MAX_INVISIBLE_STRAIN:
         sags = _sags_too_far(part, motion, verdict, true, soft)
         return (
             f"it is expected to strain by about {verdict.strain:.2g}, and as soft as the grid and "
@@ -211,13 +222,13 @@ def _too_soft(
             else ""
         )
     else:
-        dents = _dents(part, true, soft) if is_compact(part) else None
+        dents = _ball_dents(part, true, soft) if is_dented_by_impact(part) else None
     if dents is None or dents.simulated <= 2.0 * dents.life:
         return ""
-    return _dented(true.impact_speed, dents)
+    return _dented_reason(true.impact_speed, dents)
 
 
-def _dented(speed: float, dents: "_Dents") -> str:
+def _dented_reason(speed: float, dents: "_BallDents") -> str:
     """Say why a part that would be dented too deeply is rigid."""
     return (
         f"a blow at {speed:.2g} m/s would dent it by {dents.life:.2g} of its radius, and as soft "
@@ -227,22 +238,24 @@ def _dented(speed: float, dents: "_Dents") -> str:
 
 
 @dataclass(frozen=True)
-class _Dents:
+class _BallDents:
     """Greatest dents of a ball in a blow, over its radius [-]."""
 
     life: float
     simulated: float
 
 
-def _dents(part: PartGeometry, true: Treatment, soft: Treatment) -> _Dents | None:
+def _ball_dents(
+    part: PartGeometry, true: Discretization, soft: Discretization
+) -> _BallDents | None:
     """Give how deep a blow dents a solid or a sealed wall; None: it bends in another way.
 
     Other walls are open, or their restitution is that of solids: they stay soft.
     """
     if soft.kind == "deformable":
-        return _Dents(
+        return _BallDents(
             *(
-                dent_of_blow(young, true.poisson, true.density, true.impact_speed)
+                hertz_dent_of_ball(young, true.poisson, true.density, true.impact_speed)
                 for young in (true.young, soft.young)
             )
         )
@@ -251,20 +264,26 @@ def _dents(part: PartGeometry, true: Treatment, soft: Treatment) -> _Dents | Non
     speed, radius, made = true.impact_speed, 0.5 * part.size[0], part.material
     real = (made.young, made.poisson, made.density, part.structure.thickness or soft.thickness)
     slow = (soft.young, soft.poisson, soft.density, soft.thickness)
-    return _Dents(*(dent_of_wall(*wall, radius, speed) for wall in (real, slow)))
+    return _BallDents(*(dent_of_hollow_ball(*wall, radius, speed) for wall in (real, slow)))
 
 
-def _marks(part: PartGeometry, true: Treatment, soft: Treatment) -> _Dents | None:
+def _yield_marks(
+    part: PartGeometry, true: Discretization, soft: Discretization
+) -> _BallDents | None:
     """Give how deep a blow marks a compact solid that yields; None: it bends in another way."""
     solid = soft.kind == "deformable" and part.structure.kind == "solid"
-    if not (solid and is_compact(part) and true.yield_stress and soft.yield_stress):
+    if not (solid and is_dented_by_impact(part) and true.yield_stress and soft.yield_stress):
         return None
     strengths = (true.yield_stress, soft.yield_stress)
-    return _Dents(*(mark_of_blow(s, true.density, true.impact_speed) for s in strengths))
+    return _BallDents(*(yield_mark_of_ball(s, true.density, true.impact_speed) for s in strengths))
 
 
 def _sags_too_far(
-    part: PartGeometry, motion: Motion, verdict: Verdict, true: Treatment, soft: Treatment
+    part: PartGeometry,
+    motion: ExpectedMotion,
+    verdict: RigidityVerdict,
+    true: Discretization,
+    soft: Discretization,
 ) -> bool:
     """Tell whether a part sags by more than twice as much as in life.
 
@@ -275,22 +294,24 @@ def _sags_too_far(
     pull = motion.driven if part.burden else motion.acceleration
     squashed = soft.density * pull * part.size[2] / soft.young
     sags = min(1.0, max(squashed, verdict.weight * true.young / soft.young))
-    return sags - min(1.0, verdict.weight) > max(verdict.weight, INVISIBLE_STRAIN)
+    return sags - min(1.0, verdict.weight) > max(verdict.weight, MAX_INVISIBLE_STRAIN)
 
 
-def is_compact(part: PartGeometry) -> bool:
+def is_dented_by_impact(part: PartGeometry) -> bool:
     """Tell whether a blow dents a part rather than bends it: no rod, no sheet, no plant."""
-    lumpy = part.size[0] >= COMPACT * part.size[2]
+    lumpy = part.size[0] >= MIN_COMPACT_SIDE_RATIO * part.size[2]
     return lumpy and part.leaves == 0 and part.diameter == 0
 
 
-LEAST_HOLD = 0.25
+MIN_WALL_HOLD_FRACTION = 0.25
 """A flat wall that holds less than this share of what it holds in life when stretched is nearer to
 life as a rigid one: its dent, as √(1/hold), would be more than twice as deep as in life."""
 
 
-def torn_walls(
-    parts: Sequence[PartGeometry], verdicts: Sequence[Verdict], treatments: Sequence[Treatment]
+def walls_that_tear(
+    parts: Sequence[PartGeometry],
+    verdicts: Sequence[RigidityVerdict],
+    treatments: Sequence[Discretization],
 ) -> dict[int, str]:
     """Say which flat ductile walls would tear as they are simulated, and why they are rigid.
 
@@ -305,7 +326,7 @@ def torn_walls(
         if verdict.rigid or not flat or not strong or not treatment.thickness:
             continue
         hold = (treatment.yield_stress or 0.0) * treatment.thickness / (strong * thickness)
-        if treatment.impact_speed >= verdict.yield_speed and hold < LEAST_HOLD:
+        if treatment.impact_speed >= verdict.yield_speed and hold < MIN_WALL_HOLD_FRACTION:
             found[k] = (
                 f"it would yield when struck at {treatment.impact_speed:.2g} m/s, but on this grid "
                 f"it would resist being stretched with only {hold:.1%} of its strength, and tear"
@@ -313,7 +334,9 @@ def torn_walls(
     return found
 
 
-def compress(treatment: Treatment, speed: float, cell: float, because: str) -> Treatment:
+def slow_waves(
+    treatment: Discretization, speed: float, cell: float, because: str
+) -> Discretization:
     """Slow a deformable part's waves down to ``speed`` [m/s], and say why."""
     if treatment.kind == "rigid" or speed >= treatment.wave_speed:
         return treatment
@@ -329,7 +352,7 @@ def compress(treatment: Treatment, speed: float, cell: float, because: str) -> T
     )
 
 
-def cap(part: PartGeometry, treatment: Treatment, cell: float) -> Treatment:
+def cap_stiffness(part: PartGeometry, treatment: Discretization, cell: float) -> Discretization:
     """Apply the published cap instead: σ_y falls with E, which keeps the yield strain."""
     material, density = part.material, treatment.density
     poisson = min(material.poisson, 0.4999)

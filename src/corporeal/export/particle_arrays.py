@@ -11,21 +11,21 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.core.types import Law, Treatment
-from corporeal.export.target import Asked, NothingToWriteError
+from corporeal.core.types import Discretization, Law
+from corporeal.export.export_target import ExportRequest, NothingToWriteError
 
-KINDS = {
+GNS_PARTICLE_TYPES = {
     Law.COROTATED: 7,
     Law.NEO_HOOKEAN: 7,
     Law.HENCKY: 7,
     Law.DRUCKER_PRAGER: 6,
     Law.VON_MISES: 8,
 }
-RIGID = 0
+RIGID_PARTICLE_TYPE = 0
 
 
 @dataclass(frozen=True)
-class Table:
+class ParticleTable:
     """One run as arrays; F frames, P particles."""
 
     position: Float[np.ndarray, "F P 3"]
@@ -41,7 +41,7 @@ class Table:
     """[m]"""
 
 
-def table_of(asked: Asked) -> Table:
+def read_particle_table(asked: ExportRequest) -> ParticleTable:
     """Read all frames of a run.
 
     Raises:
@@ -55,7 +55,7 @@ def table_of(asked: Asked) -> Table:
     position = np.stack([frame.position for frame in motion.frames]).astype(np.float32)
     law = np.array([m.material.law.value for m in matter])[particles.part]
     soft = ~motion.rigid[particles.object]
-    kind = np.array([KINDS[m.material.law] for m in matter])[particles.part]
+    kind = np.array([GNS_PARTICLE_TYPES[m.material.law] for m in matter])[particles.part]
     columns = {
         "object": particles.object,
         "part": particles.part,
@@ -65,10 +65,10 @@ def table_of(asked: Asked) -> Table:
         "law": law,
     }
     treatments = [m.treatment for m in matter]
-    columns |= {k: v[particles.part] for k, v in _numbers(treatments).items()}
-    return Table(
+    columns |= {k: v[particles.part] for k, v in _part_values(treatments).items()}
+    return ParticleTable(
         position=position,
-        kind=np.where(soft, kind, RIGID),
+        kind=np.where(soft, kind, RIGID_PARTICLE_TYPE),
         columns=columns,
         provenance=json.dumps([m.provenance for m in matter], ensure_ascii=False, allow_nan=False),
         step=float(np.diff(motion.time).mean()),
@@ -76,7 +76,7 @@ def table_of(asked: Asked) -> Table:
     )
 
 
-def _numbers(treatments: list[Treatment]) -> dict[str, np.ndarray]:
+def _part_values(treatments: list[Discretization]) -> dict[str, np.ndarray]:
     """Values of every part as simulated; what does not yield has an infinite yield stress."""
     return {
         "young": np.array([t.young for t in treatments]),

@@ -10,29 +10,45 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.errors import UserError
-from corporeal.core.store import plain
-from corporeal.core.types import Particles, PartWords, Surface
-from corporeal.discretization.sizes import scale_of_part
-from corporeal.export.motion import Motion
-from corporeal.export.names import identifiers
-from corporeal.export.solids import Collider, Grains, Matter, PhysicalScene, Solid
-from corporeal.export.unsaid import unsaid
-from corporeal.geometry.convex_decompose import decompose
-from corporeal.geometry.convex_hull import Piece, hull_of
-from corporeal.geometry.mesh import joined
+from corporeal.core.store import to_plain
+from corporeal.core.types import PartDescription, Particles, Surface
+from corporeal.discretization.object_scaling import part_scales
+from corporeal.export.exported_solids import (
+    ConvexCollider,
+    ExportedSolid,
+    MaterialPoints,
+    PartMaterial,
+    PhysicalScene,
+)
+from corporeal.export.identifiers import identifiers
+from corporeal.export.scene_motion import SceneMotion
+from corporeal.export.unsupported_features import unsupported_features
+from corporeal.geometry.convex_decomposition import decompose_convex
+from corporeal.geometry.convex_hull import ConvexPiece, convex_hull_of
+from corporeal.geometry.mesh import join_meshes
 from corporeal.materials import materials_json
-from corporeal.mpm.physics.rigid import mass_of
-from corporeal.simulation.played import Prepared
+from corporeal.mpm.physics.rigid import mass_and_inertia
+from corporeal.simulation.simulation_result import PreparedScene
 
-THIN = 1e-4
+FLAT_HULL_THICKNESS_FRACTION = 1e-4
 """Of the extent: thickness that the hull of a flat thing is given."""
-BUILT = ("structure", "thickness", "contents", "fill")
-"""Fields of ``PartWords`` that say how a part is built."""
-RESERVED = ("World", "Looks", "Matter", "Physics", "Floor", "Floors", "Hulls", "Pieces", "floor")
+STRUCTURE_FIELDS = ("structure", "thickness", "contents", "fill")
+"""Fields of ``PartDescription`` that say how a part is built."""
+RESERVED_NAMES = (
+    "World",
+    "Looks",
+    "Matter",
+    "Physics",
+    "Floor",
+    "Floors",
+    "Hulls",
+    "Pieces",
+    "floor",
+)
 """Names that our files use for other things."""
 
 
-def physical_scene(prepared: Prepared, motion: Motion) -> PhysicalScene:
+def physical_scene(prepared: PreparedScene, motion: SceneMotion) -> PhysicalScene:
     """Take a scene as it stands at an instant of its motion.
 
     Args:
@@ -48,7 +64,7 @@ def physical_scene(prepared: Prepared, motion: Motion) -> PhysicalScene:
     if empty:
         raise UserError(f"{', '.join(empty)} holds no material points. Run corporeal fill again.")
     titles = [o.name for o in scene.objects]
-    names = identifiers(titles, RESERVED)
+    names = identifiers(titles, RESERVED_NAMES)
     made = partial(_solid, prepared, motion)
     solids = tuple(made(k, name) for k, name in enumerate(names))
     (name,) = identifiers([scene.name])
@@ -56,7 +72,7 @@ def physical_scene(prepared: Prepared, motion: Motion) -> PhysicalScene:
         name=name,
         title=scene.name,
         solids=solids,
-        matter=_matter(prepared),
+        matter=_part_materials(prepared),
         finishes=scene.finishes,
         friction=np.asarray(field.friction, dtype=float),
         restitution=np.asarray(field.restitution, dtype=float),
@@ -68,12 +84,12 @@ def physical_scene(prepared: Prepared, motion: Motion) -> PhysicalScene:
         time=motion.instant,
         duration=scene.duration,
         credits=tuple(dict.fromkeys(o.credit for o in scene.objects if o.credit)),
-        unsaid=unsaid(scene, particles, motion),
+        unsaid=unsupported_features(scene, particles, motion),
     )
 
 
-def _matter(prepared: Prepared) -> tuple[Matter, ...]:
-    heavy = prepared.particles.mass_real, scale_of_part(prepared.scene, prepared.parts)
+def _part_materials(prepared: PreparedScene) -> tuple[PartMaterial, ...]:
+    heavy = prepared.particles.mass_real, part_scales(prepared.scene, prepared.parts)
     listed = materials_json(prepared.field, prepared.parts, *heavy)["parts"]
     catalogue = prepared.parts.catalogue
     field = prepared.field
@@ -81,23 +97,23 @@ def _matter(prepared: Prepared) -> tuple[Matter, ...]:
         catalogue, field.materials, prepared.particles.treatments, listed, field.words, strict=True
     )
     return tuple(
-        Matter(
+        PartMaterial(
             part.name,
             part.object,
             material,
             treatment,
-            row | {"words": _words(words), "simulated": plain(treatment)},
+            row | {"words": _described_structure(words), "simulated": to_plain(treatment)},
         )
         for part, material, treatment, row, words in rows
     )
 
 
-def _words(words: PartWords) -> dict[str, Any]:
+def _described_structure(words: PartDescription) -> dict[str, Any]:
     """Return how a part is described as built, before its shape was looked at."""
-    return {key: getattr(words, key) for key in BUILT}
+    return {key: getattr(words, key) for key in STRUCTURE_FIELDS}
 
 
-def _provenance(prepared: Prepared, motion: Motion, number: int) -> dict[str, Any]:
+def _provenance(prepared: PreparedScene, motion: SceneMotion, number: int) -> dict[str, Any]:
     thing = prepared.scene.objects[number]
     return {
         "class": thing.class_name,
@@ -110,7 +126,7 @@ def _provenance(prepared: Prepared, motion: Motion, number: int) -> dict[str, An
     }
 
 
-def _parts_of_surfaces(prepared: Prepared, numbers: list[int]) -> tuple[int, ...]:
+def _parts_of_surfaces(prepared: PreparedScene, numbers: list[int]) -> tuple[int, ...]:
     """Return the part that most triangles of each surface belong to; none named: the first."""
     counts = [len(s.triangles) for s in prepared.scene.surfaces]
     ends = np.cumsum([0, *counts])
@@ -122,14 +138,14 @@ def _parts_of_surfaces(prepared: Prepared, numbers: list[int]) -> tuple[int, ...
     return tuple(found)
 
 
-def _solid(prepared: Prepared, motion: Motion, number: int, name: str) -> Solid:
+def _solid(prepared: PreparedScene, motion: SceneMotion, number: int, name: str) -> ExportedSolid:
     scene, particles = prepared.scene, prepared.particles
     own = np.flatnonzero(particles.object == number)
     now = motion.particles[own]
-    whole = mass_of(now, particles.mass[own], particles.volume[own])
+    whole = mass_and_inertia(now, particles.mass[own], particles.volume[own])
     rigid = motion.is_rigid(number)
     surfaces = [n for n, s in enumerate(scene.surfaces) if s.object == number]
-    solid = Solid(
+    solid = ExportedSolid(
         name=name,
         title=scene.objects[number].name,
         number=number,
@@ -139,32 +155,36 @@ def _solid(prepared: Prepared, motion: Motion, number: int, name: str) -> Solid:
         inertia=whole.inertia,
         velocity=motion.velocity(number),
         spin=motion.spin(number),
-        parts=_by_weight(particles, own),
-        surfaces=tuple(_posed(scene.surfaces[n], motion, n, whole.centre) for n in surfaces),
+        parts=_parts_by_mass(particles, own),
+        surfaces=tuple(
+            _posed_surface(scene.surfaces[n], motion, n, whole.centre) for n in surfaces
+        ),
         surface_numbers=tuple(surfaces),
         part_of_surface=_parts_of_surfaces(prepared, surfaces),
         provenance=_provenance(prepared, motion, number),
     )
     if not rigid:
-        return replace(solid, grains=_grains(particles, motion, own, whole.centre))
+        return replace(solid, grains=_material_points(particles, motion, own, whole.centre))
     return _with_colliders(solid, prepared, motion, own)
 
 
-def _by_weight(particles: Particles, own: Int[np.ndarray, " N"]) -> tuple[int, ...]:
+def _parts_by_mass(particles: Particles, own: Int[np.ndarray, " N"]) -> tuple[int, ...]:
     part, mass = particles.part[own], particles.mass[own]
     return tuple(sorted(set(part.tolist()), key=lambda k: -float(mass[part == k].sum())))
 
 
-def _posed(surface: Surface, motion: Motion, number: int, origin: np.ndarray) -> Surface:
+def _posed_surface(
+    surface: Surface, motion: SceneMotion, number: int, origin: np.ndarray
+) -> Surface:
     vertices, normals = motion.surface_now(number)
     kept = None if surface.normals is None else normals
     return replace(surface, vertices=vertices - origin, normals=kept)
 
 
-def _grains(
-    particles: Particles, motion: Motion, own: np.ndarray, origin: Float[np.ndarray, "3"]
-) -> Grains:
-    return Grains(
+def _material_points(
+    particles: Particles, motion: SceneMotion, own: np.ndarray, origin: Float[np.ndarray, "3"]
+) -> MaterialPoints:
+    return MaterialPoints(
         position=motion.particles[own] - origin,
         velocity=motion.particle_velocity[own],
         volume=particles.volume[own],
@@ -174,26 +194,32 @@ def _grains(
     )
 
 
-def _with_colliders(solid: Solid, prepared: Prepared, motion: Motion, own: np.ndarray) -> Solid:
+def _with_colliders(
+    solid: ExportedSolid, prepared: PreparedScene, motion: SceneMotion, own: np.ndarray
+) -> ExportedSolid:
     """Cut the mesh as the scene has it, and turn the pieces to where the body is now."""
     scene, particles = prepared.scene, prepared.particles
-    mesh = joined([scene.surfaces[n] for n in solid.surface_numbers])
-    pieces = decompose(mesh.vertices, mesh.triangles)
+    mesh = join_meshes([scene.surfaces[n] for n in solid.surface_numbers])
+    pieces = decompose_convex(mesh.vertices, mesh.triangles)
     near = KDTree(particles.position[own])
     parts = [int(particles.part[own[near.query(p.centre)[1]]]) for p in pieces]
-    hull = hull_of(mesh.vertices, THIN * float(np.ptp(mesh.vertices, axis=0).max()))
+    hull = convex_hull_of(
+        mesh.vertices, FLAT_HULL_THICKNESS_FRACTION * float(np.ptp(mesh.vertices, axis=0).max())
+    )
 
-    def here(piece: Piece) -> Piece:
-        return Piece(motion.placed(solid.number, piece.vertices) - solid.origin, piece.triangles)
+    def here(piece: ConvexPiece) -> ConvexPiece:
+        return ConvexPiece(
+            motion.placed(solid.number, piece.vertices) - solid.origin, piece.triangles
+        )
 
     return replace(
         solid,
-        pieces=tuple(Collider(here(p), k) for p, k in zip(pieces, parts, strict=True)),
-        hull=Collider(here(hull), solid.heaviest),
+        pieces=tuple(ConvexCollider(here(p), k) for p, k in zip(pieces, parts, strict=True)),
+        hull=ConvexCollider(here(hull), solid.heaviest),
     )
 
 
-def principal(inertia: Float[np.ndarray, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
+def principal_axes(inertia: Float[np.ndarray, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
     """Return the moments of inertia [kg m²] and the quaternion (w, x, y, z) of their axes."""
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))

@@ -11,41 +11,41 @@ import numpy as np
 from PIL import Image
 
 from corporeal.core.types import Finish, Surface
-from corporeal.export.solids import PhysicalScene, Solid
-from corporeal.export.target import Soft
-from corporeal.export.usd_soft import grains_prim, tetrahedra_prim
-from corporeal.geometry.convex_hull import Piece
-from corporeal.io.usd_text import (
-    Prim,
-    integers,
-    number,
-    text,
-    title,
-    vector,
-    vectors,
+from corporeal.export.export_target import SoftRepresentation
+from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
+from corporeal.export.usd_deformables import material_points_prim, tetrahedra_prim
+from corporeal.geometry.convex_hull import ConvexPiece
+from corporeal.io.usd.usda_writer import (
+    UsdPrim,
+    usda_display_name,
+    usda_integers,
+    usda_number,
+    usda_string,
+    usda_vector,
+    usda_vectors,
 )
 
-TEXTURES = "textures"
-WORLD = "World"
-IDENTITY = (1.0, 0.0, 0.0, 0.0)
+TEXTURE_FOLDER = "textures"
+WORLD_PRIM = "World"
+IDENTITY_QUATERNION = (1.0, 0.0, 0.0, 0.0)
 
 
-def geometry(scene: PhysicalScene, folder: Path, soft: Soft) -> Prim:
+def geometry_prims(scene: PhysicalScene, folder: Path, soft: SoftRepresentation) -> UsdPrim:
     """Return the tree of all shapes, and write the pictures on them beside it."""
-    world = Prim("Xform", WORLD, metadata=[title(scene.title)])
-    looks = world.add(Prim("Scope", "Looks"))
+    world = UsdPrim("Xform", WORLD_PRIM, metadata=[usda_display_name(scene.title)])
+    looks = world.add(UsdPrim("Scope", "Looks"))
     for key in sorted({look_name(s) for b in scene.solids for s in b.surfaces}):
         coloured = key.endswith("_coloured")
         finish = int(key.removesuffix("_coloured").removeprefix("look_"))
-        looks.add(_look(key, scene.finishes[finish], coloured, folder))
+        looks.add(_material_prim(key, scene.finishes[finish], coloured, folder))
     for solid in scene.solids:
         world.add(_solid(solid, scene, soft))
     return world
 
 
-def path_of(solid: Solid, *below: str) -> str:
+def solid_path(solid: ExportedSolid, *below: str) -> str:
     """Path of a solid's prim or of one below it."""
-    return "/".join(("", WORLD, solid.name, *below))
+    return "/".join(("", WORLD_PRIM, solid.name, *below))
 
 
 def look_name(surface: Surface) -> str:
@@ -58,59 +58,67 @@ def surface_name(number: int) -> str:
     return f"surface_{number}"
 
 
-def _solid(solid: Solid, scene: PhysicalScene, soft: Soft) -> Prim:
-    prim = Prim("Xform", solid.name, metadata=[title(solid.title)])
-    prim.set("double3", "xformOp:translate", vector(solid.origin))
-    prim.set("quatf", "xformOp:orient", vector(IDENTITY))
+def _solid(solid: ExportedSolid, scene: PhysicalScene, soft: SoftRepresentation) -> UsdPrim:
+    prim = UsdPrim("Xform", solid.name, metadata=[usda_display_name(solid.title)])
+    prim.set("double3", "xformOp:translate", usda_vector(solid.origin))
+    prim.set("quatf", "xformOp:orient", usda_vector(IDENTITY_QUATERNION))
     prim.set("uniform token[]", "xformOpOrder", '["xformOp:translate", "xformOp:orient"]')
     for number_, surface in zip(solid.surface_numbers, solid.surfaces, strict=True):
         prim.add(_surface(surface_name(number_), surface, scene))
     if solid.rigid:
         prim.add(_colliders(solid))
     elif soft != "none":
-        prim.add(grains_prim(solid))
+        prim.add(material_points_prim(solid))
         prim.add(tetrahedra_prim(solid, scene))
     return prim
 
 
-def _surface(name: str, surface: Surface, scene: PhysicalScene) -> Prim:
-    prim = Prim("Mesh", name, ["MaterialBindingAPI"], [title(surface.name)])
+def _surface(name: str, surface: Surface, scene: PhysicalScene) -> UsdPrim:
+    prim = UsdPrim("Mesh", name, ["MaterialBindingAPI"], [usda_display_name(surface.name)])
     _fill(prim, surface.vertices, surface.triangles)
     if surface.normals is not None:
-        prim.lines.append(_with(f"normal3f[] normals = {vectors(surface.normals)}", "vertex"))
+        prim.lines.append(
+            _with_interpolation(f"normal3f[] normals = {usda_vectors(surface.normals)}", "vertex")
+        )
     if surface.uv is not None:
         up = np.column_stack([surface.uv[:, 0], 1 - surface.uv[:, 1]])
-        prim.lines.append(_with(f"texCoord2f[] primvars:st = {vectors(up)}", "vertex"))
+        prim.lines.append(
+            _with_interpolation(f"texCoord2f[] primvars:st = {usda_vectors(up)}", "vertex")
+        )
     if surface.colours is not None:
         base = np.asarray(scene.finishes[surface.finish].colour[:3])
-        shown = vectors(surface.colours[:, :3] * base)
-        prim.lines.append(_with(f"color3f[] primvars:displayColor = {shown}", "vertex"))
-    prim.relate("material:binding", [f"/{WORLD}/Looks/{look_name(surface)}"])
+        shown = usda_vectors(surface.colours[:, :3] * base)
+        prim.lines.append(
+            _with_interpolation(f"color3f[] primvars:displayColor = {shown}", "vertex")
+        )
+    prim.relate("material:binding", [f"/{WORLD_PRIM}/Looks/{look_name(surface)}"])
     return prim
 
 
-def _fill(prim: Prim, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    prim.set("float3[]", "extent", vectors(np.array([vertices.min(axis=0), vertices.max(axis=0)])))
-    prim.set("int[]", "faceVertexCounts", integers(np.full(len(triangles), 3)))
-    prim.set("int[]", "faceVertexIndices", integers(triangles))
-    prim.set("point3f[]", "points", vectors(vertices))
-    prim.set("uniform token", "subdivisionScheme", text("none"))
+def _fill(prim: UsdPrim, vertices: np.ndarray, triangles: np.ndarray) -> None:
+    prim.set(
+        "float3[]", "extent", usda_vectors(np.array([vertices.min(axis=0), vertices.max(axis=0)]))
+    )
+    prim.set("int[]", "faceVertexCounts", usda_integers(np.full(len(triangles), 3)))
+    prim.set("int[]", "faceVertexIndices", usda_integers(triangles))
+    prim.set("point3f[]", "points", usda_vectors(vertices))
+    prim.set("uniform token", "subdivisionScheme", usda_string("none"))
 
 
-def _with(line: str, interpolation: str) -> str:
-    return f"{line} (\n    interpolation = {text(interpolation)}\n)"
+def _with_interpolation(line: str, interpolation: str) -> str:
+    return f"{line} (\n    interpolation = {usda_string(interpolation)}\n)"
 
 
-def _colliders(solid: Solid) -> Prim:
-    group = Prim("Scope", "colliders")
+def _colliders(solid: ExportedSolid) -> UsdPrim:
+    group = UsdPrim("Scope", "colliders")
     for name, shape in named_colliders(solid):
-        prim = group.add(Prim("Mesh", name))
+        prim = group.add(UsdPrim("Mesh", name))
         _fill(prim, shape.vertices, shape.triangles)
-        prim.set("uniform token", "purpose", text("guide"))
+        prim.set("uniform token", "purpose", usda_string("guide"))
     return group
 
 
-def named_colliders(solid: Solid) -> Iterator[tuple[str, Piece]]:
+def named_colliders(solid: ExportedSolid) -> Iterator[tuple[str, ConvexPiece]]:
     """Names and shapes of a rigid solid's pieces, then of its hull."""
     for k, collider in enumerate(solid.pieces):
         yield f"piece_{k}", collider.shape
@@ -121,61 +129,64 @@ def named_colliders(solid: Solid) -> Iterator[tuple[str, Piece]]:
 # ---------------------------------------------------------------- looks
 
 
-def _look(name: str, finish: Finish, coloured: bool, folder: Path) -> Prim:
-    material, path = Prim("Material", name, metadata=[title(finish.name)]), f"/{WORLD}/Looks/{name}"
+def _material_prim(name: str, finish: Finish, coloured: bool, folder: Path) -> UsdPrim:
+    material, path = (
+        UsdPrim("Material", name, metadata=[usda_display_name(finish.name)]),
+        f"/{WORLD_PRIM}/Looks/{name}",
+    )
     material.lines.append(f"token outputs:surface.connect = <{path}/surface.outputs:surface>")
-    shader = material.add(Prim("Shader", "surface"))
-    shader.set("uniform token", "info:id", text("UsdPreviewSurface"))
+    shader = material.add(UsdPrim("Shader", "surface"))
+    shader.set("uniform token", "info:id", usda_string("UsdPreviewSurface"))
     if finish.texture is not None and not coloured:
         shader.lines.append(_connected("color3f", "diffuseColor", f"{path}/picture", "rgb"))
         _picture(material, path, name, finish, folder)
     elif coloured:
         shader.lines.append(_connected("color3f", "diffuseColor", f"{path}/colours", "result"))
-        reader = material.add(Prim("Shader", "colours"))
-        reader.set("uniform token", "info:id", text("UsdPrimvarReader_float3"))
-        reader.set("string", "inputs:varname", text("displayColor"))
+        reader = material.add(UsdPrim("Shader", "colours"))
+        reader.set("uniform token", "info:id", usda_string("UsdPrimvarReader_float3"))
+        reader.set("string", "inputs:varname", usda_string("displayColor"))
         reader.lines.append("float3 outputs:result")
     else:
-        shader.set("color3f", "inputs:diffuseColor", vector(finish.colour[:3]))
-    shader.set("float", "inputs:metallic", number(finish.metallic))
-    shader.set("float", "inputs:roughness", number(finish.roughness))
+        shader.set("color3f", "inputs:diffuseColor", usda_vector(finish.colour[:3]))
+    shader.set("float", "inputs:metallic", usda_number(finish.metallic))
+    shader.set("float", "inputs:roughness", usda_number(finish.roughness))
     if finish.glow:
         light = [finish.glow * c for c in finish.colour[:3]]
-        shader.set("color3f", "inputs:emissiveColor", vector(light))
-    _see_through(shader, path, finish, coloured)
+        shader.set("color3f", "inputs:emissiveColor", usda_vector(light))
+    _add_transparency(shader, path, finish, coloured)
     shader.lines.append("token outputs:surface")
     return material
 
 
-def _see_through(shader: Prim, path: str, finish: Finish, coloured: bool) -> None:
+def _add_transparency(shader: UsdPrim, path: str, finish: Finish, coloured: bool) -> None:
     if finish.alpha_mode == "OPAQUE":
         if finish.transmission:
-            shader.set("float", "inputs:opacity", number(1 - finish.transmission))
+            shader.set("float", "inputs:opacity", usda_number(1 - finish.transmission))
         return
     four = finish.texture is not None and finish.texture.shape[-1] == 4 and not coloured
     if four:
         shader.lines.append(_connected("float", "opacity", f"{path}/picture", "a"))
     else:
-        shader.set("float", "inputs:opacity", number(finish.colour[3]))
+        shader.set("float", "inputs:opacity", usda_number(finish.colour[3]))
     if finish.alpha_mode == "MASK":
-        shader.set("float", "inputs:opacityThreshold", number(finish.alpha_cutoff))
+        shader.set("float", "inputs:opacityThreshold", usda_number(finish.alpha_cutoff))
 
 
-def _picture(material: Prim, path: str, name: str, finish: Finish, folder: Path) -> None:
-    (folder / TEXTURES).mkdir(exist_ok=True)
-    Image.fromarray(np.asarray(finish.texture)).save(folder / TEXTURES / f"{name}.png")
-    coordinates = material.add(Prim("Shader", "st"))
-    coordinates.set("uniform token", "info:id", text("UsdPrimvarReader_float2"))
-    coordinates.set("string", "inputs:varname", text("st"))
+def _picture(material: UsdPrim, path: str, name: str, finish: Finish, folder: Path) -> None:
+    (folder / TEXTURE_FOLDER).mkdir(exist_ok=True)
+    Image.fromarray(np.asarray(finish.texture)).save(folder / TEXTURE_FOLDER / f"{name}.png")
+    coordinates = material.add(UsdPrim("Shader", "st"))
+    coordinates.set("uniform token", "info:id", usda_string("UsdPrimvarReader_float2"))
+    coordinates.set("string", "inputs:varname", usda_string("st"))
     coordinates.lines.append("float2 outputs:result")
-    picture = material.add(Prim("Shader", "picture"))
-    picture.set("uniform token", "info:id", text("UsdUVTexture"))
-    picture.set("asset", "inputs:file", f"@./{TEXTURES}/{name}.png@")
-    picture.set("float4", "inputs:scale", vector(finish.colour))
-    picture.set("token", "inputs:sourceColorSpace", text("sRGB"))
+    picture = material.add(UsdPrim("Shader", "picture"))
+    picture.set("uniform token", "info:id", usda_string("UsdUVTexture"))
+    picture.set("asset", "inputs:file", f"@./{TEXTURE_FOLDER}/{name}.png@")
+    picture.set("float4", "inputs:scale", usda_vector(finish.colour))
+    picture.set("token", "inputs:sourceColorSpace", usda_string("sRGB"))
     picture.lines.append(_connected("float2", "st", f"{path}/st", "result"))
     for axis in ("wrapS", "wrapT"):
-        picture.set("token", f"inputs:{axis}", text("repeat"))
+        picture.set("token", f"inputs:{axis}", usda_string("repeat"))
     picture.lines += ["float outputs:a", "float3 outputs:rgb"]
 
 

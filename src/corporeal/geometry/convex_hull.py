@@ -8,16 +8,16 @@ from scipy.spatial import ConvexHull, QhullError
 
 from corporeal.core.errors import UserError
 
-FOOT = 2e-3
+WEIGHT_BEARING_HEIGHT_FRACTION = 2e-3
 """Of the largest side: what is no higher than this above the lowest point carries weight."""
-FACES = 16
+MAX_UNDERSIDE_FACES = 16
 """Faces of a hull that are tried as undersides, largest first."""
-LEAN, LEVEL = 0.17, 0.1
+UPRIGHT_LEAN_RAD, TOP_LEAN_RAD = 0.17, 0.1
 """How far a face may be from the horizontal: of a body that is upright, and of its top [rad]."""
 
 
 @dataclass(frozen=True)
-class Piece:
+class ConvexPiece:
     """A convex body."""
 
     vertices: Float[np.ndarray, "V 3"]
@@ -45,7 +45,7 @@ class Piece:
         return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
 
-def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> Piece:
+def convex_hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> ConvexPiece:
     """Enclose points; what is flatter than ``thinnest`` [m] becomes a plate of that thickness.
 
     Raises:
@@ -53,7 +53,7 @@ def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> Piece:
 
     """
     points = np.unique(points, axis=0)
-    points = points if len(points) < 3 else _thickened(points, thinnest)
+    points = points if len(points) < 3 else _thickened_points(points, thinnest)
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError) as error:
@@ -65,10 +65,10 @@ def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> Piece:
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
     triangles = np.where(inward[:, None], triangles[:, ::-1], triangles)
     used, number = np.unique(triangles, return_inverse=True)
-    return Piece(points[used], number.reshape(-1, 3).astype(np.int64))
+    return ConvexPiece(points[used], number.reshape(-1, 3).astype(np.int64))
 
 
-def _thickened(points: np.ndarray, thinnest: float) -> np.ndarray:
+def _thickened_points(points: np.ndarray, thinnest: float) -> np.ndarray:
     """Move points apart along the direction in which there is least of them."""
     _, spread, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     if spread[1] <= 1e-6 * spread[0]:
@@ -80,7 +80,9 @@ def _thickened(points: np.ndarray, thinnest: float) -> np.ndarray:
     return np.concatenate([points - shift, points + shift])
 
 
-def tip_angle(hull: Piece, centre: Float[np.ndarray, "3"], down: Float[np.ndarray, "3"]) -> float:
+def tip_angle(
+    hull: ConvexPiece, centre: Float[np.ndarray, "3"], down: Float[np.ndarray, "3"]
+) -> float:
     """How far a body must be tilted before it falls over [rad]; 0 where it does not stand at all.
 
     The least angle, over the edges of the polygon it stands on, by which its centre of mass must
@@ -94,7 +96,7 @@ def tip_angle(hull: Piece, centre: Float[np.ndarray, "3"], down: Float[np.ndarra
     """
     below = (hull.vertices - centre) @ down
     side = float(np.ptp(hull.vertices, axis=0).max())
-    foot = hull.vertices[below > below.max() - FOOT * side] - centre
+    foot = hull.vertices[below > below.max() - WEIGHT_BEARING_HEIGHT_FRACTION * side] - centre
     across = np.linalg.svd(down[None])[2][1:]
     try:
         edges = ConvexHull(foot @ across.T).equations
@@ -105,7 +107,7 @@ def tip_angle(hull: Piece, centre: Float[np.ndarray, "3"], down: Float[np.ndarra
 
 
 @dataclass(frozen=True)
-class Stance:
+class StandingStance:
     """One way for a body to stand."""
 
     down: Float[np.ndarray, "3"]
@@ -116,33 +118,36 @@ class Stance:
     """Area of what is level at its top [m²]: what other objects can stand on."""
 
 
-def stances(hull: Piece, centre: Float[np.ndarray, "3"]) -> tuple[Stance, Stance]:
+def standing_stances(
+    hull: ConvexPiece, centre: Float[np.ndarray, "3"]
+) -> tuple[StandingStance, StandingStance]:
     """Return how a body stands upright, and how it stands best of all.
 
-    Feet are seldom even: upright is any face of the hull that looks down to within ``LEAN``.
+    Feet are seldom even: upright is any face of the hull that looks down to within
+        ``UPRIGHT_LEAN_RAD``.
     """
     a, b, c = np.swapaxes(hull.vertices[hull.triangles], 0, 1)
     vector = 0.5 * np.cross(b - a, c - a)
     area = np.linalg.norm(vector, axis=1)
     normal = vector / np.maximum(area, 1e-300)[:, None]
-    below = np.where(normal[:, 2] < -np.cos(LEAN), area, 0.0)
+    below = np.where(normal[:, 2] < -np.cos(UPRIGHT_LEAN_RAD), area, 0.0)
 
-    def stance(down: np.ndarray) -> Stance:
-        level = normal @ down < -np.cos(LEVEL)
-        return Stance(down, tip_angle(hull, centre, down), float(area[level].sum()))
+    def stance(down: np.ndarray) -> StandingStance:
+        level = normal @ down < -np.cos(TOP_LEAN_RAD)
+        return StandingStance(down, tip_angle(hull, centre, down), float(area[level].sum()))
 
     straight = stance(np.array([0.0, 0.0, -1.0]))
-    leaning = [stance(d) for d in _faces(normal, below, 0.01)]
+    leaning = [stance(d) for d in _largest_face_normals(normal, below, 0.01)]
     upright = max([straight, *leaning], key=lambda s: s.tip)
-    any_way = [stance(d) for d in _faces(normal, area, LEVEL)]
+    any_way = [stance(d) for d in _largest_face_normals(normal, area, TOP_LEAN_RAD)]
     return upright, max([upright, *any_way], key=lambda s: s.tip)
 
 
-def _faces(normal: np.ndarray, area: np.ndarray, alike: float) -> list[np.ndarray]:
+def _largest_face_normals(normal: np.ndarray, area: np.ndarray, alike: float) -> list[np.ndarray]:
     """Return the normals of the largest faces, no two within ``alike`` [rad]."""
     found: list[np.ndarray] = []
     area = area.copy()
-    while len(found) < FACES and area.max() > 0:
+    while len(found) < MAX_UNDERSIDE_FACES and area.max() > 0:
         best = normal[np.argmax(area)]
         found.append(best)
         area[normal @ best > np.cos(alike)] = 0.0

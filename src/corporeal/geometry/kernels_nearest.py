@@ -3,12 +3,12 @@
 import numba
 import numpy as np
 
-RINGS = 3
+CELL_RINGS_COUNT = 3
 """Shells of cells about a place that are looked through."""
 
 
 @numba.njit(cache=True)
-def nearest(places, points, low, width, counts, first, found):
+def nearest_in_cells(places, points, low, width, counts, first, found):
     """Look shell by shell; ``found`` stays as it was where nothing is certain."""
     for n in range(len(places)):
         x, y, z = places[n]
@@ -20,7 +20,7 @@ def nearest(places, points, low, width, counts, first, found):
             z - (low[2] + k * width), (low[2] + (k + 1) * width) - z,
         )  # fmt: skip
         best, chosen = np.inf, -1
-        for ring in range(RINGS + 1):
+        for ring in range(CELL_RINGS_COUNT + 1):
             for a in range(max(i - ring, 0), min(i + ring + 1, counts[0])):
                 for b in range(max(j - ring, 0), min(j + ring + 1, counts[1])):
                     shell = abs(a - i) == ring or abs(b - j) == ring

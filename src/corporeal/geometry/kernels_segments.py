@@ -5,7 +5,7 @@ import numpy as np
 
 
 @numba.njit(cache=True)
-def through(starts, ends, vertices, triangles, met):
+def collect_segment_crossings(starts, ends, vertices, triangles, met):
     """Count the triangles that ways meet (``met`` is empty), or write them down.
 
     Möller and Trumbore 1997. Ways are taken as short: of triangles beside all of them, none is
@@ -42,7 +42,7 @@ def through(starts, ends, vertices, triangles, met):
         if beside:
             continue
         for n in range(len(starts)):
-            share, side = _meets(starts[n], ends[n], corner)
+            share, side = _meets_triangle(starts[n], ends[n], corner)
             if side != 0:
                 if len(met):
                     met[count, 0], met[count, 1], met[count, 2] = n, share, t
@@ -52,7 +52,7 @@ def through(starts, ends, vertices, triangles, met):
 
 
 @numba.njit(cache=True)
-def _meets(start, end, corner):
+def _meets_triangle(start, end, corner):
     """Share of a way at which it meets a triangle, and its side; 0: it does not.
 
     corner: of the triangle one corner and the two edges from there.

@@ -60,7 +60,7 @@ class Mesh:
         return Mesh(self.vertices, np.ascontiguousarray(self.triangles[chosen]))
 
 
-class Triangles(Protocol):
+class TriangleSurface(Protocol):
     """A surface, a mesh, or a piece of one."""
 
     @property
@@ -74,7 +74,7 @@ class Triangles(Protocol):
         ...
 
 
-def joined(pieces: Sequence[Triangles]) -> Mesh:
+def join_meshes(pieces: Sequence[TriangleSurface]) -> Mesh:
     """Return all triangles as one mesh, in their order; nothing is welded."""
     starts = np.cumsum([0, *(len(p.vertices) for p in pieces)])
     triangles = [p.triangles + k for p, k in zip(pieces, starts, strict=False)]
@@ -85,7 +85,7 @@ def joined(pieces: Sequence[Triangles]) -> Mesh:
     )
 
 
-def weld(
+def weld_mesh(
     vertices: Float[np.ndarray, "V 3"],
     triangles: Int[np.ndarray, "T 3"],
     part: Int[np.ndarray, " T"] | None = None,
@@ -128,17 +128,17 @@ def weld(
 
 def signed_volume(mesh: Mesh) -> float:
     """Volume [m³] by the divergence theorem; exact when the mesh is closed, negative inside out."""
-    return float(volumes_under(mesh).sum())
+    return float(signed_triangle_volumes(mesh).sum())
 
 
-def volumes_under(mesh: Mesh) -> Float[np.ndarray, " T"]:
+def signed_triangle_volumes(mesh: Mesh) -> Float[np.ndarray, " T"]:
     """Volume [m³] between each triangle and the middle of all; of a closed piece they add up."""
     centre = mesh.vertices[mesh.triangles].mean(axis=(0, 1))
     a, b, c = np.swapaxes(mesh.corners - centre, 0, 1)
     return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
 
-def convergence(mesh: Mesh) -> float:
+def inward_area_loss_rate(mesh: Mesh) -> float:
     """Return how fast a surface loses area as it moves inward, halved, at first [m].
 
     V(t) = A t - C t² + ... is what lies within t of it. For smooth ones C is the integral of the
@@ -161,7 +161,7 @@ def convergence(mesh: Mesh) -> float:
     return float(length @ np.where(half > 0, np.tan(half.clip(0, np.pi / 4)), half))
 
 
-def boundary(
+def boundary_edges(
     mesh: Mesh, patch: Int[np.ndarray, " T"] | None = None
 ) -> tuple[Int[np.ndarray, "B 2"], Int[np.ndarray, " B"]]:
     """Edges that an odd number of triangles (of one patch) share, and a triangle of each."""
@@ -176,14 +176,14 @@ def boundary(
     return edges[odd], odd % len(f)
 
 
-def openness(mesh: Mesh) -> float:
+def open_edge_ratio(mesh: Mesh) -> float:
     """Length of the boundary edges over the root of the area [-]; 0 when closed."""
-    edges, _ = boundary(mesh)
+    edges, _ = boundary_edges(mesh)
     length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     return float(length.sum() / np.sqrt(mesh.areas.sum()))
 
 
-def orient(mesh: Mesh) -> Mesh:
+def orient_outward(mesh: Mesh) -> Mesh:
     """Wind every patch consistently and outward, without filling cavities.
 
     Within a patch the majority of the file's own winding wins. A closed patch that is inside out
@@ -196,11 +196,14 @@ def orient(mesh: Mesh) -> Mesh:
     for roll in range(3):
         agrees |= np.all(np.roll(turned, roll, axis=1) == mesh.triangles, axis=1)
     vote = np.bincount(patch, mesh.areas * np.where(agrees, 1.0, -1.0))
-    turned = _flip(turned, vote[patch] < 0)
+    turned = _flip_triangles(turned, vote[patch] < 0)
     mesh = Mesh(mesh.vertices, turned)
     volume, closed = _patch_volumes(mesh, patch)
     if volume[closed].sum() < 0:
-        mesh, volume = Mesh(mesh.vertices, _flip(turned, np.ones(len(turned), bool))), -volume
+        mesh, volume = (
+            Mesh(mesh.vertices, _flip_triangles(turned, np.ones(len(turned), bool))),
+            -volume,
+        )
     wrong = closed & (volume < 0)
     right = closed & (volume > 0)
     if wrong.any() and right.any():
@@ -211,10 +214,10 @@ def orient(mesh: Mesh) -> Mesh:
         within = mesh.areas[asked] * (np.abs(np.asarray(around)).reshape(-1) > 0.5)
         share = np.bincount(patch[asked], within, len(wrong)) / np.bincount(patch, mesh.areas)
         wrong &= share < 0.95
-    return Mesh(mesh.vertices, _flip(mesh.triangles, wrong[patch]))
+    return Mesh(mesh.vertices, _flip_triangles(mesh.triangles, wrong[patch]))
 
 
-def _flip(triangles: np.ndarray, which: np.ndarray) -> np.ndarray:
+def _flip_triangles(triangles: np.ndarray, which: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(np.where(which[:, None], triangles[:, ::-1], triangles))
 
 
@@ -230,7 +233,7 @@ def _patch_volumes(mesh: Mesh, patch: np.ndarray) -> tuple[np.ndarray, np.ndarra
     )
     a, b, c = np.swapaxes(corners - middle[patch][:, None], 0, 1)
     volume = np.bincount(patch, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
-    edges, owner = boundary(mesh, patch)
+    edges, owner = boundary_edges(mesh, patch)
     length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
     rim = np.bincount(patch[owner], length, minlength=len(total))
     closed = (rim < 0.1 * np.sqrt(total)) & (np.bincount(patch) >= 4)

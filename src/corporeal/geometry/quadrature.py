@@ -11,18 +11,18 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Bool, Float
 
-from corporeal.geometry.nearest import cells
-from corporeal.geometry.relaxation import stay_inside
-from corporeal.geometry.shape import Shape
-from corporeal.geometry.spread import scattered
+from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.geometry.nearest_points import sort_into_cells
+from corporeal.geometry.point_relaxation import keep_points_inside
+from corporeal.geometry.point_sampling import scatter_points_by_slab
 
-FINER = 5
+SAMPLES_PER_SPACING = 5
 """Samples per spacing. With 3 a rubber ball bounces off to a side four times as far."""
 
 
-def centred(
+def centroidal_points(
     points: Float[np.ndarray, "N 3"],
-    shape: Shape,
+    shape: QueryMesh,
     spacing: float,
     held: Bool[np.ndarray, " N"],
     empty: Callable[[np.ndarray], np.ndarray] | None = None,
@@ -42,9 +42,11 @@ def centred(
     """
     if not len(points):
         return points, np.zeros(0)
-    table = cells(points, spacing)
+    table = sort_into_cells(points, spacing)
     count, total = np.zeros(len(points)), np.zeros_like(points)
-    for samples in scattered(shape, spacing / FINER, np.random.default_rng(5)):
+    for samples in scatter_points_by_slab(
+        shape, spacing / SAMPLES_PER_SPACING, np.random.default_rng(5)
+    ):
         if empty is not None:
             samples = samples[~empty(samples)]
         owner = table.nearest(samples)
@@ -54,4 +56,6 @@ def centred(
     moved = np.flatnonzero((count > 0) & ~held)
     centre = points.copy()
     centre[moved] = total[moved] / count[moved, None]
-    return stay_inside(centre, points, shape, moved), count * (spacing / FINER) ** 3
+    return keep_points_inside(centre, points, shape, moved), count * (
+        spacing / SAMPLES_PER_SPACING
+    ) ** 3

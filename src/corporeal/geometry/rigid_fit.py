@@ -23,15 +23,15 @@ class RigidFit:
     @property
     def angle(self) -> float:
         """How far the body turned [rad]."""
-        return angle(self.rotation)
+        return rotation_angle(self.rotation)
 
 
-def angle(rotation: Float[np.ndarray, "3 3"]) -> float:
+def rotation_angle(rotation: Float[np.ndarray, "3 3"]) -> float:
     """How far a rotation turns [rad]."""
     return float(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
 
 
-def rigid_fit(
+def fit_rigid_motion(
     start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"], weight: Float[np.ndarray, " N"]
 ) -> RigidFit:
     """Best rigid motion from one set of points to another (Kabsch 1976)."""

@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 
-def quaternion(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
+def quaternion_from_matrix(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
     """Return the unit quaternion (w, x, y, z), w ≥ 0, of a rotation (Bar-Itzhack 2000).
 
     It is the eigenvector of the greatest eigenvalue of a symmetric matrix of R's elements.
@@ -22,7 +22,7 @@ def quaternion(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
     return q if q[0] >= 0 else -q
 
 
-def matrix(q: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
+def matrix_from_quaternion(q: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
     """Return the rotation of a quaternion (w, x, y, z) of any length but 0."""
     w, x, y, z = np.asarray(q, dtype=float) / np.linalg.norm(q)
     return np.array(
@@ -34,14 +34,16 @@ def matrix(q: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
     )
 
 
-def product(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
+def quaternion_product(
+    a: Float[np.ndarray, "4"], b: Float[np.ndarray, "N 4"]
+) -> Float[np.ndarray, "N 4"]:
     """Return the quaternions of turning by each b, then by a."""
     w, x, y, z = a
     left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
     return b @ left.T
 
 
-def nearest(turn: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
+def nearest_rotation(turn: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3 3"]:
     """Return the rotation nearest to a matrix whose determinant is positive (polar factor)."""
     left, _, right = np.linalg.svd(turn)
     return left @ right

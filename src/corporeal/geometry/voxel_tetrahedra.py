@@ -9,21 +9,21 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Float, Int
 
-CORNER = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+CELL_CORNERS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)])
 
 
-def _kuhn() -> np.ndarray:
+def _kuhn_tetrahedra() -> np.ndarray:
     """Corner numbers of the six tetrahedra of a cell, all of positive volume."""
     found = []
     for order in permutations((1, 2, 4)):
         path = np.cumsum([0, *order])
-        a, b, c, d = CORNER[path]
+        a, b, c, d = CELL_CORNERS[path]
         positive = np.dot(np.cross(b - a, c - a), d - a) > 0
         found.append(path if positive else path[[0, 2, 1, 3]])
     return np.array(found)
 
 
-KUHN = _kuhn()
+KUHN_TETRAHEDRA = _kuhn_tetrahedra()
 
 
 def voxel_tetrahedra(
@@ -42,12 +42,12 @@ def voxel_tetrahedra(
     low = points.min(axis=0) - 1e-3 * side
     cell = np.unique(np.floor((points - low) / side).astype(np.int64), axis=0)
     corners, number = np.unique(
-        (cell[:, None] + CORNER).reshape(-1, 3), axis=0, return_inverse=True
+        (cell[:, None] + CELL_CORNERS).reshape(-1, 3), axis=0, return_inverse=True
     )
-    return low + side * corners, number.reshape(-1, 8)[:, KUHN].reshape(-1, 4)
+    return low + side * corners, number.reshape(-1, 8)[:, KUHN_TETRAHEDRA].reshape(-1, 4)
 
 
-def outer_faces(corners: Int[np.ndarray, "T 4"]) -> Int[np.ndarray, "F 3"]:
+def tetrahedra_outer_faces(corners: Int[np.ndarray, "T 4"]) -> Int[np.ndarray, "F 3"]:
     """Return the faces that belong to one tetrahedron only, anticlockwise seen from outside."""
     faces = corners[:, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]].reshape(-1, 3)
     _, first, count = np.unique(

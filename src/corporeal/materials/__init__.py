@@ -1,61 +1,61 @@
 """The measured library: what a material is like, in which range, and who measured it."""
 
-from corporeal.materials.contact import (
-    BlowLaw,
+from corporeal.materials.contact_pairs import (
     Friction,
+    ImpactBody,
     Restitution,
-    Striker,
-    combine,
+    RestitutionLaw,
+    combine_friction,
     friction_between,
-    law_of_blows,
-    restitution,
-    restitution_between,
+    pair_restitution,
+    pair_restitution_law,
+    series_restitution,
 )
-from corporeal.materials.entry import Entry
 from corporeal.materials.library import (
-    check,
-    contents,
-    counterpart,
-    find,
+    check_library,
+    content_materials,
+    find_material,
+    find_material_or_default,
     library,
-    named,
-    read,
-    substances,
+    library_counterpart,
+    part_materials,
+    read_library,
 )
-from corporeal.materials.lint import Problem
-from corporeal.materials.listing import materials_json, menu, show
-from corporeal.materials.quantities import QUANTITIES, Quantity, si
-from corporeal.materials.reference_page import markdown
-from corporeal.materials.shipped import citation, estimated, sources
+from corporeal.materials.library_entry import MaterialEntry
+from corporeal.materials.library_lint import LibraryProblem
+from corporeal.materials.library_listing import describe_material, list_materials, materials_json
+from corporeal.materials.library_page import library_markdown
+from corporeal.materials.quantities import QUANTITIES, Quantity, parse_quantity_key
+from corporeal.materials.shipped_libraries import citation, cited_sources, is_estimate
 
 __all__ = [
     "QUANTITIES",
-    "BlowLaw",
-    "Entry",
     "Friction",
-    "Problem",
+    "ImpactBody",
+    "LibraryProblem",
+    "MaterialEntry",
     "Quantity",
     "Restitution",
-    "Striker",
-    "check",
+    "RestitutionLaw",
+    "check_library",
     "citation",
-    "combine",
-    "contents",
-    "counterpart",
-    "estimated",
-    "find",
+    "cited_sources",
+    "combine_friction",
+    "content_materials",
+    "describe_material",
+    "find_material",
+    "find_material_or_default",
     "friction_between",
-    "law_of_blows",
+    "is_estimate",
     "library",
-    "markdown",
+    "library_counterpart",
+    "library_markdown",
+    "list_materials",
     "materials_json",
-    "menu",
-    "named",
-    "read",
-    "restitution",
-    "restitution_between",
-    "show",
-    "si",
-    "sources",
-    "substances",
+    "pair_restitution",
+    "pair_restitution_law",
+    "parse_quantity_key",
+    "part_materials",
+    "read_library",
+    "series_restitution",
 ]

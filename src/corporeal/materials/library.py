@@ -9,71 +9,75 @@ import tomllib
 from functools import lru_cache
 from pathlib import Path
 
-from corporeal.core.errors import NEAR, BadFileError, UnknownChoiceError, UserError
-from corporeal.materials.entry import Entry, entries, plain
-from corporeal.materials.lint import RESERVED, Problem, inspect
-from corporeal.materials.shipped import SHIPPED, shipped, source_table
+from corporeal.core.errors import MAX_SUGGESTED_CHOICES, BadFileError, UnknownChoiceError, UserError
+from corporeal.materials.library_entry import MaterialEntry, comparable_name, read_entries
+from corporeal.materials.library_lint import RESERVED_KEYS, LibraryProblem, lint_library
+from corporeal.materials.shipped_libraries import (
+    SHIPPED_LIBRARY_FILES,
+    shipped_library,
+    source_table,
+)
 
-HELD = ("liquid", "bulk", "granular", "foam", "food")
+CONTENT_GROUPS = ("liquid", "bulk", "granular", "foam", "food")
 """Groups of what is found inside objects."""
-ONLY_HELD = ("liquid", "bulk")
+CONTENT_ONLY_GROUPS = ("liquid", "bulk")
 """Groups of what is nothing without a container."""
-A_FILE = "Give the path of a TOML file."
+LIBRARY_PATH_ADVICE = "Give the path of a TOML file."
 
 
-def library(name: str = "default") -> dict[str, Entry]:
+def library(name: str = "default") -> dict[str, MaterialEntry]:
     """Return every entry of a library: "default", "reference", or the path of a TOML file.
 
     Raises:
         UserError: There is no such library, or the file has a mistake.
 
     """
-    if name in SHIPPED:
-        return shipped(name)
+    if name in SHIPPED_LIBRARY_FILES:
+        return shipped_library(name)
     if name.endswith(".toml"):
-        return read(Path(name))
-    raise UnknownChoiceError("material library", name, [*SHIPPED, "a .toml file"])
+        return read_library(Path(name))
+    raise UnknownChoiceError("material library", name, [*SHIPPED_LIBRARY_FILES, "a .toml file"])
 
 
-def substances(library_name: str = "default") -> list[str]:
+def part_materials(library_name: str = "default") -> list[str]:
     """Names of what a part itself may be made of: all but liquids and loose goods."""
-    return [e.name for e in library(library_name).values() if e.group not in ONLY_HELD]
+    return [e.name for e in library(library_name).values() if e.group not in CONTENT_ONLY_GROUPS]
 
 
-def contents(library_name: str = "default") -> list[str]:
+def content_materials(library_name: str = "default") -> list[str]:
     """Names of what an object may be filled with: liquids, loose matter and soft stuffing."""
-    return [e.name for e in library(library_name).values() if e.group in HELD]
+    return [e.name for e in library(library_name).values() if e.group in CONTENT_GROUPS]
 
 
-def find(name: str, library_name: str = "default") -> Entry:
+def find_material(name: str, library_name: str = "default") -> MaterialEntry:
     """Return the entry called ``name``; spaces, hyphens, case and aliases don't matter.
 
     Raises:
         UnknownChoiceError: No material has that name or alias.
 
     """
-    known, wanted = library(library_name), plain(name)
-    named = [e for e in known.values() if wanted == plain(e.name)]
-    also = [e for e in known.values() if wanted in map(plain, e.aliases)]
+    known, wanted = library(library_name), comparable_name(name)
+    named = [e for e in known.values() if wanted == comparable_name(e.name)]
+    also = [e for e in known.values() if wanted in map(comparable_name, e.aliases)]
     if named or also:
         return (named or also)[-1]
-    raise UnknownChoiceError("material", name, list(known), _near(wanted, known))
+    raise UnknownChoiceError("material", name, list(known), _similar_entries(wanted, known))
 
 
-def _near(wanted: str, known: dict[str, Entry]) -> list[str]:
+def _similar_entries(wanted: str, known: dict[str, MaterialEntry]) -> list[str]:
     """Return the entries that have a word in their name or in an alias, as a person reads them."""
     found = [e.name for e in known.values() if wanted in _words(e.name)]
     for entry in known.values():
         also = [alias for alias in entry.aliases if wanted in _words(alias)]
         found += [f"{alias!r} ({entry.name})" for alias in also if entry.name not in found]
-    return found[:NEAR]
+    return found[:MAX_SUGGESTED_CHOICES]
 
 
 def _words(name: str) -> list[str]:
-    return [plain(word) for word in re.split(r"[\s_-]+", name)]
+    return [comparable_name(word) for word in re.split(r"[\s_-]+", name)]
 
 
-def named(name: str, library_name: str) -> Entry:
+def find_material_or_default(name: str, library_name: str) -> MaterialEntry:
     """Return the entry called ``name``; what a smaller library leaves out is the default one's.
 
     Raises:
@@ -81,12 +85,12 @@ def named(name: str, library_name: str) -> Entry:
 
     """
     try:
-        return find(name, library_name)
+        return find_material(name, library_name)
     except UnknownChoiceError:
-        return find(name)
+        return find_material(name)
 
 
-def counterpart(entry: Entry, library_name: str) -> Entry:
+def library_counterpart(entry: MaterialEntry, library_name: str) -> MaterialEntry:
     """Return what stands for ``entry`` in another library: its own name, or the published one.
 
     Raises:
@@ -103,7 +107,7 @@ def counterpart(entry: Entry, library_name: str) -> Entry:
     )
 
 
-def read(path: Path) -> dict[str, Entry]:
+def read_library(path: Path) -> dict[str, MaterialEntry]:
     """Read a library of the user's own.
 
     Raises:
@@ -113,38 +117,38 @@ def read(path: Path) -> dict[str, Entry]:
     try:
         stat = path.stat()
     except OSError as error:
-        raise BadFileError(path, f"cannot be read ({error}).", A_FILE) from error
+        raise BadFileError(path, f"cannot be read ({error}).", LIBRARY_PATH_ADVICE) from error
     return _read(path.resolve(), path, stat.st_mtime_ns, stat.st_size)
 
 
-def check(path: Path) -> list[Problem]:
+def check_library(path: Path) -> list[LibraryProblem]:
     """Return every mistake in a user's library; empty when it is sound.
 
     Raises:
         BadFileError: The file cannot be read.
 
     """
-    return inspect(_text(path), source_table(), tuple(SHIPPED))
+    return lint_library(_text(path), source_table(), tuple(SHIPPED_LIBRARY_FILES))
 
 
 def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise BadFileError(path, f"cannot be read ({error}).", A_FILE) from error
+        raise BadFileError(path, f"cannot be read ({error}).", LIBRARY_PATH_ADVICE) from error
 
 
 @lru_cache(maxsize=8)
-def _read(where: Path, path: Path, changed: int, size: int) -> dict[str, Entry]:
-    problems = check(path)
+def _read(where: Path, path: Path, changed: int, size: int) -> dict[str, MaterialEntry]:
+    problems = check_library(path)
     if problems:
         more = f"All {len(problems)} mistakes: corporeal materials check {path}."
         raise BadFileError(path, str(problems[0]), more if len(problems) > 1 else "")
     tables = tomllib.loads(_text(path))
     base = tables.get("extends")
     own = {key: row["cite"] for key, row in tables.get("sources", {}).items()}
-    rows = {n: _cited(row, own) for n, row in tables.items() if n not in RESERVED}
-    return {**(shipped(base) if base else {}), **entries(rows)}
+    rows = {n: _cited(row, own) for n, row in tables.items() if n not in RESERVED_KEYS}
+    return {**(shipped_library(base) if base else {}), **read_entries(rows)}
 
 
 def _cited(row: dict, own: dict[str, str]) -> dict:

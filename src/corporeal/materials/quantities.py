@@ -44,8 +44,8 @@ QUANTITIES = {
     )
 }
 
-STEM = {"yield": "yield_stress"}
-UNITS = {
+FIELD_OF_KEY_STEM = {"yield": "yield_stress"}
+SI_OF_KEY_UNIT = {
     "GPa": ("Pa", 1e9),
     "MPa": ("Pa", 1e6),
     "kPa": ("Pa", 1e3),
@@ -60,7 +60,7 @@ UNITS = {
 }
 
 
-def si(key: str) -> tuple[str, float]:
+def parse_quantity_key(key: str) -> tuple[str, float]:
     """Read a data key such as ``"young_GPa"``: the field it means and the factor to SI.
 
     Raises:
@@ -69,15 +69,17 @@ def si(key: str) -> tuple[str, float]:
     """
     if key in QUANTITIES and QUANTITIES[key].unit == "-":
         return key, 1.0
-    for suffix, (unit, factor) in UNITS.items():
+    for suffix, (unit, factor) in SI_OF_KEY_UNIT.items():
         stem = key.removesuffix(f"_{suffix}")
-        field = STEM.get(stem, stem)
+        field = FIELD_OF_KEY_STEM.get(stem, stem)
         if stem != key and field in QUANTITIES and QUANTITIES[field].unit == unit:
             return field, factor
-    raise UserError(f"Unknown quantity {key!r}. The unit is in the key: {', '.join(examples())}.")
+    raise UserError(
+        f"Unknown quantity {key!r}. The unit is in the key: {', '.join(example_keys())}."
+    )
 
 
-def examples() -> list[str]:
+def example_keys() -> list[str]:
     """One valid key per quantity, as the default library spells it."""
     return [
         "young_GPa",

@@ -1,7 +1,7 @@
 """Every number of the method, once.
 
 NumPy code imports them, kernels on cards take them as they compile, and C++ text finds them in
-``namespace mpm``: ``text`` writes it. What is chosen here is chosen for all engines. Numbers of one
+``namespace mpm``: ``cpp_constants`` writes it. What is chosen here is chosen for all engines. Numbers of one
 constitutive law stand with the law, coefficients of a formula in the formula. A cell is dx long.
 """
 
@@ -15,27 +15,27 @@ COURANT = 0.4
 """Largest fraction of a cell that a wave may cross in one step [-]; the default of a problem."""
 RIGID_COURANT = 0.05
 """Largest fraction of a cell that a rigid body may cross in one step [-]."""
-FALL = 0.1
+FREE_FALL_STEP_FRACTION = 0.1
 """Largest step as a fraction of the time √(dx/g) in which a body at rest falls half a cell [-]."""
-LONGEST_STEP = 1.0
+MAX_STEP_S = 1.0
 """[s]; where nothing else limits the step."""
 STEP_ROUNDING = 1e-9
 """Share of a step by which a time may be missed before one more step is taken [-]."""
-TETHER_STEP = 0.05
+TETHER_STEP_FRACTION = 0.05
 """Longest step as a fraction of 1/ω of a tether [-]: its energy swings by ω dt/2."""
-JOINT_STEP = 0.2
+JOINT_STEP_FRACTION = 0.2
 """Longest step as a fraction of 1/ω of a joint [-], which is implicit."""
 
 # ---------------------------------------------------------------- what left the domain
 
-SUNK = 8.0
+MAX_WALL_DEPTH_DX = 8.0
 """A particle, or all of a rigid body, deeper than this in a wall [cells] has left the domain."""
-FARTHEST = 1e5
+MAX_DISTANCE_FROM_ORIGIN_DX = 1e5
 """A particle farther than this from the origin [cells] has left the domain."""
-FARTHEST_STEP = 1e4
+MAX_TRAVEL_PER_STEP_DX = 1e4
 """A particle that goes farther than this in one step [cells] is lost; checked on cards, where a
 larger number of cells would not fit the integer that counts them."""
-FASTEST = 1e9
+MAX_FINITE_VALUE = 1e9
 """A larger velocity [m/s], velocity gradient or strain is as good as infinite where a lost particle
 is looked for."""
 
@@ -49,255 +49,257 @@ TINY_DOUBLE = 1e-300
 """The same of divisors in double precision."""
 VAST_DOUBLE = 1e300
 """The same of what counts as infinite there."""
-SMALLEST_MASS = 1e-30
+MIN_NODE_MASS_KG = 1e-30
 """Nodes with less mass [kg] are empty."""
-SMALLEST_SLIP = 1e-14
+MIN_SLIP_SPEED = 1e-14
 """Slower slip [m/s] has no direction."""
-SMALLEST_SINE = 1e-12
+MIN_ROTATION_SINE = 1e-12
 """Rotations whose sine is smaller have no axis: half their antisymmetric part is the vector."""
-SMALL_TURN = 1e-6
+SMALL_ROTATION_RAD = 1e-6
 """Rotations by less [rad] follow the series of sine and cosine, exact to their last digit there."""
-SMALLEST_WEIGHT = 1e-12
+MIN_HALF_SPACE_WEIGHT = 1e-12
 """Of a half space in a node's spline, whose mean offset is then where its face lies."""
 RANK_CUTOFF = 1e-12
 """Principal moments of inertia below this share of the largest are none: a line has no spin."""
 
 # ---------------------------------------------------------------- what a grid cannot see
 
-FORGETTING = 0.1
+FLIP_DAMPING_FRACTION = 0.1
 """κ [-]: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
-SETTLING = 0.5
+GRANULAR_DAMPING_FRACTION = 0.5
 """How often granular matter forgets while it falls half a cell, in √(dx/g) [-] (decision 6)."""
-OWN_BULK = 4.0
+LOCAL_BULK_RATIO = 4.0
 """λ/μ [-], at ν = 0.4: of nearly incompressible matter what λ exceeds it by acts on the mean
 dilatation of a cluster of particles, not on each one's own volume (decision 23)."""
-BULK_ROUNDING = 1e-6
+BULK_ROUNDING_FRACTION = 1e-6
 """Share by which λ must exceed that for matter to be so at all: ν of 0.4 in single precision is
 not [-]."""
-SMALLEST_VOLUME = 1e-3
+MIN_VOLUME_RATIO = 1e-3
 """J of what is pressed flat or turned inside out, where pressure is a mean [-]."""
-POISSON_LIMIT = 0.49
+MAX_POISSON_RATIO = 0.49
 """Nearly incompressible bodies are simulated at this Poisson's ratio [-], with their true μ."""
-POISSON_FLOOR = 0.41
+MIN_REDUCED_POISSON_RATIO = 0.41
 """Where steps do not suffice the bulk gives way first, down to this Poisson's ratio [-]: pressure
-is still a mean there (``OWN_BULK``), waves run at 0.37 of the speed that they have at 0.49."""
-BASELINE_COURANT, BASELINE_STEP = 0.5, 1e-4
+is still a mean there (``LOCAL_BULK_RATIO``), waves run at 0.37 of the speed that they have at
+0.49."""
+BASELINE_COURANT, BASELINE_STEP_S = 0.5, 1e-4
 """Of the published cap on stiffness: its Courant number [-] and its step [s]."""
 
 # ---------------------------------------------------------------- contact: where, and which way
 
-DEEPEST = 1.25
+MAX_FACE_DEPTH_DX = 1.25
 """Faces farther than this from the node [cells] are treated as if they were here."""
 WALL_REACH = 0.51
 """Nodes higher than this above a wall [cells] ignore it: its infinite mass would grip the inside.
 Half a cell, and a hundredth so that rounding does not decide about nodes at exactly half a cell."""
-POINT_REACH = 0.3
+SURFACE_POINT_REACH_DX = 0.3
 """Surface points of rigid bodies are watched this far above a wall [cells]."""
-ROUNDING = types.ROUNDING
+CURVATURE_ROW = types.CURVATURE_COLUMNS
 """Numbers that say how a surface curves at a point."""
-SIDEWAYS = 0.1
+MIN_ARC_COMPONENT = 0.1
 """A direction whose part in the plane of an arc is shorter than this has none there [-]."""
-MOST_LEAN = 1.57
+MAX_ARC_ANGLE_RAD = 1.57
 """Nothing stands for a surface that looks farther aside from its own normal than this [rad]."""
 FACET_ROW = 11
 """Numbers of a rigid body's flat face: see ``physics/facets.py``."""
-FACET_TURN, SAME_PLANE = 0.9998, 0.02
+FACET_MIN_NORMAL_COSINE, FACET_MAX_HEIGHT_RATIO = 0.9998, 0.02
 """Points of one flat face have normals with at least this cosine [-], and differ in height by less
 than this, over how far it goes on from each [-]."""
-FEWEST_ON_FACET = 6
+MIN_POINTS_PER_FACET = 6
 """Fewer points are no face on which anything rolls."""
-FACET_SPREAD = 0.5
+FACET_SPREAD_RATIO = 0.5
 """A face goes on from its points by this share of what they stand for [-]: a point's distance from
 the next."""
-WIDEST_HOLE = 0.8
+FACET_HOLE_RATIO = 0.8
 """A hole between a face's points whose middle is no farther from them than this, over what they
 stand for [-], is of their scatter and belongs to the face."""
-MOSTLY_FLAT = 0.67
+MIN_FLAT_SURFACE_FRACTION = 0.67
 """A body of flat faces has more than this share of its surface points on some [-]. Where two such
 bodies meet, surface points say where they begin, however thick they are …"""
-FLAT_APART = 1.2
+FLAT_BODY_GAP_DX = 1.2
 """… unless means alone say that they are farther apart than this [cells]: those misjudge the gap of
-what is thicker than ``THIN`` by less."""
-OPPOSITE = 0.01
+what is thicker than ``THIN_BODY_DX`` by less."""
+PARALLEL_EDGE_SINE2 = 0.01
 """Edges of two bodies at a node are parallel if the squared sine between them is below this [-]."""
-FACET_NODES = 2.0
+FACET_REPLACES_NODES_DX = 2.0
 """What is round meets a flat face exactly, and not on nodes that are nearer to there than this
 [cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes
 misjudge, as they take it for a plane within the 3 cells that each sees …"""
-FACET_ALIKE = 0.95
-"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN``
-normals of nodes lean, since mass lies around them on both sides: there ``ROUND_ALIKE`` counts."""
-FACES_MEET = 0.5
-"""Where normals of nodes lean farther than ``FACET_ALIKE`` from all faces, around edges of both
+FACET_NORMAL_COSINE = 0.95
+"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN_BODY_DX``
+normals of nodes lean, since mass lies around them on both sides: there ``CURVED_NORMAL_COSINE``
+counts."""
+OPPOSED_FACES_COSINE = 0.5
+"""Where normals of nodes lean farther than ``FACET_NORMAL_COSINE`` from all faces, around edges of both
 bodies, they are of two that look at one another so nearly and lean no farther than that [-]."""
-SEEN_ASIDE = 0.03
+FACE_SCATTER_DX = 0.03
 """What a node sees aside of a face is no edge, but the scatter of particles [cells]."""
-VALLEY_TURNS = 6
+VALLEY_ITERATIONS = 6
 """How often a normal of a face is taken off that of a node, to see whether that lies between such
 normals: what is round and lies in a valley meets the faces, and not nodes that see both."""
-NEAREST_MIDDLE = 0.05
+MIN_CENTRE_DISTANCE_RATIO = 0.05
 """Least distance of what meets a hollow from its centre of curvature, over the radius [-]: at the
 centre all of the hollow is equally near."""
-CURVED_SPREAD = 0.8
+CURVED_PATCH_RATIO = 0.8
 """How far from a surface point its curvature describes the face, over the point's reach [-]: far
 enough that these patches leave no part of a face uncovered."""
-CURVED_TURNS = 4
+CURVED_CONTACT_ITERATIONS = 4
 """Iterations for the place where something round touches a curved face, which depends on the
 face's normal there."""
-OWN_PLACE = 1.1
+NEAREST_POINT_FACTOR = 1.1
 """A contact belongs to its surface point if no other is nearer to it by this factor [-]."""
-FACING = 0.2
+FACING_POINTS_COSINE = 0.2
 """Surface points of two bodies face each other if their normals have a cosine below minus this."""
-BENT_NODES = 9.0
+CURVED_GAP_ERROR_DX2 = 9.0
 """Twice the error of a gap on grid nodes over the curvature that they neglect [cells²]: within the
 3 cells that a node sees, a curve of curvature k leaves its tangent by k (3 cells)²/2."""
-ROUND_ALIKE = 0.5
+CURVED_NORMAL_COSINE = 0.5
 """Least cosine of normals on nodes around a contact of what is round with what is curved [-]."""
-LATTICE_GAP = 0.05
+LATTICE_GAP_DX = 0.05
 """What two particles per cell and axis add to the continuous touching distance [cells] …"""
 LATTICE_SLOPE = 0.25
 """… and what they add per cell once the face is farther than … [-]"""
-LATTICE_START = 0.7
+LATTICE_START_DX = 0.7
 """… this from the node [cells]; all three fitted to flat faces at that density."""
 LATTICE_ROWS = 6
 """Rows of such a lattice within a node's spline."""
-THIN = 2.0
+THIN_BODY_DX = 2.0
 """A rigid body thinner than this [cells] fills no half space around a node: its surface points say
 where it begins."""
-MANY_WALLS = 0.67
+MIN_THIN_WALL_FRACTION = 0.67
 """So they do for a body of which walls thinner than that are more than this share of its surface;
 walls are found by …"""
-WALLS_ASKED, FACING_AWAY = 400, 0.8
+WALL_SAMPLE_POINTS, FACING_AWAY_COSINE = 400, 0.8
 """… this many points at least, of its surface or all, behind which points have normals with a
 cosine below minus this [-]."""
-SHOWN_AROUND = 1.0
+SURFACE_SEARCH_RADIUS_DX = 1.0
 """They are looked at this far from the normal through the node [cells]."""
-SIGHT = 3.0
+NODE_SIGHT_DX = 3.0
 """Between two rigid bodies they say so too where one is thin that is not thin as a whole, as near
 to a node as it sees [cells]: at the thin end of a wedge. Points that lie farther behind a node are
 of another wall."""
-RUN_ACROSS = 6.0
+POINT_RUN_WIDTH_RATIO = 6.0
 """Width of a run of them that is passed over together, over their spacing [-]: some forty."""
-KEPT_STEPS = 8
+NORMAL_CACHE_STEPS = 8
 """Which candidate normal is widest is looked at anew in every so manieth step (decision 52) …"""
-KEPT_TRAVEL = 0.5
+NORMAL_CACHE_TRAVEL_DX = 0.5
 """… or two, four or eight times as often, where something moves farther meanwhile [cells]."""
-FACE_STEPS = 4096
+FACE_TABLE_INTERVALS = 4096
 """Intervals of the table that says where the face of a half space lies, from 1½ cells to none."""
 FIRST_BIAS, OTHER_BIAS = 0.10, 0.05
 """Head start of the candidate normals g_a - g_c, and g_a or -g_c [cells]."""
 FIELDS_AT_NODE = 6
 """Fields that may meet at one node on a card."""
-DENSE_REACH, LOOSE_REACH = 1.25, 1.5
+DENSE_CONTACT_REACH_DX, LOOSE_CONTACT_REACH_DX = 1.25, 1.5
 """Particles of two bodies farther apart than this along an axis [cells] are not in contact. Those
 of a solid are less than a cell from one another and touch from 1.14 on, lone grains from 1.5 on."""
-REACH_MARGIN = 1.00001
+REACH_BOUND_FACTOR = 1.00001
 """How much a bound on what a particle reaches exceeds it [-]: rounding leaves nobody out."""
 
 # ---------------------------------------------------------------- contact: what it transmits
 
-PATCH = 0.1
+IMPACT_PATCH_DX = 0.1
 """Contacts of a hit pair nearer than this [cells] rebound with it: one impact is one event."""
-SLOWEST_BOUNCE = 0.05
+MIN_REBOUND_SPEED = 0.05
 """Slower approaches [m/s] don't rebound, as in other rigid-body engines."""
-SWEEPS, SWEEPS_OF_A_HIT = 10, 100
+SWEEPS, IMPACT_SWEEPS = 10, 100
 """Gauss–Seidel sweeps of a step, and of one in which something rigid rebounds or is stacked."""
-SCATTER = 0.6180339887498949
+SWEEP_STRIDE_FRACTION = 0.6180339887498949
 """Contacts are swept in strides of this share of their number [-], the golden section: in the order
 in which they lie next to one another the first would carry more, and what rests would tilt."""
-BACKED = 3.0
+SUPPORT_FREQUENCY_RATIO2 = 3.0
 """A body between what strikes it and what it rests on is squeezed at once where the square of its
 own frequency between the two is more than this times that of the blow [-] (decision 89) …"""
-BEHIND = 0.5
+SUPPORT_NORMAL_COSINE = 0.5
 """… and what it rests on lies behind it: least cosine of the normal with the blow's [-] …"""
-AS_HEAVY = 0.9
+SUPPORT_MASS_RATIO = 0.9
 """… and is no lighter than this share of it [-]."""
-AS_LAYER = 1.5707963267948966
+LAYER_STIFFNESS_FACTOR = 1.5707963267948966
 """Stiffness E π a²/h of a layer under a disc over that of a half-space, 2 E* a, by a/h: π/2 [-]
 (decision 96)."""
-SWEEPS_OF_A_HOLD = 1000
+SUPPORTED_IMPACT_SWEEPS = 1000
 """Gauss–Seidel sweeps of such a round: what is heavy presses on what is light."""
-SWEEPS_AT_ONCE = 30
+SIMULTANEOUS_SWEEPS = 30
 """Sweeps of all contacts at once, where those in order do not come to rest and a rigid body meets
 one that moves as told: two that close leave it no room, and the last would have its way."""
-RESTING = 1e-3
+MAX_RESTING_SPEED = 1e-3
 """Contacts that open faster than this [m/s] rest on nothing."""
-IMPACTS = 50
+MAX_IMPACTS_PER_STEP = 50
 """Most impacts that follow one another within a step, as along a row of touching balls."""
-SWEEPS_REMEMBERED = 2
+WARM_START_MIN_SWEEPS = 2
 """Fewest sweeps where contacts begin with the forces of the last step."""
-STILL, STILL_OF_A_HIT = 2e-3, 2e-5
+SWEEP_TOLERANCE_DX, IMPACT_SWEEP_TOLERANCE_DX = 2e-3, 2e-5
 """Sweeps end when no contact changes its velocity by more than this [cells/s]: stacks that creep
 slower stand. An impact is one event, whose error stays in the motion."""
-JACOBI_SWEEPS, JACOBI_SWEEPS_OF_A_HIT, JACOBI_SWEEPS_OF_A_HOLD = 100, 400, 2000
+JACOBI_SWEEPS, JACOBI_IMPACT_SWEEPS, JACOBI_SUPPORTED_IMPACT_SWEEPS = 100, 400, 2000
 """The same of Jacobi sweeps on cards, which converge more slowly …"""
-JACOBI_STILL = 1e-4
+JACOBI_TOLERANCE_DX = 1e-4
 """… and end where they change less [cells/s]."""
 
 # ---------------------------------------------------------------- what is lost inside of matter
 
 BRANCHES = 2
 """Maxwell branches of lossy matter."""
-SLOWEST_LOSS, FASTEST_LOSS = 0.2, 2.0
+LOSS_BAND_LOW_RATIO, LOSS_BAND_HIGH_RATIO = 0.2, 2.0
 """Frequencies between which their loss factor is flat, over that of the slowest vibration [-]: an
 impact lasts two to three of its half periods."""
-LEAST_LOSS = 0.02
+MIN_LOSS_FACTOR = 0.02
 """A smaller loss factor takes less than the grid does, and gets no branches [-]."""
-GRID_LOSS = 3.2
+GRID_LOSS_FACTOR = 3.2
 """Loss factor of contact and transfers themselves in a blow, times the square of the number of
 cells across what is struck [-]; measured on balls of 8 to 12 cells (decision 26)."""
-FEWEST_CELLS = 8.0
+MIN_CELLS_FOR_GRID_LOSS = 8.0
 """Where there are fewer cells across, it is taken as with so many [-]."""
 
 # ---------------------------------------------------------------- liquids
 
-SOUND_OVER_SPEED = 10.0
+SOUND_TO_FLOW_SPEED_RATIO = 10.0
 """Of a liquid's waves over its largest expected speed [-]: its density changes by 1 %."""
-LIQUID_SHEAR = 0.125
+LIQUID_SHEAR_TO_BULK_RATIO = 0.125
 """G/K of a liquid's Maxwell branch [-]."""
-HELD_BY_WALL = 1.5
+LIQUID_WALL_REACH_DX = 1.5
 """Nodes of a liquid up to this high over a wall are held too, without friction, where … [cells]"""
-LIKE_HALF_SPACE = 0.15
+HALF_SPACE_TOLERANCE_DX = 0.15
 """… its mean place there is that of a half space within this [cells]: pressure pushes them all, and
 the wall answers behind its face alone …"""
-FILLED = 0.4
+MIN_FILLED_FRACTION = 0.4
 """… and it fills this share of what the node sees [-]: what is thin lies on the wall itself. Where
 a second wall passes through the node, .42 are left."""
-STICKS = 0.5
+STICKING_FRICTION = 0.5
 """Where friction is at least this, what lies at the wall is not squeezed along it, and higher nodes
 are not held: a layer that sticks could not thin [-]."""
-WALL_LAYER = 1.0 / 3.0
+WALL_LAYER_DX = 1.0 / 3.0
 """Thickness of the layer through which a wall drags on a liquid that sticks to it [cells], where
 its stress is shared among nodes by their splines' weights on the wall (decision 55)."""
-LIQUID_TOUCHES = 0.15
+LIQUID_TOUCH_DX = 0.15
 """It does so where the liquid's face is nearer than this by its mean place [cells]."""
-WETTED_REACH = 2.0
+WETTED_REACH_DX = 2.0
 """A liquid looks for the surface of a rigid body no farther than this [cells]."""
-WETTED_SLACK = 1.001
+WETTED_SEARCH_FACTOR = 1.001
 """How much farther it looks in single precision first, which passes over most points [-]."""
-WETTED_PATCH = 0.5
+WETTED_PATCH_DX = 0.5
 """Points of it count that are farther than the nearest by no more than this [cells] …"""
-WETTED_TURN = 0.7
+WETTED_NORMAL_COSINE = 0.7
 """… and whose normals have at least this cosine; what looks another way is another face [-]."""
-WETTED_FACES = 3
+MAX_WETTED_FACES = 3
 """Faces of one body that a node knows: three meet in a corner."""
-WETTED_ROWS = 512
+MAX_WETTED_POINTS = 512
 """Points of a surface that are looked at for one node, at most."""
 
 # ---------------------------------------------------------------- what bodies are tied to
 
-HELD_SHARE = 0.15
+MIN_FRAME_VOLUME_FRACTION = 0.15
 """A node of a soft field is a rigid frame's where the frame has this share of the volume [-]. Never
 a half: a face on a grid plane would be a tie."""
-HELD_LAYER = 2.0
+FRAME_LAYER_DX = 2.0
 """Soft matter this near to a frame [cells] says how dense what it holds is."""
-HELD_REACH = 6.0
+FRAME_REACH_DX = 6.0
 """Particles of a frame farther than this from what it holds [cells] never share a node with it."""
 PARTICLES_PER_CELL = 8
 """Of matter at rest."""
-CLOSING = 0.2
+JOINT_GAP_FRACTION_PER_STEP = 0.2
 """Share of a joint's gap that is closed in a step [-]."""
-GRIP_REACH = 2.0
+GRIP_RADIUS_DX = 2.0
 """Radius of what a grip holds [cells]."""
 GRIP_STIFFNESS, GRIP_DAMPING = 0.25, 0.5
 """Most that a step can follow of a grip's k dt²/m and c dt/m [-]."""
@@ -311,55 +313,55 @@ coefficients from the constant on); the rotation as it begins (9); and how many 
 
 # ---------------------------------------------------------------- air and gravity
 
-GRAVITY = types.GRAVITY
+GRAVITY = types.GRAVITY_M_S2
 """[m/s²]"""
 AIR_DENSITY = 1.2
 """ρ_air at 20 °C and sea level [kg/m³]."""
-PLATE = 1.17
+PLATE_DRAG_COEFFICIENT = 1.17
 """C: pressure on a plate that faces the wind, over ½ ρ u² [-] (Hoerner 1965, ch. 3)."""
-GUST_PARTS = 8
+GUST_SINES = 8
 """Sines that a gust is made of, half an octave apart …"""
-SLOWEST_GUST = 0.25
+MIN_GUST_FREQUENCY_HZ = 0.25
 """… from this frequency on [Hz]."""
 
 # ---------------------------------------------------------------- how far bodies are apart
 
-PARTICLE_RADIUS = 0.25
+PARTICLE_RADIUS_DX = 0.25
 """Of the ball that a particle stands for where distances are measured [cells]."""
-OVERLAP_REACH = 1.5
+OVERLAP_RADIUS_DX = 1.5
 """Radius in which neighbours are counted [cells]; deeper overlap reads as this plus a radius."""
-SQUEEZED = 0.99
+SQUEEZED_VOLUME_RATIO = 0.99
 """Where no particle is below this share of its volume at rest, neighbours are counted instead of
 their volumes added up, which is quicker [-]."""
-BOXES_APART = 4.0
+BOUNDING_BOX_DISTANCE_DX = 4.0
 """Bodies farther apart than this [cells] are measured by their bounding boxes."""
-DEEPEST_PARTICLES = 8
+OVERLAP_DEPTH_PARTICLES = 8
 """The depth is the mean over so many deepest particles: one cell's worth, against jitter."""
 
 # ---------------------------------------------------------------- how the processor is kept busy
 
-OUT_OF_BLOCK_SHARE = 0.1
+OUT_OF_BLOCK_FRACTION = 0.1
 """Share of a field's particles outside of their blocks from which it is sorted with others [-]."""
-POLL_INTERVAL = 0.2
+POLL_INTERVAL_S = 0.2
 """Computing time after which Python looks whether somebody wants to stop [s]."""
 
 
-def numbers() -> dict[str, int | float]:
+def constants_by_name() -> dict[str, int | float]:
     """All of them by name."""
     return {name: value for name, value in globals().items() if name.isupper()}
 
 
-def text() -> str:
+def cpp_constants() -> str:
     """Define all of them in C++."""
-    return written(numbers())
+    return cpp_definitions(constants_by_name())
 
 
-def written(given: Mapping[str, int | float]) -> str:
+def cpp_definitions(given: Mapping[str, int | float]) -> str:
     """Define numbers in C++, in ``namespace mpm``: whole ones as int, others as double."""
-    lines = [f"constexpr {type_of(v)} {name} = {v!r};" for name, v in given.items()]
+    lines = [f"constexpr {cpp_type(v)} {name} = {v!r};" for name, v in given.items()]
     return "\n".join(["namespace mpm {", *lines, "}", ""])
 
 
-def type_of(value: int | float) -> str:
+def cpp_type(value: int | float) -> str:
     """Give the C++ type of a number."""
     return "int" if isinstance(value, int) else "double"

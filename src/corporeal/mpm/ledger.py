@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 
 
 @dataclass
-class Ledger:
+class EngineLedger:
     """Accumulated since time 0; B bodies, W planes."""
 
     external_impulse: Float[np.ndarray, "B 3"]
@@ -37,7 +37,7 @@ class Ledger:
     """[m]"""
 
     @classmethod
-    def blank(cls, bodies: int, planes: int) -> "Ledger":
+    def blank(cls, bodies: int, planes: int) -> "EngineLedger":
         """Open a ledger at time 0."""
         everything = bodies + planes
         return cls(

@@ -8,12 +8,12 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.core.types import ROUNDING, Keyframes, Push, Vector, Wind
+from corporeal.core.types import CURVATURE_COLUMNS, Keyframes, Push, Vector, Wind
 from corporeal.mpm.constants import COURANT, GRAVITY
 
 
 @dataclass(frozen=True)
-class Faces:
+class WindFaces:
     """Where a body meets the air; A faces."""
 
     area: Float[np.ndarray, "A 3"]
@@ -32,7 +32,7 @@ class WettedSurface:
     """Unit, out of the matter."""
 
 
-NO_FACES = Faces(np.zeros((0, 3)), np.zeros(0, np.int64))
+NO_WIND_FACES = WindFaces(np.zeros((0, 3)), np.zeros(0, np.int64))
 
 
 @dataclass(frozen=True)
@@ -103,14 +103,14 @@ class Body:
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
     rounding: Float[np.ndarray, "S2 Columns"] = field(
-        default_factory=lambda: np.zeros((0, ROUNDING))
+        default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
     """How the surface curves at those points, see ``types.ROUNDING``; none: they are corners."""
     wetted: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None
     wind: Wind | None = None
-    faces: Faces = NO_FACES
+    faces: WindFaces = NO_WIND_FACES
     """What the wind blows on."""
     tether: Tether | None = None
     path: Keyframes | None = None
@@ -210,7 +210,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True)
-class Measure:
+class Diagnostics:
     """The ledger now. Work and impulses are accumulated since time 0."""
 
     time: float
@@ -261,7 +261,7 @@ class Measure:
 
 
 @dataclass
-class Steps:
+class StepStatistics:
     """How time was cut."""
 
     count: int = 0
@@ -275,7 +275,7 @@ class Steps:
 class Engine(Protocol):
     """A solver of one problem."""
 
-    steps: Steps
+    steps: StepStatistics
 
     @property
     def time(self) -> float:
@@ -296,7 +296,7 @@ class Engine(Protocol):
         """Copy every particle's state."""
         ...
 
-    def measure(self) -> Measure:
+    def measure(self) -> Diagnostics:
         """Add up the ledger."""
         ...
 
@@ -322,7 +322,7 @@ class Engine(Protocol):
 
 
 @runtime_checkable
-class Interactive(Engine, Protocol):
+class InteractiveEngine(Engine, Protocol):
     """An engine whose bodies can be touched from outside between two advances.
 
     A touch reaches the particles within two cells of a point, less with the distance; of a rigid
@@ -374,7 +374,7 @@ class Interactive(Engine, Protocol):
         ...
 
 
-MENU = {
+ENGINES = {
     "cpu": "corporeal.mpm.cpu.engine:CpuEngine",
     "cuda": "corporeal.mpm.cuda.engine:CudaEngine",
     "reference": "corporeal.mpm.reference.engine:ReferenceEngine",

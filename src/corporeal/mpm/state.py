@@ -7,33 +7,33 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.core.types import ROUNDING
+from corporeal.core.types import CURVATURE_COLUMNS
 from corporeal.mpm import laws
-from corporeal.mpm.constants import SMALLEST_VOLUME
+from corporeal.mpm.constants import MIN_VOLUME_RATIO
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.physics import branches, rigid
-from corporeal.mpm.physics.branches import Branches, Memory
-from corporeal.mpm.physics.facets import Facets, facets_of, has_edges, of_flat_faces
+from corporeal.mpm.material_table import MaterialTable
+from corporeal.mpm.physics import maxwell_branches, rigid
+from corporeal.mpm.physics.flat_facets import BodyFacets, facets_of, has_edges, is_bounded_by_facets
+from corporeal.mpm.physics.maxwell_branches import BranchMemory, MaxwellBranches
 from corporeal.mpm.problem import Body, Problem
-from corporeal.mpm.substance import Substances
 
 
-def rounding_of(body: Body) -> Float[np.ndarray, "S 12"]:
+def surface_curvature(body: Body) -> Float[np.ndarray, "S 12"]:
     """How a body's surface curves at its points; zeros where it was not told."""
-    rows = np.zeros((len(body.surface), ROUNDING))
+    rows = np.zeros((len(body.surface), CURVATURE_COLUMNS))
     if len(body.rounding) == len(body.surface):
         rows[:, : body.rounding.shape[1]] = body.rounding
     return rows
 
 
 @dataclass(frozen=True)
-class Matter:
+class ParticleConstants:
     """What never changes; all bodies' particles in one list."""
 
     body: Int[np.ndarray, " P"]
     mass: Float[np.ndarray, " P"]
     volume: Float[np.ndarray, " P"]
-    substances: Substances
+    substances: MaterialTable
     """What they are made of, and …"""
     kind: Int[np.ndarray, " P"]
     """… the row of each in it."""
@@ -51,12 +51,14 @@ class Matter:
     """How the surface curves there at the start: see ``types.ROUNDING``; zero where it does not."""
 
     @classmethod
-    def of(cls, problem: Problem) -> "Matter":
+    def of(cls, problem: Problem) -> "ParticleConstants":
         """Gather what the bodies say of their particles."""
         bodies = problem.bodies
-        substances, kind = Substances.of(problem)
+        substances, kind = MaterialTable.of(problem)
         volume = np.concatenate([np.asarray(b.volume, np.float64) for b in bodies])
-        masses = [rigid.mass_of(b.position, b.volume * b.density, b.volume) for b in bodies]
+        masses = [
+            rigid.mass_and_inertia(b.position, b.volume * b.density, b.volume) for b in bodies
+        ]
         centre = np.stack([m.centre for m in masses])
         return cls(
             body=substances.body[kind],
@@ -71,7 +73,7 @@ class Matter:
                 [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
             ),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
-            rounding=tuple(rounding_of(b) for b in bodies),
+            rounding=tuple(surface_curvature(b) for b in bodies),
         )
 
     @cached_property
@@ -81,7 +83,7 @@ class Matter:
         return np.array([np.linalg.norm(np.concatenate(p), axis=1).max() for p in points])
 
     @cached_property
-    def facets(self) -> tuple[Facets, ...]:
+    def facets(self) -> tuple[BodyFacets, ...]:
         """Flat faces of each body at the start, from its centre."""
         both = zip(self.surface, self.rounding, strict=True)
         return tuple(facets_of(points, rows) for points, rows in both)
@@ -89,7 +91,7 @@ class Matter:
     @cached_property
     def flat(self) -> tuple[bool, ...]:
         """Whether each body is bounded by flat faces for the most part."""
-        return tuple(map(of_flat_faces, self.facets, self.surface))
+        return tuple(map(is_bounded_by_facets, self.facets, self.surface))
 
     @cached_property
     def edged(self) -> tuple[bool, ...]:
@@ -99,7 +101,7 @@ class Matter:
     @cached_property
     def spacing(self) -> Float[np.ndarray, " B"]:
         """Distance of each body's surface points [m]; 0 without any."""
-        return np.array([rigid.spacing(points) for points in self.surface])
+        return np.array([rigid.surface_point_spacing(points) for points in self.surface])
 
     def thinness(self, cell: float) -> tuple[int, ...]:
         """How thin each body is against a cell [m], were it rigid: see ``rigid.thinness``."""
@@ -144,10 +146,10 @@ class Matter:
         return np.flatnonzero(self.substances.relaxes[self.kind])
 
     @cached_property
-    def branches(self) -> Branches:
+    def branches(self) -> MaxwellBranches:
         """Branches of those particles."""
         table, rows = self.substances.branches, self.kind[self.relaxing]
-        return Branches(table.shear[rows], table.bulk[rows], table.time[rows])
+        return MaxwellBranches(table.shear[rows], table.bulk[rows], table.time[rows])
 
     @cached_property
     def density(self) -> Float[np.ndarray, " P"]:
@@ -166,7 +168,7 @@ class Matter:
 
     @cached_property
     def forgetting(self) -> Float[np.ndarray, " P"]:
-        """Rate at which what the grid cannot see is forgotten [1/s]: see ``Substances``."""
+        """Rate at which what the grid cannot see is forgotten [1/s]: see ``MaterialTable``."""
         return self.substances.forgetting[self.kind]
 
     @cached_property
@@ -192,7 +194,7 @@ class Matter:
     @cached_property
     def pours(self) -> Bool[np.ndarray, " B"]:
         """Whether each body holds a liquid."""
-        poured = self.body[np.isin(self.law, laws.LIQUID)]
+        poured = self.body[np.isin(self.law, laws.LIQUID_LAWS)]
         return np.bincount(poured, minlength=len(self.total)) > 0
 
     @cached_property
@@ -210,12 +212,12 @@ class Matter:
     ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
         """Rigid motion of one body closest to its particles': velocity, angular momentum."""
         mine = self.body == body
-        whole = rigid.mass_of(position[mine], self.mass[mine], self.volume[mine])
+        whole = rigid.mass_and_inertia(position[mine], self.mass[mine], self.volume[mine])
         return rigid.fit_motion(whole, position[mine], self.mass[mine], velocity[mine])
 
 
 @dataclass(frozen=True)
-class Motion:
+class Velocities:
     """How particles and rigid bodies move; P particles, B bodies."""
 
     velocity: Float[np.ndarray, "P 3"]
@@ -226,21 +228,21 @@ class Motion:
     """Their angular momentum about it [kg m²/s]."""
 
     @classmethod
-    def none(cls, problem: Problem) -> "Motion":
+    def none(cls, problem: Problem) -> "Velocities":
         """Rest: nothing moves."""
         particles = sum(len(body.position) for body in problem.bodies)
         bodies = len(problem.bodies)
         return cls(np.zeros((particles, 3)), np.zeros((bodies, 3)), np.zeros((bodies, 3)))
 
     @classmethod
-    def at_start(cls, problem: Problem) -> "Motion":
+    def at_start(cls, problem: Problem) -> "Velocities":
         """Move as the problem says."""
         motion = cls.none(problem)
         motion.velocity[:] = np.concatenate([body.velocity for body in problem.bodies])
         for b, body in enumerate(problem.bodies):
             if body.rigid:
                 mass = body.volume * body.density
-                whole = rigid.mass_of(body.position, mass, body.volume)
+                whole = rigid.mass_and_inertia(body.position, mass, body.volume)
                 fitted = rigid.fit_motion(whole, body.position, mass, body.velocity)
                 motion.speed[b], motion.spin_momentum[b] = fitted
         return motion
@@ -278,7 +280,7 @@ class State:
     """… and how far the body has turned."""
 
     @classmethod
-    def start(cls, problem: Problem, matter: Matter) -> "State":
+    def start(cls, problem: Problem, matter: ParticleConstants) -> "State":
         """Bodies as the problem has them: undeformed, with their particles' velocities."""
         position = np.concatenate([np.asarray(b.position, np.float64) for b in problem.bodies])
         velocity = np.concatenate([np.asarray(b.velocity, np.float64) for b in problem.bodies])
@@ -305,19 +307,19 @@ class State:
         return state.follow_rigid(matter)
 
     @property
-    def memory(self) -> Memory:
+    def memory(self) -> BranchMemory:
         """What Maxwell branches remember."""
-        return Memory(self.branch_strain, self.branch_volume)
+        return BranchMemory(self.branch_strain, self.branch_volume)
 
-    def spin(self, matter: Matter) -> Float[np.ndarray, "B 3"]:
+    def spin(self, matter: ParticleConstants) -> Float[np.ndarray, "B 3"]:
         """ω of every body [rad/s]; meaningful where rigid."""
         return np.einsum("bij,bj->bi", self.inverse_inertia(matter), self.spin_momentum)
 
-    def inverse_inertia(self, matter: Matter) -> Float[np.ndarray, "B 3 3"]:
+    def inverse_inertia(self, matter: ParticleConstants) -> Float[np.ndarray, "B 3 3"]:
         """I⁻¹ of every body in the world frame [1/(kg m²)]; meaningful where rigid."""
         return self.rotation @ matter.inverse_inertia @ np.swapaxes(self.rotation, 1, 2)
 
-    def follow_rigid(self, matter: Matter) -> "State":
+    def follow_rigid(self, matter: ParticleConstants) -> "State":
         """Put the particles of rigid bodies where the bodies are: x = X + R r₀, v = V + ω × r."""
         if not matter.rigid.any():
             return self
@@ -335,7 +337,9 @@ class State:
             motion=np.where(stiff[:, None], still, self.motion),
         )
 
-    def moving(self, motion: Motion, matter: Matter, bodies: Collection[int]) -> "State":
+    def moving(
+        self, motion: Velocities, matter: ParticleConstants, bodies: Collection[int]
+    ) -> "State":
         """Return the same place with other motion of some bodies."""
         mine, body = self._of(matter, bodies)
         return replace(
@@ -346,7 +350,9 @@ class State:
             spin_momentum=np.where(body[:, None], motion.spin_momentum, self.spin_momentum),
         ).follow_rigid(matter)
 
-    def placed_as(self, there: "State", matter: Matter, bodies: Collection[int]) -> "State":
+    def placed_as(
+        self, there: "State", matter: ParticleConstants, bodies: Collection[int]
+    ) -> "State":
         """Return the same motion with some bodies where, and as strained as, they are there.
 
         Whatever they were strained by there was long ago: their branches have forgotten it.
@@ -364,7 +370,9 @@ class State:
         found["branch_volume"] = np.where(fresh[:, None], 0.0, self.branch_volume)
         return replace(self, **found).follow_rigid(matter)
 
-    def _of(self, matter: Matter, bodies: Collection[int]) -> tuple[np.ndarray, np.ndarray]:
+    def _of(
+        self, matter: ParticleConstants, bodies: Collection[int]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Which particles and which bodies are meant."""
         body = np.isin(np.arange(len(self.centre)), list(bodies))
         return body[matter.body], body
@@ -374,7 +382,7 @@ class State:
         return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
 
 
-def elastic_stress(matter: Matter, state: State) -> Float[np.ndarray, "P 3 3"]:
+def elastic_stress(matter: ParticleConstants, state: State) -> Float[np.ndarray, "P 3 3"]:
     """Kirchhoff stress τ of each particle's own strain [Pa]; none in rigid bodies.
 
     Without what ``mean_pressure`` adds where matter is nearly incompressible.
@@ -386,24 +394,24 @@ def elastic_stress(matter: Matter, state: State) -> Float[np.ndarray, "P 3 3"]:
     return out
 
 
-def branch_stress(matter: Matter, memory: Memory) -> Float[np.ndarray, "P 3 3"]:
+def branch_stress(matter: ParticleConstants, memory: BranchMemory) -> Float[np.ndarray, "P 3 3"]:
     """Kirchhoff stress of the Maxwell branches [Pa]."""
     out = np.zeros((len(matter.mass), 3, 3))
-    out[matter.relaxing] = branches.stress(matter.branches, memory)
+    out[matter.relaxing] = maxwell_branches.maxwell_stress(matter.branches, memory)
     return out
 
 
-def branch_energy(matter: Matter, memory: Memory) -> Float[np.ndarray, " P"]:
+def branch_energy(matter: ParticleConstants, memory: BranchMemory) -> Float[np.ndarray, " P"]:
     """Energy that the branches of each particle hold [J]."""
     out, k = np.zeros(len(matter.mass)), matter.relaxing
-    out[k] = matter.volume[k] * branches.free_energy(matter.branches, memory)
+    out[k] = matter.volume[k] * maxwell_branches.branch_free_energy(matter.branches, memory)
     return out
 
 
-def mean_pressure(matter: Matter, state: State) -> Float[np.ndarray, " P"]:
+def mean_pressure(matter: ParticleConstants, state: State) -> Float[np.ndarray, " P"]:
     """Kirchhoff pressure of the mean dilatation [Pa]; 0 where pressure is one's own."""
     m, k, out = matter, matter.swells, np.zeros(len(state.F))
-    mean = np.maximum(mean_volume(state.F[k], state.relief[k]), SMALLEST_VOLUME)
+    mean = np.maximum(mean_volume(state.F[k], state.relief[k]), MIN_VOLUME_RATIO)
     out[k] = laws.mean_pressure(m.law[k], mean, m.mean_bulk[k])
     return out
 
@@ -416,7 +424,7 @@ def mean_volume(
 
 
 def strain_energy(
-    matter: Matter, F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+    matter: ParticleConstants, F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
 ) -> Float[np.ndarray, " P"]:
     """Elastic energy of each particle [J] at F and the relief of its mean dilatation."""
     m, out = matter, np.zeros(len(F))
@@ -426,7 +434,9 @@ def strain_energy(
     return m.volume * out
 
 
-def flowed(matter: Matter, state: State, dt: float) -> tuple[State, float]:
+def return_to_yield_surface(
+    matter: ParticleConstants, state: State, dt: float
+) -> tuple[State, float]:
     """Bring what flows back to what it can bear after a step of dt [s]; give the energy lost [J].
 
     What takes any shape keeps no other motion than its elastic one.
@@ -438,6 +448,6 @@ def flowed(matter: Matter, state: State, dt: float) -> tuple[State, float]:
     F[k], volume[k] = flow.F, flow.volume
     plastic[k] += flow.plastic_strain
     loss = float(np.sum(matter.volume[k] * flow.loss))
-    pours = np.isin(matter.law, laws.LIQUID)[:, None, None] & ~matter.rigid[:, None, None]
+    pours = np.isin(matter.law, laws.LIQUID_LAWS)[:, None, None] & ~matter.rigid[:, None, None]
     motion = np.where(pours, F, state.motion)
     return replace(state, F=F, motion=motion, plastic=plastic, volume=volume), loss

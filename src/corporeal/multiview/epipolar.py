@@ -8,13 +8,13 @@ from jaxtyping import Float
 
 from corporeal.core.types import Camera
 
-SAME = 1e-9
+SAME_PLACE_DISTANCE_RATIO = 1e-9
 """Cameras nearer to each other than this share of their distance from the origin are in one place.
 """
-Points = Float[np.ndarray, "N 2"]
+ImagePoints = Float[np.ndarray, "N 2"]
 
 
-def fundamental(a: Camera, b: Camera) -> Float[np.ndarray, "3 3"]:
+def fundamental_matrix(a: Camera, b: Camera) -> Float[np.ndarray, "3 3"]:
     """Return F with x_b^T F x_a = 0 for pictures x of one point: K_b^-T [t]x R K_a^-1.
 
     It is 0 for cameras in one place.
@@ -22,18 +22,22 @@ def fundamental(a: Camera, b: Camera) -> Float[np.ndarray, "3 3"]:
     b_from_a = np.linalg.inv(b.world_from_camera) @ a.world_from_camera
     shift = a.world_from_camera[:3, 3] - b.world_from_camera[:3, 3]
     here = np.abs([c.world_from_camera[:3, 3] for c in (a, b)]).max()
-    x, y, z = b_from_a[:3, 3] if np.abs(shift).max() > SAME * here else np.zeros(3)
+    x, y, z = (
+        b_from_a[:3, 3] if np.abs(shift).max() > SAME_PLACE_DISTANCE_RATIO * here else np.zeros(3)
+    )
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.linalg.inv(b.K).T @ across @ b_from_a[:3, :3] @ np.linalg.inv(a.K)
 
 
-def sampson(F: Float[np.ndarray, "3 3"], a: Points, b: Points) -> Float[np.ndarray, " N"]:
+def sampson_distance(
+    F: Float[np.ndarray, "3 3"], a: ImagePoints, b: ImagePoints
+) -> Float[np.ndarray, " N"]:
     """Return how far matches are from agreeing, to first order their reprojection error [px].
 
     |x_b^T F x_a| / sqrt((F x_a)_1² + (F x_a)_2² + (F^T x_b)_1² + (F^T x_b)_2²), eq. 11.9; infinite
     where cameras in one place leave nothing to agree on.
     """
-    x, y = _homogeneous(a), _homogeneous(b)
+    x, y = _homogeneous_points(a), _homogeneous_points(b)
     across, back = x @ F.T, y @ F
     slope = np.hypot(np.hypot(*across[:, :2].T), np.hypot(*back[:, :2].T))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -41,12 +45,14 @@ def sampson(F: Float[np.ndarray, "3 3"], a: Points, b: Points) -> Float[np.ndarr
     return np.where(slope > 0, error, np.inf)
 
 
-def depths(a: Camera, b: Camera, x: Points, y: Points) -> Float[np.ndarray, "N 2"]:
+def depths_of_match(
+    a: Camera, b: Camera, x: ImagePoints, y: ImagePoints
+) -> Float[np.ndarray, "N 2"]:
     """Return how far ahead of each camera the point of a match lies [m]; negative: behind.
 
     Linear triangulation, section 12.2.
     """
-    P, Q = projection(a), projection(b)
+    P, Q = projection_matrix(a), projection_matrix(b)
     rows = np.stack(
         [
             x[:, :1] * P[2] - P[0],
@@ -62,13 +68,13 @@ def depths(a: Camera, b: Camera, x: Points, y: Points) -> Float[np.ndarray, "N 2
     return np.stack([world @ np.linalg.inv(c.world_from_camera)[2] for c in (a, b)], axis=-1)
 
 
-def projection(camera: Camera) -> Float[np.ndarray, "3 4"]:
+def projection_matrix(camera: Camera) -> Float[np.ndarray, "3 4"]:
     """Return P = K [R | t]."""
     return camera.K @ np.linalg.inv(camera.world_from_camera)[:3]
 
 
-def consensus(
-    a: Points, b: Points, tolerance: float, rng: np.random.Generator, trials: int = 300
+def consensus_fraction(
+    a: ImagePoints, b: ImagePoints, tolerance: float, rng: np.random.Generator, trials: int = 300
 ) -> float:
     """Return the share of matches that some pair of distant cameras would explain.
 
@@ -86,5 +92,5 @@ def consensus(
     return float((near.sum(axis=0).max() - 4) / (len(joint) - 4))
 
 
-def _homogeneous(points: Points) -> Float[np.ndarray, "N 3"]:
+def _homogeneous_points(points: ImagePoints) -> Float[np.ndarray, "N 3"]:
     return np.concatenate([points, np.ones((len(points), 1))], axis=1)

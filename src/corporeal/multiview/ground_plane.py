@@ -10,35 +10,35 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
-from corporeal.geometry.resting_pose import together
-from corporeal.multiview.robust import NORMAL
+from corporeal.geometry.resting_pose import remove_outliers
+from corporeal.multiview.robust_statistics import SIGMA_PER_MEDIAN_DEVIATION
 
-SAMPLES = 3000
+PLANE_HYPOTHESES_COUNT = 3000
 """Planes through three points that are tried."""
-ASKED = 2500
+SCORING_POINTS_COUNT = 2500
 """Points that judge each of them."""
-REFINED = 30_000
+MAX_REFINEMENT_POINTS = 30_000
 """Points that the best are fitted to."""
-TOLERANCE = 0.02
+INITIAL_TOLERANCE_RADII = 0.02
 """Distance from the plane of what belongs to it, in radii of the scene, at first."""
-FINEST = 0.002
+FINAL_TOLERANCE_RADII = 0.002
 """The same at the end, at least."""
-BELOW = 0.5
+POINT_BELOW_PENALTY_POINTS = 0.5
 """What a point under the plane costs, in points on it."""
-LEAST = 0.08
+MIN_GROUND_POINT_FRACTION = 0.08
 """Share of the points that must be on a plane for it to be one."""
-PROMINENT = 2.5
+MIN_GROUND_DENSITY_RATIO = 2.5
 """How many times denser points must be on it than in the layers just above it."""
-FEW = 0.05
+MAX_BELOW_GROUND_FRACTION = 0.05
 """Share of the points that may be below it, though fewer are above."""
-CARRIED = 0.75
+MIN_CARRIED_FRACTION = 0.75
 """Share of what is above it that must be above the patch of it that was seen."""
-ABOVE = 0.8
+MIN_CAMERAS_ABOVE_FRACTION = 0.8
 """Share of the cameras that must be above it."""
 
 
 @dataclass(frozen=True)
-class Plane:
+class GroundPlane:
     """A plane n · x = offset."""
 
     normal: Float[np.ndarray, "3"]
@@ -52,7 +52,7 @@ class Plane:
 
 
 @dataclass(frozen=True)
-class Search:
+class GroundSearch:
     """Where a ground may be."""
 
     up: Float[np.ndarray, "3"]
@@ -68,28 +68,32 @@ class Search:
     of it: a wall behind stands beside the patch that is seen of the floor."""
 
 
-def ground_plane(
-    points: Float[np.ndarray, "N 3"], search: Search, rng: np.random.Generator
-) -> Plane | None:
+def find_ground_plane(
+    points: Float[np.ndarray, "N 3"], search: GroundSearch, rng: np.random.Generator
+) -> GroundPlane | None:
     """Return the plane that most points are on and few are below; None: there is none."""
     if len(points) < 10:
         return None
-    asked = points[rng.permutation(len(points))[:ASKED]]
-    many = points[rng.permutation(len(points))[:REFINED]]
+    asked = points[rng.permutation(len(points))[:SCORING_POINTS_COUNT]]
+    many = points[rng.permutation(len(points))[:MAX_REFINEMENT_POINTS]]
     best, most = None, -np.inf
-    for normal, offset in _candidates(asked, search, rng):
-        plane = _refined(many, normal, offset, search)
-        score = plane.share - BELOW * _below(many, plane, search)
-        if score > most and _allowed(plane, search):
+    for normal, offset in _candidate_planes(asked, search, rng):
+        plane = _refined_plane(many, normal, offset, search)
+        score = plane.share - POINT_BELOW_PENALTY_POINTS * _fraction_below(many, plane, search)
+        if score > most and _is_allowed_plane(plane, search):
             best, most = plane, score
     return (
-        best if best is not None and most > LEAST / 2 and _is_ground(many, best, search) else None
+        best
+        if best is not None
+        and most > MIN_GROUND_POINT_FRACTION / 2
+        and _is_ground_plane(many, best, search)
+        else None
     )
 
 
-def _candidates(points: np.ndarray, search: Search, rng: np.random.Generator) -> list:
+def _candidate_planes(points: np.ndarray, search: GroundSearch, rng: np.random.Generator) -> list:
     """Return the normals and offsets of the best planes through three of the points."""
-    corners = points[rng.integers(len(points), size=(SAMPLES, 3))]
+    corners = points[rng.integers(len(points), size=(PLANE_HYPOTHESES_COUNT, 3))]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
     normals = normals[length > 0] / length[length > 0, None]
@@ -101,19 +105,21 @@ def _candidates(points: np.ndarray, search: Search, rng: np.random.Generator) ->
     if search.tilt >= np.pi:  # either side may be up
         normals, corners = np.concatenate([normals, -normals]), np.concatenate([corners] * 2)
     offsets = np.einsum("md,md->m", normals, corners[:, 0])
-    near = TOLERANCE * search.radius
+    near = INITIAL_TOLERANCE_RADII * search.radius
     scores = np.empty(len(normals))
     for start in range(0, len(normals), 500):
         some = slice(start, start + 500)
         heights = (points @ normals[some].T - offsets[some]) / near
         on = np.maximum(0, 1 - heights**2).mean(axis=0)
-        scores[some] = on - BELOW * (heights < -2).mean(axis=0)
+        scores[some] = on - POINT_BELOW_PENALTY_POINTS * (heights < -2).mean(axis=0)
     return [(normals[k], offsets[k]) for k in np.argsort(-scores, kind="stable")[:5]]
 
 
-def _refined(points: np.ndarray, normal: np.ndarray, offset: float, search: Search) -> Plane:
+def _refined_plane(
+    points: np.ndarray, normal: np.ndarray, offset: float, search: GroundSearch
+) -> GroundPlane:
     """Fit a plane to the points near it, again and again (Tukey's biweight)."""
-    near = TOLERANCE * search.radius
+    near = INITIAL_TOLERANCE_RADII * search.radius
     for _ in range(12):
         heights = points @ normal - offset
         weight = np.square(np.maximum(0, 1 - np.square(heights / near)))
@@ -125,47 +131,47 @@ def _refined(points: np.ndarray, normal: np.ndarray, offset: float, search: Sear
         normal = turned if turned @ normal > 0 else -turned
         offset = float(normal @ middle)
         heights = np.abs(points @ normal - offset)
-        typical = NORMAL * float(np.median(heights[weight > 0]))
-        near = np.clip(4 * typical, FINEST * search.radius, near)
+        typical = SIGMA_PER_MEDIAN_DEVIATION * float(np.median(heights[weight > 0]))
+        near = np.clip(4 * typical, FINAL_TOLERANCE_RADII * search.radius, near)
     heights = np.abs(points @ normal - offset)
     on = heights < near
     deviation = float(np.sqrt(np.mean(heights[on] ** 2))) if on.any() else 0.0
-    return Plane(normal, offset, float(on.mean()), deviation)
+    return GroundPlane(normal, offset, float(on.mean()), deviation)
 
 
-def _below(points: np.ndarray, plane: Plane, search: Search) -> float:
-    far = 2 * TOLERANCE * search.radius
+def _fraction_below(points: np.ndarray, plane: GroundPlane, search: GroundSearch) -> float:
+    far = 2 * INITIAL_TOLERANCE_RADII * search.radius
     return float((points @ plane.normal - plane.offset < -far).mean())
 
 
-def _allowed(plane: Plane, search: Search) -> bool:
-    if plane.share < LEAST or plane.normal @ search.up < np.cos(search.tilt):
+def _is_allowed_plane(plane: GroundPlane, search: GroundSearch) -> bool:
+    if plane.share < MIN_GROUND_POINT_FRACTION or plane.normal @ search.up < np.cos(search.tilt):
         return False
     eyes = search.eyes @ plane.normal - plane.offset
-    return not len(eyes) or (eyes > 0).mean() >= ABOVE
+    return not len(eyes) or (eyes > 0).mean() >= MIN_CAMERAS_ABOVE_FRACTION
 
 
-def _is_ground(points: np.ndarray, plane: Plane, search: Search) -> bool:
+def _is_ground_plane(points: np.ndarray, plane: GroundPlane, search: GroundSearch) -> bool:
     return _stands_out(points, plane, search) and _carries(points, plane, search)
 
 
-def _stands_out(points: np.ndarray, plane: Plane, search: Search) -> bool:
+def _stands_out(points: np.ndarray, plane: GroundPlane, search: GroundSearch) -> bool:
     """Tell whether many more points are on it than just above it."""
     heights = points @ plane.normal - plane.offset
-    half = max(3 * plane.thickness, FINEST * search.radius)
+    half = max(3 * plane.thickness, FINAL_TOLERANCE_RADII * search.radius)
     on = (np.abs(heights) < half).sum()
     over = ((heights > 2 * half) & (heights < 8 * half)).sum() / 3
-    return bool(on >= PROMINENT * over)
+    return bool(on >= MIN_GROUND_DENSITY_RATIO * over)
 
 
-def _carries(points: np.ndarray, plane: Plane, search: Search) -> bool:
+def _carries(points: np.ndarray, plane: GroundPlane, search: GroundSearch) -> bool:
     """Tell whether objects are above it, and most of them above the patch that was seen of it."""
     heights = points @ plane.normal - plane.offset
-    half = max(3 * plane.thickness, FINEST * search.radius)
+    half = max(3 * plane.thickness, FINAL_TOLERANCE_RADII * search.radius)
     flat = points @ np.linalg.svd(plane.normal[None])[2][1:].T
-    patch = together(flat[np.abs(heights) < half])
+    patch = remove_outliers(flat[np.abs(heights) < half])
     above, below = flat[heights > 2 * half], (heights < -2 * half).mean()
-    if below > max(FEW, len(above) / len(points)):
+    if below > max(MAX_BELOW_GROUND_FRACTION, len(above) / len(points)):
         return False
     if not len(above):
         return True
@@ -175,9 +181,9 @@ def _carries(points: np.ndarray, plane: Plane, search: Search) -> bool:
         return False
     rim = above @ hull.equations[:, :2].T + hull.equations[:, 2]
     carried = rim.max(axis=1) <= 0
-    if carried.mean() >= CARRIED:
+    if carried.mean() >= MIN_CARRIED_FRACTION:
         return True
     if search.middle is None:
         return False
     near = np.linalg.norm(points[heights > 2 * half] - search.middle, axis=1) < search.radius
-    return bool(near.any() and carried[near].mean() >= CARRIED)
+    return bool(near.any() and carried[near].mean() >= MIN_CARRIED_FRACTION)

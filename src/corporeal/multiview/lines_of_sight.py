@@ -16,9 +16,9 @@ from scipy.spatial import Delaunay, QhullError
 
 from corporeal.core.types import Camera
 
-WITNESSES = 2
+MIN_EMPTYING_VIEWS = 2
 """Views whose lines must pass through a cell for it to be empty."""
-APART = 8.0
+SAME_FACE_DISTANCE_CELLS = 8.0
 """Points that are nearer together [cells], and neighbours in a picture, are taken to be on one
 face: what is before it is empty, too. Things that stand on a face show points of their own."""
 
@@ -60,21 +60,23 @@ class LinesOfSight:
 
         """
         # numba takes a quarter of a second to import, and models have no lines of sight.
-        from corporeal.multiview.kernels_sight import march
+        from corporeal.multiview.kernels_lines_of_sight import march_lines
 
         votes = np.zeros(shape, np.int32)
         for k, camera in enumerate(cameras):
             ends = self.seen_by(k)
             if len(ends):
-                ends = np.concatenate([ends, _between(ends, camera, APART * side)])
+                ends = np.concatenate(
+                    [ends, _places_between(ends, camera, SAME_FACE_DISTANCE_CELLS * side)]
+                )
                 passed = np.zeros(shape, np.bool_)
                 eye = camera.world_from_camera[:3, 3]
-                march((ends - low) / side, (eye - low) / side, passed)
+                march_lines((ends - low) / side, (eye - low) / side, passed)
                 votes += binary_dilation(passed)
-        return votes >= WITNESSES
+        return votes >= MIN_EMPTYING_VIEWS
 
 
-def _between(
+def _places_between(
     ends: Float[np.ndarray, "M 3"], camera: Camera, apart: float
 ) -> Float[np.ndarray, "T 3"]:
     """Return places between points that are neighbours in a picture, and near each other."""

@@ -13,22 +13,28 @@ from jaxtyping import Bool, Float, UInt8
 from scipy.ndimage import binary_dilation
 
 from corporeal.core.types import Camera
-from corporeal.multiview.epipolar import projection
-from corporeal.multiview.silhouettes import Compared, cells_of, cube_around, shares, small
+from corporeal.multiview.epipolar import projection_matrix
+from corporeal.multiview.silhouette_coherence import (
+    SilhouetteComparison,
+    hull_grid_points,
+    mask_overlap_and_fill,
+    pixels_of_points,
+    shrink_mask,
+)
 
-SIDE = 128
+MAX_OUTLIER_IMAGE_SIDE_PX = 128
 """Longer side at which silhouettes are compared [px], at most: a step of the grid that the hull is
 carved from is no longer than a pixel, or the hull's silhouette would have holes."""
-FORGIVEN = 0.1
+MAX_DENYING_VIEWS_FRACTION = 0.1
 """Share of the views that may deny a point of the hull, at least one."""
-FEWEST = 8
+MIN_VIEWS_FOR_OUTLIERS = 8
 """Views from which on a hull tells one that is wrong from those that are right."""
-MOST = 0.34
+MAX_OUTLIER_VIEWS_FRACTION = 0.34
 """Share of the views from which on nobody can say which ones are right."""
 
 
 @dataclass(frozen=True)
-class Bounds:
+class OutlierBounds:
     """Below both of which a view is wrong.
 
     A right view may overlap little where it alone sees that a place is empty.
@@ -40,18 +46,20 @@ class Bounds:
     """Share of its mask that the hull of the others fills [-]."""
 
 
-GIVEN = Bounds(0.75, 0.95)
+GIVEN_MASK_BOUNDS = OutlierBounds(0.75, 0.95)
 """Of masks that somebody gave. Measured on real sets: overlaps of right views 0.9 and more, of
 wrong ones 0.7 and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
 """
-GROWN = Bounds(0.85, 0.8)
+GROWN_MASK_BOUNDS = OutlierBounds(0.85, 0.8)
 """Of grown masks that are believed, which vary more: of 17 sets of one thing every right view is
 filled by 0.91 and more; views that show another thing on the same floor by 0.68 and less, at
 overlaps of 0.8 and less."""
 
 
-def outliers(
-    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...], bounds: Bounds = GIVEN
+def outlier_views(
+    masks: UInt8[np.ndarray, "V H W"],
+    cameras: tuple[Camera, ...],
+    bounds: OutlierBounds = GIVEN_MASK_BOUNDS,
 ) -> tuple[int, ...]:
     """Return the numbers of views that do not show what the others see; (): of none that is known.
 
@@ -61,60 +69,62 @@ def outliers(
         bounds: Of what is right.
 
     """
-    if len(cameras) < FEWEST:
+    if len(cameras) < MIN_VIEWS_FOR_OUTLIERS:
         return ()
-    found = compare(masks, cameras)
+    found = compare_with_hull_of_others(masks, cameras)
     apart = found.overlap < bounds.overlap * np.nanmedian(found.overlap)
     wrong = np.flatnonzero(apart & (found.filled < bounds.filled))
-    return tuple(wrong.tolist()) if len(wrong) <= MOST * len(cameras) else ()
+    return tuple(wrong.tolist()) if len(wrong) <= MAX_OUTLIER_VIEWS_FRACTION * len(cameras) else ()
 
 
-def filled_by_others(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:
+def median_fill_by_others(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:
     """Return which share of a mask the hull of the others fills, the median of all views."""
-    return float(np.nanmedian(compare(masks, cameras).filled))
+    return float(np.nanmedian(compare_with_hull_of_others(masks, cameras).filled))
 
 
-def compare(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> Compared:
+def compare_with_hull_of_others(
+    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]
+) -> SilhouetteComparison:
     """Compare each mask with the hull of the others."""
-    points = cube_around(masks, cameras)
-    side = min(SIDE, _finest(points, cameras))
-    coarse = [small(mask, side) for mask in masks]
+    points = hull_grid_points(masks, cameras)
+    side = min(MAX_OUTLIER_IMAGE_SIDE_PX, _finest_image_side_px(points, cameras))
+    coarse = [shrink_mask(mask, side) for mask in masks]
     denied = np.zeros(len(points), np.int16)
     seen = np.zeros(len(points), np.int16)
     cells, denials = [], []
     for mask, camera in zip(coarse, cameras, strict=True):
-        cell = cells_of(points, camera, mask.shape)
+        cell = pixels_of_points(points, camera, mask.shape)
         near = np.asarray(binary_dilation(mask), bool)
         deny = (cell >= 0) & ~near.ravel()[cell]
         cells.append(cell.astype(np.int32))
         denials.append(deny)
         denied += deny
         seen += cell >= 0
-    allowed = max(1, int(FORGIVEN * len(cameras)))
+    allowed = max(1, int(MAX_DENYING_VIEWS_FRACTION * len(cameras)))
     looked = seen > len(cameras) / 4
     shares = np.array(
         [
-            _shares(mask, cell[looked & (denied - deny <= allowed)])
+            _mask_fractions(mask, cell[looked & (denied - deny <= allowed)])
             for mask, cell, deny in zip(coarse, cells, denials, strict=True)
         ]
     )
-    return Compared(shares[:, 0], shares[:, 1])
+    return SilhouetteComparison(shares[:, 0], shares[:, 1])
 
 
-def _finest(points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...]) -> int:
+def _finest_image_side_px(points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...]) -> int:
     """Return the longer side of pictures in which a step of a cubic grid is a pixel [px]."""
     step, middle = float(np.linalg.norm(points[1] - points[0])), points.mean(axis=0)
     shares = []
     for camera in cameras:
-        P = projection(camera)
+        P = projection_matrix(camera)
         depth = abs(float(P[2, :3] @ middle + P[2, 3]))
         focal = float(np.linalg.norm(P[0, :3] - (P[0, :3] @ P[2, :3]) * P[2, :3]))
         shares.append(step * focal / depth / max(camera.width, camera.height))
     return int(1.0 / float(np.median(shares)))
 
 
-def _shares(mask: Bool[np.ndarray, "h w"], cell: np.ndarray) -> tuple[float, float]:
+def _mask_fractions(mask: Bool[np.ndarray, "h w"], cell: np.ndarray) -> tuple[float, float]:
     """Compare a mask with pixels that are shown."""
     shown = np.zeros(mask.size, bool)
     shown[cell[cell >= 0]] = True
-    return shares(shown.reshape(mask.shape), mask)
+    return mask_overlap_and_fill(shown.reshape(mask.shape), mask)

@@ -7,13 +7,18 @@ from jaxtyping import Float, UInt8
 
 from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.multiview.silhouettes import Compared, cells_of, shares, small
+from corporeal.multiview.silhouette_coherence import (
+    SilhouetteComparison,
+    mask_overlap_and_fill,
+    pixels_of_points,
+    shrink_mask,
+)
 
-SIDE = 256
+OVERLAP_IMAGE_SIDE_PX = 256
 """Longer side at which they are compared [px]."""
-SAMPLES = 400_000
+SILHOUETTE_SAMPLES_COUNT = 400_000
 """Points on all surfaces that are drawn: several to a pixel of the silhouette."""
-FAINTEST = 4
+MIN_PIXEL_POINTS_DIVISOR = 4
 """A pixel that holds less than one in so many of the usual number of points is only touched."""
 
 
@@ -25,17 +30,17 @@ def silhouette_overlaps(
 ) -> Float[np.ndarray, " V"]:
     """Return the intersection over union of surfaces and mask in each view; NaN: an empty mask.
 
-    Args are those of ``compared``.
+    Args are those of ``compare_silhouettes``.
     """
-    return compared(meshes, cameras, masks, rng).overlap
+    return compare_silhouettes(meshes, cameras, masks, rng).overlap
 
 
-def compared(
+def compare_silhouettes(
     meshes: Sequence[Mesh],
     cameras: Sequence[Camera],
     masks: Sequence[UInt8[np.ndarray, "H W"]],
     rng: np.random.Generator,
-) -> Compared:
+) -> SilhouetteComparison:
     """Compare silhouettes of surfaces with a mask in each view.
 
     Args:
@@ -45,20 +50,20 @@ def compared(
         rng: Where points fall on the surfaces.
 
     """
-    points = sampled(meshes, SAMPLES, rng)
+    points = sample_meshes(meshes, SILHOUETTE_SAMPLES_COUNT, rng)
     found = []
     for camera, mask in zip(cameras, masks, strict=True):
-        real = small(mask, SIDE)
-        cell = cells_of(points, camera, real.shape)
+        real = shrink_mask(mask, OVERLAP_IMAGE_SIDE_PX)
+        cell = pixels_of_points(points, camera, real.shape)
         count = np.bincount(cell[cell >= 0], minlength=real.size)
         usual = np.median(count[count > 0]) if count.any() else 0
-        drawn = (count > usual / FAINTEST).reshape(real.shape)
-        found.append(shares(drawn, real))
+        drawn = (count > usual / MIN_PIXEL_POINTS_DIVISOR).reshape(real.shape)
+        found.append(mask_overlap_and_fill(drawn, real))
     overlap, filled = np.array(found).T
-    return Compared(overlap, filled)
+    return SilhouetteComparison(overlap, filled)
 
 
-def sampled(
+def sample_meshes(
     meshes: Sequence[Mesh], count: int, rng: np.random.Generator
 ) -> Float[np.ndarray, "N 3"]:
     """Return points on surfaces, as many on equal areas."""

@@ -12,31 +12,31 @@ from pathlib import Path
 from corporeal.core import registry
 from corporeal.core.errors import UserError
 from corporeal.core.types import Scene
-from corporeal.discretization.contents import with_contents
-from corporeal.discretization.problem_from_scene import pose
-from corporeal.geometry.gaussians import AskedUp, axis
-from corporeal.io.sources import kind_of
-from corporeal.mpm.problem import MENU, Engine, Problem
-from corporeal.pipeline.mixture import ground_weighed
-from corporeal.pipeline.runner import Settings
+from corporeal.discretization.build_model import build_model
+from corporeal.geometry.gaussian_transforms import UpAxisChoice, chosen_up_axis
+from corporeal.io.input_files import input_kind
+from corporeal.mpm.problem import ENGINES, Engine, Problem
+from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.segment import segment
 from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
-from corporeal.simulation.played import Played, Prepared
+from corporeal.scene.vessel_contents import add_vessel_contents
+from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
 Progress = Callable[[float, str], None]
-USUAL = Settings()
-USUAL_ENGINE = SimulateConfig().engine
+DEFAULT_SETTINGS = Settings()
+DEFAULT_ENGINE = SimulateConfig().engine
 
 
-def silent(fraction: float, words: str) -> None:
+def no_progress(fraction: float, words: str) -> None:
     """Tell nobody about progress."""
 
 
 def load_scene(
-    path: str | Path, config: AssembleConfig = USUAL.assemble, up: AskedUp = "auto"
+    path: str | Path, config: AssembleConfig = DEFAULT_SETTINGS.assemble, up: UpAxisChoice = "auto"
 ) -> Scene:
     """Read a scene from a model (glTF or a mesh), a folder of them, or a ``scene.toml``.
 
@@ -56,16 +56,18 @@ def load_scene(
     path = Path(path)
     if not path.exists():
         raise UserError(f"No such file: {path}. Check the path.")
-    kind = kind_of([path])
+    kind = input_kind([path])
     if kind != "model":
         raise UserError(
             f"{path} holds a {'splat' if kind == 'splat' else 'set of photographs'}, which must be "
             "reconstructed first: corporeal.run([path], folder) does everything."
         )
-    return assemble([path], config, axis(up))
+    return assemble([path], config, chosen_up_axis(up))
 
 
-def prepare(scene: Scene, settings: Settings = USUAL, progress: Progress = silent) -> Prepared:
+def prepare_scene(
+    scene: Scene, settings: Settings = DEFAULT_SETTINGS, progress: Progress = no_progress
+) -> PreparedScene:
     """Find the parts of a scene, give them materials, and fill them with material points.
 
     The verbs describe, segment, ground and fill, in this order.
@@ -84,14 +86,14 @@ def prepare(scene: Scene, settings: Settings = USUAL, progress: Progress = silen
     progress(0.3, "finding parts")
     parts = segment(scene, inventory, settings.segment)
     progress(0.5, "looking numbers up")
-    field = ground_weighed(scene, parts, inventory, settings.ground)
+    field = ground_with_mass_posterior(scene, parts, inventory, settings.ground)
     progress(0.6, "filling with particles")
     particles = fill(scene, parts, field, settings.fill)
-    whole = with_contents(scene, parts, field, particles.contents)
-    return Prepared(whole.scene, inventory, whole.parts, whole.field, particles)
+    whole = add_vessel_contents(scene, parts, field, particles.contents)
+    return PreparedScene(whole.scene, inventory, whole.parts, whole.field, particles)
 
 
-def pose_problem(prepared: Prepared, settings: Settings = USUAL) -> Problem:
+def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS) -> Problem:
     """Return what an engine solves: bodies in the order of the scene's objects, and the floor.
 
     An object that is partly rigid gives a soft body and then each rigid frame.
@@ -102,10 +104,10 @@ def pose_problem(prepared: Prepared, settings: Settings = USUAL) -> Problem:
 
     """
     contact = settings.simulate.contact
-    return pose(prepared.scene, prepared.particles, prepared.field, contact).problem
+    return build_model(prepared.scene, prepared.particles, prepared.field, contact).problem
 
 
-def build_engine(problem: Problem, engine: str = USUAL_ENGINE) -> Engine:
+def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE) -> Engine:
     """Return an engine at time 0 of a problem.
 
     Args:
@@ -117,15 +119,15 @@ def build_engine(problem: Problem, engine: str = USUAL_ENGINE) -> Engine:
         UserError: The engine does not work on this machine, or cannot solve the problem.
 
     """
-    return registry.load("engine", engine, MENU)(problem)
+    return registry.load_backend("engine", engine, ENGINES)(problem)
 
 
-def play(
-    scene: Scene | Prepared,
-    settings: Settings = USUAL,
+def simulate_scene(
+    scene: Scene | PreparedScene,
+    settings: Settings = DEFAULT_SETTINGS,
     folder: str | Path | None = None,
-    progress: Progress = silent,
-) -> Played:
+    progress: Progress = no_progress,
+) -> SimulationResult:
     """Simulate a scene through its duration.
 
     Args:
@@ -139,7 +141,7 @@ def play(
         SimulationError: The state became impossible.
 
     """
-    ready = scene if isinstance(scene, Prepared) else prepare(scene, settings, progress)
+    ready = scene if isinstance(scene, PreparedScene) else prepare_scene(scene, settings, progress)
     place = Path(tempfile.mkdtemp(prefix="corporeal-") if folder is None else folder)
     try:
         given = ready.scene, ready.particles, ready.field, settings.simulate
@@ -150,4 +152,4 @@ def play(
         raise
     if folder is None:
         weakref.finalize(trajectory.frames, shutil.rmtree, place, ignore_errors=True)
-    return Played(ready.broken(trajectory.breaks), trajectory)
+    return SimulationResult(ready.broken(trajectory.breaks), trajectory)

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from corporeal.core.types import (
-    Film,
     Inventory,
     MaterialField,
     Particles,
@@ -12,17 +11,18 @@ from corporeal.core.types import (
     Reconstruction,
     Scene,
     Trajectory,
+    Video,
 )
-from corporeal.discretization.broken import Filled, with_breaks
-from corporeal.discretization.contents import Whole, with_contents
-from corporeal.scene.followed import followed
-from corporeal.simulation.audit_file import AUDIT
-from corporeal.simulation.played import Played, Prepared
+from corporeal.scene.fractured_scene import FilledScene, apply_breaks
+from corporeal.scene.repose_reconstruction import repose_reconstruction
+from corporeal.scene.vessel_contents import SceneWithMaterials, add_vessel_contents
+from corporeal.simulation.audit_file import AUDIT_FILE
+from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
 T = TypeVar("T")
 
-FILES = (
-    *("film.mp4", "report.html", "materials.json", AUDIT, "fields.png", "strip.png"),
+RUN_FILES = (
+    *("film.mp4", "report.html", "materials.json", AUDIT_FILE, "fields.png", "strip.png"),
     "close-up.png",
     *("ensemble.json", "ensemble.png"),
 )
@@ -30,7 +30,7 @@ FILES = (
 
 
 @dataclass(frozen=True)
-class Results:
+class StageResults:
     """What each verb made; None: it has not been done, or need not be.
 
     The fields carry the names of the verbs. Read the properties, which carry the names of objects:
@@ -44,10 +44,10 @@ class Results:
     ground: MaterialField | None = None
     fill: Particles | None = None
     simulate: Trajectory | None = None
-    film: Film | None = None
+    film: Video | None = None
     report: None = None
 
-    def having(self, verb: str, made: Any) -> "Results":
+    def having(self, verb: str, made: Any) -> "StageResults":
         """Return the results with what one more verb made."""
         return replace(self, **{verb: made})
 
@@ -57,10 +57,10 @@ class Results:
         return self._filled.whole.scene if self._changes else _made(self.assemble, "assemble")
 
     @property
-    def assembled(self) -> Whole:
+    def assembled(self) -> SceneWithMaterials:
         """Scene, parts and materials as fill is given them: contents still in their vessels."""
         scene, parts = _made(self.assemble, "assemble"), _made(self.segment, "segment")
-        return Whole(scene, parts, _made(self.ground, "ground"))
+        return SceneWithMaterials(scene, parts, _made(self.ground, "ground"))
 
     @property
     def _changes(self) -> bool:
@@ -68,12 +68,12 @@ class Results:
         return pours or (self.simulate is not None and len(self.simulate.breaks) > 0)
 
     @property
-    def _filled(self) -> Filled:
+    def _filled(self) -> FilledScene:
         """With what moves in vessels, and the pieces of what broke."""
         particles = _made(self.fill, "fill")
-        whole = with_contents(*self.assembled.all, particles.contents)
+        whole = add_vessel_contents(*self.assembled.all, particles.contents)
         breaks = () if self.simulate is None else self.simulate.breaks
-        return with_breaks(whole, particles, breaks)
+        return apply_breaks(whole, particles, breaks)
 
     @property
     def inventory(self) -> Inventory:
@@ -101,7 +101,7 @@ class Results:
         return _made(self.simulate, "simulate")
 
     @property
-    def movie(self) -> Film:
+    def movie(self) -> Video:
         """From film."""
         return _made(self.film, "film")
 
@@ -111,7 +111,7 @@ class Results:
         return (
             None
             if self.reconstruct is None
-            else followed(self.reconstruct, _made(self.assemble, "assemble"))
+            else repose_reconstruction(self.reconstruct, _made(self.assemble, "assemble"))
         )
 
     @property
@@ -124,14 +124,14 @@ class Results:
         return found if whole else None
 
     @property
-    def prepared(self) -> Prepared:
+    def prepared(self) -> PreparedScene:
         """All up to fill."""
-        return Prepared(self.scene, self.inventory, self.parts, self.field, self.particles)
+        return PreparedScene(self.scene, self.inventory, self.parts, self.field, self.particles)
 
     @property
-    def played(self) -> Played:
+    def played(self) -> SimulationResult:
         """All up to simulate."""
-        return Played(self.prepared, self.trajectory, self.filmed)
+        return SimulationResult(self.prepared, self.trajectory, self.filmed)
 
 
 def _made(value: T | None, verb: str) -> T:

@@ -10,31 +10,31 @@ from pathlib import Path
 
 from corporeal import materials
 from corporeal.core import store
-from corporeal.core.findings import Audit, Expectation, Outcome, RunAudit
-from corporeal.core.types import Film, Inventory, Note, Reconstruction, Scene
-from corporeal.discretization.sizes import scale_of_part
-from corporeal.pipeline.playback import cast_of, playback, recorded
-from corporeal.pipeline.results import Results
-from corporeal.pipeline.stages.film import CLOSE_UP
-from corporeal.pipeline.stages.ground import doubts
-from corporeal.pipeline.stages.report import Story, report
-from corporeal.render.figures import fields_figure, strip
+from corporeal.core.audit_data import Audit, Expectation, Outcome, RunAudit
+from corporeal.core.types import Inventory, Note, Reconstruction, Scene, Video
+from corporeal.discretization.object_scaling import part_scales
+from corporeal.pipeline.results import StageResults
+from corporeal.pipeline.stages.ground import grounding_warnings
+from corporeal.pipeline.stages.report import ReportContent, report
+from corporeal.pipeline.stages.video import CLOSE_UP_FILE
+from corporeal.pipeline.viewer_data import bind_scene, record_trajectory, viewer_recording
+from corporeal.render.figures import fields_figure, write_filmstrip
 from corporeal.render.viewer_page import inline_view
-from corporeal.showcase.expectations import expect
-from corporeal.simulation.audit import believed
+from corporeal.showcase.scene_expectations import compare_with_expectations
+from corporeal.simulation.audit import reject_expectations
 from corporeal.simulation.audit_file import write_audit
-from corporeal.simulation.hints import hints
+from corporeal.simulation.run_hints import run_hints
 
 Progress = Callable[[float, str], None]
 
-LARGEST = 4_000_000
+MAX_VIEW_BYTES = 4_000_000
 """Of the 3D view in the report [bytes]."""
-THINNER = (1, 2, 4)
+FRAME_STRIDES = (1, 2, 4)
 """One of so many pictures is kept, until it fits."""
 
 
 @dataclass(frozen=True)
-class Spent:
+class RunCost:
     """What a run was asked for, and what it took."""
 
     settings: Mapping[str, str]
@@ -45,11 +45,11 @@ class Spent:
     """Whether it was asked for which nodes of a file are objects."""
 
 
-def write_results(
+def write_run_files(
     folder: Path,
-    made: Results,
+    made: StageResults,
     audit: Audit,
-    spent: Spent,
+    spent: RunCost,
     progress: Progress,
     more: Mapping[str, Path] | None = None,
 ) -> None:
@@ -74,19 +74,19 @@ def write_results(
     }
     fields_figure(made.scene, made.parts, made.field, folder / "fields.png")
     progress(0.5, "drawing the figures")
-    strip(made.movie, folder / "strip.png")
+    write_filmstrip(made.movie, folder / "strip.png")
     # What happened, and what it took.
     happened = made.played.outcome
-    seen = tuple(expect(made.scene.name, happened))
+    seen = tuple(compare_with_expectations(made.scene.name, happened))
     spent.seconds["report"] = time.perf_counter() - started
     whole = run_audit(made, audit, happened, seen, spent)
     # Files.
     shutil.copyfile(made.movie.path, folder / "film.mp4")
     write_audit(folder, whole)
-    heavy = made.particles.mass_real, scale_of_part(made.scene, made.parts)
+    heavy = made.particles.mass_real, part_scales(made.scene, made.parts)
     listed = materials.materials_json(made.field, made.parts, *heavy)
     store.write_json(folder / "materials.json", listed)
-    story = Story(
+    story = ReportContent(
         scene=made.scene,
         parts=made.parts,
         field=made.field,
@@ -94,85 +94,85 @@ def write_results(
         film=made.movie,
         audit=whole,
         figures=figures,
-        sources=materials.sources(),
+        sources=materials.cited_sources(),
         origin=made.reconstruct.statements if made.reconstruct else (),
         view=_view(made, whole),
     )
     report(story, folder / "report.html")
 
 
-def _close_up(movie: Film, path: Path) -> dict[str, Path]:
+def _close_up(movie: Video, path: Path) -> dict[str, Path]:
     """Copy the film's close-up beside the other files, where it has one."""
-    drawn = movie.path.parent / CLOSE_UP
+    drawn = movie.path.parent / CLOSE_UP_FILE
     if not drawn.exists():
         return {}
     shutil.copyfile(drawn, path)
     return {"The first contact from close by": path}
 
 
-def _view(made: Results, audit: RunAudit) -> str:
+def _view(made: StageResults, audit: RunAudit) -> str:
     """Return the 3D view for the report, with as many pictures a second as it has room for."""
-    cast = cast_of(made.prepared)
-    recording = recorded(cast, made.trajectory)
-    for step in THINNER:
-        taken = playback(made.prepared, cast, audit.outcome, recording.every(step), audit)
+    cast = bind_scene(made.prepared)
+    recording = record_trajectory(cast, made.trajectory)
+    for step in FRAME_STRIDES:
+        taken = viewer_recording(made.prepared, cast, audit.outcome, recording.every(step), audit)
         view = inline_view(taken)
-        if len(view) <= LARGEST:
+        if len(view) <= MAX_VIEW_BYTES:
             return view
     return (
-        f'<p class="lead">The 3D view of this run would take more than {LARGEST / 1e6:.0f} MB and '
+        f'<p class="lead">The 3D view of this run would take more than {MAX_VIEW_BYTES / 1e6:.0f} MB and '
         "is left out. Look at it with: corporeal view RUN</p>"
     )
 
 
 def run_audit(
-    made: Results,
+    made: StageResults,
     audit: Audit,
     happened: Outcome,
     seen: tuple[Expectation, ...],
-    spent: Spent,
+    spent: RunCost,
 ) -> RunAudit:
     """Put beside a simulation's audit what happened and what the whole run took."""
     audit = audit.noting(_warnings(made, audit))
     return RunAudit(
         **{f.name: getattr(audit, f.name) for f in fields(Audit)},
         outcome=happened,
-        expectations=believed(seen, audit),
+        expectations=reject_expectations(seen, audit),
         seconds=spent.seconds | {"total": sum(spent.seconds.values())},
         peak_memory_mb=peak_memory_mb(),
         settings=spent.settings,
         questions=made.inventory.usage,
-        hints=hints(
+        hints=run_hints(
             made.assembled.scene, happened, spent.divided, audit.unbooked_loss, audit.parts
         ),
     )
 
 
-def _warnings(made: Results, audit: Audit) -> tuple[str, ...]:
+def _warnings(made: StageResults, audit: Audit) -> tuple[str, ...]:
     """Return what every verb warns of, in the order of the verbs.
 
     What was noticed of photographs comes last: it is most, and the terminal shows the first.
     """
     groups = (
-        still_doubted(made.scene, made.inventory),
+        remaining_warnings(made.scene, made.inventory),
         made.inventory.warnings,
         made.parts.warnings,
-        doubts(made.field, made.parts, made.scene),
+        grounding_warnings(made.field, made.parts, made.scene),
         tuple(m.warning for m in made.field.mixtures if m.warning),
         made.particles.warnings,
         audit.notes,
         made.reconstruct.warnings if made.reconstruct else (),
     )
-    return doubts_first(made.reconstruct, (w for group in groups for w in group))
+    return sort_warnings(made.reconstruct, (w for group in groups for w in group))
 
 
-def doubts_first(found: Reconstruction | None, warnings: Iterable[str]) -> tuple[str, ...]:
+def sort_warnings(found: Reconstruction | None, warnings: Iterable[str]) -> tuple[str, ...]:
     """Return each warning once, before all others where shapes are not to be believed."""
     doubted = () if found is None else found.doubts
     return tuple(dict.fromkeys((*doubted, *warnings)))
 
 
-def still_doubted(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
+def remaining_warnings(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
     """Return a scene's warnings, less doubts about sizes that a model has judged since."""
     judged = {o.name for o in inventory.objects if o.usual_extent}
     return tuple(w for w in scene.warnings if not (isinstance(w, Note) and w.size_of in judged))

@@ -20,15 +20,15 @@ from pathlib import Path
 from typing import Any
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.pool.candidate import Candidate
-from corporeal.pool.table import Row
-from corporeal.recognition.words import writable
+from corporeal.pool.model_table import ModelRow
+from corporeal.pool.pool_candidates import PoolCandidate
+from corporeal.recognition.readable_names import single_line_text
 
-CACHE = Path("~/.objaverse/hf-objaverse-v1")
-PATHS = "object-paths.json.gz"
-LVIS = "lvis-annotations.json.gz"
-INSTALL = "Install it: pip install 'corporeal[objaverse]'."
-LICENCES = {
+OBJAVERSE_CACHE = Path("~/.objaverse/hf-objaverse-v1")
+OBJAVERSE_PATHS_FILE = "object-paths.json.gz"
+OBJAVERSE_LVIS_FILE = "lvis-annotations.json.gz"
+INSTALL_OBJAVERSE = "Install it: pip install 'corporeal[objaverse]'."
+OBJAVERSE_LICENCES = {
     "by": "CC-BY-4.0",
     "by-nc": "CC-BY-NC-4.0",
     "by-nc-sa": "CC-BY-NC-SA-4.0",
@@ -39,7 +39,7 @@ LICENCES = {
 
 
 @dataclass(frozen=True)
-class Wanted:
+class WantedModels:
     """Which models."""
 
     classes: tuple[str, ...] = ()
@@ -48,29 +48,36 @@ class Wanted:
     """Models of each."""
 
 
-def candidates(cache: Path | None = None) -> list[Candidate]:
+def objaverse_candidates(cache: Path | None = None) -> list[PoolCandidate]:
     """Return the models that lie in the cache, by LVIS category, then by identifier.
 
     Raises:
         UserError: There is no such cache, or a file in it is broken.
 
     """
-    root = (cache or CACHE).expanduser()
-    if not (root / PATHS).is_file():
+    root = (cache or OBJAVERSE_CACHE).expanduser()
+    if not (root / OBJAVERSE_PATHS_FILE).is_file():
         raise UserError(
-            f"{root}: {PATHS} is not there. Name the cache of the package objaverse, or let it "
+            f"{root}: {OBJAVERSE_PATHS_FILE} is not there. Name the cache of the package objaverse, or let it "
             "be downloaded: corporeal assets index --from objaverse --classes mug chair."
         )
-    paths = _read(root / PATHS)
-    lvis = _read(root / LVIS) if (root / LVIS).is_file() else {}
-    class_of = {uid: words(category) for category, uids in lvis.items() for uid in uids}
+    paths = _read_gzip_json(root / OBJAVERSE_PATHS_FILE)
+    lvis = (
+        _read_gzip_json(root / OBJAVERSE_LVIS_FILE)
+        if (root / OBJAVERSE_LVIS_FILE).is_file()
+        else {}
+    )
+    class_of = {uid: category_words(category) for category, uids in lvis.items() for uid in uids}
     files = {uid: root / path for uid, path in paths.items() if (root / path).is_file()}
     notes = _annotations(root, files)
     order = sorted(files, key=lambda uid: (class_of.get(uid, ""), uid))
-    return [_candidate(uid, files[uid], class_of.get(uid, ""), notes.get(uid, {})) for uid in order]
+    return [
+        _objaverse_candidate(uid, files[uid], class_of.get(uid, ""), notes.get(uid, {}))
+        for uid in order
+    ]
 
 
-def fetch(wanted: Wanted) -> Path:
+def fetch_objaverse(wanted: WantedModels) -> Path:
     """Have the package download the models of some categories into its cache; return the cache.
 
     Raises:
@@ -80,51 +87,53 @@ def fetch(wanted: Wanted) -> Path:
     try:
         package: Any = importlib.import_module("objaverse")
     except ImportError:
-        raise UserError(f"The package objaverse is not installed. {INSTALL}") from None
+        raise UserError(f"The package objaverse is not installed. {INSTALL_OBJAVERSE}") from None
     try:
-        uids = choose(package.load_lvis_annotations(), wanted)
+        uids = choose_models(package.load_lvis_annotations(), wanted)
         package.load_annotations(uids)
         package.load_objects(uids)
     except OSError as problem:
         raise UserError(
             f"Objaverse cannot be downloaded ({problem}). Check the network, or index what is "
-            f"there: corporeal assets index {CACHE} --from objaverse."
+            f"there: corporeal assets index {OBJAVERSE_CACHE} --from objaverse."
         ) from problem
-    return CACHE.expanduser()
+    return OBJAVERSE_CACHE.expanduser()
 
 
-def choose(lvis: dict[str, list[str]], wanted: Wanted) -> list[str]:
+def choose_models(lvis: dict[str, list[str]], wanted: WantedModels) -> list[str]:
     """Return the identifiers of the first models of each category wanted.
 
     Raises:
         UserError: A category is unknown.
 
     """
-    known = {words(category): uids for category, uids in lvis.items()}
+    known = {category_words(category): uids for category, uids in lvis.items()}
     chosen = []
     for name in wanted.classes:
-        if words(name) not in known:
-            near = [k for k in sorted(known) if words(name) in k or k in words(name)]
+        if category_words(name) not in known:
+            near = [
+                k for k in sorted(known) if category_words(name) in k or k in category_words(name)
+            ]
             advice = f"Did you mean: {', '.join(near[:8])}?" if near else "See lvisdataset.org."
             raise UserError(f"Objaverse has no LVIS category {name!r}. {advice}")
-        chosen += sorted(known[words(name)])[: wanted.per_class]
+        chosen += sorted(known[category_words(name)])[: wanted.per_class]
     return chosen
 
 
-def words(category: str) -> str:
+def category_words(category: str) -> str:
     """Return a category in words: "mouse (computer equipment)" for "mouse_(computer_equipment)"."""
     return " ".join(category.replace("_", " ").split()).lower()
 
 
-def _candidate(uid: str, file: Path, class_name: str, note: dict) -> Candidate:
-    declared = Row(
+def _objaverse_candidate(uid: str, file: Path, class_name: str, note: dict) -> PoolCandidate:
+    declared = ModelRow(
         class_name=class_name,
-        licence=LICENCES.get(str(note.get("license")), str(note.get("license") or "")),
-        attribution=writable(_attribution(note)),
-        source=writable(str(note.get("viewerUrl") or f"objaverse:{uid}")),
+        licence=OBJAVERSE_LICENCES.get(str(note.get("license")), str(note.get("license") or "")),
+        attribution=single_line_text(_attribution(note)),
+        source=single_line_text(str(note.get("viewerUrl") or f"objaverse:{uid}")),
         metric=False,
     )
-    return Candidate(file, declared, name=f"{class_name or 'objaverse'} {uid[:8]}")
+    return PoolCandidate(file, declared, name=f"{class_name or 'objaverse'} {uid[:8]}")
 
 
 def _attribution(note: dict) -> str:
@@ -142,12 +151,12 @@ def _annotations(root: Path, files: dict[str, Path]) -> dict[str, dict]:
     for part in sorted({file.parent.name for file in files.values()}):
         path = root / "metadata" / f"{part}.json.gz"
         if path.is_file():
-            notes = _read(path)
+            notes = _read_gzip_json(path)
             found |= {u: n for u, n in notes.items() if u in files and isinstance(n, dict)}
     return found
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read_gzip_json(path: Path) -> dict[str, Any]:
     try:
         with gzip.open(path, "rt", encoding="utf-8") as stream:
             value = json.load(stream)

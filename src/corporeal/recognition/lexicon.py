@@ -9,34 +9,34 @@ from importlib.resources import files
 from math import inf
 
 from corporeal.core.types import Finish
-from corporeal.recognition.goods import sold
-from corporeal.recognition.identity import words
-from corporeal.recognition.other_languages import OF, in_english
-from corporeal.recognition.spelling import (
-    Vocabulary,
-    by_squeezing,
-    mended,
-    singulars,
-    spelt,
-    unaccented,
+from corporeal.recognition.compound_words import (
+    KnownWords,
+    correct_doubled_letters,
+    index_without_doubled_letters,
+    normalise_compounds,
+    remove_unknown_accents,
+    singularise_words,
 )
-from corporeal.recognition.typical_extents import classes
-from corporeal.recognition.word_order import part_words, thing_last
+from corporeal.recognition.head_noun import move_head_noun_last, part_nouns
+from corporeal.recognition.packaged_goods import packaged_goods
+from corporeal.recognition.parts_by_name import name_words
+from corporeal.recognition.translation import OF_PREPOSITIONS, translate_words
+from corporeal.recognition.typical_extents import sized_classes
 
-LOOSE = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
+LOOSE_MATERIALS = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
 """What no container is made of: a compost bin has some in it."""
-SHAPED = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
+NOUNS_SHAPED_OF_LOOSE = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
 """Things that are made of it: a snow shoe is not."""
-OF_IT = frozenset(("block", "ring", "bag"))
+NOUNS_WHOLLY_OF_MATERIAL = frozenset(("block", "ring", "bag"))
 """What is all of it even so: a bag of sand is sand."""
-FUELS = frozenset("wood hardwood softwood coal charcoal".split())
+FUEL_MATERIALS = frozenset("wood hardwood softwood coal charcoal".split())
 """What is burnt."""
-KINDS = ("substance", "piece", "thing")
+TERM_KINDS = ("substance", "piece", "thing")
 """The most specific first: "oak", "table leg", "table"."""
 
 
 @dataclass(frozen=True)
-class Term:
+class LexiconTerm:
     """One term of the lexicon: a phrase and what it states."""
 
     phrase: tuple[str, ...]
@@ -62,9 +62,9 @@ class Term:
     rebound: float | None = None
     """Restitution on a hard floor that its rules ask for [-]."""
     moulded: bool = False
-    """It is hollow only where it is of one of the ``mouldable`` materials, or ``fired``."""
+    """It is hollow only where it is of one of the ``mouldable_materials`` materials, or ``fired_materials``."""
     blown: bool = False
-    """It is hollow only where it is of one of the ``mouldable`` materials."""
+    """It is hollow only where it is of one of the ``mouldable_materials`` materials."""
     extents: tuple[float, float] = (0.0, inf)
     """It tells of things only whose longest side is at least and below that [m]."""
     lone: bool = False
@@ -76,7 +76,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Look:
+class ColourRule:
     """What a part's colour indicates in certain objects."""
 
     hue: tuple[float, float]
@@ -90,7 +90,7 @@ class Look:
 
 
 @dataclass(frozen=True)
-class Name:
+class TokenisedName:
     """A name as it stands in the file, and the words of it that count."""
 
     text: str
@@ -102,21 +102,23 @@ class Name:
         return any(self.words[k : k + n] == phrase for k in range(len(self.words) - n + 1))
 
 
-def heads(tokens: tuple[str, ...]) -> list[Term]:
+def head_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
     """Find what stands in a name; of compound nouns the last one is the object.
 
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
-    found = list(_standing_in(tokens))
-    purposes = [(k, t) for k, t in found if not _is_of_it(t, _after(tokens, k, t))]
+    found = list(_terms_with_position(tokens))
+    purposes = [
+        (k, t) for k, t in found if not _is_material_of_following(t, _word_after(tokens, k, t))
+    ]
     standing = [
         (k, term)
         for k, term in found
         if not any(p <= k and k + len(term.phrase) <= p + len(t.phrase) for p, t in purposes)
         and not (term.lone and tokens != term.phrase)
     ]
-    head = _head(tokens)
-    if head is not None and tokens[head] in _holders():
+    head = _head_noun_index(tokens)
+    if head is not None and tokens[head] in _container_nouns():
         standing = [(k, s) for k, s in standing if s.kind != "thing" or k + len(s.phrase) > head]
     last: dict[int, int] = {}
     for k, term in standing:
@@ -125,123 +127,133 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
     return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
 
 
-def _head(tokens: tuple[str, ...]) -> int | None:
+def _head_noun_index(tokens: tuple[str, ...]) -> int | None:
     """Return where the last noun of a name stands, which is the thing; None: no noun is known."""
-    nouns = _nouns() - _describing()
+    nouns = _noun_words() - _describing_words()
     return next((k for k in range(len(tokens) - 1, -1, -1) if tokens[k] in nouns), None)
 
 
-def _is_of_it(term: Term, following: str) -> bool:
+def _is_material_of_following(term: LexiconTerm, following: str) -> bool:
     """Tell whether what follows a word may be of what it names: a steel bin, but no sand bin.
 
     What burns is no stove's matter: a coal stove, but a wooden oven.
     """
-    if term.material in FUELS and term.phrase != ("wooden",) and following in _burners():
+    if (
+        term.material in FUEL_MATERIALS
+        and term.phrase != ("wooden",)
+        and following in _burner_nouns()
+    ):
         return False
-    if following not in _holders():
+    if following not in _container_nouns():
         return True
     if term.kind != "substance":
         return False
-    return term.material not in LOOSE or following in OF_IT
+    return term.material not in LOOSE_MATERIALS or following in NOUNS_WHOLLY_OF_MATERIAL
 
 
-def _after(tokens: tuple[str, ...], k: int, term: Term) -> str:
+def _word_after(tokens: tuple[str, ...], k: int, term: LexiconTerm) -> str:
     following = k + len(term.phrase)
     return tokens[following] if following < len(tokens) else ""
 
 
-def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Term]]:
-    hushed = _hushed(tokens)
+def _terms_with_position(tokens: tuple[str, ...]) -> Iterator[tuple[int, LexiconTerm]]:
+    hushed = _silent_spans(tokens)
     for k, token in enumerate(tokens):
-        for term in _by_first_word().get(token, ()):
+        for term in _terms_by_first_word().get(token, ()):
             mine = set(range(k, k + len(term.phrase)))
             said = tokens[k : k + len(mine)] == term.phrase
             if said and all(words <= mine or not words & mine for words in hushed):
                 yield k, term
 
 
-def _hushed(tokens: tuple[str, ...]) -> list[set[int]]:
+def _silent_spans(tokens: tuple[str, ...]) -> list[set[int]]:
     """Return which words say nothing of matter where they stand: there is no ice in ice cream.
 
     What is known of the whole phrase, or of a longer one, counts: a wood stove is of iron.
     """
     return [
         set(range(k, k + len(phrase)))
-        for phrase in _listed("silent")
+        for phrase in _table_phrases("silent")
         for k in range(len(tokens))
         if tokens[k : k + len(phrase)] == phrase
     ]
 
 
 @cache
-def _by_first_word() -> dict[str, list[Term]]:
-    index: dict[str, list[Term]] = {}
-    for term in lexicon():
+def _terms_by_first_word() -> dict[str, list[LexiconTerm]]:
+    index: dict[str, list[LexiconTerm]] = {}
+    for term in lexicon_terms():
         index.setdefault(term.phrase[0], []).append(term)
     return index
 
 
 @lru_cache(maxsize=10_000)
-def tokens_of(name: str) -> tuple[str, ...]:
+def name_tokens(name: str) -> tuple[str, ...]:
     """Return a name's words in English and the singular, without what exporters write."""
     known = _vocabulary()
-    english = in_english(words(name, phrases()))
-    said = [mended(unaccented(w, known.words), known) for w in english]
-    return tuple(thing_last(spelt(singulars(said, known, singular), known), known, phrases()))
-
-
-@cache
-def phrases() -> frozenset[tuple[str, ...]]:
-    """Return every name of a thing that is more than one word."""
-    listed = (phrase for table in ("hollow", "open", "cast") for phrase in _listed(table))
-    sizes = (tuple(singular(w) for w in name.split()) for name in classes())
-    named = (*(term.phrase for term in lexicon()), *listed, *sizes)
-    return frozenset(phrase for phrase in named if len(phrase) > 1)
-
-
-@cache
-def _sizes() -> frozenset[str]:
-    """Return every single noun of the tables of sizes."""
-    return frozenset(singular(name) for name in classes() if " " not in name)
-
-
-@cache
-def _vocabulary() -> Vocabulary:
-    """Return the words of the lexicon and of the tables of sizes, for compounds and slips."""
-    sizes = _sizes()
-    known, joined = _known() | sizes, _joined()
-    return Vocabulary(
-        words=known,
-        first=_single("substance"),
-        last=_single("thing") | _single("substance") | sizes,
-        joined=joined,
-        squeezed=by_squeezing([*known, *joined]),
+    english = translate_words(name_words(name, multiword_names()))
+    said = [correct_doubled_letters(remove_unknown_accents(w, known.words), known) for w in english]
+    return tuple(
+        move_head_noun_last(
+            normalise_compounds(singularise_words(said, known, strip_plural_s), known),
+            known,
+            multiword_names(),
+        )
     )
 
 
 @cache
-def _known() -> frozenset[str]:
+def multiword_names() -> frozenset[tuple[str, ...]]:
+    """Return every name of a thing that is more than one word."""
+    listed = (phrase for table in ("hollow", "open", "cast") for phrase in _table_phrases(table))
+    sizes = (tuple(strip_plural_s(w) for w in name.split()) for name in sized_classes())
+    named = (*(term.phrase for term in lexicon_terms()), *listed, *sizes)
+    return frozenset(phrase for phrase in named if len(phrase) > 1)
+
+
+@cache
+def _single_sized_nouns() -> frozenset[str]:
+    """Return every single noun of the tables of sizes."""
+    return frozenset(strip_plural_s(name) for name in sized_classes() if " " not in name)
+
+
+@cache
+def _vocabulary() -> KnownWords:
+    """Return the words of the lexicon and of the tables of sizes, for compounds and slips."""
+    sizes = _single_sized_nouns()
+    known, joined = _lexicon_words() | sizes, _compounds_of_lexicon()
+    return KnownWords(
+        words=known,
+        first=_single_words("substance"),
+        last=_single_words("thing") | _single_words("substance") | sizes,
+        joined=joined,
+        squeezed=index_without_doubled_letters([*known, *joined]),
+    )
+
+
+@cache
+def _lexicon_words() -> frozenset[str]:
     """Return every word that stands in the lexicon by itself or in a phrase."""
-    return frozenset(w for term in lexicon() for w in term.phrase) | _holders()
+    return frozenset(w for term in lexicon_terms() for w in term.phrase) | _container_nouns()
 
 
 @cache
-def _joined() -> dict[str, tuple[str, ...]]:
+def _compounds_of_lexicon() -> dict[str, tuple[str, ...]]:
     """Return every phrase by how it looks when it is written as one word."""
-    return {"".join(s.phrase): s.phrase for s in lexicon() if len(s.phrase) > 1}
+    return {"".join(s.phrase): s.phrase for s in lexicon_terms() if len(s.phrase) > 1}
 
 
 @cache
-def _single(kind: str) -> frozenset[str]:
-    return frozenset(s.phrase[0] for s in lexicon() if s.kind == kind and len(s.phrase) == 1)
+def _single_words(kind: str) -> frozenset[str]:
+    return frozenset(s.phrase[0] for s in lexicon_terms() if s.kind == kind and len(s.phrase) == 1)
 
 
-def hollow(tokens: tuple[str, ...]) -> bool:
+def names_hollow_object(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of something hollow: its last noun is what it names."""
-    return _is_one(tokens, "hollow")
+    return _head_noun_in_table(tokens, "hollow")
 
 
-def wall_of(tokens: tuple[str, ...], material: str) -> float | None:
+def hollow_wall_thickness(tokens: tuple[str, ...], material: str) -> float | None:
     """Return the wall [m] of what is hollow where it is of such a material; None: of none.
 
     A chair of plastic is moulded, one of steel is of tubes.
@@ -251,168 +263,176 @@ def wall_of(tokens: tuple[str, ...], material: str) -> float | None:
         material: What the thing is of.
 
     """
-    row = wall_row(tokens, material, "walls")
+    row = wall_table_row(tokens, material, "walls")
     return None if row is None else row["thickness_mm"] * 1e-3
 
 
-def wall_row(tokens: tuple[str, ...], material: str | None, table: str) -> dict | None:
+def wall_table_row(tokens: tuple[str, ...], material: str | None, table: str) -> dict | None:
     """Return what a table says of the walls of things of such a material; None: nothing."""
     for row in _table()[table]:
-        if material in row["of"] and _ends_in(tokens, _singulars(row["words"])):
-            other = _ends_in(tokens, _singulars(row.get("but", ())))
+        if material in row["of"] and _head_noun_among(tokens, _singular_phrases(row["words"])):
+            other = _head_noun_among(tokens, _singular_phrases(row.get("but", ())))
             return None if other else row
     return None
 
 
-def open_ware(tokens: tuple[str, ...]) -> bool:
+def names_open_vessel(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of an open vessel: its last noun is what it names."""
-    return _is_one(tokens, "open")
+    return _head_noun_in_table(tokens, "open")
 
 
-def cast(tokens: tuple[str, ...]) -> bool:
+def names_hollow_casting(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of what is cast hollow where it is large and of metal."""
-    return _is_one(tokens, "cast")
+    return _head_noun_in_table(tokens, "cast")
 
 
-def _is_one(tokens: tuple[str, ...], table: str) -> bool:
+def _head_noun_in_table(tokens: tuple[str, ...], table: str) -> bool:
     """Tell whether a name's last noun stands in a table: "bin" in "bin old green"."""
-    return _ends_in(tokens, _listed(table))
+    return _head_noun_among(tokens, _table_phrases(table))
 
 
-def ends_in(tokens: tuple[str, ...], named: Sequence[str]) -> bool:
+def head_noun_in(tokens: tuple[str, ...], named: Sequence[str]) -> bool:
     """Tell whether a name's last noun is one of these names of things."""
-    return _ends_in(tokens, _singulars(named))
+    return _head_noun_among(tokens, _singular_phrases(named))
 
 
-def _ends_in(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]]) -> bool:
+def _head_noun_among(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]]) -> bool:
     """Tell whether a name's last noun is one of these, whatever describes it behind."""
-    first = _head(tokens) or 0
+    first = _head_noun_index(tokens) or 0
     ends = range(len(tokens), first, -1)
     return any(tokens[:end][-len(phrase) :] == phrase for end in ends for phrase in named)
 
 
 @cache
-def _nouns() -> frozenset[str]:
+def _noun_words() -> frozenset[str]:
     """Return words that name a thing: what stands behind the last of them only describes it."""
-    tables = {phrase[-1] for table in ("hollow", "open", "cast") for phrase in _listed(table)}
-    things = {term.phrase[-1] for term in lexicon() if term.kind != "substance"}
-    return frozenset(tables | things | {name[-1] for name in phrases()}) | _holders() | part_words()
+    tables = {
+        phrase[-1] for table in ("hollow", "open", "cast") for phrase in _table_phrases(table)
+    }
+    things = {term.phrase[-1] for term in lexicon_terms() if term.kind != "substance"}
+    return (
+        frozenset(tables | things | {name[-1] for name in multiword_names()})
+        | _container_nouns()
+        | part_nouns()
+    )
 
 
 @cache
-def _describing() -> frozenset[str]:
+def _describing_words() -> frozenset[str]:
     """Return words after a noun that only say what it is like: of what, how large, how old."""
-    return _single("substance") | _colours() | emptied()
+    return _single_words("substance") | _colour_words() | emptied_words()
 
 
 @cache
-def _listed(table: str) -> frozenset[tuple[str, ...]]:
-    return _singulars(_table()[table])
+def _table_phrases(table: str) -> frozenset[tuple[str, ...]]:
+    return _singular_phrases(_table()[table])
 
 
-def _singulars(named: Sequence[str]) -> frozenset[tuple[str, ...]]:
-    return frozenset(tuple(singular(w) for w in phrase.split()) for phrase in named)
+def _singular_phrases(named: Sequence[str]) -> frozenset[tuple[str, ...]]:
+    return frozenset(tuple(strip_plural_s(w) for w in phrase.split()) for phrase in named)
 
 
-def singular(word: str) -> str:
+def strip_plural_s(word: str) -> str:
     """Cut a plural's s; it need not be English, only the same on both sides."""
     keep = len(word) <= 3 or word.endswith(("ss", "us", "is"))
     return word[:-1] if word.endswith("s") and not keep else word
 
 
-def seen_as(look: Look, finish: Finish) -> bool:
+def matches_colour_rule(look: ColourRule, finish: Finish) -> bool:
     """Tell whether a finish's colour factor, as an eye sees it, lies within a look."""
-    red, green, blue = (_as_seen(c) for c in finish.colour[:3])
+    red, green, blue = (_srgb_of_linear(c) for c in finish.colour[:3])
     hue, saturation, value = colorsys.rgb_to_hsv(red, green, blue)
     seen = (360.0 * hue, saturation, value)
     bounds = (look.hue, look.saturation, look.value)
     return all(low <= x <= high for x, (low, high) in zip(seen, bounds, strict=True))
 
 
-def _as_seen(light: float) -> float:
+def _srgb_of_linear(light: float) -> float:
     """Linear light to sRGB (IEC 61966-2-1)."""
     c = min(max(light, 0.0), 1.0)
     return 12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055
 
 
-def kin(one: str, other: str) -> bool:
+def have_same_walls(one: str, other: str) -> bool:
     """Tell whether things of either of two materials have walls of the same thickness."""
     return one == other or any({one, other} <= set(alike) for alike in _table()["kin"])
 
 
 @cache
-def mouldable() -> frozenset[str]:
+def mouldable_materials() -> frozenset[str]:
     """Materials of which blown and moulded things are hollow: blown, moulded or sewn."""
     return frozenset(_table()["mouldable"])
 
 
 @cache
-def fired() -> frozenset[str]:
+def fired_materials() -> frozenset[str]:
     """Materials of which moulded things are hollow, and balls are not: slip-cast."""
     return frozenset(_table()["fired"])
 
 
 @cache
-def formed() -> frozenset[str]:
+def formed_materials() -> frozenset[str]:
     """Return materials that things of any kind are sheets, castings or mouldings of."""
-    return (metals() | mouldable() | fired() | {"glass"}) - frozenset(_table()["solid"])
+    return (metal_materials() | mouldable_materials() | fired_materials() | {"glass"}) - frozenset(
+        _table()["solid"]
+    )
 
 
-def nameless(tokens: tuple[str, ...]) -> bool:
+def names_unknown_object(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name has a word for a thing, of whose matter no table knows anything."""
-    standing = heads(tokens)
-    known = {w for term in standing for w in term.phrase} | _describing() | OF
+    standing = head_terms(tokens)
+    known = {w for term in standing for w in term.phrase} | _describing_words() | OF_PREPOSITIONS
     return all(t.kind == "substance" for t in standing) and any(w not in known for w in tokens)
 
 
-def substances(tokens: tuple[str, ...]) -> list[Term]:
+def substance_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
     """Return the words of a name that say what the thing is made of."""
-    return [t for t in heads(tokens) if t.kind == "substance"]
+    return [t for t in head_terms(tokens) if t.kind == "substance"]
 
 
-def massive(tokens: tuple[str, ...]) -> bool:
+def names_solid_object(tokens: tuple[str, ...]) -> bool:
     """Tell whether a word of a name says that the thing is solid all through."""
-    return bool(set(tokens) & frozenset(map(singular, _table()["massive"])))
+    return bool(set(tokens) & frozenset(map(strip_plural_s, _table()["massive"])))
 
 
-def made_hollow(thing: Term, material: str) -> bool:
+def is_hollow_in_material(thing: LexiconTerm, material: str) -> bool:
     """Tell whether a thing has its wall where it is of a material that somebody names."""
-    if not (thing.moulded or thing.blown) or material in mouldable():
+    if not (thing.moulded or thing.blown) or material in mouldable_materials():
         return True
-    return thing.moulded and material in fired()
+    return thing.moulded and material in fired_materials()
 
 
 @cache
-def metals() -> frozenset[str]:
+def metal_materials() -> frozenset[str]:
     """Materials whose surface is metallic."""
-    general = next(s for s in lexicon() if s.phrase == ("metal",))
+    general = next(s for s in lexicon_terms() if s.phrase == ("metal",))
     others = ("hardened_steel", "magnesium", "zinc", "lead")
     return frozenset((general.material, *others, *general.gives_way))
 
 
 @cache
-def lexicon() -> tuple[Term, ...]:
+def lexicon_terms() -> tuple[LexiconTerm, ...]:
     """Every phrase of the lexicon with what it states."""
     named = [
         _term(kind, phrase, row)
-        for kind in KINDS
+        for kind in TERM_KINDS
         for row in _table()[kind]
         for phrase in row["words"]
     ]
     known = {term.phrase for term in named if term.kind == "thing"}
-    goods = (_term("thing", phrase, row) for phrase, row in sold())
+    goods = (_term("thing", phrase, row) for phrase, row in packaged_goods())
     return (*named, *(term for term in goods if term.phrase not in known))
 
 
 @cache
-def lookbook() -> tuple[Look, ...]:
+def colour_rules() -> tuple[ColourRule, ...]:
     """Every plain colour that indicates a part, with the objects in which it does."""
     return tuple(
-        Look(
+        ColourRule(
             hue=tuple(row["hue"]),
             saturation=tuple(row["saturation"]),
             value=tuple(row["value"]),
-            of=frozenset(singular(w) for w in row["of"]),
+            of=frozenset(strip_plural_s(w) for w in row["of"]),
             says=row["says"],
             material=row["material"],
             margin=row["margin"],
@@ -422,31 +442,33 @@ def lookbook() -> tuple[Look, ...]:
 
 
 @cache
-def _holders() -> frozenset[str]:
+def _container_nouns() -> frozenset[str]:
     """Nouns that make the noun before them a mere purpose.
 
     Beside those of the table every thing that has a usual size and no usual material: a bowl is a
     bowl, whatever is in it.
     """
-    single = _sizes()
-    material = {w for term in lexicon() for w in term.phrase if len(term.phrase) == 1}
-    return frozenset(map(singular, _table()["holders"])) | (single - material - _colours())
+    single = _single_sized_nouns()
+    material = {w for term in lexicon_terms() for w in term.phrase if len(term.phrase) == 1}
+    return frozenset(map(strip_plural_s, _table()["holders"])) | (
+        single - material - _colour_words()
+    )
 
 
 @cache
-def _burners() -> frozenset[str]:
-    return frozenset(map(singular, _table()["burners"]))
+def _burner_nouns() -> frozenset[str]:
+    return frozenset(map(strip_plural_s, _table()["burners"]))
 
 
 @cache
-def _colours() -> frozenset[str]:
-    return frozenset(map(singular, _table()["describing"]))
+def _colour_words() -> frozenset[str]:
+    return frozenset(map(strip_plural_s, _table()["describing"]))
 
 
 @cache
-def emptied() -> frozenset[str]:
+def emptied_words() -> frozenset[str]:
     """Words that say of goods that they are not full any more."""
-    return frozenset(map(singular, _table()["emptied"]))
+    return frozenset(map(strip_plural_s, _table()["emptied"]))
 
 
 @cache
@@ -456,10 +478,10 @@ def _table() -> dict[str, list]:
     )
 
 
-def _term(kind: str, phrase: str, row: dict) -> Term:
+def _term(kind: str, phrase: str, row: dict) -> LexiconTerm:
     thickness, pressure = row.get("thickness_mm"), row.get("inflation_kPa")
-    return Term(
-        phrase=tuple(singular(w) for w in phrase.split()),
+    return LexiconTerm(
+        phrase=tuple(strip_plural_s(w) for w in phrase.split()),
         kind=kind,
         material=row["material"],
         margin=row["margin"],

@@ -8,15 +8,36 @@ from functools import cache
 from pathlib import Path
 
 from corporeal.core.types import Note, NoteKind
-from corporeal.recognition.other_languages import in_english, substances
-from corporeal.recognition.spelling import Vocabulary, by_squeezing, mended, spelt, unaccented
-from corporeal.recognition.word_order import is_several, of_part, thing_last
+from corporeal.recognition.compound_words import (
+    KnownWords,
+    correct_doubled_letters,
+    index_without_doubled_letters,
+    normalise_compounds,
+    remove_unknown_accents,
+)
+from corporeal.recognition.head_noun import (
+    move_head_noun_last,
+    names_several_objects,
+    strip_whole_from_part_name,
+)
+from corporeal.recognition.translation import substance_words, translate_words
 
-MARGIN = 1.5
+TYPICAL_EXTENT_MARGIN_RATIO = 1.5
 """How far beyond the table an object may be before it is reported."""
-SMALLEST, LARGEST = 0.005, 20.0
+MIN_PLAUSIBLE_EXTENT_M, MAX_PLAUSIBLE_EXTENT_M = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
-AS_MATTER = ("marble", "brick", "stone", "rock", "sand", "snow", "mud", "foam", "paper", "glass")
+CLASSES_ALSO_SUBSTANCES = (
+    "marble",
+    "brick",
+    "stone",
+    "rock",
+    "sand",
+    "snow",
+    "mud",
+    "foam",
+    "paper",
+    "glass",
+)
 """Classes that may be meant as matter where another is named, the least likely last."""
 
 
@@ -37,24 +58,24 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
 
     "soda can" for "soda can crushed", "cup" for "tea set cup": English puts the noun last.
     """
-    words = words_in(class_name)
-    if is_several(plain_words(class_name)):
+    words = class_name_words(class_name)
+    if names_several_objects(plain_words(class_name)):
         return None
     found = [e for e in _table() if set(singular_words(e.words)) <= set(words)]
-    return max(found, key=lambda e: _fit(e, words), default=None)
+    return max(found, key=lambda e: _rank_entry(e, words), default=None)
 
 
-def words_in(class_name: str) -> list[str]:
-    """Return a name's words as ``nouns`` has them, with the compounds of this table."""
-    return nouns(class_name, _compounds())
+def class_name_words(class_name: str) -> list[str]:
+    """Return a name's words as ``normalised_words`` has them, with the compounds of this table."""
+    return normalised_words(class_name, _compounds())
 
 
-def classes() -> tuple[str, ...]:
+def sized_classes() -> tuple[str, ...]:
     """Return what is called every class that has a usual size."""
     return tuple(e.words for e in _table())
 
 
-def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:
+def normalised_words(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:
     """Return a name's words, in English and the singular; a known compound counts as its words.
 
     Args:
@@ -63,10 +84,14 @@ def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str
 
     """
     known = _vocabulary()
-    said = [unaccented(w, known.words) for w in in_english(plain_words(class_name))]
-    tokens = spelt([_singular(mended(w, known)) for w in said], known)
+    said = [
+        remove_unknown_accents(w, known.words) for w in translate_words(plain_words(class_name))
+    ]
+    tokens = normalise_compounds(
+        [_singular(correct_doubled_letters(w, known)) for w in said], known
+    )
     phrases = frozenset((*known.joined.values(), *compounds.values()))
-    ordered = of_part(thing_last(tokens, known, phrases), phrases)
+    ordered = strip_whole_from_part_name(move_head_noun_last(tokens, known, phrases), phrases)
     return [part for word in ordered for part in compounds.get(word, (word,))]
 
 
@@ -75,46 +100,50 @@ def plain_words(class_name: str) -> list[str]:
     return re.findall(r"[^\W\d_]+", class_name.lower())
 
 
-PLURALS = frozenset(
+PLURAL_ONLY_NOUNS = frozenset(
     "scissors pliers tongs tweezers handcuffs binoculars goggles sunglasses spectacles eyeglasses "
     "jeans pants trousers tights".split()
 )
 """Words that stand for one thing in the plural."""
 
 
-def one_of(words: str, has: str, have: str) -> str:
+def with_article(words: str, has: str, have: str) -> str:
     """Return a class with its article and verb: "an axe is", "scissors are"."""
-    if words.split()[-1] in PLURALS:
+    if words.split()[-1] in PLURAL_ONLY_NOUNS:
         return f"{words} {have}"
     return f"{'an' if words[0] in 'aeiou' else 'a'} {words} {has}"
 
 
 @cache
 def singular_words(phrase: str) -> tuple[str, ...]:
-    """Return the words of a class as they stand among ``nouns``."""
+    """Return the words of a class as they stand among ``normalised_words``."""
     return tuple(_singular(w) for w in phrase.split())
 
 
-def joined(phrases: Iterable[str]) -> dict[str, tuple[str, ...]]:
+def index_compounds(phrases: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return phrases of several words, by how they look when they are written as one."""
     compounds = (singular_words(phrase) for phrase in phrases)
     return {"".join(words): words for words in compounds if len(words) > 1}
 
 
-def doubt(name: str, class_name: str, extent: float) -> str | None:
+def extent_warning(name: str, class_name: str, extent: float) -> str | None:
     """Return a sentence for the user where an object is implausibly large or small [m]."""
     known = typical_extent(class_name)
-    low, high = (known.low / MARGIN, known.high * MARGIN) if known else (SMALLEST, LARGEST)
-    if low <= extent <= high and not _normalised(extent, known):
+    low, high = (
+        (known.low / TYPICAL_EXTENT_MARGIN_RATIO, known.high * TYPICAL_EXTENT_MARGIN_RATIO)
+        if known
+        else (MIN_PLAUSIBLE_EXTENT_M, MAX_PLAUSIBLE_EXTENT_M)
+    )
+    if low <= extent <= high and not _is_normalised(extent, known):
         return None
-    size = f"{name} is {length(extent)} large"
+    size = f"{name} is {length_text(extent)} large"
     if known is None:
         return Note(
             f"{size}: is the file in metres? Give its real size with --extent {name}=METRES.",
             NoteKind.ASSUMED,
             name,
         )
-    usual = f"{one_of(known.words, 'is', 'are')} usually about {length(known.usual)}"
+    usual = f"{with_article(known.words, 'is', 'are')} usually about {length_text(known.usual)}"
     return Note(
         f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}.",
         NoteKind.ASSUMED,
@@ -122,10 +151,16 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     )
 
 
-def _normalised(extent: float, known: TypicalExtent | None) -> bool:
+def _is_normalised(extent: float, known: TypicalExtent | None) -> bool:
     """Tell whether a program seems to have fitted the model into a box of 1 or 2 units."""
     exact = min(abs(extent - 1), abs(extent - 2)) < 1e-5
-    return exact and known is not None and not known.usual / MARGIN < extent < known.usual * MARGIN
+    return (
+        exact
+        and known is not None
+        and not known.usual / TYPICAL_EXTENT_MARGIN_RATIO
+        < extent
+        < known.usual * TYPICAL_EXTENT_MARGIN_RATIO
+    )
 
 
 @cache
@@ -146,31 +181,41 @@ def _typical(words: str, sizes: list[int | float], part: bool = False) -> Typica
 
 @cache
 def _compounds() -> dict[str, tuple[str, ...]]:
-    return joined(e.words for e in _table())
+    return index_compounds(e.words for e in _table())
 
 
 @cache
-def _vocabulary() -> Vocabulary:
+def _vocabulary() -> KnownWords:
     """Return the words of the table and for substances, for compounds and slips."""
-    things = {singular_words(name)[0] for name in classes() if " " not in name}
-    known = things | {w for name in classes() for w in singular_words(name)} | substances()
-    return Vocabulary(
-        known, substances(), things, _compounds(), by_squeezing([*known, *_compounds()])
+    things = {singular_words(name)[0] for name in sized_classes() if " " not in name}
+    known = (
+        things | {w for name in sized_classes() for w in singular_words(name)} | substance_words()
+    )
+    return KnownWords(
+        known,
+        substance_words(),
+        things,
+        _compounds(),
+        index_without_doubled_letters([*known, *_compounds()]),
     )
 
 
-def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:
-    return fit(entry.words, words)
+def _rank_entry(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:
+    return rank_class_match(entry.words, words)
 
 
-def fit(phrase: str, words: list[str]) -> tuple[int, int, int]:
+def rank_class_match(phrase: str, words: list[str]) -> tuple[int, int, int]:
     """Tell how well a class fits a name that has all its words, best last.
 
     What may be matter as well ("table glass", "lego brick") comes after what cannot; then the last
     in the name, and the one of most words.
     """
     own = singular_words(phrase)
-    matter = AS_MATTER.index(own[0]) + 1 if len(own) == 1 and own[0] in AS_MATTER else 0
+    matter = (
+        CLASSES_ALSO_SUBSTANCES.index(own[0]) + 1
+        if len(own) == 1 and own[0] in CLASSES_ALSO_SUBSTANCES
+        else 0
+    )
     return -matter, max(words.index(w) for w in own), len(own)
 
 
@@ -179,6 +224,6 @@ def _singular(word: str) -> str:
     return word[:-1] if word.endswith("s") and not keep and len(word) > 3 else word
 
 
-def length(metres: float) -> str:
+def length_text(metres: float) -> str:
     """Return a length in words [m]."""
     return f"{metres:.3g} m" if metres >= 1 else f"{100 * metres:.3g} cm"

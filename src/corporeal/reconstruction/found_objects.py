@@ -7,25 +7,25 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.core.types import Cloud
-from corporeal.discretization.extent import oriented_size
-from corporeal.reconstruction.features import Reader, connect
-from corporeal.reconstruction.features.vectors import similarity as likeness
-from corporeal.reconstruction.features.vectors import unit
-from corporeal.reconstruction.gaussians.closed import Closed
-from corporeal.reconstruction.gaussians.intake import Intake
-from corporeal.reconstruction.gaussians.solid import Solid
+from corporeal.core.types import FeatureCloud
+from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.reconstruction.features import TextPictureEncoder, connect_encoder
+from corporeal.reconstruction.features.unit_vectors import cosine_similarity as likeness
+from corporeal.reconstruction.features.unit_vectors import unit_rows
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.segment.match import match
-from corporeal.render.portrait import COLOURS, colour_of_part
-from corporeal.vlm.seen_objects import (
-    UNKNOWN,
+from corporeal.reconstruction.segment.optimal_assignment import optimal_assignment
+from corporeal.reconstruction.surface.closed_surface import ClosedSurface
+from corporeal.reconstruction.surface.object_surfaces import ObjectSurfaces
+from corporeal.render.object_portrait import PART_COLOURS, part_colour_names
+from corporeal.vlm.photographed_objects import (
+    UNKNOWN_CLASS,
+    PhotoInterview,
     SeenObject,
-    Viewer,
-    usual,
+    object_of_usual_size,
 )
 
-GREY = (0.2, 0.2, 0.2)
+NOBODYS_GREY = (0.2, 0.2, 0.2)
 """Linear RGB of what is nobody's, in painted pictures."""
 
 
@@ -33,12 +33,12 @@ GREY = (0.2, 0.2, 0.2)
 class FoundObjects:
     """Objects before anybody knows what they are, in order of size."""
 
-    taken: Intake
-    cloud: Cloud
-    closed: Closed
+    taken: GaussianScene
+    cloud: FeatureCloud
+    closed: ObjectSurfaces
 
     @property
-    def solids(self) -> tuple[Solid, ...]:
+    def solids(self) -> tuple[ClosedSurface, ...]:
         """One closed surface each."""
         return self.closed.solids
 
@@ -56,18 +56,23 @@ class FoundObjects:
     @cached_property
     def extents(self) -> list[float]:
         """Longest side of each one's oriented bounding box, in the file's unit."""
-        return [oriented_size(solid.vertices)[2] for solid in self.solids]
+        return [oriented_box_size(solid.vertices)[2] for solid in self.solids]
 
 
-def named_objects(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[SeenObject]:
+def named_objects(
+    config: ReconstructConfig, viewer: PhotoInterview, taken: GaussianScene
+) -> list[SeenObject]:
     """Return what objects there are, from the command line or a model; or nothing."""
     if config.things:
-        return [usual(name) for name in config.things]
+        return [object_of_usual_size(name) for name in config.things]
     return viewer.objects([*taken.some().values()])
 
 
-def recognised(
-    wanted: Sequence[SeenObject], found: FoundObjects, config: ReconstructConfig, viewer: Viewer
+def recognise_objects(
+    wanted: Sequence[SeenObject],
+    found: FoundObjects,
+    config: ReconstructConfig,
+    viewer: PhotoInterview,
 ) -> list[SeenObject]:
     """Return what each segmented object is; these are in order of size.
 
@@ -78,25 +83,27 @@ def recognised(
     if config.things or not wanted:
         number: Sequence[int | None] = range(len(wanted))
     elif config.semantic.startswith("clip"):
-        number = _by_words(wanted, found, config.semantic)
+        number = _match_by_words(wanted, found, config.semantic)
     else:
-        number = viewer.regions(_painted(found), colour_of_part(count), wanted) or []
+        number = viewer.regions(_paint_objects(found), part_colour_names(count), wanted) or []
     known = [None if k is None or k < 0 or k >= len(wanted) else wanted[k] for k in number]
-    return [obj or SeenObject(UNKNOWN) for obj in [*known, *[None] * count][:count]]
+    return [obj or SeenObject(UNKNOWN_CLASS) for obj in [*known, *[None] * count][:count]]
 
 
-def _by_words(wanted: Sequence[SeenObject], found: FoundObjects, spec: str) -> list[int]:
+def _match_by_words(wanted: Sequence[SeenObject], found: FoundObjects, spec: str) -> list[int]:
     """Pair segmented objects with names by CLIP similarity."""
-    encoder = connect(spec)
-    assert isinstance(encoder, Reader)
+    encoder = connect_encoder(spec)
+    assert isinstance(encoder, TextPictureEncoder)
     of, seen = found.closed.object_of_point, found.cloud.semantic
     looks = np.stack([seen[of == k].mean(axis=0, dtype=np.float64) for k in range(found.count)])
     words = encoder.words([obj.class_name for obj in wanted])
-    return match(likeness(unit(looks), words)).tolist()
+    return optimal_assignment(likeness(unit_rows(looks), words)).tolist()
 
 
-def _painted(found: FoundObjects) -> list[np.ndarray]:
+def _paint_objects(found: FoundObjects) -> list[np.ndarray]:
     """Return pictures, each followed by itself with the objects in colours of their own."""
-    paints = np.array([*COLOURS.values()])
-    ink = np.concatenate([paints[np.minimum(np.arange(found.count), len(paints) - 1)], [GREY]])
+    paints = np.array([*PART_COLOURS.values()])
+    ink = np.concatenate(
+        [paints[np.minimum(np.arange(found.count), len(paints) - 1)], [NOBODYS_GREY]]
+    )
     return found.taken.painted(np.sqrt(ink[found.closed.owner]))

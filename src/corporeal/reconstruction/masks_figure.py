@@ -7,20 +7,20 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from corporeal.core.errors import UserError
-from corporeal.core.store import writing
-from corporeal.io.photographs import read_photographs
-from corporeal.reconstruction.gaussians.intake import ON
-from corporeal.render.sheet import Tile, sheet
+from corporeal.core.store import disk_errors
+from corporeal.io.photos.posed_photos import read_posed_photos
+from corporeal.reconstruction.gaussians.gaussian_scene import MASK_MIN_U8
+from corporeal.render.contact_sheet import SheetTile, write_contact_sheet
 
-FIGURE = "objects.png"
+MASKS_FIGURE_FILE = "objects.png"
 """Beside what was reconstructed."""
-MOST = 6
+MAX_SHOWN_PHOTOGRAPHS = 6
 """Photographs that are shown, from all sides."""
-SIDE = 320
+SHOWN_SIDE_PX = 320
 """Longest side of each [px]."""
-FAINT = 0.25
+FAINT_CONTRAST_FRACTION = 0.25
 """Of its contrast, what is no object keeps so much, on white."""
-EDGE = (230, 60, 40)
+OUTLINE_RGB = (230, 60, 40)
 """sRGB of outlines."""
 
 
@@ -34,17 +34,17 @@ def masks_figure(source: Path, masked_by: Path | None, path: Path) -> None:
 
     """
     try:
-        seen = read_photographs(source, SIDE, bare=True, most=MOST)
-        cut = read_photographs(source, SIDE, masked_by, most=MOST)
+        seen = read_posed_photos(source, SHOWN_SIDE_PX, bare=True, most=MAX_SHOWN_PHOTOGRAPHS)
+        cut = read_posed_photos(source, SHOWN_SIDE_PX, masked_by, most=MAX_SHOWN_PHOTOGRAPHS)
     except UserError:  # of those few most are broken: whoever reads all says what is wrong
         return
     if cut.masks is None or cut.masks.shape[1:] != seen.views.rgb.shape[1:3]:
         return
     own = dict(zip(seen.names, seen.views.rgb, strict=True))
-    drawn_over([own[name] for name in cut.names], cut.masks >= ON, cut.names, path)
+    draw_masks_over([own[name] for name in cut.names], cut.masks >= MASK_MIN_U8, cut.names, path)
 
 
-def drawn_over(
+def draw_masks_over(
     pictures: Sequence[UInt8[np.ndarray, "H W 3"]],
     masks: Bool[np.ndarray, "V H W"],
     names: Sequence[str],
@@ -59,22 +59,22 @@ def drawn_over(
         path: A PNG.
 
     """
-    steps = np.linspace(0, len(names) - 1, min(len(names), MOST)).round()
+    steps = np.linspace(0, len(names) - 1, min(len(names), MAX_SHOWN_PHOTOGRAPHS)).round()
     which: list[int] = np.unique(steps.astype(int)).tolist()
-    tiles = [Tile(_over(pictures[k], masks[k]), names[k]) for k in which]
-    with writing(path):
-        sheet(tiles, path)
+    tiles = [SheetTile(_draw_over(pictures[k], masks[k]), names[k]) for k in which]
+    with disk_errors(path):
+        write_contact_sheet(tiles, path)
 
 
-def _over(
+def _draw_over(
     picture: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]
 ) -> UInt8[np.ndarray, "H W 3"]:
-    pale = (255 - FAINT * (255 - picture.astype(np.float64))).astype(np.uint8)
+    pale = (255 - FAINT_CONTRAST_FRACTION * (255 - picture.astype(np.float64))).astype(np.uint8)
     made = np.where(mask[..., None], picture, pale)
     inner = mask.copy()
     inner[1:] &= mask[:-1]
     inner[:-1] &= mask[1:]
     inner[:, 1:] &= mask[:, :-1]
     inner[:, :-1] &= mask[:, 1:]
-    made[mask & ~inner] = EDGE
+    made[mask & ~inner] = OUTLINE_RGB
     return made

@@ -11,25 +11,36 @@ from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
 from corporeal.core.progress import Progress
-from corporeal.core.types import Cloud
-from corporeal.geometry.harmonics import DC
-from corporeal.reconstruction.features.clouds import Placed, projected
-from corporeal.reconstruction.features.descriptor import LET_THROUGH, seen_from
-from corporeal.reconstruction.features.lifting import Lifted, known, uplift
+from corporeal.core.types import FeatureCloud
+from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
+from corporeal.reconstruction.features.feature_lifting import (
+    LiftedFeatures,
+    known_features,
+    uplift_features,
+)
+from corporeal.reconstruction.features.point_descriptor import (
+    MAX_SHOWING_THROUGH_FRACTION,
+    mean_view_directions,
+)
+from corporeal.reconstruction.features.point_features import PlacedPoints, points_by_projection
 from corporeal.reconstruction.gaussians.depth_rendering import render_depth
-from corporeal.reconstruction.gaussians.feature_distillation import distilled
-from corporeal.reconstruction.gaussians.field_points import field_points
-from corporeal.reconstruction.gaussians.foreground import Shown, foreground, shown
-from corporeal.reconstruction.gaussians.intake import Intake
-from corporeal.reconstruction.gaussians.radiance import FieldConfig
-from corporeal.reconstruction.gaussians.raster import weights
+from corporeal.reconstruction.gaussians.feature_distillation import distil_features
+from corporeal.reconstruction.gaussians.foreground import (
+    GaussianVisibility,
+    foreground_gaussians,
+    gaussian_visibility,
+)
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
+from corporeal.reconstruction.gaussians.radiance_field import RadianceFieldConfig
+from corporeal.reconstruction.gaussians.radiance_field_points import radiance_field_points
+from corporeal.reconstruction.gaussians.rasteriser_numba import gaussian_weights
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.segment.masks import lifted
+from corporeal.reconstruction.segment.instance_masks import lift_labels
 
-MOST_POINTS = 100_000
+MAX_OBJECT_POINTS = 100_000
 """Points that are looked at; other Gaussians do as their neighbours."""
-CELL = 8
+WEIGHT_CELL_PX = 8
 """Pixels along a cell of blending weights: maps of features are no finer."""
 
 
@@ -37,20 +48,20 @@ CELL = 8
 class Foreground:
     """What shows of the Gaussians, and which of them are no floor and no background."""
 
-    shown: Shown
+    shown: GaussianVisibility
     on_objects: Int[np.ndarray, " M"]
     """Numbers of Gaussians."""
 
 
-def foreground_of(source: Path, taken: Intake) -> Foreground:
+def foreground_of(source: Path, taken: GaussianScene) -> Foreground:
     """Tell objects from floor and background.
 
     Raises:
         UserError: Nothing stands out.
 
     """
-    seen = shown(taken.gaussians, taken.cameras, taken.masks)
-    found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, seen, taken.floor))
+    seen = gaussian_visibility(taken.gaussians, taken.cameras, taken.masks)
+    found = np.flatnonzero(foreground_gaussians(taken.gaussians, taken.cameras, seen, taken.floor))
     if not len(found):
         what = "shows nothing but floor and background"
         raise UserError(f"{source} {what}. Give masks of the objects.")
@@ -58,61 +69,69 @@ def foreground_of(source: Path, taken: Intake) -> Foreground:
 
 
 def points_on_objects(
-    taken: Intake,
-    seen: Shown,
+    taken: GaussianScene,
+    seen: GaussianVisibility,
     on_objects: Int[np.ndarray, " M"],
     config: ReconstructConfig,
     folder: Path | None,
     progress: Progress,
-) -> Placed:
+) -> PlacedPoints:
     """Return points on objects, and how what their pictures look like comes onto them."""
     if config.lifting == "radiance":
-        return _of_field(taken, on_objects, config, folder, progress)
+        return _points_of_field(taken, on_objects, config, folder, progress)
     gaussians, cameras = taken.gaussians, taken.cameras
-    if len(on_objects) > MOST_POINTS:
+    if len(on_objects) > MAX_OBJECT_POINTS:
         random = np.random.default_rng(config.training_seed)
-        on_objects = np.sort(random.choice(on_objects, MOST_POINTS, replace=False))
+        on_objects = np.sort(random.choice(on_objects, MAX_OBJECT_POINTS, replace=False))
     position = gaussians.mean[on_objects].astype(np.float64)
-    colour = np.clip(0.5 + DC * gaussians.sh[on_objects, 0], 0, 1)
+    colour = np.clip(0.5 + SH_DC_COEFFICIENT * gaussians.sh[on_objects, 0], 0, 1)
     if config.lifting == "back-projection":
         with ThreadPool() as pool:
             depth = render_depth(gaussians, cameras, pool).depth
-        return projected(position, colour, cameras, depth, on_objects)
-    outside = seen_from(position, cameras, list(seen.share[:, on_objects]), LET_THROUGH)
-    shares = cache(lambda v: weights(gaussians, cameras[v], CELL)[on_objects])
-    cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
+        return points_by_projection(position, colour, cameras, depth, on_objects)
+    outside = mean_view_directions(
+        position, cameras, list(seen.share[:, on_objects]), MAX_SHOWING_THROUGH_FRACTION
+    )
+    shares = cache(lambda v: gaussian_weights(gaussians, cameras[v], WEIGHT_CELL_PX)[on_objects])
+    cells = -(-cameras[0].height // WEIGHT_CELL_PX), -(-cameras[0].width // WEIGHT_CELL_PX)
 
-    def lift(maps: Sequence[np.ndarray]) -> Lifted:
-        return uplift(shares, cells, maps, len(on_objects), seen.least)
+    def lift(maps: Sequence[np.ndarray]) -> LiftedFeatures:
+        return uplift_features(shares, cells, maps, len(on_objects), seen.least)
 
-    return Placed(position, colour, outside, seen.views[on_objects], lift, on_objects)
+    return PlacedPoints(position, colour, outside, seen.views[on_objects], lift, on_objects)
 
 
-def _of_field(
-    taken: Intake,
+def _points_of_field(
+    taken: GaussianScene,
     on_objects: Int[np.ndarray, " M"],
     config: ReconstructConfig,
     folder: Path | None,
     progress: Progress,
-) -> Placed:
+) -> PlacedPoints:
     """Learn a radiance field of the objects, and take points from where it is dense."""
-    how = FieldConfig(config.training, seed=config.training_seed)
+    how = RadianceFieldConfig(config.training, seed=config.training_seed)
     kept = None if folder is None else folder / "radiance.npz"
-    learned, found = field_points(taken, on_objects, MOST_POINTS, how, kept, progress)
-    placed = projected(found.position, found.colour, taken.cameras, found.depth)
+    learned, found = radiance_field_points(
+        taken, on_objects, MAX_OBJECT_POINTS, how, kept, progress
+    )
+    placed = points_by_projection(found.position, found.colour, taken.cameras, found.depth)
 
-    def lift(maps: Sequence[np.ndarray]) -> Lifted:
-        return known(distilled(learned.field, taken.cameras, maps).at(found.position))
+    def lift(maps: Sequence[np.ndarray]) -> LiftedFeatures:
+        return known_features(
+            distil_features(learned.field, taken.cameras, maps).at(found.position)
+        )
 
     return replace(placed, lift=lift, statements=learned.statements)
 
 
-def drawn_masks(
-    taken: Intake, cloud: Cloud, on_objects: Int[np.ndarray, " M"]
+def labels_from_masks(
+    taken: GaussianScene, cloud: FeatureCloud, on_objects: Int[np.ndarray, " M"]
 ) -> Int[np.ndarray, "V N"] | None:
     """Return what instance masks take each point for in each view; None: there are none."""
     if taken.views is None or taken.views.object_of_pixel is None:
         return None
     near = on_objects[KDTree(taken.gaussians.mean[on_objects]).query(cloud.position)[1]]
     pixels = list(taken.views.object_of_pixel)
-    return lifted(lambda v: weights(taken.gaussians, taken.cameras[v])[near], pixels, cloud.count)
+    return lift_labels(
+        lambda v: gaussian_weights(taken.gaussians, taken.cameras[v])[near], pixels, cloud.count
+    )

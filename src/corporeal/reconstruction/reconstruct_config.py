@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Literal
 
 from corporeal.core.errors import UserError, check_range
-from corporeal.geometry.gaussians import LARGEST, AskedUp
-from corporeal.multiview.metric import MetricScale, TwoPoints, measured
-from corporeal.reconstruction.features import connect
-from corporeal.reconstruction.features.maskers import MENU as MASKERS
-from corporeal.reconstruction.features.maskers import connect_masker, split
-from corporeal.reconstruction.segment.rule import Rule
+from corporeal.geometry.gaussian_transforms import MAX_COORDINATE_UNITS, UpAxisChoice
+from corporeal.multiview.metric_scale import MeasuredDistance, MetricScale, stated_metric_scale
+from corporeal.reconstruction.features import connect_encoder
+from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
+from corporeal.reconstruction.features.mask_models import connect_mask_model, split_model_spec
+from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
 
-AUTO, NONE = "auto", "none"
+MASKS_AUTO, MASKS_NONE = "auto", "none"
 
 
 @dataclass(frozen=True)
@@ -24,21 +24,21 @@ class ReconstructConfig:
     """Names of the objects, the largest first, such as "armchair" "soda can"."""
     count: int | None = None
     """Number of objects; by default as many as --things names, else it is estimated."""
-    apart: Rule = "auto"
+    apart: SegmentationRule = "auto"
     """What objects are segmented by; auto: instance masks where there are any, else appearance
     features and concavity (look)."""
     masks: str = "auto"
     """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER"
     with weights of such a model; auto: those beside the photographs, else grown from what all
     cameras look at; none: objects are what stands on the floor."""
-    up: AskedUp = "auto"
+    up: UpAxisChoice = "auto"
     """Axis of the file that points up, also of a mesh; auto: from the file or the cameras."""
     floor_at: float | None = None
     """Height of the floor along the up axis, in the file's unit; by default a plane is fitted, or,
     where there is none, the floor is put below the lowest object."""
     metres_per_unit: float | None = None
     """Length of one unit of the file [m]; by default it follows from the sizes of the objects."""
-    known_distance: TwoPoints | None = None
+    known_distance: MeasuredDistance | None = None
     """Two points of the file, x y z x y z, and their true distance [m]."""
     training: Literal["preview", "draft", "normal"] = "normal"
     """Length of training on photographs: seconds, about one minute, or four, on two cores."""
@@ -58,10 +58,10 @@ class ReconstructConfig:
     """Seed of all random numbers."""
 
 
-DEFAULT = ReconstructConfig()
+DEFAULT_RECONSTRUCT = ReconstructConfig()
 
 
-def validate(
+def validate_reconstruct(
     config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False, source: str = ""
 ) -> None:
     """Raise UserError where a setting cannot be right, whatever the pictures.
@@ -75,40 +75,42 @@ def validate(
     """
     # A person who asks for help needs neither what trains nor what answers.
     from corporeal.reconstruction.gaussians import training_schedule
-    from corporeal.vlm.seen_objects import check_extents, usual
+    from corporeal.vlm.photographed_objects import check_stated_extents, object_of_usual_size
 
     check_range("--count", config.count, 1, 1000)
     check_range("--training-seed", config.training_seed, 0, 2**63)
-    check_range("--floor-at", config.floor_at, -LARGEST, LARGEST)
+    check_range("--floor-at", config.floor_at, -MAX_COORDINATE_UNITS, MAX_COORDINATE_UNITS)
     if config.count and config.things and config.count != len(config.things):
         raise UserError(
             f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
             "--count out, or name all of them."
         )
     if config.things or not asked:
-        check_extents(extents, [usual(name) for name in config.things], source)
+        check_stated_extents(
+            extents, [object_of_usual_size(name) for name in config.things], source
+        )
     for spec in (config.semantic, config.structural):
-        connect(spec)  # who is to look must be there before anything is learned
-    training_schedule.validate(config.rasteriser)
+        connect_encoder(spec)  # who is to look must be there before anything is learned
+    training_schedule.validate_rasteriser(config.rasteriser)
     _check_masks(config)
     metric_scale(config)
 
 
 def _check_masks(config: ReconstructConfig) -> None:
-    if config.masks in (AUTO, NONE):
+    if config.masks in (MASKS_AUTO, MASKS_NONE):
         return
-    if split(config.masks) is None:
+    if split_model_spec(config.masks) is None:
         if not Path(config.masks).expanduser().is_dir():
             raise UserError(
                 f"There is no folder {config.masks} for --masks. Name a folder of masks, or "
                 f"{', '.join(f'{kind}:FOLDER' for kind in MASKERS)}."
             )
-    elif connect_masker(config.masks).needs_words and not config.things:
+    elif connect_mask_model(config.masks).needs_words and not config.things:
         raise UserError("These masks are found by words: name the objects with --things.")
 
 
 def metric_scale(config: ReconstructConfig) -> MetricScale | None:
     """Return the scale that the settings state; None: they state none."""
-    from corporeal.vlm.seen_objects import PERSON
+    from corporeal.vlm.photographed_objects import COMMAND_LINE_SOURCE
 
-    return measured(config.metres_per_unit, config.known_distance, PERSON)
+    return stated_metric_scale(config.metres_per_unit, config.known_distance, COMMAND_LINE_SOURCE)

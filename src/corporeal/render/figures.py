@@ -9,19 +9,28 @@ from jaxtyping import Float
 from PIL import Image, ImageDraw, ImageFont
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import Film, MaterialField, Parts, Scene
-from corporeal.geometry.srgb import linear
-from corporeal.render import colours, video
-from corporeal.render.camera import place
-from corporeal.render.choices import Quantity
-from corporeal.render.embree import identify
-from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
-from corporeal.render.glyphs import drawable
-from corporeal.render.png import write_png
-from corporeal.render.repainted import render_each
-from corporeal.render.stage import Light, Stage
+from corporeal.core.types import MaterialField, Parts, Scene, Video
+from corporeal.geometry.srgb import srgb_to_linear
+from corporeal.render import colours, video_file
+from corporeal.render.camera_placement import fit_camera
+from corporeal.render.embree import identify_triangles
+from corporeal.render.figure_legends import (
+    INK_COLOUR,
+    LARGE_FONT_PX,
+    LegendEntry,
+    PanelLegend,
+    ScaleTick,
+    TextLine,
+    names_legend,
+    scale_legend,
+)
+from corporeal.render.glyphs import drawable_name
+from corporeal.render.png_writer import write_png
+from corporeal.render.ray_scene import RayScene, StudioLight
+from corporeal.render.recolouring import render_recoloured
+from corporeal.render.video_choices import ColourQuantity
 
-PAPER = Light(
+PAPER_LIGHT = StudioLight(
     sun_colour=(2.6, 2.6, 2.6),
     zenith=(0.95, 0.97, 1.0),
     horizon=(1.0, 1.0, 1.0),
@@ -29,24 +38,31 @@ PAPER = Light(
     backdrop=("#ffffff", "#ffffff"),
 )
 """A white studio: colours are data here."""
-PANEL = (520, 390)
+PANEL_SIZE_PX = (520, 390)
 """[px]"""
-ENTRIES = 8
+MAX_LEGEND_ENTRIES = 8
 """Names in a legend before the rest is summed up."""
-LETTERS = 24
+MAX_LEGEND_CHARACTERS = 24
 """Of a name in a legend before it is cut."""
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
-SHEET, SHOWN = (1485, 1045), (472, 354)
+SI_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
+SHEET_SIZE_PX, SHEET_PANEL_SIZE_PX = (1485, 1045), (472, 354)
 """The page of all panels, and the picture of each [px]."""
-FIRST, STEP = (18, 41), (489, 522)
+FIRST_PANEL_CORNER_PX, PANEL_STEP_PX = (18, 41), (489, 522)
 """Left and top of the first picture, and from one to the next [px]."""
 
-ORDER: tuple[Quantity, ...] = ("material", "law", "young", "poisson", "density", "object")
+PANEL_ORDER: tuple[ColourQuantity, ...] = (
+    "material",
+    "law",
+    "young",
+    "poisson",
+    "density",
+    "object",
+)
 """Panels of the figure, row by row."""
 
 
 @dataclass(frozen=True)
-class Names:
+class CategoryPanel:
     """A panel of discrete colours."""
 
     title: str
@@ -57,7 +73,7 @@ class Names:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class NumericPanel:
     """A panel of a continuous quantity."""
 
     title: str
@@ -74,23 +90,30 @@ def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) 
         UserError: The file cannot be written.
 
     """
-    stage = Stage(scene)
-    camera = place(_boxes(scene), PANEL, fill=0.93)
-    seen, _ = identify(stage, camera)
-    share = _share(seen, parts)
-    sheet = Image.new("RGB", SHEET, "white")
-    shown = panels(scene, parts, field)
-    chosen = [shown[name] for name in ORDER]
-    pictures = render_each([_painted(stage, parts, shades(p)) for p in chosen], camera, "draft")
+    stage = RayScene(scene)
+    camera = fit_camera(_boxes(scene), PANEL_SIZE_PX, fill=0.93)
+    seen, _ = identify_triangles(stage, camera)
+    share = _visible_pixels(seen, parts)
+    sheet = Image.new("RGB", SHEET_SIZE_PX, "white")
+    shown = colour_panels(scene, parts, field)
+    chosen = [shown[name] for name in PANEL_ORDER]
+    pictures = render_recoloured(
+        [_paint_parts(stage, parts, part_colours(p)) for p in chosen], camera, "draft"
+    )
     for k, (panel, picture) in enumerate(zip(chosen, pictures, strict=True)):
-        left, top = FIRST[0] + k % 3 * STEP[0], FIRST[1] + k // 3 * STEP[1]
-        small = Image.fromarray(picture).resize(SHOWN, Image.Resampling.LANCZOS)
+        left, top = (
+            FIRST_PANEL_CORNER_PX[0] + k % 3 * PANEL_STEP_PX[0],
+            FIRST_PANEL_CORNER_PX[1] + k // 3 * PANEL_STEP_PX[1],
+        )
+        small = Image.fromarray(picture).resize(SHEET_PANEL_SIZE_PX, Image.Resampling.LANCZOS)
         sheet.paste(small, (left, top))
-        key_of(panel, share, (left, top)).draw(sheet)
+        panel_legend(panel, share, (left, top)).draw(sheet)
     write_png(sheet, path)
 
 
-def key_of(panel: Names | Numbers, share: np.ndarray, corner: tuple[int, int]) -> Key:
+def panel_legend(
+    panel: CategoryPanel | NumericPanel, share: np.ndarray, corner: tuple[int, int]
+) -> PanelLegend:
     """Place a panel's title, and below its picture what its colours mean.
 
     Args:
@@ -100,25 +123,25 @@ def key_of(panel: Names | Numbers, share: np.ndarray, corner: tuple[int, int]) -
 
     """
     left, top = corner
-    middle, below = left + SHOWN[0] / 2, top + SHOWN[1]
-    if isinstance(panel, Names):
-        made = legend(_entries(panel, share), middle, below + 6)
+    middle, below = left + SHEET_PANEL_SIZE_PX[0] / 2, top + SHEET_PANEL_SIZE_PX[1]
+    if isinstance(panel, CategoryPanel):
+        made = names_legend(_entries(panel, share), middle, below + 6)
     else:
-        made = scale(*_scale(panel), middle, below + 19)
-    title = Line(panel.title, (left, top - 9), "ls", LARGE)
-    return Key((title, *made.lines), made.swatches)
+        made = scale_legend(*_scale(panel), middle, below + 19)
+    title = TextLine(panel.title, (left, top - 9), "ls", LARGE_FONT_PX)
+    return PanelLegend((title, *made.lines), made.swatches)
 
 
-def strip(film: Film, path: Path, count: int = 6, width: int = 340) -> None:
+def write_filmstrip(film: Video, path: Path, count: int = 6, width: int = 340) -> None:
     """Set evenly chosen frames of a film in a row with thin white gaps, each with its time.
 
     Raises:
         UserError: The film cannot be read, or the file cannot be written.
 
     """
-    last = max((len(film.times) or video.length(film.path)) - 1, 0)
+    last = max((len(film.times) or video_file.count_frames(film.path)) - 1, 0)
     numbers = [int(k) for k in np.unique(np.linspace(0, last, count).round())]
-    pictures = video.pictures(film.path, numbers)
+    pictures = video_file.read_frames(film.path, numbers)
     if not pictures:
         raise UserError(f"{film.path}: has no frames. Make it again.")
     small = (width, round(width * film.height / film.width))
@@ -126,10 +149,10 @@ def strip(film: Film, path: Path, count: int = 6, width: int = 340) -> None:
         np.asarray(Image.fromarray(p).resize(small, Image.Resampling.LANCZOS)) for p in pictures
     ]
     times = [film.times[k] if film.times else k / film.fps for k in numbers]
-    row_of(shown, [f"{t:.2f} s" for t in times], path)
+    write_image_row(shown, [f"{t:.2f} s" for t in times], path)
 
 
-def row_of(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> None:
+def write_image_row(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> None:
     """Set pictures of one size in a row with thin white gaps, each over its words.
 
     Raises:
@@ -144,97 +167,111 @@ def row_of(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> 
     for k, (picture, label) in enumerate(zip(pictures, words, strict=True)):
         row.paste(Image.fromarray(picture), (k * (width + gap), 0))
         middle = (k * (width + gap) + width / 2, height + foot / 2 + 1)
-        draw.text(middle, label, fill=INK, font=font, anchor="mm")
+        draw.text(middle, label, fill=INK_COLOUR, font=font, anchor="mm")
     write_png(row, path)
 
 
-def si(value: float, unit: str) -> str:
+def si_prefix_text(value: float, unit: str) -> str:
     """Three digits and a prefix: 2.1e11 Pa is 210 GPa."""
     if unit != "Pa" and 1e3 <= abs(value) < 1e5:
         return f"{value:.0f} {unit}".strip()
     if unit != "Pa" or value == 0:
         return f"{value:.3g} {unit}".strip()
-    factor, prefix = next((p for p in PREFIXES if abs(value) >= p[0]), PREFIXES[-1])
+    factor, prefix = next((p for p in SI_PREFIXES if abs(value) >= p[0]), SI_PREFIXES[-1])
     return f"{value / factor:.3g} {prefix}{unit}"
 
 
-def panels(scene: Scene, parts: Parts, field: MaterialField) -> dict[Quantity, Names | Numbers]:
+def colour_panels(
+    scene: Scene, parts: Parts, field: MaterialField
+) -> dict[ColourQuantity, CategoryPanel | NumericPanel]:
     """Return what parts can be coloured by."""
-    made, palette = field.materials, [colours.of_hex(c) for c in colours.OBJECTS]
-    laws = [colours.LAWS[m.law] for m in made]
+    made, palette = field.materials, [colours.colour_from_hex(c) for c in colours.OBJECT_COLOURS]
+    laws = [colours.LAW_COLOURS[m.law] for m in made]
     things = [part.object for part in parts.catalogue]
     numbers = range(len(parts.catalogue))
     return {
-        "material": Names(
+        "material": CategoryPanel(
             "Material",
             [m.name.replace("_", " ") for m in made],
-            colours.apart([m.name for m in made]),
+            colours.distinct_colours([m.name for m in made]),
         ),
-        "law": Names(
-            "Constitutive law", [n for n, _ in laws], [colours.of_hex(c) for _, c in laws]
+        "law": CategoryPanel(
+            "Constitutive law", [n for n, _ in laws], [colours.colour_from_hex(c) for _, c in laws]
         ),
-        "object": Names(
+        "object": CategoryPanel(
             "Object",
             [scene.objects[k].name.replace("_", " ") for k in things],
             [palette[k % len(palette)] for k in things],
         ),
-        "part": Names(
+        "part": CategoryPanel(
             "Part",
             [part.name.replace("_", " ") for part in parts.catalogue],
             [palette[k % len(palette)] for k in numbers],
         ),
-        "young": Numbers("Young's modulus E", "Pa", [m.young for m in made], log=True),
-        "poisson": Numbers("Poisson's ratio ν", "", [m.poisson for m in made]),
-        "density": Numbers("Density ρ", "kg/m³", [m.density for m in made], log=True),
+        "young": NumericPanel("Young's modulus E", "Pa", [m.young for m in made], log=True),
+        "poisson": NumericPanel("Poisson's ratio ν", "", [m.poisson for m in made]),
+        "density": NumericPanel("Density ρ", "kg/m³", [m.density for m in made], log=True),
     }
 
 
-def shades(panel: Names | Numbers) -> Float[np.ndarray, "K 3"]:
+def part_colours(panel: CategoryPanel | NumericPanel) -> Float[np.ndarray, "K 3"]:
     """Return the colour of every part, sRGB."""
-    if isinstance(panel, Names):
+    if isinstance(panel, CategoryPanel):
         return np.array(panel.colour, dtype=float).reshape(-1, 3)
     return colours.turbo(panel.value or [0.0], panel.log)[0]
 
 
-def _painted(stage: Stage, parts: Parts, colour_of_part: np.ndarray) -> Stage:
+def _paint_parts(stage: RayScene, parts: Parts, colour_of_part: np.ndarray) -> RayScene:
     """Paint each part; what is of none, number -1, is grey."""
     table = np.vstack([colour_of_part, [[0.75] * 3]])
-    return stage.painted(linear(table), np.mod(parts.part_of_point, len(table)), PAPER)
+    return stage.painted(
+        srgb_to_linear(table), np.mod(parts.part_of_point, len(table)), PAPER_LIGHT
+    )
 
 
-def _share(seen: np.ndarray, parts: Parts) -> np.ndarray:
+def _visible_pixels(seen: np.ndarray, parts: Parts) -> np.ndarray:
     """Pixels in which each part is seen."""
     part = parts.part_of_point[seen[seen >= 0]]
     return np.bincount(part[part >= 0], minlength=len(parts.catalogue))
 
 
-def _entries(panel: Names, share: np.ndarray) -> list[Entry]:
+def _entries(panel: CategoryPanel, share: np.ndarray) -> list[LegendEntry]:
     """List names by how much is seen of them; as many as fit."""
     total: dict[str, float] = {}
     colour: dict[str, colours.Colour] = {}
     for k, label in enumerate(panel.label):
-        name = drawable(label, f"{panel.title.lower()} {panel.label.index(label) + 1}")
+        name = drawable_name(label, f"{panel.title.lower()} {panel.label.index(label) + 1}")
         total[name] = total.get(name, 0) + float(share[k])
         colour[name] = panel.colour[k]
     ranked = sorted(total, key=lambda n: (-total[n], n))
-    shown = ranked if len(ranked) <= ENTRIES else ranked[: ENTRIES - 1]
-    rest = [Entry(f"and {len(ranked) - len(shown)} more", None)] if len(ranked) > len(shown) else []
-    return [*(Entry(_cut(n), colour[n]) for n in shown), *rest]
+    shown = ranked if len(ranked) <= MAX_LEGEND_ENTRIES else ranked[: MAX_LEGEND_ENTRIES - 1]
+    rest = (
+        [LegendEntry(f"and {len(ranked) - len(shown)} more", None)]
+        if len(ranked) > len(shown)
+        else []
+    )
+    return [*(LegendEntry(_shorten(n), colour[n]) for n in shown), *rest]
 
 
-def _cut(name: str) -> str:
-    return name if len(name) <= LETTERS else name[: LETTERS - 1].rstrip() + "…"
+def _shorten(name: str) -> str:
+    return (
+        name
+        if len(name) <= MAX_LEGEND_CHARACTERS
+        else name[: MAX_LEGEND_CHARACTERS - 1].rstrip() + "…"
+    )
 
 
-def _scale(panel: Numbers) -> tuple[list[Mark], np.ndarray]:
+def _scale(panel: NumericPanel) -> tuple[list[ScaleTick], np.ndarray]:
     """Give the lowest value, the highest and what lies between, and the colours along them."""
     _, low, high = colours.turbo(panel.value or [0.0], panel.log)
-    ramp = colours.ramp(np.linspace(0, 1, 256))
+    ramp = colours.ramp_colours(np.linspace(0, 1, 256))
     if high - low <= 1e-9 * max(abs(high), 1e-30):
-        return [Mark(0.5, si(low, panel.unit))], np.repeat(ramp[128:129], 256, axis=0)
+        return [ScaleTick(0.5, si_prefix_text(low, panel.unit))], np.repeat(
+            ramp[128:129], 256, axis=0
+        )
     middle = np.sqrt(low * high) if panel.log else (low + high) / 2
     marks = [(0.0, low), (0.5, float(middle)), (1.0, high)]
-    return [Mark(x, si(value, panel.unit)) for x, value in marks], ramp
+    return [ScaleTick(x, si_prefix_text(value, panel.unit)) for x, value in marks], ramp
 
 
 def _boxes(scene: Scene) -> np.ndarray:

@@ -3,15 +3,15 @@
 import numba
 import numpy as np
 
-from corporeal.render.kernels import JIT, LOOP
-from corporeal.render.kernels_floor import TILE
+from corporeal.render.kernels_floor import TILE_PX
+from corporeal.render.kernels_hits import JIT, LOOP
 
-NEAREST = 1e-3
+MIN_DEPTH_RATIO = 1e-3
 """Of its distance: how far a corner must be before the eye to be placed in the picture."""
 
 
 @numba.njit(**JIT)
-def outlined(vertices, triangles, eye, frame, tangent, size, out):
+def mark_outlined_tiles(vertices, triangles, eye, frame, tangent, size, out):
     """Mark the tiles that a triangle's outline in the picture reaches, or is a pixel away from.
 
     Args:
@@ -26,12 +26,12 @@ def outlined(vertices, triangles, eye, frame, tangent, size, out):
     """
     row, column = np.empty(len(vertices)), np.empty(len(vertices))
     ahead = np.empty(len(vertices), np.bool_)
-    _placed(vertices, eye, frame, tangent, size, row, column, ahead)
-    _marked(triangles, row, column, ahead, size, out)
+    _project_vertices(vertices, eye, frame, tangent, size, row, column, ahead)
+    _mark_triangle_tiles(triangles, row, column, ahead, size, out)
 
 
 @numba.njit(**LOOP)
-def _placed(vertices, eye, frame, tangent, size, row, column, ahead):
+def _project_vertices(vertices, eye, frame, tangent, size, row, column, ahead):
     """Find where each vertex is seen [px], and whether it is before the eye."""
     width, height = size
     for k in range(len(vertices)):
@@ -42,14 +42,14 @@ def _placed(vertices, eye, frame, tangent, size, row, column, ahead):
             up += frame[1, a] * way
             depth -= frame[2, a] * way
             square += way * way
-        ahead[k] = depth > NEAREST * np.sqrt(square)
+        ahead[k] = depth > MIN_DEPTH_RATIO * np.sqrt(square)
         if ahead[k]:
             row[k] = (1 - up / depth / tangent) * height / 2
             column[k] = (1 + right / depth / tangent * height / width) * width / 2
 
 
 @numba.njit(**LOOP)
-def _marked(triangles, row, column, ahead, size, out):
+def _mark_triangle_tiles(triangles, row, column, ahead, size, out):
     width, height = size
     for k in range(len(triangles)):
         a, b, c = triangles[k, 0], triangles[k, 1], triangles[k, 2]
@@ -64,6 +64,6 @@ def _marked(triangles, row, column, ahead, size, out):
         right = max(max(column[a], column[b]), column[c]) + 1
         if bottom < 0 or right < 0 or top >= height or left >= width:
             continue
-        for i in range(int(max(top, 0)) // TILE, int(min(bottom, height - 1)) // TILE + 1):
-            for j in range(int(max(left, 0)) // TILE, int(min(right, width - 1)) // TILE + 1):
+        for i in range(int(max(top, 0)) // TILE_PX, int(min(bottom, height - 1)) // TILE_PX + 1):
+            for j in range(int(max(left, 0)) // TILE_PX, int(min(right, width - 1)) // TILE_PX + 1):
                 out[i, j] = True

@@ -8,30 +8,36 @@ tiles and changes evenly between. Loops compiled by numba, over a band of pixels
 import numba
 import numpy as np
 
-from corporeal.render.kernels import FLOOR_ROUGHNESS, INNER, JIT, LOOP
-from corporeal.render.kernels_film import HORIZON, filmic, hull_of, meets_box, way_of
-from corporeal.render.kernels_light import fading, glance, shade_seen
+from corporeal.render.kernels_hits import FLOOR_ROUGHNESS, INNER, JIT, LOOP
+from corporeal.render.kernels_light import floor_fade, shade_with_view_terms, view_terms
+from corporeal.render.kernels_video import (
+    HORIZON_SINE,
+    bounding_box_of,
+    filmic,
+    meets_box,
+    pixel_direction,
+)
 
-TILE = 8
+TILE_PX = 8
 """Sides of a tile [px]."""
-UNTOUCHED, FAR, NEAR = 0, 1, 2
+TILE_UNTOUCHED, TILE_SOFT, TILE_CAST = 0, 1, 2
 """As in the empty studio; darkened softly; to be cast pixel by pixel."""
-AROUND = 2
+NEAR_OBJECT_TILES = 2
 """Tiles about one that shows an object that are near it."""
 
 
 @numba.njit(**LOOP)
-def things(prim, shape, out):
+def mark_object_tiles(prim, shape, out):
     """Mark the tiles in which objects are seen."""
     h, w = shape
     for i in range(h):
         for j in range(w):
             if prim[i * w + j] >= 0:
-                out[i // TILE, j // TILE] = True
+                out[i // TILE_PX, j // TILE_PX] = True
 
 
 @numba.njit(**JIT)
-def grown(mask, reach):
+def dilate_tiles(mask, reach):
     """Mark all tiles within ``reach`` of those that are marked."""
     h, w = mask.shape
     out = np.zeros((h, w), np.bool_)
@@ -43,7 +49,7 @@ def grown(mask, reach):
 
 
 @numba.njit(**JIT)
-def stains(d, eye, lamps, ways, boxes, blur, shape, near, far):
+def mark_shadowed_tiles(d, eye, lamps, ways, boxes, blur, shape, near, far):
     """Mark the tiles of floor that the sun's and the sky's light may not reach.
 
     Args:
@@ -59,22 +65,22 @@ def stains(d, eye, lamps, ways, boxes, blur, shape, near, far):
 
     """
     room = np.empty(3, np.float32), boxes.copy(), boxes.copy()
-    hulls = boxes[:1].copy(), hull_of(boxes)
-    _stains(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls)
+    hulls = boxes[:1].copy(), bounding_box_of(boxes)
+    _mark_shadowed_tiles(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls)
 
 
 @numba.njit(**LOOP)
-def _stains(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls):
+def _mark_shadowed_tiles(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls):
     h, w = shape
     p, wide, dark = room
     around, hull = hulls
     p[2] = lamps.floor[3]
-    for top in range(0, h, TILE):
-        for left in range(0, w, TILE):
-            bottom, right = min(top + TILE, h) - 1, min(left + TILE, w) - 1
+    for top in range(0, h, TILE_PX):
+        for left in range(0, w, TILE_PX):
+            bottom, right = min(top + TILE_PX, h) - 1, min(left + TILE_PX, w) - 1
             radius, seen = _patch(d, eye, lamps.floor[3], w, (top, bottom, left, right), p)
             away = np.hypot(p[0] - lamps.centre[0], p[1] - lamps.centre[1]) - 2 * radius
-            if not seen or fading(away, lamps) == 0:
+            if not seen or floor_fade(away, lamps) == 0:
                 continue
             for b in range(len(boxes)):
                 for a in range(2):
@@ -85,14 +91,14 @@ def _stains(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls):
                 for a in range(3):
                     reach = radius if a < 2 else np.float32(0)
                     around[b, 0, a], around[b, 1, a] = hull[b, 0, a] - reach, hull[b, 1, a] + reach
-            i, j = top // TILE, left // TILE
+            i, j = top // TILE_PX, left // TILE_PX
             near[i, j] = near[i, j] or meets_box(p, ways[len(ways) - 1], dark)
             for k in range(len(ways) - 1):
                 if near[i, j] or (meets_box(p, ways[k], around) and meets_box(p, ways[k], wide)):
                     far[i, j] = True
                     break
             # Corners above the horizon have no floor to ask.
-            if far[i, j] and d[top * w + left, 2] > -HORIZON:
+            if far[i, j] and d[top * w + left, 2] > -HORIZON_SINE:
                 near[i, j] = True
 
 
@@ -100,7 +106,7 @@ def _stains(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls):
 def _patch(d, eye, floor, w, tile, centre):
     """Middle and radius [m] of the floor that a tile of pixels sees, and whether it sees any."""
     top, bottom, left, right = tile
-    if d[bottom * w + left, 2] > -HORIZON and d[bottom * w + right, 2] > -HORIZON:
+    if d[bottom * w + left, 2] > -HORIZON_SINE and d[bottom * w + right, 2] > -HORIZON_SINE:
         return np.float32(0), False
     widest = np.float32(0)
     for a in range(2):
@@ -108,7 +114,7 @@ def _patch(d, eye, floor, w, tile, centre):
         for i in (top, bottom):
             for j in (left, right):
                 e = d[i * w + j]
-                t = (floor - eye[2]) / min(e[2], -HORIZON)
+                t = (floor - eye[2]) / min(e[2], -HORIZON_SINE)
                 low = min(low, np.float32(eye[a] + t * e[a]))
                 high = max(high, np.float32(eye[a] + t * e[a]))
         centre[a] = (low + high) / 2
@@ -122,12 +128,12 @@ def _corner(tiles, i, j):
     wanted = False
     for a in range(max(i - 1, 0), min(i + 1, len(tiles))):
         for b in range(max(j - 1, 0), min(j + 1, tiles.shape[1])):
-            wanted = wanted or tiles[a, b] == FAR
+            wanted = wanted or tiles[a, b] == TILE_SOFT
     return wanted
 
 
 @numba.njit(**LOOP)
-def corners(tiles):
+def count_soft_corners(tiles):
     """Count the corners of far tiles."""
     count = 0
     for i in range(tiles.shape[0] + 1):
@@ -137,7 +143,7 @@ def corners(tiles):
 
 
 @numba.njit(**JIT)
-def at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, o, w, asker):
+def queue_corner_rays(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, o, w, asker):
     """Write down rays from the corners of far tiles that could meet something.
 
     Args:
@@ -158,14 +164,16 @@ def at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, o, w
         How many rays are to be cast.
 
     """
-    room = np.empty(3), np.empty(3, np.float32), hull_of(boxes)
-    return _at_corners(
+    room = np.empty(3), np.empty(3, np.float32), bounding_box_of(boxes)
+    return _queue_corner_rays(
         tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker
     )
 
 
 @numba.njit(**LOOP)
-def _at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker):
+def _queue_corner_rays(
+    tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker
+):
     h, width = tiles.shape
     n, many = 0, len(ways) - 1
     e, p, hull = room
@@ -173,8 +181,8 @@ def _at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, roo
         for j in range(width + 1):
             if not _corner(tiles, i, j):
                 continue
-            way_of(eye, frame, tangent, size, first + i * TILE, j * TILE, e)
-            t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON)
+            pixel_direction(eye, frame, tangent, size, first + i * TILE_PX, j * TILE_PX, e)
+            t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON_SINE)
             p[0], p[1] = eye[0] + t * e[0], eye[1] + t * e[1]
             p[2] = lamps.floor[3] + 2e-4 * lamps.size
             for k in range(many):
@@ -187,11 +195,11 @@ def _at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, roo
 
 
 @numba.njit(**LOOP)
-def hidden(asker, free, ways, columns, light):
+def subtract_hidden_sky(asker, free, ways, columns, light):
     """Take the sky of rays that were cast from corners and met something.
 
     Args:
-        asker: From ``at_corners``.
+        asker: From ``queue_corner_rays``.
         free: Which rays got away.
         ways: All that corners look along, as there.
         columns: Of corners.
@@ -208,7 +216,7 @@ def hidden(asker, free, ways, columns, light):
 
 
 @numba.njit(**JIT)
-def glances(d, index, eye, lamps, out):
+def floor_view_terms(d, index, eye, lamps, out):
     """Write how pixels see the floor: what no object changes, worked out once for each camera.
 
     Args:
@@ -221,28 +229,28 @@ def glances(d, index, eye, lamps, out):
     """
     up, scratch = np.zeros(3, np.float32), np.empty(3, np.float32)
     up[2] = 1
-    _glances(d, index, eye, lamps, up, scratch, out)
+    _floor_view_terms(d, index, eye, lamps, up, scratch, out)
 
 
 @numba.njit(**LOOP)
-def _glances(d, index, eye, lamps, up, scratch, out):
+def _floor_view_terms(d, index, eye, lamps, up, scratch, out):
     for g in index:
         e = d[g]
-        t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON)
+        t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON_SINE)
         x, y = eye[0] + t * e[0] - lamps.centre[0], eye[1] + t * e[1] - lamps.centre[1]
-        out[g, 0], out[g, 1] = glance(up, e, FLOOR_ROUGHNESS, lamps.sun, scratch)
-        out[g, 2] = fading(np.hypot(x, y), lamps)
+        out[g, 0], out[g, 1] = view_terms(up, e, FLOOR_ROUGHNESS, lamps.sun, scratch)
+        out[g, 2] = floor_fade(np.hypot(x, y), lamps)
 
 
 @numba.njit(**JIT)
-def softly(tiles, shape, lamps, sky, glances, mirrored, wall, out):
+def shade_soft_tiles(tiles, shape, lamps, sky, glances, mirrored, wall, out):
     """Write the filmic light of the pixels of far tiles.
 
     Args:
         tiles: Kinds (rows, columns).
         shape: Rows and columns of pixels.
         lamps: The studio.
-        sky: At the corners of tiles, from ``at_corners``.
+        sky: At the corners of tiles, from ``queue_corner_rays``.
         glances: How the band's pixels see the floor (P, 3).
         mirrored: What each pixel of the band mirrors in the empty studio (P, 3).
         wall: Light of the backdrop (P, 3).
@@ -254,21 +262,21 @@ def softly(tiles, shape, lamps, sky, glances, mirrored, wall, out):
     light = np.zeros(7, np.float32)
     light[3] = 1
     room = np.empty(3, np.float32), np.empty(3, np.float32)
-    _softly(tiles, shape, lamps, sky, glances, mirrored, wall, (traits, light), room, out)
+    _shade_soft_tiles(tiles, shape, lamps, sky, glances, mirrored, wall, (traits, light), room, out)
 
 
 @numba.njit(**LOOP)
-def _softly(tiles, shape, lamps, sky, glances, mirrored, wall, floor, room, out):
+def _shade_soft_tiles(tiles, shape, lamps, sky, glances, mirrored, wall, floor, room, out):
     h, w = shape
     traits, light = floor
     near, above = room
     for i in range(h):
-        a, fy = i // TILE, np.float32(i % TILE / TILE)
+        a, fy = i // TILE_PX, np.float32(i % TILE_PX / TILE_PX)
         for j in range(w):
-            b = j // TILE
-            if tiles[a, b] != FAR:
+            b = j // TILE_PX
+            if tiles[a, b] != TILE_SOFT:
                 continue
-            g, fx = i * w + j, np.float32(j % TILE / TILE)
+            g, fx = i * w + j, np.float32(j % TILE_PX / TILE_PX)
             for c in range(2):
                 upper = (1 - fx) * sky[a, b, c] + fx * sky[a, b + 1, c]
                 lower = (1 - fx) * sky[a + 1, b, c] + fx * sky[a + 1, b + 1, c]
@@ -276,6 +284,8 @@ def _softly(tiles, shape, lamps, sky, glances, mirrored, wall, floor, room, out)
             for c in range(3):
                 light[4 + c] = mirrored[g, c]
             spot, graze, fade = glances[g, 0], glances[g, 1], glances[g, 2]
-            shade_seen(lamps.sun[2], spot, graze, lamps.floor, traits, light, lamps, above, near)
+            shade_with_view_terms(
+                lamps.sun[2], spot, graze, lamps.floor, traits, light, lamps, above, near
+            )
             for c in range(3):
                 out[g, c] = filmic(near[c] * fade + wall[g, c] * (1 - fade))

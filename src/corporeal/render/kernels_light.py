@@ -11,17 +11,26 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from corporeal.render.kernels import FLOOR, INNER, JIT, LOOP, THING, colour, dot, hash01
+from corporeal.render.kernels_hits import (
+    HIT_FLOOR,
+    HIT_OBJECT,
+    INNER,
+    JIT,
+    LOOP,
+    dot,
+    hash01,
+    surface_colour,
+)
 
-SHARP = 0.2
+SHARP_MIRROR_ROUGHNESS = 0.2
 """Roughness up to which each sample follows its own mirrored ray."""
-GLOSSY = 0.45
+GLOSSY_ROUGHNESS = 0.45
 """Roughness up to which objects are seen mirrored at all."""
-CHANNELS = 7
+LIGHT_CHANNELS = 7
 """Of light: sky above, its height, floor below, sun, mirrored RGB."""
 
 
-class Lamps(NamedTuple):
+class StudioLamps(NamedTuple):
     """The light of the studio, all float32."""
 
     sun: np.ndarray
@@ -59,7 +68,7 @@ def on_sphere(u, v, out):
 
 
 @numba.njit(**INNER)
-def sky_way(s, g, point, w):
+def sky_direction(s, g, point, w):
     """Write the cosine-weighted direction of a point of the unit sphere: it plus the normal."""
     n = s.normal[g]
     _normalised(n[0] + point[0], n[1] + point[1], n[2] + point[2], w)
@@ -85,13 +94,13 @@ def _sky_rays(s, index, cells, lamps, number, count, point, o, w):
         q = cells[k] * count + number
         u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
         on_sphere(u, v, point)
-        sky_way(s, g, point, w[k])
+        sky_direction(s, g, point, w[k])
         for a in range(3):
             o[k, a] = s.point[g, a] + gap * s.flat[g, a]
 
 
 @numba.njit(**INNER)
-def open_way(s, g, w, lamps, share, light):
+def add_open_ray(s, g, w, lamps, share, light):
     """Add what a ray sees that gets away: open sky, or the sunlit floor below the horizon."""
     if w[2] > 0:
         light[0] += share
@@ -107,11 +116,11 @@ def gather_sky(s, index, w, free, lamps, share, light):
     """Add what one ray per sample saw."""
     for k in range(len(index)):
         if free[k]:
-            open_way(s, index[k], w[k], lamps, share, light[k])
+            add_open_ray(s, index[k], w[k], lamps, share, light[k])
 
 
 @numba.njit(**JIT)
-def across(sun, e):
+def sun_tangents(sun, e):
     """Write a unit vector across the sun's direction into ``e``; return the one across both."""
     if abs(sun[2]) < 0.999:
         _normalised(sun[1], -sun[0], np.float32(0), e)
@@ -127,7 +136,7 @@ def across(sun, e):
 
 
 @numba.njit(**LOOP)
-def sun_way(i, pixel, lamps, e, h, w):
+def sun_direction(i, pixel, lamps, e, h, w):
     """Write the direction of one of 16 × 16 places on the sun's disc."""
     sun = lamps.sun
     j = int(hash01(pixel, 7) * 16)
@@ -144,7 +153,7 @@ def sun_way(i, pixel, lamps, e, h, w):
 
 
 @numba.njit(**INNER)
-def sunlit(s, g, lamps, o):
+def begin_sun_ray(s, g, lamps, o):
     """Say whether the sun may reach a sample, and write where its ray begins.
 
     Leaves look through, too.
@@ -160,18 +169,18 @@ def sunlit(s, g, lamps, o):
 def sun_rays(s, index, cells, pixels, lamps, o, w, ask):
     """One ray each to the sun."""
     e = np.empty(3, np.float32)
-    _sun_rays(s, index, cells, pixels, lamps, e, across(lamps.sun, e), o, w, ask)
+    _sun_rays(s, index, cells, pixels, lamps, e, sun_tangents(lamps.sun, e), o, w, ask)
 
 
 @numba.njit(**LOOP)
 def _sun_rays(s, index, cells, pixels, lamps, e, h, o, w, ask):
     for k in range(len(index)):
-        sun_way(cells[k], pixels[k], lamps, e, h, w[k])
-        ask[k] = sunlit(s, index[k], lamps, o[k])
+        sun_direction(cells[k], pixels[k], lamps, e, h, w[k])
+        ask[k] = begin_sun_ray(s, index[k], lamps, o[k])
 
 
 @numba.njit(**INNER)
-def mirror_way(s, g, e, q, w):
+def mirror_direction(s, g, e, q, w):
     """Write the direction in which a sample mirrors view ``e``, spread by roughness."""
     n, f = s.normal[g], s.flat[g]
     c = 2 * dot(e, n)
@@ -192,7 +201,7 @@ def mirror_rays(s, index, d, cells, lamps, o, w):
     gap = np.float32(2e-4 * lamps.size)
     for k in range(len(index)):
         g = index[k]
-        mirror_way(s, g, d[g], cells[k], w[k])
+        mirror_direction(s, g, d[g], cells[k], w[k])
         for a in range(3):
             o[k, a] = s.point[g, a] + gap * s.flat[g, a]
 
@@ -204,7 +213,7 @@ def _ramp(x):
 
 
 @numba.njit(**INNER)
-def studio(w, blur, lamps, out):
+def studio_radiance(w, blur, lamps, out):
     """Floor, sky, a softbox at the sun and a strip light; blurred for rough surfaces."""
     up = w[2]
     high = min(max(up, 0.0), 1.0)
@@ -220,21 +229,21 @@ def studio(w, blur, lamps, out):
 
 
 @numba.njit(**JIT)
-def mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
+def write_mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
     """Write what was mirrored into light[:, first:first+3]: objects roughly lit, or the studio."""
     rgba = np.empty(8, np.float32)
-    _mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first, rgba)
+    _write_mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first, rgba)
 
 
 @numba.njit(**LOOP)
-def _mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first, rgba):
+def _write_mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first, rgba):
     for k in range(len(index)):
         rough = s.traits[index[k], 1]
-        studio(w[k], max(rough - 0.15, 0.0) ** 2, lamps, light[k, first : first + 3])
+        studio_radiance(w[k], max(rough - 0.15, 0.0) ** 2, lamps, light[k, first : first + 3])
         # A facet must not mirror its own neighbours: the smooth surface it stands for would not.
         if prim[k] < 0 or t[k] < 0.02 * lamps.size:
             continue
-        colour(look, prim[k], u[k], v[k], 0.01 * lamps.size, rgba)
+        surface_colour(look, prim[k], u[k], v[k], 0.01 * lamps.size, rgba)
         n = normals[look.triangles[prim[k], 0]]
         facing = min(max(dot(n, lamps.sun), 0), 1)
         for c in range(3):
@@ -271,7 +280,7 @@ def _pass(data, normal, depth, on, steps, stride, out):
 
 
 @numba.njit(**JIT)
-def smooth(data, normal, depth, on):
+def smooth_light(data, normal, depth, on):
     """Mean over 4 samples down, 4 across, then once more over thrice that, of like samples."""
     spare = np.zeros_like(data)
     near, far = (-2, -1, 1), (-4, 4)
@@ -282,18 +291,18 @@ def smooth(data, normal, depth, on):
 
 
 @numba.njit(**JIT)
-def spread(s, index, shape, lattice, normal, depth, on, every, out):
+def spread_light(s, index, shape, lattice, normal, depth, on, every, out):
     """Give each sample the light of the nearest lattice cell that sees the same surface.
 
     Returns where there is none: True asks for rays of its own.
     """
     missing = np.zeros(len(s.kind), np.bool_)
-    _spread(s, index, shape, lattice, normal, depth, on, every, out, missing)
+    _spread_light(s, index, shape, lattice, normal, depth, on, every, out, missing)
     return missing
 
 
 @numba.njit(**LOOP)
-def _spread(s, index, shape, lattice, normal, depth, on, every, out, missing):
+def _spread_light(s, index, shape, lattice, normal, depth, on, every, out, missing):
     h, w = lattice.shape[:2]
     for g in index:
         i, j = (g // shape[1]) // every, (g % shape[1]) // every
@@ -328,12 +337,12 @@ def shade_one(n, e, tint, traits, light, lamps, room, out):
         out: The light (3,).
 
     """
-    spot, graze = glance(n, e, traits[1], lamps.sun, room[0])
-    shade_seen(dot(n, lamps.sun), spot, graze, tint, traits, light, lamps, room[1], out)
+    spot, graze = view_terms(n, e, traits[1], lamps.sun, room[0])
+    shade_with_view_terms(dot(n, lamps.sun), spot, graze, tint, traits, light, lamps, room[1], out)
 
 
 @numba.njit(**INNER)
-def glance(n, e, rough, sun, h):
+def view_terms(n, e, rough, sun, h):
     """Highlight of a unit sun, and how grazing a sample is seen: what no light changes.
 
     Args:
@@ -352,8 +361,8 @@ def glance(n, e, rough, sun, h):
 
 
 @numba.njit(**INNER)
-def shade_seen(cos, spot, graze, tint, traits, light, lamps, sky, out):
-    """Do as ``shade_one`` where ``glance`` is known.
+def shade_with_view_terms(cos, spot, graze, tint, traits, light, lamps, sky, out):
+    """Do as ``shade_one`` where ``view_terms`` is known.
 
     Args:
         cos: Of the angle between normal and sun.
@@ -416,23 +425,23 @@ def backdrop(lamps, rows, height, width, grid, out):
 
 
 @numba.njit(**INNER)
-def fading(away, lamps):
+def floor_fade(away, lamps):
     """Share of the floor so far away [m] from the scene that is seen before the backdrop."""
     return min(max(1.35 - away / (3 * lamps.size), 0.0), 1.0) ** 1.5
 
 
 @numba.njit(**LOOP)
-def blend(s, index, near, lamps, behind):
+def blend_layers(s, index, near, lamps, behind):
     """Lay nearer light over what is behind it; the floor fades into the backdrop far away."""
     for k in range(len(index)):
         g = index[k]
-        if s.kind[g] == FLOOR:
+        if s.kind[g] == HIT_FLOOR:
             x = s.point[g, 0] - lamps.centre[0]
             y = s.point[g, 1] - lamps.centre[1]
-            fade = fading(np.sqrt(x * x + y * y), lamps)
+            fade = floor_fade(np.sqrt(x * x + y * y), lamps)
             for c in range(3):
                 behind[g, c] = near[g, c] * fade + behind[g, c] * (1 - fade)
-        elif s.kind[g] == THING:
+        elif s.kind[g] == HIT_OBJECT:
             rest = 1 - s.traits[g, 4]
             for c in range(3):
                 tint = 1 - s.traits[g, 5] * (1 - s.albedo[g, c])
@@ -440,7 +449,7 @@ def blend(s, index, near, lamps, behind):
 
 
 @numba.njit(**LOOP)
-def develop(light, rows, size, grid, out):
+def develop_image(light, rows, size, grid, out):
     """Filmic curve per sample (Narkowicz 2016), mean over each pixel, faint vignette, sRGB.
 
     A fixed grain of one grey level keeps soft gradients from showing steps.

@@ -3,11 +3,11 @@
 import numba
 import numpy as np
 
-from corporeal.render.kernels import JIT, LOOP
+from corporeal.render.kernels_hits import JIT, LOOP
 
 
 @numba.njit(**LOOP)
-def weights(distance, out):
+def shepard_weights(distance, out):
     """Shepard's weights with local support: (1 - d/R)² / (d/R)² (Franke & Nielson 1980).
 
     R is the distance of one neighbour more, so that a weight is 0 when its neighbour is exchanged.
@@ -35,7 +35,7 @@ def weights(distance, out):
 
 
 @numba.njit(**LOOP)
-def stretch(rest, near, weight, start, now, F, place, gradient):
+def deform_points(rest, near, weight, start, now, F, place, gradient):
     """X' = Σ w (x_p + F_p (X - X_p)) and Σ w F_p; what has no particles stays as it is."""
     for v in range(len(rest)):
         bare = weight[v].sum() == 0
@@ -57,10 +57,10 @@ def stretch(rest, near, weight, start, now, F, place, gradient):
 
 
 @numba.njit(**JIT)
-def carry(rest, normals, near, weight, start, now, F, place, turned):
-    """Do as ``stretch``; normals turn by the cofactor of Σ w F_p (Nanson's formula)."""
+def deform_points_and_normals(rest, normals, near, weight, start, now, F, place, turned):
+    """Do as ``deform_points``; normals turn by the cofactor of Σ w F_p (Nanson's formula)."""
     gradient = np.empty((len(rest), 3, 3))
-    stretch(rest, near, weight, start, now, F, place, gradient)
+    deform_points(rest, near, weight, start, now, F, place, gradient)
     C = np.empty((3, 3))
     for v in range(len(rest)):
         G = gradient[v]
@@ -82,7 +82,7 @@ def carry(rest, normals, near, weight, start, now, F, place, turned):
 
 
 @numba.njit(**LOOP)
-def strained(F, limit, out):
+def mark_strained(F, limit, out):
     """Mark gradients with ‖FᵀF - 1‖² > their ``limit`` (P,), and those that mirror."""
     for p in range(len(F)):
         norm = 0.0

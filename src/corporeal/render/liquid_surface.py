@@ -12,16 +12,16 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 from skimage.measure import marching_cubes
 
-NEIGHBOURS = 20
+MAX_NEIGHBOURS = 20
 """Particles that count at a point."""
-REACH = 2.0
+REACH_SPACINGS = 2.0
 """They count up to this distance [spacings]."""
-RADIUS = 0.6
+PARTICLE_RADIUS_SPACINGS = 0.6
 """Of a particle: half a spacing, and what makes a flat surface lie half a spacing outside of its
 first layer [spacings]."""
-STEP = 0.6
+SAMPLE_STEP_SPACINGS = 0.6
 """Between samples [spacings]."""
-MOST_SAMPLES = 3_000_000
+MAX_GRID_SAMPLES = 3_000_000
 """In the box around it; where it needs more, they lie farther apart."""
 
 
@@ -38,10 +38,10 @@ class LiquidSurface:
     """Index into the scene's finishes."""
 
 
-NOTHING = LiquidSurface(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3), np.int64))
+EMPTY_SURFACE = LiquidSurface(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3), np.int64))
 
 
-def surface_of(points: Float[np.ndarray, "N 3"], spacing: float) -> LiquidSurface:
+def liquid_surface(points: Float[np.ndarray, "N 3"], spacing: float) -> LiquidSurface:
     """Wrap particles in a surface.
 
     Args:
@@ -51,16 +51,16 @@ def surface_of(points: Float[np.ndarray, "N 3"], spacing: float) -> LiquidSurfac
     """
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 2:
-        return NOTHING
+        return EMPTY_SURFACE
     low, high = points.min(axis=0), points.max(axis=0)
-    step = STEP * spacing
-    margin = (REACH + 1.0) * spacing
-    while np.prod((high - low + 2 * margin) / step) > MOST_SAMPLES:
+    step = SAMPLE_STEP_SPACINGS * spacing
+    margin = (REACH_SPACINGS + 1.0) * spacing
+    while np.prod((high - low + 2 * margin) / step) > MAX_GRID_SAMPLES:
         step *= 1.1
     shape = np.ceil((high - low + 2 * margin) / step).astype(int) + 1
     origin = low - margin
     field = np.full(shape, -spacing)
-    near = _near(points, origin, step, shape, REACH * spacing)
+    near = _near(points, origin, step, shape, REACH_SPACINGS * spacing)
     field[tuple(near.T)] = _depth(origin + step * near, points, spacing)
     vertices, triangles, normals, _ = marching_cubes(
         field, 0.0, spacing=(step,) * 3, gradient_direction="ascent"
@@ -95,14 +95,14 @@ def _near(
 
 def _depth(samples: np.ndarray, points: np.ndarray, spacing: float) -> Float[np.ndarray, " M"]:
     """How deep samples lie below the surface [m]; negative outside."""
-    reach, count = REACH * spacing, min(NEIGHBOURS, len(points))
+    reach, count = REACH_SPACINGS * spacing, min(MAX_NEIGHBOURS, len(points))
     distance, index = KDTree(points).query(samples, k=count, distance_upper_bound=reach)
     weight = np.clip(1.0 - (distance / reach) ** 2, 0.0, 1.0) ** 3
     total = weight.sum(axis=1)
     found = total > 0
     place = points[np.minimum(index, len(points) - 1)]
     mean = np.einsum("mk,mkd->md", weight, place) / np.maximum(total, 1e-30)[:, None]
-    depth = RADIUS * spacing - np.linalg.norm(samples - mean, axis=1)
+    depth = PARTICLE_RADIUS_SPACINGS * spacing - np.linalg.norm(samples - mean, axis=1)
     return np.where(found, np.maximum(depth, -spacing), -spacing)
 
 

@@ -5,11 +5,11 @@ import zlib
 from base64 import b64encode
 from importlib.resources import files
 
-from corporeal.render.png import EFFORT
+from corporeal.render.png_writer import ZLIB_LEVEL
 
-MODULES = ("three.min.js", "take.js", "splats.js", "stage.js", "cards.js", "page.js")
+VIEW_SCRIPTS = ("three.min.js", "take.js", "splats.js", "stage.js", "cards.js", "page.js")
 """Of the view, each after those that it imports."""
-ALONE = """<div id="view"><p class="unseen">The 3D view is drawn by scripts, and takes a moment. Where this sentence stays, this browser does not run them: the film below and all else on this page need none.</p></div>
+INLINE_VIEW_HTML = """<div id="view"><p class="unseen">The 3D view is drawn by scripts, and takes a moment. Where this sentence stays, this browser does not run them: the film below and all else on this page need none.</p></div>
 <script type="text/plain" id="view-modules">{modules}</script>
 <script type="text/plain" id="view-take">{take}</script>
 <style>
@@ -45,9 +45,11 @@ def inline_view(take: bytes) -> str:
         take: From ``render.take``.
 
     """
-    modules = json.dumps([(name, web_file(name)) for name in MODULES]).encode()
-    return ALONE.format(modules=_packed(modules), take=_packed(take), style=web_file("viewer.css"))
+    modules = json.dumps([(name, web_file(name)) for name in VIEW_SCRIPTS]).encode()
+    return INLINE_VIEW_HTML.format(
+        modules=_packed(modules), take=_packed(take), style=web_file("viewer.css")
+    )
 
 
 def _packed(data: bytes) -> str:
-    return b64encode(zlib.compress(data, EFFORT)).decode()
+    return b64encode(zlib.compress(data, ZLIB_LEVEL)).decode()

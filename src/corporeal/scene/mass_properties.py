@@ -30,7 +30,7 @@ class MassProperties:
         return replace(self, mass=mass, centre=self.centre * factor, inertia=inertia)
 
 
-def mass_properties(
+def cubes_mass_properties(
     points: Float[np.ndarray, "N 3"], mass: Float[np.ndarray, " N"], size: Float[np.ndarray, " N"]
 ) -> MassProperties:
     """Add up cubes.

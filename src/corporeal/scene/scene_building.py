@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import (
-    DOWNWARDS,
+    GRAVITY_VECTOR,
     Finish,
     Keyframes,
     Push,
@@ -23,18 +23,18 @@ from corporeal.core.types import (
     Vector,
     Wind,
 )
-from corporeal.geometry.arrangement import intersecting
-from corporeal.geometry.creases import creased
-from corporeal.materials import Entry, find
-from corporeal.materials.looks import finish_of
-from corporeal.recognition.words import unique
+from corporeal.geometry.crease_normals import add_crease_normals
+from corporeal.geometry.scene_transforms import overlapping_objects
+from corporeal.materials import MaterialEntry, find_material
+from corporeal.materials.default_appearance import default_finish
+from corporeal.recognition.readable_names import unique_names
 
-STILL: Vector = (0.0, 0.0, 0.0)
-ROUNDNESS = 3
+ZERO_VELOCITY: Vector = (0.0, 0.0, 0.0)
+BALL_SUBDIVISIONS = 3
 """How often the twenty triangles of a ball are divided: its volume is 0.9 % too small."""
-SECTIONS = 48
+CYLINDER_SIDES_COUNT = 48
 """Sides of a cylinder: its volume is 0.3 % too small."""
-SUNK = 1e-6
+MAX_ROUNDOFF_DEPTH_M = 1e-6
 """Depth below the floor that is round-off [m]."""
 
 
@@ -52,7 +52,7 @@ class Solid:
     """World position [m]."""
     triangles: Int[np.ndarray, "T 3"]
     """Vertex numbers, anticlockwise seen from outside."""
-    velocity: Vector = STILL
+    velocity: Vector = ZERO_VELOCITY
     """At the start [m/s]."""
     push: Push | None = None
     wind: Wind | None = None
@@ -65,10 +65,10 @@ class Solid:
 
 
 def ball(
-    material: str | Entry,
+    material: str | MaterialEntry,
     radius: float,
     at: Vector | None = None,
-    velocity: Vector = STILL,
+    velocity: Vector = ZERO_VELOCITY,
     name: str = "ball",
 ) -> Solid:
     """Return a ball.
@@ -87,15 +87,15 @@ def ball(
     """
     _check_lengths(name, radius=radius)
     at = (0.0, 0.0, radius) if at is None else at
-    shape = trimesh.creation.icosphere(ROUNDNESS, radius)
-    return _placed(material, shape, at, velocity, name)
+    shape = trimesh.creation.icosphere(BALL_SUBDIVISIONS, radius)
+    return _placed_solid(material, shape, at, velocity, name)
 
 
 def box(
-    material: str | Entry,
+    material: str | MaterialEntry,
     size: Vector,
     at: Vector | None = None,
-    velocity: Vector = STILL,
+    velocity: Vector = ZERO_VELOCITY,
     name: str = "box",
 ) -> Solid:
     """Return a box whose sides are along the axes.
@@ -112,18 +112,18 @@ def box(
         UserError: A side is not positive, or a number is not finite.
 
     """
-    width, depth, height = _vector(name, "size", size)
+    width, depth, height = _checked_vector(name, "size", size)
     _check_lengths(name, width=width, depth=depth, height=height)
     at = (0.0, 0.0, height / 2) if at is None else at
-    return _placed(material, trimesh.creation.box(size), at, velocity, name)
+    return _placed_solid(material, trimesh.creation.box(size), at, velocity, name)
 
 
 def cylinder(
-    material: str | Entry,
+    material: str | MaterialEntry,
     radius: float,
     height: float,
     at: Vector | None = None,
-    velocity: Vector = STILL,
+    velocity: Vector = ZERO_VELOCITY,
     name: str = "cylinder",
 ) -> Solid:
     """Return an upright cylinder.
@@ -143,15 +143,15 @@ def cylinder(
     """
     _check_lengths(name, radius=radius, height=height)
     at = (0.0, 0.0, height / 2) if at is None else at
-    shape = trimesh.creation.cylinder(radius, height, sections=SECTIONS)
-    return _placed(material, shape, at, velocity, name)
+    shape = trimesh.creation.cylinder(radius, height, sections=CYLINDER_SIDES_COUNT)
+    return _placed_solid(material, shape, at, velocity, name)
 
 
 def solid(
-    material: str | Entry,
+    material: str | MaterialEntry,
     vertices: Float[np.ndarray, "V 3"],
     triangles: Int[np.ndarray, "T 3"],
-    velocity: Vector = STILL,
+    velocity: Vector = ZERO_VELOCITY,
     name: str = "solid",
 ) -> Solid:
     """Return the body inside a closed triangle mesh.
@@ -177,7 +177,7 @@ def solid(
             f"{name} is not closed, or its triangles face inwards. Give every edge two triangles, "
             "anticlockwise seen from outside."
         )
-    return _placed(material, shape, STILL, velocity, name)
+    return _placed_solid(material, shape, ZERO_VELOCITY, velocity, name)
 
 
 def build_scene(
@@ -185,7 +185,7 @@ def build_scene(
     name: str = "scene",
     duration: float = 1.0,
     fps: int = 60,
-    gravity: Vector = DOWNWARDS,
+    gravity: Vector = GRAVITY_VECTOR,
 ) -> Scene:
     """Put solids into a scene above the floor.
 
@@ -207,44 +207,46 @@ def build_scene(
     if not solids:
         raise UserError("A scene needs at least one solid: corporeal.ball('rubber', 0.03).")
     _check_lengths(name, duration=duration, fps=fps)
-    gravity = _vector(name, "gravity", gravity)
+    gravity = _checked_vector(name, "gravity", gravity)
     for one in solids:
         _refuse_below_floor(one)
-    names = unique([one.name for one in solids])
+    names = unique_names([one.name for one in solids])
     made = Scene(
         name=name,
         source="built in Python",
-        objects=tuple(_object(one, called) for one, called in zip(solids, names, strict=True)),
-        surfaces=tuple(_surface(one, k) for k, one in enumerate(solids)),
-        finishes=tuple(_finish(one) for one in solids),
+        objects=tuple(
+            _scene_object_of(one, called) for one, called in zip(solids, names, strict=True)
+        ),
+        surfaces=tuple(_surface_of(one, k) for k, one in enumerate(solids)),
+        finishes=tuple(_finish_of(one) for one in solids),
         gravity=gravity,
         duration=float(duration),
         fps=fps,
     )
-    return _with_overlaps_told(made)
+    return _with_overlap_warnings(made)
 
 
-def _placed(
-    material: str | Entry, shape: trimesh.Trimesh, at: Vector, velocity: Vector, name: str
+def _placed_solid(
+    material: str | MaterialEntry, shape: trimesh.Trimesh, at: Vector, velocity: Vector, name: str
 ) -> Solid:
-    entry = material if isinstance(material, Entry) else find(material)
+    entry = material if isinstance(material, MaterialEntry) else find_material(material)
     return Solid(
         name=name,
         material=entry.name,
-        vertices=np.array(shape.vertices, float) + _vector(name, "at", at),
+        vertices=np.array(shape.vertices, float) + _checked_vector(name, "at", at),
         triangles=np.array(shape.faces, np.int64),
-        velocity=_vector(name, "velocity", velocity),
-        finish=finish_of(*entry.kin),
+        velocity=_checked_vector(name, "velocity", velocity),
+        finish=default_finish(*entry.kin),
     )
 
 
-def _finish(one: Solid) -> Finish:
+def _finish_of(one: Solid) -> Finish:
     return (
         replace(one.finish, name=one.name) if one.colour is None else Finish(one.name, one.colour)
     )
 
 
-def _object(one: Solid, name: str) -> SceneObject:
+def _scene_object_of(one: Solid, name: str) -> SceneObject:
     return SceneObject(
         name=name,
         class_name=one.name.replace("_", " "),
@@ -257,15 +259,15 @@ def _object(one: Solid, name: str) -> SceneObject:
     )
 
 
-def _surface(one: Solid, number: int) -> Surface:
+def _surface_of(one: Solid, number: int) -> Surface:
     stated = {"substance": one.material}
     bare = Surface(one.name, number, number, one.vertices, one.triangles, extras=stated)
-    return creased(bare)
+    return add_crease_normals(bare)
 
 
-def _with_overlaps_told(scene: Scene) -> Scene:
+def _with_overlap_warnings(scene: Scene) -> Scene:
     names = [obj.name for obj in scene.objects]
-    pairs = intersecting(scene)
+    pairs = overlapping_objects(scene)
     overlaps = tuple(f"{names[a]} and {names[b]} overlap at the start." for a, b in pairs)
     return replace(scene, warnings=scene.warnings + overlaps)
 
@@ -279,7 +281,7 @@ def _check_lengths(name: str, **given: float) -> None:
             raise UserError(f"The {what} of {name} is {value}. Give a positive number.")
 
 
-def _vector(name: str, what: str, given: Sequence[float]) -> Vector:
+def _checked_vector(name: str, what: str, given: Sequence[float]) -> Vector:
     numbers = tuple(map(float, given))
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise UserError(f"{what} of {name} is {given!r}. Give three finite numbers (x, y, z).")
@@ -288,7 +290,7 @@ def _vector(name: str, what: str, given: Sequence[float]) -> Vector:
 
 def _refuse_below_floor(one: Solid) -> None:
     depth = -float(one.vertices[:, 2].min())
-    if depth > SUNK:
+    if depth > MAX_ROUNDOFF_DEPTH_M:
         raise UserError(
             f"{one.name} reaches {depth:.3g} m below the floor, which is at z = 0. Raise it with "
             "at=(x, y, z)."

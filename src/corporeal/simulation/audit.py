@@ -9,24 +9,24 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.core.findings import (
+from corporeal.core.audit_data import (
     Audit,
     EnergyGain,
     Expectation,
     PartAudit,
-    Settled,
+    SettlingOutcome,
 )
 from corporeal.core.types import Ledger, MaterialField, Particles, Scene, SceneObject, Trajectory
-from corporeal.discretization.filled import acting
-from corporeal.simulation.audit_words import (
-    ALLOWED,
-    breaches,
+from corporeal.discretization.filled_shells import acting_material
+from corporeal.simulation.audit_messages import (
+    ALLOWED_BREACHES,
+    breach_messages,
     equilibrium_warnings,
-    passage,
+    passage_message,
     surface_warnings,
 )
-from corporeal.simulation.breakage import breakage
 from corporeal.simulation.energy_gain import energy_gain
+from corporeal.simulation.fracture_prediction import predict_breakage
 from corporeal.simulation.mesh_gaps import surface_pairs
 
 
@@ -35,7 +35,7 @@ def audit(
     particles: Particles,
     field: MaterialField,
     trajectory: Trajectory,
-    settling: Settled | None = None,
+    settling: SettlingOutcome | None = None,
 ) -> Audit:
     """Check a run against the laws it must obey.
 
@@ -58,12 +58,12 @@ def audit(
         steps=int(ledger.steps[-1]),
         dt_min=float(ledger.dt_min[-1]),
         dt_max=float(ledger.dt_max[-1]),
-        nan_count=int(ledger.nan.max()) + not_finite(ledger),
+        nan_count=int(ledger.nan.max()) + count_not_finite(ledger),
         particles_out_of_domain=int(ledger.lost.max()),
         momentum_residual=momentum_residual(ledger, scene, cell),
         energy_growth=energy_growth(ledger, scene, cell),
         mechanical_growth=energy_growth(ledger, scene, cell, with_losses=False),
-        energy_gain=who_gained(ledger, scene, cell),
+        energy_gain=object_gaining_energy(ledger, scene, cell),
         unbooked_loss=unbooked_loss(ledger, scene, cell),
         impact_loss=impact_loss(ledger, scene, cell),
         impact_gain=impact_gain(ledger, scene, cell),
@@ -75,14 +75,14 @@ def audit(
         pair_penetration_m=pair,
         start_penetration_m=float(ledger.overlap[0].max(initial=0.0)),
         parts=part_rows(scene, particles, field),
-        breakage=breakage(scene, particles, field, trajectory),
+        breakage=predict_breakage(scene, particles, field, trajectory),
         settling=settling,
         warnings=(),
     )
     warnings = (
         *particles.warnings,
         *equilibrium_warnings(settling),
-        *breaches(found),
+        *breach_messages(found),
         *surface_warnings(found.surfaces),
     )
     return found.noting(warnings)
@@ -91,7 +91,7 @@ def audit(
 # ------------------------------------------------------------------ laws
 
 
-BOOKED = (
+LEDGER_QUANTITIES = (
     *("momentum", "angular_momentum", "kinetic", "elastic", "potential"),
     *("external_impulse", "plane_impulse", "pair_impulse", "push_work"),
     *("friction_loss", "impact_loss", "plastic_loss", "viscous_loss"),
@@ -99,9 +99,11 @@ BOOKED = (
 """What the ledger adds up: each is a number at any time."""
 
 
-def not_finite(ledger: Ledger) -> int:
+def count_not_finite(ledger: Ledger) -> int:
     """Count the booked numbers that are none: no law can be checked by them."""
-    return sum(int(np.count_nonzero(~np.isfinite(getattr(ledger, name)))) for name in BOOKED)
+    return sum(
+        int(np.count_nonzero(~np.isfinite(getattr(ledger, name)))) for name in LEDGER_QUANTITIES
+    )
 
 
 def momentum_residual(ledger: Ledger, scene: Scene, cell: float) -> float:
@@ -126,17 +128,17 @@ def energy_growth(ledger: Ledger, scene: Scene, cell: float, with_losses: bool =
     """
     balance, scale = energy_balance(ledger, scene, cell)
     if with_losses:
-        balance = balance + dissipated(ledger)
+        balance = balance + dissipated_energy(ledger)
     growth = max(0.0, float((balance - balance[0]).max()))
     return growth / scale if scale > 0 else 0.0
 
 
-def dissipated(ledger: Ledger) -> Float[np.ndarray, " F"]:
+def dissipated_energy(ledger: Ledger) -> Float[np.ndarray, " F"]:
     """Energy that friction, plastic flow and viscosity took [J]."""
     return ledger.friction_loss + ledger.plastic_loss + ledger.viscous_loss
 
 
-def given(ledger: Ledger, scene: Scene, cell: float) -> float:
+def available_energy(ledger: Ledger, scene: Scene, cell: float) -> float:
     """Energy that there was in all [J]: at the start, and what gravity and pushes gave.
 
     At least that of a fall through one cell.
@@ -152,9 +154,9 @@ def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
 
     Transfers between particles and the grid took it, and nothing in nature.
     """
-    balance = energy_balance(ledger, scene, cell)[0] + dissipated(ledger)
+    balance = energy_balance(ledger, scene, cell)[0] + dissipated_energy(ledger)
     balance = balance + ledger.impact_loss
-    lost, whole = float((balance[0] - balance).max()), given(ledger, scene, cell)
+    lost, whole = float((balance[0] - balance).max()), available_energy(ledger, scene, cell)
     return max(0.0, lost) / whole if whole > 0 else 0.0
 
 
@@ -163,7 +165,7 @@ def impact_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
 
     Pairs that gained hide nothing of it, where it is known what each pair took.
     """
-    whole = given(ledger, scene, cell)
+    whole = available_energy(ledger, scene, cell)
     lost = float(ledger.impact_loss[-1]) + (impact_gain(ledger, scene, cell) or 0.0) * whole
     return lost / whole if whole > 0 else 0.0
 
@@ -173,7 +175,7 @@ def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float | None:
 
     None: a run from before it was kept by pairs.
     """
-    taken, whole = np.triu(ledger.impact_of_pair[-1]), given(ledger, scene, cell)
+    taken, whole = np.triu(ledger.impact_of_pair[-1]), available_energy(ledger, scene, cell)
     if not np.isfinite(taken).all():
         return None
     return float(-taken[taken < 0.0].sum()) / whole if whole > 0 else 0.0
@@ -193,22 +195,22 @@ def energy_balance(
     return energy - ledger.push_work - fallen, scale
 
 
-def who_gained(ledger: Ledger, scene: Scene, cell: float) -> EnergyGain | None:
+def object_gaining_energy(ledger: Ledger, scene: Scene, cell: float) -> EnergyGain | None:
     """Say which object gained energy from nowhere, if any did beyond what is allowed."""
     balance, scale = energy_balance(ledger, scene, cell)
     names = [thing.name for thing in scene.objects]
-    return energy_gain(ledger, names, balance, ALLOWED["mechanical_growth"] * scale)
+    return energy_gain(ledger, names, balance, ALLOWED_BREACHES["mechanical_growth"] * scale)
 
 
-def believed(seen: Iterable[Expectation], found: Audit) -> tuple[Expectation, ...]:
+def reject_expectations(seen: Iterable[Expectation], found: Audit) -> tuple[Expectation, ...]:
     """Let no expectation be met by a run that is not physics.
 
     That is one that gained energy, or in which an object passed through another.
     """
     through = [pair for pair in found.surfaces if pair.passed]
     if through:
-        doubt = f"but {passage(through[0])}"
-    elif found.mechanical_growth > ALLOWED["mechanical_growth"]:
+        doubt = f"but {passage_message(through[0])}"
+    elif found.mechanical_growth > ALLOWED_BREACHES["mechanical_growth"]:
         doubt = f"but energy grew by {found.mechanical_growth:.1%}"
     else:
         return tuple(seen)
@@ -237,7 +239,7 @@ def part_row(
     """Put the numbers of one part side by side; owner: None where it has no particles."""
     material, structure, mass = field.materials[k], field.structures[k], particles.mass_real[k]
     treatment = particles.treatments[k]
-    acts = acting(material, structure, treatment)
+    acts = acting_material(material, structure, treatment)
     return PartAudit(
         name=field.words[k].name,
         object=None if owner is None else owner.name,

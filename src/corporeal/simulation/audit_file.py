@@ -4,11 +4,11 @@ from pathlib import Path
 from typing import TypeVar
 
 from corporeal.core import store
+from corporeal.core.audit_data import Audit, RunAudit
+from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
-from corporeal.core.findings import Audit, RunAudit
-from corporeal.core.typed import typed
 
-AUDIT = "audit.json"
+AUDIT_FILE = "audit.json"
 
 A = TypeVar("A", bound=Audit)
 
@@ -20,7 +20,7 @@ def write_audit(folder: Path, audit: Audit) -> None:
         DiskError: The disk refuses it.
 
     """
-    store.write_json(folder / AUDIT, audit)
+    store.write_json(folder / AUDIT_FILE, audit)
 
 
 def read_audit(folder: Path) -> Audit:
@@ -44,10 +44,10 @@ def read_run_audit(folder: Path) -> RunAudit:
 
 
 def _read(kind: type[A], folder: Path, remedy: str) -> A:
-    path = folder / AUDIT
+    path = folder / AUDIT_FILE
     data = store.read_json(path)
     try:
-        return typed(kind, data)
+        return from_plain(kind, data)
     except (ValueError, TypeError, AttributeError) as error:
         raise BadFileError(
             path, f"is no audit that this version can read ({error}).", remedy

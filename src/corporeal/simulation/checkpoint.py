@@ -16,20 +16,20 @@ from typing import Any
 import numpy as np
 
 from corporeal.core.errors import BadFileError
-from corporeal.simulation.frames import frame_path, read_arrays, write_arrays
+from corporeal.simulation.trajectory_files import frame_path, read_arrays, write_arrays
 
-LAST, BEFORE = "checkpoint.npz", "checkpoint-before.npz"
-EVERY = 10.0
+CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE = "checkpoint.npz", "checkpoint-before.npz"
+MIN_INTERVAL_S = 10.0
 """Least seconds of computing between two checkpoints."""
-LARGEST_SHARE = 0.05
+MAX_WRITE_TIME_FRACTION = 0.05
 """Largest share of the time that may be spent on writing them."""
-STATE = "engine."
+STATE_PREFIX = "engine."
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Saved:
+class CheckpointState:
     """What a checkpoint holds."""
 
     done: int = 0
@@ -55,25 +55,25 @@ class Checkpoints:
     @property
     def due(self) -> bool:
         """Whether enough was computed since the last one to write another."""
-        pause = max(EVERY, self.seconds / LARGEST_SHARE)
+        pause = max(MIN_INTERVAL_S, self.seconds / MAX_WRITE_TIME_FRACTION)
         return time.monotonic() - self.written >= pause
 
     def keep(self, saved: dict[str, np.ndarray], done: int) -> None:
         """Write a state after ``done`` frames; the last one becomes the one before."""
         start = time.monotonic()
-        last = self.folder / LAST
+        last = self.folder / CHECKPOINT_FILE
         if last.exists():
-            last.replace(self.folder / BEFORE)
+            last.replace(self.folder / PREVIOUS_CHECKPOINT_FILE)
         saved = {name: np.asarray(value) for name, value in saved.items()}
-        state = {f"{STATE}{name}": value for name, value in saved.items()}
+        state = {f"{STATE_PREFIX}{name}": value for name, value in saved.items()}
         about = {"done": done, "name": self.name, "seal": fingerprint(done, self.name, saved)}
         write_arrays(last, state | {name: np.array(value) for name, value in about.items()})
         self.written = time.monotonic()
         self.seconds = self.written - start
 
-    def newest(self) -> Saved:
+    def newest(self) -> CheckpointState:
         """Return the newest usable checkpoint; one of nothing where there is none."""
-        for path in (self.folder / LAST, self.folder / BEFORE):
+        for path in (self.folder / CHECKPOINT_FILE, self.folder / PREVIOUS_CHECKPOINT_FILE):
             if not path.exists():
                 continue
             try:
@@ -81,11 +81,13 @@ class Checkpoints:
             except BadFileError as error:
                 log.warning("%s Looking for an earlier one, or starting again.", error)
                 path.unlink()
-        return Saved()
+        return CheckpointState()
 
-    def _read(self, path: Path) -> Saved:
+    def _read(self, path: Path) -> CheckpointState:
         found = read_arrays(path)
-        state = {k.removeprefix(STATE): v for k, v in found.items() if k.startswith(STATE)}
+        state = {
+            k.removeprefix(STATE_PREFIX): v for k, v in found.items() if k.startswith(STATE_PREFIX)
+        }
         try:
             done, name, seal = int(found["done"]), str(found["name"]), str(found["seal"])
         except KeyError as error:
@@ -97,11 +99,11 @@ class Checkpoints:
         missing = [k for k in range(done) if not frame_path(self.folder, k).exists()]
         if missing:
             raise BadFileError(path, f"does not fit: frame {missing[0]} is missing.")
-        return Saved(done, state)
+        return CheckpointState(done, state)
 
     def forget(self) -> None:
         """Remove them: the simulation is finished."""
-        for name in (LAST, BEFORE):
+        for name in (CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE):
             (self.folder / name).unlink(missing_ok=True)
 
 

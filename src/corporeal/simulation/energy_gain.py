@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from corporeal.core.audit_data import EnergyGain
 from corporeal.core.errors import SimulationError
-from corporeal.core.findings import EnergyGain
 from corporeal.core.types import Ledger
 from corporeal.mpm.problem import Problem
 from corporeal.simulation.ledger_row import object_of_body
 
-ALONE = 0.01
+MAX_FREE_FLIGHT_GROWTH = 0.01
 """Growth of an object's energy in flight, as a share of the most it had, that ends a run: explicit
 steps and transfers between particles and grid only lose energy."""
 
@@ -63,7 +63,7 @@ class EnergyWatch:
         share = (energy - self.least) / np.maximum(scale, 1e-300)
         self.time, self.work = float(row.time), float(row.push_work)
         worst = int(np.argmax(share))
-        if share[worst] > ALONE:
+        if share[worst] > MAX_FREE_FLIGHT_GROWTH:
             raise SimulationError(
                 f"At t = {self.time:.4g} s {self.names[worst]!r} had gained {share[worst]:.1%} of "
                 "its energy although it touched nothing and nothing pushed it: its motion from "

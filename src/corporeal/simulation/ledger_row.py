@@ -5,11 +5,13 @@ from dataclasses import fields
 import numpy as np
 
 from corporeal.core.types import Ledger
-from corporeal.mpm.physics.distance import pair_gaps, plane_depth
-from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
+from corporeal.mpm.physics.body_distance import pair_gaps, plane_depth
+from corporeal.mpm.problem import Diagnostics, Problem, Snapshot, StepStatistics
 
 
-def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) -> Ledger:
+def ledger_row(
+    problem: Problem, now: Snapshot, measure: Diagnostics, steps: StepStatistics
+) -> Ledger:
     """Everything the audit needs of one instant.
 
     The bodies of one object, its soft matter and the frames bonded to it, are added up.
@@ -19,7 +21,7 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
     position = np.split(now.position, ends)
     speed = np.split(np.linalg.norm(now.velocity, axis=1), ends)
     mass = [b.volume * b.density for b in problem.bodies]
-    found = {f.name: np.asarray(getattr(measure, f.name)) for f in fields(Measure)}
+    found = {f.name: np.asarray(getattr(measure, f.name)) for f in fields(Diagnostics)}
     found["lost"] = np.array(np.count_nonzero(measure.lost))
     # Not ``@``: that is a sum of as many parts as BLAS has threads, which spin while they wait.
     carried_on = [np.einsum("p,p->", m, v) for m, v in zip(mass, speed, strict=True)]
@@ -34,7 +36,7 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
     group = object_of_body(problem)
     squeezed = np.split(volume_shares(now), ends)
     if problem.bonds or problem.apart:
-        found |= merged(found, group)
+        found |= sum_by_object(found, group)
         one = [np.flatnonzero(group == k) for k in range(group.max() + 1)]
         position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
         squeezed = [np.concatenate([squeezed[b] for b in bodies]) for bodies in one]
@@ -74,13 +76,16 @@ def plane_depths(problem: Problem, now: Snapshot) -> np.ndarray:
         if body.rigid:
             stretch = now.deformation[mine]
         if body.rigid and len(body.surface):
-            points, stretch = carried(body.surface, body.position, points, stretch[0]), None
+            points, stretch = (
+                rotate_with_body(body.surface, body.position, points, stretch[0]),
+                None,
+            )
         for w, plane in enumerate(problem.planes):
             depths[w, b] = plane_depth(points, plane, stretch, problem.cell)
     return depths
 
 
-def carried(
+def rotate_with_body(
     points: np.ndarray, start: np.ndarray, now: np.ndarray, rotation: np.ndarray
 ) -> np.ndarray:
     """Points that turn with a rigid body whose particles went from ``start`` to ``now`` [m]."""
@@ -99,34 +104,36 @@ def object_of_body(problem: Problem) -> np.ndarray:
     return np.array(group)
 
 
-def merged(row: dict[str, np.ndarray], group: np.ndarray) -> dict[str, np.ndarray]:
+def sum_by_object(row: dict[str, np.ndarray], group: np.ndarray) -> dict[str, np.ndarray]:
     """Return sums over bodies with one entry per object, by the names of ``Ledger``."""
     share = (group == np.arange(group.max() + 1)[:, None]).astype(float)
     mass = share @ row["mass"]
-    found = {name: share @ row[name] for name in ADDED}
+    found = {name: share @ row[name] for name in SUMMED_QUANTITIES}
     found["centre"] = (share * row["mass"]) @ row["centre"] / mass[:, None]
     found["rms_speed"] = np.sqrt((share * row["mass"]) @ row["rms_speed"] ** 2 / mass)
     found["plane_impulse"] = np.einsum("ob,wbk->wok", share, row["plane_impulse"])
     deepest = [row["plane_depth"][:, group == k].max(axis=1) for k in range(len(share))]
     found["plane_depth"] = np.stack(deepest, axis=1)
-    found["pair_impulse"] = between_objects(row["pair_impulse"], group)
+    found["pair_impulse"] = sum_by_object_pair(row["pair_impulse"], group)
     planes = len(row["first_contact"]) - len(group)
     names = np.concatenate([group, group.max() + 1 + np.arange(planes)])
-    found["impact_of_pair"] = between_objects(row["impact_of_pair"], names)
-    return found | meetings(row, names)
+    found["impact_of_pair"] = sum_by_object_pair(row["impact_of_pair"], names)
+    return found | object_contact_times(row, names)
 
 
-def between_objects(table: np.ndarray, name: np.ndarray) -> np.ndarray:
+def sum_by_object_pair(table: np.ndarray, name: np.ndarray) -> np.ndarray:
     """Add up what pairs of bodies have by pairs of objects; within one object it is 0."""
     share = (name == np.arange(name.max() + 1)[:, None]).astype(float)
     between = share @ table @ share.T
     return between - np.diag(np.diag(between))
 
 
-ADDED = "mass momentum angular_momentum kinetic elastic potential external_impulse flow".split()
+SUMMED_QUANTITIES = (
+    "mass momentum angular_momentum kinetic elastic potential external_impulse flow".split()
+)
 
 
-def meetings(row: dict[str, np.ndarray], name: np.ndarray) -> dict[str, np.ndarray]:
+def object_contact_times(row: dict[str, np.ndarray], name: np.ndarray) -> dict[str, np.ndarray]:
     """First and last contact of every pair of objects, of which some are several bodies."""
     count = name.max() + 1
     first, last = np.full((2, count, count), np.nan)

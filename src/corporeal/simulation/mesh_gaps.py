@@ -11,44 +11,44 @@ from itertools import combinations, permutations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.core.findings import PairSurfaces
+from corporeal.core.audit_data import SurfacePairCheck
 from corporeal.core.types import Frame, Particles, Scene, Trajectory
-from corporeal.geometry.mesh import Mesh, joined
-from corporeal.geometry.rigid_fit import RigidFit, angle, rigid_fit
-from corporeal.geometry.shape import Crossings, Shape
-from corporeal.geometry.spread import sample_surface
-from corporeal.render.skin import Skin, bind_points
+from corporeal.geometry.mesh import Mesh, join_meshes
+from corporeal.geometry.mesh_queries import QueryMesh, SegmentCrossings
+from corporeal.geometry.point_sampling import sample_surface
+from corporeal.geometry.rigid_fit import RigidFit, fit_rigid_motion, rotation_angle
+from corporeal.render.skin_binding import SkinBinding, bind_points
 
-NEAR = 2.0
+NEAR_DX = 2.0
 """Objects whose particles never come nearer than this [cells] are not looked at."""
-LOOKS = 12
+OVERLAP_FRAMES = 12
 """Frames in which overlaps are measured, beside the last …"""
-SAMPLES = 400
+SURFACE_SAMPLES = 400
 """… at so many points of each surface."""
-GRAINS = 60
+TRACKED_PARTICLES = 60
 """Particles of an object whose ways through another one are followed."""
-STRIDE = 0.25
+TRACK_STRIDE_DX = 0.25
 """Their ways are looked at where one has gone farther than this [cells]."""
-MOST_TURN = np.radians(60.0)
+MAX_TURN_RAD = np.radians(60.0)
 """Where the other turned farther from one look to the next, nobody knows their ways [rad]."""
-PASSED = 0.5
+PASSED_FRACTION = 0.5
 """An object has passed through another when more than this share of them has [-]."""
-HOVERS = 0.15
+VISIBLE_GAP_RATIO = 0.15
 """A gap between objects that touch is visible beyond this share of the narrower one's
 middle side [-]."""
-FINEST = 40
+MAX_EDGES_ALONG_SURFACE = 40
 """Edges of a surface that bends are at most its longest side over this, so that dents show, …"""
-DENT = 1.0
+DENT_EDGE_DX = 1.0
 """… or this, which is as fine as what it follows knows [cells]."""
 
 
 @dataclass(frozen=True)
-class Coat:
+class TrackedSurface:
     """The surface of one object and what it follows."""
 
-    surface: Shape
+    surface: QueryMesh
     """At time 0."""
-    skin: Skin
+    skin: SkinBinding
     sample: Int[np.ndarray, " N"]
     """Triangle of each point that is asked, and …"""
     weight: Float[np.ndarray, "N 3"]
@@ -59,11 +59,11 @@ class Coat:
     """Numbers of all of the object's particles."""
     closed: bool
 
-    def shape(self, frame: Frame) -> Shape:
+    def shape(self, frame: Frame) -> QueryMesh:
         """Give the surface at one instant."""
         return self.surface.moved(self.skin.carried(frame)[0])
 
-    def points(self, shape: Shape) -> Float[np.ndarray, "N 3"]:
+    def points(self, shape: QueryMesh) -> Float[np.ndarray, "N 3"]:
         """Give the points on it that are asked [m]."""
         corners = shape.mesh.vertices[shape.mesh.triangles[self.sample]]
         return np.einsum("nk,nkd->nd", self.weight, corners)
@@ -71,7 +71,7 @@ class Coat:
 
 def surface_pairs(
     scene: Scene, particles: Particles, trajectory: Trajectory
-) -> tuple[PairSurfaces, ...]:
+) -> tuple[SurfacePairCheck, ...]:
     """Measure every two objects that came near each other, in the scene's order.
 
     Args:
@@ -82,23 +82,25 @@ def surface_pairs(
     """
     shown = {s.object for s in scene.surfaces if len(s.triangles)}
     close = [p for p in _close_pairs(particles, trajectory) if shown.issuperset(p)]
-    coats = {k: _coat(scene, particles, k) for k in sorted({b for p in close for b in p})}
+    coats = {
+        k: _tracked_surface(scene, particles, k) for k in sorted({b for p in close for b in p})
+    }
     passed = _passages(coats, close, trajectory, particles.cell)
-    looked = np.unique(np.linspace(0, len(trajectory.time) - 1, LOOKS + 1).astype(int))
+    looked = np.unique(np.linspace(0, len(trajectory.time) - 1, OVERLAP_FRAMES + 1).astype(int))
     rows: dict[tuple[int, int], list[float]] = {pair: [] for pair in close}
     for k in looked.tolist():
         frame = trajectory.frames[k]
         shapes = {b: coats[b].shape(frame) for pair in close for b in pair}
         for pair in close:
-            rows[pair].append(_gap(pair, coats, shapes, NEAR * particles.cell))
+            rows[pair].append(_gap(pair, coats, shapes, NEAR_DX * particles.cell))
     names = [thing.name for thing in scene.objects]
     widths = {k: float(np.sort(np.ptp(coat.skin.rest, axis=0))[1]) for k, coat in coats.items()}
     found = []
     for a, c in close:
         gap, through = rows[a, c][-1], passed.get((a, c))
-        small = HOVERS * min(widths[a], widths[c]) < gap < NEAR * particles.cell
+        small = VISIBLE_GAP_RATIO * min(widths[a], widths[c]) < gap < NEAR_DX * particles.cell
         found.append(
-            PairSurfaces(
+            SurfacePairCheck(
                 first=names[a],
                 second=names[c],
                 gap_end_m=gap if np.isfinite(gap) else None,
@@ -117,31 +119,33 @@ def _touch_still(trajectory: Trajectory, a: int, c: int) -> bool:
     return bool(trajectory.ledger.last_contact[-1, a, c] >= late)
 
 
-def _coat(scene: Scene, particles: Particles, number: int) -> Coat:
+def _tracked_surface(scene: Scene, particles: Particles, number: int) -> TrackedSurface:
     """Bind an object's surface to its particles, and choose where it is asked."""
     rng = np.random.default_rng([number, 7])
-    mesh = joined([s for s in scene.surfaces if s.object == number])
+    mesh = join_meshes([s for s in scene.surfaces if s.object == number])
     members = np.flatnonzero(particles.object == number)
     bends = any(particles.treatments[k].kind != "rigid" for k in np.unique(particles.part[members]))
     if bends:
         longest = float(np.ptp(mesh.vertices, axis=0).max())
-        mesh = finer(mesh, max(longest / FINEST, DENT * particles.cell))
+        mesh = refine_mesh(
+            mesh, max(longest / MAX_EDGES_ALONG_SURFACE, DENT_EDGE_DX * particles.cell)
+        )
     owner = np.full(len(mesh.vertices), number)
     skin = bind_points(mesh.vertices, owner, particles, np.zeros(0, dtype=bool))
-    points, triangle = sample_surface(mesh, SAMPLES, rng)
-    surface = Shape(mesh)
-    return Coat(
+    points, triangle = sample_surface(mesh, SURFACE_SAMPLES, rng)
+    surface = QueryMesh(mesh)
+    return TrackedSurface(
         surface=surface,
         skin=skin,
         sample=triangle,
         weight=_barycentric(points, mesh.corners[triangle]),
-        grains=rng.permutation(members)[:GRAINS],
+        grains=rng.permutation(members)[:TRACKED_PARTICLES],
         members=members,
-        closed=surface.inside(particles.position[members].astype(float)).mean() > PASSED,
+        closed=surface.inside(particles.position[members].astype(float)).mean() > PASSED_FRACTION,
     )
 
 
-def finer(mesh: Mesh, edge: float) -> Mesh:
+def refine_mesh(mesh: Mesh, edge: float) -> Mesh:
     """Halve triangles until no edge is longer than ``edge`` [m]; neighbours stay neighbours.
 
     Edges that are the longest of all their triangles are cut in the middle, again and again
@@ -202,7 +206,7 @@ def _close_pairs(particles: Particles, trajectory: Trajectory) -> list[tuple[int
     gone = np.linalg.norm(np.diff(ledger.centre, axis=0), axis=2).max(axis=0, initial=0.0)
     pairs = []
     for a, c in combinations(range(count), 2):
-        reach = NEAR * particles.cell + gone[a] + gone[c]
+        reach = NEAR_DX * particles.cell + gone[a] + gone[c]
         touched = np.isfinite(ledger.first_contact[-1, a, c])
         if touched or np.nanmin(ledger.gap[:, a, c]) < reach:
             pairs.append((a, c))
@@ -210,7 +214,10 @@ def _close_pairs(particles: Particles, trajectory: Trajectory) -> list[tuple[int
 
 
 def _gap(
-    pair: tuple[int, int], coats: Mapping[int, Coat], shapes: dict[int, Shape], reach: float
+    pair: tuple[int, int],
+    coats: Mapping[int, TrackedSurface],
+    shapes: dict[int, QueryMesh],
+    reach: float,
 ) -> float:
     """Distance of two surfaces [m], negative where they overlap; inf beyond ``reach``."""
     found = [np.inf]
@@ -228,7 +235,7 @@ def _gap(
 
 def distance_within(
     points: Float[np.ndarray, "N 3"],
-    shape: Shape,
+    shape: QueryMesh,
     within: Bool[np.ndarray, " N"],
     reach: float,
 ) -> Float[np.ndarray, " N"]:
@@ -245,7 +252,7 @@ def distance_within(
     near = near == np.packbits(np.ones(6, np.bool_))[0]
     distance = np.full(len(points), np.inf)
     if near.any():
-        distance = Shape(shape.mesh.only(near)).closest(points)[0]
+        distance = QueryMesh(shape.mesh.only(near)).closest(points)[0]
     far = distance > reach
     if far.all() or within[far].any():
         distance[far] = shape.closest(points[far])[0]
@@ -265,7 +272,7 @@ class Passage:
 
 
 def _passages(
-    coats: Mapping[int, Coat],
+    coats: Mapping[int, TrackedSurface],
     close: Sequence[tuple[int, int]],
     trajectory: Trajectory,
     cell: float,
@@ -273,33 +280,35 @@ def _passages(
     """Find the objects that passed through others, by pair."""
     found: dict[tuple[int, int], Passage] = {}
     walks = {
-        (a, c): Walk(coats[a], coats[c], cell) for pair in close for a, c in permutations(pair)
+        (a, c): RelativePath(coats[a], coats[c], cell)
+        for pair in close
+        for a, c in permutations(pair)
     }
     for k, time in enumerate(trajectory.time.tolist()):
         frame = trajectory.frames[k]
         if not np.isfinite(frame.position).all():
             break
-        shapes: dict[int, Shape] = {}
+        shapes: dict[int, QueryMesh] = {}
         for (a, c), walk in walks.items():
             pair = (min(a, c), max(a, c))
             if pair in found or not walk.goes_on(frame):
                 continue
             if c not in shapes:
                 shapes[c] = coats[c].shape(frame)
-            if walk.go(frame, shapes[c]) > PASSED:
+            if walk.go(frame, shapes[c]) > PASSED_FRACTION:
                 found[pair] = Passage(a, time)
     return found
 
 
-class Walk:
+class RelativePath:
     """How particles of one object go in the frame of another: in straight lines.
 
-    A line ends where something has moved by ``STRIDE``; what rests costs nothing. Of what spins
-    so fast that it turns by more than ``MOST_TURN`` between frames (a shard), nothing is said: a
-    straight line in its frame would lead through it where the true arc leads past.
+    A line ends where something has moved by ``TRACK_STRIDE_DX``; what rests costs nothing. Of what
+    spins so fast that it turns by more than ``MAX_TURN_RAD`` between frames (a shard), nothing is
+    said: a straight line in its frame would lead through it where the true arc leads past.
     """
 
-    def __init__(self, walker: Coat, other: Coat, cell: float) -> None:
+    def __init__(self, walker: TrackedSurface, other: TrackedSurface, cell: float) -> None:
         self.walker, self.other, self.cell = walker, other, cell
         self.passed = np.zeros(len(walker.grains), dtype=bool)
         self.last: np.ndarray | None = None
@@ -313,7 +322,11 @@ class Walk:
         """Whether some grain has come so far near the other that it must be looked at."""
         self.now = fit, there = self._there(frame)
         turned, self.turned = self.turned, fit.rotation
-        if self.last is None or turned is None or angle(fit.rotation @ turned.T) > MOST_TURN:
+        if (
+            self.last is None
+            or turned is None
+            or rotation_angle(fit.rotation @ turned.T) > MAX_TURN_RAD
+        ):
             self.last = there
             return False
         box = fit.undo(frame.position[self.other.members].astype(float))
@@ -323,15 +336,15 @@ class Walk:
             self.last = there
             return False
         gone = np.linalg.norm(there - self.last, axis=1).max()
-        return bool(gone > STRIDE * self.cell)
+        return bool(gone > TRACK_STRIDE_DX * self.cell)
 
     def _there(self, frame: Frame) -> tuple[RigidFit, np.ndarray]:
         """Give the other's rigid motion, and the grains in its frame at the start [m]."""
         mine, start = self.other.members, self.other.skin.start
-        fit = rigid_fit(start[mine], frame.position[mine].astype(float), np.ones(len(mine)))
+        fit = fit_rigid_motion(start[mine], frame.position[mine].astype(float), np.ones(len(mine)))
         return fit, fit.undo(frame.position[self.walker.grains].astype(float))
 
-    def go(self, frame: Frame, shape: Shape) -> float:
+    def go(self, frame: Frame, shape: QueryMesh) -> float:
         """Take the step just asked for; give the share of the grains that have passed through."""
         assert self.now is not None
         fit, there = self.now
@@ -345,7 +358,7 @@ class Walk:
         return float(self.passed.mean())
 
     def _through(
-        self, fit: RigidFit, shape: Shape, there: np.ndarray, last: np.ndarray
+        self, fit: RigidFit, shape: QueryMesh, there: np.ndarray, last: np.ndarray
     ) -> Bool[np.ndarray, " N"]:
         """Whether each way, in the other's frame at the start [m], leads through it.
 
@@ -360,7 +373,7 @@ class Walk:
         found = np.zeros(len(there), dtype=bool)
         if not near.any():
             return found
-        body = Shape(Mesh(box, mesh.triangles))
+        body = QueryMesh(Mesh(box, mesh.triangles))
         met, count = body.crossings(last[near], there[near]), int(np.count_nonzero(near))
         into = np.bincount(met.way[met.side > 0], minlength=count)
         out = np.bincount(met.way[met.side < 0], minlength=count)
@@ -371,7 +384,7 @@ class Walk:
         return found
 
     @staticmethod
-    def _opposite(body: Shape, met: Crossings, count: int) -> Bool[np.ndarray, " N"]:
+    def _opposite(body: QueryMesh, met: SegmentCrossings, count: int) -> Bool[np.ndarray, " N"]:
         """Whether the first face that each way meets looks against the last one."""
         answer = np.zeros(count, dtype=bool)
         if not len(met.way):

@@ -9,26 +9,32 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import Delaunay
 
-from corporeal.core.findings import FLOOR, ObjectOutcome, Outcome, PairOutcome, pair_name
+from corporeal.core.audit_data import FLOOR_NAME, ObjectOutcome, Outcome, PairOutcome, pair_name
 from corporeal.core.types import MaterialField, Particles, Scene, Trajectory, Vector
-from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.simulation.residual_shape import Dent, dent, diagonal, reached_by_share, where_it_was
-from corporeal.simulation.surface_mark import marked_at_its_surface, surface_mark
+from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.simulation.residual_shape import (
+    ResidualDent,
+    box_diagonal,
+    place_at_start,
+    residual_dent,
+    upper_percentile,
+)
+from corporeal.simulation.surface_mark import keeps_surface_mark, surface_mark
 
-REST = 0.3
+REST_DURATION_S = 0.3
 """A dent is what is left after so long at rest [s]."""
-APART = 0.1
+SEPARATION_DURATION_S = 0.1
 """Bodies have separated when they stay apart so long [s]."""
-MOST = 0.98
+REACH_PARTICLE_FRACTION = 0.98
 """Share of the particles that tell how far something reaches [-]; lone drops do not."""
-SAMPLES = 8
+REST_FRAMES = 8
 """Frames that are averaged over the rest."""
-TOUCHING = 0.5
+TOUCHING_DISTANCE_DX = 0.5
 """Bodies no farther apart touch [cells]: the distance of two particles in one body. Surfaces are
 known no better. What rests on something is within 0.45, what stands beside it from 1 on."""
 
 
-def outcome(
+def measure_outcome(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> Outcome:
     """Say what was seen.
@@ -41,18 +47,18 @@ def outcome(
 
     """
     names = [o.name for o in scene.objects]
-    bodies = Bodies(scene, particles, field, trajectory)
+    bodies = ObjectParticles(scene, particles, field, trajectory)
     pairs = pair_rows(names, particles.cell, trajectory)
     return Outcome(
         objects={name: object_row(b, names, bodies) for b, name in enumerate(names)},
         pairs=pairs,
-        order=order(pairs),
+        order=contact_order(pairs),
         cell_m=particles.cell,
         duration_s=float(trajectory.time[-1]),
     )
 
 
-class Bodies:
+class ObjectParticles:
     """Particle positions of every object over time; one pass over the frames on disk."""
 
     def __init__(
@@ -68,8 +74,8 @@ class Bodies:
         self.members = [np.flatnonzero(particles.object == b) for b in range(count)]
         first = trajectory.frames[0].position.astype(float)
         self.start = [first[m] for m in self.members]
-        self.size = [diagonal(start) for start in self.start]
-        parting = np.array([marked_at_its_surface(m) for m in field.materials], dtype=bool)
+        self.size = [box_diagonal(start) for start in self.start]
+        parting = np.array([keeps_surface_mark(m) for m in field.materials], dtype=bool)
         self.parting = [parting[particles.part[m]] for m in self.members]
         """Of each object's particles, which keep a mark at their surface."""
         self.error = np.zeros((len(self.time), count))
@@ -83,18 +89,18 @@ class Bodies:
         position = self.trajectory.frames[k].position.astype(float)
         for b, mine in enumerate(self.members):
             now, start = position[mine], self.start[b]
-            fit = rigid_fit(start, now, np.ones(len(start)))
+            fit = fit_rigid_motion(start, now, np.ones(len(start)))
             shift = np.linalg.norm(fit.undo(now) - start, axis=1)
             if self.size[b] > 0.0:  # one particle has no shape
                 self.error[k, b] = np.sqrt(np.mean(shift**2)) / self.size[b]
-            self.squeeze[b] = max(self.squeeze[b], reached_by_share(shift))
+            self.squeeze[b] = max(self.squeeze[b], upper_percentile(shift))
             if keep:
                 self.last[b].append(now)
 
     def resting_frames(self) -> np.ndarray:
-        """Numbers of up to ``SAMPLES`` frames in the last 0.3 s."""
-        late = np.flatnonzero(self.time >= self.time[-1] - REST - 1e-9)
-        return np.unique(np.linspace(late[0], late[-1], SAMPLES).astype(int))
+        """Numbers of up to ``REST_FRAMES`` frames in the last 0.3 s."""
+        late = np.flatnonzero(self.time >= self.time[-1] - REST_DURATION_S - 1e-9)
+        return np.unique(np.linspace(late[0], late[-1], REST_FRAMES).astype(int))
 
     def before(self, instant: float) -> int:
         """Return the number of the last frame before an instant [s]."""
@@ -112,7 +118,7 @@ class Bodies:
         return position + flight * velocity
 
 
-def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
+def object_row(body: int, names: list[str], bodies: ObjectParticles) -> ObjectOutcome:
     """Say what happened to one object."""
     ledger, cell, start = bodies.ledger, bodies.cell, bodies.start[body]
     mark, rim = residual_mark(body, bodies)
@@ -120,22 +126,22 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
     late = bodies.resting_frames()
     drift = float(np.linalg.norm(np.ptp(centre[late], axis=0)))
     moved = centre[-1] - centre[0]
-    fit = rigid_fit(start, bodies.last[body][-1], np.ones(len(start)))
+    fit = fit_rigid_motion(start, bodies.last[body][-1], np.ones(len(start)))
     rms = ledger.rms_speed[late, body]
     bounced = bounce(body, bodies, bodies.gravity)
     return ObjectOutcome(
-        at_rest=bool(rms.max() * REST < cell),
+        at_rest=bool(rms.max() * REST_DURATION_S < cell),
         rms_speed_end=float(rms[-1]),
         shape_error_end=float(bodies.error[-1, body]),
         shape_error_max=float(bodies.error[:, body].max()),
         dent_depth_m=mark.depth,
         dent_depth_dx=mark.depth / cell,
-        dent_place=None if mark.share == 0 else vector(mark.place),
+        dent_place=None if mark.share == 0 else to_vector(mark.place),
         dent_share=mark.share,
         dent_from_contact_m=dent_distances(body, mark, names, bodies),
         rim_height_m=rim,
         deepest_squeeze_m=float(bodies.squeeze[body]),
-        moved_m=vector(moved),
+        moved_m=to_vector(moved),
         moved_level_m=float(np.hypot(moved[0], moved[1])),
         turned_deg=degrees(fit.angle),
         rest_drift_m=drift,
@@ -143,32 +149,34 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
         fall_m=bounced.fall,
         rebound_m=bounced.rebound,
         rebound_ratio=bounced.ratio,
-        reach_m=reach(bodies.last[body][-1], cell),
-        height_m=height(bodies.last[body][-1], start, cell),
+        reach_m=level_reach(bodies.last[body][-1], cell),
+        height_m=vertical_extent(bodies.last[body][-1], start, cell),
         left_vessel=left_vessel(body, bodies),
     )
 
 
-def residual_mark(body: int, bodies: Bodies) -> tuple[Dent, float | None]:
+def residual_mark(body: int, bodies: ObjectParticles) -> tuple[ResidualDent, float | None]:
     """Find what mark is left, and how high a rim rose about it [m]; None: it holds together.
 
     An object of whose particles most are grains or paste is measured at their surface.
     """
     start, last, parting = bodies.start[body], bodies.last[body], bodies.parting[body]
     if 2 * np.count_nonzero(parting) <= len(start):
-        return dent(start, last, bodies.cell), None
+        return residual_dent(start, last, bodies.cell), None
     mark = surface_mark(start[parting], [x[parting] for x in last], bodies.cell, bodies.cell)
-    return Dent(mark.depth, mark.place, mark.share), mark.rim
+    return ResidualDent(mark.depth, mark.place, mark.share), mark.rim
 
 
-def reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
+def level_reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
     """Level distance from their middle within which most points lie [m]."""
     points = points[np.isfinite(points).all(axis=1)]
     aside = points[:, :2] - np.median(points[:, :2], axis=0)
-    return float(np.quantile(np.hypot(*aside.T), MOST)) + cell / 4
+    return float(np.quantile(np.hypot(*aside.T), REACH_PARTICLE_FRACTION)) + cell / 4
 
 
-def height(points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float) -> float:
+def vertical_extent(
+    points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float
+) -> float:
     """Extent of most matter along z [m]: of the points, and half a row above and below them.
 
     A row is half a cell high at the start. What is squeezed flat has rows as much lower: a puddle
@@ -187,16 +195,16 @@ def height(points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], ce
 
 def _along_z(points: Float[np.ndarray, "N 3"]) -> float:
     points = points[np.isfinite(points).all(axis=1)]
-    low, high = np.quantile(points[:, 2], (1 - MOST, MOST))
+    low, high = np.quantile(points[:, 2], (1 - REACH_PARTICLE_FRACTION, REACH_PARTICLE_FRACTION))
     return float(high - low)
 
 
-def left_vessel(body: int, bodies: "Bodies") -> float | None:
+def left_vessel(body: int, bodies: "ObjectParticles") -> float | None:
     """Share of what lay in a vessel that is outside of the vessel's convex hull at the end [-]."""
     vessel = bodies.vessel_of.get(body)
     if vessel is None:
         return None
-    fit = rigid_fit(
+    fit = fit_rigid_motion(
         bodies.start[vessel], bodies.last[vessel][-1], np.ones(len(bodies.start[vessel]))
     )
     points = bodies.last[body][-1]
@@ -205,23 +213,23 @@ def left_vessel(body: int, bodies: "Bodies") -> float | None:
     return 1.0 - float(inside.sum()) / len(points)
 
 
-def vector(values: Float[np.ndarray, "3"]) -> Vector:
+def to_vector(values: Float[np.ndarray, "3"]) -> Vector:
     """Return three numbers of an array as a tuple."""
     x, y, z = values.tolist()
     return x, y, z
 
 
 def dent_distances(
-    body: int, mark: Dent, names: list[str], bodies: Bodies
+    body: int, mark: ResidualDent, names: list[str], bodies: ObjectParticles
 ) -> dict[str, float | None]:
     """Distance on the undeformed body from each first contact to the dent's centroid [m]."""
     found: dict[str, float | None] = {}
-    for other, name in enumerate([*names, FLOOR]):
+    for other, name in enumerate([*names, FLOOR_NAME]):
         instant = bodies.ledger.first_contact[-1, body, other]
         if other == body or not np.isfinite(instant):
             continue
         point = bodies.ledger.contact_point[-1, body, other]
-        struck = where_it_was(point, bodies.when(instant, body), bodies.start[body])
+        struck = place_at_start(point, bodies.when(instant, body), bodies.start[body])
         found[name] = None if mark.share == 0 else float(np.linalg.norm(mark.place - struck))
     return found
 
@@ -238,7 +246,7 @@ class Bounce:
     """Rebound over fall [-]."""
 
 
-def bounce(body: int, bodies: Bodies, gravity: float) -> Bounce:
+def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
     """From how high a body came when it first touched anything, and how high it came back.
 
     The fall is the free fall from rest that ends at its speed, so that an object thrown down has
@@ -286,10 +294,10 @@ def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str
             if floor
             else ledger.pair_impulse[-1, a, c]
         )
-        rows[pair_name(names[a], FLOOR if floor else names[c])] = PairOutcome(
+        rows[pair_name(names[a], FLOOR_NAME if floor else names[c])] = PairOutcome(
             first_contact_s=instant if touched else None,
-            contact_point=vector(ledger.contact_point[-1, a, c]) if touched else None,
-            separated=None if after is None else separated(after, time[time > instant], cell),
+            contact_point=to_vector(ledger.contact_point[-1, a, c]) if touched else None,
+            separated=None if after is None else stays_separated(after, time[time > instant], cell),
             gap_start_dx=None if gap is None else float(gap[0]) / cell,
             gap_end_m=None if gap is None else float(gap[-1]),
             gap_end_dx=None if gap is None else float(gap[-1]) / cell,
@@ -299,21 +307,25 @@ def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str
     return rows
 
 
-def separated(gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell: float) -> bool:
+def stays_separated(
+    gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell: float
+) -> bool:
     """Whether two bodies stay more than a cell apart for 0.1 s or longer."""
     apart = np.concatenate([[False], gap > cell, [False]]).astype(int)
     edges = np.flatnonzero(np.diff(apart)).reshape(-1, 2)
-    return any(time[last - 1] - time[first] >= APART - 1e-9 for first, last in edges)
+    return any(
+        time[last - 1] - time[first] >= SEPARATION_DURATION_S - 1e-9 for first, last in edges
+    )
 
 
-def order(pairs: Mapping[str, PairOutcome]) -> tuple[tuple[str, str], ...]:
+def contact_order(pairs: Mapping[str, PairOutcome]) -> tuple[tuple[str, str], ...]:
     """Pairs of objects by the time they first touched, those that touched at the start left out."""
     met = [
         (row.first_contact_s, name)
         for name, row in pairs.items()
         if row.gap_start_dx is not None
         and row.first_contact_s is not None
-        and row.gap_start_dx > TOUCHING
+        and row.gap_start_dx > TOUCHING_DISTANCE_DX
     ]
     split = [name.split("|") for _, name in sorted(met)]
     return tuple((first, second) for first, second in split)

@@ -6,60 +6,64 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.geometry.rigid_fit import RigidFit, rigid_fit
+from corporeal.geometry.rigid_fit import RigidFit, fit_rigid_motion
 
-ROUNDS, TRUSTED = 5, 0.7
+FIT_ITERATIONS, TRUSTED_FRACTION = 5, 0.7
 """The rigid fit is repeated on the trusted share of points that fitted best."""
-DEEPEST = 0.01
+IGNORED_DEEPEST_FRACTION = 0.01
 """Share of a body's particles that went farther than is reported as its squeeze."""
-NEIGHBOURS = 32
+NEIGHBOUR_PARTICLES = 32
 """Particles around a place that tell where it was."""
 
 
 def trusted_fit(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) -> RigidFit:
     """Rigid motion of the part of a body that kept its shape: a dent does not tilt it."""
     weight = np.ones(len(start))
-    fit = rigid_fit(start, now, weight)
-    for _ in range(ROUNDS):
+    fit = fit_rigid_motion(start, now, weight)
+    for _ in range(FIT_ITERATIONS):
         error = np.linalg.norm(fit.undo(now) - start, axis=1)
-        fit = rigid_fit(start, now, (error <= np.quantile(error, TRUSTED)).astype(float))
+        fit = fit_rigid_motion(
+            start, now, (error <= np.quantile(error, TRUSTED_FRACTION)).astype(float)
+        )
     return fit
 
 
-def diagonal(points: Float[np.ndarray, "N 3"]) -> float:
+def box_diagonal(points: Float[np.ndarray, "N 3"]) -> float:
     """Diagonal of the bounding box [m]."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def shape_error(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) -> float:
     """RMS distance after the best rigid fit over the bounding box's diagonal [-]."""
-    fit = rigid_fit(start, now, np.ones(len(start)))
-    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / diagonal(start)
+    fit = fit_rigid_motion(start, now, np.ones(len(start)))
+    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / box_diagonal(
+        start
+    )
 
 
-PATCH = 27
+PATCH_PARTICLES = 27
 """So many neighbours, a cube of three particles' side, are a patch."""
-THROWN = 2.0
+THROWN_MOTION_RATIO = 2.0
 """What moved farther than so many times the median of its patch did not move with it."""
 
 
-def largest(size: Float[np.ndarray, " N"]) -> float:
+def mean_of_largest(size: Float[np.ndarray, " N"]) -> float:
     """Mean of the eight largest values: one cell's worth of particles."""
     few = min(8, len(size))
     return float(np.partition(size, len(size) - few)[-few:].mean())
 
 
-def reached_by_share(size: Float[np.ndarray, " N"]) -> float:
+def upper_percentile(size: Float[np.ndarray, " N"]) -> float:
     """Return what a hundredth of the values exceed.
 
     A fixed number of largest values grows with how many there are: the mean of eight is 23 mm for
     the leaves of a ficus of 1,238 particles and 40 mm of 3,094, this 21.5 and 21.9 mm.
     """
-    return float(np.quantile(size, 1.0 - DEEPEST))
+    return float(np.quantile(size, 1.0 - IGNORED_DEEPEST_FRACTION))
 
 
 @dataclass(frozen=True)
-class Dent:
+class ResidualDent:
     """A residual change of shape: the patch that moved the way its deepest place did."""
 
     depth: float
@@ -70,9 +74,9 @@ class Dent:
     """Share of the particles that belong to it [-]."""
 
 
-def dent(
+def residual_dent(
     start: Float[np.ndarray, "N 3"], now: list[Float[np.ndarray, "N 3"]], threshold: float
-) -> Dent:
+) -> ResidualDent:
     """Residual displacement of a body, averaged over its last frames so that vibration cancels.
 
     A can that is struck on top also gives where it stands: only what moved within 60° of the
@@ -85,27 +89,29 @@ def dent(
 
     """
     shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
-    around = KDTree(start).query(start, k=min(PATCH, len(start)))[1].reshape(len(start), -1)
+    around = (
+        KDTree(start).query(start, k=min(PATCH_PARTICLES, len(start)))[1].reshape(len(start), -1)
+    )
     size = np.linalg.norm(shift, axis=1)
-    together = size <= THROWN * np.median(size[around], axis=1)
+    together = size <= THROWN_MOTION_RATIO * np.median(size[around], axis=1)
     moved = together & (size > threshold)
     if not moved.any():
-        return Dent(largest(size[together]), np.full(3, np.nan), 0.0)
+        return ResidualDent(mean_of_largest(size[together]), np.full(3, np.nan), 0.0)
     smooth = np.linalg.norm(np.median(shift[around[:, :8]], axis=1), axis=1)
     deepest = np.argmax(np.where(moved, smooth, -1.0))
     along = shift @ shift[deepest] / size[deepest]
     dented = moved & (along > 0.5 * size)
     place = np.average(start[dented], axis=0, weights=size[dented] ** 2)
-    return Dent(largest(size[dented]), place, float(dented.mean()))
+    return ResidualDent(mean_of_largest(size[dented]), place, float(dented.mean()))
 
 
-def where_it_was(
+def place_at_start(
     point: Float[np.ndarray, " 3"],
     now: Float[np.ndarray, "N 3"],
     start: Float[np.ndarray, "N 3"],
 ) -> Float[np.ndarray, " 3"]:
     """Take a point on a body now back to where that bit of the body started [m]."""
-    _, nearest = KDTree(now).query(point, k=min(NEIGHBOURS, len(now)))
+    _, nearest = KDTree(now).query(point, k=min(NEIGHBOUR_PARTICLES, len(now)))
     nearest = np.atleast_1d(nearest)
-    fit = rigid_fit(start[nearest], now[nearest], np.ones(len(nearest)))
+    fit = fit_rigid_motion(start[nearest], now[nearest], np.ones(len(nearest)))
     return fit.undo(point[None])[0]

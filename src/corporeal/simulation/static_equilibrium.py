@@ -18,28 +18,28 @@ from corporeal.core.types import Keyframes, Push
 from corporeal.mpm.problem import Engine, Problem, Snapshot
 from corporeal.simulation.ledger_row import object_of_body
 
-SAMPLE = 0.1
+ENERGY_CHECK_INTERVAL_RATIO = 0.1
 """How often energies are looked at, over √(dx/g): what is let go falls 1/200 of a cell in it."""
-CALM, SLOW = 0.05, 0.02
+CALM_WINDOW_S, CALM_DRIFT_DX = 0.05, 0.02
 """Less than so many cells within so many seconds [s, dx]: it is tried whether it stays."""
-WATCH, STILL = 0.25, 0.1
+WATCH_WINDOW_S, STILL_DRIFT_DX = 0.25, 0.1
 """It stays when, left alone so long, nothing drifts by so much [s, dx]: a fifth of what counts as
 motion (docs/rest.md)."""
-LONGEST = 4.0
+MAX_RELAXATION_S = 4.0
 """Gives up after so long [s]."""
-PAUSE = 10
+CHECKS_BETWEEN_SAVE_POINTS = 10
 """Looks between two chances to stop."""
-AT_ONCE = 1e6
+MAXWELL_RELAXATION_SPEEDUP = 1e6
 """How much faster Maxwell branches forget here [-]: what lies has had all the time it takes."""
 
-RESTING = Keyframes((0.0,), ((0.0, 0.0, 0.0),), ((0.0, 0.0, 0.0),))
+RESTING_PATH = Keyframes((0.0,), ((0.0, 0.0, 0.0),), ((0.0, 0.0, 0.0),))
 """What follows a path is held where it starts."""
 
-Pause = Callable[[float], None]
+SaveCallback = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class Balance:
+class StaticEquilibrium:
     """What became of objects that were left to themselves; B objects."""
 
     seconds: float
@@ -54,7 +54,7 @@ class Balance:
     """Of the engine: where everything lies, at rest."""
 
 
-def before(problem: Problem, hung: set[int]) -> Problem:
+def settling_problem(problem: Problem, hung: set[int]) -> Problem:
     """Pose the same problem before its time 0: without motion, wind, pushes and loss.
 
     Branches that forget at once neither bear nor lose anything: what remains is the slow modulus,
@@ -70,17 +70,17 @@ def before(problem: Problem, hung: set[int]) -> Problem:
         replace(
             body,
             velocity=np.zeros_like(body.velocity),
-            vibration=AT_ONCE * body.vibration,
+            vibration=MAXWELL_RELAXATION_SPEEDUP * body.vibration,
             push=Push((-x, -y, -z)) if k in hung else None,
             wind=None,
-            path=None if body.path is None else RESTING,
+            path=None if body.path is None else RESTING_PATH,
         )
         for k, body in enumerate(problem.bodies)
     ]
     return replace(problem, bodies=tuple(bodies), gravity_ramp=0.0)
 
 
-class Relaxation:
+class DynamicRelaxation:
     """One dynamic relaxation, from its start or from where it was left."""
 
     def __init__(self, engine: Engine, problem: Problem, hung: set[int]) -> None:
@@ -88,7 +88,7 @@ class Relaxation:
 
         Args:
             engine: Fresh, of the problem.
-            problem: What ``before`` returned.
+            problem: What ``settling_problem`` returned.
             hung: Bodies that are held where they are.
 
         """
@@ -97,22 +97,24 @@ class Relaxation:
         self.members = [np.flatnonzero(group == k).tolist() for k in range(group.max() + 1)]
         self.bodies = range(len(group))
         self.owner = np.repeat(group, [len(b.position) for b in problem.bodies])
-        self.sample = SAMPLE * float(np.sqrt(self.cell / np.linalg.norm(problem.gravity)))
+        self.sample = ENERGY_CHECK_INTERVAL_RATIO * float(
+            np.sqrt(self.cell / np.linalg.norm(problem.gravity))
+        )
         self.first: Snapshot = engine.snapshot()
         self.start, self.energy = self._look()
         self.energy[:] = 0.0
         self.anchor, self.since, self.count, self.watching = self.start.copy(), 0.0, 0, False
 
-    def run(self, pause: Pause) -> Balance:
-        """Go on until everything has found its balance, or for ``LONGEST``.
+    def run(self, pause: SaveCallback) -> StaticEquilibrium:
+        """Go on until everything has found its balance, or for ``MAX_RELAXATION_S``.
 
         Args:
             pause: Told the time [s] now and then, when the state is good to go on from.
 
         """
         found = False
-        while not found and self.engine.time < LONGEST:
-            if self.count % PAUSE == 0:
+        while not found and self.engine.time < MAX_RELAXATION_S:
+            if self.count % CHECKS_BETWEEN_SAVE_POINTS == 0:
                 pause(self.engine.time)
             self.count += 1
             self.engine.advance(self.count * self.sample)
@@ -127,15 +129,15 @@ class Relaxation:
         drift = float(np.linalg.norm(centre - self.anchor, axis=1).max()) / self.cell
         waited = self.engine.time - self.since
         if self.watching:
-            if drift < STILL:
-                return waited >= WATCH
+            if drift < STILL_DRIFT_DX:
+                return waited >= WATCH_WINDOW_S
             self._note(centre, watching=False)
             return False
         falling = energy < self.energy
         self.energy = np.where(falling, 0.0, energy)
         self.engine.stop([b for k in np.flatnonzero(falling) for b in self.members[k]])
-        if waited >= CALM:
-            self._note(centre, watching=drift < SLOW)
+        if waited >= CALM_WINDOW_S:
+            self._note(centre, watching=drift < CALM_DRIFT_DX)
         return False
 
     def _note(self, centre: np.ndarray, watching: bool) -> None:
@@ -152,9 +154,9 @@ class Relaxation:
         centre = [s @ now.centre[m] for s, m in zip(shares, self.members, strict=True)]
         return np.stack(centre), np.array([now.kinetic[m].sum() for m in self.members])
 
-    def _balance(self, found: bool) -> Balance:
+    def _balance(self, found: bool) -> StaticEquilibrium:
         far = np.linalg.norm(self.engine.snapshot().position - self.first.position, axis=1)
-        return Balance(
+        return StaticEquilibrium(
             seconds=self.engine.time,
             found=found,
             moved=self._look()[0] - self.start,

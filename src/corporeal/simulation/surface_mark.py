@@ -2,7 +2,8 @@
 
 What holds together is dented where its matter went (``residual_shape.dent``). Grains and pastes
 part: a splash takes a few of them far from where they lay, which says nothing of the hollow that
-is seen. Its depth is that of the surface, in columns along z of a width of ``COLUMN`` cells.
+is seen. Its depth is that of the surface, in columns along z of a width of ``COLUMN_WIDTH_DX``
+cells.
 """
 
 from dataclasses import dataclass
@@ -11,12 +12,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.core.types import Material
-from corporeal.mpm.laws import MENU
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.simulation.residual_shape import trusted_fit
 
-COLUMN = 1.0
+COLUMN_WIDTH_DX = 1.0
 """Side of a column [cells]: a layer of it is four particles, half a cell apart."""
-ABOVE = 2
+PARTICLES_ABOVE_SURFACE = 2
 """So many particles of a column may lie above its surface: half a layer, grains that lie loose."""
 
 
@@ -35,9 +36,9 @@ class SurfaceMark:
     """Share of the columns that fell so far [-]."""
 
 
-def marked_at_its_surface(material: Material) -> bool:
+def keeps_surface_mark(material: Material) -> bool:
     """Whether neighbours part in it and yet it keeps a mark: grains, and pastes that yield."""
-    return MENU[material.law].granular or material.yield_shear > 0.0
+    return CONSTITUTIVE_LAWS[material.law].granular or material.yield_shear > 0.0
 
 
 def surface_mark(
@@ -60,7 +61,7 @@ def surface_mark(
         threshold: What fell by less belongs to no mark [m].
 
     """
-    columns = Columns.over(start, COLUMN * cell)
+    columns = HeightColumns.over(start, COLUMN_WIDTH_DX * cell)
     before = columns.heights(start)
     after = np.median([columns.heights(trusted_fit(start, x).undo(x)) for x in now], axis=0)
     filled = before > columns.bottom
@@ -78,7 +79,7 @@ def surface_mark(
 
 
 @dataclass(frozen=True)
-class Columns:
+class HeightColumns:
     """Columns of square section along z over a body, C of them."""
 
     corner: Float[np.ndarray, " 2"]
@@ -91,7 +92,7 @@ class Columns:
     """Height of the lowest point of each at the start [m]; inf: it has none."""
 
     @classmethod
-    def over(cls, points: Float[np.ndarray, "N 3"], width: float) -> "Columns":
+    def over(cls, points: Float[np.ndarray, "N 3"], width: float) -> "HeightColumns":
         """Lay columns over the points that a body starts with.
 
         Their edges lie half a spacing beside its outermost points, so that where points are a
@@ -113,7 +114,7 @@ class Columns:
         return x * self.count[1] + y, inside
 
     def heights(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " C"]:
-        """Height of the surface in each column [m]: of the highest point but ``ABOVE`` others.
+        """Height of the surface in each column [m]: of the highest point but ``PARTICLES_ABOVE_SURFACE`` others.
 
         Where there are fewer points it is the bottom.
         """
@@ -122,7 +123,7 @@ class Columns:
         downwards = np.lexsort((-height, column))
         column, height = column[downwards], height[downwards]
         number = np.arange(len(self.bottom))
-        surface = np.searchsorted(column, number) + ABOVE
+        surface = np.searchsorted(column, number) + PARTICLES_ABOVE_SURFACE
         found = surface < np.searchsorted(column, number, side="right")
         result = self.bottom.copy()
         result[found] = np.maximum(result[found], height[surface[found]])

@@ -13,18 +13,18 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from corporeal.core.errors import UserError
-from corporeal.viewer.shelf import INBOX
-from corporeal.viewer.unpack import unpack
+from corporeal.viewer.run_store import INBOX_FOLDER
+from corporeal.viewer.zip_unpack import unpack_zip
 
-LARGEST = 1 << 30
+MAX_FILE_BYTES = 1 << 30
 """Of one file [bytes]."""
-ALL = 4 << 30
+MAX_INBOX_BYTES = 4 << 30
 """Of all files in the inbox [bytes]."""
-SPARE = 5 << 30
+MIN_FREE_DISK_BYTES = 5 << 30
 """What stays free on the disk [bytes]."""
-KINDS = ((b"glTF", "scene.glb"), (b"ply", "splat.ply"), (b"PK\x03\x04", "photos.zip"))
+FILE_SIGNATURES = ((b"glTF", "scene.glb"), (b"ply", "splat.ply"), (b"PK\x03\x04", "photos.zip"))
 """First bytes, and what such a file is called here."""
-TOKEN = re.compile(r"[0-9a-f]{16}")
+TOKEN_PATTERN = re.compile(r"[0-9a-f]{16}")
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class Upload:
     """[bytes]"""
 
 
-class Inbox:
+class UploadInbox:
     """Where uploads lie: one folder each, under names of ours."""
 
     def __init__(self, runs: Path) -> None:
-        self.folder = runs / INBOX
+        self.folder = runs / INBOX_FOLDER
 
     def find(self, name: str) -> Path:
         """Return what an upload is made of.
@@ -52,7 +52,7 @@ class Inbox:
             UserError: There is none of that name.
 
         """
-        if TOKEN.fullmatch(name):
+        if TOKEN_PATTERN.fullmatch(name):
             for known in ("scene.glb", "splat.ply", "photos"):
                 path = self.folder / name / known
                 if path.exists():
@@ -64,18 +64,18 @@ class Inbox:
         self.folder.mkdir(parents=True, exist_ok=True)
         held = sum(p.stat().st_size for p in self.folder.rglob("*") if p.is_file())
         free = shutil.disk_usage(self.folder).free
-        spare, most = in_gib(SPARE), in_gib(ALL)
+        spare, most = in_gib(MIN_FREE_DISK_BYTES), in_gib(MAX_INBOX_BYTES)
         room, reason = min(
             (
-                LARGEST,
-                f"More than {in_gib(LARGEST)}, the most that a page takes: corporeal run FILE.",
+                MAX_FILE_BYTES,
+                f"More than {in_gib(MAX_FILE_BYTES)}, the most that a page takes: corporeal run FILE.",
             ),
             (
-                ALL - held,
-                f"Uploads may have {most} together: delete what is not needed in {INBOX}.",
+                MAX_INBOX_BYTES - held,
+                f"Uploads may have {most} together: delete what is not needed in {INBOX_FOLDER}.",
             ),
             (
-                free - SPARE,
+                free - MIN_FREE_DISK_BYTES,
                 f"The disk is nearly full: {in_gib(free)} are free, and {spare} stay so.",
             ),
         )
@@ -91,7 +91,7 @@ class Inbox:
         raw = folder / "upload"
         with raw.open("rb") as file:
             head = file.read(4)
-        known = next((name for magic, name in KINDS if head.startswith(magic)), None)
+        known = next((name for magic, name in FILE_SIGNATURES if head.startswith(magic)), None)
         if known is None:
             raise UserError(
                 "Neither a GLB, nor a splat (PLY), nor a zip of photographs. Other files: "
@@ -100,7 +100,7 @@ class Inbox:
         path, size = folder / known, raw.stat().st_size
         raw.rename(path)
         if known.endswith(".zip"):
-            unpack(path, folder / "photos", self.room()[0] * 4 or 1)
+            unpack_zip(path, folder / "photos", self.room()[0] * 4 or 1)
             path.unlink()
             path = folder / "photos"
         return Upload(folder.name, path, known.rpartition(".")[2], size)
@@ -111,7 +111,7 @@ def in_gib(size: int) -> str:
     return f"{size / (1 << 30):.3g} GiB"
 
 
-def upload_route(inbox: Inbox) -> Route:
+def upload_route(inbox: UploadInbox) -> Route:
     """Return the route that takes files: ``PUT /files``."""
     one_at_a_time = asyncio.Lock()
 
@@ -124,7 +124,7 @@ def upload_route(inbox: Inbox) -> Route:
     return Route("/files", put, methods=["PUT"])
 
 
-async def _taken(request: Request, inbox: Inbox) -> Response:
+async def _taken(request: Request, inbox: UploadInbox) -> Response:
     """Take a file in, counting; whatever is refused leaves nothing behind."""
     room, reason = await run_in_threadpool(inbox.room)
     folder = inbox.folder / secrets.token_hex(8)

@@ -15,29 +15,29 @@ from corporeal.core.errors import UnknownChoiceError, UserError
 
 Answer = TypeVar("Answer", bound=BaseModel)
 
-MENU = {
-    "replay": "corporeal.vlm.recordings:Recordings",
-    "ask": "corporeal.vlm.by_hand:ByHand",
-    "openai": "corporeal.vlm.provider:OpenAI",
-    "anthropic": "corporeal.vlm.provider:Anthropic",
-    "google": "corporeal.vlm.provider:Google",
-    "ollama": "corporeal.vlm.provider:Ollama",
+VLM_CLIENTS = {
+    "replay": "corporeal.vlm.recordings:ReplayClient",
+    "ask": "corporeal.vlm.human_client:HumanClient",
+    "openai": "corporeal.vlm.api_clients:OpenAIClient",
+    "anthropic": "corporeal.vlm.api_clients:AnthropicClient",
+    "google": "corporeal.vlm.api_clients:GoogleClient",
+    "ollama": "corporeal.vlm.api_clients:OllamaClient",
 }
 """How to reach a model: name before the colon → class that takes what stands after it."""
-WRAPPERS = {
-    "cache": "corporeal.vlm.cache:Cached",
-    "record": "corporeal.vlm.recordings:Recorder",
+VLM_WRAPPERS = {
+    "cache": "corporeal.vlm.answer_cache:CachingClient",
+    "record": "corporeal.vlm.recordings:RecordingClient",
 }
 """What stands between a question and a model."""
-LIVE = ("openai", "anthropic", "google", "ollama")
+LIVE_CLIENTS = ("openai", "anthropic", "google", "ollama")
 """Answered over a network, and so by a package that the core does without."""
-CRITIC = "openai:gpt-5-mini"
+DEFAULT_OPENAI_CRITIC = "openai:gpt-5-mini"
 """Ranks where OpenAI answers and nobody else was asked for."""
-NOBODY = "metadata"
+NO_MODEL = "metadata"
 """No model: names and materials in the file decide."""
 
 
-class Album(Sequence[np.ndarray]):
+class OnDemandPictures(Sequence[np.ndarray]):
     """Pictures that are taken, one album at a time, when somebody first looks at them."""
 
     _one = Lock()
@@ -46,7 +46,7 @@ class Album(Sequence[np.ndarray]):
         self._take, self._taken = take, None
 
     def _pictures(self) -> Sequence[np.ndarray]:
-        with Album._one:
+        with OnDemandPictures._one:
             if self._taken is None:
                 self._taken = self._take()
             return self._taken
@@ -59,7 +59,7 @@ class Album(Sequence[np.ndarray]):
 
 
 @dataclass(frozen=True)
-class Turn:
+class AnswerNumber:
     """Which of several answers to a question is wanted (self-consistency: Wang et al. 2022)."""
 
     number: int = 1
@@ -69,7 +69,7 @@ class Turn:
     """Whether the later ones are answers to the same text, so that one request can give them."""
 
 
-ONCE = Turn()
+SINGLE_ANSWER = AnswerNumber()
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Question:
     """Each H x W x 3, uint8, sRGB."""
     lists: Mapping[str, str] = field(default_factory=dict)
     """What the library in use offers, by name. A longer list does not make an answer stale."""
-    turn: Turn = ONCE
+    turn: AnswerNumber = SINGLE_ANSWER
 
     @property
     def text(self) -> str:
@@ -100,7 +100,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Spent:
+class AnswerCost:
     """What an answer took."""
 
     calls: int = 0
@@ -118,14 +118,14 @@ class Reply(Generic[Answer]):
     by: Literal["model", "recording"]
     model: str
     """As a person types it: "openai:gpt-5.4"."""
-    spent: Spent = Spent()
+    spent: AnswerCost = AnswerCost()
 
 
-Check = Callable[[Answer], list[str]]
+AnswerCheck = Callable[[Answer], list[str]]
 """Returns what is wrong with an answer, one sentence each, as the model is to read it."""
 
 
-def nothing(answer: BaseModel) -> list[str]:
+def no_complaints(answer: BaseModel) -> list[str]:
     """Complain about nothing."""
     return []
 
@@ -135,14 +135,14 @@ class UnansweredError(UserError):
 
 
 @runtime_checkable
-class Vlm(Protocol):
+class VlmClient(Protocol):
     """The whole contract."""
 
     looks: bool
     """Whether anybody looks at a question's pictures; without it they need not be taken."""
 
     def ask(
-        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer] = no_complaints
     ) -> Reply[Answer]:
         """Answer ``question`` in the shape of ``answer``, with nothing left to complain about.
 
@@ -154,7 +154,7 @@ class Vlm(Protocol):
         ...
 
 
-def critic_of(spec: str, asked: str) -> str:
+def choose_critic(spec: str, asked: str) -> str:
     """Say who ranks partitions of an object: who is ``asked`` to, a cheaper one, or the same.
 
     Args:
@@ -163,10 +163,10 @@ def critic_of(spec: str, asked: str) -> str:
 
     """
     theirs = spec.startswith("openai:") and "@" not in spec
-    return asked or (CRITIC if theirs else spec)
+    return asked or (DEFAULT_OPENAI_CRITIC if theirs else spec)
 
 
-def connect(spec: str, record: Path | None = None) -> Vlm | None:
+def connect_vlm(spec: str, record: Path | None = None) -> VlmClient | None:
     """Connect to ``"openai:gpt-5.4"`` and the like; ``"metadata"`` asks nobody and gives None.
 
     What a live model answered once is not paid for again.
@@ -180,19 +180,19 @@ def connect(spec: str, record: Path | None = None) -> Vlm | None:
 
     """
     name, _, rest = spec.partition(":")
-    if name == NOBODY:
+    if name == NO_MODEL:
         return None
-    if name not in MENU:
-        raise UnknownChoiceError("vision-language model", name, [NOBODY, *MENU])
-    if name in LIVE and find_spec("pydantic_ai") is None:
+    if name not in VLM_CLIENTS:
+        raise UnknownChoiceError("vision-language model", name, [NO_MODEL, *VLM_CLIENTS])
+    if name in LIVE_CLIENTS and find_spec("pydantic_ai") is None:
         raise UserError(
             f"Asking {spec!r} needs a package that is not installed. Type: pip install "
             "'corporeal[models]'. Without it there are --vlm ask:FOLDER (you answer), --vlm "
             "replay:FOLDER and --vlm metadata."
         )
-    model = registry.load("vision-language model", name, MENU)(rest)
-    if name in LIVE:
-        model = registry.load("wrapper", "cache", WRAPPERS)(model, spec, {})
+    model = registry.load_backend("vision-language model", name, VLM_CLIENTS)(rest)
+    if name in LIVE_CLIENTS:
+        model = registry.load_backend("wrapper", "cache", VLM_WRAPPERS)(model, spec, {})
     if record is not None:
-        model = registry.load("wrapper", "record", WRAPPERS)(model, Path(record))
+        model = registry.load_backend("wrapper", "record", VLM_WRAPPERS)(model, Path(record))
     return model

@@ -4,40 +4,40 @@ from collections.abc import Collection, Mapping, Sequence
 from math import isclose
 
 from corporeal.recognition.typical_extents import typical_extent
-from corporeal.vlm.answers import (
-    KILOGRAMS,
+from corporeal.vlm.answer_schemas import (
+    KILOGRAMS_OF_PRINTED_UNIT,
+    AllowedNames,
     ExtentsAnswer,
     FractionAnswer,
     MassAnswer,
     MaterialsAnswer,
+    ObjectsAnswer,
     PartAnswer,
+    PartHypothesis,
     PartsAnswer,
-    Printed,
+    PrintedStatement,
+    QuantityValue,
     RankingAnswer,
     RegionsAnswer,
     SizeAnswer,
     ThicknessAnswer,
-    ThingsAnswer,
-    Value,
     ValueAnswer,
-    Vocabulary,
-    Way,
 )
 
-MOST_PARTS = 6
-MOST_THINGS = 12
-MOST_WAYS = 6
-SOLIDITY = (0.1, 0.95)
+MAX_PARTS = 6
+MAX_OBJECTS_IN_SCENE = 12
+MAX_HYPOTHESES_PER_PART = 6
+PACKED_SOLIDITY_RANGE = (0.1, 0.95)
 """Between these is packed what is packed of parts and air."""
-REAL_SHARE = (0.1, 1.25)
+REAL_VOLUME_SHARE_RANGE = (0.1, 1.25)
 """Volume of a real part over the volume that a scan draws of it [-]: scans thicken."""
-DENSITIES = (0.3, 25_000.0)
+BOX_DENSITY_RANGE_KG_M3 = (0.3, 25_000.0)
 """Mass of an object over the volume of its smallest box [kg/m³]: from a paper lampshade to gold."""
-SLACK = 0.05
+SHARE_SUM_TOLERANCE = 0.05
 """By how much shares may miss 1."""
-SMALLEST_THING, LARGEST_THING = 1e-3, 100.0
+MIN_OBJECT_EXTENT_M, MAX_OBJECT_EXTENT_M = 1e-3, 100.0
 """Extents of what may stand in a scene [m]."""
-SLIP = 10.0
+UNIT_SLIP_RATIO = 10.0
 """A size this many times beyond the known ones is in another unit."""
 
 
@@ -46,8 +46,8 @@ def parts_complaints(answer: PartsAnswer) -> list[str]:
     found = []
     if not answer.decompositions:
         found.append("Give at least one decomposition.")
-    if any(not 1 <= len(d.parts) <= MOST_PARTS for d in answer.decompositions):
-        found.append(f"A decomposition has 1 to {MOST_PARTS} parts.")
+    if any(not 1 <= len(d.parts) <= MAX_PARTS for d in answer.decompositions):
+        found.append(f"A decomposition has 1 to {MAX_PARTS} parts.")
     for decomposition in answer.decompositions:
         names = [p.name for p in decomposition.parts]
         if len({n.lower() for n in names}) < len(names):
@@ -67,14 +67,14 @@ def ranking_complaints(answer: RankingAnswer, count: int) -> list[str]:
 def materials_complaints(
     answer: MaterialsAnswer,
     parts: Sequence[str],
-    names: Vocabulary,
+    names: AllowedNames,
     shared: bool,
 ) -> list[str]:
     """Check names, builds, probabilities and, where parts share one mesh, what they take up."""
     found = name_complaints([p.part for p in answer.parts], parts)
     for part in answer.parts:
         found += [f"{part.part}: {problem}" for problem in _part_problems(part, names)]
-    found = found or _held_problems(answer, names)
+    found = found or _contents_problems(answer, names)
     return found if found or not shared else _share_problems(answer)
 
 
@@ -88,9 +88,9 @@ def name_complaints(got: Sequence[str], wanted: Sequence[str]) -> list[str]:
     ]
 
 
-def _part_problems(part: PartAnswer, names: Vocabulary) -> list[str]:
-    if not 1 <= len(part.ways) <= MOST_WAYS:
-        return [f"Give 1 to {MOST_WAYS} ways it may be; you gave {len(part.ways)}."]
+def _part_problems(part: PartAnswer, names: AllowedNames) -> list[str]:
+    if not 1 <= len(part.ways) <= MAX_HYPOTHESES_PER_PART:
+        return [f"Give 1 to {MAX_HYPOTHESES_PER_PART} ways it may be; you gave {len(part.ways)}."]
     found = [
         f"{way.material!r} is not in the list of materials."
         for way in part.ways
@@ -98,10 +98,10 @@ def _part_problems(part: PartAnswer, names: Vocabulary) -> list[str]:
     ]
     if sum(way.probability for way in part.ways) <= 0:
         found.append("The probabilities of its ways must be above 0 and add up to 1.")
-    return found or [problem for way in part.ways for problem in _build_problems(way, names)]
+    return found or [problem for way in part.ways for problem in _structure_problems(way, names)]
 
 
-def _build_problems(way: Way, names: Vocabulary) -> list[str]:
+def _structure_problems(way: PartHypothesis, names: AllowedNames) -> list[str]:
     found = []
     walled = way.built in ("sheet", "hollow", "filled")
     made = names.material(way.material) if way.material is not None else None
@@ -117,13 +117,13 @@ def _build_problems(way: Way, names: Vocabulary) -> list[str]:
         found.append("What is filled needs contents, and a fill above 0.")
     elif names.contents(way.contents) is None:
         found.append(f"{way.contents!r} is not in the list of contents.")
-    low, high = SOLIDITY
+    low, high = PACKED_SOLIDITY_RANGE
     if way.built == "packed" and not low <= (way.solidity or 0.0) <= high:
         found.append(f"What is packed needs a solidity, from {low:g} to {high:g}.")
     return found
 
 
-def _held_problems(answer: MaterialsAnswer, names: Vocabulary) -> list[str]:
+def _contents_problems(answer: MaterialsAnswer, names: AllowedNames) -> list[str]:
     """Find what a container holds among the parts, where it would weigh twice."""
     found = []
     for box in answer.parts:
@@ -144,7 +144,7 @@ def _share_problems(answer: MaterialsAnswer) -> list[str]:
     outside = [p for p in answer.parts if p.inside is None and not p.missing]
     if not found and not outside:
         return ["At least one part must lie at the surface: inside null, missing false."]
-    return found or [*_sums(outside), *_nested(answer)]
+    return found or [*_sums(outside), *_nesting_problems(answer)]
 
 
 def _own_shares(part: PartAnswer, answer: MaterialsAnswer) -> list[str]:
@@ -162,14 +162,14 @@ def _sums(outside: Sequence[PartAnswer]) -> list[str]:
     found = []
     for what in ("volume_share", "surface_share"):
         total = sum(getattr(p, what) for p in outside)
-        if not isclose(total, 1.0, abs_tol=SLACK):
+        if not isclose(total, 1.0, abs_tol=SHARE_SUM_TOLERANCE):
             found.append(
                 f"{what} of the parts that lie at the surface must add up to 1, not {total:.2f}."
             )
     return found
 
 
-def _nested(answer: MaterialsAnswer) -> list[str]:
+def _nesting_problems(answer: MaterialsAnswer) -> list[str]:
     found = []
     for part in answer.parts:
         within = sum(p.volume_share or 0.0 for p in answer.parts if p.inside == part.part)
@@ -178,16 +178,18 @@ def _nested(answer: MaterialsAnswer) -> list[str]:
     return found
 
 
-def shaky(answer: MaterialsAnswer) -> list[str]:
+def weakness_notes(answer: MaterialsAnswer) -> list[str]:
     """Say what was mended in an answer, or makes it weak, in clauses."""
     found = []
     for part in answer.parts:
         total = sum(way.probability for way in part.ways)
-        if total > 1 + SLACK:
+        if total > 1 + SHARE_SUM_TOLERANCE:
             found.append(
                 f"the probabilities of {part.part} add up to {total:.3g} and were divided by it"
             )
-    if all(len(p.ways) == 1 and p.ways[0].probability > 1 - SLACK for p in answer.parts):
+    if all(
+        len(p.ways) == 1 and p.ways[0].probability > 1 - SHARE_SUM_TOLERANCE for p in answer.parts
+    ):
         found.append(
             "one way only was given for every part, as certain: the interval of its mass covers "
             "measured ranges and no other build"
@@ -198,7 +200,7 @@ def shaky(answer: MaterialsAnswer) -> list[str]:
 def thickness_complaints(answer: ThicknessAnswer, parts: Sequence[str]) -> list[str]:
     """Check the names, the order and the bounds of how much of a scan is real."""
     found = name_complaints([p.part for p in answer.parts], parts)
-    low, high = REAL_SHARE
+    low, high = REAL_VOLUME_SHARE_RANGE
     for part in answer.parts:
         if not part.low <= part.likely <= part.high:
             found.append(f"{part.part}: low, likely and high must be in this order.")
@@ -222,19 +224,25 @@ def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
     if not answer.low_kg <= answer.likely_kg <= answer.high_kg:
         return ["low_kg, likely_kg and high_kg must be in this order."]
     said = [(answer.likely_kg, "Answer in kilograms.")]
-    said += [(_weight(fact), f"Check the unit of {fact.words!r}.") for fact in answer.printed]
+    said += [
+        (_printed_weight(fact), f"Check the unit of {fact.words!r}.") for fact in answer.printed
+    ]
     return [problem for mass, advice in said if (problem := _too_dense(mass, box, advice))]
 
 
-def _weight(fact: Printed) -> float | None:
+def _printed_weight(fact: PrintedStatement) -> float | None:
     """Weight [kg] that is printed on an object, or None where it is something else."""
-    factor = KILOGRAMS.get(fact.unit) if fact.kind in ("net weight", "total weight") else None
+    factor = (
+        KILOGRAMS_OF_PRINTED_UNIT.get(fact.unit)
+        if fact.kind in ("net weight", "total weight")
+        else None
+    )
     return fact.number * factor if fact.number and factor else None
 
 
 def _too_dense(mass: float | None, box: float, advice: str) -> str:
     """Say that nothing of a mass [kg] fits a box [m³], or is so light; "": it may be."""
-    low, high = DENSITIES
+    low, high = BOX_DENSITY_RANGE_KG_M3
     mean = mass / box if mass is not None and box > 0 else low
     if low <= mean <= high:
         return ""
@@ -270,7 +278,7 @@ def placement_complaints(
             continue
         for place in part.values:
             low, high = bounds[part.part, place.quantity]
-            if isinstance(place, Value) and not _within(place.value, low, high):
+            if isinstance(place, QuantityValue) and not _within(place.value, low, high):
                 found.append(
                     f"{part.part}: {place.quantity} is {place.value:g}, outside the measured range "
                     f"{low:g} to {high:g}. Choose a value inside it."
@@ -292,24 +300,26 @@ def extents_complaints(answer: ExtentsAnswer, classes: Sequence[str]) -> list[st
 def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
     """Check that sizes are lengths of things, in order, and no slip of a unit."""
     sizes = (answer.smallest, answer.usual, answer.largest)
-    if not all(SMALLEST_THING <= size <= LARGEST_THING for size in sizes):
-        return [f"Sizes must lie between {SMALLEST_THING:g} and {LARGEST_THING:g} metres."]
+    if not all(MIN_OBJECT_EXTENT_M <= size <= MAX_OBJECT_EXTENT_M for size in sizes):
+        return [
+            f"Sizes must lie between {MIN_OBJECT_EXTENT_M:g} and {MAX_OBJECT_EXTENT_M:g} metres."
+        ]
     if not answer.smallest <= answer.usual <= answer.largest:
         return ["smallest, usual and largest must be in this order."]
     known = typical_extent(class_name)
-    if known is None or known.low / SLIP <= answer.usual <= known.high * SLIP:
+    if known is None or known.low / UNIT_SLIP_RATIO <= answer.usual <= known.high * UNIT_SLIP_RATIO:
         return []
     return [
         f"You said that an ordinary {class_name} is {answer.usual:g} metres long. That is "
-        f"{SLIP:g} times beyond what such things are known to be. Answer in metres."
+        f"{UNIT_SLIP_RATIO:g} times beyond what such things are known to be. Answer in metres."
     ]
 
 
-def things_complaints(answer: ThingsAnswer) -> list[str]:
+def things_complaints(answer: ObjectsAnswer) -> list[str]:
     """Check that there are things, and not more than can be told apart."""
-    if 1 <= len(answer.things) <= MOST_THINGS:
+    if 1 <= len(answer.things) <= MAX_OBJECTS_IN_SCENE:
         return []
-    return [f"Name 1 to {MOST_THINGS} things; you named {len(answer.things)}."]
+    return [f"Name 1 to {MAX_OBJECTS_IN_SCENE} things; you named {len(answer.things)}."]
 
 
 def regions_complaints(answer: RegionsAnswer, colours: Collection[str], things: int) -> list[str]:

@@ -7,21 +7,21 @@ from string import Template
 
 import numpy as np
 
-from corporeal.discretization.drawn import NOTHING, Drawn, Thin
+from corporeal.discretization.drawn_thickness import NO_DRAWN_SHAPE, DrawnShape, ThinScan
 from corporeal.vlm import (
-    ONCE,
+    SINGLE_ANSWER,
     Answer,
-    Check,
+    AnswerCheck,
+    AnswerNumber,
     Question,
     Reply,
-    Turn,
     UnansweredError,
-    Vlm,
+    VlmClient,
 )
 from corporeal.vlm.answer_checks import (
-    MOST_PARTS,
-    MOST_THINGS,
-    REAL_SHARE,
+    MAX_OBJECTS_IN_SCENE,
+    MAX_PARTS,
+    REAL_VOLUME_SHARE_RANGE,
     extents_complaints,
     mass_complaints,
     materials_complaints,
@@ -29,30 +29,30 @@ from corporeal.vlm.answer_checks import (
     placement_complaints,
     ranking_complaints,
     regions_complaints,
-    shaky,
     size_complaints,
     thickness_complaints,
     things_complaints,
+    weakness_notes,
 )
-from corporeal.vlm.answers import (
+from corporeal.vlm.answer_schemas import (
+    AllowedNames,
     Decomposition,
     ExtentsAnswer,
     FractionAnswer,
     MassAnswer,
     MaterialsAnswer,
+    ObjectsAnswer,
     PartsAnswer,
     RankingAnswer,
     RegionsAnswer,
     SeenPart,
     SizeAnswer,
     ThicknessAnswer,
-    ThingsAnswer,
     ValueAnswer,
-    Vocabulary,
 )
-from corporeal.vlm.words import Asked, millimetres, strange_shares
+from corporeal.vlm.interpret_answers import LookingSource, millimetres_text, strange_share_notes
 
-SHARES = (
+SHARES_INSTRUCTION = (
     "The parts share one model, so say for each what it takes up of the object as the pictures "
     "show it, thickened or not:\n"
     "- inside: the part that encloses it, where it is hidden within another (a core within its "
@@ -66,28 +66,30 @@ SHARES = (
     "surface, never 0, also for what lies inside. Over the parts with inside null (what is missing "
     "apart) they add up to 1."
 )
-UNSEEN = " that the model does not show"
-MODELLED = (
+UNSEEN_CLAUSE = " that the model does not show"
+MODELLED_HOLES_CLAUSE = (
     "; holes, gaps and hollows that the pictures show are modelled: they are already taken off, "
     "and solidity is of what is left"
 )
-NO_SHARES = "- inside, volume_share and surface_share: null; missing: false."
-FRACTION = (
+NO_SHARES_INSTRUCTION = "- inside, volume_share and surface_share: null; missing: false."
+FRACTION_INSTRUCTION = (
     "Answer with a fraction for each quantity: 0 is the low end of its range, 1 the high end, 0.5 "
     "the middle; on a logarithmic scale, where one is named, 0.5 is the geometric middle."
 )
-VALUE = "Answer with a value for each quantity, in the unit and inside the range that it names."
-AGAIN = (
+VALUE_INSTRUCTION = (
+    "Answer with a value for each quantity, in the unit and inside the range that it names."
+)
+REVISION_INSTRUCTION = (
     "\n\nYou answered this before, and your values do not fit each other:\n\n$answer\n\n"
     "$problems\n\nAnswer again, for all parts. Keep a value only if it is meant so, and say why."
 )
 
-ALIKE = ("materials", "mass")
+TASKS_WITH_FIXED_TEXT = ("materials", "mass")
 """Questions whose text hangs on question 1 only, so that each of several answers is to the same."""
 
 
 @dataclass(frozen=True)
-class Subject:
+class InterviewSubject:
     """What the questions are about."""
 
     scene: str
@@ -98,7 +100,7 @@ class Subject:
     """The three sides of its smallest box, in words."""
     box: float = 0.0
     """Their product [m³]; 0: not known."""
-    drawn: Drawn = NOTHING
+    drawn: DrawnShape = NO_DRAWN_SHAPE
     """What its mesh shows."""
     views: str = "none"
     count: int = 0
@@ -107,7 +109,7 @@ class Subject:
 
 
 @dataclass(frozen=True)
-class Offer:
+class PlacementOffer:
     """What one part's quantities can be, for question 3."""
 
     facts: str
@@ -122,18 +124,18 @@ class Offer:
 class Interview:
     """Puts questions about one subject; keeps the transcript and what went wrong."""
 
-    model: Vlm
-    critic: Vlm
+    model: VlmClient
+    critic: VlmClient
     prompts: Mapping[str, str]
     """Task → wording, with $facts and {lists}."""
-    subject: Subject
+    subject: InterviewSubject
     seen: str = ""
     """What question 1 found it to be; "": it was not asked."""
     looks: dict[str, str] = field(default_factory=dict)
     """Part → how question 1 found it to look."""
     transcript: list[dict] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
-    turn: Turn = ONCE
+    turn: AnswerNumber = SINGLE_ANSWER
     """Which of several answers the questions are asked for."""
 
     def parts(self) -> tuple[Decomposition, PartsAnswer] | None:
@@ -143,14 +145,14 @@ class Interview:
             The best decomposition, and the whole answer.
 
         """
-        asked = self._question("parts", most=str(MOST_PARTS))
+        asked = self._question("parts", most=str(MAX_PARTS))
         reply = self._ask(self.model, asked, PartsAnswer, parts_complaints)
         if reply is None:
             return None
         options = reply.answer.decompositions
         self.seen = reply.answer.object
         best = options[self._best(options) if len(options) > 1 else 0]
-        self.looks = {p.name: _look(p) for p in best.parts}
+        self.looks = {p.name: _look_text(p) for p in best.parts}
         return best, reply.answer
 
     def _best(self, options: Sequence[Decomposition]) -> int:
@@ -169,10 +171,10 @@ class Interview:
     def materials(
         self,
         parts: Mapping[str, str],
-        names: Vocabulary,
+        names: AllowedNames,
         lists: Mapping[str, str],
         shared: bool,
-    ) -> tuple[MaterialsAnswer, Asked] | None:
+    ) -> tuple[MaterialsAnswer, LookingSource] | None:
         """Ask question 2; None where nobody answers.
 
         Args:
@@ -185,14 +187,14 @@ class Interview:
             The answer, and who gave it: "model" or "recording".
 
         """
-        named = _named(parts)
+        named = _part_list(parts)
         hollowed = self.subject.drawn.hollowed
         asked = self._question(
             "materials",
             parts=named,
-            unseen=UNSEEN if hollowed else "",
-            holes=MODELLED if hollowed else "",
-            shares=SHARES if shared else NO_SHARES,
+            unseen=UNSEEN_CLAUSE if hollowed else "",
+            holes=MODELLED_HOLES_CLAUSE if hollowed else "",
+            shares=SHARES_INSTRUCTION if shared else NO_SHARES_INSTRUCTION,
         )
         asked = replace(asked, lists=lists)
         reply = self._ask(
@@ -203,10 +205,14 @@ class Interview:
         )
         if reply is None:
             return None
-        self.warnings += [f"{self.subject.name}: {clause}." for clause in shaky(reply.answer)]
+        self.warnings += [
+            f"{self.subject.name}: {clause}." for clause in weakness_notes(reply.answer)
+        ]
         return reply.answer, reply.by
 
-    def thickness(self, parts: Sequence[str], thin: Thin) -> tuple[ThicknessAnswer, Asked] | None:
+    def thickness(
+        self, parts: Sequence[str], thin: ThinScan
+    ) -> tuple[ThicknessAnswer, LookingSource] | None:
         """Ask how much of what a scan draws of something thin is real; None: no answer.
 
         Args:
@@ -214,12 +220,12 @@ class Interview:
             thin: How coarse the scan is, and how thick it draws the object.
 
         """
-        tenth, quarter, half = map(millimetres, thin.behind)
-        least, greatest = (f"{share:g}" for share in REAL_SHARE)
+        tenth, quarter, half = map(millimetres_text, thin.behind)
+        least, greatest = (f"{share:g}" for share in REAL_VOLUME_SHARE_RANGE)
         asked = self._question(
             "thickness",
-            parts=_named({name: self.looks.get(name, "") for name in parts}),
-            edge=millimetres(thin.edge),
+            parts=_part_list({name: self.looks.get(name, "") for name in parts}),
+            edge=millimetres_text(thin.edge),
             tenth=tenth,
             quarter=quarter,
             half=half,
@@ -232,10 +238,12 @@ class Interview:
         if reply is None:
             return None
         about = f"{self.subject.name}: "
-        self.warnings += [about + sentence for sentence in strange_shares(reply.answer, thin.doubt)]
+        self.warnings += [
+            about + sentence for sentence in strange_share_notes(reply.answer, thin.doubt)
+        ]
         return reply.answer, reply.by
 
-    def mass(self) -> tuple[MassAnswer, Asked] | None:
+    def mass(self) -> tuple[MassAnswer, LookingSource] | None:
         """Ask what is printed on it and what it weighs, no library in sight; None: no answer."""
         box = self.subject.box
         asked = self._question("mass")
@@ -244,10 +252,10 @@ class Interview:
 
     def placement(
         self,
-        offers: Mapping[str, Offer],
+        offers: Mapping[str, PlacementOffer],
         shape: type[FractionAnswer] | type[ValueAnswer],
         odd: Callable[[FractionAnswer | ValueAnswer], Sequence[str]],
-    ) -> tuple[FractionAnswer | ValueAnswer, Asked] | None:
+    ) -> tuple[FractionAnswer | ValueAnswer, LookingSource] | None:
         """Ask question 3, once more where the values do not fit each other; None: no answer.
 
         Args:
@@ -259,7 +267,7 @@ class Interview:
         reply = self._placement(offers, shape, "")
         problems = odd(reply.answer) if reply else ()
         if reply and problems:
-            again = Template(AGAIN).substitute(
+            again = Template(REVISION_INSTRUCTION).substitute(
                 answer=json.dumps(reply.answer.model_dump()),
                 problems="\n".join(f"- {p}" for p in problems),
             )
@@ -268,19 +276,19 @@ class Interview:
 
     def _placement(
         self,
-        offers: Mapping[str, Offer],
+        offers: Mapping[str, PlacementOffer],
         shape: type[FractionAnswer] | type[ValueAnswer],
         again: str,
     ) -> Reply[FractionAnswer | ValueAnswer] | None:
         asked = self._question(
             "placement",
             parts="\n".join(f"- {offer.facts}" for offer in offers.values()),
-            how=FRACTION if shape is FractionAnswer else VALUE,
+            how=FRACTION_INSTRUCTION if shape is FractionAnswer else VALUE_INSTRUCTION,
         )
         asked = replace(
             asked,
             prompt=asked.prompt + again,
-            lists={"ranges": _ranges(offers)},
+            lists={"ranges": _range_list(offers)},
         )
         wanted: dict[str, Collection[str]] = {part: list(o.ranges) for part, o in offers.items()}
         bounds = {(p, q): b for p, o in offers.items() for q, b in o.bounds.items()}
@@ -303,10 +311,10 @@ class Interview:
         asked = self._question("sizes")
         return self._ask(self.model, asked, SizeAnswer, lambda a: size_complaints(a, kind))
 
-    def things(self) -> Reply[ThingsAnswer] | None:
+    def things(self) -> Reply[ObjectsAnswer] | None:
         """Ask which objects stand in a scene; None where nobody answers."""
-        asked = self._question("things", most=str(MOST_THINGS))
-        return self._ask(self.model, asked, ThingsAnswer, things_complaints)
+        asked = self._question("things", most=str(MAX_OBJECTS_IN_SCENE))
+        return self._ask(self.model, asked, ObjectsAnswer, things_complaints)
 
     def regions(self, colours: Sequence[str], things: Sequence[str]) -> Reply[RegionsAnswer] | None:
         """Ask which object each painted region is; None where nobody answers.
@@ -335,37 +343,43 @@ class Interview:
             "seen": f"It was found to be: {self.seen}." if self.seen else "",
         }
         prompt = Template(self.prompts[task]).substitute(common | facts).strip()
-        turn = replace(self.turn, alike=True) if task in ALIKE and self.turn.of > 1 else self.turn
+        turn = (
+            replace(self.turn, alike=True)
+            if task in TASKS_WITH_FIXED_TEXT and self.turn.of > 1
+            else self.turn
+        )
         return Question(task, prompt, about.scene, about.views, about.pictures, turn=turn)
 
     def _ask(
-        self, whom: Vlm, question: Question, shape: type[Answer], check: Check[Answer]
+        self, whom: VlmClient, question: Question, shape: type[Answer], check: AnswerCheck[Answer]
     ) -> Reply[Answer] | None:
         try:
             reply = whom.ask(question, shape, check)
         except UnansweredError as error:
             self.warnings.append(
                 f"{self.subject.name}: the question about {question.task} got no usable answer "
-                f"{_which(question.turn)}({error})"
+                f"{_answer_number_text(question.turn)}({error})"
             )
-            self.transcript.append(_row(question) | {"answer": None, "error": str(error)})
+            self.transcript.append(
+                _transcript_row(question) | {"answer": None, "error": str(error)}
+            )
             return None
-        self.transcript.append(_row(question) | _answered(reply))
+        self.transcript.append(_transcript_row(question) | _answered(reply))
         return reply
 
 
-def _named(parts: Mapping[str, str]) -> str:
+def _part_list(parts: Mapping[str, str]) -> str:
     """List parts, each with how to tell it in the pictures."""
     return "; ".join(f"{name} ({look})" if look else name for name, look in parts.items())
 
 
-def _look(part: SeenPart) -> str:
+def _look_text(part: SeenPart) -> str:
     """Say how a part looks, and where it cannot be seen."""
     where = {"yes": "", "hidden": "; hidden", "missing": "; the model lacks it"}
     return f"{part.look}{where[part.seen]}"
 
 
-def _ranges(offers: Mapping[str, Offer]) -> str:
+def _range_list(offers: Mapping[str, PlacementOffer]) -> str:
     blocks = []
     for part, offer in offers.items():
         lines = (f"- {name}: {words}" for name, words in offer.ranges.items())
@@ -373,12 +387,12 @@ def _ranges(offers: Mapping[str, Offer]) -> str:
     return "\n\n".join(blocks)
 
 
-def _which(turn: Turn) -> str:
+def _answer_number_text(turn: AnswerNumber) -> str:
     """Say which of several answers is meant; "" where one only is wanted."""
     return f"{turn.number} of {turn.of} " if turn.of > 1 else ""
 
 
-def _row(question: Question) -> dict:
+def _transcript_row(question: Question) -> dict:
     turn = question.turn
     return {
         "task": question.task,

@@ -14,15 +14,15 @@ from pydantic import BaseModel, ValidationError
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
+from corporeal.vlm import Answer, AnswerCheck, Question, Reply, VlmClient, no_complaints
 
-FIELDS = ("task", "scene", "prompt", "schema", "views")
+RECORDING_KEY_FIELDS = ("task", "scene", "prompt", "schema", "views")
 """What must be equal for a recording to answer a question, most telling last to differ."""
-NUMBER = "answer_number"
+ANSWER_NUMBER_KEY = "answer_number"
 """Which of several answers to a question it is; absent: the first, as in recordings of one."""
 
 
-class Recordings:
+class ReplayClient:
     """Look each question up in a folder of recorded answers."""
 
     looks = False
@@ -34,10 +34,10 @@ class Recordings:
                 f"No folder of recordings at {folder!r}. Say --vlm replay:FOLDER, or --vlm "
                 "metadata to go without."
             )
-        self.rows = [_read(path) for path in sorted(self.folder.glob("*.json"))]
+        self.rows = [_read_recording(path) for path in sorted(self.folder.glob("*.json"))]
 
     def ask(
-        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer] = no_complaints
     ) -> Reply[Answer]:
         """Return the recorded answer.
 
@@ -46,21 +46,28 @@ class Recordings:
                 Or there is one that no longer fits what can be answered.
 
         """
-        row = self._row(asked(question, answer))
+        row = self._row(recording_key_row(question, answer))
         if row is None:
-            raise UserError(self._why_not(asked(question, answer)))
+            raise UserError(self._why_not(recording_key_row(question, answer)))
         return Reply(_validated(row, answer, check), "recording", str(row.get("model", "")))
 
     def holds(self, question: Question, answer: type[BaseModel]) -> bool:
         """Tell whether the question was answered."""
-        return self._row(asked(question, answer)) is not None
+        return self._row(recording_key_row(question, answer)) is not None
 
     def _row(self, wanted: dict[str, str]) -> dict | None:
-        return next((r for r in self._alike(wanted) if r.get(NUMBER) == wanted.get(NUMBER)), None)
+        return next(
+            (
+                r
+                for r in self._alike(wanted)
+                if r.get(ANSWER_NUMBER_KEY) == wanted.get(ANSWER_NUMBER_KEY)
+            ),
+            None,
+        )
 
     def _alike(self, wanted: dict[str, str]) -> list[dict]:
         """Return the recorded answers to a question, whichever of several they are."""
-        return [r for r in self.rows if all(r[f] == wanted[f] for f in FIELDS)]
+        return [r for r in self.rows if all(r[f] == wanted[f] for f in RECORDING_KEY_FIELDS)]
 
     def _why_not(self, wanted: dict[str, str]) -> str:
         about = f"{wanted['task']!r} about {wanted['scene']!r}"
@@ -68,54 +75,56 @@ class Recordings:
             return f"No recording in {self.folder}: nothing answers {about}."
         if alike := self._alike(wanted):
             return (
-                f"No recording in {self.folder} is answer {wanted.get(NUMBER, '1')} to {about}; it "
+                f"No recording in {self.folder} is answer {wanted.get(ANSWER_NUMBER_KEY, '1')} to {about}; it "
                 f"holds {len(alike)}. Record more of them, or ask for fewer (--answers)."
             )
-        nearest = max(self.rows, key=lambda row: [row[f] == wanted[f] for f in FIELDS])
-        differs = next(f for f in FIELDS if nearest[f] != wanted[f])
+        nearest = max(
+            self.rows, key=lambda row: [row[f] == wanted[f] for f in RECORDING_KEY_FIELDS]
+        )
+        differs = next(f for f in RECORDING_KEY_FIELDS if nearest[f] != wanted[f])
         if differs in ("prompt", "schema"):
             return (
                 f"The answers in {self.folder} are to another wording of the questions "
                 f"({nearest['file']} differs in {differs!r}: recorded "
-                f"{_short(nearest[differs], wanted[differs])}, asked "
-                f"{_short(wanted[differs], nearest[differs])}): record them again, or use "
+                f"{_quote_difference(nearest[differs], wanted[differs])}, asked "
+                f"{_quote_difference(wanted[differs], nearest[differs])}): record them again, or use "
                 "--vlm metadata."
             )
         return (
             f"No recording in {self.folder} answers {about}. The nearest, {nearest['file']}, "
-            f"differs in {differs!r}: recorded {_short(nearest[differs], wanted[differs])}, asked "
-            f"{_short(wanted[differs], nearest[differs])}. Record it again, or use --vlm metadata."
+            f"differs in {differs!r}: recorded {_quote_difference(nearest[differs], wanted[differs])}, asked "
+            f"{_quote_difference(wanted[differs], nearest[differs])}. Record it again, or use --vlm metadata."
         )
 
 
-class Recorder:
-    """Ask somebody else, and keep every answer where ``Recordings`` finds it."""
+class RecordingClient:
+    """Ask somebody else, and keep every answer where ``ReplayClient`` finds it."""
 
-    def __init__(self, model: Vlm, folder: Path) -> None:
+    def __init__(self, model: VlmClient, folder: Path) -> None:
         self.model, self.folder, self._one = model, folder, Lock()
         self.looks = model.looks
 
     def ask(
-        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer] = no_complaints
     ) -> Reply[Answer]:
         """Pass the question on and record its answer."""
         reply = self.model.ask(question, answer, check)
         with self._one:
-            record(self.folder, question, reply.answer, reply.model)
+            write_recording(self.folder, question, reply.answer, reply.model)
         return reply
 
 
-def record(folder: Path, question: Question, answer: BaseModel, model: str) -> Path:
-    """Keep an answer where ``Recordings`` finds it; the file appears whole or not at all."""
-    row = asked(question, type(answer))
-    key = digest(row)[:16]
+def write_recording(folder: Path, question: Question, answer: BaseModel, model: str) -> Path:
+    """Keep an answer where ``ReplayClient`` finds it; the file appears whole or not at all."""
+    row = recording_key_row(question, type(answer))
+    key = recording_digest(row)[:16]
     row = row | {"model": model, "lists": dict(question.lists), "answer": answer.model_dump()}
     path = folder / f"{question.task}-{key}.json"
     store.write_json(path, row)
     return path
 
 
-def asked(question: Question, answer: type[BaseModel]) -> dict[str, str]:
+def recording_key_row(question: Question, answer: type[BaseModel]) -> dict[str, str]:
     """Name a question by all that its answer depends on."""
     number = question.turn.number
     return {
@@ -124,13 +133,15 @@ def asked(question: Question, answer: type[BaseModel]) -> dict[str, str]:
         "prompt": question.prompt,
         "schema": schema_digest(answer),
         "views": question.views,
-        **({NUMBER: str(number)} if number > 1 else {}),
+        **({ANSWER_NUMBER_KEY: str(number)} if number > 1 else {}),
     }
 
 
-def digest(row: dict[str, str]) -> str:
+def recording_digest(row: dict[str, str]) -> str:
     """Return the name of what was asked, in hexadecimal digits."""
-    words = [row[f] for f in FIELDS] + ([row[NUMBER]] if NUMBER in row else [])
+    words = [row[f] for f in RECORDING_KEY_FIELDS] + (
+        [row[ANSWER_NUMBER_KEY]] if ANSWER_NUMBER_KEY in row else []
+    )
     return hashlib.sha256("\0".join(words).encode()).hexdigest()
 
 
@@ -140,23 +151,27 @@ def schema_digest(answer: type[BaseModel]) -> str:
     return hashlib.sha256(schema.encode()).hexdigest()[:16]
 
 
-def _read(path: Path) -> dict:
+def _read_recording(path: Path) -> dict:
     try:
         row = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise BadFileError(path, f"is not a recording ({error}).", "Delete it.") from error
-    missing = [f for f in (*FIELDS, "answer") if not isinstance(row, dict) or f not in row]
+    missing = [
+        f for f in (*RECORDING_KEY_FIELDS, "answer") if not isinstance(row, dict) or f not in row
+    ]
     if missing:
         raise BadFileError(path, f"is not a recording: it has no {missing[0]!r}.", "Delete it.")
     return row | {"file": path.name}
 
 
-def _validated(row: dict, answer: type[Answer], check: Check[Answer]) -> Answer:
+def _validated(row: dict, answer: type[Answer], check: AnswerCheck[Answer]) -> Answer:
     try:
         found = answer.model_validate(row["answer"])
     except ValidationError as error:
         raise BadFileError(
-            row["file"], f"its answer does not fit: {first_problem(error)}.", "Record it again."
+            row["file"],
+            f"its answer does not fit: {first_validation_problem(error)}.",
+            "Record it again.",
         ) from error
     complaints = check(found)
     if complaints:
@@ -166,13 +181,13 @@ def _validated(row: dict, answer: type[Answer], check: Check[Answer]) -> Answer:
     return found
 
 
-def first_problem(error: ValidationError) -> str:
+def first_validation_problem(error: ValidationError) -> str:
     """Say where an answer first leaves its shape, and how."""
     first = error.errors()[0]
     return f"{'.'.join(str(x) for x in first['loc'])}: {first['msg']}"
 
 
-def _short(text: str, other: str) -> str:
+def _quote_difference(text: str, other: str) -> str:
     """Quote the first words in which a text differs from another."""
     if len(text) <= 60:
         return repr(text)

@@ -8,21 +8,23 @@ import pytest
 from corporeal.core.types import Law
 from corporeal.mpm import formulas, laws
 from corporeal.mpm.formulas.one_lane import (
-    OPENED,
-    PLASTIC_STRAIN,
-    PLASTIC_WORK,
-    STRAIN,
-    WAVE,
+    RESPONSE_OPENED,
+    RESPONSE_PLASTIC_STRAIN,
+    RESPONSE_PLASTIC_WORK,
+    RESPONSE_STRAIN,
+    RESPONSE_WAVE,
+    law_response,
     mean_pressure,
-    respond,
 )
 from corporeal.mpm.laws import hencky
+from corporeal.mpm.laws.constitutive_law import YieldParameters, lame_parameters
 from corporeal.mpm.laws.drucker_prager import apex_strain, cone_slope
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.laws.law import Numbers, lame
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
-wp.set_module_options(formulas.options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
+wp.set_module_options(
+    formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast")
+)
 
 COUNT = 8000
 YOUNG, POISSON, YIELD, HARDENING, ANGLE = 1e5, 0.3, 2e3, 1e4, np.radians(30.0)
@@ -32,9 +34,9 @@ PLACES = 20
 """Numbers of a response."""
 TOLERANCE = 2e-6
 """Of stresses, as a share of E ‖F - 1‖; of large ones, of themselves."""
-ELASTIC = tuple(law for law in Law if not laws.MENU[law].flows)
-PLASTIC = tuple(law for law in Law if laws.MENU[law].flows)
-BULKY = tuple(law for law in Law if laws.MENU[law].volumetric)
+ELASTIC = tuple(law for law in Law if not laws.CONSTITUTIVE_LAWS[law].flows)
+PLASTIC = tuple(law for law in Law if laws.CONSTITUTIVE_LAWS[law].flows)
+BULKY = tuple(law for law in Law if laws.CONSTITUTIVE_LAWS[law].volumetric)
 UPPER = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 """Rows and columns of what is kept of a symmetric matrix."""
 
@@ -45,7 +47,9 @@ Doubles = wp.array(dtype=wp.float64)
 @wp.kernel
 def at_one_lane(H: wp.array(dtype=wp.mat33), past: wp.array(dtype=wp.vec2), t: Floats, out: Floats):
     i = wp.tid()
-    r = respond(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], H[i], past[i][0], past[i][1])
+    r = law_response(
+        t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], H[i], past[i][0], past[i][1]
+    )
     for k in range(PLACES):
         out[PLACES * i + k] = r[k]
 
@@ -169,7 +173,7 @@ def responses(law, H, width, past=None, apex=0.0, index=0.4):
 
     ``past`` is the plastic strain and the volume correction so far, (COUNT, 2).
     """
-    mu, lam = lame(YOUNG, POISSON)
+    mu, lam = lame_parameters(YOUNG, POISSON)
     cone = float(cone_slope(ANGLE)) if law == Law.DRUCKER_PRAGER else 0.0
     numbers = [law.value, mu, lam, YIELD, HARDENING, cone, apex, DRAG, index]
     table = np.array(numbers, np.float32)
@@ -186,7 +190,7 @@ def responses(law, H, width, past=None, apex=0.0, index=0.4):
 
 def moduli():
     """μ and λ of every particle [Pa]."""
-    mu, lam = lame(np.full(COUNT, YOUNG), np.full(COUNT, POISSON))
+    mu, lam = lame_parameters(np.full(COUNT, YOUNG), np.full(COUNT, POISSON))
     return np.asarray(mu), np.asarray(lam)
 
 
@@ -194,8 +198,8 @@ def flowed(law, F, past=None, cohesion=0.0, index=0.4):
     """What NumPy makes of the return map: the strain that is left, and what flowed."""
     full = lambda value: np.full(COUNT, float(value))  # noqa: E731
     past = np.zeros((COUNT, 2)) if past is None else past.astype(np.float64)
-    cone, apex = cone_slope(ANGLE), apex_strain(ANGLE, cohesion, *lame(YOUNG, POISSON))
-    numbers = Numbers(*moduli(), *map(full, (YIELD, HARDENING, cone, apex, DRAG, index)))
+    cone, apex = cone_slope(ANGLE), apex_strain(ANGLE, cohesion, *lame_parameters(YOUNG, POISSON))
+    numbers = YieldParameters(*moduli(), *map(full, (YIELD, HARDENING, cone, apex, DRAG, index)))
     return laws.flow(np.full(COUNT, law.value), F, numbers, past[:, 0], past[:, 1])
 
 
@@ -214,7 +218,7 @@ def test_the_stress_of_every_law_is_that_of_float64(law, width, H):
     left = flowed(law, F).F if law in PLASTIC else F
     found = responses(law, H, width)
     assert astray(law, left, H, found)[0].max() < TOLERANCE
-    strain = found[:, int(STRAIN) : int(STRAIN) + 9].reshape(-1, 3, 3)
+    strain = found[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9].reshape(-1, 3, 3)
     assert np.abs(strain - (left - np.eye(3))).max() < TOLERANCE
 
 
@@ -246,22 +250,22 @@ def test_matter_with_a_past_flows_as_in_float64(law, width, H):
     found, exact = responses(law, H, width, past, apex), flowed(law, F, past, cohesion)
     assert 0.1 < (exact.plastic_strain > 0.0).mean() < 1.0
     size = np.linalg.norm(H.astype(np.float64), axis=(1, 2)) + past[:, 1]
-    strain = found[:, int(STRAIN) : int(STRAIN) + 9].reshape(-1, 3, 3)
+    strain = found[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9].reshape(-1, 3, 3)
     assert np.abs(strain - (exact.F - np.eye(3))).max() < TOLERANCE
     tau = hencky.tau(exact.F, mu, lam)[:, *UPPER]
     assert (np.linalg.norm(found[:, :6] - tau, axis=1) / (YOUNG * size)).max() < TOLERANCE
-    assert np.abs(found[:, int(PLASTIC_STRAIN)] - exact.plastic_strain).max() < TOLERANCE
+    assert np.abs(found[:, int(RESPONSE_PLASTIC_STRAIN)] - exact.plastic_strain).max() < TOLERANCE
     assert (
-        np.abs(found[:, int(PLASTIC_WORK)] - exact.loss) / (YOUNG * size**2)
+        np.abs(found[:, int(RESPONSE_PLASTIC_WORK)] - exact.loss) / (YOUNG * size**2)
     ).max() < 2 * TOLERANCE
     if law == Law.FLUID:
         plain, newton = responses(law, H, width, past, apex, 1.0), flowed(law, F, past, cohesion, 1)
-        strain = plain[:, int(STRAIN) : int(STRAIN) + 9].reshape(-1, 3, 3)
+        strain = plain[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9].reshape(-1, 3, 3)
         assert np.abs(strain - (newton.F - np.eye(3))).max() < TOLERANCE
         assert np.abs(newton.F - exact.F).max() > 1e-2
     if law == Law.DRUCKER_PRAGER:
         assert (exact.volume > past[:, 1]).any() and (exact.volume < past[:, 1]).any()
-        assert np.abs(found[:, int(OPENED)] - exact.volume).max() < TOLERANCE
+        assert np.abs(found[:, int(RESPONSE_OPENED)] - exact.volume).max() < TOLERANCE
 
 
 @pytest.mark.parametrize("width", [1, 8])
@@ -270,7 +274,7 @@ def test_no_wave_along_a_principal_axis_is_faster_than_its_bound(law, width, wil
     diagonal = np.zeros_like(wild)
     for d in range(3):
         diagonal[:, d, d] = np.maximum(wild[:, d, d], -0.8)
-    bound = responses(law, diagonal, width)[:, int(WAVE)]
+    bound = responses(law, diagonal, width)[:, int(RESPONSE_WAVE)]
     F, numbers, h = np.eye(3) + diagonal.astype(np.float64), np.full(COUNT, law.value), 1e-6
     for d in range(3):
         stretched = F.copy()
@@ -280,7 +284,7 @@ def test_no_wave_along_a_principal_axis_is_faster_than_its_bound(law, width, wil
     exact = laws.wave_modulus(numbers, F, *moduli())
     assert (bound >= exact * (1.0 - 1e-5)).all()
     mu, lam = (value[0] for value in moduli())
-    rest = responses(law, np.zeros_like(wild), width)[:, int(WAVE)]
+    rest = responses(law, np.zeros_like(wild), width)[:, int(RESPONSE_WAVE)]
     assert rest == pytest.approx(lam + 2.0 * mu, rel=1e-6)
 
 
@@ -326,20 +330,24 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
 def test_elastic_laws_leave_the_strain_alone_and_do_no_plastic_work(width, H):
     for law in ELASTIC:
         found = responses(law, H, width)
-        np.testing.assert_array_equal(found[:, int(STRAIN) : int(STRAIN) + 9], H.reshape(-1, 9))
-        assert not found[:, [int(PLASTIC_STRAIN), int(OPENED), int(PLASTIC_WORK)]].any()
+        np.testing.assert_array_equal(
+            found[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9], H.reshape(-1, 9)
+        )
+        assert not found[
+            :, [int(RESPONSE_PLASTIC_STRAIN), int(RESPONSE_OPENED), int(RESPONSE_PLASTIC_WORK)]
+        ].any()
 
 
 @pytest.mark.parametrize("width", [1, 8])
 def test_plastic_work_is_never_negative_and_flow_happens(width, H):
     found = responses(Law.VON_MISES, H, width)
-    assert (found[:, int(PLASTIC_WORK)] >= 0.0).all()
-    assert 0.2 < (found[:, int(PLASTIC_STRAIN)] > 0.0).mean() < 1.0
+    assert (found[:, int(RESPONSE_PLASTIC_WORK)] >= 0.0).all()
+    assert 0.2 < (found[:, int(RESPONSE_PLASTIC_STRAIN)] > 0.0).mean() < 1.0
 
 
 @pytest.mark.parametrize("law", list(Law))
 def test_the_stored_energy_is_that_of_numpy(law, H):
-    mu, lam = (float(value) for value in lame(YOUNG, POISSON))
+    mu, lam = (float(value) for value in lame_parameters(YOUNG, POISSON))
     out = on_processor(np.zeros(COUNT), wp.float64)
     strain = on_processor(H.astype(np.float64).ravel(), wp.float64)
     wp.launch(energies, COUNT, [law.value, mu, lam, strain, out], device="cpu")
@@ -351,7 +359,7 @@ def test_the_stored_energy_is_that_of_numpy(law, H):
 
 
 def test_laws_have_the_same_numbers_in_both_languages():
-    numbers = re.search(r"enum Law {(.*)}", formulas.preamble())[1]
+    numbers = re.search(r"enum Law {(.*)}", formulas.cpp_preamble())[1]
     listed = dict(re.findall(r"(\w+) = (\d+)", numbers))
     assert {name: int(number) for name, number in listed.items()} == {
         law.name: law.value for law in Law
@@ -359,7 +367,7 @@ def test_laws_have_the_same_numbers_in_both_languages():
 
 
 def test_no_law_is_chosen_by_a_bare_number():
-    folder = formulas.HERE.parent
+    folder = formulas.FORMULAS_FOLDER.parent
     texts = [*folder.rglob("*.cpp"), *folder.rglob("*.h")]
     assert len(texts) > 20
     for path in texts:

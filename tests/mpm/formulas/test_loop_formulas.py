@@ -8,19 +8,21 @@ import pytest
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.formulas import one_lane, one_lane_contact
 from corporeal.mpm.physics import (
-    backing,
     contact,
     contact_impulses,
-    grips,
+    grid_spline,
+    impact_support,
     rigid,
-    spline,
+    spring_grips,
     springs,
     wall_stress,
-    wind,
+    wind_pressure,
 )
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
-wp.set_module_options(formulas.options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
+wp.set_module_options(
+    formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast")
+)
 
 COUNT = 4000
 SINGLE, DOUBLE = 2e-6, 1e-13
@@ -56,7 +58,7 @@ def rotations(rng):
     """Rotation matrices and their rotation vectors, by up to 3 rad."""
     turns = unit_vectors(rng) * rng.uniform(0.0, 3.0, COUNT)[:, None]
     turns[0] = 0.0
-    return np.stack([rigid.rotation(turn) for turn in turns]), turns
+    return np.stack([rigid.rotation_matrix(turn) for turn in turns]), turns
 
 
 # ---------------------------------------------------------------- splines
@@ -65,8 +67,8 @@ def rotations(rng):
 @wp.kernel
 def splines_at_one_lane(f: Vectors, out: wp.array2d(dtype=wp.mat33)):
     i = wp.tid()
-    out[0, i] = one_lane.splines(f[i])
-    out[1, i] = one_lane.slopes(f[i])
+    out[0, i] = one_lane.spline_weights(f[i])
+    out[1, i] = one_lane.spline_slopes(f[i])
 
 
 @wp.func_native("""
@@ -86,7 +88,7 @@ def splines_at_eight_lanes(f: Floats, out: Floats):
 
 def test_splines_and_slopes_are_those_of_float64_at_both_widths(rng):
     f = rng.uniform(0.5, 1.5, (COUNT, 3)).astype(np.float32)
-    exact = spline.stencil(f.astype(np.float64), np.zeros(COUNT, np.int64), 1.0)
+    exact = grid_spline.stencil(f.astype(np.float64), np.zeros(COUNT, np.int64), 1.0)
     exact = np.stack([exact.spline, exact.slope]).swapaxes(2, 3)
     one = run(splines_at_one_lane, sent(f, wp.vec3), out=((2, COUNT), wp.mat33))
     np.testing.assert_allclose(one, exact, atol=SINGLE)
@@ -150,9 +152,10 @@ def test_open_distances_are_those_of_numpy_in_either_precision(dtype, rng):
 
 
 def test_the_numbers_of_the_method_are_written_from_python():
-    listed = dict(re.findall(r"constexpr (\w+ \w+) = ([^;]+);", formulas.preamble()))
+    listed = dict(re.findall(r"constexpr (\w+ \w+) = ([^;]+);", formulas.cpp_preamble()))
     assert {name: float(value) for name, value in listed.items()} == {
-        f"{constants.type_of(value)} {name}": value for name, value in constants.numbers().items()
+        f"{constants.cpp_type(value)} {name}": value
+        for name, value in constants.constants_by_name().items()
     }
     assert {"double LATTICE_GAP", "double DEEPEST", "int SWEEPS"} <= listed.keys()
 
@@ -160,7 +163,7 @@ def test_the_numbers_of_the_method_are_written_from_python():
 @wp.kernel
 def reaches(F: Matrices, n: Vectors, r0: Floats, out: Floats):
     i = wp.tid()
-    out[i] = one_lane_contact.reach_of(F[i], n[i], r0[i])
+    out[i] = one_lane_contact.support_reach(F[i], n[i], r0[i])
 
 
 @wp.func_native("""
@@ -192,16 +195,16 @@ def test_particles_reach_as_far_as_their_stretch_says_at_both_widths(rng):
 
 @wp.kernel
 def steps_kept_in_native_text(travel: Doubles, out: wp.array(dtype=wp.int32)):
-    out[wp.tid()] = one_lane_contact.steps_kept(travel[wp.tid()])
+    out[wp.tid()] = one_lane_contact.normal_cache_steps(travel[wp.tid()])
 
 
 def test_normals_of_what_moves_farther_in_a_step_are_chosen_more_often():
-    eighth = constants.KEPT_TRAVEL / constants.KEPT_STEPS
+    eighth = constants.NORMAL_CACHE_TRAVEL_DX / constants.NORMAL_CACHE_STEPS
     travel = np.array([0.0, eighth, 1.01 * eighth, 2.5 * eighth, 7.5 * eighth, 1e3])
     out = ((len(travel),), wp.int32)
     found = run(steps_kept_in_native_text, sent(travel, D), out=out, threads=len(travel))
     assert found.tolist() == [8, 8, 4, 2, 1, 1]
-    assert [contact.steps_kept(v) for v in travel.tolist()] == found.tolist()
+    assert [contact.normal_cache_steps(v) for v in travel.tolist()] == found.tolist()
 
 
 @wp.kernel
@@ -212,7 +215,7 @@ def projections(
     i = wp.tid()
     un = wp.dot(u[i], n[i])
     old = wp.dot(J[i], n[i])
-    push = one_lane_contact.push_of(old, un, D(0.1), soft[i])
+    push = one_lane_contact.normal_impulse(old, un, D(0.1), soft[i])
     rub = J[i] - old * n[i] + (u[i] - un * n[i]) / soft[i]
     out[i] = one_lane_contact.within_cone(mu[i], push, n[i], rub)
 
@@ -231,7 +234,7 @@ def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
         )
         # ``solve`` begins with no impulse: from u + J/m the first projection gives J's next value.
         pair = (np.array([value]) for value in (0, 1))
-        one = contact_impulses.Contacts(
+        one = contact_impulses.ContactList(
             *pair, np.zeros((1, 3)), n[i : i + 1], np.zeros(1), mu[i : i + 1]
         )
         exact[i] = contact_impulses.solve(one, movers, np.array([0.1]), 1)[0]
@@ -260,13 +263,13 @@ def drags(
     span: Doubles, soft: Doubles, curve: Vectors64, n: Vectors64, t: Vectors64, out: Vectors64
 ):
     i = wp.tid()
-    out[i] = one_lane_contact.dragged(soft[i], span[i], curve[i], D(0.25), n[i], t[i])
+    out[i] = one_lane_contact.drag_impulse(soft[i], span[i], curve[i], D(0.25), n[i], t[i])
 
 
 def test_what_a_wall_drags_on_a_liquid_is_that_of_numpy(rng):
     dx, dt, full = 0.01, 2e-4, 1.1e-3
     mass, height = rng.uniform(0.0, full, COUNT), rng.uniform(-1.45, 1.5, COUNT) * dx
-    exact = wall_stress.span(mass, full, height, dx, dt)
+    exact = wall_stress.drag_span(mass, full, height, dx, dt)
     given = [sent(mass, wp.float64), sent(height / dx, wp.float64)]
     found = run(spans, *given, full, dx, dt, out=(COUNT, wp.float64))
     assert np.abs(found - exact).max() < 1e-12 * exact.max()
@@ -275,7 +278,7 @@ def test_what_a_wall_drags_on_a_liquid_is_that_of_numpy(rng):
     soft, n = rng.uniform(100.0, 1e4, COUNT), unit_vectors(rng)
     t = np.cross(n, rng.normal(size=(COUNT, 3))) * 1e-4
     layers = np.column_stack([exact, curve])
-    drag = np.array([wall_stress.drag(*row) for row in zip(t, soft, layers, strict=True)])
+    drag = np.array([wall_stress.drag_impulse(*row) for row in zip(t, soft, layers, strict=True)])
     given = [sent(a, wp.float64) for a in (exact, soft)]
     found = run(drags, *given, *(sent(a, wp.vec3d) for a in (curve, n, t)), out=(COUNT, wp.vec3d))
     assert np.abs(found - (0.25 * n + drag)).max() < 1e-9 * np.abs(t).max()
@@ -304,11 +307,11 @@ def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
     u, kick = rng.uniform(-0.3, 1.0, COUNT), rng.uniform(-0.1, 0.1, COUNT)
     e = rng.uniform(0.1, 1.0, COUNT) * (rng.uniform(size=COUNT) > 0.2)
     gap = rng.uniform(-0.2, 0.2, COUNT) * dx
-    contacts = contact_impulses.Contacts(
+    contacts = contact_impulses.ContactList(
         *[np.zeros((COUNT, *shape)) for shape in [()] * 2 + [(3,)] * 2 + [()] * 2]
     )
     feigned = rng.uniform(0.0, 0.2, COUNT)
-    rebound = contact_impulses.Rebound(np.arange(COUNT), e, kick, feigned)
+    rebound = contact_impulses.ReboundRules(np.arange(COUNT), e, kick, feigned)
     exact, hit = contact_impulses.target_speeds(contacts._replace(gap=gap), u, rebound, dx, dt)
     assert 0.1 < hit.mean() < 0.9 and (exact[hit] < 0.0).all() and (exact[~hit] >= 0.0).all()
     given = [sent(value, wp.float64) for value in (e, u, kick, feigned, gap)]
@@ -319,7 +322,7 @@ def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
 @wp.kernel
 def bounces(e: Doubles, laws: wp.array2d(dtype=D), v: Doubles, out: Doubles):
     i = wp.tid()
-    out[i] = one_lane_contact.bounce_at(e[i], laws, i, v[i])
+    out[i] = one_lane_contact.restitution_at_speed(e[i], laws, i, v[i])
 
 
 def test_restitution_at_the_speed_of_a_blow_is_as_in_numpy(rng):
@@ -327,7 +330,9 @@ def test_restitution_at_the_speed_of_a_blow_is_as_in_numpy(rng):
     power = np.where(rng.uniform(size=COUNT) < 0.5, 0.25, 0.0)
     law = np.column_stack([rng.uniform(0.1, 9.0, COUNT), rng.uniform(0, 0.05, COUNT), power])
     law = np.column_stack([law, rng.uniform(0.0, 0.3, COUNT), rng.uniform(0.5, 1.0, COUNT)])
-    exact = np.array([backing.bounce_at(*row) for row in zip(e, law, v, strict=True)])
+    exact = np.array(
+        [impact_support.restitution_at_speed(*row) for row in zip(e, law, v, strict=True)]
+    )
     assert 0.05 < (exact == law[:, 4]).mean() < 0.6
     table = wp.array(law, dtype=D, device="cpu")
     found = run(bounces, sent(e, wp.float64), table, sent(v, wp.float64), out=(COUNT, wp.float64))
@@ -342,7 +347,7 @@ def turns(R: Matrices64, rest: Matrices64, L: Vectors64, dt: D, out: wp.array2d(
     i = wp.tid()
     now = one_lane.inverse_inertia(R[i], rest[i])
     out[0, i] = now
-    out[1, i] = one_lane.turned(R[i], rest[i], L[i], now * L[i], dt)
+    out[1, i] = one_lane.integrate_rotation(R[i], rest[i], L[i], now * L[i], dt)
 
 
 @pytest.mark.parametrize("dt", [1e-9, 0.01, 0.3])
@@ -355,20 +360,23 @@ def test_a_free_turn_is_that_of_numpy(dt, rng):
     found = run(turns, *given, dt, out=((2, COUNT), wp.mat33d))
     for i in range(0, COUNT, 10):
         assert np.abs(found[0, i] - rigid.world_inverse_inertia(R[i], inertia[i])).max() < DOUBLE
-        assert np.abs(found[1, i] - rigid.turned(R[i], inertia[i], L[i], dt)).max() < DOUBLE
+        assert (
+            np.abs(found[1, i] - rigid.integrate_rotation(R[i], inertia[i], L[i], dt)).max()
+            < DOUBLE
+        )
     assert np.abs(found[1] @ found[1].swapaxes(1, 2) - np.eye(3)).max() < DOUBLE
 
 
 @wp.kernel
 def turn_vectors(R: Matrices64, out: Vectors64):
-    out[wp.tid()] = one_lane.turn_of(R[wp.tid()])
+    out[wp.tid()] = one_lane.rotation_vector(R[wp.tid()])
 
 
 def test_the_vector_of_a_rotation_is_found_again(rng):
     R, vectors = rotations(rng)
     found = run(turn_vectors, sent(R, wp.mat33d), out=(COUNT, wp.vec3d))
     assert np.abs(found - vectors).max() < 1e-12
-    assert np.abs(found - np.stack([springs.turn_of(each) for each in R])).max() < DOUBLE
+    assert np.abs(found - np.stack([springs.rotation_vector(each) for each in R])).max() < DOUBLE
 
 
 # ---------------------------------------------------------------- loads
@@ -377,7 +385,7 @@ def test_the_vector_of_a_rotation_is_found_again(rng):
 @wp.kernel
 def winds(F: Matrices, N: Vectors, u: Vectors, m: Floats, air: float, dt: float, out: Vectors):
     i = wp.tid()
-    out[i] = one_lane.pressed(air, one_lane.turned_area(F[i], N[i]), u[i], m[i], dt)
+    out[i] = one_lane.wind_impulse(air, one_lane.turned_area(F[i], N[i]), u[i], m[i], dt)
 
 
 @wp.func_native("""
@@ -403,11 +411,11 @@ def test_wind_presses_on_a_deformed_face_as_in_numpy_in_either_precision(rng):
     F = (np.eye(3) + 0.2 * rng.normal(size=(COUNT, 3, 3))).astype(np.float32)
     N, seen = (rng.normal(size=(2, COUNT, 3)) * [[[1e-3]], [[5.0]]]).astype(np.float32)
     mass, dt = rng.uniform(1e-4, 1e-2, COUNT).astype(np.float32), 1e-3
-    air = wind.HALF_RHO_C
+    air = wind_pressure.HALF_RHO_C
     wide = F.astype(np.float64)
     cofactor = np.linalg.det(wide)[:, None, None] * np.linalg.inv(wide).swapaxes(1, 2)
     area = np.einsum("pij,pj->pi", cofactor, N.astype(np.float64))
-    exact = wind.pressed(area, seen.astype(np.float64), mass.astype(np.float64), dt)
+    exact = wind_pressure.wind_impulses(area, seen.astype(np.float64), mass.astype(np.float64), dt)
     assert (exact == 0.0).all(axis=1).any()
     largest = np.abs(exact).max()
     given = [sent(F, wp.mat33), sent(N, wp.vec3), sent(seen, wp.vec3), sent(mass, wp.float32)]
@@ -425,12 +433,12 @@ def test_wind_presses_on_a_deformed_face_as_in_numpy_in_either_precision(rng):
 @wp.kernel
 def holds(k: Doubles, c: Doubles, m: Doubles, x: Vectors64, v: Vectors64, dt: D, out: Vectors64):
     i = wp.tid()
-    out[i] = one_lane.pulled(k[i], c[i], m[i], x[i], v[i], dt)
+    out[i] = one_lane.grip_spring_impulse(k[i], c[i], m[i], x[i], v[i], dt)
 
 
 def hold(mass):
     """Give a hold on one particle of some mass."""
-    return grips.Hold(np.zeros(1, np.int64), np.ones(1), mass, np.zeros(3))
+    return spring_grips.GripHold(np.zeros(1, np.int64), np.ones(1), mass, np.zeros(3))
 
 
 def test_a_grip_pulls_as_in_numpy_and_no_more_than_a_step_can_follow(rng):
@@ -438,8 +446,8 @@ def test_a_grip_pulls_as_in_numpy_and_no_more_than_a_step_can_follow(rng):
     away, v, dt = rng.normal(size=(COUNT, 3)), rng.normal(size=(COUNT, 3)), 1e-3
     exact = np.stack(
         [
-            grips.Grip(
-                grips.Hold(np.zeros(1, np.int64), np.ones(1), m[i], np.zeros(3)),
+            spring_grips.Grip(
+                spring_grips.GripHold(np.zeros(1, np.int64), np.ones(1), m[i], np.zeros(3)),
                 away[i],
                 k[i],
                 c[i],
@@ -456,7 +464,7 @@ def test_a_grip_pulls_as_in_numpy_and_no_more_than_a_step_can_follow(rng):
 
 @wp.kernel
 def ramps(time: Doubles, ramp: D, out: Doubles):
-    out[wp.tid()] = one_lane.ramped(time[wp.tid()], ramp)
+    out[wp.tid()] = one_lane.ramped_time(time[wp.tid()], ramp)
 
 
 @pytest.mark.parametrize("ramp", [0.0, 0.5])

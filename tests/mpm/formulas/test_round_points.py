@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from corporeal.mpm.cuda.layout import wp
-from corporeal.mpm.formulas import one_lane_contact, options
-from corporeal.mpm.physics.rounding import shift_to_contact
+from corporeal.mpm.formulas import formula_options, one_lane_contact
+from corporeal.mpm.physics.rounded_surface import support_point_shift
 
-wp.set_module_options(options())
+wp.set_module_options(formula_options())
 COUNT = 300
 
 
@@ -44,7 +44,7 @@ def test_the_fast_engines_shift_as_numpy_does():
     ways = wp.array(towards, dtype=wp.vec3d, device="cpu")
     out = wp.zeros(COUNT, dtype=wp.vec4d, device="cpu")
     wp.launch(shifts, COUNT, inputs=[flat, ways, out], device="cpu")
-    shift, own = shift_to_contact(rows, towards)
+    shift, own = support_point_shift(rows, towards)
     assert out.numpy()[:, :3] == pytest.approx(shift, abs=1e-13)
     assert (out.numpy()[:, 3] == own).all()
     assert 20 < (~own).sum() < COUNT - 20
@@ -52,7 +52,7 @@ def test_the_fast_engines_shift_as_numpy_does():
 
 def test_a_shift_goes_forwards_and_no_farther_than_each_part_reaches():
     rows, towards = some(1)
-    shift, _ = shift_to_contact(rows, towards)
+    shift, _ = support_point_shift(rows, towards)
     facing = np.sum(towards * rows[:, :3], axis=1) > 0.1
     assert (np.sum(shift * towards, axis=1)[facing] > -1e-12).all()
     assert (np.linalg.norm(shift, axis=1) <= 2 * rows[:, 8] + 1e-12).all()
@@ -65,6 +65,6 @@ def test_every_point_of_a_ball_that_reaches_the_lowest_point_gives_that():
     radii = np.tile([0.5, 0.0, 0.25, 1.0], (COUNT, 1))
     rows = np.column_stack([normal, np.zeros((COUNT, 3)), radii])
     down = np.tile([0.0, 0.0, -1.0], (COUNT, 1))
-    shift, own = shift_to_contact(rows, down)
+    shift, own = support_point_shift(rows, down)
     assert (0.5 * normal + shift)[own] == pytest.approx(0.5 * down[own], abs=1e-12)
     assert (own == (np.arccos(-normal[:, 2]) <= 0.5)).all()

@@ -6,9 +6,9 @@ import pytest
 from corporeal.core.types import Law
 from corporeal.mpm import laws
 from corporeal.mpm.laws import kinematics
-from corporeal.mpm.laws.law import lame
+from corporeal.mpm.laws.constitutive_law import lame_parameters
 
-MU, LAM = lame(1e3, 0.3)
+MU, LAM = lame_parameters(1e3, 0.3)
 
 
 def some_rotations(count, rng):
@@ -34,14 +34,14 @@ def constants(count):
 @pytest.mark.parametrize("law", Law)
 def test_stress_is_the_derivative_of_the_energy(law):
     F, h = some_deformations(), 1e-5
-    pk1 = laws.MENU[law].pk1(F, *constants(len(F)))
+    pk1 = laws.CONSTITUTIVE_LAWS[law].pk1(F, *constants(len(F)))
     slope = np.zeros_like(F)
     for i in range(3):
         for j in range(3):
             step = np.zeros((3, 3))
             step[i, j] = h
-            up = laws.MENU[law].psi(F + step, *constants(len(F)))
-            down = laws.MENU[law].psi(F - step, *constants(len(F)))
+            up = laws.CONSTITUTIVE_LAWS[law].psi(F + step, *constants(len(F)))
+            down = laws.CONSTITUTIVE_LAWS[law].psi(F - step, *constants(len(F)))
             slope[:, i, j] = (up - down) / (2 * h)
     error = np.abs(slope - pk1).max(axis=(1, 2)) / np.abs(pk1).max(axis=(1, 2))
     assert error.max() < 1e-6
@@ -50,8 +50,8 @@ def test_stress_is_the_derivative_of_the_energy(law):
 @pytest.mark.parametrize("law", Law)
 def test_kirchhoff_stress_is_pk1_times_f_transposed_and_symmetric(law):
     F = some_deformations()
-    tau = laws.MENU[law].tau(F, *constants(len(F)))
-    pk1 = laws.MENU[law].pk1(F, *constants(len(F)))
+    tau = laws.CONSTITUTIVE_LAWS[law].tau(F, *constants(len(F)))
+    pk1 = laws.CONSTITUTIVE_LAWS[law].pk1(F, *constants(len(F)))
     scale = np.abs(tau).max()
     assert np.abs(tau - pk1 @ kinematics.transpose(F)).max() < 1e-11 * scale
     assert np.abs(tau - kinematics.transpose(tau)).max() < 1e-11 * scale
@@ -72,16 +72,16 @@ def test_principal_stresses_are_those_of_the_kirchhoff_stress(law):
 @pytest.mark.parametrize("law", Law)
 def test_a_pure_rotation_costs_neither_stress_nor_energy(law):
     R = some_rotations(40, np.random.default_rng(1))
-    assert np.abs(laws.MENU[law].tau(R, *constants(len(R)))).max() < 1e-11 * MU
-    assert np.abs(laws.MENU[law].psi(R, *constants(len(R)))).max() < 1e-11 * MU
+    assert np.abs(laws.CONSTITUTIVE_LAWS[law].tau(R, *constants(len(R)))).max() < 1e-11 * MU
+    assert np.abs(laws.CONSTITUTIVE_LAWS[law].psi(R, *constants(len(R)))).max() < 1e-11 * MU
 
 
 @pytest.mark.parametrize("law", Law)
 def test_turning_the_observer_turns_the_stress_and_keeps_the_energy(law):
     F = some_deformations()
     Q = some_rotations(len(F), np.random.default_rng(2))
-    tau = laws.MENU[law].tau(F, *constants(len(F)))
-    turned = laws.MENU[law].tau(Q @ F, *constants(len(F)))
+    tau = laws.CONSTITUTIVE_LAWS[law].tau(F, *constants(len(F)))
+    turned = laws.CONSTITUTIVE_LAWS[law].tau(Q @ F, *constants(len(F)))
     expected = Q @ tau @ kinematics.transpose(Q)
     assert np.abs(turned - expected).max() < 1e-10 * np.abs(tau).max()
 
@@ -92,7 +92,7 @@ def test_all_laws_agree_with_linear_elasticity_at_small_strain(law):
     gradient = 1e-6 * rng.standard_normal((20, 3, 3))
     strain = 0.5 * (gradient + kinematics.transpose(gradient))
     linear = 2 * MU * strain + LAM * np.trace(strain, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-    tau = laws.MENU[law].tau(np.eye(3) + gradient, *constants(20))
+    tau = laws.CONSTITUTIVE_LAWS[law].tau(np.eye(3) + gradient, *constants(20))
     assert np.abs(tau - linear).max() < 2e-5 * np.abs(linear).max()
 
 
@@ -102,8 +102,8 @@ def test_mixed_laws_are_answered_particle_by_particle():
     tau = laws.tau(law, F, *constants(len(F)))
     psi = laws.psi(law, F, *constants(len(F)))
     for i, rule in enumerate(Law):
-        assert np.allclose(tau[i], laws.MENU[rule].tau(F[i : i + 1], *constants(1))[0])
-        assert np.allclose(psi[i], laws.MENU[rule].psi(F[i : i + 1], *constants(1))[0])
+        assert np.allclose(tau[i], laws.CONSTITUTIVE_LAWS[rule].tau(F[i : i + 1], *constants(1))[0])
+        assert np.allclose(psi[i], laws.CONSTITUTIVE_LAWS[rule].psi(F[i : i + 1], *constants(1))[0])
 
 
 def test_the_decomposition_is_accurate_for_flat_and_mirrored_matter():
@@ -149,7 +149,7 @@ def test_small_strains_store_the_energy_of_linear_elasticity():
         trace = np.trace(E, axis1=1, axis2=2)
         linear = mu * np.sum(E * E, axis=(1, 2)) + 0.5 * lam * trace**2
         for law in Law:
-            psi = laws.MENU[law].psi(np.eye(3) + E, mu, lam)
+            psi = laws.CONSTITUTIVE_LAWS[law].psi(np.eye(3) + E, mu, lam)
             np.testing.assert_allclose(psi, linear, rtol=30 * size)
 
 
@@ -157,7 +157,7 @@ def test_a_confined_bar_shortens_by_the_p_wave_modulus():
     strain = 1e-7
     F = np.diag([1.0, 1.0, 1.0 - strain])[None]
     for law in Law:
-        tau = laws.MENU[law].tau(F, *constants(1))[0]
+        tau = laws.CONSTITUTIVE_LAWS[law].tau(F, *constants(1))[0]
         assert tau[2, 2] == pytest.approx(-(LAM + 2 * MU) * strain, rel=1e-6)
         assert tau[0, 0] == pytest.approx(-LAM * strain, rel=1e-6)
 
@@ -167,7 +167,7 @@ def test_no_wave_along_a_principal_axis_is_faster_than_its_bound(law):
     """And at rest the bound is the P-wave modulus, which no smaller one would be."""
     rng, h = np.random.default_rng(6), 1e-6
     F = np.exp(rng.uniform(-0.6, 0.9, (400, 3)))[:, None, :] * np.eye(3)
-    rule, numbers = laws.MENU[law], constants(400)
+    rule, numbers = laws.CONSTITUTIVE_LAWS[law], constants(400)
     bound = rule.wave_modulus(F, *numbers)
     for d in range(3):
         stretched = F.copy()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.mpm.laws import fluid, hencky
-from corporeal.mpm.laws.law import Numbers
+from corporeal.mpm.laws.constitutive_law import YieldParameters
 
 MU, LAM = 100.0, 750.0
 ONE = np.ones(1)
@@ -14,7 +14,7 @@ def numbers(dt, consistency, index=1.0, yield_shear=0.0):
     """What the law reads, for particles and steps of dt [s]; one number, or one per particle."""
     drag = consistency * np.asarray(dt) ** -np.asarray(index)
     given = (MU, LAM, np.sqrt(3.0) * yield_shear, 0.0, 0.0, 0.0, drag, index)
-    return Numbers(*(value * np.ones(np.size(drag)) for value in given))
+    return YieldParameters(*(value * np.ones(np.size(drag)) for value in given))
 
 
 def sheared(rate, dt, steps, given):
@@ -73,12 +73,12 @@ def test_the_slip_of_a_step_balances_its_stress(index):
     mu, drag = 10.0 ** rng.uniform(1, 5, count), 10.0 ** rng.uniform(-2, 6, count)
     excess = mu * 10.0 ** rng.uniform(-6, 0, count)
     n = np.full(count, index)
-    slip = fluid.slip_of(excess, mu, drag, n)
+    slip = fluid.shear_slip(excess, mu, drag, n)
     seen = slip > 1e-25
     assert seen.mean() > 0.5
     bears = (mu * slip + drag * slip**n)[seen]
     assert bears == pytest.approx(excess[seen], rel=1e-6)
-    assert not fluid.slip_of(-excess, mu, drag, n).any()
+    assert not fluid.shear_slip(-excess, mu, drag, n).any()
 
 
 def test_no_step_makes_energy():
@@ -86,7 +86,7 @@ def test_no_step_makes_energy():
     rng = np.random.default_rng(2)
     F = np.eye(3) + 0.05 * rng.normal(size=(300, 3, 3))
     given = numbers(1e-3, 3.0, 0.5, 2.0)
-    many = Numbers(*(np.repeat(getattr(given, f), 300) for f in given.__dataclass_fields__))
+    many = YieldParameters(*(np.repeat(getattr(given, f), 300) for f in given.__dataclass_fields__))
     none = np.zeros(300)
     back = fluid.flow(F, many, none, none)
     stored = [hencky.psi(x, many.mu, many.lam) for x in (F, back.F)]

@@ -7,9 +7,9 @@ from scipy.optimize import brentq
 from corporeal.mpm.laws import drucker_prager as cone
 from corporeal.mpm.laws import hencky
 from corporeal.mpm.laws import von_mises as cylinder
-from corporeal.mpm.laws.law import Numbers, lame
+from corporeal.mpm.laws.constitutive_law import YieldParameters, lame_parameters
 
-MU, LAM = lame(1e3, 0.3)
+MU, LAM = lame_parameters(1e3, 0.3)
 YOUNG = 1e3
 ONE = np.ones(1)
 SHEARED = np.array([[-0.06, -0.01, 0.04]])
@@ -40,7 +40,7 @@ def numbers(count, yield_stress=0.0, friction_angle=0.5, cohesion=0.0):
         cone.apex_strain(friction_angle, cohesion, MU, LAM),
     )
     given = (MU, LAM, yield_stress, 0.0, slope, apex, 0.0, 1.0)
-    return Numbers(*(value * one for value in given))
+    return YieldParameters(*(value * one for value in given))
 
 
 def pull(total, steps, yield_stress, hardening=0.0):

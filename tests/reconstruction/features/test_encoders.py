@@ -3,8 +3,8 @@ import pytest
 
 from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.reconstruction import features
-from corporeal.reconstruction.features import connect
-from corporeal.reconstruction.features.saved_maps import Kept
+from corporeal.reconstruction.features import connect_encoder
+from corporeal.reconstruction.features.feature_map_cache import CachedEncoder
 
 
 class Counting:
@@ -27,8 +27,8 @@ def picture(seed=0):
 
 def test_a_map_that_was_made_once_is_not_made_again(tmp_path):
     encoder = Counting()
-    first = Kept(encoder, tmp_path / "maps").map(picture())
-    second = Kept(encoder, tmp_path / "maps").map(picture())
+    first = CachedEncoder(encoder, tmp_path / "maps").map(picture())
+    second = CachedEncoder(encoder, tmp_path / "maps").map(picture())
     assert encoder.asked == 1
     np.testing.assert_array_equal(first, second)
     assert second.dtype == np.float16
@@ -36,21 +36,21 @@ def test_a_map_that_was_made_once_is_not_made_again(tmp_path):
 
 def test_another_picture_or_another_model_is_another_map(tmp_path):
     encoder, other = Counting(), Counting("counting@2")
-    kept = Kept(encoder, tmp_path)
+    kept = CachedEncoder(encoder, tmp_path)
     changed = picture()
     changed[0, 0, 0] ^= 1
     for shown in (picture(), changed, picture().reshape(4, 16, 3)[:, :8].repeat(2, 0)):
         kept.map(shown)
     assert encoder.asked == 3
     assert kept.path(picture()) != kept.path(picture().reshape(4, 16, 3))
-    Kept(other, tmp_path).map(picture())
+    CachedEncoder(other, tmp_path).map(picture())
     assert other.asked == 1
 
 
 @pytest.mark.parametrize("damage", [b"", b"\x93NUMPY", b"no map at all"])
 def test_a_damaged_map_is_made_again(tmp_path, damage):
     encoder = Counting()
-    kept = Kept(encoder, tmp_path)
+    kept = CachedEncoder(encoder, tmp_path)
     first = kept.map(picture())
     kept.path(picture()).write_bytes(damage)
     np.testing.assert_array_equal(kept.map(picture()), first)
@@ -59,12 +59,12 @@ def test_a_damaged_map_is_made_again(tmp_path, damage):
 
 
 def test_no_model_is_a_choice_and_an_unknown_one_is_not():
-    assert connect("descriptor") is None
+    assert connect_encoder("descriptor") is None
     with pytest.raises(UnknownChoiceError, match="clip, descriptor, dinov2"):
-        connect("resnet")
+        connect_encoder("resnet")
 
 
 def test_what_is_not_installed_is_named(monkeypatch):
     monkeypatch.setattr(features, "find_spec", lambda name: None)
     with pytest.raises(UserError, match=r"needs torch and transformers.*corporeal\[learned\]"):
-        connect("clip:openai/clip-vit-base-patch16")
+        connect_encoder("clip:openai/clip-vit-base-patch16")

@@ -5,14 +5,15 @@ import pytest
 from box_scenes import on_faces
 from tiny_models import needs_models, save_clip, save_dinov2
 
-from corporeal.core.types import Gaussians, Inventory, ObjectWords, PartWords
-from corporeal.io.splat_ply import write_splat
+from corporeal.core.types import Gaussians, Inventory, ObjectDescription, PartDescription
+from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.pipeline.stages.reconstruct import reconstruct
 from corporeal.pipeline.stages.segment import segment
-from corporeal.reconstruction.gaussians import hull, radiance, solid
+from corporeal.reconstruction.gaussians import radiance_field, visual_hull
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.vlm.seen_objects import SeenObject, Viewer
+from corporeal.reconstruction.surface import closed_surface
+from corporeal.vlm.photographed_objects import PhotoInterview, SeenObject
 
 pytestmark = [needs_models(), pytest.mark.slow]
 BOXES = (((-0.5, -0.25, 0.0), (-0.1, 0.25, 0.5)), ((0.2, -0.2, 0.0), (0.5, 0.2, 0.3)))
@@ -29,12 +30,12 @@ def models(tmp_path_factory):
 @pytest.fixture
 def splat(tmp_path, monkeypatch):
     """Two boxes of flat Gaussians, z up; looked at coarsely."""
-    monkeypatch.setattr(stage, "OWN_VIEWS", 12)
-    monkeypatch.setattr(stage, "OWN_SIZE", (96, 96))
-    monkeypatch.setattr(solid, "CELLS", 60_000)
-    monkeypatch.setattr(hull, "CELLS", 60_000)
-    monkeypatch.setattr(radiance, "RAYS", 2048)
-    monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(60, 96))
+    monkeypatch.setattr(stage, "RENDERED_VIEWS", 12)
+    monkeypatch.setattr(stage, "RENDERED_SIZE_PX", (96, 96))
+    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 60_000)
+    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 60_000)
+    monkeypatch.setattr(radiance_field, "RAYS_PER_STEP", 2048)
+    monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", radiance_field.FieldPreset(60, 96))
     position, normal, owner = on_faces(BOXES, 2500, np.random.default_rng(0))
     turn = np.column_stack([1 + normal[:, 2], -normal[:, 1], normal[:, 0], 0 * owner])
     turn[normal[:, 2] == -1] = [0, 1, 0, 0]
@@ -45,11 +46,11 @@ def splat(tmp_path, monkeypatch):
         opacity=np.full(len(owner), 0.97, np.float32),
         sh=np.float32([[[1.0, -1.0, -1.0]], [[-1.0, -1.0, 1.0]]])[owner],
     )
-    write_splat(tmp_path / "boxes.ply", made)
+    write_splat_ply(tmp_path / "boxes.ply", made)
     return tmp_path / "boxes.ply"
 
 
-class Seer(Viewer):
+class Seer(PhotoInterview):
     """Somebody who sees two things; which is which CLIP tells."""
 
     def __init__(self):
@@ -71,10 +72,13 @@ def test_models_that_were_saved_here_see_things_and_name_parts(
     assert {o.class_name for o in scene.objects} == {"brick", "crate"}
     assert found.cloud.semantic.shape == (found.cloud.count, 24)
     assert found.cloud.structural.shape == (found.cloud.count, 48)
-    pieces = (PartWords("lid", "wood"), PartWords("body", "steel"))
-    things = [ObjectWords(o.name, o.class_name, (PartWords(o.name, None),)) for o in scene.objects]
-    pieced = PartWords(scene.objects[0].name, "wood", pieces=pieces)
-    things[0] = ObjectWords(scene.objects[0].name, scene.objects[0].class_name, (pieced,))
+    pieces = (PartDescription("lid", "wood"), PartDescription("body", "steel"))
+    things = [
+        ObjectDescription(o.name, o.class_name, (PartDescription(o.name, None),))
+        for o in scene.objects
+    ]
+    pieced = PartDescription(scene.objects[0].name, "wood", pieces=pieces)
+    things[0] = ObjectDescription(scene.objects[0].name, scene.objects[0].class_name, (pieced,))
     inventory = Inventory(tuple(things))
     parts = segment(scene, inventory, found=found, semantic=config.semantic)
     assert [(p.name, p.found_by) for p in parts.catalogue[:2]] == [
@@ -89,7 +93,7 @@ def test_models_that_were_saved_here_see_things_and_name_parts(
         np.testing.assert_array_equal(cloud.semantic, found.cloud.semantic)
         raise StopIteration
 
-    monkeypatch.setattr("corporeal.reconstruction.features.clip.dense", looked)
+    monkeypatch.setattr("corporeal.reconstruction.features.clip.dense_features", looked)
     monkeypatch.setattr(stage, "assign_instances", enough)
     with pytest.raises(StopIteration):
         reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")

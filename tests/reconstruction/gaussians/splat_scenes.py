@@ -5,9 +5,13 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Camera, Gaussians, Views
-from corporeal.geometry.harmonics import DC
-from corporeal.reconstruction.gaussians.parameters import parameters
-from corporeal.reconstruction.gaussians.raster import draw, picture_of, pinhole
+from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
+from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
+from corporeal.reconstruction.gaussians.rasteriser_numba import (
+    draw,
+    picture_of_drawing,
+    pinhole_of_camera,
+)
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 
@@ -46,8 +50,13 @@ def pictured(gaussians, cameras, background=(0.0, 0.0, 0.0)):
     made = []
     with ThreadPool(1) as pool:
         for camera in cameras:
-            drawing = draw(parameters(gaussians), pinhole(camera), np.array(background), pool)
-            made.append(picture_of(drawing))
+            drawing = draw(
+                parameters_of_gaussians(gaussians),
+                pinhole_of_camera(camera),
+                np.array(background),
+                pool,
+            )
+            made.append(picture_of_drawing(drawing))
     rgb = np.stack([np.round(np.clip(p.rgb, 0, 1) * 255).astype(np.uint8) for p in made])
     return Views(rgb, cameras), np.stack([p.alpha > 0.5 for p in made])
 
@@ -60,7 +69,7 @@ def clad(mesh, count=5000, colour=(0.8, 0.3, 0.1), seed=0):
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     axes = np.stack([across, np.cross(normal, across), normal], axis=2)
     wide = 0.8 * np.sqrt(mesh.area / count)
-    sh = np.tile((np.array(colour) - 0.5) / DC, (len(points), 1, 1))
+    sh = np.tile((np.array(colour) - 0.5) / SH_DC_COEFFICIENT, (len(points), 1, 1))
     return Gaussians(
         mean=np.asarray(points),
         rotation=Rotation.from_matrix(axes).as_quat(scalar_first=True),

@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 
-from corporeal.reconstruction.gaussians.carve import carved, gridded
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
+from corporeal.reconstruction.gaussians.space_carving import carve_signed_distance, grid_over_box
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 SIZE, AWAY, RADIUS, HEIGHT = 96, 3.0, 0.5, 0.6
@@ -44,9 +44,9 @@ def met(eye, rays, radius, side):
 
 def space(seen):
     """Return the carved distance, how far from the ball's middle cells are, and the grid."""
-    grid = gridded(np.array([-0.6, -0.6, 0.0]), np.array([0.6, 0.6, 1.2]), 120_000, 0.0)
+    grid = grid_over_box(np.array([-0.6, -0.6, 0.0]), np.array([0.6, 0.6, 1.2]), 120_000, 0.0)
     with ThreadPool(1) as pool:
-        field = carved(grid, seen, 0.0, pool)
+        field = carve_signed_distance(grid, seen, 0.0, pool)
     far = np.linalg.norm(grid.points(np.ones(grid.shape, bool)) - MIDDLE, axis=1)
     return field, far.reshape(grid.shape), grid
 

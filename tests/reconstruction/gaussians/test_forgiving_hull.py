@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 from splat_scenes import around
-from test_hull import masks_of
+from test_visual_hull import masks_of
 
 from corporeal.core.types import Views
-from corporeal.reconstruction.gaussians import hull
+from corporeal.reconstruction.gaussians import visual_hull
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 CENTRES = np.array([[0, 0, 0], [0.5, 0.1, 0.2], [-0.4, 0.3, -0.2], [0.1, -0.45, 0.3]])
@@ -29,7 +29,7 @@ def kept_and_added(masks, cameras):
     """Shares of the balls' volume that the hull keeps, and that it has beside them."""
     views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)
     with ThreadPool(1) as pool:
-        made = hull.carved(np.full(3, -0.9), np.full(3, 0.9), views, masks, pool)
+        made = visual_hull.carve_hull(np.full(3, -0.9), np.full(3, 0.9), views, masks, pool)
     distance = np.linalg.norm(made.cells[..., None, :] - CENTRES, axis=-1)
     true = (distance < RADII).any(axis=-1)
     return (made.inside & true).sum() / true.sum(), (made.inside & ~true).sum() / true.sum()
@@ -40,7 +40,7 @@ def test_outlines_that_are_off_by_ten_of_640_pixels_eat_little(count, monkeypatc
     cameras = around(count, (SIDE, SIDE), focal=1.3 * SIDE)
     masks = wobbly(masks_of(CENTRES, RADII, cameras), 10 * SIDE / 640)
     kept, added = kept_and_added(masks, cameras)
-    monkeypatch.setattr(hull, "FILLED", 0.0)
+    monkeypatch.setattr(visual_hull, "MIN_MASK_FILL_FRACTION", 0.0)
     strict, _ = kept_and_added(masks, cameras)
     assert strict < 0.93, "the control eats"
     assert 1 - kept < 0.6 * (1 - strict)
@@ -51,6 +51,6 @@ def test_exact_outlines_are_taken_at_their_word(monkeypatch):
     cameras = around(24, (SIDE, SIDE), focal=1.3 * SIDE)
     masks = masks_of(CENTRES, RADII, cameras)
     found = kept_and_added(masks, cameras)
-    monkeypatch.setattr(hull, "FILLED", 0.0)
+    monkeypatch.setattr(visual_hull, "MIN_MASK_FILL_FRACTION", 0.0)
     assert found == kept_and_added(masks, cameras)
     assert found[0] > 0.98

@@ -5,11 +5,11 @@ import pytest
 import trimesh
 
 from corporeal.core.types import Camera, Views
-from corporeal.reconstruction.gaussians import hull
-from corporeal.reconstruction.gaussians.deepened import deepened, laid
+from corporeal.reconstruction.gaussians import visual_hull
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
-from corporeal.reconstruction.gaussians.hull_stereo import seen_past
+from corporeal.reconstruction.gaussians.hull_stereo import hull_cells_seen_past
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
+from corporeal.reconstruction.surface.refine_depth import fill_plain_depth, refine_depth
 
 HALF, WALL, HEIGHT, SIZE = 1.0, 0.25, 1.2, 96
 """A box without a lid: half its width, its walls and bottom, its height [m]; pictures [px]."""
@@ -66,11 +66,11 @@ def photographed(solid, contrast):
 
 
 def emptied(solid, contrast, monkeypatch):
-    monkeypatch.setattr(hull, "CELLS", 60_000)
+    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 60_000)
     views, masks = photographed(solid, contrast)
     with ThreadPool(1) as pool:
-        found = hull.tight(views, masks, pool)
-        return found, seen_past(views, masks, found, pool)
+        found = visual_hull.carve_tight_hull(views, masks, pool)
+        return found, hull_cells_seen_past(views, masks, found, pool)
 
 
 def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls(monkeypatch):
@@ -102,12 +102,16 @@ def test_plain_pictures_empty_nothing(monkeypatch):
 
 
 def test_the_number_of_threads_changes_nothing(monkeypatch):
-    monkeypatch.setattr(hull, "CELLS", 20_000)
+    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 20_000)
     views, masks = photographed(without_lid(), 0.25)
     results = []
     for count in (1, 3):
         with ThreadPool(count) as pool:
-            results.append(seen_past(views, masks, hull.tight(views, masks, pool), pool))
+            results.append(
+                hull_cells_seen_past(
+                    views, masks, visual_hull.carve_tight_hull(views, masks, pool), pool
+                )
+            )
     np.testing.assert_array_equal(*results)
 
 
@@ -127,7 +131,7 @@ def depths(solid):
 @pytest.fixture
 def lidless(monkeypatch):
     """A box without a lid, of which Gaussians show one: its photographs, masks and both depths."""
-    monkeypatch.setattr(hull, "CELLS", 60_000)
+    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 60_000)
     shown, true = depths(block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])), depths(without_lid())
     return *photographed(without_lid(), 0.25), shown, true
 
@@ -135,7 +139,9 @@ def lidless(monkeypatch):
 def deeper(views, masks, shown, far):
     met, rows = np.zeros(shown.shape, np.int32), np.zeros((len(shown), 18))
     with ThreadPool(1) as pool:
-        return deepened(DepthRendering(views.rgb, shown, far, met, rows), views, masks, pool).depth
+        return refine_depth(
+            DepthRendering(views.rgb, shown, far, met, rows), views, masks, pool
+        ).depth
 
 
 def test_photographs_see_below_a_thin_lid_of_gaussians(lidless):
@@ -164,9 +170,9 @@ def test_a_plain_face_goes_on_between_known_depths():
     true = 1 / (0.2 + 0.004 * rows + 0.003 * columns)
     known = (rows < 4) | (rows > 19) | (columns < 4) | (columns > 25)
     plain = columns < 20
-    found = laid(np.where(known, true, np.inf), np.ones(true.shape, bool), plain)
+    found = fill_plain_depth(np.where(known, true, np.inf), np.ones(true.shape, bool), plain)
     there = known | plain
     np.testing.assert_allclose(found[there], true[there], rtol=1e-3)
     assert np.isinf(found[~there]).all()
     nothing = np.full(true.shape, np.inf)
-    assert np.isinf(laid(nothing, np.ones(true.shape, bool), plain)).all()
+    assert np.isinf(fill_plain_depth(nothing, np.ones(true.shape, bool), plain)).all()

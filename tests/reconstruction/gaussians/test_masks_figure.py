@@ -5,8 +5,13 @@ import json
 import numpy as np
 from PIL import Image
 
-from corporeal.reconstruction.masks_figure import EDGE, FAINT, drawn_over, masks_figure
-from corporeal.render.sheet import GAP
+from corporeal.reconstruction.masks_figure import (
+    FAINT_CONTRAST_FRACTION,
+    OUTLINE_RGB,
+    draw_masks_over,
+    masks_figure,
+)
+from corporeal.render.contact_sheet import TILE_GAP_PX
 
 GREY = 100
 
@@ -19,15 +24,15 @@ def square(height, width):
 
 def test_what_is_no_object_is_paler_and_its_outline_is_drawn(tmp_path):
     picture = np.full((48, 64, 3), GREY, np.uint8)
-    drawn_over([picture] * 9, np.stack([square(48, 64)] * 9), [f"{k}.jpg" for k in range(9)],
+    draw_masks_over([picture] * 9, np.stack([square(48, 64)] * 9), [f"{k}.jpg" for k in range(9)],
                tmp_path / "objects.png")  # fmt: skip
     page = np.asarray(Image.open(tmp_path / "objects.png").convert("RGB"))
-    first = page[GAP : GAP + 48, GAP : GAP + 64]
+    first = page[TILE_GAP_PX : TILE_GAP_PX + 48, TILE_GAP_PX : TILE_GAP_PX + 64]
     assert (first[20, 35] == GREY).all()
-    assert (first[5, 5] == int(255 - FAINT * (255 - GREY))).all()
-    assert (first[10, 35] == EDGE).all()
-    assert (first[20, 20] == EDGE).all()
-    assert (np.all(page == EDGE, axis=-1).sum()) == 6 * 96, "six of nine are shown"
+    assert (first[5, 5] == int(255 - FAINT_CONTRAST_FRACTION * (255 - GREY))).all()
+    assert (first[10, 35] == OUTLINE_RGB).all()
+    assert (first[20, 20] == OUTLINE_RGB).all()
+    assert (np.all(page == OUTLINE_RGB, axis=-1).sum()) == 6 * 96, "six of nine are shown"
 
 
 def photographs(folder, count=8):
@@ -52,6 +57,6 @@ def test_masks_of_another_folder_are_drawn_over_whole_photographs(tmp_path):
         mask.save(tmp_path / "drawn" / f"{k}.png")
     masks_figure(tmp_path, tmp_path / "drawn", tmp_path / "objects.png")
     page = np.asarray(Image.open(tmp_path / "objects.png").convert("RGB"))
-    assert np.all(page == EDGE, axis=-1).sum() == 6 * 96
-    pale = int(255 - FAINT * (255 - GREY))
+    assert np.all(page == OUTLINE_RGB, axis=-1).sum() == 6 * 96
+    pale = int(255 - FAINT_CONTRAST_FRACTION * (255 - GREY))
     assert np.all(page == pale, axis=-1).sum() == 6 * (48 * 64 - 20 * 30), "not white outside"

@@ -5,28 +5,33 @@ import pytest
 from splat_scenes import around, blobs, pictured
 
 from corporeal.core.types import Gaussians, Views
-from corporeal.multiview.ground_plane import Plane
-from corporeal.reconstruction.gaussians import exposure, limits, sweep
+from corporeal.multiview.ground_plane import GroundPlane
+from corporeal.reconstruction.gaussians import exposure_gains, plane_sweep, scale_limits
 from corporeal.reconstruction.gaussians.background_model import (
     BackgroundModel,
     background_model,
-    cover,
-    directions,
+    cover_background,
+    fibonacci_directions,
 )
-from corporeal.reconstruction.gaussians.hull import camera_rows
-from corporeal.reconstruction.gaussians.kernels_learn import adam
-from corporeal.reconstruction.gaussians.parameters import parameters
-from corporeal.reconstruction.gaussians.quality import quality
-from corporeal.reconstruction.gaussians.raster import draw, pinhole
-from corporeal.reconstruction.gaussians.start import Points, chosen, joined, seeded
-from corporeal.reconstruction.gaussians.surfaces import Surfaces
-from corporeal.reconstruction.gaussians.sweep import swept
+from corporeal.reconstruction.gaussians.gaussian_initialisation import (
+    StartPoints,
+    choose_points,
+    initial_gaussians,
+    join_points,
+)
+from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
+from corporeal.reconstruction.gaussians.heldout_quality import heldout_quality
+from corporeal.reconstruction.gaussians.kernels_training import adam_rows
+from corporeal.reconstruction.gaussians.plane_sweep import sweep_planes
+from corporeal.reconstruction.gaussians.rasteriser_numba import draw, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.train import train
+from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
+from corporeal.reconstruction.gaussians.view_depths import ViewDepths
+from corporeal.reconstruction.gaussians.visual_hull import camera_rows
 
 RNG = np.random.default_rng
-FLOOR = Plane(np.array([0.0, 0.0, 1.0]), -0.5, 0.5, 0.001)
+FLOOR = GroundPlane(np.array([0.0, 0.0, 1.0]), -0.5, 0.5, 0.001)
 ROOM = BackgroundModel(np.zeros(3), 10.0, FLOOR, 0.02)
 
 
@@ -61,19 +66,19 @@ def test_the_floor_is_found_whichever_way_is_up():
 def test_a_cover_leaves_no_gap():
     """From anywhere within, whichever way one looks."""
     white = np.ones((50, 3))
-    points = cover(ROOM, above(), 1500, 9 * directions(50), white)
+    points = cover_background(ROOM, above(), 1500, 9 * fibonacci_directions(50), white)
     np.testing.assert_allclose(points.colour, 1)
-    made = seeded(points, 2000, 0, RNG(0))
+    made = initial_gaussians(points, 2000, 0, RNG(0))
     low = around(24, centre=(0.0, 0.0, 0.7), distance=2.0)
     with ThreadPool(1) as pool:
-        through = [draw(made, pinhole(c), np.zeros(3), pool).planes[3].max() for c in low]
+        through = [draw(made, pinhole_of_camera(c), np.zeros(3), pool).planes[3].max() for c in low]
     assert max(through) < 0.3 and np.mean(through) < 0.1
 
 
 def test_gaussians_begin_flat_on_known_surfaces_and_as_wide_as_told():
     normal = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.6, 0, 0.8], [0, 0, 0]])
-    points = Points(np.eye(4, 3), np.ones((4, 3)), 0.5, normal, np.full(4, 0.2))
-    theta = seeded(points, 9, 0, RNG(0))
+    points = StartPoints(np.eye(4, 3), np.ones((4, 3)), 0.5, normal, np.full(4, 0.2))
+    theta = initial_gaussians(points, 9, 0, RNG(0))
     np.testing.assert_allclose(
         np.exp(theta[:, 7:10]), [[0.2, 0.2, 0.02]] * 3 + [[0.2] * 3], rtol=1e-5
     )
@@ -83,13 +88,13 @@ def test_gaussians_begin_flat_on_known_surfaces_and_as_wide_as_told():
 
 
 def test_points_are_joined_with_what_is_known_of_each():
-    plain = Points(np.zeros((2, 3)), np.zeros((2, 3)))
-    flat = Points(np.ones((1, 3)), np.ones((1, 3)), 0.9, np.array([[0, 1.0, 0]]), np.ones(1))
-    both = joined(plain, flat)
+    plain = StartPoints(np.zeros((2, 3)), np.zeros((2, 3)))
+    flat = StartPoints(np.ones((1, 3)), np.ones((1, 3)), 0.9, np.array([[0, 1.0, 0]]), np.ones(1))
+    both = join_points(plain, flat)
     np.testing.assert_allclose(both.opacity, [0.5, 0.5, 0.9])
     np.testing.assert_allclose(both.normal, [[0, 0, 0], [0, 0, 0], [0, 1, 0]])
     np.testing.assert_allclose(both.width, [np.nan, np.nan, 1])
-    last = chosen(both, np.array([2]))
+    last = choose_points(both, np.array([2]))
     assert last.position.tolist() == [[1, 1, 1]] and last.opacity.tolist() == [0.9]
 
 
@@ -98,7 +103,7 @@ def wall():
     """What twelve cameras say who see, in all directions, a surface 3 m away."""
     cameras = around(12)
     shape = 12, 10, 12
-    return cameras, Surfaces(
+    return cameras, ViewDepths(
         camera_rows(cameras), 4.0, np.full(12, 0.9), np.full(shape, 3.0), np.full(shape, 30.0)
     )
 
@@ -116,14 +121,14 @@ def test_what_views_see_past_is_haze_if_it_is_wide(wall):
 
 def test_what_is_wide_is_flat_and_what_few_see_has_one_colour(wall):
     cameras, surfaces = wall
-    theta = parameters(blobs(2, degree=1))
+    theta = parameters_of_gaussians(blobs(2, degree=1))
     theta[:, :3] = [[0, 0, 0], 0.6 * cameras[0].world_from_camera[:3, 3]]
     theta[:, 7:10] = np.log([0.5, 0.4, 0.2])
     with ThreadPool(1) as pool:
-        bounds, _ = limits.strict(theta, 1.0, surfaces, pool)
+        bounds, _ = scale_limits.scale_limits_from_views(theta, 1.0, surfaces, pool)
     before, zeros = theta.copy(), np.zeros_like(theta)
     spans, rates = np.array([[0, 1], [0, 1]]), np.full(theta.shape[1], 0.01, np.float32)
-    adam(theta, zeros + 1, zeros, zeros + 1, rates, 1, (0, 0), bounds, spans, 0, 2)
+    adam_rows(theta, zeros + 1, zeros, zeros + 1, rates, 1, (0, 0), bounds, spans, 0, 2)
     np.testing.assert_allclose(np.exp(theta[0, 7:10]), [0.3, 0.3, 0.03], rtol=1e-5)
     np.testing.assert_allclose(np.exp(theta[1, 7:10]), [0.12, 0.12, 0.012], rtol=1e-5)
     assert (theta[0, 14:] != before[0, 14:]).all()
@@ -131,23 +136,23 @@ def test_what_is_wide_is_flat_and_what_few_see_has_one_colour(wall):
 
 
 def test_what_is_out_of_the_picture_stays_or_fades():
-    theta = parameters(blobs(2))
+    theta = parameters_of_gaussians(blobs(2))
     zeros, rates = np.zeros_like(theta), np.full(theta.shape[1], 0.1, np.float32)
-    bounds = limits.even(theta, 10.0)
+    bounds = scale_limits.equal_scale_limits(theta, 10.0)
     bounds[0, 3] = 1
     before, spans = theta[:, 10].copy(), np.zeros((2, 2), int)
     pull = np.float32(0.1), np.float32(0)
-    adam(theta, zeros.copy(), zeros.copy(), zeros.copy(), rates, 1, pull, bounds, spans, 0, 2)
+    adam_rows(theta, zeros.copy(), zeros.copy(), zeros.copy(), rates, 1, pull, bounds, spans, 0, 2)
     assert theta[0, 10] == before[0] and theta[1, 10] < before[1] - 0.05
 
 
 def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
     """Of a floor only a spot about a ball has texture; all of it is found."""
-    monkeypatch.setattr(sweep, "PIXELS", 6_000)
+    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 6_000)
     rng, count = RNG(1), 12_000
     flat = rng.uniform(-3, 3, (count, 3)) * [1, 1, 0] - [0, 0, 0.5]
     near = np.linalg.norm(flat[:, :2], axis=1) < 0.5
-    flat[:2000] = 0.25 * directions(2000) - [0, 0, 0.25]
+    flat[:2000] = 0.25 * fibonacci_directions(2000) - [0, 0, 0.25]
     near[:2000] = True
     sh = np.zeros((count, 1, 3))
     sh[near, 0] = 2 * np.sin(12 * flat[near] + [0, 1, 2])
@@ -160,7 +165,7 @@ def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
     )
     views, _ = pictured(made, above(16, size=(96, 96), focal=120.0), (0.5, 0.5, 0.5))
     with ThreadPool(1) as pool:
-        points = swept(views, 3000, RNG(0), pool).points
+        points = sweep_planes(views, 3000, RNG(0), pool).points
     on = np.abs(points.position[:, 2] + 0.49) < 0.04
     wide = np.linalg.norm(points.position[:, :2], axis=1)
     around_it = (wide > 0.7) & (wide < 2) & (points.position[:, 2] < 1)
@@ -169,18 +174,18 @@ def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
 
 @pytest.mark.slow
 def test_exposures_are_learned_and_held_against_nobody(monkeypatch):
-    monkeypatch.setattr(sweep, "PIXELS", 4_000)
+    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 4_000)
     views, _ = pictured(blobs(40), around(16, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
     gains = np.exp(0.15 * RNG(0).normal(size=(16, 3)))
     rgb = np.clip(views.rgb * gains[:, None, None], 0, 255).astype(np.uint8)
     config = TrainConfig(preset="draft", gaussians=400, steps=300, threads=1)
-    out = train(Views(rgb, views.cameras), config=config)
+    out = train_gaussians(Views(rgb, views.cameras), config=config)
     learned = [k for k in range(16) if k % 8 != 4]
     true = np.log(gains[learned] / np.exp(np.log(gains[learned]).mean(axis=0)))
     np.testing.assert_allclose(np.log(out.exposures[learned]), true, atol=0.06)
     np.testing.assert_allclose(out.exposures[[4, 12]], 1)
-    assert exposure.differ(out.exposures)
-    plain = quality(out.gaussians, Views(rgb, views.cameras), [4, 12])
+    assert exposure_gains.exposures_differ(out.exposures)
+    plain = heldout_quality(out.gaussians, Views(rgb, views.cameras), [4, 12])
     assert out.quality.psnr > 24 and out.quality.psnr > plain.psnr + 2
 
 
@@ -189,17 +194,23 @@ def test_a_gain_is_told_from_what_is_covered_alone():
     views, masks = pictured(truth, cameras)
     darker = (0.5 * views.rgb[0]).astype(np.uint8)
     with ThreadPool(1) as pool:
-        drawing = draw(parameters(truth), pinhole(cameras[0]), np.ones(3), pool)
-    found = exposure.gain(drawing, darker, np.where(masks[0], 255, 0).astype(np.uint8))
+        drawing = draw(
+            parameters_of_gaussians(truth), pinhole_of_camera(cameras[0]), np.ones(3), pool
+        )
+    found = exposure_gains.exposure_gain(
+        drawing, darker, np.where(masks[0], 255, 0).astype(np.uint8)
+    )
     np.testing.assert_allclose(found, 0.5, rtol=0.02)
-    assert np.isnan(exposure.gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))).all()
+    assert np.isnan(
+        exposure_gains.exposure_gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))
+    ).all()
 
 
 def test_exposure_changes_things_and_not_the_grey_behind_them():
     grey = (0.5, 0.5, 0.5)
     views, masks = pictured(blobs(), around(6), grey)
     dark = Views((0.6 * views.rgb).astype(np.uint8), views.cameras)
-    found = quality(blobs(), dark, [0, 1], masks, grey, apart=True)
-    even = quality(blobs(), views, [0, 1], masks, grey)
+    found = heldout_quality(blobs(), dark, [0, 1], masks, grey, apart=True)
+    even = heldout_quality(blobs(), views, [0, 1], masks, grey)
     assert found.psnr > even.psnr - 2.5
-    assert quality(blobs(), dark, [0, 1], masks, grey).psnr < found.psnr - 3
+    assert heldout_quality(blobs(), dark, [0, 1], masks, grey).psnr < found.psnr - 3

@@ -3,7 +3,7 @@
 import numpy as np
 
 from corporeal.core.types import Views
-from corporeal.render.camera import Aim, camera_of
+from corporeal.render.camera_placement import CameraAim, camera_from_aim
 
 WIDE, HIGH = 96, 72
 RADIUS, FLOOR = 0.5, -0.5
@@ -33,7 +33,9 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
     mottled = random.uniform(-1, 1, (64, 64, 64))
     turns = 2.4 * np.arange(count)
     eyes = np.stack([2.6 * np.cos(turns), 2.6 * np.sin(turns), np.linspace(0.5, 2.0, count)], -1)
-    cameras = tuple(camera_of(Aim(tuple(e), (0.0, 0.0, 0.0), 48.0, WIDE, HIGH)) for e in eyes)
+    cameras = tuple(
+        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, WIDE, HIGH)) for e in eyes
+    )
     pictures, masks, seen = [], [], []
     for camera in cameras:
         v, u = np.mgrid[:HIGH, :WIDE] + 0.5

@@ -6,15 +6,15 @@ import pytest
 from painted_scene import FLOOR, GREY, RED, agreement, scene
 
 from corporeal.core.types import Views
-from corporeal.multiview.ground_plane import Plane
-from corporeal.multiview.region import region
-from corporeal.reconstruction.masks.doubt import doubt
+from corporeal.multiview.ground_plane import GroundPlane
+from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.masks.floor_colour import shaded_floor
-from corporeal.reconstruction.masks.floor_square import met, partners
-from corporeal.reconstruction.masks.grow import grow
-from corporeal.reconstruction.masks.seeds import looked_at
+from corporeal.reconstruction.masks.floor_grid import comparison_partners, floor_intersections
+from corporeal.reconstruction.masks.mask_quality import mask_doubt
+from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
+from corporeal.reconstruction.masks.region_growing import grow_masks
 
-GROUND = Plane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
+GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
 OAK, SLATE = (0.62, 0.46, 0.32), (0.12, 0.12, 0.16)
 FAINT = 0.25
 """Share of the floor's pattern that is left: in shadow it drowns in noise."""
@@ -38,7 +38,7 @@ def shadowed(ball, ground):
     views, masks, points = scene(ball=ball, ground=ground, count=20)
     rgb, shadows = views.rgb.copy(), np.zeros_like(masks)
     for k, camera in enumerate(views.cameras):
-        place = met(camera, GROUND).reshape(*masks.shape[1:], 3)
+        place = floor_intersections(camera, GROUND).reshape(*masks.shape[1:], 3)
         with np.errstate(invalid="ignore"):
             shadows[k] = in_shadow(place) & ~masks[k]
         bare = rgb[k][~masks[k]]
@@ -51,7 +51,7 @@ def shadowed(ball, ground):
 @pytest.mark.parametrize("ball", [RED, SLATE], ids=["red", "slate"])
 def test_a_shadow_is_floor_and_what_casts_it_is_not(ball):
     views, masks, shadows, _ = shadowed(ball, OAK)
-    found = shaded_floor(views, GROUND, region(views.cameras))
+    found = shaded_floor(views, GROUND, find_viewed_region(views.cameras))
     assert found[shadows].mean() > 0.6
     assert found[masks].mean() < 0.01
 
@@ -59,8 +59,8 @@ def test_a_shadow_is_floor_and_what_casts_it_is_not(ball):
 def test_masks_that_are_grown_leave_the_shadow_out():
     """The ball is as dark as the shadow: colours alone take both."""
     views, masks, shadows, points = shadowed(SLATE, OAK)
-    grown = grow(views, looked_at(views, points))
-    assert grown is not None and doubt(grown) is None
+    grown = grow_masks(views, seeds_from_cameras(views, points))
+    assert grown is not None and mask_doubt(grown) is None
     assert (grown.inside > 0.5)[shadows].mean() < 0.1
     assert agreement(grown.inside, masks).mean() > 0.9
 
@@ -68,19 +68,19 @@ def test_masks_that_are_grown_leave_the_shadow_out():
 def test_of_a_grey_floor_nothing_is_said():
     """Whatever is grey and darker would be a shade of it."""
     views, _, _, _ = shadowed(RED, (0.5, 0.5, 0.5))
-    assert not shaded_floor(views, GROUND, region(views.cameras)).any()
+    assert not shaded_floor(views, GROUND, find_viewed_region(views.cameras)).any()
 
 
 def test_without_a_floor_nothing_is_said():
     views, _, _, _ = shadowed(RED, GREY)
-    assert not shaded_floor(views, None, region(views.cameras)).any()
+    assert not shaded_floor(views, None, find_viewed_region(views.cameras)).any()
 
 
 def test_views_from_any_other_side_are_asked_about_shades():
     """Of half a circle the nearest see a shadow hidden behind what casts it."""
     turns = np.linspace(0, np.pi, 30)
     slant = 1.7 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    near, wide = partners(slant, 0), partners(slant, 0, wide=True)
+    near, wide = comparison_partners(slant, 0), comparison_partners(slant, 0, wide=True)
     assert np.array_equal(wide[: len(near)], near)
     assert near.max() < 15 and wide.max() == 29
     assert len(wide) == 2 * len(near)

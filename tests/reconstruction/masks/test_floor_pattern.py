@@ -6,13 +6,13 @@ import pytest
 from painted_scene import FLOOR, scene
 
 from corporeal.core.types import Views
-from corporeal.multiview.ground_plane import Plane
-from corporeal.multiview.region import region
-from corporeal.reconstruction.masks.floor_pattern import shows_floor
+from corporeal.multiview.ground_plane import GroundPlane
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.masks.floor_pattern import shows_floor_pattern
 
 FINER = 3
 """A patch of seven pixels must be smaller than the ball's foot."""
-GROUND = Plane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
+GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
 
 
 @pytest.fixture(autouse=True)
@@ -24,7 +24,7 @@ def finer(monkeypatch):
 def test_a_pattern_of_the_floor_is_told_from_what_stands_on_it():
     """The ball and the floor have one colour: only the plane tells them apart."""
     views, masks, _ = scene(ball=(0.5, 0.5, 0.45), count=24)
-    found = shows_floor(views, GROUND, region(views.cameras))
+    found = shows_floor_pattern(views, GROUND, find_viewed_region(views.cameras))
     assert found[~masks].mean() > 0.1
     assert found[masks].mean() < 0.01
 
@@ -32,22 +32,24 @@ def test_a_pattern_of_the_floor_is_told_from_what_stands_on_it():
 def test_a_shadow_on_the_pattern_changes_nothing():
     views, _, _ = scene(count=24)
     dark = Views((0.5 * views.rgb).astype(np.uint8), views.cameras)
-    around = region(views.cameras)
-    plain, shaded = (shows_floor(v, GROUND, around) for v in (views, dark))
+    around = find_viewed_region(views.cameras)
+    plain, shaded = (shows_floor_pattern(v, GROUND, around) for v in (views, dark))
     assert (plain & shaded).sum() > 0.7 * plain.sum()
 
 
 def test_another_plane_has_no_pattern():
     """Half a radius higher nothing lies: views from different sides do not agree about it."""
     views, masks, _ = scene(count=24)
-    wrong = Plane(GROUND.normal, FLOOR + 0.25, 0.5, 0.001)
-    right, other = (shows_floor(views, p, region(views.cameras)) for p in (GROUND, wrong))
+    wrong = GroundPlane(GROUND.normal, FLOOR + 0.25, 0.5, 0.001)
+    right, other = (
+        shows_floor_pattern(views, p, find_viewed_region(views.cameras)) for p in (GROUND, wrong)
+    )
     assert other[~masks].mean() < 0.2 * right[~masks].mean()
 
 
 def test_without_a_floor_or_a_pattern_nothing_is_said():
     views, _, _ = scene()
     plain = Views(np.full_like(views.rgb, 128), views.cameras)
-    around = region(views.cameras)
-    assert not shows_floor(views, None, around).any()
-    assert not shows_floor(plain, GROUND, around).any()
+    around = find_viewed_region(views.cameras)
+    assert not shows_floor_pattern(views, None, around).any()
+    assert not shows_floor_pattern(plain, GROUND, around).any()

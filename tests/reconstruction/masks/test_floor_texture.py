@@ -6,17 +6,26 @@ import pytest
 from painted_scene import GREY, agreement, scene
 
 from corporeal.core.types import Views
-from corporeal.multiview.ground_plane import Plane
-from corporeal.multiview.region import region
-from corporeal.reconstruction.masks.doubt import ALIKE
-from corporeal.reconstruction.masks.floor_texture import CONTRADICTS, FITS, UNKNOWN, floor_fit
-from corporeal.reconstruction.masks.grow import grow
-from corporeal.reconstruction.masks.grown_masks import BY_FLOOR, UNSURE, _grown
-from corporeal.reconstruction.masks.seeds import looked_at
+from corporeal.multiview.ground_plane import GroundPlane
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.masks.floor_texture import (
+    FIT_AGREES,
+    FIT_CONTRADICTS,
+    FIT_UNKNOWN,
+    floor_fit,
+)
+from corporeal.reconstruction.masks.grown_masks import (
+    BY_FLOOR_STATEMENT,
+    UNSURE_OVERLAP_FRACTION,
+    _grow_and_describe,
+)
+from corporeal.reconstruction.masks.mask_quality import MAX_COLOUR_OVERLAP
+from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
+from corporeal.reconstruction.masks.region_growing import grow_masks
 
 LOW = -0.51
 """Height of the floor: not between two cells of the paint."""
-GROUND = Plane(np.array([0.0, 0.0, 1.0]), LOW, 0.5, 0.001)
+GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), LOW, 0.5, 0.001)
 
 
 @pytest.fixture(autouse=True)
@@ -35,18 +44,18 @@ def printed(count=20):
 
 def levels(views):
     none = np.zeros(views.rgb.shape[:3], np.bool_)
-    return floor_fit(views, GROUND, region(views.cameras), none)
+    return floor_fit(views, GROUND, find_viewed_region(views.cameras), none)
 
 
 def contradicted(level, where):
-    return (level[where & (level != UNKNOWN)] == CONTRADICTS).mean()
+    return (level[where & (level != FIT_UNKNOWN)] == FIT_CONTRADICTS).mean()
 
 
 def test_what_stands_on_a_print_of_its_colours_contradicts_it():
     views, masks, _ = printed()
     level = levels(views)
     assert contradicted(level, masks) > 3 * contradicted(level, ~masks)
-    assert (level[~masks] == FITS).sum() > 5 * (level[~masks] == CONTRADICTS).sum()
+    assert (level[~masks] == FIT_AGREES).sum() > 5 * (level[~masks] == FIT_CONTRADICTS).sum()
 
 
 def test_light_that_comes_from_the_camera_is_no_contradiction():
@@ -62,16 +71,18 @@ def test_light_that_comes_from_the_camera_is_no_contradiction():
 def test_without_a_floor_nothing_is_known():
     views, _, _ = scene()
     none = np.zeros(views.rgb.shape[:3], np.bool_)
-    assert (floor_fit(views, None, region(views.cameras), none) == UNKNOWN).all()
+    assert (floor_fit(views, None, find_viewed_region(views.cameras), none) == FIT_UNKNOWN).all()
 
 
 def test_masks_on_a_print_of_their_colours_are_believed():
     views, masks, points = printed()
-    seeds = looked_at(views, points)
-    before = grow(views, seeds)
-    assert before is not None and before.alike > UNSURE * ALIKE, "colours hardly tell"
-    grown, said = _grown(views, seeds, False, lambda fraction, words: None)
-    assert BY_FLOOR in said
+    seeds = seeds_from_cameras(views, points)
+    before = grow_masks(views, seeds)
+    assert before is not None and before.alike > UNSURE_OVERLAP_FRACTION * MAX_COLOUR_OVERLAP, (
+        "colours hardly tell"
+    )
+    grown, said = _grow_and_describe(views, seeds, False, lambda fraction, words: None)
+    assert BY_FLOOR_STATEMENT in said
     assert grown is not None
     gained = agreement(grown.inside, masks) - agreement(before.inside, masks)
     assert gained.mean() > 0.05

@@ -11,20 +11,20 @@ from PIL import Image
 from corporeal.cli import main
 from corporeal.core.errors import UserError
 from corporeal.core.types import Gaussians, Views
-from corporeal.io.colmap import write_colmap
-from corporeal.io.mask_files import corrected
-from corporeal.io.photographs import MASKS, read_photographs
-from corporeal.io.transforms import write_views
-from corporeal.pipeline.runner import Settings, _Run, quiet
-from corporeal.reconstruction import picture_intake
-from corporeal.reconstruction.gaussians.intake import Intake
+from corporeal.io.photos.colmap import write_colmap
+from corporeal.io.photos.mask_files import edited_masks
+from corporeal.io.photos.posed_photos import MASK_FOLDERS, read_posed_photos
+from corporeal.io.photos.transforms_json import write_views
+from corporeal.pipeline.run_pipeline import Settings, _Run, no_progress_of_stage
+from corporeal.reconstruction import gaussian_source
+from corporeal.reconstruction.gaussian_source import find_or_grow_masks, gaussians_from_source
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.masks import grown_masks as module
-from corporeal.reconstruction.masks.grow import grow
 from corporeal.reconstruction.masks.grown_masks import GrownMasks, grown_masks
-from corporeal.reconstruction.masks.pointed import Pointed
-from corporeal.reconstruction.masks.seeds import looked_at
-from corporeal.reconstruction.picture_intake import masks_for, take_pictures
-from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate
+from corporeal.reconstruction.masks.mask_prompts import MaskPrompt
+from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
+from corporeal.reconstruction.masks.region_growing import grow_masks
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate_reconstruct
 
 
 def unheard(fraction, words):
@@ -42,9 +42,9 @@ def test_masks_are_written_and_read_as_given_ones(photos, tmp_path):
     folder, masks = photos
     made = grown_masks(folder, tmp_path / "made")
     assert made.folder is not None
-    read = read_photographs(folder, WIDE, made.folder)
+    read = read_posed_photos(folder, WIDE, made.folder)
     assert agreement(read.masks / 255, masks).mean() > 0.93
-    assert read_photographs(folder, WIDE, made.folder / "masks").masks is not None
+    assert read_posed_photos(folder, WIDE, made.folder / "masks").masks is not None
     assert len(list((made.folder / "masks").glob("*.png"))) == len(masks)
 
 
@@ -61,13 +61,13 @@ def test_masks_lie_on_the_photograph_as_it_is_stored(photos, tmp_path):
 
 def test_what_was_corrected_is_kept_and_makes_results_stale(photos, tmp_path):
     folder, _ = photos
-    run = _Run([folder], tmp_path, Settings(), quiet)
+    run = _Run([folder], tmp_path, Settings(), no_progress_of_stage)
     before = run._borrowed("reconstruct")
     made = grown_masks(folder, tmp_path / "0-reconstruct")
     assert run._borrowed("reconstruct") == before, "what was made is no correction"
     mask = made.folder / "masks" / "0003.png"
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(mask)
-    assert list(corrected(made.folder)) == ["masks/0003.png"]
+    assert list(edited_masks(made.folder)) == ["masks/0003.png"]
     assert run._borrowed("reconstruct") != before
     again = grown_masks(folder, tmp_path / "0-reconstruct")
     assert again.said[-1] == "1 of the masks were corrected by hand."
@@ -84,23 +84,23 @@ def test_what_masks_hold_a_part_of_is_refused_until_somebody_corrects_them(tmp_p
     write_colmap(photos / "sparse" / "0", views.cameras, names, points)
     for _ in range(2):  # the second time what was noted is read
         with pytest.raises(UserError, match=r"tea set: not all of .* --force goes on"):
-            take_pictures(photos, ReconstructConfig(), run, unheard)
-    forced = masks_for(ReconstructConfig(force=True), photos, run, unheard)
+            gaussians_from_source(photos, ReconstructConfig(), run, unheard)
+    forced = find_or_grow_masks(ReconstructConfig(force=True), photos, run, unheard)
     assert forced.folder is not None and "Check them: not all of it" in forced.warnings[0]
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(run / "masks" / names[3])
-    assert not masks_for(ReconstructConfig(), photos, run, unheard).incomplete
+    assert not find_or_grow_masks(ReconstructConfig(), photos, run, unheard).incomplete
 
 
 @pytest.mark.parametrize("left_over", [0.0, 0.5])
 def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monkeypatch, left_over):
     folder, _ = photos
     views, _, points = scene()
-    whole = grow(views, looked_at(views, points))
+    whole = grow_masks(views, seeds_from_cameras(views, points))
     assert whole is not None
     made = {False: replace(whole, left_over=1.0), True: replace(whole, left_over=left_over)}
-    monkeypatch.setattr(module, "grow", lambda *_, flat=False: made[flat])
+    monkeypatch.setattr(module, "grow_masks", lambda *_, flat=False: made[flat])
     found = grown_masks(folder, tmp_path / "made")
-    assert (module.FLAT in found.said) == (left_over == 0)
+    assert (module.FLAT_TAKEN_STATEMENT in found.said) == (left_over == 0)
     assert ("1.0 times as much" in found.incomplete) == (left_over > 0)
 
 
@@ -110,7 +110,7 @@ def test_what_cannot_be_told_is_not_written(tmp_path):
     assert made.folder is None and "No masks were grown" in made.said[0]
     assert not (tmp_path / "made" / "masks").exists()
     assert made.doubted is not None, "they are kept, to be compared with"
-    assert read_photographs(tmp_path / "photos", WIDE, made.doubted).masks is not None
+    assert read_posed_photos(tmp_path / "photos", WIDE, made.doubted).masks is not None
     again = grown_masks(tmp_path / "photos", tmp_path / "made")
     assert again == made
 
@@ -119,8 +119,14 @@ def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(tmp_path, mon
     views, _, _ = scene(ball=GREY)
     write_views(tmp_path / "photos", views)
     none = Gaussians(*(np.zeros((0, n)) for n in (3, 4, 3)), np.zeros(0), np.zeros((0, 1, 3)))
-    monkeypatch.setattr(picture_intake, "take_in", lambda *_: Intake(none, views.cameras, views))
-    taken, masked = take_pictures(tmp_path / "photos", ReconstructConfig(), tmp_path, unheard)
+    monkeypatch.setattr(
+        gaussian_source,
+        "load_or_train_gaussians",
+        lambda *_: GaussianScene(none, views.cameras, views),
+    )
+    taken, masked = gaussians_from_source(
+        tmp_path / "photos", ReconstructConfig(), tmp_path, unheard
+    )
     assert not masked and taken.coloured is not None
     assert taken.coloured.shape == views.rgb.shape[:3]
 
@@ -128,9 +134,9 @@ def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(tmp_path, mon
 @pytest.mark.parametrize(
     ("pointed", "words"),
     [
-        (Pointed("", (200.0, 3.0)), "does not lie in"),
-        (Pointed("", None, (30.0, 30.0, 20.0, 40.0)), "the upper left corner first"),
-        (Pointed("other.png", (2.0, 3.0)), "no photograph 'other.png'"),
+        (MaskPrompt("", (200.0, 3.0)), "does not lie in"),
+        (MaskPrompt("", None, (30.0, 30.0, 20.0, 40.0)), "the upper left corner first"),
+        (MaskPrompt("other.png", (2.0, 3.0)), "no photograph 'other.png'"),
     ],
 )
 def test_a_place_that_is_not_there_is_named(photos, tmp_path, pointed, words):
@@ -144,7 +150,7 @@ def test_a_point_is_in_the_pixels_of_the_photograph(photos, tmp_path, lens):
     file = folder / "transforms.json"
     file.write_text(json.dumps(json.loads(file.read_text()) | lens))
     rows, columns = np.nonzero(masks[5])
-    made = grown_masks(folder, tmp_path / "made", Pointed("0005", (columns.mean(), rows.mean())))
+    made = grown_masks(folder, tmp_path / "made", MaskPrompt("0005", (columns.mean(), rows.mean())))
     written = [np.asarray(Image.open(p)) for p in sorted((made.folder / "masks").glob("*.png"))]
     assert agreement(np.stack(written) / 255, masks).mean() > 0.85
 
@@ -162,7 +168,7 @@ def test_the_command_says_how_to_go_on(photos, tmp_path, monkeypatch, capsys):
     out = tmp_path / "masks"
     assert type_in(monkeypatch, "masks", photos[0], "--out", out) == 0
     told = capsys.readouterr().out.replace("\n", " ")
-    assert f"Look at {out / MASKS[0]}." in told, "they lie there"
+    assert f"Look at {out / MASK_FOLDERS[0]}." in told, "they lie there"
     assert f"corporeal run {photos[0]} --masks {out}" in told
 
 
@@ -209,7 +215,7 @@ def test_a_run_grows_masks_where_there_are_none(photos, tmp_path):
 
     def asked(masks, source=photos[0]):
         config = ReconstructConfig(masks=masks)
-        return masks_for(config, source, tmp_path / "run", lambda fraction, words: None)
+        return find_or_grow_masks(config, source, tmp_path / "run", lambda fraction, words: None)
 
     grown = asked("auto")
     assert grown.grown and grown.folder == tmp_path / "run"
@@ -224,14 +230,14 @@ def test_a_run_grows_masks_where_there_are_none(photos, tmp_path):
 
 def test_masks_that_cannot_be_are_refused_before_anything_is_learned(tmp_path):
     with pytest.raises(UserError, match="There is no folder"):
-        validate(ReconstructConfig(masks=str(tmp_path / "nowhere")))
+        validate_reconstruct(ReconstructConfig(masks=str(tmp_path / "nowhere")))
 
 
 def test_a_folder_without_masks_of_these_photographs_is_refused(photos, tmp_path):
     (tmp_path / "empty").mkdir()
     Image.fromarray(np.zeros((HIGH, WIDE), np.uint8)).save(tmp_path / "empty" / "other.png")
     with pytest.raises(UserError, match="no mask with the name of a photograph"):
-        read_photographs(photos[0], WIDE, tmp_path / "empty")
+        read_posed_photos(photos[0], WIDE, tmp_path / "empty")
 
 
 @pytest.mark.parametrize("doubted", [True, False])
@@ -239,7 +245,7 @@ def test_growing_ends_where_outlines_contradict_each_other_under_doubted_poses(
     monkeypatch, doubted
 ):
     grown, told = [], lambda share, words: None
-    monkeypatch.setattr(module, "grow", lambda *what, **more: grown.append(more))
-    monkeypatch.setattr(module, "contradict", lambda made: True)
-    module._grown(None, None, False, told, doubted_poses=doubted)  # type: ignore[arg-type]
+    monkeypatch.setattr(module, "grow_masks", lambda *what, **more: grown.append(more))
+    monkeypatch.setattr(module, "outlines_contradict", lambda made: True)
+    module._grow_and_describe(None, None, False, told, doubted_poses=doubted)  # type: ignore[arg-type]
     assert len(grown) == (1 if doubted else 2)

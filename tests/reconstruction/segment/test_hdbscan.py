@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from corporeal.reconstruction.segment.hdbscan import NOISE, hdbscan
+from corporeal.reconstruction.segment.hdbscan import NOISE_LABEL, hdbscan
 
 
 def blobs(rng, middles, each=100, wide=0.1):
@@ -21,7 +21,7 @@ def four():
 def test_places_that_are_apart_are_clusters_and_nothing_else_is(four):
     points, truth = four
     found = hdbscan(points, 20, 5, "mass")
-    inside = found.cluster_of_point != NOISE
+    inside = found.cluster_of_point != NOISE_LABEL
     assert same_partition(found.cluster_of_point[inside], truth[inside])
     assert inside.mean() > 0.9
 
@@ -32,7 +32,7 @@ def test_what_lies_between_is_mostly_noise_and_never_strong(four):
     far = np.linalg.norm(between[:, None] - points[None], axis=2).min(axis=1) > 0.5
     found = hdbscan(np.concatenate([points, between[far]]), 20, 5, "mass")
     assert far.sum() > 10
-    noise = found.cluster_of_point[400:] == NOISE
+    noise = found.cluster_of_point[400:] == NOISE_LABEL
     assert noise.mean() > 0.7
     assert (found.strength[400:][noise] == 0).all()
     assert found.strength[400:].max() < 0.2 < np.median(found.strength[:400])
@@ -84,7 +84,7 @@ def test_leaves_are_the_finest_clusters_and_mass_prefers_what_lasts():
     points, truth = np.concatenate(plates), np.repeat(np.arange(4), len(grid))
     leaves = hdbscan(points, 50, 5, "leaf").cluster_of_point
     lasting = hdbscan(points, 50, 5, "mass").cluster_of_point
-    inside = leaves != NOISE
+    inside = leaves != NOISE_LABEL
     assert leaves.max() == 3 and same_partition(leaves[inside], truth[inside])
     assert lasting.max() == 1
     assert same_partition(lasting[lasting >= 0], truth[lasting >= 0] // 2)
@@ -92,13 +92,13 @@ def test_leaves_are_the_finest_clusters_and_mass_prefers_what_lasts():
 
 def test_what_nothing_parts_is_all_noise():
     points = np.random.default_rng(5).normal(size=(30, 3))
-    assert (hdbscan(points, 20, 5).cluster_of_point == NOISE).all()
+    assert (hdbscan(points, 20, 5).cluster_of_point == NOISE_LABEL).all()
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
 def test_a_handful_of_points_is_noise(count):
     found = hdbscan(np.arange(3.0 * count).reshape(count, 3))
-    np.testing.assert_array_equal(found.cluster_of_point, np.full(count, NOISE))
+    np.testing.assert_array_equal(found.cluster_of_point, np.full(count, NOISE_LABEL))
 
 
 def test_points_at_one_place_are_a_cluster():

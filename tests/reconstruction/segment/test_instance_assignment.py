@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import Cloud
+from corporeal.core.types import FeatureCloud
 from corporeal.reconstruction.segment.instance_assignment import assign_instances
-from corporeal.reconstruction.segment.space import Space
+from corporeal.reconstruction.segment.space_pieces import SpacePieces
 
 RNG = np.random.default_rng(0)
 EACH = 1500
@@ -23,7 +23,11 @@ def pair():
     normal = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
     appearance = np.ones((2 * EACH, 1), np.float32)
     seen = np.full(2 * EACH, 4)
-    return Cloud(position, np.full((2 * EACH, 3), 0.5), appearance, appearance, seen), normal, owner
+    return (
+        FeatureCloud(position, np.full((2 * EACH, 3), 0.5), appearance, appearance, seen),
+        normal,
+        owner,
+    )
 
 
 def views(owner, numbers, hidden=0.5):
@@ -125,7 +129,7 @@ def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count,
     looks = np.eye(2, dtype=np.float32)[owner]
     shifted = cloud.position + np.outer(owner, [1.0 if pieces > 1 else -0.3, 0, 0])
     unlike = replace(cloud, position=shifted, semantic=looks)
-    space = Space(owner * (pieces > 1), alone=True)
+    space = SpacePieces(owner * (pieces > 1), alone=True)
     split = assign_instances(unlike, rule, count, normal, None, space)
     assert split.object_of_point.max() + 1 == found
     if found > 1:

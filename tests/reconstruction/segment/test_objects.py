@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import Cloud
-from corporeal.reconstruction.segment.objects import TOUCHING_IS_ONE, components, objects
+from corporeal.core.types import FeatureCloud
+from corporeal.reconstruction.segment.object_segmentation import (
+    TOUCHING_IS_ONE_CONFIG,
+    nearest_neighbour_components,
+    segment_objects,
+)
 
 
 def ball(count, centre, radius, rng):
@@ -21,7 +25,11 @@ def scene(spheres, looks, count=3000, seed=0):
     appearance = np.array(looks, float)[owner] + 0.02 * rng.normal(size=(len(owner), len(looks[0])))
     appearance = (appearance / np.linalg.norm(appearance, axis=1, keepdims=True)).astype(np.float16)
     grey = np.full(position.shape, 0.5)
-    return Cloud(position, grey, appearance, appearance, np.ones(len(owner), int)), normal, owner
+    return (
+        FeatureCloud(position, grey, appearance, appearance, np.ones(len(owner), int)),
+        normal,
+        owner,
+    )
 
 
 def agreement(owner, found):
@@ -42,15 +50,15 @@ TWINS = [((-0.3, 0, 0.3), 0.3), ((0.3, 0, 0.3), 0.3)]
 @pytest.mark.parametrize("given", [True, False])
 def test_two_like_balls_that_touch_are_told_apart_by_the_notch_between_them(given):
     cloud, normal, owner = scene(TWINS, [[1, 0], [1, 0]])
-    split = objects(cloud, 2, normal if given else None)
+    split = segment_objects(cloud, 2, normal if given else None)
     assert agreement(owner, split.object_of_point) > 0.97
-    assert components(cloud.position).max() == 0
+    assert nearest_neighbour_components(cloud.position).max() == 0
 
 
 def test_four_things_in_a_heap_are_four():
     spheres = [*TWINS, ((0, 0.5196, 0.3), 0.3), ((0, 0.1732, 0.79), 0.3)]
     cloud, normal, owner = scene(spheres, [[1, 0, 0]] * 2 + [[0, 1, 0], [0, 0, 1]])
-    split = objects(cloud, 4, normal)
+    split = segment_objects(cloud, 4, normal)
     assert split.object_of_point.max() == 3
     assert agreement(owner, split.object_of_point) > 0.97
     assert split.warnings == ()
@@ -58,49 +66,52 @@ def test_four_things_in_a_heap_are_four():
 
 def test_what_is_one_thing_stays_one():
     cloud, normal, _ = scene(TWINS, [[1, 0], [0, 1]])
-    split = objects(cloud, 1, normal)
+    split = segment_objects(cloud, 1, normal)
     assert (split.object_of_point == 0).all() and (split.confidence == 1).all()
 
 
 def test_components_find_things_that_stand_apart():
     cloud, _, owner = scene([((-1, 0, 0.3), 0.3), ((1, 0, 0.3), 0.2)], [[1, 0], [1, 0]])
-    found = components(cloud.position)
+    found = nearest_neighbour_components(cloud.position)
     np.testing.assert_array_equal(found, np.where(owner == owner[0], found[0], 1 - found[0]))
 
 
 def test_a_number_that_nobody_gave_is_said_to_be_counted():
     cloud, normal, owner = scene(TWINS, [[1, 0], [0, 1]])
-    split = objects(cloud, None, normal)
+    split = segment_objects(cloud, None, normal)
     assert split.object_of_point.max() == 1 and agreement(owner, split.object_of_point) > 0.97
     assert "2 were counted" in split.warnings[0]
     alone, normal, _ = scene(TWINS[:1], [[1, 0]])
-    assert "1 was counted" in objects(alone, None, normal, config=TOUCHING_IS_ONE).warnings[0]
+    assert (
+        "1 was counted"
+        in segment_objects(alone, None, normal, config=TOUCHING_IS_ONE_CONFIG).warnings[0]
+    )
 
 
 @pytest.mark.parametrize("count", [0, -1, 201])
 def test_a_number_of_things_that_cannot_be_is_refused(count):
     cloud, _, _ = scene(TWINS, [[1, 0], [1, 0]], count=150)
     with pytest.raises(UserError, match="Ask for 1 to 200"):
-        objects(cloud, count)
+        segment_objects(cloud, count)
 
 
 def test_no_points_are_refused():
     nothing = np.zeros((0, 3))
     with pytest.raises(UserError, match="no points"):
-        objects(Cloud(nothing, nothing, nothing, nothing, np.zeros(0, int)))
+        segment_objects(FeatureCloud(nothing, nothing, nothing, nothing, np.zeros(0, int)))
 
 
 @pytest.mark.parametrize("points", [1, 2, 7, 40])
 def test_few_points_are_few_things(points):
     rng = np.random.default_rng(3)
     appearance = np.ones((points, 2)) / np.sqrt(2)
-    cloud = Cloud(
+    cloud = FeatureCloud(
         rng.random((points, 3)),
         appearance[:, :1] * [1, 1, 1],
         appearance,
         appearance,
         np.ones(points, int),
     )
-    split = objects(cloud, min(points, 3))
+    split = segment_objects(cloud, min(points, 3))
     assert len(split.object_of_point) == points == len(split.confidence)
     assert np.isfinite(split.confidence).all()

@@ -4,10 +4,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corporeal.core.types import Cloud, ObjectWords, PartWords
-from corporeal.reconstruction.features.descriptor import descriptor
-from corporeal.reconstruction.segment.naming import TEMPERATURE, _agreed, name_parts, named
-from corporeal.reconstruction.segment.parts import Clusters, PartsConfig, parts
+from corporeal.core.types import FeatureCloud, ObjectDescription, PartDescription
+from corporeal.reconstruction.features.point_descriptor import point_descriptor
+from corporeal.reconstruction.segment.part_clusters import PartClusters, PartsConfig, cluster_parts
+from corporeal.reconstruction.segment.part_naming import (
+    CLIP_TEMPERATURE,
+    _agree_on_appearance,
+    name_clusters,
+    name_parts,
+)
 
 QUICK = PartsConfig(superpoints=600)
 
@@ -33,15 +38,15 @@ def boxes(rng, count=800):
 
 
 def thing(*names):
-    return ObjectWords("pile", "pile", tuple(PartWords(name, None) for name in names))
+    return ObjectDescription("pile", "pile", tuple(PartDescription(name, None) for name in names))
 
 
 @pytest.fixture(scope="module")
 def pile():
     position, normal, colour, truth = boxes(np.random.default_rng(0))
-    appearance = descriptor(position, colour, normal)
+    appearance = point_descriptor(position, colour, normal)
     nothing = np.zeros((len(position), 0), np.float16)
-    return Cloud(position, colour, nothing, appearance, np.ones(len(position), int)), truth
+    return FeatureCloud(position, colour, nothing, appearance, np.ones(len(position), int)), truth
 
 
 def with_words(truth, rng, noise=0.3, channels=32):
@@ -64,7 +69,7 @@ def purity(cluster, truth):
 
 def test_no_cluster_holds_two_parts_of_unlike_colour(pile):
     cloud, truth = pile
-    found = parts(cloud, QUICK)
+    found = cluster_parts(cloud, QUICK)
     assert found.count >= 3
     assert purity(found.cluster_of_point, truth) > 0.995
     assert ((found.confidence >= 0) & (found.confidence <= 1)).all()
@@ -74,7 +79,7 @@ def test_no_cluster_holds_two_parts_of_unlike_colour(pile):
 def test_where_a_thing_stands_and_how_large_it_is_does_not_matter(pile):
     cloud, _ = pile
     moved = replace(cloud, position=32 * cloud.position + 64)
-    a, b = parts(cloud, QUICK), parts(moved, QUICK)
+    a, b = cluster_parts(cloud, QUICK), cluster_parts(moved, QUICK)
     pairs = set(zip(a.cluster_of_point, b.cluster_of_point, strict=True))
     assert len(pairs) == a.count == b.count
 
@@ -85,12 +90,12 @@ def test_place_tells_apart_what_looks_the_same():
     points = np.concatenate([rng.random((1000, 3)) * [1, 1, 0] + [2 * k, 0, 0] for k in (0, 1)])
     same = np.tile(np.array([[1.0, 0.0]], np.float16), (2000, 1))
     nothing = np.zeros((2000, 0), np.float16)
-    cloud = Cloud(points, np.full((2000, 3), 0.5), nothing, same, np.ones(2000, int))
-    apart = parts(
+    cloud = FeatureCloud(points, np.full((2000, 3), 0.5), nothing, same, np.ones(2000, int))
+    apart = cluster_parts(
         cloud, PartsConfig(selection="mass", smallest=100, superpoints=1000)
     ).cluster_of_point
     assert apart.max() >= 1 and purity(apart, np.repeat([0, 1], 1000)) == 1
-    together = parts(cloud, replace(QUICK, position_weight=0.0)).cluster_of_point
+    together = cluster_parts(cloud, replace(QUICK, position_weight=0.0)).cluster_of_point
     assert together.max() == 0
 
 
@@ -99,7 +104,9 @@ def test_a_handful_of_points_is_one_cluster(count):
     nothing = np.zeros((count, 0), np.float16)
     appearance = np.ones((count, 4), np.float16)
     x = np.arange(3.0 * count).reshape(count, 3)
-    found = parts(Cloud(x, np.zeros((count, 3)), nothing, appearance, np.ones(count, int)))
+    found = cluster_parts(
+        FeatureCloud(x, np.zeros((count, 3)), nothing, appearance, np.ones(count, int))
+    )
     np.testing.assert_array_equal(found.cluster_of_point, np.zeros(count))
 
 
@@ -135,7 +142,7 @@ def test_one_part_is_everything_and_sure(pile):
 
 def test_an_object_without_points_has_no_parts():
     none = np.zeros((0, 3))
-    cloud = Cloud(none, none, np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(0, int))
+    cloud = FeatureCloud(none, none, np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(0, int))
     found = name_parts(cloud, thing("legs", "seat"))
     assert not len(found.part_of_point) and not len(found.confidence)
     assert found.warnings == ("No points were found for 'legs', 'seat'.",)
@@ -144,24 +151,24 @@ def test_an_object_without_points_has_no_parts():
 def test_features_in_half_precision_are_not_widened_all_at_once():
     rng = np.random.default_rng(6)
     rows = rng.normal(size=(60_000, 64)).astype(np.float16)
-    cloud = Cloud(
+    cloud = FeatureCloud(
         rng.random((60_000, 3)), rng.random((60_000, 3)), rows, rows, np.ones(60_000, int)
     )
-    clusters = Clusters(rng.integers(0, 5, 60_000), np.ones(60_000))
+    clusters = PartClusters(rng.integers(0, 5, 60_000), np.ones(60_000))
     tracemalloc.start()
-    named(clusters, cloud, np.eye(64)[:2], thing("a", "b").parts)
+    name_clusters(clusters, cloud, np.eye(64)[:2], thing("a", "b").parts)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1.5 * rows.nbytes  # in single precision they alone are twice as large
 
 
 def test_more_names_than_clusters_are_told():
-    one = Clusters(np.zeros(10, np.int64), np.ones(10))
+    one = PartClusters(np.zeros(10, np.int64), np.ones(10))
     x = np.zeros((10, 3))
     brown = np.tile([0.42, 0.28, 0.17], (10, 1))
     nothing = np.zeros((10, 0), np.float16)
-    cloud = Cloud(x, brown, nothing, np.ones((10, 4), np.float16), np.ones(10, int))
-    found = named(one, cloud, None, thing("wooden seat", "blue seat").parts)
+    cloud = FeatureCloud(x, brown, nothing, np.ones((10, 4), np.float16), np.ones(10, int))
+    found = name_clusters(one, cloud, None, thing("wooden seat", "blue seat").parts)
     assert (found.part_of_point == 0).all()
     assert found.warnings == ("No points were found for 'blue seat'.",)
 
@@ -179,9 +186,9 @@ def test_words_find_what_points_at_them(pile):
 def test_one_cluster_from_foot_to_top_is_named_by_layers():
     rng = np.random.default_rng(5)
     place, nothing = rng.random((2000, 3)) * [0.5, 0.5, 1], np.zeros((2000, 0))
-    cloud = Cloud(place, np.full((2000, 3), 0.5), nothing, nothing, np.ones(2000, int))
-    one = Clusters(np.zeros(2000, np.int64), np.full(2000, 0.5))
-    found = named(one, cloud, None, thing("grey pedestal", "grey lid").parts)
+    cloud = FeatureCloud(place, np.full((2000, 3), 0.5), nothing, nothing, np.ones(2000, int))
+    one = PartClusters(np.zeros(2000, np.int64), np.full(2000, 0.5))
+    found = name_clusters(one, cloud, None, thing("grey pedestal", "grey lid").parts)
     high = place[:, 2] > 0.5
     far = abs(place[:, 2] - 0.5) > 0.11  # the middle layer may go either way
     assert (found.part_of_point[far] == high[far]).all() and len(found.confidence) == 2000
@@ -195,43 +202,49 @@ def test_what_is_not_typical_of_a_cluster_does_not_decide_its_name():
     structural = np.where(odd[:, None], -looks[0] + looks[1], looks[0])
     semantic = np.where(odd[:, None], words[1], 0.7 * words[0] + 0.69 * words[1])
     semantic /= np.linalg.norm(semantic, axis=1, keepdims=True)
-    cloud = Cloud(rng.random((90, 3)), rng.random((90, 3)), semantic, structural, odd + 1)
-    one = Clusters(np.zeros(90, np.int64), np.ones(90))
+    cloud = FeatureCloud(rng.random((90, 3)), rng.random((90, 3)), semantic, structural, odd + 1)
+    one = PartClusters(np.zeros(90, np.int64), np.ones(90))
     plain = semantic.mean(axis=0) @ words.T
-    found = named(one, cloud, words, thing("first", "second").parts)
+    found = name_clusters(one, cloud, words, thing("first", "second").parts)
     assert plain.argmax() == 1 and set(found.part_of_point) == {0}
 
 
 def test_a_cluster_that_looks_like_those_of_another_name_goes_over_to_them():
     looks = np.array([[1, 0, 0], [0.98, 0.2, 0], [0, 1, 0], [0, 0.98, 0.2], [0.05, 1, 0.1]])
     doubt = np.log([[9, 1], [9, 1], [1, 9], [1, 9], [6, 4]])
-    np.testing.assert_array_equal(_agreed(looks, doubt, doubt.argmax(1)), [0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(
+        _agree_on_appearance(looks, doubt, doubt.argmax(1)), [0, 0, 1, 1, 1]
+    )
 
 
 def test_words_that_are_sure_are_not_overruled_by_looks():
     looks = np.array([[1, 0, 0], [0.98, 0.2, 0], [0, 1, 0], [0, 0.98, 0.2], [0.05, 1, 0.1]])
     sure = np.log([[9, 1], [9, 1], [1, 9], [1, 9], [999, 1]])
-    np.testing.assert_array_equal(_agreed(looks, sure, sure.argmax(1)), [0, 0, 1, 1, 0])
+    np.testing.assert_array_equal(
+        _agree_on_appearance(looks, sure, sure.argmax(1)), [0, 0, 1, 1, 0]
+    )
 
 
 def test_the_last_cluster_of_a_name_keeps_it():
     looks = np.array([[1.0, 0], [1.0, 0.01], [0.98, 0.2]])
     score = np.log([[9.0, 1], [9, 1], [4, 6]])
-    np.testing.assert_array_equal(_agreed(looks, score, np.array([0, 0, 1])), [0, 0, 1])
+    np.testing.assert_array_equal(
+        _agree_on_appearance(looks, score, np.array([0, 0, 1])), [0, 0, 1]
+    )
 
 
 def test_confidence_is_how_probable_a_name_is_by_the_temperature_of_training():
     words = np.eye(4)[:2]
-    way = np.array([0.5, 0.5 - 2 * TEMPERATURE, 0, 0])
+    way = np.array([0.5, 0.5 - 2 * CLIP_TEMPERATURE, 0, 0])
     way[2] = np.sqrt(1 - way @ way)
-    cloud = Cloud(
+    cloud = FeatureCloud(
         np.random.default_rng(5).random((6, 3)),
         np.zeros((6, 3)),
         np.tile(way, (6, 1)),
         np.tile(np.eye(4)[:1], (6, 1)),
         np.ones(6, int),
     )
-    found = named(
-        Clusters(np.zeros(6, np.int64), np.full(6, 0.5)), cloud, words, thing("a", "b").parts
+    found = name_clusters(
+        PartClusters(np.zeros(6, np.int64), np.full(6, 0.5)), cloud, words, thing("a", "b").parts
     )
     np.testing.assert_allclose(found.confidence, 0.5 / (1 + np.exp(-2)), rtol=1e-6)

@@ -3,8 +3,8 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from corporeal.reconstruction.segment.match import match
-from corporeal.reconstruction.segment.reduce import reduced
+from corporeal.reconstruction.segment.optimal_assignment import optimal_assignment
+from corporeal.reconstruction.segment.reduce_features import reduce_features
 from corporeal.reconstruction.segment.superpoints import superpoints
 
 
@@ -57,19 +57,19 @@ def test_few_points_make_few_patches(count):
 def test_distances_survive_when_few_axes_hold_all_there_is():
     rng = np.random.default_rng(3)
     mixed = rng.normal(size=(500, 5)) @ np.linalg.qr(rng.normal(size=(40, 5)))[0].T
-    short = reduced(mixed.astype(np.float16), 8)
+    short = reduce_features(mixed.astype(np.float16), 8)
     assert short.shape == (500, 8) and short.dtype == np.float32
     unit = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
     expected = 2 - 2 * unit @ unit.T
     found = ((short[:, None] - short[None]) ** 2).sum(2)
     np.testing.assert_allclose(found, expected, atol=4e-3)
-    np.testing.assert_allclose(reduced(mixed[:, :5]).std(0) > 0, True)
+    np.testing.assert_allclose(reduce_features(mixed[:, :5]).std(0) > 0, True)
 
 
 def test_half_precision_features_are_never_widened_all_at_once():
     features = np.ones((60_000, 256), np.float16)
     tracemalloc.start()
-    reduced(features, 16)
+    reduce_features(features, 16)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1.5 * (20_000 * 256 * 4) + 60_000 * 16 * 4 + 4 * 8192 * 256 * 4
@@ -77,13 +77,15 @@ def test_half_precision_features_are_never_widened_all_at_once():
 
 def test_the_best_pairs_are_not_always_the_best_pair():
     similarity = np.array([[0.9, 0.8], [0.85, 0.1]])
-    np.testing.assert_array_equal(match(similarity), [1, 0])
-    np.testing.assert_array_equal(match(similarity[:, :1]), [0, -1])
-    np.testing.assert_array_equal(match(similarity[:1]), [0])
-    np.testing.assert_array_equal(match(np.empty((2, 0))), [-1, -1])
+    np.testing.assert_array_equal(optimal_assignment(similarity), [1, 0])
+    np.testing.assert_array_equal(optimal_assignment(similarity[:, :1]), [0, -1])
+    np.testing.assert_array_equal(optimal_assignment(similarity[:1]), [0])
+    np.testing.assert_array_equal(optimal_assignment(np.empty((2, 0))), [-1, -1])
 
 
 def test_a_forbidden_pair_is_never_made():
     never = -np.inf
-    np.testing.assert_array_equal(match(np.array([[never, 1.0], [never, 0.9]])), [1, -1])
-    np.testing.assert_array_equal(match(np.array([[5.0, 1.0], [5.0, never]])), [1, 0])
+    np.testing.assert_array_equal(
+        optimal_assignment(np.array([[never, 1.0], [never, 0.9]])), [1, -1]
+    )
+    np.testing.assert_array_equal(optimal_assignment(np.array([[5.0, 1.0], [5.0, never]])), [1, 0])

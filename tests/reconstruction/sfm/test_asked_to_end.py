@@ -9,7 +9,7 @@ pytest.importorskip("pycolmap")
 
 ASKED = """
 import os, signal
-from corporeal.reconstruction.sfm.attempt import require
+from corporeal.reconstruction.sfm.sfm_run import require
 require()
 os.kill(os.getpid(), signal.SIGTERM)
 """

@@ -7,11 +7,16 @@ import pytest
 from PIL import Image
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.io.sources import photographs_in
+from corporeal.io.input_files import photos_in_folder
 from corporeal.pipeline.stages.assemble import assemble
-from corporeal.reconstruction.sfm.film_frames import write_frames
-from corporeal.reconstruction.sfm.gather import Gathered, gather, lens_stated, spread
-from corporeal.reconstruction.sfm.pose import _refused
+from corporeal.reconstruction.sfm.find_poses import _refusal
+from corporeal.reconstruction.sfm.prepare_images import (
+    PreparedImages,
+    focal_from_exif,
+    prepare_images,
+    spread_selection,
+)
+from corporeal.reconstruction.sfm.video_frames import write_video_frames
 
 COUNT = 5
 EXIF, DESCRIPTION, FILM_FOCAL, PLACE = 0x8769, 0x010E, 0xA405, 0x8825
@@ -26,7 +31,7 @@ def greys():
 
 
 def gathered(tmp_path):
-    return gather(tmp_path / "photos", tmp_path / "poses", lambda fraction, words: None)
+    return prepare_images(tmp_path / "photos", tmp_path / "poses", lambda fraction, words: None)
 
 
 def saved(tmp_path, greys, suffix, made, **options):
@@ -122,7 +127,7 @@ def test_of_exif_only_the_lens_is_copied_however_long_the_rest_is(tmp_path, grey
     saved(tmp_path, greys, ".png", Image.fromarray, exif=exif)
     gathered(tmp_path)
     copy = tmp_path / "poses" / "images" / "0.jpg"
-    assert lens_stated(copy) == 26
+    assert focal_from_exif(copy) == 26
     with Image.open(copy) as picture:
         assert not picture.getexif().get_ifd(PLACE) and copy.stat().st_size < 20_000
 
@@ -151,7 +156,9 @@ def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
     with pytest.raises(BadFileError, match=said):
         gathered(tmp_path)
     Image.fromarray(greys[0]).save(tmp_path / "photos" / "0.jpg")
-    assert [p.name for p in photographs_in(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
+    assert [p.name for p in photos_in_folder(tmp_path / "photos")] == ["0.jpg"], (
+        "raws lie beside it"
+    )
 
 
 def test_what_is_not_read_beside_photographs_is_said_if_no_raw_picture(tmp_path, greys):
@@ -193,7 +200,7 @@ def test_one_picture_beside_a_folder_of_photographs_is_told_where_these_are(tmp_
     saved(tmp_path / "mine", greys, ".jpg", Image.fromarray)
     Image.fromarray(greys[0]).save(tmp_path / "mine" / "cover.jpg")
     with pytest.raises(BadFileError, match=r"5 more lie in folders of it: name .*photos\.$"):
-        gather(tmp_path / "mine", tmp_path / "poses", lambda fraction, words: None)
+        prepare_images(tmp_path / "mine", tmp_path / "poses", lambda fraction, words: None)
 
 
 def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, greys):
@@ -236,14 +243,14 @@ def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, grey
 def test_half_a_film_is_not_told_to_become_the_kind_it_is(tmp_path):
     (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
     with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
-        write_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)
+        write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)
 
 
 @pytest.mark.parametrize("turns", [2, 3, 5])
 def test_things_by_turns_are_all_among_the_photographs_that_are_used(turns, tmp_path):
     """Of two photographs at a time, or of five, at equal steps one thing only was looked at."""
     found = [tmp_path / f"{k:03d}" for k in range(500)]
-    used = spread(found, 5)
+    used = spread_selection(found, 5)
     assert len(used) == 100 and used == sorted(set(used))
     shares = np.bincount([int(file.name) % turns for file in used], minlength=turns) / 100
     assert shares.min() > 0.6 / turns and shares.max() < 1.5 / turns
@@ -262,10 +269,10 @@ def test_photographs_that_were_cropped_one_by_one_are_told_by_their_sizes(tmp_pa
 
 def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
     names = tuple(f"{k}.jpg" for k in range(COUNT))
-    cropped = Gathered(names, tuple((64, 40 + k) for k in range(COUNT)), ())
-    whole = Gathered(names, ((64, 48),) * COUNT, ())
-    assert "as the camera took them" in _refused(["why"], cropped, ()).what_to_do
-    assert "newspaper" in _refused(["why"], whole, ()).what_to_do
+    cropped = PreparedImages(names, tuple((64, 40 + k) for k in range(COUNT)), ())
+    whole = PreparedImages(names, ((64, 48),) * COUNT, ())
+    assert "as the camera took them" in _refusal(["why"], cropped, ()).what_to_do
+    assert "newspaper" in _refusal(["why"], whole, ()).what_to_do
 
 
 def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path, greys):

@@ -12,26 +12,31 @@ import pytest
 from PIL import Image
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.io.colmap import write_colmap
-from corporeal.io.photographs import read_photographs
-from corporeal.io.sources import kind_of, photographs_in, sources, unposed
-from corporeal.multiview.silhouettes import FILLED
-from corporeal.reconstruction import picture_intake as reconstructing
+from corporeal.io.input_files import input_kind, lacks_poses, list_input_files, photos_in_folder
+from corporeal.io.photos.colmap import write_colmap
+from corporeal.io.photos.posed_photos import read_posed_photos
+from corporeal.multiview.silhouette_coherence import MIN_MASK_FILLED_FRACTION
+from corporeal.reconstruction import gaussian_source as reconstructing
 from corporeal.reconstruction.masks.grown_masks import GrownMasks
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.sfm import film_frames
-from corporeal.reconstruction.sfm import pose as posing
-from corporeal.reconstruction.sfm.attempt import Attempt, beside_first, by_camera
-from corporeal.reconstruction.sfm.by_masks import checked_by_masks
-from corporeal.reconstruction.sfm.film_frames import choose, write_frames
-from corporeal.reconstruction.sfm.gather import gather
-from corporeal.reconstruction.sfm.judge import doubts, in_vain, names_of
-from corporeal.reconstruction.sfm.pose import FIGURE, moved_within, pose, pose_object
-from corporeal.reconstruction.sfm.standstill import Standstill
-from corporeal.render.camera import camera_of
-from corporeal.render.embree import identify
-from corporeal.render.stage import Stage
-from corporeal.render.video import reel
+from corporeal.reconstruction.sfm import find_poses as posing
+from corporeal.reconstruction.sfm import video_frames
+from corporeal.reconstruction.sfm.find_poses import (
+    CAMERAS_FIGURE_FILE,
+    describe_moved_object,
+    find_object_poses,
+    find_poses,
+)
+from corporeal.reconstruction.sfm.mask_consistency import remove_by_masks
+from corporeal.reconstruction.sfm.pose_acceptance import model_doubts, some_names, thorough_in_vain
+from corporeal.reconstruction.sfm.prepare_images import prepare_images
+from corporeal.reconstruction.sfm.sfm_run import SfmRun, names_by_camera, pictures_beside_first
+from corporeal.reconstruction.sfm.static_pixels import StaticPixels
+from corporeal.reconstruction.sfm.video_frames import choose_frames, write_video_frames
+from corporeal.render.camera_placement import camera_from_aim
+from corporeal.render.embree import identify_triangles
+from corporeal.render.ray_scene import RayScene
+from corporeal.render.video_file import open_video
 from patterned_scene import (
     OF_SLAB,
     blots,
@@ -82,8 +87,8 @@ def spoilt(taken, tmp_path_factory):
 
 def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
     pytest.importorskip("pycolmap")
-    found = pose(spoilt, tmp_path / "poses", silent)
-    seen = read_photographs(found.folder)
+    found = find_poses(spoilt, tmp_path / "poses", silent)
+    seen = read_posed_photos(found.folder)
     true = [taken[1][int(name[6:9])] for name in seen.names]
     assert len(seen.names) == COUNT, "also the one that was held upright"
     angle, place = pose_errors(seen.views.cameras, true)
@@ -97,7 +102,7 @@ def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
     ):
         assert name in told
     assert "photo_001.jpg shows the same as photo_001_(copy).jpg" in told
-    assert (found.folder / FIGURE).stat().st_size > 10_000
+    assert (found.folder / CAMERAS_FIGURE_FILE).stat().st_size > 10_000
     assert (found.folder / "sparse" / "0" / "images.txt").exists()
 
 
@@ -112,7 +117,7 @@ def test_pictures_that_were_cropped_each_differently_are_posed_by_where_their_le
             left, top, right, low = (rng.uniform(0, 0.15, 4) * [320, 240, 320, 240]).astype(int)
             cut = picture.crop((left, top, 320 - right, 240 - low))
             cut.save(tmp_path / "cropped" / f"photo_{k:03d}.jpg", quality=95)
-    seen = read_photographs(pose(tmp_path / "cropped", tmp_path / "poses", silent).folder)
+    seen = read_posed_photos(find_poses(tmp_path / "cropped", tmp_path / "poses", silent).folder)
     assert len(seen.names) == COUNT
     angle, place = pose_errors(seen.views.cameras, taken[1])
     assert np.median(angle) < 1.25 and np.median(place) < 0.01, "1.5° and 2.1 % by their middles"
@@ -130,14 +135,14 @@ def turned_over(tmp_path, monkeypatch):
     back[:3, 3] = -0.02, 0.01, 0.12
     by_slab, by_block, names = [], [], []
     for turned in (False, True):
-        stage = Stage(stepped(turned))
+        stage = RayScene(stepped(turned))
         for k, aim in enumerate(aims):
             names.append(f"{int(turned)}_{k:02d}.jpg")
-            mask = np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB)
+            mask = np.uint8(255) * (identify_triangles(stage, aim)[0] >= OF_SLAB)
             Image.fromarray(mask).save(folder / "masks" / f"{names[-1][:-4]}.png")
             noise = np.random.default_rng(len(names)).integers(0, 255, (120, 160, 3))
             Image.fromarray(noise.astype(np.uint8)).save(folder / names[-1])
-            camera = camera_of(aim)
+            camera = camera_from_aim(aim)
             by_slab.append(camera)
             seen = back @ camera.world_from_camera if turned else camera.world_from_camera
             by_block.append(replace(camera, world_from_camera=seen))
@@ -150,30 +155,30 @@ def turned_over(tmp_path, monkeypatch):
         if cameras:
             grey = np.full((2000, 3), 90, np.uint8)
             write_colmap(out / "sparse" / "0", tuple(cameras), tuple(names), points, grey)
-        return Attempt(way, len(names), len(cameras), 9000 * bool(cameras), focal=1.0)
+        return SfmRun(way, len(names), len(cameras), 9000 * bool(cameras), focal=1.0)
 
-    monkeypatch.setattr(posing, "attempt", attempt)
+    monkeypatch.setattr(posing, "run_sfm", attempt)
     return folder, models, tried
 
 
 def test_an_object_that_was_turned_over_is_posed_by_what_its_masks_show(turned_over, tmp_path):
     """All pictures fit by the floor, and no count of the model speaks against that."""
     folder, models, tried = turned_over
-    found = pose(folder, tmp_path / "poses", silent)
+    found = find_poses(folder, tmp_path / "poses", silent)
     assert tried == ["plain", "masked"] and found.warnings == ()
     assert "from points on objects alone" in found.statements[0]
-    angle, place = pose_errors(read_photographs(found.folder).views.cameras, models["masked"])
+    angle, place = pose_errors(read_posed_photos(found.folder).views.cameras, models["masked"])
     assert angle.max() < 0.01 and place.max() < 1e-4
     kept = json.loads((tmp_path / "poses" / "poses.json").read_text())
     first, last = (told["filled"] for told in kept["attempts"])
-    assert first < FILLED < last
+    assert first < MIN_MASK_FILLED_FRACTION < last
 
 
 def test_masks_that_nothing_agrees_with_are_a_warning(turned_over, tmp_path):
     """They may be poor: what all pictures agree on is not refused for them."""
     folder, models, tried = turned_over
     models["masked"] = []
-    found = pose(folder, tmp_path / "poses", silent)
+    found = find_poses(folder, tmp_path / "poses", silent)
     assert tried == ["plain", "masked"], "what is plainly believed needs no thorough attempt"
     assert "masks alone" not in found.statements[0] and len(found.warnings) >= 1
     assert "turned over between the pictures, or masks miss parts" in found.warnings[-1]
@@ -184,17 +189,19 @@ def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_
     """Nobody drew masks: those that are grown under the slab's poses contradict each other."""
     folder, models, _ = turned_over
     by_block = models.pop("masked")
-    by_slab = pose(folder, tmp_path / "poses", silent)
+    by_slab = find_poses(folder, tmp_path / "poses", silent)
     masks = folder / "masks"
-    why = moved_within(by_slab, masks)
+    why = describe_moved_object(by_slab, masks)
     assert why is not None and "moved or turned over between the pictures" in why
-    assert pose_object(by_slab, masks, tmp_path / "nothing", silent) is None
+    assert find_object_poses(by_slab, masks, tmp_path / "nothing", silent) is None
     models["masked"] = by_block
-    assert pose_object(by_slab, masks, tmp_path / "nothing", silent) is None, "it is remembered"
-    found = pose_object(by_slab, masks, tmp_path / "object", silent)
+    assert find_object_poses(by_slab, masks, tmp_path / "nothing", silent) is None, (
+        "it is remembered"
+    )
+    found = find_object_poses(by_slab, masks, tmp_path / "object", silent)
     assert found is not None and not (found.folder / "masks").exists()
-    assert moved_within(found, masks) is None
-    angle, place = pose_errors(read_photographs(found.folder).views.cameras, by_block)
+    assert describe_moved_object(found, masks) is None
+    angle, place = pose_errors(read_posed_photos(found.folder).views.cameras, by_block)
     assert angle.max() < 0.01 and place.max() < 1e-4
 
 
@@ -215,18 +222,18 @@ def test_a_run_does_not_believe_poses_of_the_background(turned_over, tmp_path, h
         for k in range(COUNT):
             first = tmp_path / "grown" / "masks" / f"0_{k:02d}.png"
             shutil.copy(first, first.with_name(f"1_{k:02d}.png"))
-    by_slab = pose(folder, tmp_path / "poses", silent)
+    by_slab = find_poses(folder, tmp_path / "poses", silent)
     models["masked"] = by_block if how == "found" else []
-    monkeypatch.setattr(reconstructing, "pose", lambda *what: by_slab)
+    monkeypatch.setattr(reconstructing, "find_poses", lambda *what: by_slab)
     monkeypatch.setattr(reconstructing, "has_masks", lambda shots: False)
     grown = GrownMasks(tmp_path / "grown", ())
     monkeypatch.setattr(reconstructing, "grown_masks", lambda *what, **more: grown)
     config = ReconstructConfig(force=how == "forced")
     if how == "refused":
         with pytest.raises(BadFileError, match="turned over between the pictures, and it has"):
-            reconstructing._posed(folder, config, tmp_path / "run", silent)
+            reconstructing._find_source_poses(folder, config, tmp_path / "run", silent)
         return
-    found = reconstructing._posed(folder, config, tmp_path / "run", silent)
+    found = reconstructing._find_source_poses(folder, config, tmp_path / "run", silent)
     assert found is not None
     assert (found.folder == by_slab.folder) == (how != "found")
     assert (found.warnings != by_slab.warnings) == (how != "still")
@@ -235,22 +242,22 @@ def test_a_run_does_not_believe_poses_of_the_background(turned_over, tmp_path, h
 def test_a_picture_on_the_wrong_piece_of_a_pattern_is_left_out(taken, tmp_path):
     """As one of the bananas on a carpet was: right by reprojection, wrong by its silhouette."""
     pytest.importorskip("pycolmap")
-    scene, folder = Stage(patterned()), tmp_path / "poses"
+    scene, folder = RayScene(patterned()), tmp_path / "poses"
     aims = ring(np.arange(COUNT) * 360 / COUNT, (320, 240))
     (folder / "masks").mkdir(parents=True)
     for k, aim in enumerate(aims):
-        mask = np.uint8(255) * (identify(scene, aim)[0] >= OF_SLAB)
+        mask = np.uint8(255) * (identify_triangles(scene, aim)[0] >= OF_SLAB)
         Image.fromarray(mask).save(folder / "masks" / f"photo_{k:03d}.png")
     names = tuple(f"photo_{k:03d}.jpg" for k in range(COUNT))
     cameras = list(taken[1])
     cameras[4] = replace(cameras[4], world_from_camera=AWAY @ cameras[4].world_from_camera)
     write_colmap(tmp_path / "model", tuple(cameras), names)
-    told = Attempt("plain", COUNT, registered=COUNT, points=9000, focal=1.0)
-    left = checked_by_masks(told, folder, tmp_path / "model")
+    told = SfmRun("plain", COUNT, registered=COUNT, points=9000, focal=1.0)
+    left = remove_by_masks(told, folder, tmp_path / "model")
     assert left.astray == ("photo_004.jpg",) and left.registered == COUNT - 1
-    assert left.filled > FILLED
+    assert left.filled > MIN_MASK_FILLED_FRACTION
     assert "photo_004.jpg" not in (tmp_path / "model" / "images.txt").read_text()
-    again = checked_by_masks(told, folder, tmp_path / "model")
+    again = remove_by_masks(told, folder, tmp_path / "model")
     assert again.astray == () and again.registered == COUNT
 
 
@@ -260,26 +267,26 @@ def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
 
     def attempt(folder, out, gathered, way, progress):
         tried.append(way)
-        return Attempt(way, COUNT, registered=5, points=20)
+        return SfmRun(way, COUNT, registered=5, points=20)
 
-    monkeypatch.setattr(posing, "attempt", attempt)
+    monkeypatch.setattr(posing, "run_sfm", attempt)
     said = []
     for _ in range(2):
         with pytest.raises(BadFileError, match=r"only 5 of 14 pictures fit together; there are 4 "):
             said.append(1)
-            pose(taken[0], tmp_path / "poses", silent)
+            find_poses(taken[0], tmp_path / "poses", silent)
     assert tried == ["plain", "thorough"], "both attempts once"
     shutil.copytree(taken[0], tmp_path / "other")
     (tmp_path / "other" / "photo_000.jpg").unlink()
     with pytest.raises(BadFileError, match="Put the thing on something with a pattern"):
-        pose(tmp_path / "other", tmp_path / "poses", silent)
+        find_poses(tmp_path / "other", tmp_path / "poses", silent)
     assert len(tried) == 4, "other pictures are looked at anew"
 
 
 def test_pycolmap_is_asked_for_where_it_is_absent(taken, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pycolmap", None)
     with pytest.raises(UserError, match=r"pip install 'corporeal\[poses\]'"):
-        pose(taken[0], tmp_path / "poses", silent)
+        find_poses(taken[0], tmp_path / "poses", silent)
 
 
 @pytest.mark.parametrize("kind", ["black", "same", "broken", "heic"])
@@ -301,9 +308,9 @@ def test_folders_that_show_nothing_are_refused_in_one_sentence(taken, tmp_path, 
         "broken": "none of 30 photographs can be used.*is no PNG, JPEG or WebP",
         "heic": "none of 30 photographs can be used.*is a HEIC picture: convert it to JPEG",
     }
-    assert kind_of([folder]) == "photographs" and unposed(folder)
+    assert input_kind([folder]) == "photographs" and lacks_poses(folder)
     with pytest.raises(BadFileError, match=said[kind]) as error:
-        gather(folder, tmp_path / "poses", silent)
+        prepare_images(folder, tmp_path / "poses", silent)
     assert "\n" not in str(error.value)
 
 
@@ -313,7 +320,7 @@ def test_of_very_many_photographs_some_are_used(tmp_path):
     for k in range(250):
         picture = rng.integers(0, 255, (12, 16, 3)).astype(np.uint8)
         Image.fromarray(picture).resize((64, 48)).save(tmp_path / "photos" / f"{k:03d}.png")
-    found = gather(tmp_path / "photos", tmp_path / "poses", silent)
+    found = prepare_images(tmp_path / "photos", tmp_path / "poses", silent)
     assert len(found.names) == 84
     assert "Of 250 photographs, one in 3 was used." in found.said
 
@@ -333,7 +340,7 @@ def test_masks_are_turned_with_their_photographs(tmp_path):
         if k % 2:
             mask = np.rot90(mask, -1)  # drawn on the picture as it is shown
         Image.fromarray(mask).save(tmp_path / "photos" / "masks" / f"{k}.png")
-    gather(tmp_path / "photos", tmp_path / "poses", silent)
+    prepare_images(tmp_path / "photos", tmp_path / "poses", silent)
     for k in range(4):
         with Image.open(tmp_path / "poses" / "masks" / f"{k}.png") as mask:
             white = np.asarray(mask) > 128
@@ -345,29 +352,29 @@ def test_photographs_lie_in_a_folder_or_in_its_images(tmp_path):
     (tmp_path / "scan" / "masks").mkdir()
     for name in ("images/b.JPG", "images/a.png", "masks/a.png", "notes.txt"):
         (tmp_path / "scan" / name).touch()
-    assert [p.name for p in photographs_in(tmp_path / "scan")] == ["a.png", "b.JPG"]
-    assert kind_of([tmp_path / "scan"]) == "photographs"
+    assert [p.name for p in photos_in_folder(tmp_path / "scan")] == ["a.png", "b.JPG"]
+    assert input_kind([tmp_path / "scan"]) == "photographs"
     (tmp_path / "a.MOV").touch()
-    assert kind_of([tmp_path / "a.MOV"]) == "photographs" and unposed(tmp_path / "a.MOV")
-    assert sources([tmp_path / "a.MOV"]) == [tmp_path / "a.MOV"]
+    assert input_kind([tmp_path / "a.MOV"]) == "photographs" and lacks_poses(tmp_path / "a.MOV")
+    assert list_input_files([tmp_path / "a.MOV"]) == [tmp_path / "a.MOV"]
 
 
 # ---------------------------------------------------------------- what is believed
 
 RIGHT = {
-    "a patterned slab": Attempt("plain", 48, 48, 13_999, 0.21, (), 1.0, 0.01),
-    "a plain floor": Attempt("thorough", 48, 47, 2403, 0.98, (), 1.0, 0.05),
-    "real": Attempt("thorough", 13, 12, 2092, 0.43, (), 0.99, 0.1),
-    "a film": Attempt("plain", 30, 30, 9705, 0.3, (), 1.0, 0.0),
+    "a patterned slab": SfmRun("plain", 48, 48, 13_999, 0.21, (), 1.0, 0.01),
+    "a plain floor": SfmRun("thorough", 48, 47, 2403, 0.98, (), 1.0, 0.05),
+    "real": SfmRun("thorough", 13, 12, 2092, 0.43, (), 0.99, 0.1),
+    "a film": SfmRun("plain", 30, 30, 9705, 0.3, (), 1.0, 0.0),
 }
 WRONG = {
-    "nothing": (Attempt("thorough", 20), "no two pictures"),
-    "groups": (Attempt("plain", 48, 34, 2000, 0.5, (18,), 1.0, 0.0), "groups of 34 and 18"),
-    "few": (Attempt("thorough", 24, 11, 541, 0.9, (), 0.85, 0.1), "only 11 of 24"),
-    "a lens": (Attempt("thorough", 24, 20, 1541, 0.9, (), 0.85, 0.55), "k1 0.55"),
-    "a vase": (Attempt("thorough", 48, 40, 380, 1.1, (), 1.0, 0.0), "10 points per picture"),
+    "nothing": (SfmRun("thorough", 20), "no two pictures"),
+    "groups": (SfmRun("plain", 48, 34, 2000, 0.5, (18,), 1.0, 0.0), "groups of 34 and 18"),
+    "few": (SfmRun("thorough", 24, 11, 541, 0.9, (), 0.85, 0.1), "only 11 of 24"),
+    "a lens": (SfmRun("thorough", 24, 20, 1541, 0.9, (), 0.85, 0.55), "k1 0.55"),
+    "a vase": (SfmRun("thorough", 48, 40, 380, 1.1, (), 1.0, 0.0), "10 points per picture"),
     "a lens of a vase": (
-        Attempt("thorough", 48, 40, 4000, 1.1, (), 0.14, 0.0),
+        SfmRun("thorough", 48, 40, 4000, 1.1, (), 0.14, 0.0),
         "focal length 0.14",
     ),
 }
@@ -376,28 +383,28 @@ WRONG = {
 @pytest.mark.parametrize("name", RIGHT)
 def test_models_that_were_right_are_believed(name):
     """Measured against known poses, docs/inputs.md."""
-    assert doubts(RIGHT[name]) == []
+    assert model_doubts(RIGHT[name]) == []
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_models_that_were_wrong_are_not(name):
     told, said = WRONG[name]
-    assert any(said in clause for clause in doubts(told))
+    assert any(said in clause for clause in model_doubts(told))
     cured = replace(told, pictures=40, registered=40, points=4000, others=(), focal=1.0, bent=0.0)
-    assert doubts(cured) == [], "each has one thing wrong, or several, and nothing else"
+    assert model_doubts(cured) == [], "each has one thing wrong, or several, and nothing else"
 
 
 def test_a_group_that_says_the_same_again_is_no_rival():
     """COLMAP begins anew at pictures that it has placed: 20 far apart gave 17 that were right, and
     12 of these once more."""
     pycolmap = pytest.importorskip("pycolmap")
-    eyes = [camera_of(aim).world_from_camera for aim in ring(np.arange(12) * 30)]
+    eyes = [camera_from_aim(aim).world_from_camera for aim in ring(np.arange(12) * 30)]
     first = model_of(pycolmap, eyes)
     turned = [TURN_ABOUT_Z @ eye for eye in eyes[4:]]
-    assert beside_first(first, model_of(pycolmap, turned, 4)) == 0
-    assert beside_first(first, model_of(pycolmap, [*turned, np.eye(4), np.eye(4)], 4)) == 2
+    assert pictures_beside_first(first, model_of(pycolmap, turned, 4)) == 0
+    assert pictures_beside_first(first, model_of(pycolmap, [*turned, np.eye(4), np.eye(4)], 4)) == 2
     mirrored = [eyes[k] for k in (8, 4, 9, 5, 10, 6, 11, 7)]
-    assert beside_first(first, model_of(pycolmap, mirrored, 4)) == 8, "it contradicts"
+    assert pictures_beside_first(first, model_of(pycolmap, mirrored, 4)) == 8, "it contradicts"
 
 
 def model_of(pycolmap, eyes, begin=0):
@@ -420,24 +427,24 @@ def test_pictures_of_two_lenses_have_two_cameras(tmp_path):
         exif.get_ifd(0x8769)[0xA405] = 52 if k % 2 else 26
         noise = np.random.default_rng(k).integers(0, 255, (30, 40, 3)).astype(np.uint8)
         Image.fromarray(noise).save(tmp_path / "photos" / f"{k}.jpg", exif=exif)
-    gathered = gather(tmp_path / "photos", tmp_path / "poses", silent)
-    assert by_camera(tmp_path / "poses" / "images", gathered) == [
+    gathered = prepare_images(tmp_path / "photos", tmp_path / "poses", silent)
+    assert names_by_camera(tmp_path / "poses" / "images", gathered) == [
         ["0.jpg", "2.jpg", "4.jpg"],
         ["1.jpg", "3.jpg", "5.jpg"],
     ]
 
 
 def test_only_pictures_that_points_join_can_be_placed():
-    told = Attempt("plain", 20, joined=7)
-    assert doubts(told) == ["only 7 of 20 pictures share points with one another"]
-    assert in_vain(told, 0) and not in_vain(replace(told, joined=20), 0)
-    assert in_vain(replace(told, joined=20), 12), "most are blurred"
-    assert doubts(replace(told, joined=20)) == ["no two pictures share enough points"]
+    told = SfmRun("plain", 20, joined=7)
+    assert model_doubts(told) == ["only 7 of 20 pictures share points with one another"]
+    assert thorough_in_vain(told, 0) and not thorough_in_vain(replace(told, joined=20), 0)
+    assert thorough_in_vain(replace(told, joined=20), 12), "most are blurred"
+    assert model_doubts(replace(told, joined=20)) == ["no two pictures share enough points"]
 
 
 def test_eight_names_are_enough():
-    assert names_of(("a", "b")) == "a, b"
-    assert names_of(tuple("abcdefghijk")) == "a, b, c, d, e, f, g, h and 3 more"
+    assert some_names(("a", "b")) == "a, b"
+    assert some_names(tuple("abcdefghijk")) == "a, b, c, d, e, f, g, h and 3 more"
 
 
 # ---------------------------------------------------------------- films
@@ -448,21 +455,21 @@ def test_frames_are_sharp_and_equally_far_apart():
     sharp = np.full(200, 10.0)
     sharp[[10, 160]] = 20.0
     sharp[20:24] = 1.0
-    chosen = choose(change, sharp, 10)
+    chosen = choose_frames(change, sharp, 10)
     assert 10 in chosen and 160 in chosen
     assert sum(50 <= k < 150 for k in chosen) <= 1, "a hand that rests gives no frames"
     assert not set(chosen) & set(range(20, 24)), "smeared"
-    assert choose(np.zeros(30), np.ones(30), 10) == []
+    assert choose_frames(np.zeros(30), np.ones(30), 10) == []
     # A stretch that is smeared as a whole gives none.
     sharp[:] = 10.0
     sharp[20:30] = 1.0
-    assert not set(choose(np.full(200, 1.0), sharp, 20)) & set(range(20, 30))
+    assert not set(choose_frames(np.full(200, 1.0), sharp, 20)) & set(range(20, 30))
 
 
 def film(path, count, smeared=lambda k: False, size=(320, 240)):
     """A camera that passes over a newspaper; some frames are smeared."""
     paper = np.kron(blots(0, 512), np.ones((2, 2, 1), np.uint8))
-    with reel(path, 30, size) as made:
+    with open_video(path, 30, size) as made:
         for k in range(count):
             y, x = 2 * k, 4 * k % (paper.shape[1] - size[0])
             picture = paper[y : y + size[1], x : x + size[0]]
@@ -475,7 +482,7 @@ def film(path, count, smeared=lambda k: False, size=(320, 240)):
 
 def test_a_film_gives_sharp_frames(tmp_path):
     path = film(tmp_path / "a.mp4", 120, lambda k: k % 12 < 4)
-    said = write_frames(path, tmp_path / "frames", silent)
+    said = write_video_frames(path, tmp_path / "frames", silent)
     numbers = [int(p.stem[6:]) for p in sorted((tmp_path / "frames").iterdir())]
     assert 40 <= len(numbers) <= 60 and "120 that were looked at" in said[0]
     assert np.mean([k % 12 < 4 for k in numbers]) <= 0.1
@@ -491,7 +498,7 @@ def test_a_film_that_was_held_upright_is_turned(tmp_path, caplog):
     program = imageio_ffmpeg.get_ffmpeg_exe()
     command = [program, "-v", "error", "-display_rotation", "90", "-i", str(tmp_path / "a.mp4")]
     subprocess.run([*command, "-c", "copy", str(tmp_path / "b.mp4")], check=True)
-    write_frames(tmp_path / "b.mp4", tmp_path / "frames", silent)
+    write_video_frames(tmp_path / "b.mp4", tmp_path / "frames", silent)
     with Image.open(next((tmp_path / "frames").iterdir())) as picture:
         assert picture.size == (240, 320)
     assert caplog.records == [], "nothing is said of it in the terminal"
@@ -505,17 +512,17 @@ def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monk
         film(path, 10)
     elif kind == "still":
         said = "none of 40 frames are sharp and differ"
-        with reel(path, 30, (320, 240)) as made:
+        with open_video(path, 30, (320, 240)) as made:
             for _ in range(40):
                 made.add(np.full((240, 320, 3), 90, np.uint8))
     elif kind == "long":
         said = "is 0 minutes long; at most"
-        monkeypatch.setattr(film_frames, "LONGEST", 0.5)
+        monkeypatch.setattr(video_frames, "MAX_VIDEO_S", 0.5)
         film(path, 30)
     else:
         path.write_bytes({"noise": bytes(range(256)) * 50, "empty": b"", "text": b"film"}[kind])
     with pytest.raises(BadFileError, match=said) as error:
-        write_frames(path, tmp_path / "frames", silent)
+        write_video_frames(path, tmp_path / "frames", silent)
     assert "\n" not in str(error.value)
 
 
@@ -523,19 +530,19 @@ def test_a_recording_of_a_screen_is_refused(tmp_path):
     """A page that scrolls in a window whose frame stands still."""
     page = np.kron(blots(0, 512), np.ones((2, 2, 1), np.uint8))
     frame = blots(3, 256)[:240].repeat(2, axis=1)[:, :320]
-    with reel(tmp_path / "a.mp4", 30, (320, 240)) as made:
+    with open_video(tmp_path / "a.mp4", 30, (320, 240)) as made:
         for k in range(60):
             shown = frame.copy()
             shown[40:220, 60:] = page[8 * k : 8 * k + 180, :260]
             made.add(shown)
     with pytest.raises(BadFileError, match="never moves: it is a recording of a screen") as error:
-        write_frames(tmp_path / "a.mp4", tmp_path / "frames", silent)
+        write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", silent)
     assert "\n" not in str(error.value) and "Do not turn the thing" in str(error.value)
 
 
 def test_what_stands_still_before_a_plain_wall_is_no_screen():
     """A turntable; and a camera that moves."""
-    moves, turns = Standstill(), Standstill()
+    moves, turns = StaticPixels(), StaticPixels()
     paper = blots(0, 512)[..., 0]
     for k in range(40):
         moves.look(paper[k : k + 200, 3 * k : 3 * k + 300].copy())
@@ -548,4 +555,4 @@ def test_what_stands_still_before_a_plain_wall_is_no_screen():
 def test_a_film_that_is_not_there_is_named(tmp_path):
     """A scene file that named one ended as a mistake of ours."""
     with pytest.raises(BadFileError, match=r"none\.mp4: there is no such file"):
-        pose(tmp_path / "none.mp4", tmp_path / "poses", lambda share, what: None)
+        find_poses(tmp_path / "none.mp4", tmp_path / "poses", lambda share, what: None)

@@ -8,15 +8,20 @@ import pytest
 from PIL import Image
 
 from corporeal.core import store
+from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
-from corporeal.core.typed import typed
-from corporeal.reconstruction import picture_intake
+from corporeal.reconstruction import gaussian_source
 from corporeal.reconstruction.masks.grown_masks import GrownMasks
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.sfm.pose import FOUND, Posed, _Kept, without_strangers
-from corporeal.render.camera import camera_of
-from corporeal.render.embree import identify
-from corporeal.render.stage import Stage
+from corporeal.reconstruction.sfm.find_poses import (
+    FOUND_POSES_FILE,
+    FoundPoses,
+    _PosesRecord,
+    drop_pictures_of_something_else,
+)
+from corporeal.render.camera_placement import camera_from_aim
+from corporeal.render.embree import identify_triangles
+from corporeal.render.ray_scene import RayScene
 from patterned_scene import OF_SLAB, box, on_slab, patterned, ring
 
 pycolmap = pytest.importorskip("pycolmap")
@@ -29,9 +34,9 @@ def placed(folder, strangers):
     """Poses of pictures around a block of which some show a plate, and masks of what they show."""
     model, masks = pycolmap.Reconstruction(), folder / "masks"
     masks.mkdir()
-    block, plate = Stage(patterned()), Stage(OTHER)
+    block, plate = RayScene(patterned()), RayScene(OTHER)
     for k, aim in enumerate(ring(np.arange(COUNT) * 360 / COUNT, SIZE)):
-        camera = camera_of(aim)
+        camera = camera_from_aim(aim)
         if not k:
             lens = [camera.K[0, 0], *camera.K[:2, 2], 0.0]
             made = {"model": "SIMPLE_RADIAL", "width": SIZE[0], "height": SIZE[1]}
@@ -39,35 +44,35 @@ def placed(folder, strangers):
         pose = pycolmap.Rigid3d(np.linalg.inv(camera.world_from_camera)[:3])
         image = pycolmap.Image(name=f"{k:02d}.jpg", camera_id=1, image_id=k + 1)
         model.add_image_with_trivial_frame(image, pose)
-        shown = identify(plate if k in strangers else block, aim)[0] >= OF_SLAB
+        shown = identify_triangles(plate if k in strangers else block, aim)[0] >= OF_SLAB
         Image.fromarray(np.uint8(255) * shown).save(masks / f"{k:02d}.png")
     place = folder / "sparse" / "0"
     place.mkdir(parents=True)
     model.write_text(str(place))
-    store.write_json(folder / FOUND, _Kept(("found",), ("before",), "", ()))
-    return Posed(folder, ("found",), ("before",), "doubt"), masks
+    store.write_json(folder / FOUND_POSES_FILE, _PosesRecord(("found",), ("before",), "", ()))
+    return FoundPoses(folder, ("found",), ("before",), "doubt"), masks
 
 
 def test_what_shows_something_else_on_the_same_floor_is_left_out_and_named(tmp_path):
     posed, masks = placed(tmp_path, (2, 7, 11))
-    left = without_strangers(posed, masks)
+    left = drop_pictures_of_something_else(posed, masks)
     assert left.warnings[0] == "before" and left.doubt == "doubt"
     assert left.warnings[1].startswith("3 photographs show something else")
     assert "02.jpg, 07.jpg, 11.jpg" in left.warnings[1]
     assert pycolmap.Reconstruction(str(tmp_path / "sparse" / "0")).num_reg_images() == COUNT - 3
-    kept = typed(_Kept, store.read_json(tmp_path / FOUND))
+    kept = from_plain(_PosesRecord, store.read_json(tmp_path / FOUND_POSES_FILE))
     assert kept.warnings == left.warnings
-    assert without_strangers(left, masks) == left  # it is not said twice
+    assert drop_pictures_of_something_else(left, masks) == left  # it is not said twice
 
 
 def test_of_one_thing_nothing_is_left_out(tmp_path):
     posed, masks = placed(tmp_path, ())
-    assert without_strangers(posed, masks) == posed
+    assert drop_pictures_of_something_else(posed, masks) == posed
 
 
 def test_nobody_is_blamed_where_half_show_something_else(tmp_path):
     posed, masks = placed(tmp_path, range(0, COUNT, 2))
-    assert without_strangers(posed, masks) == posed
+    assert drop_pictures_of_something_else(posed, masks) == posed
 
 
 class _Shots:
@@ -80,20 +85,22 @@ def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believe
 ):
     (tmp_path / "poses").mkdir()
     posed, masks = placed(tmp_path / "poses", (2, 7, 11))
-    posed = Posed(posed.folder, posed.statements, posed.warnings)
+    posed = FoundPoses(posed.folder, posed.statements, posed.warnings)
     doubted, believed = tmp_path / "doubted", tmp_path / "believed"
     for folder in (doubted, believed):
         shutil.copytree(masks, folder / "masks")
     first = GrownMasks(None, (), doubted, contradict=why != "colours")
     after = GrownMasks(None if why == "still doubted" else believed, ())
     answers = iter([first, after])
-    monkeypatch.setattr(picture_intake, "unposed", lambda source: True)
-    monkeypatch.setattr(picture_intake, "pose", lambda *what: posed)
-    monkeypatch.setattr(picture_intake, "listed", lambda folder: _Shots())
-    monkeypatch.setattr(picture_intake, "has_masks", lambda shots: False)
-    monkeypatch.setattr(picture_intake, "grown_masks", lambda *what, **more: next(answers))
+    monkeypatch.setattr(gaussian_source, "lacks_poses", lambda source: True)
+    monkeypatch.setattr(gaussian_source, "find_poses", lambda *what: posed)
+    monkeypatch.setattr(gaussian_source, "list_posed_photos", lambda folder: _Shots())
+    monkeypatch.setattr(gaussian_source, "has_masks", lambda shots: False)
+    monkeypatch.setattr(gaussian_source, "grown_masks", lambda *what, **more: next(answers))
     run = tmp_path / "run"
-    found = picture_intake._posed(tmp_path, ReconstructConfig(), run, lambda share, words: None)
+    found = gaussian_source._find_source_poses(
+        tmp_path, ReconstructConfig(), run, lambda share, words: None
+    )
     assert found is not None
     count = pycolmap.Reconstruction(str(found.folder / "sparse" / "0")).num_reg_images()
     if why == "outlines":
@@ -101,7 +108,7 @@ def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believe
         assert found.warnings[1].startswith("3 photographs show something else")
     else:
         assert found == posed and count == COUNT
-        assert not (run / picture_intake.ALIKE).exists()
+        assert not (run / gaussian_source.ALIKE_POSES_FOLDER).exists()
 
 
 def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(
@@ -117,14 +124,16 @@ def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(
         asked.append(more["doubted"])
         return GrownMasks(None, (), doubted, contradict=True)
 
-    monkeypatch.setattr(picture_intake, "unposed", lambda source: True)
-    monkeypatch.setattr(picture_intake, "pose", lambda *what: posed)
-    monkeypatch.setattr(picture_intake, "listed", lambda folder: _Shots())
-    monkeypatch.setattr(picture_intake, "has_masks", lambda shots: False)
-    monkeypatch.setattr(picture_intake, "grown_masks", grown)
+    monkeypatch.setattr(gaussian_source, "lacks_poses", lambda source: True)
+    monkeypatch.setattr(gaussian_source, "find_poses", lambda *what: posed)
+    monkeypatch.setattr(gaussian_source, "list_posed_photos", lambda folder: _Shots())
+    monkeypatch.setattr(gaussian_source, "has_masks", lambda shots: False)
+    monkeypatch.setattr(gaussian_source, "grown_masks", grown)
     run = tmp_path / "run"
     with pytest.raises(BadFileError, match="doubt"):
-        picture_intake._posed(tmp_path, ReconstructConfig(), run, lambda share, words: None)
+        gaussian_source._find_source_poses(
+            tmp_path, ReconstructConfig(), run, lambda share, words: None
+        )
     assert asked == [True], "masks are not grown again"
 
 
@@ -134,15 +143,21 @@ def test_masks_that_were_given_are_asked_about_poses_that_neighbours_doubt(
 ):
     wrong = range(0, COUNT, 2) if masks != "agree" else ()
     posed, _ = placed(tmp_path, wrong)
-    monkeypatch.setattr(picture_intake, "unposed", lambda source: True)
-    monkeypatch.setattr(picture_intake, "pose", lambda *_: posed)
-    monkeypatch.setattr(picture_intake, "listed", lambda folder: SimpleNamespace(shots=()))
-    monkeypatch.setattr(picture_intake, "has_masks", lambda shots: True)
+    monkeypatch.setattr(gaussian_source, "lacks_poses", lambda source: True)
+    monkeypatch.setattr(gaussian_source, "find_poses", lambda *_: posed)
+    monkeypatch.setattr(
+        gaussian_source, "list_posed_photos", lambda folder: SimpleNamespace(shots=())
+    )
+    monkeypatch.setattr(gaussian_source, "has_masks", lambda shots: True)
     how = "none" if masks == "not asked" else "auto"
     config = ReconstructConfig(masks=how, force=masks == "forced")
     if masks == "contradict":
         with pytest.raises(BadFileError, match=r"doubt\. Put it on something with a pattern"):
-            picture_intake._posed(tmp_path, config, tmp_path / "run", lambda share, words: None)
+            gaussian_source._find_source_poses(
+                tmp_path, config, tmp_path / "run", lambda share, words: None
+            )
         return
-    found = picture_intake._posed(tmp_path, config, tmp_path / "run", lambda share, words: None)
+    found = gaussian_source._find_source_poses(
+        tmp_path, config, tmp_path / "run", lambda share, words: None
+    )
     assert found is not None and found.warnings == ("Doubt.", "before")

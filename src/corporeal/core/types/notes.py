@@ -21,7 +21,7 @@ class NoteKind(Enum):
 class Note(str):
     """A sentence, or some, of one kind.
 
-    What is made of it by formatting is a plain string; ``reworded`` keeps the kind.
+    What is made of it by formatting is a plain string; ``with_text`` keeps the kind.
     """
 
     kind: NoteKind
@@ -39,22 +39,22 @@ class Note(str):
         return str(self), self.kind, self.size_of
 
 
-def kind_of(sentence: str) -> NoteKind:
+def note_kind(sentence: str) -> NoteKind:
     """Return the kind of a sentence; a plain string is a doubt."""
     return sentence.kind if isinstance(sentence, Note) else NoteKind.DOUBT
 
 
-def reworded(sentence: str, text: str) -> Note:
+def with_text(sentence: str, text: str) -> Note:
     """Return another text of the same kind, about the same."""
-    return Note(text, kind_of(sentence), sentence.size_of if isinstance(sentence, Note) else "")
+    return Note(text, note_kind(sentence), sentence.size_of if isinstance(sentence, Note) else "")
 
 
-def kinds_of(sentences: Iterable[str]) -> tuple[NoteKind, ...]:
+def note_kinds(sentences: Iterable[str]) -> tuple[NoteKind, ...]:
     """Return the kind of each sentence, for a JSON file beside the plain sentences."""
-    return tuple(map(kind_of, sentences))
+    return tuple(map(note_kind, sentences))
 
 
-def with_kinds(sentences: Sequence[str], kinds: Sequence[NoteKind]) -> tuple[Note, ...]:
-    """Return what ``kinds_of`` was told; sentences of files without kinds are doubts."""
+def notes_with_kinds(sentences: Sequence[str], kinds: Sequence[NoteKind]) -> tuple[Note, ...]:
+    """Return what ``note_kinds`` was told; sentences of files without kinds are doubts."""
     pairs = zip_longest(sentences, kinds[: len(sentences)], fillvalue=NoteKind.DOUBT)
     return tuple(Note(str(text), NoteKind(kind)) for text, kind in pairs)

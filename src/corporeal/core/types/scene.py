@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 Vector = tuple[float, float, float]
-GRAVITY = 9.81
+GRAVITY_M_S2 = 9.81
 """Where nobody states another [m/s²]."""
-DOWNWARDS: Vector = (0.0, 0.0, -GRAVITY)
+GRAVITY_VECTOR: Vector = (0.0, 0.0, -GRAVITY_M_S2)
 """The same as a vector [m/s²]."""
-SUBSTANCE, MATTER = "substance", "stated_matter"
+SUBSTANCE_KEY, STATED_MATTER_KEY = "substance", "stated_matter"
 """Keys of a surface's extras: the name of what a file says that it is made of, and all that the
 file says of it (``values``, ``words``)."""
 
@@ -113,7 +113,7 @@ class Wall:
     """Any point of it [m]."""
 
 
-Objects = Literal["auto", "one", "nodes"]
+ObjectGrouping = Literal["auto", "one", "nodes"]
 """What counts as one object within a file."""
 
 
@@ -160,7 +160,7 @@ class Scene:
     finishes: tuple[Finish, ...]
     metres_per_unit: float = 1.0
     """What one unit of the file was taken to be [m]."""
-    gravity: Vector = DOWNWARDS
+    gravity: Vector = GRAVITY_VECTOR
     """[m/s²]"""
     walls: tuple[Wall, ...] = ()
     """Beside the floor, which is always there."""
@@ -250,7 +250,7 @@ class Gaussians:
 
 
 @dataclass(frozen=True)
-class Cloud:
+class FeatureCloud:
     """Points of a scene with what they look like to a model; N points."""
 
     position: Float[np.ndarray, "N 3"]
@@ -279,7 +279,7 @@ class Reconstruction:
     gaussians: Gaussians
     object_of_gaussian: Int[np.ndarray, " N"]
     """Index into ``names``; -1: the floor, the background, or haze."""
-    cloud: Cloud
+    cloud: FeatureCloud
     """On the objects: means of Gaussians, or points of a radiance field."""
     object_of_point: Int[np.ndarray, " M"]
     """Of the cloud's points."""

@@ -4,21 +4,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from corporeal.core.types import GRAVITY, Scene
-from corporeal.lab.evaluation.life import Rebound
-from corporeal.mpm.problem import Engine, Measure
-from corporeal.pipeline.in_memory import build_engine, pose_problem, prepare
-from corporeal.pipeline.runner import Settings
+from corporeal.core.types import GRAVITY_M_S2, Scene
+from corporeal.lab.evaluation.rebound_data import MeasuredRebound
+from corporeal.mpm.problem import Diagnostics, Engine
+from corporeal.pipeline.in_memory import build_engine, pose_problem, prepare_scene
+from corporeal.pipeline.run_pipeline import Settings
 from corporeal.scene.scene_building import ball, box, build_scene
 
-GAP = 0.1
+START_GAP_DIAMETERS = 0.1
 """How far above what it strikes a ball begins, over its diameter [-]."""
-LOOKS = 2000
+CHECKS_PER_DIAMETER = 2000
 """How often the ball is looked at while it falls its own diameter at its speed of impact."""
 
 
 @dataclass(frozen=True)
-class Drop:
+class DropResult:
     """One thing that was dropped in the simulation."""
 
     name: str
@@ -37,11 +37,11 @@ class Drop:
     steps: int
 
 
-def scene_of(row: Rebound) -> Scene:
+def drop_scene(row: MeasuredRebound) -> Scene:
     """Put the ball just above what it strikes, as fast as its fall has made it there."""
-    radius, gap = 0.5 * row.diameter, GAP * row.diameter
+    radius, gap = 0.5 * row.diameter, START_GAP_DIAMETERS * row.diameter
     ground = row.on.size[2] if row.on else 0.0
-    speed = np.sqrt(max(row.speed**2 - 2.0 * GRAVITY * gap, 0.0))
+    speed = np.sqrt(max(row.speed**2 - 2.0 * GRAVITY_M_S2 * gap, 0.0))
     material = row.material or "rubber"
     thing = ball(material, radius, (0.0, 0.0, ground + gap + radius), (0.0, 0.0, -speed), row.name)
     below = [box(row.on.material, row.on.size, name="block")] if row.on else []
@@ -53,7 +53,7 @@ def scene_of(row: Rebound) -> Scene:
     return replace(scene, surfaces=(replace(first, extras=said), *others))
 
 
-def drop(row: Rebound, settings: Settings) -> Drop:
+def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
     """Drop one thing and watch until it has left what it struck.
 
     Args:
@@ -65,17 +65,19 @@ def drop(row: Rebound, settings: Settings) -> Drop:
 
     """
     settings = replace(settings, ground=replace(settings.ground, floor=row.floor))
-    prepared = prepare(scene_of(row), settings)
+    prepared = prepare_scene(drop_scene(row), settings)
     problem = pose_problem(prepared, settings)
     engine = build_engine(problem)
     first = engine.measure()
     speed = row.speed
-    last = bounce(engine, row.diameter / speed / LOOKS * 10, 30.0 * row.diameter / speed)
+    last = advance_until_rise(
+        engine, row.diameter / speed / CHECKS_PER_DIAMETER * 10, 30.0 * row.diameter / speed
+    )
     treatment = prepared.particles.treatments[0]
-    met = touch(last)
-    after = last.momentum[0, 2] / last.mass[0] + GRAVITY * (last.time - met[1])
+    met = contact_interval(last)
+    after = last.momentum[0, 2] / last.mass[0] + GRAVITY_M_S2 * (last.time - met[1])
     rigid = treatment.kind == "rigid"
-    return Drop(
+    return DropResult(
         row.name,
         settings.fill.detail,
         settings.fill.seed,
@@ -83,12 +85,12 @@ def drop(row: Rebound, settings: Settings) -> Drop:
         met[1] - met[0],
         treatment.kind,
         treatment.young / treatment.young_real if not rigid else 1.0,
-        0.0 if rigid else lost(first, last) / float(0.5 * first.mass[0] * speed**2),
+        0.0 if rigid else unbooked_energy(first, last) / float(0.5 * first.mass[0] * speed**2),
         engine.steps.count,
     )
 
 
-def touch(now: Measure) -> tuple[float, float]:
+def contact_interval(now: Diagnostics) -> tuple[float, float]:
     """First and last instant [s] at which the ball touched anything; nan: it has not."""
     first, last = now.first_contact[0], now.last_contact[0]
     if not np.isfinite(first).any():
@@ -96,7 +98,7 @@ def touch(now: Measure) -> tuple[float, float]:
     return float(np.nanmin(first)), float(np.nanmax(last))
 
 
-def bounce(engine: Engine, look: float, longest: float) -> Measure:
+def advance_until_rise(engine: Engine, look: float, longest: float) -> Diagnostics:
     """Go on until the ball rises and has touched nothing for a fifth of the time it touched.
 
     Args:
@@ -108,14 +110,14 @@ def bounce(engine: Engine, look: float, longest: float) -> Measure:
     while engine.time < longest:
         engine.advance(engine.time + look)
         now = engine.measure()
-        began, ended = touch(now)
+        began, ended = contact_interval(now)
         rises = now.momentum[0, 2] > 0.0
         if rises and now.time - ended > max(0.2 * (ended - began), 2.0 * look):
             return now
     return engine.measure()
 
 
-def lost(first: Measure, last: Measure) -> float:
+def unbooked_energy(first: Diagnostics, last: Diagnostics) -> float:
     """Energy [J] that is neither in motion, strain or height nor booked as lost."""
     energy = [m.kinetic.sum() + m.elastic.sum() + m.potential.sum() for m in (first, last)]
     booked = last.friction_loss + last.impact_loss + last.plastic_loss + last.viscous_loss

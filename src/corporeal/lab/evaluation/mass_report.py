@@ -7,21 +7,21 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.figure import keep
-from corporeal.lab.evaluation.mass import Comparison, Prediction
-from corporeal.lab.evaluation.result_table import Table
+from corporeal.lab.evaluation.figure_files import save_figure
+from corporeal.lab.evaluation.mass_evaluation import MassComparison, MassPrediction
+from corporeal.lab.evaluation.result_table import ResultTable
 
-COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#7b5ea7", "#b08900", "#555555")
-INK = "#222222"
+METHOD_COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#7b5ea7", "#b08900", "#555555")
+INK_COLOUR = "#222222"
 
 
-def tables(result: Comparison) -> list[Table]:
+def mass_tables(result: MassComparison) -> list[ResultTable]:
     """Return what a person wants to read of ``compare``'s result."""
     evidence = [_with_evidence(result)] if any(r.direct for r in result.rows) else []
     return [_masses(result), *evidence, *(_errors(result, group) for group in result.metrics)]
 
 
-def _masses(result: Comparison) -> Table:
+def _masses(result: MassComparison) -> ResultTable:
     """Every object's predicted mass beside the measured one."""
     heads = ("object", "filled", "measured [kg]", "predicted", "from", "to", "taken for")
     rows = [
@@ -36,10 +36,10 @@ def _masses(result: Comparison) -> Table:
         )
         for r in result.rows
     ]
-    return Table("Masses", heads, rows)
+    return ResultTable("Masses", heads, rows)
 
 
-def _with_evidence(result: Comparison) -> Table:
+def _with_evidence(result: MassComparison) -> ResultTable:
     """Every object's mass with and without an estimate made without the library."""
     heads = ("object", "predicted [kg]", "without evidence", "from", "to", "asked directly")
     rows = [
@@ -53,10 +53,10 @@ def _with_evidence(result: Comparison) -> Table:
         )
         for r in result.rows
     ]
-    return Table("With and without outside evidence", heads, rows)
+    return ResultTable("With and without outside evidence", heads, rows)
 
 
-def _errors(result: Comparison, group: str) -> Table:
+def _errors(result: MassComparison, group: str) -> ResultTable:
     """Errors of all methods on one group of objects."""
     heads = ("method", "objects", "ADE [kg]", "ALDE", "APE", "MnRE", "within 2×")
     lines = [
@@ -76,14 +76,14 @@ def _errors(result: Comparison, group: str) -> Table:
         f"median width is a factor {result.width[group]:.2f} (without outside evidence "
         f"{result.coverage_without[group]:.0%}, {result.width_without[group]:.2f})"
     )
-    return Table(f"Errors, {group}: {inside}", heads, lines)
+    return ResultTable(f"Errors, {group}: {inside}", heads, lines)
 
 
 def _kg(mass: float | None) -> str:
     return "–" if mass is None else f"{mass:.3g}"
 
 
-def mass_figure(rows: Sequence[Prediction], path: Path) -> None:
+def mass_figure(rows: Sequence[MassPrediction], path: Path) -> None:
     """Draw each object with its interval, the line of truth, and a factor of two on either side.
 
     Raises:
@@ -97,10 +97,12 @@ def mass_figure(rows: Sequence[Prediction], path: Path) -> None:
     axes = figure.add_subplot()
     every = [v for r in known for v in (r.mass_true or 0.0, r.low, r.high, r.mass)]
     ends = np.array([min(v for v in every if v > 0) / 2, max(every) * 2])
-    axes.plot(ends, ends, color=INK, lw=1)
-    axes.fill_between(ends, ends / 2, ends * 2, color=INK, alpha=0.07, lw=0, label="factor of 2")
+    axes.plot(ends, ends, color=INK_COLOUR, lw=1)
+    axes.fill_between(
+        ends, ends / 2, ends * 2, color=INK_COLOUR, alpha=0.07, lw=0, label="factor of 2"
+    )
     for k, fill in enumerate(sorted({r.fill for r in known})):
-        colour = COLOURS[k % len(COLOURS)]
+        colour = METHOD_COLOURS[k % len(METHOD_COLOURS)]
         own = [r for r in known if r.fill == fill]
         true, mass, low, high = (
             np.array([getattr(r, name) for r in own])
@@ -111,11 +113,11 @@ def mass_figure(rows: Sequence[Prediction], path: Path) -> None:
     for row in known:
         axes.annotate(
             row.object, (row.mass_true, row.mass), (4, 4), textcoords="offset points",
-            fontsize=6, color=INK,
+            fontsize=6, color=INK_COLOUR,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     axes.set_xlabel("measured mass [kg]")
     axes.set_ylabel("predicted mass, with the interval of 90 % of the samples [kg]")
     axes.set_aspect("equal")
     axes.legend(frameon=False, loc="upper left")
-    keep(figure, path)
+    save_figure(figure, path)

@@ -6,32 +6,32 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from corporeal.lab.evaluation.figure import keep_points
-from corporeal.lab.evaluation.objects import Judged
-from corporeal.lab.evaluation.overlap import iou
-from corporeal.lab.evaluation.parts_figure import seen, tinted
-from corporeal.reconstruction.segment.match import match
+from corporeal.lab.evaluation.figure_files import save_point_figure
+from corporeal.lab.evaluation.objects_evaluation import ObjectsResult
+from corporeal.lab.evaluation.parts_figure import number_colours, project_points
+from corporeal.lab.evaluation.segmentation_scores import iou_matrix
+from corporeal.reconstruction.segment.optimal_assignment import optimal_assignment
 
-COLUMNS = ("points of photographs", "identity", "superpoints", "components")
+COLUMN_TITLES = ("points of photographs", "identity", "superpoints", "components")
 
-DRAWN = 5000
+MAX_DRAWN_POINTS = 5000
 """Points of a scene that are drawn, about."""
 
 
-def draw(found: Sequence[Judged], path: Path) -> None:
+def draw_objects(found: Sequence[ObjectsResult], path: Path) -> None:
     """Draw one row per scene."""
     figure = Figure(figsize=(10, 2.6 * len(found)), dpi=72, layout="constrained")
-    grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
+    grid = figure.subplots(len(found), len(COLUMN_TITLES), squeeze=False)
     for judged, axes in zip(found, grid, strict=True):
         row = judged.row
         truth = judged.taken.object_of_point
-        place, order = seen(judged.taken.cloud.position)
-        order = order[:: max(1, len(order) // DRAWN)]
+        place, order = project_points(judged.taken.cloud.position)
+        order = order[:: max(1, len(order) // MAX_DRAWN_POINTS)]
         tints = (
             np.clip(judged.taken.cloud.colour, 0, 1),
-            tinted(truth, "tab10"),
-            tinted(_as(truth, judged.ours.object_of_point), "tab10"),
-            tinted(_as(truth, judged.components), "tab10"),
+            number_colours(truth, "tab10"),
+            number_colours(_match_numbers(truth, judged.ours.object_of_point), "tab10"),
+            number_colours(_match_numbers(truth, judged.components), "tab10"),
         )
         for axis, tint in zip(axes, tints, strict=True):
             axis.scatter(*place[order].T, s=2.0, c=tint[order], lw=0)
@@ -40,15 +40,15 @@ def draw(found: Sequence[Judged], path: Path) -> None:
         for axis, text in zip(axes, scores, strict=True):
             axis.set_xlabel(text, fontsize=8)
         axes[0].set_ylabel(row.scene.replace("_", " "), fontsize=9)
-    for axis, title in zip(grid[0], COLUMNS, strict=True):
+    for axis, title in zip(grid[0], COLUMN_TITLES, strict=True):
         axis.set_title(title, fontsize=9)
-    keep_points(figure, path)
+    save_point_figure(figure, path)
 
 
-def _as(truth: np.ndarray, found: np.ndarray) -> np.ndarray:
+def _match_numbers(truth: np.ndarray, found: np.ndarray) -> np.ndarray:
     """Give what was found the number of what it fits best; what fits nothing comes after."""
     count, known = int(found.max()) + 1, int(truth.max()) + 1
-    number = match(iou(truth, found, known, count).T)
+    number = optimal_assignment(iou_matrix(truth, found, known, count).T)
     left = number < 0
     number[left] = known + np.arange(left.sum())
     return number[found]

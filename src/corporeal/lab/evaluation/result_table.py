@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Table:
+class ResultTable:
     """Cells in words; each row as long as the heads."""
 
     title: str

@@ -4,46 +4,46 @@ import numpy as np
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import (
-    HELD_BY_WALL,
-    RUN_ACROSS,
-    SHOWN_AROUND,
+    LIQUID_WALL_REACH_DX,
+    POINT_RUN_WIDTH_RATIO,
+    SURFACE_SEARCH_RADIUS_DX,
     VAST,
     WALL_REACH,
-    WETTED_REACH,
+    WETTED_REACH_DX,
 )
 from corporeal.mpm.cpu import layout
-from corporeal.mpm.cpu.layout import BOX, CENTRE, LANES, PAIR, RADIUS
-from corporeal.mpm.ledger import Ledger
+from corporeal.mpm.cpu.layout import CENTRE, LANES, LOCAL_BOX, PAIR_COLUMNS, RADIUS
+from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact import face_table
-from corporeal.mpm.physics.facets import facets_of, has_edges, of_flat_faces
+from corporeal.mpm.physics.flat_facets import facets_of, has_edges, is_bounded_by_facets
 from corporeal.mpm.problem import Body, Problem
-from corporeal.mpm.state import rounding_of
+from corporeal.mpm.state import surface_curvature
 
-LISTS = {
-    "junction": layout.JUNCTION,
-    "meet": layout.MEET,
-    "side": layout.SIDE,
-    "touch": layout.TOUCH,
-    "aim": layout.AIM,
-    "lean": layout.LEAN,
-    "choice": layout.CHOICE,
-    "kept": layout.CHOICE,
-    "entry": layout.ENTRY,
-    "line": layout.LINE,
-    "past": layout.PAST,
+CONTACT_LISTS = {
+    "junction": layout.JUNCTION_RECORD,
+    "meet": layout.MEET_RECORD,
+    "side": layout.SIDE_RECORD,
+    "touch": layout.TOUCH_RECORD,
+    "aim": layout.AIM_RECORD,
+    "lean": layout.LEAN_RECORD,
+    "choice": layout.CHOICE_RECORD,
+    "kept": layout.CHOICE_RECORD,
+    "entry": layout.ENTRY_RECORD,
+    "line": layout.LINE_RECORD,
+    "past": layout.PAST_RECORD,
 }
 """What the native pieces list."""
-BYTES = {name: record.dtype.itemsize for name, record in LISTS.items()}
-BONDED = -1
+RECORD_BYTES = {name: record.dtype.itemsize for name, record in CONTACT_LISTS.items()}
+BONDED_FRICTION = -1
 """Friction of a pair that is never in contact, to the native piece."""
-BOOKS = (
+LEDGER_ARRAYS = (
     "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss "
     "impact_of_pair"
 )
 
 
-def point(record: np.ndarray, **arrays: np.ndarray) -> None:
+def write_pointers(record: np.ndarray, **arrays: np.ndarray) -> None:
     """Write the addresses of arrays, which must stay alive, into a native struct."""
     for name, array in arrays.items():
         record[name] = array.ctypes.data
@@ -63,20 +63,23 @@ def rigid_grid(
 
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
-    surface, rounding = body.surface - state[CENTRE : CENTRE + 3], rounding_of(body)
+    surface, rounding = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
     facets = facets_of(surface, rounding)
-    points, clumps = _clumped(points, 4.0 * cell)
-    wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
+    points, clumps = _sort_into_cubes(points, 4.0 * cell)
+    wetted, patches = _wetted_points(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
     normals = rounding[:, :3]
     thin = rigid.thinness(body.surface, normals, cell)
-    spacing = rigid.spacing(body.surface)
+    spacing = rigid.surface_point_spacing(body.surface)
     # Many nodes ask where a body's surface begins: runs of points that are near each other.
-    width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
-    shown, shows = _clumped(surface, width)
+    width = max(SURFACE_SEARCH_RADIUS_DX * cell, POINT_RUN_WIDTH_RATIO * spacing)
+    shown, shows = _sort_into_cubes(surface, width)
     slim = surface[rigid.thin_places(body.surface, normals, cell)]
-    state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
+    state[LOCAL_BOX : LOCAL_BOX + 3], state[LOCAL_BOX + 3 : LOCAL_BOX + 6] = (
+        points[:, :3].min(0),
+        points[:, :3].max(0),
+    )
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
         "table": np.full(across**3, -1, np.int32),
@@ -96,7 +99,7 @@ def rigid_grid(
         "slim": np.ascontiguousarray(slim),
         "rigid": state,
     }
-    point(record, **arrays)
+    write_pointers(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
     record["pointed"] = len(surface) > 0 or body.path is not None
@@ -106,12 +109,12 @@ def rigid_grid(
     record["bends"] = bool(np.any(rounding[:, 10:] != 0.0))
     record["spacing"] = spacing
     record["thin"], record["slims"] = thin, len(slim)
-    record["flat"] = of_flat_faces(facets, body.surface)
+    record["flat"] = is_bounded_by_facets(facets, body.surface)
     record["edged"] = has_edges(rounding)
     return arrays
 
 
-def _wetted(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+def _wetted_points(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
     """Give points that liquids touch and their normals, in the body's frame, and patches of them.
 
     Patches are two cells wide: a liquid looks no farther.
@@ -119,10 +122,10 @@ def _wetted(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndarray, np
     if body.wetted is None:
         return np.zeros((0, 6)), np.zeros((0, 6))
     rows = np.concatenate([body.wetted.point - centre, body.wetted.normal], axis=1)
-    return _clumped(rows, WETTED_REACH * cell)
+    return _sort_into_cubes(rows, WETTED_REACH_DX * cell)
 
 
-def _clumped(points: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+def _sort_into_cubes(points: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
     """Sort a rigid body's points into cubes, which are passed over where all is far.
 
     Args:
@@ -149,20 +152,20 @@ def _clumped(points: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
 class ContactMemory:
     """Lists of nodes, contacts and particles near them, and tables that never change."""
 
-    def __init__(self, world: np.ndarray, problem: Problem, ledger: Ledger) -> None:
+    def __init__(self, world: np.ndarray, problem: Problem, ledger: EngineLedger) -> None:
         self.world, self.cell = world, problem.cell
-        poured = any(np.isin(body.law, laws.LIQUID).any() for body in problem.bodies)
-        self.reach = HELD_BY_WALL if poured else WALL_REACH
+        poured = any(np.isin(body.law, laws.LIQUID_LAWS).any() for body in problem.bodies)
+        self.reach = LIQUID_WALL_REACH_DX if poured else WALL_REACH
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
         self.blows = np.ascontiguousarray(problem.blow_laws)
         self.face = face_table()
-        self.stage = np.zeros(1, layout.STAGE.dtype)
-        self.pair = np.zeros(self.friction.size * PAIR)
+        self.stage = np.zeros(1, layout.CONTACT_STAGE_RECORD.dtype)
+        self.pair = np.zeros(self.friction.size * PAIR_COLUMNS)
         self.light = np.zeros(len(self.friction))
-        point(self.stage, pair=self.pair, light=self.light)
-        point(
+        write_pointers(self.stage, pair=self.pair, light=self.light)
+        write_pointers(
             world,
             plane=self.plane,
             friction=self.friction,
@@ -173,8 +176,8 @@ class ContactMemory:
         )
         if problem.brakes:
             self.rolling = np.array(problem.rolling, float)
-            point(world, rolling=self.rolling)
-        point(world, **{name: getattr(ledger, name) for name in BOOKS.split()})
+            write_pointers(world, rolling=self.rolling)
+        write_pointers(world, **{name: getattr(ledger, name) for name in LEDGER_ARRAYS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
         moves = problem.contact == "multi" and any(body.rigid for body in problem.bodies)
         self.lines = 8 if moves else 0
@@ -201,34 +204,34 @@ class ContactMemory:
 
     def stand(self, floor: np.ndarray, tasks: int) -> int:
         """Make room for the books of tasks on nodes; how many of them there are, if any stands."""
-        self.stands = np.zeros(tasks * BYTES["entry"], np.uint8)
-        point(self.stage, stand=self.stands)
+        self.stands = np.zeros(tasks * RECORD_BYTES["entry"], np.uint8)
+        write_pointers(self.stage, stand=self.stands)
         return tasks if (floor >= 0).any() else 0
 
     @property
     def past(self) -> np.ndarray:
         """Forces of the contacts in the last step, as bytes: where the next one begins to look."""
-        return self.lists["past"][: int(self.stage["pasts"][0]) * BYTES["past"]].copy()
+        return self.lists["past"][: int(self.stage["pasts"][0]) * RECORD_BYTES["past"]].copy()
 
     @past.setter
     def past(self, bytes_: np.ndarray) -> None:
         while len(bytes_) > len(self.lists["past"]):
             self.lengthen()
         self.lists["past"][: len(bytes_)] = bytes_
-        self.stage["pasts"] = len(bytes_) // BYTES["past"]
+        self.stage["pasts"] = len(bytes_) // RECORD_BYTES["past"]
 
     @property
     def kept(self) -> np.ndarray:
         """Choices of candidate normals in the last step, as bytes: what the next one keeps."""
         which = self._list_of_kept()
-        return self.lists[which][: int(self.stage["kepts"][0]) * BYTES["kept"]].copy()
+        return self.lists[which][: int(self.stage["kepts"][0]) * RECORD_BYTES["kept"]].copy()
 
     @kept.setter
     def kept(self, bytes_: np.ndarray) -> None:
         while len(bytes_) > len(self.lists["kept"]):
             self.lengthen()
         self.lists[self._list_of_kept()][: len(bytes_)] = bytes_
-        self.stage["kepts"] = len(bytes_) // BYTES["kept"]
+        self.stage["kepts"] = len(bytes_) // RECORD_BYTES["kept"]
 
     def _list_of_kept(self) -> str:
         """Name the list of the last step: it takes turns with that of this step."""
@@ -252,12 +255,12 @@ class ContactMemory:
             "past": self.lines * self.room,
         }
         past, kept = self.past, self.kept
-        self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
+        self.lists = {name: np.zeros(n * RECORD_BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
         self.slot = np.zeros(1 << (4 * room["past"]).bit_length(), np.int32)
         self.kept_slot = np.zeros(1 << (2 * room["kept"]).bit_length(), np.int32)
         self.stage["slots"] = len(self.slot)
-        point(
+        write_pointers(
             self.stage,
             order=self.order,
             slot=self.slot,
@@ -275,7 +278,7 @@ def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     restitution = np.array(problem.restitution, float)
     if problem.contact == "multi":
         for frame, soft in problem.never_touch:
-            friction[frame, soft] = friction[soft, frame] = BONDED
+            friction[frame, soft] = friction[soft, frame] = BONDED_FRICTION
         return friction, restitution
     bodies, walls = len(problem.bodies), len(problem.planes)
     shared = np.zeros((1 + walls, 1 + walls))

@@ -9,66 +9,71 @@ from collections.abc import Collection
 import numpy as np
 
 from corporeal.core.errors import SimulationError
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
+from corporeal.mpm.add_bodies import AddedBodies, adopt_running_conditions
 from corporeal.mpm.constants import (
-    FALL,
-    FARTHEST,
-    FASTEST,
-    OUT_OF_BLOCK_SHARE,
-    POLL_INTERVAL,
+    FREE_FALL_STEP_FRACTION,
+    MAX_DISTANCE_FROM_ORIGIN_DX,
+    MAX_FINITE_VALUE,
+    MAX_WALL_DEPTH_DX,
+    OUT_OF_BLOCK_FRACTION,
+    POLL_INTERVAL_S,
     RIGID_COURANT,
-    SUNK,
     TINY,
 )
-from corporeal.mpm.cpu import clock as pacing
-from corporeal.mpm.cpu import tables, tasks
-from corporeal.mpm.cpu.contact_memory import ContactMemory, point, rigid_grid
+from corporeal.mpm.cpu import native_tables, task_lists
+from corporeal.mpm.cpu import step_clock as pacing
+from corporeal.mpm.cpu.contact_memory import ContactMemory, rigid_grid, write_pointers
+from corporeal.mpm.cpu.engine_checkpoint import (
+    EngineCheckpoint,
+    SavedArrays,
+    extend_state,
+    inherit_state,
+)
+from corporeal.mpm.cpu.field_window import NATIVE_ARRAYS, FieldWindow, window_too_wide_error
 from corporeal.mpm.cpu.layout import (
-    ASTRAY,
-    CLOCK,
-    FIELD,
-    INFINITE,
+    BODY_SUMS,
+    CLOCK_RECORD,
+    FIELD_RECORD,
     LAMBDA,
     MT,
     MU,
     PLASTIC,
-    REPORT,
+    REPORT_ASTRAY,
+    REPORT_COLUMNS,
+    REPORT_WORK,
     RHO,
     ST,
     STIFFENING,
-    STRAYED,
-    SUMS,
+    STOP_INFINITE,
+    STOP_PARTICLE_STRAYED,
     VE,
     VISCOUS,
-    WORK,
-    WORLD,
+    WORLD_RECORD,
 )
-from corporeal.mpm.cpu.program import Program
-from corporeal.mpm.cpu.read import Reader
-from corporeal.mpm.cpu.saving import Saved, Saving, inherited, joined
-from corporeal.mpm.cpu.shared_field import Carried
-from corporeal.mpm.cpu.sort import Sorter
-from corporeal.mpm.cpu.spring_records import Springs
-from corporeal.mpm.cpu.wind_records import Blows
-from corporeal.mpm.cpu.window import POINTED, Window, too_wide
-from corporeal.mpm.interaction import Interaction
-from corporeal.mpm.joining import Joined, as_it_runs
-from corporeal.mpm.ledger import Ledger
-from corporeal.mpm.measure import Sums
-from corporeal.mpm.physics import prescribed, wall_stress
-from corporeal.mpm.physics.contact import full_cell
-from corporeal.mpm.physics.grips import Grip
+from corporeal.mpm.cpu.particle_reader import ParticleReader
+from corporeal.mpm.cpu.particle_sorter import ParticleSorter
+from corporeal.mpm.cpu.program import CpuProgram
+from corporeal.mpm.cpu.shared_field import CarriedRigidBody
+from corporeal.mpm.cpu.spring_records import SpringRecords
+from corporeal.mpm.cpu.wind_records import WindRecords
+from corporeal.mpm.diagnostics import BodySums
+from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.ledger import EngineLedger
+from corporeal.mpm.material_table import MaterialTable
+from corporeal.mpm.physics import prescribed_motion, wall_stress
+from corporeal.mpm.physics.contact import full_cell_mass
 from corporeal.mpm.physics.rigid import RigidBody
+from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.physics.springs import longest_step
-from corporeal.mpm.problem import Problem, Snapshot, Steps
-from corporeal.mpm.splitting import Heirs
-from corporeal.mpm.state import Motion
-from corporeal.mpm.substance import Substances
+from corporeal.mpm.problem import Problem, Snapshot, StepStatistics
+from corporeal.mpm.split_body import ParentMap
+from corporeal.mpm.state import Velocities
 
 DEFAULT_THREADS = 4
 
 
-class CpuEngine(Interaction):
+class CpuEngine(EngineInteraction):
     """Steps one problem on the CPU."""
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
@@ -81,20 +86,23 @@ class CpuEngine(Interaction):
 
         """
         self.problem = problem
-        self.threads = threads or min(DEFAULT_THREADS, cores())
-        self.steps = Steps()
-        self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
+        self.threads = threads or min(DEFAULT_THREADS, usable_cores())
+        self.steps = StepStatistics()
+        self.ledger = EngineLedger.blank(len(problem.bodies), len(problem.planes))
         self.first = [0, *np.cumsum([len(b.position) for b in problem.bodies]).tolist()]
         self.lost = np.zeros(self.first[-1], bool)
         everything = list(range(len(problem.bodies)))
         single = problem.contact == "single"
         self.members = [everything] if single else [[b] for b in everything]
         self.rigid = {
-            b: tables.rigid_state(body) for b, body in enumerate(problem.bodies) if body.rigid
+            b: native_tables.rigid_state(body)
+            for b, body in enumerate(problem.bodies)
+            if body.rigid
         }
-        self.paths = prescribed.guides(problem)
+        self.paths = prescribed_motion.path_followers(problem)
         self.points = {
-            b: tables.rigid_points(problem.bodies[b], state) for b, state in self.rigid.items()
+            b: native_tables.rigid_points(problem.bodies[b], state)
+            for b, state in self.rigid.items()
         }
         self._lay_out()
 
@@ -105,13 +113,17 @@ class CpuEngine(Interaction):
 
     def _lay_out(self) -> None:
         problem = self.problem
-        self.world = np.zeros(1, WORLD.dtype)
-        self.program = Program(self.world, self.threads)
-        self.field = np.zeros(len(self.members), FIELD.dtype)
-        self.window: dict[int, Window] = {}
+        self.world = np.zeros(1, WORLD_RECORD.dtype)
+        self.program = CpuProgram(self.world, self.threads)
+        self.field = np.zeros(len(self.members), FIELD_RECORD.dtype)
+        self.window: dict[int, FieldWindow] = {}
         walls = [[*plane.normal, plane.offset / problem.cell] for plane in problem.planes]
-        sorter = Sorter(np.reshape(walls, (-1, 4)), (SUNK, FARTHEST), self.program)
-        self.reader = Reader(problem.cell, self.program)
+        sorter = ParticleSorter(
+            np.reshape(walls, (-1, 4)),
+            (MAX_WALL_DEPTH_DX, MAX_DISTANCE_FROM_ORIGIN_DX),
+            self.program,
+        )
+        self.reader = ParticleReader(problem.cell, self.program)
         self._fill_fields(sorter)
         separate = [b for b in self.rigid if self._is_rigid(b)]
         self.grids = [
@@ -125,43 +137,43 @@ class CpuEngine(Interaction):
             for b in separate
         ]
         self.carried = [
-            Carried(problem.bodies[b], state, self.first[b], problem.cell)
+            CarriedRigidBody(problem.bodies[b], state, self.first[b], problem.cell)
             for b, state in self.rigid.items()
             if b not in separate
         ]
         self.contact = ContactMemory(self.world, problem, self.ledger)
-        self.blows = Blows(
+        self.blows = WindRecords(
             problem, self.first, self.ledger.external_impulse, self.rigid, self.points
         )
-        self.springs = Springs(problem, self.first, self.ledger.external_impulse, self.rigid)
+        self.springs = SpringRecords(problem, self.first, self.ledger.external_impulse, self.rigid)
         self.grips: dict[int, Grip] = {}
-        self.bond, self.bonded = tables.bonds(problem)
+        self.bond, self.bonded = native_tables.bond_records(problem)
         self._wind_clock()
-        self.saving = Saving(
+        self.saving = EngineCheckpoint(
             self.ledger, self.window, self.rigid, self.contact, self.clock, self.world
         )
         self.connect()
 
-    def _fill_fields(self, sorter: Sorter) -> None:
+    def _fill_fields(self, sorter: ParticleSorter) -> None:
         """Give every field that deforms its materials and its particles."""
         problem = self.problem
-        substances, row_of_particle = Substances.of(problem)
-        self.material: dict[int, tables.Materials] = {}
+        substances, row_of_particle = MaterialTable.of(problem)
+        self.material: dict[int, native_tables.FieldMaterials] = {}
         for f, bodies in enumerate(self.members):
             if self._is_rigid(f):
                 continue
-            self.material[f] = tables.Materials.of(substances.of_bodies(bodies))
+            self.material[f] = native_tables.FieldMaterials.of(substances.of_bodies(bodies))
             kind = row_of_particle[self.first[bodies[0]] : self.first[bodies[-1] + 1]]
             kind = (kind - kind.min()).astype(np.int32)
-            rows = tables.particle_rows(problem, bodies, self.first, kind)
+            rows = native_tables.particle_rows(problem, bodies, self.first, kind)
             place = np.concatenate([problem.bodies[b].position for b in bodies]) / problem.cell
             self._refuse_far(place, bodies)
-            self.window[f] = Window(place, rows, self.material[f], sorter)
+            self.window[f] = FieldWindow(place, rows, self.material[f], sorter)
             if not self.window[f].fits:
-                raise SimulationError(too_wide(problem, bodies, 0.0))
+                raise SimulationError(window_too_wide_error(problem, bodies, 0.0))
 
     def _wind_clock(self) -> None:
-        problem, clock = self.problem, np.zeros(1, CLOCK.dtype)
+        problem, clock = self.problem, np.zeros(1, CLOCK_RECORD.dtype)
         self.clock = clock
         self.body_loads = pacing.body_loads(
             problem,
@@ -178,20 +190,22 @@ class CpuEngine(Interaction):
         clock["body_loads"] = len(self.body_loads)
         # Carried bodies are moved between steps.
         clock["fuse"] = not self.carried
-        point(
+        write_pointers(
             clock,
             body_load=self.body_loads,
             external_impulse=self.ledger.external_impulse,
             push_work=self.ledger.push_work,
         )
-        point(self.world, clock=clock)
+        write_pointers(self.world, clock=clock)
 
     def _longest_fall(self) -> float:
         """Longest step in which nothing falls far from rest, and springs are followed [s]."""
         pulls = (self.problem.gravity, *self.body_loads["push"].tolist())
         pull = max(float(np.linalg.norm(a)) for a in pulls)
-        fall = FALL * np.sqrt(self.problem.cell / max(pull, TINY))
-        return float(min(fall, longest_step(self.problem), prescribed.longest_step(self.problem)))
+        fall = FREE_FALL_STEP_FRACTION * np.sqrt(self.problem.cell / max(pull, TINY))
+        return float(
+            min(fall, longest_step(self.problem), prescribed_motion.longest_step(self.problem))
+        )
 
     def _refuse_far(self, place: np.ndarray, bodies: list[int]) -> None:
         if not np.isfinite(place).all():
@@ -209,15 +223,15 @@ class CpuEngine(Interaction):
     def connect(self) -> None:
         """List the tasks and point the native structs to where everything is."""
         hands = self.program.employ(window.count for window in self.window.values())
-        self.task = tasks.on_particles(self.window, hands)
-        self.node_task = tasks.on_nodes(self.window)
-        self.report = np.zeros((len(self.task.row), REPORT))
+        self.task = task_lists.list_particle_tasks(self.window, hands)
+        self.node_task = task_lists.list_node_tasks(self.window)
+        self.report = np.zeros((len(self.task.row), REPORT_COLUMNS))
         for f, window in self.window.items():
             self._connect_field(f, window)
         for body in self.carried:
             body.find(self.window[0])
         world = self.world
-        point(
+        write_pointers(
             world,
             field=self.field,
             task=self.task.row,
@@ -249,17 +263,17 @@ class CpuEngine(Interaction):
             row["slot"], row["mass"], row["volume"] = (array.ctypes.data for array in held)
         self.world["bonds"] = len(self.bond)
 
-    def _connect_field(self, f: int, window: Window) -> None:
+    def _connect_field(self, f: int, window: FieldWindow) -> None:
         record = self.field[f : f + 1]
         window.used[:] = 3  # which set of nodes is which is forgotten: both may hold anything
-        for name in POINTED:
+        for name in NATIVE_ARRAYS:
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].table.ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
         record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
         record["swells"], record["pours"] = self.material[f].swells, self.material[f].pours
-        record["full"] = full_cell(self.problem.bodies[f], self.problem.cell)
+        record["full"] = full_cell_mass(self.problem.bodies[f], self.problem.cell)
         record["flows_by"] = wall_stress.flow_curve(self.problem.bodies[f], self.problem.cell)
         # One lane of a node says how high mass lies over a floor.
         record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
@@ -276,7 +290,7 @@ class CpuEngine(Interaction):
         good = self.save()
         try:
             self.clock["until"], self.clock["given"] = until, 0.0
-            batch = pacing.StepBatch(POLL_INTERVAL)
+            batch = pacing.StepBatch(POLL_INTERVAL_S)
             while self.time < until:
                 with batch:
                     self.clock["budget"] = 1 if self.carried else batch.steps
@@ -308,23 +322,25 @@ class CpuEngine(Interaction):
             self.program.run(resume=True)
         self._note_steps()
         strayed = [body.carry(self.window[0], float(world["dt"][0])) for body in self.carried]
-        if world["stop"][0] == INFINITE:
+        if world["stop"][0] == STOP_INFINITE:
             self._find_lost()
-        if world["stop"][0] == STRAYED or any(strayed):
-            astray = (self.report[:, ASTRAY] > 0) | any(strayed)
+        if world["stop"][0] == STOP_PARTICLE_STRAYED or any(strayed):
+            astray = (self.report[:, REPORT_ASTRAY] > 0) | any(strayed)
             self._sort({int(f) for f in self.task.field[astray]})
 
     def _note_steps(self) -> None:
         clock = self.clock[0]
-        self.steps = Steps(int(clock["count"]), float(clock["smallest"]), float(clock["largest"]))
+        self.steps = StepStatistics(
+            int(clock["count"]), float(clock["smallest"]), float(clock["largest"])
+        )
 
     def book(self) -> None:
         """Move what the tasks added up into the ledger."""
-        total = self.report[:, [PLASTIC, VISCOUS, WORK]].sum(axis=0)
+        total = self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]].sum(axis=0)
         self.ledger.plastic_loss += total[0]
         self.ledger.viscous_loss += total[1] + self.springs.take_loss()
         self.ledger.push_work += total[2] + self.blows.take_work() + self.springs.take_work()
-        self.report[:, [PLASTIC, VISCOUS, WORK]] = 0.0
+        self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]] = 0.0
 
     def _sort(self, fields: set[int]) -> None:
         self.book()
@@ -333,11 +349,13 @@ class CpuEngine(Interaction):
             self._find_lost()
         # Who would be next soon is sorted now: all particles must lie down again after every sort.
         out = {f: window.out_of_block for f, window in self.window.items()}
-        fields |= {f for f, share in out.items() if share > OUT_OF_BLOCK_SHARE}
+        fields |= {f for f, share in out.items() if share > OUT_OF_BLOCK_FRACTION}
         wide = [f for f in sorted(fields) if not self.window[f].sort()]
         self.connect()
         if wide:
-            raise SimulationError(too_wide(self.problem, self.members[wide[0]], self.time))
+            raise SimulationError(
+                window_too_wide_error(self.problem, self.members[wide[0]], self.time)
+            )
 
     def _find_lost(self) -> None:
         """Raise when a particle is not finite or left the domain."""
@@ -346,10 +364,12 @@ class CpuEngine(Interaction):
         for window in self.window.values():
             place = window.position()
             rows = window.channel(VE, ST - VE)
-            good = (np.abs(rows) < FASTEST).all(axis=1) & (np.abs(place) < FARTHEST).all(axis=1)
+            good = (np.abs(rows) < MAX_FINITE_VALUE).all(axis=1) & (
+                np.abs(place) < MAX_DISTANCE_FROM_ORIGIN_DX
+            ).all(axis=1)
             for plane in self.problem.planes:
                 height = place @ np.array(plane.normal) - plane.offset / cell
-                good &= height > -SUNK
+                good &= height > -MAX_WALL_DEPTH_DX
             self.lost[window.number[~good]] = True
         if self.lost.any():
             first = int(np.argmax(self.lost))
@@ -363,24 +383,24 @@ class CpuEngine(Interaction):
 
     # ------------------------------------------------------------ reading and keeping
 
-    def save(self) -> Saved:
+    def save(self) -> SavedArrays:
         """Everything needed to go on later exactly as if nothing had happened."""
         self.book()
         return self.saving.save()
 
-    def restore(self, saved: Saved) -> None:
+    def restore(self, saved: SavedArrays) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
         self.saving.restore(saved)
         self._note_steps()
         self.lost[:] = False
         self.connect()
 
-    def inherit(self, saved: Saved, heirs: Heirs) -> None:
+    def inherit(self, saved: SavedArrays, heirs: ParentMap) -> None:
         """Go on from the ``save`` of an engine of whose bodies one is several here.
 
         The pieces are where the problem says; all else is as it was, and so are the books.
         """
-        self.restore(inherited(self.save(), saved, heirs))
+        self.restore(inherit_state(self.save(), saved, heirs))
 
     def joined_by(self, problem: Problem) -> "CpuEngine":
         """Return an engine that goes on from here with more bodies.
@@ -392,10 +412,10 @@ class CpuEngine(Interaction):
             problem: With those that join after all others, which are as at the start.
 
         """
-        who = Joined(len(self.problem.bodies), len(problem.bodies))
-        after = CpuEngine(as_it_runs(problem, self.problem), self.threads)
+        who = AddedBodies(len(self.problem.bodies), len(problem.bodies))
+        after = CpuEngine(adopt_running_conditions(problem, self.problem), self.threads)
         saved, shared = self.save(), after.problem.contact == "single"
-        after.restore(joined(after.save(), saved, who, shared))
+        after.restore(extend_state(after.save(), saved, who, shared))
         if shared:
             after.window[0].continue_as(self.window[0], after.material[0])
             after.connect()
@@ -421,11 +441,11 @@ class CpuEngine(Interaction):
             self.reader.spread(window, self.material[f], now)
         return now
 
-    def _sums(self) -> Sums:
-        rows = np.zeros((len(self.problem.bodies), SUMS))
+    def _sums(self) -> BodySums:
+        rows = np.zeros((len(self.problem.bodies), BODY_SUMS))
         for f, window in self.window.items():
             rows[self.members[f]] = self.reader.total(window, self.material[f])
-        return Sums(
+        return BodySums(
             mass=self.body_loads["mass"].copy(),
             first_moment=rows[:, :3],
             momentum=rows[:, 3:6],
@@ -439,10 +459,11 @@ class CpuEngine(Interaction):
     def _rigid_bodies(self) -> dict[int, RigidBody]:
         start = self.springs.start
         return {
-            b: tables.rigid_body(state, start[b], self.points[b]) for b, state in self.rigid.items()
+            b: native_tables.rigid_body(state, start[b], self.points[b])
+            for b, state in self.rigid.items()
         }
 
-    def _booked(self) -> Ledger:
+    def _booked(self) -> EngineLedger:
         self.book()
         return self.ledger
 
@@ -460,9 +481,9 @@ class CpuEngine(Interaction):
 
     def _add_momentum(self, body: int, momentum: np.ndarray, angular: np.ndarray) -> None:
         state = self.rigid[body]
-        moving = tables.rigid_body(state, self.springs.start[body], self.points[body])
+        moving = native_tables.rigid_body(state, self.springs.start[body], self.points[body])
         speed = moving.velocity + momentum / moving.mass
-        tables.set_rigid_motion(state, speed, moving.angular_momentum + angular)
+        native_tables.set_rigid_motion(state, speed, moving.angular_momentum + angular)
         self._forget_nodes()
 
     def _take_grips(self) -> None:
@@ -476,20 +497,20 @@ class CpuEngine(Interaction):
         self.clock["fall"] = self._longest_fall()
         self.blows.blow(self.problem)
 
-    def _set_motion(self, bodies: Collection[int], motion: Motion) -> None:
+    def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         for f, window in self.window.items():
             own = np.isin(self.material[f].body, list(bodies))
             chosen = own[window.channel(MT, 1)[:, 0].view(np.int32)]
             window.set_motion(chosen, motion.velocity[window.number[chosen]])
         for b in self.rigid.keys() & set(bodies):
-            tables.set_rigid_motion(self.rigid[b], motion.speed[b], motion.spin_momentum[b])
+            native_tables.set_rigid_motion(self.rigid[b], motion.speed[b], motion.spin_momentum[b])
         self._forget_nodes()
 
     def _forget_nodes(self) -> None:
         """Void nodes that were laid with other velocities."""
         self.clock["laid"] = 0
 
-    def _place_as(self, saved: Saved, bodies: Collection[int]) -> None:
+    def _place_as(self, saved: SavedArrays, bodies: Collection[int]) -> None:
         """Take bodies over with their fields: in one that all share, every particle comes along."""
         fields = [f for f in self.window if not set(bodies).isdisjoint(self.members[f])]
         self.saving.place_as(saved, fields, bodies)

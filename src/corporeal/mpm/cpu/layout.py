@@ -1,17 +1,17 @@
 """Memory that Python and the native loops share: channels, columns, codes and structs.
 
-``numbers`` and the texts of the records stand in front of the loops that read them; no number and
+``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no number and
 no struct of this layout is written in ``loops``.
 """
 
 from corporeal.mpm.constants import BRANCHES
-from corporeal.mpm.records import Record
+from corporeal.mpm.native_records import NativeRecord
 
 # ---------------------------------------------------------------- particles
 
 PLACE = 22
 """Places are fixed point, relative to the field's window: 2**PLACE units per cell."""
-UNIT, HALF = 1 << PLACE, 1 << (PLACE - 1)
+CELL_UNITS, HALF_CELL_UNITS = 1 << PLACE, 1 << (PLACE - 1)
 """A cell and half a cell [units]."""
 XI, VE, AF, DE, ST, MA, VO, MT, ID = 0, 3, 6, 15, 24, 30, 31, 32, 33
 """First channels of a particle in its batch, [channel][8]: place (3), velocity (3), affine part (9,
@@ -21,93 +21,114 @@ CHANNELS = 34
 EP, VC, TM = 0, 1, 2
 """First channels of what matter that flows remembers besides: plastic strain, volume correction,
 whole motion - 1 (9)."""
-RELIEF, PRESSURE, GROWN, CLUSTER, BOUND = 1, 2, 3, 4, 5
+LOG_VOLUME_RATIO, PRESSURE, OWN_DILATATION, CLUSTER, WAVE_BOUND = 1, 2, 3, 4, 5
 """The same of nearly incompressible matter: ln of the mean volume over its own and the Kirchhoff
 pressure of the mean [Pa]; within a step, its own dilatation, its cluster and the wave bound so far.
 Its plastic strain, in the channel before, stays 0."""
-HISTORY = 11
+HISTORY_CHANNELS = 11
 """Channels of that."""
-CONFORMATION, SWOLLEN = 0, 6
+BRANCH_STRAIN, BRANCH_DILATATION = 0, 6
 """First channels of a Maxwell branch: its strain (6) and θ."""
-BRANCH = 7
+BRANCH_CHANNELS = 7
 """Channels of a branch."""
-MEMORY = BRANCHES * BRANCH
+MAXWELL_CHANNELS = BRANCHES * BRANCH_CHANNELS
 """Channels of what all branches of a particle remember."""
-LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, KEEP, RHO, RIGID = range(12)
+LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, FLIP_DAMPING_RATE, RHO, RIGID = range(12)
 """Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain
 p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, forgetting rate [1/s], ρ [kg/m³], 1 where
 rigid."""
-SHEAR, BULK, KEPT, FRESH, TIME, PUSH, CONSISTENCY, STIFFENING = 12, 14, 16, 18, 20, 22, 25, 26
+SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY, STIFFENING = (
+    12,
+    14,
+    16,
+    18,
+    20,
+    22,
+    25,
+    26,
+)
 """And of each Maxwell branch G, K [Pa], what this step leaves of old and of new strain, T [s]; this
 step's push [m/s] (3); K_c of a liquid [Pa sⁿ]; how many times stiffer waves find it with branches
 than without [-]."""
-MATERIAL = 32
+MATERIAL_COLUMNS = 32
 """Columns with room to spare: a row is two cache lines."""
 
 # ---------------------------------------------------------------- blocks and tasks
 
-BLOCK = 32
+BLOCK_INTEGERS = 32
 """Integers of a block's record: start, end, coordinates 3, neighbours 27."""
 NEIGHBOURS = 5
 """The first of the node blocks around it, and …"""
 OWN_BLOCK = NEIGHBOURS + 13
 """… its own."""
-RUN = 5
+RUN_INTEGERS = 5
 """Integers of a run of slots before a sort: the first of them."""
-LAYER = 66
+ARENA_LAYER_NODES = 66
 """Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third
 layer would wait for what was just written in the first, 4096 bytes before."""
-ARENA = 8 * LAYER
+ARENA_FLOATS = 8 * ARENA_LAYER_NODES
 LANES = 8
 """Numbers in a vector, in single precision."""
 COLOURS = 8
 """Tasks on particles are pieces of columns of blocks. Those of one colour, the parities of their x,
 y and number in the column, never overlap."""
-SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
+SPEED2, WAVE2, PLASTIC, VISCOUS, REPORT_ASTRAY, REPORT_WORK = range(6)
 """Columns of a task's report."""
-REPORT = 8
+REPORT_COLUMNS = 8
 """Columns with room to spare: a row is a cache line."""
-REACHED, STRAYED, PAUSED, INFINITE = 1, 2, 3, 4
+STOP_TIME_REACHED, STOP_PARTICLE_STRAYED, STOP_PAUSED, STOP_INFINITE = 1, 2, 3, 4
 """Why steps ended: time is up; a particle left its block; enough for now; something overflowed."""
 NANOSECONDS = 1_000_000_000
 """Of a second: what phases are timed in."""
-MOST_THREADS = 64
+MAX_THREADS = 64
 """That may share tasks."""
-SURVEY, COUNT, RANK, COPY = range(4)
+SORT_SURVEY, COUNT, RANK, SORT_COPY = range(4)
 """Stages of a sort."""
-RUNS = 64
+READING_RUNS = 64
 """Runs of blocks that are added up on their own where particles are read."""
-SUMS = 13
+BODY_SUMS = 13
 """Of a body: m x (3), m v (3), angular momentum about the origin (3), kinetic and elastic energy,
 the energy in Maxwell branches, and the largest |v|²."""
 
 # ---------------------------------------------------------------- rigid bodies
 
-CENTRE, TURN, REST, SPEED, MOMENT, INERTIA, SPIN, RADIUS, KICK, OWN, BOX = (
+(
+    CENTRE,
+    TURN,
+    REST_INVERSE_INERTIA,
+    SPEED,
+    MOMENT,
+    INERTIA,
+    SPIN,
+    RADIUS,
+    KICK,
+    FRAME_MASS,
+    LOCAL_BOX,
+) = (
     *(1, 4, 13, 22, 25, 28, 37, 40, 41),
     *(44, 48),
 )
-LIGHT, HEAVY, NEXT = 54, 55, 64
+INVERSE_MASS, REST_INERTIA, NEXT_ROTATION = 54, 55, 64
 """First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest
 (9), velocity (3), angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while
 a frame holds soft nodes its own mass and centre (4); lowest and highest corner of the box around
 its particles in its own frame (6). Then 1/M in contact (0: prescribed motion), and of what does its
 inertia at rest (9) and its rotation at the end of the step (9)."""
-RIGID_STATE = 80
+RIGID_STATE_COLUMNS = 80
 """Columns with room to spare."""
 
 # ---------------------------------------------------------------- contact
 
-PARTS = 16
+LIST_PARTS = 16
 """Parts that a list is cut into, whoever works on them."""
 FIELDS_IN_BLOCK = 12
 """Fields that may meet in one block of nodes."""
-PAIR = 17
+PAIR_COLUMNS = 17
 """Columns of a pair of fields in a step: its part in a round of impacts, normal sum, weighted place
 (3), spare; in such a round those of ``Backing`` in backing.h."""
 
 
-def numbers() -> str:
+def cpp_layout_numbers() -> str:
     """C++ text of all numbers of the layout."""
     found = {k: v for k, v in globals().items() if k.isupper() and isinstance(v, int)}
     return "".join(f"const int {name} = {value};\n" for name, value in found.items())
@@ -115,13 +136,13 @@ def numbers() -> str:
 
 # ---------------------------------------------------------------- structs of a step
 
-POST = Record(  # one thread's, on a cache line of its own
+POST_RECORD = NativeRecord(  # one thread's, on a cache line of its own
     "Post",
     ("unsigned long long", "share"),  # its tasks of this phase: epoch 24 bits, next 20, end 20
     ("unsigned long long", "busy"),
     ("unsigned long long[6]", "spare"),
 )
-THREAD_POOL = Record(
+THREAD_POOL_RECORD = NativeRecord(
     "ThreadPool",
     ("void *", "yield_core read_clock"),  # the system's sched_yield and clock_gettime, or null
     ("int *", "phase"),  # [phases][4]: piece, first task, how many, or where in World that stands
@@ -131,18 +152,20 @@ THREAD_POOL = Record(
     ("unsigned long long[7]", "fill1"),
     ("int", "done spare2"),
     ("unsigned long long[7]", "fill2"),
-    (f"Post[{MOST_THREADS}]", "post"),
-    within=(POST,),
+    (f"Post[{MAX_THREADS}]", "post"),
+    within=(POST_RECORD,),
 )
-BOND = Record(  # a frame and the soft nodes it holds in this step: see physics/inclusions.py
-    "Bond",
-    ("int *", "slot"),
-    ("float *", "mass volume"),
-    ("double *", "point"),  # [points][4] near the soft body: place in the frame's frame, volume
-    ("double", "per_soft"),  # volume per mass [m³/kg]
-    ("int", "frame soft points count"),
+BOND_RECORD = (
+    NativeRecord(  # a frame and the soft nodes it holds in this step: see physics/inclusions.py
+        "Bond",
+        ("int *", "slot"),
+        ("float *", "mass volume"),
+        ("double *", "point"),  # [points][4] near the soft body: place in the frame's frame, volume
+        ("double", "per_soft"),  # volume per mass [m³/kg]
+        ("int", "frame soft points count"),
+    )
 )
-BODY_LOAD = Record(  # uniform accelerations of a body
+BODY_LOAD_RECORD = NativeRecord(  # uniform accelerations of a body
     "BodyLoad",
     ("double", "mass"),
     ("double[3]", "push"),
@@ -153,7 +176,7 @@ BODY_LOAD = Record(  # uniform accelerations of a body
     ("int", "field first last"),  # first and last row of the field's materials
     ("int", "paths"),  # rows of the path; 0: it moves freely
 )
-CLOCK = Record(
+CLOCK_RECORD = NativeRecord(
     "Clock",
     ("BodyLoad *", "body_load"),
     ("double *", "external_impulse push_work"),
@@ -166,7 +189,7 @@ CLOCK = Record(
 # Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level";
 # after the forces mass, velocity 3, velocity as it was 3, mean height. While a step reads its
 # nodes, the next one's are laid.
-FIELD = Record(
+FIELD_RECORD = NativeRecord(
     "Field",
     ("float *", "part node next history branch material"),
     ("int *", "table block where"),
@@ -200,7 +223,7 @@ FIELD = Record(
     ("int", "bends"),  # rigid: whether it curves outwards or inwards anywhere
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
-BLOW = Record(  # a body in the wind: see wind_records.py
+WIND_RECORD = NativeRecord(  # a body in the wind: see wind_records.py
     "Blow",
     ("double *", "area point rigid impulse signal"),
     ("int *", "face"),
@@ -208,26 +231,28 @@ BLOW = Record(  # a body in the wind: see wind_records.py
     ("double", "gust start end half_rho_c work"),
     ("int", "field first count free"),
 )
-TETHER = Record(  # particles of a field on springs to a rigid body: see physics/springs.py
-    "Tether",
-    ("double *", "anchor rate holder"),
-    ("double", "damping lost"),
-    ("int", "field first count"),
+TETHER_RECORD = (
+    NativeRecord(  # particles of a field on springs to a rigid body: see physics/springs.py
+        "Tether",
+        ("double *", "anchor rate holder"),
+        ("double", "damping lost"),
+        ("int", "field first count"),
+    )
 )
-JOINT = Record(  # two rigid bodies: arms in their own frames
+JOINT_RECORD = NativeRecord(  # two rigid bodies: arms in their own frames
     "Joint",
     ("double *", "first second"),
     ("double[3]", "arm_first arm_second"),
     ("double", "stiffness damping lost"),
 )
-GRIP = Record(  # a spring from a body to a point outside: see physics/grips.py
+GRIP_RECORD = NativeRecord(  # a spring from a body to a point outside: see physics/grips.py
     "Grip",
     ("double *", "share rigid impulse"),
     ("double[3]", "arm target"),
     ("double", "stiffness damping mass work"),
     ("int", "field first count"),
 )
-WORLD = Record(
+WORLD_RECORD = NativeRecord(
     "World",
     ("ThreadPool *", "thread_pool"),
     ("Clock *", "clock"),
@@ -261,11 +286,23 @@ WORLD = Record(
     ("int", "rigids turns"),  # fields, where some are rigid; tasks to look at those
     ("int", "chores spare"),
 )
-STEP = (POST, THREAD_POOL, BOND, BODY_LOAD, CLOCK, FIELD, BLOW, TETHER, JOINT, GRIP, WORLD)
+STEP_RECORDS = (
+    POST_RECORD,
+    THREAD_POOL_RECORD,
+    BOND_RECORD,
+    BODY_LOAD_RECORD,
+    CLOCK_RECORD,
+    FIELD_RECORD,
+    WIND_RECORD,
+    TETHER_RECORD,
+    JOINT_RECORD,
+    GRIP_RECORD,
+    WORLD_RECORD,
+)
 
 # ---------------------------------------------------------------- structs of contact
 
-JUNCTION = Record(  # a block of nodes where fields meet each other or a plane
+JUNCTION_RECORD = NativeRecord(  # a block of nodes where fields meet each other or a plane
     "Junction",
     ("int[3]", "at"),
     ("int", "fields meet side touch last choice spare"),
@@ -275,10 +312,10 @@ JUNCTION = Record(  # a block of nodes where fields meet each other or a plane
     (f"unsigned long long[{FIELDS_IN_BLOCK}]", "have"),
     (f"int[{FIELDS_IN_BLOCK}]", "met"),  # of the fields here, those that each may meet: bits
 )
-MEET = Record(  # one such node
+MEET_RECORD = NativeRecord(  # one such node
     "Meet", ("int[3]", "at"), ("int", "side sides touch touches stiff")
 )
-SIDE = Record(  # one field there
+SIDE_RECORD = NativeRecord(  # one field there
     "Side",
     ("int", "field slot"),
     ("float", "m"),
@@ -287,7 +324,7 @@ SIDE = Record(  # one field there
     ("double[3]", "v"),
     ("double", "inverse"),
 )
-AIM = Record(  # candidate normals of a possible contact of two fields
+AIM_RECORD = NativeRecord(  # candidate normals of a possible contact of two fields
     "Aim",
     ("float[3][4]", "n"),  # component by component
     ("float[2][4]", "far"),  # how far the first reaches along them, and the second against them
@@ -295,18 +332,25 @@ AIM = Record(  # candidate normals of a possible contact of two fields
     ("float[3]", "chosen"),
     ("float", "weight"),
 )
-LEAN = Record(  # what neighbours read of a possible contact: pair by pair of a block's fields
-    "Lean",
-    ("float[3]", "u"),  # weighted normal
-    ("int", "touch"),  # the contact, or the first of them
+LEAN_RECORD = (
+    NativeRecord(  # what neighbours read of a possible contact: pair by pair of a block's fields
+        "Lean",
+        ("float[3]", "u"),  # weighted normal
+        ("int", "touch"),  # the contact, or the first of them
+    )
 )
-CHOICE = Record(  # which candidates won where two fields meet in a block: see physics/contact.py
-    "Choice",
-    ("int[3]", "at"),
-    ("int", "a c spare"),  # fields
-    ("unsigned long long[2]", "bits"),  # low and high bit of 1 + candidate, node by node; 0: none
+CHOICE_RECORD = (
+    NativeRecord(  # which candidates won where two fields meet in a block: see physics/contact.py
+        "Choice",
+        ("int[3]", "at"),
+        ("int", "a c spare"),  # fields
+        (
+            "unsigned long long[2]",
+            "bits",
+        ),  # low and high bit of 1 + candidate, node by node; 0: none
+    )
 )
-TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - c
+TOUCH_RECORD = NativeRecord(  # a possible contact of side a with side c, or with plane -1 - c
     "Touch",
     ("int", "meet a c fa fc active"),
     ("int", "face"),  # which face of a rigid body a liquid meets
@@ -320,17 +364,17 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("double[3]", "x before"),
     ("double", "instead"),  # of round on curved: nodes nearer transmit nothing [m]; else 0
 )
-ENTRY = Record(  # what some contacts of one pair add to the books
+ENTRY_RECORD = NativeRecord(  # what some contacts of one pair add to the books
     "Entry",
     ("int", "a c"),
     ("double", "normal"),
     ("double[3]", "place J"),
     ("double", "loss impact"),
 )
-PAST = Record(  # force of a contact in the last step
+PAST_RECORD = NativeRecord(  # force of a contact in the last step
     "Past", ("unsigned long long", "key"), ("double[3]", "force")
 )
-LINE = Record(  # a contact in the list of those that move rigid bodies
+LINE_RECORD = NativeRecord(  # a contact in the list of those that move rigid bodies
     "Line",
     ("double *", "a c"),  # velocity of a node or state of a rigid body; 0: a plane
     ("double *", "flows_by"),  # flow curve of a liquid that a wall drags on over a span
@@ -342,7 +386,7 @@ LINE = Record(  # a contact in the list of those that move rigid bodies
     ("unsigned long long", "key"),
     ("int", "touch group waits spare"),  # waits: not in this round of impacts
 )
-STAGE = Record(
+CONTACT_STAGE_RECORD = NativeRecord(
     "Stage",
     ("Junction *", "junction"),
     ("Meet *", "meet"),
@@ -363,13 +407,25 @@ STAGE = Record(
     ("int", "slots pasts sweeps"),
     ("int", "junctions meets sides touches points"),
     ("int", "choices kepts kept_slots anew"),  # kept_slots: a power of two
-    (f"int[{PARTS}]", "entries"),
+    (f"int[{LIST_PARTS}]", "entries"),
 )
-CONTACT = (JUNCTION, MEET, SIDE, AIM, LEAN, CHOICE, TOUCH, ENTRY, PAST, LINE, STAGE)
+CONTACT_RECORDS = (
+    JUNCTION_RECORD,
+    MEET_RECORD,
+    SIDE_RECORD,
+    AIM_RECORD,
+    LEAN_RECORD,
+    CHOICE_RECORD,
+    TOUCH_RECORD,
+    ENTRY_RECORD,
+    PAST_RECORD,
+    LINE_RECORD,
+    CONTACT_STAGE_RECORD,
+)
 
 # ---------------------------------------------------------------- sorting and reading
 
-SORTING = Record(
+SORTING_RECORD = NativeRecord(
     "Sorting",
     ("float *", "part history branch to past_to branch_to"),
     ("int *", "old"),  # [olds][RUN]: runs of slots in use before, and the blocks they were
@@ -384,7 +440,7 @@ SORTING = Record(
     ("int[3]", "dim origin"),  # of the new one
     ("int", "olds bins planes lost blocks slots pool flows relaxes out_of_block"),
 )
-READING = Record(
+READING_RECORD = NativeRecord(
     "Reading",
     ("float *", "part history branch material"),
     ("int *", "block owner"),  # owner of each row of materials

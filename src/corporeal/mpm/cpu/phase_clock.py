@@ -13,7 +13,7 @@ from corporeal.mpm.cpu.layout import NANOSECONDS
 class PhaseClock:
     """Processor time of a program's phases, read from one thread as each of them ends."""
 
-    def __init__(self, watched: program.Program) -> None:
+    def __init__(self, watched: program.CpuProgram) -> None:
         """Begin to watch a program that runs on one thread.
 
         Raises:
@@ -41,7 +41,7 @@ class PhaseClock:
         found: dict[str, float] = {}
         seconds = (self.spent[:-1] / NANOSECONDS).tolist()
         for phase, spent in zip(program.SCHEDULE, seconds, strict=True):
-            name = program.NAMES[phase.piece]
+            name = program.PIECE_NAMES[phase.piece]
             found[name] = found.get(name, 0.0) + spent
         return found
 

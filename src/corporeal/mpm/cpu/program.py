@@ -5,15 +5,15 @@ extensions, so they build on any processor. What they share with Python stands i
 
 A step is a list of phases, ``SCHEDULE``; a phase is a number of tasks of one piece, which any
 thread may take in any order. A new one needs four things: ``loops/NAME.cpp``, which does task
-``index`` and returns; a stub ``NAME_native``; a number and a branch in ``work``; a ``Phase``. How
-many tasks it has may be known only at run time: then it is an int in ``WORLD``, which an earlier
-phase wrote. Tasks of one phase must not write to the same place, or what is written must not depend
-on their order. A piece ends the steps through ``World.full`` (a list was too short: Python
-lengthens it and goes on at the phase marked ``resume``, with ``World.again`` set) or
+``index`` and returns; a stub ``NAME_native``; a number and a branch in ``run_tasks``; a ``Phase``. How
+many tasks it has may be known only at run time: then it is an int in ``WORLD_RECORD``, which an
+earlier phase wrote. Tasks of one phase must not write to the same place, or what is written must
+not depend on their order. A piece ends the steps through ``World.full`` (a list was too short:
+Python lengthens it and goes on at the phase marked ``resume``, with ``World.again`` set) or
 ``World.stop``.
 
-Before ``FORCES`` nodes hold mass, momentum and force: loads add to the force, so that affine FLIP
-sees them. After it they hold mass, velocity and the velocity as it was.
+Before ``PIECE_FORCES`` nodes hold mass, momentum and force: loads add to the force, so that affine
+FLIP sees them. After it they hold mass, velocity and the velocity as it was.
 """
 
 import ctypes
@@ -25,26 +25,45 @@ from typing import NamedTuple
 import numpy as np
 
 from corporeal.mpm.cpu import layout
-from corporeal.mpm.cpu.layout import COLOURS, MOST_THREADS, THREAD_POOL, WORLD
-from corporeal.mpm.formulas import options
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.cpu.layout import COLOURS, MAX_THREADS, THREAD_POOL_RECORD, WORLD_RECORD
+from corporeal.mpm.formulas import formula_options
+from corporeal.mpm.quiet_warp import wp
 
-OPTIONS = options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast")
-wp.set_module_options(OPTIONS)
+COMPILE_OPTIONS = formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast")
+wp.set_module_options(COMPILE_OPTIONS)
 
-SMALLEST_SHARE = 500
+MIN_PARTICLES_PER_THREAD = 500
 """Particles below which a thread is not worth waking …"""
-SMALLEST_PASS = 4096
+MIN_PARTICLES_PER_READING_THREAD = 4096
 """… and where they are only read or copied, once."""
 
-LAY, MOVE, PACE, CLEAR, BLOW_ON, SPRING, FORCES, CONTACT = range(8)
+(
+    PIECE_LAY,
+    PIECE_MOVE,
+    PIECE_TIMESTEP,
+    PIECE_CLEAR,
+    PIECE_WIND,
+    PIECE_SPRING,
+    PIECE_FORCES,
+    PIECE_CONTACT,
+) = range(8)
 """Numbers of the pieces; those of contact follow from the last."""
-START, MARK, FIND, STAND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, RESOLVE = range(
-    CONTACT, CONTACT + 11
-)
-TOUCHING = "start mark find stand list look face reach choose solve resolve"
+(
+    PIECE_START,
+    PIECE_MARK,
+    PIECE_FIND,
+    PIECE_STAND,
+    PIECE_LIST,
+    PIECE_LOOK,
+    PIECE_FACE,
+    PIECE_REACH,
+    PIECE_CHOOSE,
+    PIECE_SOLVE,
+    PIECE_RESOLVE,
+) = range(PIECE_CONTACT, PIECE_CONTACT + 11)
+CONTACT_PIECES = "start mark find stand list look face reach choose solve resolve"
 """Pieces of contact: ``loops/contact_NAME.cpp``."""
-NAMES = [*"lay move pace clear blow spring forces".split(), *TOUCHING.split()]
+PIECE_NAMES = [*"lay move pace clear blow spring forces".split(), *CONTACT_PIECES.split()]
 """Of all pieces, by number."""
 
 
@@ -53,7 +72,7 @@ class Phase(NamedTuple):
 
     piece: int
     count: str | int = 1
-    """How many tasks; or where in ``WORLD`` that stands when the phase begins; 0 skips it."""
+    """How many tasks; or where in ``WORLD_RECORD`` that stands when the phase begins; 0 skips it."""
     which: int = 0
     """Place in it, where it is an array."""
     resume: bool = False
@@ -61,25 +80,25 @@ class Phase(NamedTuple):
 
 
 SCHEDULE = (
-    Phase(PACE),
-    Phase(CLEAR, "bare_nodes"),
-    *(Phase(LAY, "bare", colour) for colour in range(COLOURS)),
-    Phase(BLOW_ON, "blown"),
-    Phase(SPRING, "sprung"),
-    Phase(FORCES, "nodes"),
-    Phase(START, "rigids"),
-    Phase(MARK, "rigids"),
-    Phase(FIND, resume=True),
-    Phase(STAND, "stands"),
-    Phase(LIST, "parts"),
-    *(Phase(LOOK, "looks", colour) for colour in range(COLOURS)),
-    Phase(FACE, "parts"),
-    *(Phase(REACH, "reaches", colour) for colour in range(COLOURS)),
-    Phase(REACH, "turns"),
-    Phase(CHOOSE, "parts"),
-    Phase(SOLVE, "parts"),
-    Phase(RESOLVE),
-    *(Phase(MOVE, "colour", colour) for colour in range(COLOURS)),
+    Phase(PIECE_TIMESTEP),
+    Phase(PIECE_CLEAR, "bare_nodes"),
+    *(Phase(PIECE_LAY, "bare", colour) for colour in range(COLOURS)),
+    Phase(PIECE_WIND, "blown"),
+    Phase(PIECE_SPRING, "sprung"),
+    Phase(PIECE_FORCES, "nodes"),
+    Phase(PIECE_START, "rigids"),
+    Phase(PIECE_MARK, "rigids"),
+    Phase(PIECE_FIND, resume=True),
+    Phase(PIECE_STAND, "stands"),
+    Phase(PIECE_LIST, "parts"),
+    *(Phase(PIECE_LOOK, "looks", colour) for colour in range(COLOURS)),
+    Phase(PIECE_FACE, "parts"),
+    *(Phase(PIECE_REACH, "reaches", colour) for colour in range(COLOURS)),
+    Phase(PIECE_REACH, "turns"),
+    Phase(PIECE_CHOOSE, "parts"),
+    Phase(PIECE_SOLVE, "parts"),
+    Phase(PIECE_RESOLVE),
+    *(Phase(PIECE_MOVE, "colour", colour) for colour in range(COLOURS)),
 )
 """A step. Particles lay the nodes of the next step when they move, so laying is skipped unless the
 nodes are bare: at the start, after a sort, and while a push acts."""
@@ -87,94 +106,96 @@ nodes are bare: at the start, after a sort, and while a push acts."""
 _LOOPS = Path(__file__).parent / "loops"
 
 
-_RECORDS = {
-    "shared": layout.STEP,
-    "contact_shared": layout.CONTACT,
-    "sort": (layout.SORTING,),
-    "read": (layout.READING,),
+_RECORDS_BEFORE_PIECE = {
+    "shared": layout.STEP_RECORDS,
+    "contact_shared": layout.CONTACT_RECORDS,
+    "sort": (layout.SORTING_RECORD,),
+    "read": (layout.READING_RECORD,),
 }
 """Structs that stand in front of a file."""
 
 
-def native(*names: str) -> str:
+def native_source(*names: str) -> str:
     """Source of a piece: the layout's numbers, what all share, then its own files."""
-    return "\n".join([layout.numbers(), *(_text(part) for part in ("shared", *names))])
+    return "\n".join(
+        [layout.cpp_layout_numbers(), *(_piece_source(part) for part in ("shared", *names))]
+    )
 
 
-def _text(part: str) -> str:
-    records = "".join(record.text for record in _RECORDS.get(part, ()))
+def _piece_source(part: str) -> str:
+    records = "".join(record.text for record in _RECORDS_BEFORE_PIECE.get(part, ()))
     return records + (_LOOPS / f"{part}.cpp").read_text()
 
 
-Memory = wp.array(dtype=wp.uint64)
+MemoryArray = wp.array(dtype=wp.uint64)
 
 
-@wp.func_native(native("conduct"))
-def conduct_native(memory: Memory, thread: int) -> int: ...
+@wp.func_native(native_source("step_loop"))
+def step_loop_native(memory: MemoryArray, thread: int) -> int: ...
 
 
-@wp.func_native(native("pace"))
-def pace_native(memory: Memory, index: int): ...
+@wp.func_native(native_source("timestep"))
+def timestep_native(memory: MemoryArray, index: int): ...
 
 
-@wp.func_native(native("clear"))
-def clear_native(memory: Memory, index: int): ...
+@wp.func_native(native_source("clear"))
+def clear_native(memory: MemoryArray, index: int): ...
 
 
-@wp.func_native(native("hand", "blow"))
-def blow_native(memory: Memory, index: int): ...
+@wp.func_native(native_source("node_impulses", "wind"))
+def wind_native(memory: MemoryArray, index: int): ...
 
 
-@wp.func_native(native("hand", "springs"))
-def springs_native(memory: Memory, index: int): ...
+@wp.func_native(native_source("node_impulses", "springs"))
+def springs_native(memory: MemoryArray, index: int): ...
 
 
-@wp.func_native(native("forces"))
-def forces_native(memory: Memory, index: int): ...
+@wp.func_native(native_source("forces"))
+def forces_native(memory: MemoryArray, index: int): ...
 
 
-@wp.func_native(native("gather", "scatter", "transfer"))
-def transfer_native(memory: Memory, index: int): ...
+@wp.func_native(native_source("gather", "scatter", "transfer"))
+def transfer_native(memory: MemoryArray, index: int): ...
 
 
-def _contact() -> str:
+def _contact_source() -> str:
     """Text of all pieces of contact: what they share, then one branch for each."""
     shared = ("contact_shared", "contact_points", "contact_begins", "contact_lines")
-    text = [native("bond", *shared)]
-    for number, name in enumerate(TOUCHING.split()):
-        piece = _text(f"contact_{name}")
+    text = [native_source("rigid_inclusions", *shared)]
+    for number, name in enumerate(CONTACT_PIECES.split()):
+        piece = _piece_source(f"contact_{name}")
         text.append(f"if (piece == {number}) {{\n{piece}}}")
     return "\n".join(text)
 
 
-@wp.func_native(_contact())
-def contact_native(memory: Memory, piece: int, index: int): ...
+@wp.func_native(_contact_source())
+def contact_native(memory: MemoryArray, piece: int, index: int): ...
 
 
 @wp.kernel
-def work(memory: Memory, thread: int):
-    order = conduct_native(memory, thread)
+def run_tasks(memory: MemoryArray, thread: int):
+    order = step_loop_native(memory, thread)
     while order >= 0:
         piece = order >> 24
         task = order & 0xFFFFFF
-        if piece <= MOVE:
+        if piece <= PIECE_MOVE:
             transfer_native(memory, 2 * task + 1 - piece)
-        elif piece == PACE:
-            pace_native(memory, task)
-        elif piece == CLEAR:
+        elif piece == PIECE_TIMESTEP:
+            timestep_native(memory, task)
+        elif piece == PIECE_CLEAR:
             clear_native(memory, task)
-        elif piece == BLOW_ON:
-            blow_native(memory, task)
-        elif piece == SPRING:
+        elif piece == PIECE_WIND:
+            wind_native(memory, task)
+        elif piece == PIECE_SPRING:
             springs_native(memory, task)
-        elif piece == FORCES:
+        elif piece == PIECE_FORCES:
             forces_native(memory, task)
-        elif piece >= CONTACT:
-            contact_native(memory, piece - CONTACT, task)
-        order = conduct_native(memory, thread)
+        elif piece >= PIECE_CONTACT:
+            contact_native(memory, piece - PIECE_CONTACT, task)
+        order = step_loop_native(memory, thread)
 
 
-class Program:
+class CpuProgram:
     """Runs steps on several threads without coming back to Python in between.
 
     Each thread runs one Warp kernel, which lets go of Python's lock, and takes tasks until the
@@ -187,13 +208,13 @@ class Program:
         memory = wp.array(
             ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
         )
-        self.threads = min(threads, MOST_THREADS)
-        self.thread_pool = aligned((1,), THREAD_POOL.dtype)
+        self.threads = min(threads, MAX_THREADS)
+        self.thread_pool = aligned_zeros((1,), THREAD_POOL_RECORD.dtype)
         self.phase = np.zeros((len(SCHEDULE), 4), np.int32)
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
             named = isinstance(phase.count, str)
             row[0], row[2] = phase.piece, -1 if named else phase.count
-            row[3] = WORLD.dtype.fields[phase.count][1] + 4 * phase.which if named else 0
+            row[3] = WORLD_RECORD.dtype.fields[phase.count][1] + 4 * phase.which if named else 0
         self.resume = next(i for i, phase in enumerate(SCHEDULE) if phase.resume)
         self.thread_pool["phase"] = self.phase.ctypes.data
         self.thread_pool["phases"] = len(SCHEDULE)
@@ -201,10 +222,10 @@ class Program:
         world["thread_pool"] = self.thread_pool.ctypes.data
         self.executor = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
         self.launches = [
-            wp.launch(work, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True)
+            wp.launch(run_tasks, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True)
             for thread in range(self.threads)
         ]
-        self.smallest_share = SMALLEST_SHARE
+        self.smallest_share = MIN_PARTICLES_PER_THREAD
 
     def employ(self, particles: Iterable[int]) -> int:
         """Choose how many threads share the particles of some fields."""
@@ -237,19 +258,21 @@ class Program:
             other.result()
 
 
-def aligned(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+def aligned_zeros(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
     """Zeros that begin on a cache line."""
-    return within(np.zeros(on_lines(shape, dtype), np.uint8), shape, dtype)
+    return array_in_bytes(np.zeros(cache_line_bytes(shape, dtype), np.uint8), shape, dtype)
 
 
-def on_lines(shape: tuple[int, ...], dtype: np.dtype | type) -> int:
+def cache_line_bytes(shape: tuple[int, ...], dtype: np.dtype | type) -> int:
     """Bytes in which an array that begins on a cache line finds room."""
     return int(np.prod(shape)) * np.dtype(dtype).itemsize + 64
 
 
-def within(memory: np.ndarray, shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+def array_in_bytes(
+    memory: np.ndarray, shape: tuple[int, ...], dtype: np.dtype | type
+) -> np.ndarray:
     """Lay an array that begins on a cache line into bytes; its ``base`` are these bytes."""
-    start, size = -memory.ctypes.data % 64, on_lines(shape, dtype) - 64
+    start, size = -memory.ctypes.data % 64, cache_line_bytes(shape, dtype) - 64
     return memory[start : start + size].view(dtype).reshape(shape)
 
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from corporeal.mpm.cpu import layout, tables
-from corporeal.mpm.cpu.contact_memory import point
-from corporeal.mpm.cpu.layout import GRIP, JOINT, TETHER
-from corporeal.mpm.physics.grips import Grip
+from corporeal.mpm.cpu import layout, native_tables
+from corporeal.mpm.cpu.contact_memory import write_pointers
+from corporeal.mpm.cpu.layout import GRIP_RECORD, JOINT_RECORD, TETHER_RECORD
+from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.problem import Body, Joint, Problem
 
 
-class Springs:
+class SpringRecords:
     """Records of a problem's springs, and the arrays that they point to."""
 
     def __init__(
@@ -25,16 +25,16 @@ class Springs:
 
         """
         self.problem, self.first, self.impulse, self.rigid = problem, first, impulse, rigid
-        self.start = {b: tables.rigid_state(problem.bodies[b]) for b in rigid}
+        self.start = {b: native_tables.rigid_state(problem.bodies[b]) for b in rigid}
         self.kept: list[np.ndarray] = []
         apart = problem.contact == "multi"
         tied = [(b, body) for b, body in enumerate(problem.bodies) if body.tether and apart]
         joints = problem.joints if apart else ()
         self.tether, self.joint = (
-            np.zeros(len(tied), TETHER.dtype),
-            np.zeros(len(joints), JOINT.dtype),
+            np.zeros(len(tied), TETHER_RECORD.dtype),
+            np.zeros(len(joints), JOINT_RECORD.dtype),
         )
-        self.grip = np.zeros(0, GRIP.dtype)
+        self.grip = np.zeros(0, GRIP_RECORD.dtype)
         for row, (b, body) in enumerate(tied):
             self._tie(self.tether[row : row + 1], b, body)
         for row, joint in enumerate(joints):
@@ -47,7 +47,7 @@ class Springs:
         anchor = np.ascontiguousarray(body.position - centre, np.float64)
         rate = np.ascontiguousarray(body.tether.rate, np.float64)
         self.kept += [anchor, rate]
-        point(record, anchor=anchor, rate=rate, holder=self.rigid[holder])
+        write_pointers(record, anchor=anchor, rate=rate, holder=self.rigid[holder])
         record["damping"], record["field"] = body.tether.damping, b
         record["first"], record["count"] = self.first[b], len(rate)
 
@@ -60,19 +60,19 @@ class Springs:
 
     def grasp(self, grips: dict[int, Grip]) -> None:
         """Take these grips in place of all earlier ones; by body."""
-        self.grip = np.zeros(len(grips), GRIP.dtype)
+        self.grip = np.zeros(len(grips), GRIP_RECORD.dtype)
         single = self.problem.contact == "single"
         self.held: list[np.ndarray] = []
         for row, (b, grip) in enumerate(grips.items()):
             record = self.grip[row : row + 1]
             share = np.zeros(len(self.problem.bodies[b].position))
-            point(record, impulse=self.impulse[b])
+            write_pointers(record, impulse=self.impulse[b])
             if b in self.rigid and not single:
-                point(record, rigid=self.rigid[b])
+                write_pointers(record, rigid=self.rigid[b])
             else:
                 share[grip.hold.particle] = grip.hold.share
             self.held.append(share)
-            point(record, share=share)
+            write_pointers(record, share=share)
             record["arm"], record["target"] = grip.hold.arm, grip.target
             record["stiffness"], record["damping"] = grip.stiffness, grip.damping
             record["mass"], record["field"] = grip.hold.mass, 0 if single else b
@@ -80,7 +80,7 @@ class Springs:
 
     def connect(self, world: np.ndarray) -> None:
         """Point the world to the records."""
-        point(world, tether=self.tether, joint=self.joint, grip=self.grip)
+        write_pointers(world, tether=self.tether, joint=self.joint, grip=self.grip)
         counts = len(self.tether), len(self.joint), len(self.grip)
         world["tethers"], world["joints"], world["grips"] = counts
         world["sprung"] = int(any(counts))

@@ -2,16 +2,18 @@
 
 import numpy as np
 
-from corporeal.mpm.cpu.contact_memory import point
-from corporeal.mpm.cpu.layout import BLOW
-from corporeal.mpm.physics import wind
+from corporeal.mpm.cpu.contact_memory import write_pointers
+from corporeal.mpm.cpu.layout import WIND_RECORD
+from corporeal.mpm.physics import wind_pressure
 from corporeal.mpm.problem import Body, Problem
 
-SIGNAL = np.stack([wind.GUST_SHARE, wind.GUST_FREQUENCY, wind.GUST_PHASE])
+GUST_SIGNAL = np.stack(
+    [wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE]
+)
 """Of the gusts: share, frequency [Hz] and phase [rad] of every part."""
 
 
-class Blows:
+class WindRecords:
     """Records of the bodies in the wind, and the arrays that they point to."""
 
     def __init__(
@@ -34,17 +36,17 @@ class Blows:
         """
         blown = [b for b, body in enumerate(problem.bodies) if body.wind and len(body.faces.area)]
         self.body = blown
-        self.record = np.zeros(len(blown), BLOW.dtype)
-        self.kept: list[np.ndarray] = [np.ascontiguousarray(SIGNAL)]
+        self.record = np.zeros(len(blown), WIND_RECORD.dtype)
+        self.kept: list[np.ndarray] = [np.ascontiguousarray(GUST_SIGNAL)]
         single = problem.contact == "single"
         for row, b in zip(range(len(blown)), blown, strict=True):
             record = self.record[row : row + 1]
             self._face(record, problem.bodies[b])
-            point(record, impulse=impulse[b], signal=self.kept[0])
+            write_pointers(record, impulse=impulse[b], signal=self.kept[0])
             record["field"], record["first"] = 0 if single else b, first[b]
             if b in rigid:
                 self.kept.append(np.ascontiguousarray(points[b]))
-                point(record, rigid=rigid[b], point=self.kept[-1])
+                write_pointers(record, rigid=rigid[b], point=self.kept[-1])
                 record["free"] = not single
 
     def _face(self, record: np.ndarray, body: Body) -> None:
@@ -55,11 +57,11 @@ class Blows:
         owned = np.bincount(body.faces.particle, minlength=count)
         face = np.concatenate([[0], np.cumsum(owned)]).astype(np.int32)
         self.kept += [area, face]
-        point(record, area=area, face=face)
+        write_pointers(record, area=area, face=face)
         record["count"], record["wind"] = count, body.wind.velocity
         record["gust"] = body.wind.gust
         record["start"], record["end"] = body.wind.start, body.wind.end
-        record["half_rho_c"] = wind.HALF_RHO_C
+        record["half_rho_c"] = wind_pressure.HALF_RHO_C
 
     def blow(self, problem: Problem) -> None:
         """Take the winds of a problem that differs in nothing else."""

@@ -11,58 +11,60 @@ bodies come first, in rounds of such sweeps: see ``contact_rounds``.
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
-    JACOBI_STILL,
+    JACOBI_IMPACT_SWEEPS,
+    JACOBI_SUPPORTED_IMPACT_SWEEPS,
     JACOBI_SWEEPS,
-    JACOBI_SWEEPS_OF_A_HIT,
-    JACOBI_SWEEPS_OF_A_HOLD,
+    JACOBI_TOLERANCE_DX,
     SWEEPS,
     VAST,
 )
-from corporeal.mpm.cuda.arena import meet
+from corporeal.mpm.cuda.block_arena import wait_for_group
 from corporeal.mpm.cuda.contact import mean_of
 from corporeal.mpm.cuda.contact_nodes import curve_of
-from corporeal.mpm.cuda.contact_surface import replaced
+from corporeal.mpm.cuda.contact_surface import is_replaced
 from corporeal.mpm.cuda.layout import (
-    DT,
-    FULL,
-    HITS,
-    HOLDS,
-    IMPACTING,
-    LANES,
-    MEETS,
-    NODES,
-    PAIRS,
-    PUSHING,
-    RUBBING,
-    STIFF,
-    STRIKING,
-    SWEEPING,
-    SWEPT,
-    SWEPT_NOW,
-    TOUCHES,
+    CLOCK_DT,
+    CONTACT_SWEPT,
+    FLAG_FULL,
+    FLAG_HITS,
+    FLAG_HOLDS,
+    FLAG_IMPACTING,
+    FLAG_MEETS,
+    FLAG_NODES,
+    FLAG_PAIRS,
+    FLAG_STIFF,
+    FLAG_SWEEPING,
+    FLAG_SWEPT,
+    FLAG_TOUCHES,
+    LOSS_FRICTION,
+    LOSS_IMPACT,
+    LOSS_LANES,
+    LOSS_PUSH_WORK,
+    BlockGrid,
     D,
-    Grid,
-    Sheet,
+    StepGlobals,
     wp,
 )
-from corporeal.mpm.cuda.layout_bodies import Rigid
-from corporeal.mpm.cuda.layout_contact import Contacts
+from corporeal.mpm.cuda.layout_bodies import DeviceRigidBodies
+from corporeal.mpm.cuda.layout_contact import DeviceContacts
 from corporeal.mpm.cuda.rigid import softness_at, speed_at
 from corporeal.mpm.formulas.one_lane_contact import (
     closing_speed,
-    dragged,
-    push_of,
-    touched,
+    drag_impulse,
+    normal_impulse,
+    touching_offset,
     within_cone,
 )
 
-wp.set_module_options(formulas.options(max_unroll=0))
+wp.set_module_options(formulas.formula_options(max_unroll=0))
 
-SMALLEST_SLIP = wp.constant(D(constants.SMALLEST_SLIP))
+MIN_SLIP_SPEED = wp.constant(D(constants.MIN_SLIP_SPEED))
 
 
 @wp.func
-def side_speed(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int):
+def side_speed(
+    c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, entry: int, field: int
+):
     """Velocity of one side of a contact [m/s]."""
     if field >= s.bodies:
         return wp.vec3d(D(0.0))
@@ -72,14 +74,22 @@ def side_speed(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int):
 
 
 @wp.func
-def slip_of(c: Contacts, r: Rigid, s: Sheet, t: int):
+def contact_slip(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int):
     """Slip and approach together: u = v_a - v_c [m/s]."""
     a = side_speed(c, r, s, t, c.a[t], c.fa[t])
     return a - side_speed(c, r, s, t, c.c[t], c.fc[t])
 
 
 @wp.func
-def side_before(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int, entry: int, field: int):
+def side_before(
+    c: DeviceContacts,
+    r: DeviceRigidBodies,
+    g: BlockGrid,
+    s: StepGlobals,
+    t: int,
+    entry: int,
+    field: int,
+):
     """Velocity of one side as the step began, before its forces [m/s]."""
     if field >= s.bodies:
         return wp.vec3d(D(0.0))
@@ -90,7 +100,15 @@ def side_before(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int, entry: int, fi
 
 
 @wp.func
-def side_softness(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, n: wp.vec3d):
+def side_softness(
+    c: DeviceContacts,
+    r: DeviceRigidBodies,
+    s: StepGlobals,
+    t: int,
+    entry: int,
+    field: int,
+    n: wp.vec3d,
+):
     """1/m_eff of one side; a rigid body is shared among its busy contacts."""
     if field >= s.bodies:
         return D(0.0)
@@ -100,14 +118,22 @@ def side_softness(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: in
 
 
 @wp.func
-def softness_of(c: Contacts, r: Rigid, s: Sheet, t: int, n: wp.vec3d):
+def softness_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, n: wp.vec3d):
     """1/m_eff of a contact along n [1/kg]."""
     a = side_softness(c, r, s, t, c.a[t], c.fa[t], n)
     return a + side_softness(c, r, s, t, c.c[t], c.fc[t], n)
 
 
 @wp.func
-def give(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, J: wp.vec3d):
+def give_contact_impulse(
+    c: DeviceContacts,
+    r: DeviceRigidBodies,
+    s: StepGlobals,
+    t: int,
+    entry: int,
+    field: int,
+    J: wp.vec3d,
+):
     """Give an impulse to one side: nodes at once, rigid bodies at the end of the sweep."""
     if field < s.bodies:
         if r.path_count[field] > 0:
@@ -122,15 +148,15 @@ def give(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, J: wp.
 
 
 @wp.func
-def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
+def relax_contact(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int):
     """One projection of one contact onto its Coulomb cone; by how much it changed [m/s]."""
-    u = slip_of(c, r, s, t)
+    u = contact_slip(c, r, s, t)
     n = wp.vec3d(c.normal[t])
     un = wp.dot(u, n)
     J = c.impulse[t]
     old = wp.dot(J, n)
     soft = softness_of(c, r, s, t, n)
-    new = push_of(old, un, c.target[t], soft)
+    new = normal_impulse(old, un, c.target[t], soft)
     c.turn[t] = D(0.0)
     if new == D(0.0) and wp.length_sq(J) == D(0.0) and c.span[t] == D(0.0):
         return float(0.0)
@@ -138,18 +164,18 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
     rub = J - old * n
     size = wp.length(slide)
     along = soft
-    if size > SMALLEST_SLIP:
+    if size > MIN_SLIP_SPEED:
         along = softness_of(c, r, s, t, slide / size)
         rub = rub + slide / along
     grip = c.friction[c.fa[t], c.fc[t]] * D(1 - c.slips[t])
     given = within_cone(grip, new, n, rub)
     if c.span[t] > D(0.0):
-        given = dragged(along, c.span[t], curve_of(c, r, s, t), new, n, rub)
+        given = drag_impulse(along, c.span[t], curve_of(c, r, s, t), new, n, rub)
     change = given - J
     c.impulse[t] = given
     c.turn[t] = -wp.dot(change, given - c.last_impulse[t]) * soft
-    give(c, r, s, t, c.a[t], c.fa[t], -change)
-    give(c, r, s, t, c.c[t], c.fc[t], change)
+    give_contact_impulse(c, r, s, t, c.a[t], c.fa[t], -change)
+    give_contact_impulse(c, r, s, t, c.c[t], c.fc[t], change)
     return float(wp.length(change) * soft)
 
 
@@ -157,7 +183,9 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
 
 
 @wp.func
-def put(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
+def add_rigid_contact(
+    c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, t: int
+):
     """Put a contact of two rigid bodies that meet at a node where both of them are."""
     rigid = c.meet[t] >= 0 and c.c[t] >= 0
     if rigid:
@@ -166,17 +194,17 @@ def put(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
         # What is round all over has no edges.
         a = mean_of(c, g, s, c.a[t]) * D(r.edged[c.fa[t]])
         other = mean_of(c, g, s, c.c[t]) * D(r.edged[c.fc[t]])
-        shift = touched(c.face, a, other, wp.vec3d(c.normal[t]))
+        shift = touching_offset(c.face, a, other, wp.vec3d(c.normal[t]))
         c.point[t] = c.point[t] + shift * s.dx
     return 0
 
 
 @wp.func
-def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
+def prepare_contact(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, t: int):
     """Normal speed that a contact may keep, and whether it is of a rigid pair."""
-    if replaced(r, c, s, t):
+    if is_replaced(r, c, s, t):
         c.gap[t] = VAST
-    put(c, r, g, s, t)
+    add_rigid_contact(c, r, g, s, t)
     if c.gap[t] < VAST or c.span[t] > D(0.0):
         gap = D(c.gap[t])
         fa = c.fa[t]
@@ -184,11 +212,11 @@ def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
         c.active[t] = 1
         before = side_before(c, r, g, s, t, c.a[t], fa)
         c.before[t] = before - side_before(c, r, g, s, t, c.c[t], fc)
-        c.target[t] = closing_speed(gap, s.clock[DT]) - c.inward[t]
+        c.target[t] = closing_speed(gap, s.clock[CLOCK_DT]) - c.inward[t]
         c.struck[t] = wp.vec3d(D(0.0))
         if r.stiff[fa] == 1 and fc < s.bodies:
             if r.stiff[fc] == 1:
-                wp.atomic_max(s.flag, HITS, 1)
+                wp.atomic_max(s.flag, FLAG_HITS, 1)
     return 0
 
 
@@ -196,45 +224,47 @@ def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
 
 
 @wp.kernel
-def begin_contact(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
+def begin_contact(
+    c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, stride: int
+):
     """Prepare all contacts, and solve every node that no rigid body takes part in."""
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
-    for k in range(wp.tid(), s.flag[MEETS], stride):
+    for k in range(wp.tid(), s.flag[FLAG_MEETS], stride):
         for t in range(c.first[k], c.last[k]):
-            prepare(c, r, g, s, t)
+            prepare_contact(c, r, g, s, t)
         if c.stiff[k] == 0:
             solve_node(c, r, s, k)
-    for t in range(s.flag[NODES] + wp.tid(), s.flag[TOUCHES], stride):
-        prepare(c, r, g, s, t)
+    for t in range(s.flag[FLAG_NODES] + wp.tid(), s.flag[FLAG_TOUCHES], stride):
+        prepare_contact(c, r, g, s, t)
     if wp.tid() == 0:
-        s.flag[IMPACTING] = 0
-        if s.flag[STIFF] > 0:
-            s.flag[IMPACTING] = 1
+        s.flag[FLAG_IMPACTING] = 0
+        if s.flag[FLAG_STIFF] > 0:
+            s.flag[FLAG_IMPACTING] = 1
 
 
 @wp.func
-def solve_node(c: Contacts, r: Rigid, s: Sheet, k: int):
+def solve_node(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, k: int):
     """Sweep over a node's contacts until nothing changes."""
     for _ in range(SWEEPS):
         moved = float(0.0)
         for t in range(c.first[k], c.last[k]):
             if c.active[t] > 0:
-                moved += relax(c, r, s, t)
+                moved += relax_contact(c, r, s, t)
         if moved == 0.0 or c.last[k] - c.first[k] == 1:
             break
     return 0
 
 
 @wp.func
-def count(c: Contacts, r: Rigid, s: Sheet, t: int):
+def count_contact(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int):
     """Note whether a contact wants something of its bodies in this sweep."""
-    if c.active[t] == SWEPT_NOW:
+    if c.active[t] == CONTACT_SWEPT:
         fa = c.fa[t]
         fc = c.fc[t]
         n = wp.vec3d(c.normal[t])
         busy = wp.length_sq(c.impulse[t]) > D(0.0) or c.span[t] > D(0.0)
-        busy = busy or wp.dot(slip_of(c, r, s, t), n) > c.target[t]
+        busy = busy or wp.dot(contact_slip(c, r, s, t), n) > c.target[t]
         if busy and r.stiff[fa] == 1:
             wp.atomic_add(r.busy, fa, 1)
         if busy and fc < s.bodies:
@@ -244,7 +274,7 @@ def count(c: Contacts, r: Rigid, s: Sheet, t: int):
 
 
 @wp.func
-def hasten(c: Contacts, t: int, more: wp.float64):
+def extrapolate_impulse(c: DeviceContacts, t: int, more: wp.float64):
     """Carry an impulse on in the direction that it took in the last sweep."""
     J = c.impulse[t]
     c.impulse[t] = J + more * (J - c.last_impulse[t])
@@ -253,10 +283,10 @@ def hasten(c: Contacts, t: int, more: wp.float64):
 
 
 @wp.kernel
-def count_busy(c: Contacts, r: Rigid, s: Sheet, stride: int):
+def count_busy(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """Carry everything on, and count the contacts that share each rigid body in this sweep."""
     more = s.pace[1]
-    for k in range(wp.tid(), s.flag[MEETS], stride):
+    for k in range(wp.tid(), s.flag[FLAG_MEETS], stride):
         if c.stiff[k] == 1:
             for q in range(c.number[k]):
                 e = k * FIELDS_AT_NODE + q
@@ -264,31 +294,31 @@ def count_busy(c: Contacts, r: Rigid, s: Sheet, stride: int):
                 c.velocity[e] = v + more * (v - c.last_velocity[e])
                 c.last_velocity[e] = v
             for t in range(c.first[k], c.last[k]):
-                hasten(c, t, more)
-                count(c, r, s, t)
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+                extrapolate_impulse(c, t, more)
+                count_contact(c, r, s, t)
+    for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
         if c.meet[t] < 0:
-            hasten(c, t, more)
-            count(c, r, s, t)
+            extrapolate_impulse(c, t, more)
+            count_contact(c, r, s, t)
 
 
 @wp.kernel
-def sweep(c: Contacts, r: Rigid, s: Sheet, stride: int):
+def sweep_contacts(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """One sweep over the nodes and points that rigid bodies take part in."""
-    for k in range(wp.tid(), s.flag[MEETS], stride):
+    for k in range(wp.tid(), s.flag[FLAG_MEETS], stride):
         if c.stiff[k] == 1:
             for t in range(c.first[k], c.last[k]):
-                if c.active[t] == SWEPT_NOW:
-                    wp.atomic_max(s.change, 0, relax(c, r, s, t))
+                if c.active[t] == CONTACT_SWEPT:
+                    wp.atomic_max(s.change, 0, relax_contact(c, r, s, t))
                     wp.atomic_add(s.pace, 2, c.turn[t])
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if c.meet[t] < 0 and c.active[t] == SWEPT_NOW:
-            wp.atomic_max(s.change, 0, relax(c, r, s, t))
+    for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
+        if c.meet[t] < 0 and c.active[t] == CONTACT_SWEPT:
+            wp.atomic_max(s.change, 0, relax_contact(c, r, s, t))
             wp.atomic_add(s.pace, 2, c.turn[t])
 
 
 @wp.func
-def quicken(s: Sheet):
+def update_momentum(s: StepGlobals):
     """Nesterov's pace; from the start again where the last sweep went back on its way."""
     t = s.pace[0]
     s.pace[1] = D(0.0)
@@ -301,24 +331,24 @@ def quicken(s: Sheet):
 
 
 @wp.kernel
-def apply(r: Rigid, s: Sheet, lanes: int):
+def apply_rigid_impulses(r: DeviceRigidBodies, s: StepGlobals, lanes: int):
     """Let rigid bodies have what they were given; go on while it was much. One group."""
     lane = wp.tid()
     if lane == 0:
-        n = s.flag[SWEPT] + 1
-        s.flag[SWEPT] = n
+        n = s.flag[FLAG_SWEPT] + 1
+        s.flag[FLAG_SWEPT] = n
         limit = JACOBI_SWEEPS
-        if s.flag[HITS] > 0:
-            limit = JACOBI_SWEEPS_OF_A_HIT
-        if s.flag[HOLDS] > 0:
-            limit = JACOBI_SWEEPS_OF_A_HOLD
+        if s.flag[FLAG_HITS] > 0:
+            limit = JACOBI_IMPACT_SWEEPS
+        if s.flag[FLAG_HOLDS] > 0:
+            limit = JACOBI_SUPPORTED_IMPACT_SWEEPS
         moved = s.change[0]
         s.change[0] = 0.0
-        s.pace[3] = quicken(s)
-        if moved == 0.0 or n >= limit or (n >= SWEEPS and moved < JACOBI_STILL * s.cell):
-            s.flag[SWEEPING] = 0
+        s.pace[3] = update_momentum(s)
+        if moved == 0.0 or n >= limit or (n >= SWEEPS and moved < JACOBI_TOLERANCE_DX * s.cell):
+            s.flag[FLAG_SWEEPING] = 0
             s.pace[3] = D(0.0)
-    meet()
+    wait_for_group()
     more = s.pace[3]
     for b in range(lane, s.bodies, lanes):
         if r.stiff[b] == 1 and r.path_count[b] == 0:
@@ -338,7 +368,7 @@ def apply(r: Rigid, s: Sheet, lanes: int):
 
 
 @wp.func
-def hand_back(g: Grid, c: Contacts, r: Rigid, k: int):
+def write_velocities(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, k: int):
     """Give a node's fields their velocities after contact."""
     for q in range(c.number[k]):
         e = k * FIELDS_AT_NODE + q
@@ -349,26 +379,28 @@ def hand_back(g: Grid, c: Contacts, r: Rigid, k: int):
 
 
 @wp.func
-def react(c: Contacts, r: Rigid, s: Sheet, t: int, field: int, J: wp.vec3d):
+def book_mover_impulse(
+    c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, field: int, J: wp.vec3d
+):
     """Book what a contact's impulse on a body that has a prescribed motion takes of its mover."""
     if r.path_count[field] > 0:
         work = wp.dot(J, speed_at(r, field, c.point[t]))
-        wp.atomic_add(s.loss, PUSHING, t % LANES, -work)
+        wp.atomic_add(s.loss, LOSS_PUSH_WORK, t % LOSS_LANES, -work)
         wp.atomic_sub(s.external, field, J)
     return 0
 
 
 @wp.func
-def met(s: Sheet, a: int, b: int):
+def list_pair(s: StepGlobals, a: int, b: int):
     """List a pair that met in this step, once."""
     if s.marked[a, b] == 0:
         if wp.atomic_max(s.marked, a, b, 1) == 0:
-            s.met[wp.atomic_add(s.flag, PAIRS, 1)] = a * s.marked.shape[0] + b
+            s.met[wp.atomic_add(s.flag, FLAG_PAIRS, 1)] = a * s.marked.shape[0] + b
     return 0
 
 
 @wp.func
-def note(c: Contacts, r: Rigid, s: Sheet, t: int):
+def book_contact(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int):
     """Add up what a contact exchanged."""
     n = wp.vec3d(c.normal[t])
     J = c.impulse[t] + c.struck[t]
@@ -376,29 +408,29 @@ def note(c: Contacts, r: Rigid, s: Sheet, t: int):
     if c.active[t] > 0 and (size > D(0.0) or c.span[t] > D(0.0)):
         fa = c.fa[t]
         fc = c.fc[t]
-        mean = D(0.5) * (c.before[t] + slip_of(c, r, s, t))
-        wp.atomic_add(s.loss, RUBBING, t % LANES, wp.dot(J - size * n, mean))
+        mean = D(0.5) * (c.before[t] + contact_slip(c, r, s, t))
+        wp.atomic_add(s.loss, LOSS_FRICTION, t % LOSS_LANES, wp.dot(J - size * n, mean))
         taken = size * wp.dot(n, mean)
-        wp.atomic_add(s.loss, STRIKING, t % LANES, taken)
+        wp.atomic_add(s.loss, LOSS_IMPACT, t % LOSS_LANES, taken)
         wp.atomic_add(s.impact_of_pair, fa, fc, taken)
         wp.atomic_add(s.impact_of_pair, fc, fa, taken)
-        met(s, fa, fc)
+        list_pair(s, fa, fc)
         wp.atomic_add(s.step_impulse, fa, fc, size)
         wp.atomic_add(s.step_place, fa, fc, size * c.point[t])
-        react(c, r, s, t, fa, -J)
+        book_mover_impulse(c, r, s, t, fa, -J)
         if fc >= s.bodies:
             wp.atomic_sub(s.plane_impulse, fc - s.bodies, fa, J)
         else:
-            react(c, r, s, t, fc, J)
+            book_mover_impulse(c, r, s, t, fc, J)
     return 0
 
 
 @wp.kernel
-def end_contact(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
+def end_contact(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """Give nodes their velocities, and add up what every pair exchanged."""
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
-    for k in range(wp.tid(), s.flag[MEETS], stride):
-        hand_back(g, c, r, k)
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        note(c, r, s, t)
+    for k in range(wp.tid(), s.flag[FLAG_MEETS], stride):
+        write_velocities(g, c, r, k)
+    for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
+        book_contact(c, r, s, t)

@@ -6,24 +6,24 @@ A body with n contacts on which it rolls lends each of them an n-th of its mass,
 
 from corporeal.mpm import formulas
 from corporeal.mpm.cuda.layout import (
-    FULL,
-    LANES,
-    PUSHING,
-    RUBBING,
-    TOUCHES,
+    FLAG_FULL,
+    FLAG_TOUCHES,
+    LOSS_FRICTION,
+    LOSS_LANES,
+    LOSS_PUSH_WORK,
     D,
-    Sheet,
+    StepGlobals,
     wp,
 )
-from corporeal.mpm.cuda.layout_bodies import Rigid
-from corporeal.mpm.cuda.layout_contact import Contacts
-from corporeal.mpm.formulas.one_lane import brake
+from corporeal.mpm.cuda.layout_bodies import DeviceRigidBodies
+from corporeal.mpm.cuda.layout_contact import DeviceContacts
+from corporeal.mpm.formulas.one_lane import rolling_brake
 
-wp.set_module_options(formulas.options(max_unroll=0))
+wp.set_module_options(formulas.formula_options(max_unroll=0))
 
 
 @wp.func
-def most_of(c: Contacts, t: int):
+def max_rolling_moment(c: DeviceContacts, t: int):
     """Greatest moment of a contact, c J_n [N m s]; 0 where nothing rolls."""
     most = D(0.0)
     if c.active[t] > 0 and c.meet[t] < 0:
@@ -34,7 +34,7 @@ def most_of(c: Contacts, t: int):
 
 
 @wp.func
-def yields(r: Rigid, s: Sheet, field: int):
+def can_move(r: DeviceRigidBodies, s: StepGlobals, field: int):
     """Whether a side can be moved: no plane, and no body with prescribed motion."""
     free = field < s.bodies
     if free:
@@ -43,7 +43,7 @@ def yields(r: Rigid, s: Sheet, field: int):
 
 
 @wp.func
-def spin_of(r: Rigid, s: Sheet, field: int):
+def spin_of(r: DeviceRigidBodies, s: StepGlobals, field: int):
     """ω of a side [rad/s]."""
     if field < s.bodies:
         return r.spin[field]
@@ -51,23 +51,23 @@ def spin_of(r: Rigid, s: Sheet, field: int):
 
 
 @wp.func
-def light_of(r: Rigid, s: Sheet, field: int):
+def inverse_mass_share(r: DeviceRigidBodies, s: StepGlobals, field: int):
     """1/M of a side's share [1/kg]."""
-    if yields(r, s, field):
+    if can_move(r, s, field):
         return r.light[field] * D(wp.max(r.busy[field], 1))
     return D(0.0)
 
 
 @wp.func
-def inertia_of(r: Rigid, s: Sheet, field: int):
+def inverse_inertia_share(r: DeviceRigidBodies, s: StepGlobals, field: int):
     """I⁻¹ of a side's share [1/(kg m²)]."""
-    if yields(r, s, field):
+    if can_move(r, s, field):
         return r.inertia[field] * D(wp.max(r.busy[field], 1))
     return wp.mat33d(D(0.0))
 
 
 @wp.func
-def arm_of(c: Contacts, r: Rigid, s: Sheet, t: int, field: int):
+def arm_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, field: int):
     """Place of contact less the centre of a side [m]."""
     if field < s.bodies:
         return c.point[t] - r.centre[field]
@@ -75,46 +75,54 @@ def arm_of(c: Contacts, r: Rigid, s: Sheet, t: int, field: int):
 
 
 @wp.func
-def hand(r: Rigid, s: Sheet, t: int, field: int, arm: wp.vec3d, M: wp.vec3d, f: wp.vec3d):
+def give_brake(
+    r: DeviceRigidBodies,
+    s: StepGlobals,
+    t: int,
+    field: int,
+    arm: wp.vec3d,
+    M: wp.vec3d,
+    f: wp.vec3d,
+):
     """Give a side its part, at the end of the kernel; book what a mover has to do."""
-    if yields(r, s, field):
+    if can_move(r, s, field):
         wp.atomic_add(r.speed_change, field, f * r.light[field])
         wp.atomic_add(r.moment_change, field, M + wp.cross(arm, f))
     elif field < s.bodies:
-        wp.atomic_add(s.loss, PUSHING, t % LANES, -wp.dot(M, r.spin[field]))
+        wp.atomic_add(s.loss, LOSS_PUSH_WORK, t % LOSS_LANES, -wp.dot(M, r.spin[field]))
     return 0
 
 
 @wp.kernel
-def count_rolling(c: Contacts, r: Rigid, s: Sheet, stride: int):
+def count_rolling(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """Count the contacts on which each body rolls."""
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if most_of(c, t) > D(0.0):
+    for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
+        if max_rolling_moment(c, t) > D(0.0):
             wp.atomic_add(r.busy, c.fa[t], 1)
             if c.fc[t] < s.bodies:
                 wp.atomic_add(r.busy, c.fc[t], 1)
 
 
 @wp.kernel
-def brake_rolling(c: Contacts, r: Rigid, s: Sheet, stride: int):
+def brake_rolling(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """Take spin from what rolls, as far as c J_n reaches."""
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        most = most_of(c, t)
+    for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
+        most = max_rolling_moment(c, t)
         if most > D(0.0):
             fa = c.fa[t]
             fc = c.fc[t]
             arm_a = arm_of(c, r, s, t, fa)
             arm_c = arm_of(c, r, s, t, fc)
-            done = brake(
-                light_of(r, s, fa),
-                inertia_of(r, s, fa),
+            done = rolling_brake(
+                inverse_mass_share(r, s, fa),
+                inverse_inertia_share(r, s, fa),
                 arm_a,
-                light_of(r, s, fc),
-                inertia_of(r, s, fc),
+                inverse_mass_share(r, s, fc),
+                inverse_inertia_share(r, s, fc),
                 arm_c,
                 spin_of(r, s, fa) - spin_of(r, s, fc),
                 wp.vec3d(c.normal[t]),
@@ -124,17 +132,17 @@ def brake_rolling(c: Contacts, r: Rigid, s: Sheet, stride: int):
             )
             M = wp.vec3d(done[0], done[1], done[2])
             f = wp.vec3d(done[3], done[4], done[5])
-            hand(r, s, t, fa, arm_a, -M, -f)
-            hand(r, s, t, fc, arm_c, M, f)
+            give_brake(r, s, t, fa, arm_a, -M, -f)
+            give_brake(r, s, t, fc, arm_c, M, f)
             c.impulse[t] = c.impulse[t] + f
-            wp.atomic_add(s.loss, RUBBING, t % LANES, done[6])
+            wp.atomic_add(s.loss, LOSS_FRICTION, t % LOSS_LANES, done[6])
 
 
 @wp.kernel
-def slow_down(r: Rigid, s: Sheet):
+def apply_brakes(r: DeviceRigidBodies, s: StepGlobals):
     """Let bodies have what they were given."""
     b = wp.tid()
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
     if r.stiff[b] == 1 and r.path_count[b] == 0:
         r.speed[b] = r.speed[b] + r.speed_change[b]

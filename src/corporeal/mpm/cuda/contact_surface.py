@@ -6,9 +6,18 @@ Same rules as ``reference.contact.find``.
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.constants import VAST
 from corporeal.mpm.cuda.contact_nodes import add_touch
-from corporeal.mpm.cuda.layout import DT, FULL, NODES, STIFF, TOUCHES, D, Sheet, wp
-from corporeal.mpm.cuda.layout_bodies import Rigid
-from corporeal.mpm.cuda.layout_contact import Contacts
+from corporeal.mpm.cuda.layout import (
+    CLOCK_DT,
+    FLAG_FULL,
+    FLAG_NODES,
+    FLAG_STIFF,
+    FLAG_TOUCHES,
+    D,
+    StepGlobals,
+    wp,
+)
+from corporeal.mpm.cuda.layout_bodies import DeviceRigidBodies
+from corporeal.mpm.cuda.layout_contact import DeviceContacts
 from corporeal.mpm.cuda.rigid import speed_at
 from corporeal.mpm.formulas.one_lane_contact import (
     ball_radius,
@@ -24,25 +33,32 @@ from corporeal.mpm.formulas.one_lane_contact import (
     shift_to_contact,
 )
 
-wp.set_module_options(formulas.options(max_unroll=0))
+wp.set_module_options(formulas.formula_options(max_unroll=0))
 
-POINT_REACH = wp.constant(D(constants.POINT_REACH))
-ROUNDING = wp.constant(constants.ROUNDING)
+SURFACE_POINT_REACH_DX = wp.constant(D(constants.SURFACE_POINT_REACH_DX))
+CURVATURE_ROW = wp.constant(constants.CURVATURE_ROW)
 FACET_ROW = wp.constant(constants.FACET_ROW)
-FACET_ALIKE = wp.constant(D(constants.FACET_ALIKE))
-ROUND_ALIKE = wp.constant(D(constants.ROUND_ALIKE))
-VALLEY_TURNS = wp.constant(constants.VALLEY_TURNS)
+FACET_NORMAL_COSINE = wp.constant(D(constants.FACET_NORMAL_COSINE))
+CURVED_NORMAL_COSINE = wp.constant(D(constants.CURVED_NORMAL_COSINE))
+VALLEY_ITERATIONS = wp.constant(constants.VALLEY_ITERATIONS)
 
 
 @wp.func
 def enter_point(
-    c: Contacts, s: Sheet, a: int, other: int, side: int, x: wp.vec3d, n: wp.vec3d, gap: D
+    c: DeviceContacts,
+    s: StepGlobals,
+    a: int,
+    other: int,
+    side: int,
+    x: wp.vec3d,
+    n: wp.vec3d,
+    gap: D,
 ):
     """Enter a contact on a surface point; side: whose point it is, 0 or 1."""
-    t = wp.atomic_add(s.flag, TOUCHES, 1)
-    wp.atomic_add(s.flag, STIFF, 1)
+    t = wp.atomic_add(s.flag, FLAG_TOUCHES, 1)
+    wp.atomic_add(s.flag, FLAG_STIFF, 1)
     if t >= 2 * c.room:
-        s.flag[FULL] = 2
+        s.flag[FLAG_FULL] = 2
     else:
         add_touch(c, t, -1, -1, -1 - other)
         c.fa[t] = a
@@ -56,13 +72,13 @@ def enter_point(
 
 
 @wp.func
-def radius_at(r: Rigid, p: int):
+def radius_at(r: DeviceRigidBodies, p: int):
     """Larger radius of curvature at a surface point [m]; 0 where it is not round."""
-    return r.rounding[ROUNDING * p + 6] + r.rounding[ROUNDING * p + 7]
+    return r.rounding[CURVATURE_ROW * p + 6] + r.rounding[CURVATURE_ROW * p + 7]
 
 
 @wp.func
-def roll(c: Contacts, t: int, radius: wp.float64):
+def note_rolling(c: DeviceContacts, t: int, radius: wp.float64):
     """Note that something round may roll on a contact."""
     if t < 2 * c.room and radius > D(0.0):
         c.rolls[t] = 1
@@ -70,7 +86,7 @@ def roll(c: Contacts, t: int, radius: wp.float64):
 
 
 @wp.func
-def list_points(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
+def list_points(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: int, stride: int):
     """Contacts of rigid bodies with planes, on the bodies' surface points."""
     for i in range(tid, r.surfaces * s.planes, stride):
         w = i % s.planes
@@ -83,16 +99,16 @@ def list_points(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
         on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
         x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(s.plane[w], x) - s.offset[w]
-        if gap < POINT_REACH * s.dx and shift[3] > D(0.0):
+        if gap < SURFACE_POINT_REACH_DX * s.dx and shift[3] > D(0.0):
             t = enter_point(c, s, b, s.bodies + w, 0, x, -s.plane[w], gap)
-            roll(c, t, radius_at(r, p))
+            note_rolling(c, t, radius_at(r, p))
     return 0
 
 
 @wp.func
-def list_facets(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
+def list_facets(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: int, stride: int):
     """Contacts of rounded surface points with the flat faces of other rigid bodies."""
-    reach = POINT_REACH * s.dx
+    reach = SURFACE_POINT_REACH_DX * s.dx
     for i in range(tid, r.surfaces * r.facets, stride):
         p = i // r.facets
         k = i % r.facets
@@ -117,14 +133,14 @@ def list_facets(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
                 t = enter_point(c, s, b, other, 0, x, -n, gap)
             else:
                 t = enter_point(c, s, other, b, 1, x, n, gap)
-            roll(c, t, radius_at(r, p))
+            note_rolling(c, t, radius_at(r, p))
     return 0
 
 
 @wp.func
-def nearest_curved(r: Rigid, p: int, b: int, other: int, far: D):
+def nearest_curved(r: DeviceRigidBodies, p: int, b: int, other: int, far: D):
     """Find the curved point of another body that a round point faces, nearest to its middle."""
-    row = ROUNDING * p
+    row = CURVATURE_ROW * p
     n = wp.vec3d(r.rounding[row], r.rounding[row + 1], r.rounding[row + 2])
     back = wp.transpose(r.turn[other])
     apart = r.centre[b] - r.centre[other]
@@ -138,7 +154,9 @@ def nearest_curved(r: Rigid, p: int, b: int, other: int, far: D):
         square = wp.length_sq(d)
         if square < least and curved_may(r.rounding, r.surface, q, centre, far, first):
             out = wp.vec3d(
-                r.rounding[ROUNDING * q], r.rounding[ROUNDING * q + 1], r.rounding[ROUNDING * q + 2]
+                r.rounding[CURVATURE_ROW * q],
+                r.rounding[CURVATURE_ROW * q + 1],
+                r.rounding[CURVATURE_ROW * q + 2],
             )
             if wp.dot(d, out) > D(0.0):
                 least = square
@@ -147,7 +165,7 @@ def nearest_curved(r: Rigid, p: int, b: int, other: int, far: D):
 
 
 @wp.func
-def square_along(r: Rigid, b: int, other: int, x: wp.vec3d, n: wp.vec3d):
+def square_along(r: DeviceRigidBodies, b: int, other: int, x: wp.vec3d, n: wp.vec3d):
     """How fast a place of one body moves over another, across a normal, squared [m²/s²]."""
     v = speed_at(r, b, x) - speed_at(r, other, x)
     along = wp.dot(v, n)
@@ -155,9 +173,9 @@ def square_along(r: Rigid, b: int, other: int, x: wp.vec3d, n: wp.vec3d):
 
 
 @wp.func
-def list_curves(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
+def list_curves(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: int, stride: int):
     """Contacts of round surface points with curved faces of other rigid bodies."""
-    reach = POINT_REACH * s.dx
+    reach = SURFACE_POINT_REACH_DX * s.dx
     for i in range(tid, r.surfaces * s.bodies, stride):
         p = i // s.bodies
         other = i % s.bodies
@@ -187,12 +205,12 @@ def list_curves(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
             c.rolls[t] = 1
             c.instead[t] = curved_misjudged(r.rounding, p, q, s.dx)
             square = square_along(r, b, other, x + radius * n, n)
-            c.inward[t] = curved_inward(r.rounding, p, q, square, s.clock[DT])
+            c.inward[t] = curved_inward(r.rounding, p, q, square, s.clock[CLOCK_DT])
     return 0
 
 
 @wp.func
-def instead_at(r: Rigid, c: Contacts, s: Sheet, q: int):
+def replaced_radius(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, q: int):
     """How far around a contact with a face nodes are not asked [m]."""
     reach = c.instead[q]
     if reach == D(0.0):
@@ -204,53 +222,53 @@ def instead_at(r: Rigid, c: Contacts, s: Sheet, q: int):
 
 
 @wp.func
-def in_valley(r: Rigid, c: Contacts, s: Sheet, t: int):
+def lies_in_valley(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, t: int):
     """Whether the normal on a node lies between those of several faces near it."""
     rest = wp.vec3d(c.normal[t])
-    for _ in range(VALLEY_TURNS):
+    for _ in range(VALLEY_ITERATIONS):
         most = D(0.0)
         best = int(-1)
-        for q in range(s.flag[NODES], s.flag[TOUCHES]):
+        for q in range(s.flag[FLAG_NODES], s.flag[FLAG_TOUCHES]):
             if c.fa[q] == c.fa[t] and c.fc[q] == c.fc[t]:
                 cosine = wp.dot(rest, wp.vec3d(c.normal[q]))
-                near = wp.length(c.point[t] - c.point[q]) < instead_at(r, c, s, q)
+                near = wp.length(c.point[t] - c.point[q]) < replaced_radius(r, c, s, q)
                 if near and cosine > most:
                     most = cosine
                     best = q
         if best >= 0:
             rest = rest - most * wp.vec3d(c.normal[best])
-    return wp.length_sq(rest) < D(1.0) - FACET_ALIKE * FACET_ALIKE
+    return wp.length_sq(rest) < D(1.0) - FACET_NORMAL_COSINE * FACET_NORMAL_COSINE
 
 
 @wp.func
-def replaced(r: Rigid, c: Contacts, s: Sheet, t: int):
+def is_replaced(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, t: int):
     """Whether a contact on a node is one of those on flat or curved faces, less well known."""
     found = int(0)
     rigid = c.meet[t] >= 0 and c.c[t] >= 0
     if rigid:
         rigid = r.stiff[c.fa[t]] == 1 and r.stiff[c.fc[t]] == 1
     if rigid:
-        for q in range(s.flag[NODES], s.flag[TOUCHES]):
+        for q in range(s.flag[FLAG_NODES], s.flag[FLAG_TOUCHES]):
             if c.fa[q] == c.fa[t] and c.fc[q] == c.fc[t]:
                 flat = c.fc[q]
                 if c.facet[q] == 1:
                     flat = c.fa[q]
                 cosine = D(wp.dot(c.normal[t], c.normal[q]))
                 apart = c.point[t] - c.point[q]
-                alike = ROUND_ALIKE
+                alike = CURVED_NORMAL_COSINE
                 if c.instead[q] == D(0.0) and r.thin[flat] == 0:
-                    alike = FACET_ALIKE
-                if facet_replaces(apart, cosine, instead_at(r, c, s, q), alike):
+                    alike = FACET_NORMAL_COSINE
+                if facet_replaces(apart, cosine, replaced_radius(r, c, s, q), alike):
                     found = 1
-        if found == 0 and in_valley(r, c, s, t):
+        if found == 0 and lies_in_valley(r, c, s, t):
             found = 1
     return found == 1
 
 
 @wp.kernel
-def list_surface(r: Rigid, c: Contacts, s: Sheet, rolls: int, stride: int):
+def list_surface(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, rolls: int, stride: int):
     """Contacts of rigid bodies on their surface points: with faces of others, and with planes."""
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
     list_facets(r, c, s, wp.tid(), stride)
     if rolls == 1:

@@ -12,21 +12,21 @@ from typing import Any
 import numpy as np
 
 from corporeal.core.errors import SimulationError, UserError
-from corporeal.mpm.cuda import layout, memory, particle_memory
+from corporeal.mpm.cuda import device_memory, layout, particle_memory
 from corporeal.mpm.cuda import load_memory as extras
+from corporeal.mpm.cuda.device_memory import DeviceMemory, split_position
 from corporeal.mpm.cuda.layout import wp
-from corporeal.mpm.cuda.memory import Memory, split
-from corporeal.mpm.cuda.program import Arrays, Program
-from corporeal.mpm.interaction import Interaction
-from corporeal.mpm.ledger import Ledger
-from corporeal.mpm.measure import Energy, Sums
-from corporeal.mpm.physics import branches
-from corporeal.mpm.physics.grips import Grip
+from corporeal.mpm.cuda.program import CudaProgram, DeviceArrays
+from corporeal.mpm.diagnostics import BodySums, ParticleEnergy
+from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.ledger import EngineLedger
+from corporeal.mpm.physics import maxwell_branches
 from corporeal.mpm.physics.rigid import RigidBody, world_inverse_inertia
-from corporeal.mpm.problem import Body, Problem, Snapshot, Steps
-from corporeal.mpm.state import Matter, Motion, branch_energy, strain_energy
+from corporeal.mpm.physics.spring_grips import Grip
+from corporeal.mpm.problem import Body, Problem, Snapshot, StepStatistics
+from corporeal.mpm.state import ParticleConstants, Velocities, branch_energy, strain_energy
 
-KNOWN = {
+KNOWN_FIELDS = {
     Body: "name position velocity volume density law young poisson yield_stress hardening "
     "friction_angle cohesion loss vibration consistency flow_index "
     "rigid surface rounding wetted push wind faces tether path pivot",
@@ -34,17 +34,17 @@ KNOWN = {
     "courant bonds joints apart rolling blows",
 }
 """What this engine knows of a problem; anything else must be at its default."""
-CONTACT_ROOM = 4096
-PLACED = tuple("cell place strain motion stress plastic opened relief pressure".split())
+INITIAL_CONTACT_ROOM = 4096
+WARM_START_ARRAYS = tuple("cell place strain motion stress plastic opened relief pressure".split())
 """What a warm start takes over of particles."""
-RIGID_STATE = "centre turn speed moment inertia spin cell place"
-SHEET_STATE = (
+RIGID_STATE_ARRAYS = "centre turn speed moment inertia spin cell place"
+STEP_STATE_ARRAYS = (
     "clock fast loss external plane_impulse pair_impulse impact_of_pair first_contact last_contact "
     "contact_point"
 )
 
 
-class CudaEngine(Interaction):
+class CudaEngine(EngineInteraction):
     """Steps one problem on a CUDA card."""
 
     def __init__(self, problem: Problem, device: str = "cuda") -> None:
@@ -58,24 +58,24 @@ class CudaEngine(Interaction):
             UserError: There is no such card, or the problem asks for what only other engines do.
 
         """
-        self.device = present(device)
+        self.device = require_device(device)
         _refuse_unknown(problem)
         self.problem = problem
-        self.steps = Steps()
-        self.matter = Matter.of(problem)
-        room = self.memory = Memory(self.device)
+        self.steps = StepStatistics()
+        self.matter = ParticleConstants.of(problem)
+        room = self.memory = DeviceMemory(self.device)
         apart = self.matter.rigid & (problem.contact == "multi")
         soft = np.flatnonzero(~apart)
-        self.arrays = Arrays(
+        self.arrays = DeviceArrays(
             sheet=room.sheet(problem, self.matter),
-            particles=particle_memory.particles(room, problem, self.matter, soft),
+            particles=particle_memory.lay_out_particles(room, problem, self.matter, soft),
             rigid=room.rigid(problem, self.matter),
             grid=room.grid(problem, self._blocks_needed()),
-            contacts=room.contacts(problem, CONTACT_ROOM),
-            loads=extras.loads(room, problem, self.matter),
-            bonds=extras.bonds(room, problem),
+            contacts=room.contacts(problem, INITIAL_CONTACT_ROOM),
+            loads=extras.lay_out_loads(room, problem, self.matter),
+            bonds=extras.lay_out_bonds(room, problem),
         )
-        self.program = Program(problem, self.arrays, self.device)
+        self.program = CudaProgram(problem, self.arrays, self.device)
         self.kept = self._kept()
         self.spare = {name: wp.empty_like(array) for name, array in self.kept.items()}
         self.lost = np.zeros(len(self.matter.mass), bool)
@@ -90,7 +90,7 @@ class CudaEngine(Interaction):
             raise SimulationError(
                 "There are positions that are not finite. Look at the mesh that was filled."
             )
-        low = split(position)[0] >> 2
+        low = split_position(position)[0] >> 2
         single = self.problem.contact == "single"
         field = self.matter.body * (not single)
         homes = np.unique(np.column_stack([field, low]), axis=0)
@@ -100,9 +100,9 @@ class CudaEngine(Interaction):
     def _kept(self) -> dict[str, Any]:
         """Everything that the next step depends on, and the books."""
         groups = (
-            ("particle", self.arrays.particles, " ".join(particle_memory.STATE)),
-            ("rigid", self.arrays.rigid, RIGID_STATE),
-            ("sheet", self.arrays.sheet, SHEET_STATE),
+            ("particle", self.arrays.particles, " ".join(particle_memory.PARTICLE_STATE)),
+            ("rigid", self.arrays.rigid, RIGID_STATE_ARRAYS),
+            ("sheet", self.arrays.sheet, STEP_STATE_ARRAYS),
         )
         return {
             f"{group}.{name}": getattr(struct, name)
@@ -128,22 +128,22 @@ class CudaEngine(Interaction):
     @property
     def time(self) -> float:
         """Simulated time so far [s]."""
-        return float(self.arrays.sheet.clock.numpy()[layout.TIME])
+        return float(self.arrays.sheet.clock.numpy()[layout.CLOCK_TIME])
 
     def stable_step(self) -> float:
         """Largest stable step now [s]."""
-        self._set(layout.UNTIL, self.time)
+        self._set(layout.CLOCK_UNTIL, self.time)
         self.program.look_ahead()
-        return float(self.arrays.sheet.clock.numpy()[layout.STABLE])
+        return float(self.arrays.sheet.clock.numpy()[layout.CLOCK_STABLE])
 
     def advance(self, until: float) -> None:
         """Step until exactly ``until`` [s], choosing steps by stability."""
-        self._set(layout.FORCED, 0.0)
+        self._set(layout.CLOCK_FORCED, 0.0)
         self._go(until)
 
     def step(self, dt: float) -> None:
         """Take one step of dt [s]."""
-        self._set(layout.FORCED, 1.0)
+        self._set(layout.CLOCK_FORCED, 1.0)
         self._go(self.time + dt)
 
     def _set(self, what: Any, value: float) -> None:
@@ -152,24 +152,24 @@ class CudaEngine(Interaction):
     def _go(self, until: float) -> None:
         for name, array in self.kept.items():
             wp.copy(self.spare[name], array)
-        self._set(layout.UNTIL, until)
+        self._set(layout.CLOCK_UNTIL, until)
         self._arrange()
         while True:
             self.program.run()
             flag = self.arrays.sheet.flag.numpy()
-            if flag[layout.LOST]:
+            if flag[layout.FLAG_LOST]:
                 self._give_up()
-            if not flag[layout.FULL]:
+            if not flag[layout.FLAG_FULL]:
                 break
-            self._enlarge(int(flag[layout.FULL]))
+            self._enlarge(int(flag[layout.FLAG_FULL]))
             self._arrange()
         self._read_steps()
 
     def _read_steps(self) -> None:
         clock = self.arrays.sheet.clock.numpy()
-        self.steps.count = int(clock[layout.COUNT])
-        self.steps.smallest = float(clock[layout.SMALLEST])
-        self.steps.largest = float(clock[layout.LARGEST])
+        self.steps.count = int(clock[layout.CLOCK_COUNT])
+        self.steps.smallest = float(clock[layout.CLOCK_SMALLEST])
+        self.steps.largest = float(clock[layout.CLOCK_LARGEST])
 
     def _enlarge(self, what: int) -> None:
         """Double what was too small; the program is recorded anew."""
@@ -186,13 +186,13 @@ class CudaEngine(Interaction):
 
     def _choices(self) -> np.ndarray:
         """Candidate normals that contacts took in the last step."""
-        count = int(self.arrays.sheet.flag.numpy()[layout.KEPT])
+        count = int(self.arrays.sheet.flag.numpy()[layout.FLAG_NORMALS_KEPT])
         return self.memory.choices(self.arrays.contacts, count)
 
     def _arrange(self) -> None:
         """Sort particles, and give every block that they reach a slot."""
         self.program.arrange()
-        while self.arrays.sheet.flag.numpy()[layout.FULL]:
+        while self.arrays.sheet.flag.numpy()[layout.FLAG_FULL]:
             self._enlarge(1)
             self.program.arrange()
 
@@ -235,7 +235,9 @@ class CudaEngine(Interaction):
             self.program.forget()
             self._make_room_for_contacts(len(choices))
         self.memory.put_choices(self.arrays.contacts, choices)
-        memory.change(self.arrays.sheet.flag, np.array([layout.KEPT]), len(choices))
+        device_memory.overwrite_rows(
+            self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), len(choices)
+        )
         self._arrange()
         self._read_steps()
 
@@ -254,23 +256,23 @@ class CudaEngine(Interaction):
             plastic_strain=self._placed("plastic"),
         )
 
-    def _sums(self) -> Sums:
+    def _sums(self) -> BodySums:
         now, cell = self._particles(), self.problem.cell
         affine = self._placed("affine") / cell
         relief = self._placed("relief")
         elastic = strain_energy(self.matter, now.deformation, relief)
-        energy = Energy(elastic, branch_energy(self.matter, self._memory()))
-        return Sums.of(self.matter, now, affine, energy, cell)
+        energy = ParticleEnergy(elastic, branch_energy(self.matter, self._memory()))
+        return BodySums.of(self.matter, now, affine, energy, cell)
 
-    def _memory(self) -> branches.Memory:
+    def _memory(self) -> maxwell_branches.BranchMemory:
         """Read what the Maxwell branches of the particles that have any remember."""
         rows = self._placed("branch")[self.matter.relaxing]
-        rows = rows.reshape(-1, int(layout.BRANCHES), int(layout.BRANCH))
-        return branches.Memory(_full(rows[..., :6]), rows[..., 6])
+        rows = rows.reshape(-1, int(layout.BRANCHES), int(layout.BRANCH_CHANNELS))
+        return maxwell_branches.BranchMemory(_full_tensors(rows[..., :6]), rows[..., 6])
 
     def _rows(self, name: str) -> np.ndarray:
         """Copy what is kept of particles to the host, in the engine's order."""
-        return particle_memory.rows(self.arrays.particles, name)
+        return particle_memory.read_rows(self.arrays.particles, name)
 
     def _placed(self, name: str) -> np.ndarray:
         """Copy what is kept of particles to the host, in the problem's order; 0 where rigid."""
@@ -290,7 +292,7 @@ class CudaEngine(Interaction):
         """Write what ``_read`` gave."""
         group, _, own = name.partition(".")
         if group == "particle":
-            particle_memory.put(self.arrays.particles, own, values)
+            particle_memory.write_rows(self.arrays.particles, own, values)
         else:
             self.kept[name].assign(values)
 
@@ -312,19 +314,19 @@ class CudaEngine(Interaction):
             for b in np.flatnonzero(r.stiff.numpy())
         }
 
-    def _booked(self) -> Ledger:
+    def _booked(self) -> EngineLedger:
         s = self.arrays.sheet
         loss = s.loss.numpy().sum(axis=1)
-        return Ledger(
+        return EngineLedger(
             external_impulse=s.external.numpy(),
             plane_impulse=s.plane_impulse.numpy()[: len(self.problem.planes)],
             pair_impulse=s.pair_impulse.numpy(),
-            push_work=np.array(loss[layout.PUSHING]),
-            friction_loss=np.array(loss[layout.RUBBING]),
-            impact_loss=np.array(loss[layout.STRIKING]),
+            push_work=np.array(loss[layout.LOSS_PUSH_WORK]),
+            friction_loss=np.array(loss[layout.LOSS_FRICTION]),
+            impact_loss=np.array(loss[layout.LOSS_IMPACT]),
             impact_of_pair=s.impact_of_pair.numpy(),
-            plastic_loss=np.array(loss[layout.PLASTIC]),
-            viscous_loss=np.array(loss[layout.VISCOUS]),
+            plastic_loss=np.array(loss[layout.LOSS_PLASTIC]),
+            viscous_loss=np.array(loss[layout.LOSS_VISCOUS]),
             first_contact=s.first_contact.numpy(),
             last_contact=s.last_contact.numpy(),
             contact_point=s.contact_point.numpy(),
@@ -332,15 +334,15 @@ class CudaEngine(Interaction):
 
     def _enter(self, body: int, impulse: np.ndarray, work: float) -> None:
         s = self.arrays.sheet
-        memory.add(s.external, body, impulse)
-        memory.add(s.loss, (int(layout.PUSHING), 0), work)
+        device_memory.add_to_row(s.external, body, impulse)
+        device_memory.add_to_row(s.loss, (int(layout.LOSS_PUSH_WORK), 0), work)
 
     def _add_velocity(self, body: int, particle: np.ndarray, gained: np.ndarray) -> None:
         p, m = self.arrays.particles, self.matter
         every = np.zeros((len(m.mass), 3))
         every[np.flatnonzero(m.body == body)[particle]] = gained
         velocity = self._rows("velocity") + every[self._rows("number")].astype(np.float32)
-        particle_memory.put(p, "velocity", velocity)
+        particle_memory.write_rows(p, "velocity", velocity)
         self._note_fast(2, np.linalg.norm(velocity, axis=1).max())
 
     def _note_fast(self, what: int, speed: float) -> None:
@@ -351,25 +353,25 @@ class CudaEngine(Interaction):
 
     def _add_momentum(self, body: int, momentum: np.ndarray, angular: np.ndarray) -> None:
         r = self.arrays.rigid
-        memory.add(r.speed, body, momentum / self.matter.total[body])
-        memory.add(r.moment, body, angular)
-        memory.add(r.spin, body, r.inertia.numpy()[body] @ angular)
+        device_memory.add_to_row(r.speed, body, momentum / self.matter.total[body])
+        device_memory.add_to_row(r.moment, body, angular)
+        device_memory.add_to_row(r.spin, body, r.inertia.numpy()[body] @ angular)
 
     def _take_grips(self) -> None:
-        extras.put_grips(self.arrays.loads, self.problem, self.matter, self.grips)
+        extras.write_grips(self.arrays.loads, self.problem, self.matter, self.grips)
         self.program.hold(bool(self.grips))
 
-    def _set_motion(self, bodies: Collection[int], motion: Motion) -> None:
+    def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         p, r = self.arrays.particles, self.arrays.rigid
         number, which = self._rows("number"), np.array(list(bodies), int)
         mine = np.flatnonzero(np.isin(self.matter.body[number], which))
-        particle_memory.change(p, "velocity", mine, motion.velocity[number[mine]])
-        particle_memory.change(p, "affine", mine, 0.0)
+        particle_memory.overwrite_particles(p, "velocity", mine, motion.velocity[number[mine]])
+        particle_memory.overwrite_particles(p, "affine", mine, 0.0)
         moment = motion.spin_momentum[which]
-        memory.change(r.speed, which, motion.speed[which])
-        memory.change(r.moment, which, moment)
+        device_memory.overwrite_rows(r.speed, which, motion.speed[which])
+        device_memory.overwrite_rows(r.moment, which, moment)
         spin = np.einsum("bij,bj->bi", r.inertia.numpy()[which], moment)
-        memory.change(r.spin, which, spin)
+        device_memory.overwrite_rows(r.spin, which, spin)
 
     def _place_as(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
         p, r, owner = self.arrays.particles, self.arrays.rigid, self.matter.body
@@ -378,27 +380,29 @@ class CudaEngine(Interaction):
         there[saved["particle.number"][: p.count]] = np.arange(p.count)
         number = self._rows("number")
         mine = np.flatnonzero(np.isin(owner[number], which))
-        for name in PLACED:
+        for name in WARM_START_ARRAYS:
             then = saved[f"particle.{name}"][there[number[mine]]]
-            particle_memory.change(p, name, mine, then)
+            particle_memory.overwrite_particles(p, name, mine, then)
         # Whatever it was strained by there was long ago: branches have forgotten it.
-        particle_memory.change(p, "branch", mine, 0.0)
+        particle_memory.overwrite_particles(p, "branch", mine, 0.0)
         for name in ("centre", "turn", "inertia"):
-            memory.change(getattr(r, name), which, saved[f"rigid.{name}"][which])
+            device_memory.overwrite_rows(getattr(r, name), which, saved[f"rigid.{name}"][which])
         riding = np.flatnonzero(np.isin(r.body.numpy(), which))
         for name in ("cell", "place"):
-            memory.change(getattr(r, name), riding, saved[f"rigid.{name}"][riding])
+            device_memory.overwrite_rows(getattr(r, name), riding, saved[f"rigid.{name}"][riding])
         self._note_fast(3, saved["sheet.fast"][3])
-        memory.change(self.arrays.sheet.flag, np.array([layout.KEPT]), 0)
+        device_memory.overwrite_rows(
+            self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), 0
+        )
         self._arrange()
 
 
-def _full(rows: np.ndarray) -> np.ndarray:
+def _full_tensors(rows: np.ndarray) -> np.ndarray:
     """Symmetric tensors of their six numbers 00 01 02 11 12 22, which stand in the last axis."""
     return rows[..., [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(*rows.shape[:-1], 3, 3)
 
 
-def present(device: str) -> str:
+def require_device(device: str) -> str:
     """Name of a device that is there.
 
     Raises:
@@ -425,19 +429,21 @@ def present(device: str) -> str:
 def _refuse_unknown(problem: Problem) -> None:
     """Raise when a problem asks for something that this engine would leave out."""
     if problem.contact == "single" and any(b.rigid for b in problem.bodies):
-        raise UserError(_cannot("rigid bodies in one shared field (contact='single')"))
+        raise UserError(_unsupported_error("rigid bodies in one shared field (contact='single')"))
     for thing in (problem, *problem.bodies):
-        known = KNOWN[Problem if thing is problem else Body].split()
+        known = KNOWN_FIELDS[Problem if thing is problem else Body].split()
         for f in fields(thing):
-            if f.name not in known and not _default(getattr(thing, f.name), f):
-                raise UserError(_cannot(f"{f.name} (of {getattr(thing, 'name', 'the problem')!r})"))
+            if f.name not in known and not _is_default(getattr(thing, f.name), f):
+                raise UserError(
+                    _unsupported_error(f"{f.name} (of {getattr(thing, 'name', 'the problem')!r})")
+                )
 
 
-def _cannot(what: str) -> str:
+def _unsupported_error(what: str) -> str:
     return f"The engine 'cuda' does not simulate {what} yet. Use --engine cpu."
 
 
-def _default(value: Any, declared: Any) -> bool:
+def _is_default(value: Any, declared: Any) -> bool:
     """Whether a field says nothing."""
     usual = declared.default
     if usual is MISSING and declared.default_factory is not MISSING:

@@ -7,22 +7,22 @@ stands for the whole: its centre, mass, inertia, velocity and spin are those of 
 from corporeal.mpm import constants
 from corporeal.mpm.constants import FIELDS_AT_NODE
 from corporeal.mpm.cuda.layout import (
-    BLOCKS,
-    FULL,
+    FLAG_BLOCKS,
+    FLAG_FULL,
+    BlockGrid,
     D,
-    Grid,
-    Sheet,
+    StepGlobals,
     wp,
 )
-from corporeal.mpm.cuda.layout_bodies import Bonds, Rigid
+from corporeal.mpm.cuda.layout_bodies import DeviceBonds, DeviceRigidBodies
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 0})
 
-HELD_SHARE = wp.constant(D(constants.HELD_SHARE))
+MIN_FRAME_VOLUME_FRACTION = wp.constant(D(constants.MIN_FRAME_VOLUME_FRACTION))
 
 
 @wp.func
-def place_of(g: Grid, s: Sheet, node: int):
+def place_of(g: BlockGrid, s: StepGlobals, node: int):
     """Where a node is [m]."""
     o = node % 64
     at = g.where[node // 64]
@@ -33,7 +33,7 @@ def place_of(g: Grid, s: Sheet, node: int):
 
 
 @wp.func
-def frame_of(g: Grid, h: Bonds, node: int):
+def frame_of(g: BlockGrid, h: DeviceBonds, node: int):
     """Which frame holds a node; -1: none."""
     slot = node // 64
     own = g.node[node][0]
@@ -47,13 +47,13 @@ def frame_of(g: Grid, h: Bonds, node: int):
                     if g.field[other] == h.frame[k]:
                         stiff = D(g.node[64 * other + node % 64][0]) / h.stiff_density[k]
                         soft = D(own) / h.soft_density[k]
-                        if stiff > D(0.0) and stiff >= HELD_SHARE * (stiff + soft):
+                        if stiff > D(0.0) and stiff >= MIN_FRAME_VOLUME_FRACTION * (stiff + soft):
                             return h.frame[k]
     return -1
 
 
 @wp.kernel
-def let_go(h: Bonds, s: Sheet):
+def clear_bonds(h: DeviceBonds, s: StepGlobals):
     """Begin the sums."""
     b = wp.tid()
     h.mass[b] = D(0.0)
@@ -64,9 +64,9 @@ def let_go(h: Bonds, s: Sheet):
 
 
 @wp.kernel
-def hold(g: Grid, r: Rigid, h: Bonds, s: Sheet, stride: int):
+def hold_nodes(g: BlockGrid, r: DeviceRigidBodies, h: DeviceBonds, s: StepGlobals, stride: int):
     """Mark the nodes that frames hold, and sum their mass and motion."""
-    for i in range(wp.tid(), 64 * s.flag[BLOCKS], stride):
+    for i in range(wp.tid(), 64 * s.flag[FLAG_BLOCKS], stride):
         f = frame_of(g, h, i)
         g.held[i] = f + 1
         if f >= 0:
@@ -82,10 +82,10 @@ def hold(g: Grid, r: Rigid, h: Bonds, s: Sheet, stride: int):
 
 
 @wp.kernel
-def compose(r: Rigid, h: Bonds, s: Sheet):
+def compose_bodies(r: DeviceRigidBodies, h: DeviceBonds, s: StepGlobals):
     """Make one rigid body of every frame and what it holds."""
     b = wp.tid()
-    if h.framing[b] == 0 or s.flag[FULL] == 2:
+    if h.framing[b] == 0 or s.flag[FLAG_FULL] == 2:
         return
     own = s.mass[b]
     total = own + h.mass[b]
@@ -107,11 +107,11 @@ def compose(r: Rigid, h: Bonds, s: Sheet):
 
 
 @wp.kernel
-def split_nodes(g: Grid, r: Rigid, h: Bonds, s: Sheet, stride: int):
+def split_nodes(g: BlockGrid, r: DeviceRigidBodies, h: DeviceBonds, s: StepGlobals, stride: int):
     """Give held nodes the motion of the whole: v = V + ω × r."""
-    if s.flag[FULL] == 2:
+    if s.flag[FLAG_FULL] == 2:
         return
-    for i in range(wp.tid(), 64 * s.flag[BLOCKS], stride):
+    for i in range(wp.tid(), 64 * s.flag[FLAG_BLOCKS], stride):
         f = g.held[i] - 1
         if f >= 0:
             v = r.speed[f] + wp.cross(r.spin[f], place_of(g, s, i) - r.centre[f])
@@ -120,10 +120,10 @@ def split_nodes(g: Grid, r: Rigid, h: Bonds, s: Sheet, stride: int):
 
 
 @wp.kernel
-def split_frames(r: Rigid, h: Bonds, s: Sheet):
+def split_frames(r: DeviceRigidBodies, h: DeviceBonds, s: StepGlobals):
     """Give frames their own part of it."""
     b = wp.tid()
-    if h.framing[b] == 0 or s.flag[FULL] == 2:
+    if h.framing[b] == 0 or s.flag[FLAG_FULL] == 2:
         return
     r.speed[b] = r.speed[b] + wp.cross(r.spin[b], h.centre[b] - r.centre[b])
     r.centre[b] = h.centre[b]

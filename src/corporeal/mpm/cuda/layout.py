@@ -6,88 +6,88 @@ the number of items may change on the device without a word to the host.
 """
 
 from corporeal.mpm import constants
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
 wp.set_module_options({"enable_backward": False})
 
-EMPTY = wp.constant(wp.int64(-1))
+EMPTY_KEY = wp.constant(wp.int64(-1))
 
 # What ``Sheet.flag`` holds.
-GOING = wp.constant(0)
+FLAG_GOING = wp.constant(0)
 """1: take another step."""
-BLOCKS = wp.constant(1)
+FLAG_BLOCKS = wp.constant(1)
 """Blocks in use."""
-FULL = wp.constant(2)
+FLAG_FULL = wp.constant(2)
 """1: too few blocks; 2: too little room for contacts. The step was not taken."""
-LOST = wp.constant(3)
+FLAG_LOST = wp.constant(3)
 """1: a particle is not finite or left the domain."""
-FRESH = wp.constant(4)
+FLAG_FRESH = wp.constant(4)
 """1: blocks were added since they were linked."""
-MEETS = wp.constant(5)
-TOUCHES = wp.constant(6)
-STIFF = wp.constant(7)
+FLAG_MEETS = wp.constant(5)
+FLAG_TOUCHES = wp.constant(6)
+FLAG_STIFF = wp.constant(7)
 """Contacts that rigid bodies take part in."""
-HITS = wp.constant(8)
+FLAG_HITS = wp.constant(8)
 """1: something rigid bounces in this step; 2: rigid bodies lie on one another."""
-SWEEPING = wp.constant(9)
-SWEPT = wp.constant(10)
+FLAG_SWEEPING = wp.constant(9)
+FLAG_SWEPT = wp.constant(10)
 """Sweeps of this step so far."""
-IMPACTING = wp.constant(11)
+FLAG_IMPACTING = wp.constant(11)
 """1: rounds of impacts go on, of which the last is of all contacts."""
-STRUCK = wp.constant(12)
+FLAG_STRUCK = wp.constant(12)
 """1: some rigid pair is hit as things move now."""
-ROUND = wp.constant(13)
+FLAG_ROUND = wp.constant(13)
 """Rounds of this step so far."""
-LAST_ROUND = wp.constant(14)
-KEPT = wp.constant(15)
+FLAG_LAST_ROUND = wp.constant(14)
+FLAG_NORMALS_KEPT = wp.constant(15)
 """Choices of candidate normals of the last step; 0 where all are made anew."""
-ASKED = wp.constant(16)
+FLAG_NORMALS_RENEWED = wp.constant(16)
 """1: some are made anew in this step."""
-NODES = wp.constant(17)
+FLAG_NODES = wp.constant(17)
 """Contacts on nodes: those on surface points come after them."""
-HOLDS = wp.constant(18)
+FLAG_HOLDS = wp.constant(18)
 """1: in this round of impacts something is held from behind."""
-STEPPING = wp.constant(19)
+FLAG_STEPPING = wp.constant(19)
 """1: another step comes before particles are sorted."""
-HOMES = wp.constant(20)
+FLAG_HOMES = wp.constant(20)
 """Blocks that had particles in them when these were sorted: the first ones."""
-TASKS = wp.constant(21)
+FLAG_TASKS = wp.constant(21)
 """Tasks: parts of such blocks' particles, each for a group of threads."""
-PLACED = wp.constant(22)
+FLAG_PLACED = wp.constant(22)
 """Particles that have a place, while they are sorted."""
-STRAYS = wp.constant(23)
+FLAG_STRAYS = wp.constant(23)
 """Particles that have left the block they were sorted into."""
-PAIRS = wp.constant(24)
+FLAG_PAIRS = wp.constant(24)
 """Pairs that met in this step."""
-FLAGS = 25
+FLAG_COUNT = 25
 ARENA_SIDE, ARENA_NODES, NODES_OF_BLOCK = 6, 216, 64
 """Nodes along an axis that particles of one block reach, all of them, and nodes of a block."""
 ARENA_SUMS, ARENA_MOTION = wp.constant(7), 6
 """Sums of a node: mass [kg], momentum and impulse [kg m/s]; numbers of its motion [m/s]."""
-GROUP = 128
+THREADS_PER_GROUP = 128
 """Threads of a group on a card."""
 TASK = wp.constant(512)
 """Particles of a task at most: a block of eight a cell is one."""
 # What ``Contacts.active`` says, where it is not 0: not in this step.
-WAITING = wp.constant(1)
+CONTACT_WAITING = wp.constant(1)
 """Not in this round of impacts."""
-SWEPT_NOW = wp.constant(2)
+CONTACT_SWEPT = wp.constant(2)
 
 
 # What ``Sheet.clock`` holds.
-TIME = wp.constant(0)
-UNTIL = wp.constant(1)
-DT = wp.constant(2)
-COUNT = wp.constant(3)
-SMALLEST = wp.constant(4)
-LARGEST = wp.constant(5)
-STABLE = wp.constant(6)
+CLOCK_TIME = wp.constant(0)
+CLOCK_UNTIL = wp.constant(1)
+CLOCK_DT = wp.constant(2)
+CLOCK_COUNT = wp.constant(3)
+CLOCK_SMALLEST = wp.constant(4)
+CLOCK_LARGEST = wp.constant(5)
+CLOCK_STABLE = wp.constant(6)
 """Largest stable step as of now [s]."""
-LAST = wp.constant(7)
+CLOCK_LAST_STEP = wp.constant(7)
 """1: this step ends exactly at UNTIL."""
-FORCED = wp.constant(8)
+CLOCK_FORCED = wp.constant(8)
 """1: one step to UNTIL, stable or not."""
-CLOCK = 9
+CLOCK_LENGTH = 9
 
 # Columns of the table of materials.
 LAW = wp.constant(0)
@@ -105,8 +105,8 @@ DENSITY = wp.constant(10)
 RIGID = wp.constant(11)
 STIFFENING = wp.constant(12)
 """How much faster waves run with Maxwell branches; 1 without."""
-BODY = wp.constant(13)
-SWELLS = wp.constant(14)
+MATERIAL_BODY = wp.constant(13)
+USES_MEAN_DILATATION = wp.constant(14)
 """1: pressure comes from a mean dilatation."""
 SHEAR = wp.constant(15)
 """G of each Maxwell branch [Pa], …"""
@@ -116,25 +116,25 @@ RELAXATION = wp.constant(19)
 """… and T [s]."""
 CONSISTENCY = wp.constant(21)
 """K_c of a liquid [Pa sⁿ]."""
-COLUMNS = 22
+MATERIAL_COLUMNS = 22
 
 # Rows of ``Sheet.loss``; each is spread over LANES places, so that threads rarely collide.
-PLASTIC = wp.constant(0)
-VISCOUS = wp.constant(1)
-PUSHING = wp.constant(2)
-RUBBING = wp.constant(3)
-STRIKING = wp.constant(4)
-LANES = wp.constant(256)
+LOSS_PLASTIC = wp.constant(0)
+LOSS_VISCOUS = wp.constant(1)
+LOSS_PUSH_WORK = wp.constant(2)
+LOSS_FRICTION = wp.constant(3)
+LOSS_IMPACT = wp.constant(4)
+LOSS_LANES = wp.constant(256)
 
 vec6 = wp.types.vector(length=6, dtype=wp.float32)
 vec14 = wp.types.vector(length=14, dtype=wp.float32)
-BRANCHES, BRANCH = wp.constant(constants.BRANCHES), wp.constant(7)
+BRANCHES, BRANCH_CHANNELS = wp.constant(constants.BRANCHES), wp.constant(7)
 """Maxwell branches of a particle; numbers that each remembers: its strain (6) and θ."""
 D = wp.float64
 
 
 @wp.struct
-class Sheet:
+class StepGlobals:
     """What one step shares: clock, flags, forces, and the books."""
 
     clock: wp.array(dtype=wp.float64)
@@ -188,7 +188,7 @@ class Sheet:
 
 
 @wp.struct
-class Particles:
+class DeviceParticles:
     """Everything that can deform, sorted by block now and then."""
 
     count: int
@@ -237,7 +237,7 @@ class Particles:
 
 
 @wp.struct
-class Grid:
+class BlockGrid:
     """Node blocks of 4³ of all fields, found by hashing (field, block)."""
 
     keys: wp.array(dtype=wp.int64)

@@ -1,12 +1,12 @@
 """Structs of rigid bodies, of what acts on bodies, and of what frames hold: see ``layout``."""
 
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
-class Rigid:
+class DeviceRigidBodies:
     """Rigid bodies, their particles and surface points; arrays of states go by body."""
 
     stiff: wp.array(dtype=wp.int32)
@@ -101,7 +101,7 @@ class Rigid:
 
 
 @wp.struct
-class Loads:
+class DeviceLoads:
     """What acts on single particles, wind and tethers; and joints of rigid bodies."""
 
     acts: int
@@ -180,7 +180,7 @@ class Loads:
 
 
 @wp.struct
-class Bonds:
+class DeviceBonds:
     """Rigid frames and the soft bodies' nodes that they hold; sums go by body."""
 
     count: int

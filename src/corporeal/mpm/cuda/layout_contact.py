@@ -1,12 +1,12 @@
 """Struct of contacts: see ``layout``."""
 
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
 wp.set_module_options({"enable_backward": False})
 
 
 @wp.struct
-class Contacts:
+class DeviceContacts:
     """Nodes where fields meet, FIELDS_AT_NODE entries for each, and the touches of pairs there."""
 
     room: int

@@ -4,20 +4,20 @@ from typing import Any
 
 import numpy as np
 
+from corporeal.mpm.cuda.device_memory import DeviceMemory
 from corporeal.mpm.cuda.layout import wp
-from corporeal.mpm.cuda.layout_bodies import Bonds, Loads
-from corporeal.mpm.cuda.memory import Memory
-from corporeal.mpm.physics import inclusions, wind
-from corporeal.mpm.physics.grips import Grip
+from corporeal.mpm.cuda.layout_bodies import DeviceBonds, DeviceLoads
+from corporeal.mpm.physics import inclusions, wind_pressure
+from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.problem import Problem
-from corporeal.mpm.state import Matter
+from corporeal.mpm.state import ParticleConstants
 
-NEVER = (0.0, -1.0)
+NO_TIME_WINDOW = (0.0, -1.0)
 
 
-def loads(memory: Memory, problem: Problem, matter: Matter) -> Any:
+def lay_out_loads(memory: DeviceMemory, problem: Problem, matter: ParticleConstants) -> Any:
     """Lay out wind, tethers and joints."""
-    bodies, count, out = len(problem.bodies), len(matter.mass), Loads()
+    bodies, count, out = len(problem.bodies), len(matter.mass), DeviceLoads()
     out.blown = memory.zeros((3, count), wp.float32)
     out.pulled = memory.zeros((3, count), wp.float32)
     out.at = memory.zeros(count, wp.int32)
@@ -36,18 +36,20 @@ def loads(memory: Memory, problem: Problem, matter: Matter) -> Any:
     return out
 
 
-def _wind(out: Any, memory: Memory, problem: Problem) -> None:
+def _wind(out: Any, memory: DeviceMemory, problem: Problem) -> None:
     winds = [body.wind for body in problem.bodies]
     air = np.array([w.velocity if w else (0.0, 0.0, 0.0) for w in winds], float)
-    window = np.array([(w.start, w.end) if w else NEVER for w in winds], float)
+    window = np.array([(w.start, w.end) if w else NO_TIME_WINDOW for w in winds], float)
     out.air = memory.put(air, wp.vec3d)
     out.gust = memory.put(np.array([w.gust if w else 0.0 for w in winds]), wp.float64)
     out.start, out.end = memory.put(window[:, 0], wp.float64), memory.put(window[:, 1], wp.float64)
-    parts = np.stack([wind.GUST_SHARE, wind.GUST_FREQUENCY, wind.GUST_PHASE], axis=1)
+    parts = np.stack(
+        [wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE], axis=1
+    )
     out.octave = memory.put(parts, wp.vec3d)
 
 
-def _faces(out: Any, memory: Memory, problem: Problem, matter: Matter) -> None:
+def _faces(out: Any, memory: DeviceMemory, problem: Problem, matter: ParticleConstants) -> None:
     number, owner, area = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros((0, 3))]
     first = 0
     for b, body in enumerate(problem.bodies):
@@ -65,7 +67,7 @@ def _faces(out: Any, memory: Memory, problem: Problem, matter: Matter) -> None:
     out.weight = memory.put(matter.mass[face], wp.float32)
 
 
-def _tethers(out: Any, memory: Memory, problem: Problem, matter: Matter) -> None:
+def _tethers(out: Any, memory: DeviceMemory, problem: Problem, matter: ParticleConstants) -> None:
     number, holder = [np.zeros(0, int)], [np.zeros(0, int)]
     rate, damping = [np.zeros(0)], [np.zeros(0)]
     first = 0
@@ -87,7 +89,7 @@ def _tethers(out: Any, memory: Memory, problem: Problem, matter: Matter) -> None
     out.damping = memory.put(np.concatenate(damping), wp.float64)
 
 
-def _joints(out: Any, memory: Memory, problem: Problem, matter: Matter) -> None:
+def _joints(out: Any, memory: DeviceMemory, problem: Problem, matter: ParticleConstants) -> None:
     joints = problem.joints if problem.contact == "multi" else ()
     first = np.array([j.first for j in joints], int)
     second = np.array([j.second for j in joints], int)
@@ -100,7 +102,9 @@ def _joints(out: Any, memory: Memory, problem: Problem, matter: Matter) -> None:
     out.friction = memory.put(np.array([j.damping for j in joints], float), wp.float64)
 
 
-def put_grips(out: Any, problem: Problem, matter: Matter, grips: dict[int, Grip]) -> None:
+def write_grips(
+    out: Any, problem: Problem, matter: ParticleConstants, grips: dict[int, Grip]
+) -> None:
     """Write what is held from outside, by body, in place of all earlier grips."""
     bodies = len(problem.bodies)
     gripped, share = np.zeros(bodies, np.int32), np.zeros(len(matter.mass), np.float32)
@@ -119,12 +123,13 @@ def put_grips(out: Any, problem: Problem, matter: Matter, grips: dict[int, Grip]
     out.external.zero_()
 
 
-def bonds(memory: Memory, problem: Problem) -> Any:
+def lay_out_bonds(memory: DeviceMemory, problem: Problem) -> Any:
     """Lay out rigid inclusions; where two frames could hold a node, the first does."""
     pairs = sorted(problem.bonds) if problem.contact == "multi" else []
-    bodies, h = len(problem.bodies), Bonds()
+    bodies, h = len(problem.bodies), DeviceBonds()
     dense = [
-        inclusions.densities(problem.bodies[f], problem.bodies[s], problem.cell) for f, s in pairs
+        inclusions.frame_and_soft_density(problem.bodies[f], problem.bodies[s], problem.cell)
+        for f, s in pairs
     ]
     density = np.array(dense, float).reshape(-1, 2)
     frame, soft = np.array(pairs, int).reshape(-1, 2).T

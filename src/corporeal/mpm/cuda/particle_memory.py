@@ -10,14 +10,14 @@ import numpy as np
 
 from corporeal.mpm import constants
 from corporeal.mpm.cuda import layout
-from corporeal.mpm.cuda.layout import Particles, wp
-from corporeal.mpm.cuda.memory import Memory, split
+from corporeal.mpm.cuda.device_memory import DeviceMemory, split_position
+from corporeal.mpm.cuda.layout import DeviceParticles, wp
 from corporeal.mpm.problem import Problem
-from corporeal.mpm.state import Matter
+from corporeal.mpm.state import ParticleConstants
 
-LANES_OF_A_WARP = 32
+WARP_LANES = 32
 """Channels begin where a warp's reads are one transaction a word."""
-STATE: dict[str, tuple[tuple[int, ...], Any]] = {
+PARTICLE_STATE: dict[str, tuple[tuple[int, ...], Any]] = {
     "cell": ((3,), wp.int32),
     "place": ((3,), wp.float32),
     "velocity": ((3,), wp.float32),
@@ -31,36 +31,38 @@ STATE: dict[str, tuple[tuple[int, ...], Any]] = {
     "opened": ((), wp.float32),
     "relief": ((), wp.float32),
     "pressure": ((), wp.float32),
-    "branch": ((constants.BRANCHES * int(layout.BRANCH),), wp.float32),
+    "branch": ((constants.BRANCHES * int(layout.BRANCH_CHANNELS),), wp.float32),
     "kind": ((), wp.int32),
     "field": ((), wp.int32),
     "number": ((), wp.int32),
 }
 """What is kept of each particle: shape of a row, and type; behind it stands their block."""
-SORTED_AT_ONCE = 16
+CHANNELS_SORTED_AT_ONCE = 16
 """Channels that are moved together when particles are sorted: so many are there twice."""
-CHANNELS = 1 + sum(int(np.prod(shape)) for shape, _ in STATE.values())
+PARTICLE_CHANNELS = 1 + sum(int(np.prod(shape)) for shape, _ in PARTICLE_STATE.values())
 
 
-def particles(memory: Memory, problem: Problem, matter: Matter, chosen: np.ndarray) -> Any:
+def lay_out_particles(
+    memory: DeviceMemory, problem: Problem, matter: ParticleConstants, chosen: np.ndarray
+) -> Any:
     """Lay out the particles that move with a grid of their own."""
-    p = Particles()
+    p = DeviceParticles()
     p.count = len(chosen)
-    lanes = max(1, -(-p.count // LANES_OF_A_WARP)) * LANES_OF_A_WARP
-    p.words = memory.zeros((CHANNELS, lanes), wp.int32)
+    lanes = max(1, -(-p.count // WARP_LANES)) * WARP_LANES
+    p.words = memory.zeros((PARTICLE_CHANNELS, lanes), wp.int32)
     first = 0
-    for name, (shape, kind) in STATE.items():
+    for name, (shape, kind) in PARTICLE_STATE.items():
         width = int(np.prod(shape))
         typed = p.words if kind is wp.int32 else p.words.view(kind)
         setattr(p, name, typed[first : first + width] if shape else typed[first])
         first += width
     p.home = p.words[first]
-    p.spare = memory.zeros((SORTED_AT_ONCE, lanes), wp.int32)
-    cell, place = split(_joined(problem, "position")[chosen] / problem.cell)
+    p.spare = memory.zeros((CHANNELS_SORTED_AT_ONCE, lanes), wp.int32)
+    cell, place = split_position(_join_bodies(problem, "position")[chosen] / problem.cell)
     given = {
         "cell": cell,
         "place": place,
-        "velocity": _joined(problem, "velocity")[chosen],
+        "velocity": _join_bodies(problem, "velocity")[chosen],
         "mass": matter.mass[chosen],
         "volume": matter.volume[chosen],
         "kind": matter.kind[chosen],
@@ -68,7 +70,7 @@ def particles(memory: Memory, problem: Problem, matter: Matter, chosen: np.ndarr
         "number": chosen,
     }
     for name, rows in given.items():
-        put(p, name, rows)
+        write_rows(p, name, rows)
     for name in ("grown", "bound"):
         setattr(p, name, memory.zeros(lanes, wp.float32))
     for name in ("cluster", "rank", "lost"):
@@ -77,14 +79,14 @@ def particles(memory: Memory, problem: Problem, matter: Matter, chosen: np.ndarr
     return p
 
 
-def rows(p: Any, name: str) -> np.ndarray:
+def read_rows(p: Any, name: str) -> np.ndarray:
     """Copy what is kept of all particles by a name to the host, (P, *shape)."""
-    shape, _ = STATE[name]
+    shape, _ = PARTICLE_STATE[name]
     values = getattr(p, name).numpy().reshape(-1, p.words.shape[1])[:, : p.count]
     return np.array(values.T, order="C").reshape(p.count, *shape)  # never a view
 
 
-def put(p: Any, name: str, values: np.ndarray) -> None:
+def write_rows(p: Any, name: str, values: np.ndarray) -> None:
     """Write rows of all particles, (P, *shape)."""
     array = getattr(p, name)
     there = array.numpy().reshape(-1, p.words.shape[1])
@@ -92,21 +94,21 @@ def put(p: Any, name: str, values: np.ndarray) -> None:
     array.assign(there.reshape(array.shape))
 
 
-def change(p: Any, name: str, which: np.ndarray, values: np.ndarray | float) -> None:
+def overwrite_particles(p: Any, name: str, which: np.ndarray, values: np.ndarray | float) -> None:
     """Overwrite rows of some particles."""
-    there = rows(p, name)
+    there = read_rows(p, name)
     there[which] = values
-    put(p, name, there)
+    write_rows(p, name, there)
 
 
-def _joined(problem: Problem, name: str) -> np.ndarray:
+def _join_bodies(problem: Problem, name: str) -> np.ndarray:
     return np.concatenate([getattr(body, name) for body in problem.bodies])
 
 
-def _materials(matter: Matter) -> np.ndarray:
+def _materials(matter: ParticleConstants) -> np.ndarray:
     """Write the rows that kernels read: see ``layout`` for the columns."""
     s = matter.substances
-    table = np.zeros((len(s.body), layout.COLUMNS))
+    table = np.zeros((len(s.body), layout.MATERIAL_COLUMNS))
     table[:, layout.LAW], table[:, layout.MU], table[:, layout.LAMBDA] = s.law, s.mu, s.lam
     table[:, layout.YIELD], table[:, layout.HARD] = s.yield_stress, s.hardening
     table[:, layout.CONE], table[:, layout.APEX] = s.cone, s.apex
@@ -117,6 +119,6 @@ def _materials(matter: Matter) -> np.ndarray:
     for first, name in named.items():
         column = getattr(s.branches, name)
         table[:, int(first) : int(first) + column.shape[1]] = column
-    table[:, layout.BODY], table[:, layout.RIGID] = s.body, s.rigid
-    table[:, layout.SWELLS] = s.swells
+    table[:, layout.MATERIAL_BODY], table[:, layout.RIGID] = s.body, s.rigid
+    table[:, layout.USES_MEAN_DILATATION] = s.swells
     return table

@@ -1,7 +1,7 @@
 """The formulas of the fast engines in C++, each once: eight lanes on processors, one on cards.
 
 The headers beside this file are templates on the number type (``lanes.h``). Warp includes them in
-every module that was given ``options``, whatever the module is compiled for.
+every module that was given ``formula_options``, whatever the module is compiled for.
 """
 
 import re
@@ -11,35 +11,35 @@ from typing import Any
 
 from corporeal.core.types import Law
 from corporeal.mpm import constants, laws
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
-HERE = Path(__file__).parent.resolve()
-HEADERS = tuple(sorted(path.name for path in HERE.glob("*.h")))
+FORMULAS_FOLDER = Path(__file__).parent.resolve()
+HEADERS = tuple(sorted(path.name for path in FORMULAS_FOLDER.glob("*.h")))
 
 
-def preamble() -> str:
+def cpp_preamble() -> str:
     """C++ text in front of a module: the numbers of laws and method, then all formulas."""
     numbers = ", ".join(f"{law.name} = {law.value}" for law in Law)
     kinds = f"namespace mpm {{ enum Law {{ {numbers} }}; }}"
-    lines = [kinds, *law_lists(), *(f'#include "{name}"' for name in HEADERS)]
-    return constants.text() + "".join(f"{line}\n" for line in lines)
+    lines = [kinds, *cpp_law_lists(), *(f'#include "{name}"' for name in HEADERS)]
+    return constants.cpp_constants() + "".join(f"{line}\n" for line in lines)
 
 
-def law_lists() -> list[str]:
+def cpp_law_lists() -> list[str]:
     """C++ lists of laws, X(NUMBER) for each, from which ``laws.h`` chooses: written from the menu.
 
     Raises:
         ImportError: A law of the menu is not in ``laws.h``.
 
     """
-    written = set(re.findall(r"struct Rule<(\w+), R>", (HERE / "laws.h").read_text()))
+    written = set(re.findall(r"struct Rule<(\w+), R>", (FORMULAS_FOLDER / "laws.h").read_text()))
     for law in Law:
         if law.name not in written:
             raise ImportError(
                 f"types.Law has {law.name}, but formulas/laws.h has no struct Rule<{law.name}, R>. "
                 "Write its formulas there: docs/extend.md says how."
             )
-    menu = laws.MENU
+    menu = laws.CONSTITUTIVE_LAWS
     groups = {
         # Hencky's stress is shared with all that flow, and so is not on the first list.
         "MPM_ELASTIC": [k for k in Law if not menu[k].flows and k is not Law.HENCKY],
@@ -53,7 +53,7 @@ def law_lists() -> list[str]:
     ]
 
 
-def options(
+def formula_options(
     *headers: Path, numbers: Mapping[str, int] | None = None, **others: Any
 ) -> dict[str, Any]:
     """Options of a Warp module that uses the formulas.
@@ -64,14 +64,17 @@ def options(
         others: More options of ``wp.set_module_options``.
 
     """
-    folders = [str(folder) for folder in (HERE, *(header.parent for header in headers))]
-    text = preamble() + constants.written(numbers or {})
+    folders = [str(folder) for folder in (FORMULAS_FOLDER, *(header.parent for header in headers))]
+    text = cpp_preamble() + constants.cpp_definitions(numbers or {})
     text += "".join(f'#include "{header.name}"\n' for header in headers)
     build = wp.ModuleBuildOptions(
         extra_cpu_include_dirs=folders,
         extra_cuda_include_dirs=folders,
         extra_cpu_preamble=text,
         extra_cuda_preamble=text,
-        extra_build_dependencies=[*(str(HERE / name) for name in HEADERS), *map(str, headers)],
+        extra_build_dependencies=[
+            *(str(FORMULAS_FOLDER / name) for name in HEADERS),
+            *map(str, headers),
+        ],
     )
     return {"enable_backward": False, "extra_build_options": build, **others}

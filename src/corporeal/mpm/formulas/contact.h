@@ -18,7 +18,7 @@ template <class R> struct Face {
     return n < R(-0.5) ? far : near;
   }
   CUDA_CALLABLE static inline R enough(R share) {
-    return share > R(SMALLEST_WEIGHT) ? share : R(SMALLEST_WEIGHT);
+    return share > R(MIN_HALF_SPACE_WEIGHT) ? share : R(MIN_HALF_SPACE_WEIGHT);
   }
   // Share of a node's spline that the half space u < s fills.
   CUDA_CALLABLE static inline R filled(R s) {
@@ -30,33 +30,33 @@ template <class R> struct Face {
   CUDA_CALLABLE static inline R mean(R s) {
     s = s < R(-1.5) ? R(-1.5) : s > R(1.5) ? R(1.5) : s;
     const R n = s > 0 ? -s : s, weight = filled(s);
-    return weight > R(SMALLEST_WEIGHT) ? moment(n) / weight : n;
+    return weight > R(MIN_HALF_SPACE_WEIGHT) ? moment(n) / weight : n;
   }
   // The same of a lattice of two points per cell and axis, the first a quarter of a cell behind the face.
   CUDA_CALLABLE static inline R lattice(R s) {
     s = s > R(1.5) ? R(1.5) : s;
     R weight = 0, moment = 0;
     for (int k = 0; k < LATTICE_ROWS; k++) {
-      const R u = s - R(PARTICLE_RADIUS) * R(1 + 2 * k), a = u < 0 ? -u : u, t = R(1.5) - a;
+      const R u = s - R(PARTICLE_RADIUS_DX) * R(1 + 2 * k), a = u < 0 ? -u : u, t = R(1.5) - a;
       const R w = a < R(0.5) ? R(0.75) - a * a : a < R(1.5) ? R(0.5) * t * t : R(0.0);
       weight += w;
       moment += w * u;
     }
-    return weight > R(SMALLEST_WEIGHT) ? moment / weight : s - R(PARTICLE_RADIUS);
+    return weight > R(MIN_HALF_SPACE_WEIGHT) ? moment / weight : s - R(PARTICLE_RADIUS_DX);
   }
-  // Where the face lies: the inverse of mean, from a table of FACE_STEPS + 1 values over [-1.5, 0].
+  // Where the face lies: the inverse of mean, from a table of FACE_TABLE_INTERVALS + 1 values over [-1.5, 0].
   CUDA_CALLABLE static inline R place(const R *table, R p) {
-    R f = ((p < R(-1.5) ? R(-1.5) : p > R(0.0) ? R(0.0) : p) + R(1.5)) * R(FACE_STEPS / 1.5);
-    int i = f < R(FACE_STEPS - 1) ? (int)f : FACE_STEPS - 1;
+    R f = ((p < R(-1.5) ? R(-1.5) : p > R(0.0) ? R(0.0) : p) + R(1.5)) * R(FACE_TABLE_INTERVALS / 1.5);
+    int i = f < R(FACE_TABLE_INTERVALS - 1) ? (int)f : FACE_TABLE_INTERVALS - 1;
     return table[i] + (table[i + 1] - table[i]) * (f - i);
   }
   // Distance t(s) of the mean offsets of two half spaces that touch.
   CUDA_CALLABLE static inline R touching(R s) {
     s = s < 0 ? -s : s;
-    if (s > R(DEEPEST)) s = R(DEEPEST);
-    const R n = -s, over = s - R(LATTICE_START), less = least(n), m = moment(n), fills = enough(less);
-    const R ahead = m / enough(R(1.0) - less), behind = fills > R(SMALLEST_WEIGHT) ? m / fills : n;
-    return -ahead - behind + R(LATTICE_GAP) + R(LATTICE_SLOPE) * (over > 0 ? over : R(0.0));
+    if (s > R(MAX_FACE_DEPTH_DX)) s = R(MAX_FACE_DEPTH_DX);
+    const R n = -s, over = s - R(LATTICE_START_DX), less = least(n), m = moment(n), fills = enough(less);
+    const R ahead = m / enough(R(1.0) - less), behind = fills > R(MIN_HALF_SPACE_WEIGHT) ? m / fills : n;
+    return -ahead - behind + R(LATTICE_GAP_DX) + R(LATTICE_SLOPE) * (over > 0 ? over : R(0.0));
   }
   // Open distance along n, from a to c, of two fields whose mean offsets along it are a and c.
   CUDA_CALLABLE static inline R gap(const R *table, R a, R c) {
@@ -72,8 +72,8 @@ template <class R> struct Face {
   // node's mass over that of a full cell.
   CUDA_CALLABLE static inline R gap_of_liquid(R a, R h, R full) {
     const R off = mean(h) - a;
-    const bool like = full >= R(FILLED) && off < R(LIKE_HALF_SPACE) && off > R(-LIKE_HALF_SPACE);
-    return h > R(WALL_REACH) && (h > R(HELD_BY_WALL) || !like) ? R(VAST) : gap_to_plane(a, h);
+    const bool like = full >= R(MIN_FILLED_FRACTION) && off < R(HALF_SPACE_TOLERANCE_DX) && off > R(-HALF_SPACE_TOLERANCE_DX);
+    return h > R(WALL_REACH) && (h > R(LIQUID_WALL_REACH_DX) || !like) ? R(VAST) : gap_to_plane(a, h);
   }
   // The same to a surface; what is deep inside of a field does not feel it.
   CUDA_CALLABLE static inline R gap_to_surface(R a, R h) {
@@ -103,8 +103,8 @@ template <class R> struct Touched {
     const double apart = 1.0 - cosine * cosine;
     double first = far >= other ? far : 0.0, second = far >= other ? 0.0 : other;
     if (far * cosine < other && other * cosine < far) {   // neither edge is all that counts
-      first = apart > OPPOSITE ? (far - other * cosine) / apart : 0.5 * far;
-      second = apart > OPPOSITE ? (other - far * cosine) / apart : 0.5 * other;
+      first = apart > PARALLEL_EDGE_SINE2 ? (far - other * cosine) / apart : 0.5 * far;
+      second = apart > PARALLEL_EDGE_SINE2 ? (other - far * cosine) / apart : 0.5 * other;
     }
     for (int i = 0; i < 3; i++) out[i] = first * p[i] + second * q[i];
   }
@@ -120,15 +120,15 @@ template <class R> struct Support {
 // For how many steps a choice of candidate normals is kept, at a speed of so many cells a step.
 struct Keep {
   CUDA_CALLABLE static inline int steps(double speed) {
-    int n = KEPT_STEPS;
-    while (n > 1 && n * speed > KEPT_TRAVEL) n /= 2;
+    int n = NORMAL_CACHE_STEPS;
+    while (n > 1 && n * speed > NORMAL_CACHE_TRAVEL_DX) n /= 2;
     return n;
   }
 };
 // In which order contacts are swept: number k is k times the stride, modulo their number.
 struct Scatter {
   CUDA_CALLABLE static inline int stride(int count) {
-    int step = (int)(SCATTER * count);
+    int step = (int)(SWEEP_STRIDE_FRACTION * count);
     while (step > 1 && shared(step, count)) step--;
     return step > 1 ? step : 1;
   }
@@ -148,16 +148,16 @@ struct Scatter {
 struct Impact {
   CUDA_CALLABLE static inline double approach(double speed, double kick, double feigned) {
     const double all = kick > 0 ? speed - kick : speed;
-    return all > SLOWEST_BOUNCE + feigned ? all : 0.0;
+    return all > MIN_REBOUND_SPEED + feigned ? all : 0.0;
   }
   // Whether a contact closes fast enough to begin an impact of its pair.
   CUDA_CALLABLE static inline bool begins(double approach, double speed, double gap, double dt) {
-    return approach > SLOWEST_BOUNCE && speed * dt > gap;
+    return approach > MIN_REBOUND_SPEED && speed * dt > gap;
   }
   // Speed that a contact of a pair in an impact may keep: all near ones rebound.
   CUDA_CALLABLE static inline double target(double e, double approach, double speed, double gap,
                                             double dt, double dx) {
-    const bool rebounds = approach > SLOWEST_BOUNCE && (speed * dt > gap || gap < PATCH * dx);
+    const bool rebounds = approach > MIN_REBOUND_SPEED && (speed * dt > gap || gap < IMPACT_PATCH_DX * dx);
     return rebounds ? -e * approach : closing(gap, dt);
   }
   // Restitution at the speed of a blow. law: the speed at which it is e, slope, exponent, least and most.
@@ -177,7 +177,7 @@ struct FlowCurve {
   double yield, drag, index;
 };
 // What a liquid that sticks bears on a wall: twin of physics/wall_stress.py. Herschel and Bulkley's flow curve
-// tau = yield + K (u/d)^n of a layer d = WALL_LAYER dx thick whose other side slips by u.
+// tau = yield + K (u/d)^n of a layer d = WALL_LAYER_DX dx thick whose other side slips by u.
 struct WallStress {
   // Area of the wall times time [m^2 s] that acts on a node of mass m, h cells over the wall: its spline's
   // weight on the wall over that of the half space above it; full: mass of a full cell.

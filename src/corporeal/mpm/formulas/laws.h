@@ -565,12 +565,12 @@ template <class R> struct Laws {
   }
   // The part of lambda that acts on the mean dilatation of nearly incompressible matter [Pa].
   CUDA_CALLABLE static inline R mean_bulk(const Material<R> &t) {
-    return S::high(t.lambda - (float)OWN_BULK * t.mu, S::all(0.0f));
+    return S::high(t.lambda - (float)LOCAL_BULK_RATIO * t.mu, S::all(0.0f));
   }
   // Kirchhoff pressure of that part at the volume J e^relief [Pa]; adds its bound on rho c^2 to wave.
   CUDA_CALLABLE static inline R mean_pressure(const Material<R> &t, R bulk, R j1, R relief, R &wave) {
     R p = S::all(0.0f), slope = p;
-    j1 = S::high(j1, S::all((float)SMALLEST_VOLUME - 1.0f));
+    j1 = S::high(j1, S::all((float)MIN_VOLUME_RATIO - 1.0f));
 #define MPM_MEAN(NUMBER) averaged<NUMBER>(t, j1, relief, p, slope);
     MPM_BULKY(MPM_MEAN)
 #undef MPM_MEAN

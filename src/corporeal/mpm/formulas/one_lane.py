@@ -3,13 +3,21 @@
 Every function is a call into the headers beside this file and holds no formula of its own.
 """
 
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
-STRAIN, WAVE, J1, PLASTIC_STRAIN, OPENED, PLASTIC_WORK, LENGTH = 6, 15, 16, 17, 18, 19, 20
+(
+    RESPONSE_STRAIN,
+    RESPONSE_WAVE,
+    RESPONSE_J1,
+    RESPONSE_PLASTIC_STRAIN,
+    RESPONSE_OPENED,
+    RESPONSE_PLASTIC_WORK,
+    RESPONSE_LENGTH,
+) = 6, 15, 16, 17, 18, 19, 20
 """First places in a ``Response``: F - 1 after the return map (9), bound on ρ c² [Pa], J - 1 of the
 trial strain, increment of the equivalent plastic strain, volume correction of granular matter,
 plastic work per rest volume [J/m³]; before them τ (6: 00 01 02 11 12 22) [Pa]."""
-Response = wp.types.vector(length=LENGTH, dtype=wp.float32)
+Response = wp.types.vector(length=RESPONSE_LENGTH, dtype=wp.float32)
 
 
 @wp.func_native(f"""
@@ -18,17 +26,17 @@ Response = wp.types.vector(length=LENGTH, dtype=wp.float32)
   for (int k = 0; k < 9; k++) F[k] = H.data[k / 3][k % 3];
   mpm::Response<float> a;
   mpm::Laws<float>::respond(t, plastic, opened, F, a);
-  wp::vec_t<{LENGTH}, wp::float32> r;
-  for (int k = 0; k < {STRAIN}; k++) r[k] = a.tau[k];
-  for (int k = 0; k < 9; k++) r[{STRAIN} + k] = F[k];
-  r[{WAVE}] = a.wave;
-  r[{J1}] = a.j1;
-  r[{PLASTIC_STRAIN}] = a.plastic;
-  r[{OPENED}] = a.opened;
-  r[{PLASTIC_WORK}] = a.work;
+  wp::vec_t<{RESPONSE_LENGTH}, wp::float32> r;
+  for (int k = 0; k < {RESPONSE_STRAIN}; k++) r[k] = a.tau[k];
+  for (int k = 0; k < 9; k++) r[{RESPONSE_STRAIN} + k] = F[k];
+  r[{RESPONSE_WAVE}] = a.wave;
+  r[{RESPONSE_J1}] = a.j1;
+  r[{RESPONSE_PLASTIC_STRAIN}] = a.plastic;
+  r[{RESPONSE_OPENED}] = a.opened;
+  r[{RESPONSE_PLASTIC_WORK}] = a.work;
   return r;
 """)
-def respond(
+def law_response(
     law: wp.float32,
     mu: wp.float32,
     lam: wp.float32,
@@ -64,16 +72,16 @@ def mean_pressure(law: wp.float32, bulk: wp.float32, H: wp.mat33, relief: wp.flo
 
 
 @wp.func_native("return mpm::remembers((int)law);")
-def remembers(law: wp.float32) -> wp.bool: ...
+def law_has_branches(law: wp.float32) -> wp.bool: ...
 
 
 @wp.func_native("return mpm::liquid((int)law);")
-def liquid(law: wp.float32) -> wp.bool: ...
+def law_is_liquid(law: wp.float32) -> wp.bool: ...
 
 
 # ---------------------------------------------------------------- Maxwell branches
 
-Branches = wp.types.vector(length=14, dtype=wp.float32)
+BranchState = wp.types.vector(length=14, dtype=wp.float32)
 """What two branches remember: strain (6: 00 01 02 11 12 22) and θ of one after the other."""
 
 
@@ -86,12 +94,12 @@ Branches = wp.types.vector(length=14, dtype=wp.float32)
   m.c[first + 6] = q * m.c[first + 6] + r * trace;
   return m;
 """)
-def follow(
-    A: wp.mat33, dt: wp.float32, time: wp.float32, memory: Branches, first: int
-) -> Branches: ...
+def advance_branch(
+    A: wp.mat33, dt: wp.float32, time: wp.float32, memory: BranchState, first: int
+) -> BranchState: ...
 
 
-Stress = wp.types.vector(length=6, dtype=wp.float32)
+StressVector = wp.types.vector(length=6, dtype=wp.float32)
 
 
 @wp.func_native("""
@@ -100,7 +108,9 @@ Stress = wp.types.vector(length=6, dtype=wp.float32)
   mpm::Branch<float>::press(shear, bulk, &memory.c[first], memory.c[first + 6], &tau.c[0]);
   return tau;
 """)
-def press(shear: wp.float32, bulk: wp.float32, memory: Branches, first: int) -> Stress: ...
+def branch_stress(
+    shear: wp.float32, bulk: wp.float32, memory: BranchState, first: int
+) -> StressVector: ...
 
 
 # ---------------------------------------------------------------- splines
@@ -111,7 +121,7 @@ def press(shear: wp.float32, bulk: wp.float32, memory: Branches, first: int) -> 
   for (int d = 0; d < 3; d++) mpm::Spline<float>::weights(f[d], n.data[d]);
   return n;
 """)
-def splines(f: wp.vec3) -> wp.mat33: ...
+def spline_weights(f: wp.vec3) -> wp.mat33: ...
 
 
 @wp.func_native("""
@@ -119,7 +129,7 @@ def splines(f: wp.vec3) -> wp.mat33: ...
   for (int d = 0; d < 3; d++) mpm::Spline<float>::slopes(f[d], g.data[d]);
   return g;
 """)
-def slopes(f: wp.vec3) -> wp.mat33: ...
+def spline_slopes(f: wp.vec3) -> wp.mat33: ...
 
 
 # ---------------------------------------------------------------- rigid bodies
@@ -130,7 +140,7 @@ def slopes(f: wp.vec3) -> wp.mat33: ...
   mpm::Body::advance(&R.data[0][0], &rest.data[0][0], &moment.c[0], &spin.c[0], dt, &Q.data[0][0]);
   return Q;
 """)
-def turned(
+def integrate_rotation(
     R: wp.mat33d, rest: wp.mat33d, moment: wp.vec3d, spin: wp.vec3d, dt: wp.float64
 ) -> wp.mat33d: ...
 
@@ -148,10 +158,10 @@ def inverse_inertia(R: wp.mat33d, rest: wp.mat33d) -> wp.mat33d: ...
   double angle = mpm::Body::turned(&R.data[0][0], &axis.c[0]);
   return wp::mul(axis, angle);
 """)
-def turn_of(R: wp.mat33d) -> wp.vec3d: ...
+def rotation_vector(R: wp.mat33d) -> wp.vec3d: ...
 
 
-Brake = wp.types.vector(length=7, dtype=wp.float64)
+BrakeVector = wp.types.vector(length=7, dtype=wp.float64)
 """Angular impulse (3) [N m s], impulse (3) [N s] and the energy that they take [J]."""
 
 
@@ -172,7 +182,7 @@ Brake = wp.types.vector(length=7, dtype=wp.float64)
   r.c[6] = mpm::Rolling::brake(a, c, &spin.c[0], &n.c[0], &J.c[0], friction, most, to, to + 3);
   return r;
 """)
-def brake(
+def rolling_brake(
     light_a: wp.float64,
     inertia_a: wp.mat33d,
     arm_a: wp.vec3d,
@@ -184,10 +194,10 @@ def brake(
     J: wp.vec3d,
     friction: wp.float64,
     most: wp.float64,
-) -> Brake: ...
+) -> BrakeVector: ...
 
 
-Guided = wp.types.vector(length=15, dtype=wp.float64)
+PathMotion = wp.types.vector(length=15, dtype=wp.float64)
 """Velocity (3), spin (3) and rotation (9)."""
 
 
@@ -207,7 +217,7 @@ def follow_path(
     dt: wp.float64,
     x: wp.vec3d,
     R: wp.mat33d,
-) -> Guided: ...
+) -> PathMotion: ...
 
 
 # ---------------------------------------------------------------- loads
@@ -226,7 +236,7 @@ def turned_area(F: wp.mat33, area: wp.vec3) -> wp.vec3: ...
   mpm::Air<float>::press(half_rho_c, &area.c[0], &seen.c[0], mass, dt, &J.c[0]);
   return J;
 """)
-def pressed(
+def wind_impulse(
     half_rho_c: wp.float32, area: wp.vec3, seen: wp.vec3, mass: wp.float32, dt: wp.float32
 ) -> wp.vec3: ...
 
@@ -236,7 +246,7 @@ def pressed(
   mpm::Grips::pull(stiffness, damping, mass, &away.c[0], &velocity.c[0], dt, &J.c[0]);
   return J;
 """)
-def pulled(
+def grip_spring_impulse(
     stiffness: wp.float64,
     damping: wp.float64,
     mass: wp.float64,
@@ -247,4 +257,4 @@ def pulled(
 
 
 @wp.func_native("return mpm::Clocks::ramped(time, ramp);")
-def ramped(time: wp.float64, ramp: wp.float64) -> wp.float64: ...
+def ramped_time(time: wp.float64, ramp: wp.float64) -> wp.float64: ...

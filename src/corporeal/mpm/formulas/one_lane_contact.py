@@ -1,6 +1,6 @@
 """The formulas of contact at one lane, as functions that Warp kernels call: see ``one_lane``."""
 
-from corporeal.mpm.warp_start import wp
+from corporeal.mpm.quiet_warp import wp
 
 
 @wp.func_native("return mpm::Face<float>::gap((const float *)table.data, mean_a, mean_c);")
@@ -41,14 +41,14 @@ def surface_begins(
   const double *from = (const double *)places.data + 3 * first;
   return mpm::Surface::thin_there(from, count, &x.c[0], far);
 """)
-def thin_there(
+def sees_thin_place(
     places: wp.array(dtype=wp.vec3d), first: int, count: int, x: wp.vec3d, far: wp.float64
 ) -> bool: ...
 
 
 @wp.func_native("""
   const double *from = (const double *)rows.data + 6 * first;
-  mpm::Wetted face[mpm::WETTED_FACES];
+  mpm::Wetted face[mpm::MAX_WETTED_FACES];
   mpm::AllWetted all = {from, &place.c[0], count, 0, face};
   const int found = mpm::Wetted::faces(all, &x.c[0], &place.c[0], dx, face);
   if (number >= found) return wp::vec4d(0.0, 0.0, 0.0, (double)mpm::VAST);
@@ -68,7 +68,7 @@ def wetted_face(
 
 @wp.func_native("""
   wp::vec_t<4, wp::float64> out;
-  const double *row = (const double *)rows.data + mpm::ROUNDING * number;
+  const double *row = (const double *)rows.data + mpm::CURVATURE_ROW * number;
   out[3] = mpm::Round::shift(row, &towards.c[0], &out.c[0]) ? 1.0 : 0.0;
   return out;
 """)
@@ -94,7 +94,7 @@ def facet_holds(
 ) -> bool: ...
 
 
-SEEN = wp.types.vector(length=8, dtype=wp.float64)
+SeenFromNode = wp.types.vector(length=8, dtype=wp.float64)
 """Where a node is in a body's frame [m]; the body's mean offset from there in the world [cells];
 its first flat face, and how many it has."""
 
@@ -110,11 +110,11 @@ its first flat face, and how many it has."""
   mpm::SeenFaces::along(A, C, &u.c[0], dx, &n.c[0]);
   return n;
 """)
-def along_faces(
+def facet_normal_at(
     rows: wp.array(dtype=wp.float64),
-    a: SEEN,
+    a: SeenFromNode,
     R: wp.mat33d,
-    c: SEEN,
+    c: SeenFromNode,
     S: wp.mat33d,
     u: wp.vec3d,
     dx: wp.float64,
@@ -122,12 +122,12 @@ def along_faces(
 ) -> wp.vec3d: ...
 
 
-MET = wp.types.vector(length=7, dtype=wp.float64)
+CurvedMeeting = wp.types.vector(length=7, dtype=wp.float64)
 """Place of a contact in the frame of what is round, normal of the face in the world, and gap."""
 
 
 @wp.func_native("""
-  const double *row = (const double *)rows.data + mpm::ROUNDING * q;
+  const double *row = (const double *)rows.data + mpm::CURVATURE_ROW * q;
   return mpm::Curved::may(row, (const double *)&points[q], &centre.c[0], far, first != 0);
 """)
 def curved_may(
@@ -141,7 +141,7 @@ def curved_may(
 
 
 @wp.func_native("""
-  return mpm::Curved::ball((const double *)rows.data + mpm::ROUNDING * p);
+  return mpm::Curved::ball((const double *)rows.data + mpm::CURVATURE_ROW * p);
 """)
 def ball_radius(rows: wp.array(dtype=wp.float64), p: int) -> wp.float64: ...
 
@@ -149,9 +149,9 @@ def ball_radius(rows: wp.array(dtype=wp.float64), p: int) -> wp.float64: ...
 @wp.func_native("""
   wp::vec_t<7, wp::float64> out;
   const double *row = (const double *)rows.data, *x = (const double *)points.data;
-  const bool met = mpm::Curved::meet(row + mpm::ROUNDING * p, x + 3 * p, &S.data[0][0],
-                                     row + mpm::ROUNDING * q, x + 3 * q, &R.data[0][0], &apart.c[0],
-                                     reach, &out.c[0], &out.c[3], out.c[6]);
+  const bool met = mpm::Curved::meet(row + mpm::CURVATURE_ROW * p, x + 3 * p, &S.data[0][0],
+                                     row + mpm::CURVATURE_ROW * q, x + 3 * q, &R.data[0][0],
+                                     &apart.c[0], reach, &out.c[0], &out.c[3], out.c[6]);
   if (!met) out.c[6] = mpm::VAST;
   return out;
 """)
@@ -164,7 +164,7 @@ def curved_meet(
     R: wp.mat33d,
     apart: wp.vec3d,
     reach: wp.float64,
-) -> MET: ...
+) -> CurvedMeeting: ...
 
 
 @wp.func_native("""
@@ -172,7 +172,7 @@ def curved_meet(
   double own = 0;
   for (int i = 0; i < 3; i++) own += (x.c[i] - at[3 * p + i]) * (x.c[i] - at[3 * p + i]);
   for (int o = first; o < first + count; o++)
-    if (mpm::Curved::taken(row + mpm::ROUNDING * p, own, &x.c[0], row + mpm::ROUNDING * o,
+    if (mpm::Curved::taken(row + mpm::CURVATURE_ROW * p, own, &x.c[0], row + mpm::CURVATURE_ROW * o,
                            at + 3 * o))
       return false;
   return true;
@@ -189,7 +189,7 @@ def curved_owns(
 
 @wp.func_native("""
   const double *row = (const double *)rows.data;
-  return mpm::Curved::misjudged(row + mpm::ROUNDING * p, row + mpm::ROUNDING * q, dx);
+  return mpm::Curved::misjudged(row + mpm::CURVATURE_ROW * p, row + mpm::CURVATURE_ROW * q, dx);
 """)
 def curved_misjudged(
     rows: wp.array(dtype=wp.float64), p: int, q: int, dx: wp.float64
@@ -198,7 +198,8 @@ def curved_misjudged(
 
 @wp.func_native("""
   const double *row = (const double *)rows.data;
-  return mpm::Curved::inward(row + mpm::ROUNDING * p, row + mpm::ROUNDING * q, square, dt);
+  return mpm::Curved::inward(row + mpm::CURVATURE_ROW * p, row + mpm::CURVATURE_ROW * q, square,
+  dt);
 """)
 def curved_inward(
     rows: wp.array(dtype=wp.float64), p: int, q: int, square: wp.float64, dt: wp.float64
@@ -220,7 +221,7 @@ def facet_replaces(
   mpm::Touched<float>::shift((const float *)table.data, &a.c[0], &c.c[0], &n.c[0], &out.c[0]);
   return out;
 """)
-def touched(
+def touching_offset(
     table: wp.array(dtype=wp.float32), a: wp.vec3d, c: wp.vec3d, n: wp.vec3d
 ) -> wp.vec3d: ...
 
@@ -230,7 +231,7 @@ def gap_of_liquid(mean: wp.float32, height: wp.float32, full: wp.float32) -> wp.
 
 
 @wp.func_native("return mpm::Support<float>::reach(&F.data[0][0], n[0], n[1], n[2], radius);")
-def reach_of(F: wp.mat33, n: wp.vec3, radius: wp.float32) -> wp.float32: ...
+def support_reach(F: wp.mat33, n: wp.vec3, radius: wp.float32) -> wp.float32: ...
 
 
 @wp.func_native("return mpm::Impact::approach(speed, kick, feigned);")
@@ -254,32 +255,39 @@ def impact_target(
 ) -> wp.float64: ...
 
 
-BACKING_ROW, ROLE, BOUNCE, LEAST, FASTEST_BLOW, BACKING_SUMS = 17, 0, 1, 2, 3, 4
+(
+    SUPPORT_ROW,
+    SUPPORT_ROLE,
+    SUPPORT_RESTITUTION,
+    SUPPORT_LEAST_GAP,
+    SUPPORT_IMPACT_SPEED,
+    SUPPORT_SUMS,
+) = 17, 0, 1, 2, 3, 4
 """Columns of ``Backing`` in backing.h: how many, and some of them; from BACKING_SUMS on sums."""
 STRUCK_PAIR, HELD_PAIR = 1, 2
 """What its role may be, where it is not 0: waiting."""
-BackingSums = wp.types.vector(length=BACKING_ROW - BACKING_SUMS, dtype=wp.float64)
+SupportSums = wp.types.vector(length=SUPPORT_ROW - SUPPORT_SUMS, dtype=wp.float64)
 
 
 @wp.func_native("return mpm::Backing::near(gap, least, speed, dx);")
-def backing_near(gap: wp.float64, least: wp.float64, speed: wp.float64, dx: wp.float64) -> bool: ...
+def support_near(gap: wp.float64, least: wp.float64, speed: wp.float64, dx: wp.float64) -> bool: ...
 
 
 @wp.func_native(f"""
-  static_assert(mpm::Backing::ROW == {BACKING_ROW} && mpm::Backing::COUNT == {BACKING_SUMS} &&
+  static_assert(mpm::Backing::ROW == {SUPPORT_ROW} && mpm::Backing::COUNT == {SUPPORT_SUMS} &&
                 mpm::Backing::STRUCK == {STRUCK_PAIR} && mpm::Backing::HELD == {HELD_PAIR}, "");
-  wp::vec_t<{BACKING_ROW - BACKING_SUMS}, wp::float64> sums;
+  wp::vec_t<{SUPPORT_ROW - SUPPORT_SUMS}, wp::float64> sums;
   mpm::Backing::adds(&x.c[0], &n.c[0], &sums.c[0]);
   return sums;
 """)
-def backing_adds(x: wp.vec3d, n: wp.vec3d) -> BackingSums: ...
+def support_adds(x: wp.vec3d, n: wp.vec3d) -> SupportSums: ...
 
 
 @wp.func_native("""
   mpm::Backing::hold((double *)rows.data, (const double *)restitution.data,
                      (const double *)laws.data, (const double *)light.data, light.shape[0], dx);
 """)
-def backing_hold(
+def support_hold(
     rows: wp.array2d(dtype=wp.float64),
     restitution: wp.array2d(dtype=wp.float64),
     laws: wp.array2d(dtype=wp.float64),
@@ -289,19 +297,19 @@ def backing_hold(
 
 
 @wp.func_native("return mpm::Backing::held(gap, dt, dx);")
-def held_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float64: ...
+def supported_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("""
   return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::PER_BLOW * pair, speed);
 """)
-def bounce_at(
+def restitution_at_speed(
     e: wp.float64, laws: wp.array2d(dtype=wp.float64), pair: int, speed: wp.float64
 ) -> wp.float64: ...
 
 
 @wp.func_native("return mpm::Keep::steps(travel);")
-def steps_kept(travel: wp.float64) -> int: ...
+def normal_cache_steps(travel: wp.float64) -> int: ...
 
 
 @wp.func_native("return mpm::Impact::closing(gap, dt);")
@@ -309,7 +317,7 @@ def closing_speed(gap: wp.float64, dt: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("return mpm::Coulomb::push(old, speed, target, softness);")
-def push_of(
+def normal_impulse(
     old: wp.float64, speed: wp.float64, target: wp.float64, softness: wp.float64
 ) -> wp.float64: ...
 
@@ -334,7 +342,7 @@ def wall_span(
   mpm::WallStress::drag(softness, span, flow, push, &n.c[0], &rub.c[0], &J.c[0]);
   return J;
 """)
-def dragged(
+def drag_impulse(
     softness: wp.float64,
     span: wp.float64,
     curve: wp.vec3d,

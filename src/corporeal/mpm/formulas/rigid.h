@@ -44,8 +44,8 @@ struct Body {
     double a[3] = {w[0] * dt, w[1] * dt, w[2] * dt}, t = sqrt(Vec::dot(a, a));
     double K[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0}, K2[9], E[9];
     Vec::times(K, K, K2);
-    double f = t < SMALL_TURN ? 1.0 - t * t / 6.0 : sin(t) / t;
-    double g = t < SMALL_TURN ? 0.5 - t * t / 24.0 : (1.0 - cos(t)) / (t * t);
+    double f = t < SMALL_ROTATION_RAD ? 1.0 - t * t / 6.0 : sin(t) / t;
+    double g = t < SMALL_ROTATION_RAD ? 0.5 - t * t / 24.0 : (1.0 - cos(t)) / (t * t);
     for (int i = 0; i < 9; i++) E[i] = f * K[i] + g * K2[i] + (i % 4 == 0);
     Vec::times(E, R, Q);
   }
@@ -86,7 +86,7 @@ struct Body {
     axis[1] = 0.5 * (Q[2] - Q[6]);
     axis[2] = 0.5 * (Q[3] - Q[1]);
     double sine = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-    return sine > SMALLEST_SINE ? atan2(sine, 0.5 * (Q[0] + Q[4] + Q[8] - 1.0)) / sine : 1.0;
+    return sine > MIN_ROTATION_SINE ? atan2(sine, 0.5 * (Q[0] + Q[4] + Q[8] - 1.0)) / sine : 1.0;
   }
 };
 // Prescribed motion: twin of physics/prescribed.py. A path has KEY_ROW columns a row.

@@ -32,7 +32,7 @@ struct Rolling {
     Vec::apply(a.inertia, e, ia);
     Vec::apply(c.inertia, e, ic);
     const double alone = Vec::dot(e, ia) + Vec::dot(e, ic);
-    if (spin <= SMALLEST_SLIP || most <= 0 || alone <= 0) return 0;
+    if (spin <= MIN_SLIP_SPEED || most <= 0 || alone <= 0) return 0;
     double given = spin / alone < most ? spin / alone : most, soft = alone;
     Vec::cross(ia, a.arm, B);
     Vec::cross(ic, c.arm, D);

@@ -77,11 +77,11 @@ struct AllShown {
   }
 };
 // How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of
-// physics/rounding.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.ROUNDING.
+// physics/rounding.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.CURVATURE_ROW.
 struct Round {
   // Angle from the normal, no larger than that up to which a point stands for its surroundings.
   CUDA_CALLABLE static inline double bounded(double angle, double reach, double radius, bool &beyond) {
-    const double most = reach < MOST_LEAN * radius ? reach / radius : MOST_LEAN;
+    const double most = reach < MAX_ARC_ANGLE_RAD * radius ? reach / radius : MAX_ARC_ANGLE_RAD;
     beyond |= angle > most || angle < -most;
     return angle > most ? most : angle < -most ? -most : angle;
   }
@@ -91,7 +91,7 @@ struct Round {
     const double *n = row, *e = row + 3, ball = row[6], arc = row[7], reach = row[8];
     double outward = 0, ahead = 0, aside[3], square = 0;
     for (int i = 0; i < 3; i++) outward += d[i] * n[i], ahead += d[i] * e[i], out[i] = 0;
-    if (arc > 0 && sqrt(outward * outward + ahead * ahead) > SIDEWAYS) {
+    if (arc > 0 && sqrt(outward * outward + ahead * ahead) > MIN_ARC_COMPONENT) {
       const double a = bounded(atan2(ahead, outward), reach, ball + arc, beyond);
       for (int i = 0; i < 3; i++) out[i] += arc * (sin(a) * e[i] + (cos(a) - 1.0) * n[i]);
     }
@@ -104,7 +104,7 @@ struct Round {
   }
 };
 // A surface around a point that curves along an arc and across it, outwards or inwards, and what is round
-// that meets it: twin of physics/curved.py. row: types.ROUNDING.
+// that meets it: twin of physics/curved.py. row: types.CURVATURE_ROW.
 struct Curved {
   // Radius of the ball that lies under a round point, and that of the arc along which it moves.
   CUDA_CALLABLE static inline double ball(const double *row) { return row[6] > 0 ? row[6] : row[7] > 0 ? row[7] : 0.0; }
@@ -115,7 +115,7 @@ struct Curved {
   // how far along the curve it lies, and how far the curve has turned; whether it is on the curve's side.
   CUDA_CALLABLE static inline bool over(double k, double s, double &h, double &way, double &sine, double &cosine) {
     const double d = 1.0 + k * h, t = k * s, w = sqrt(t * t + d * d);
-    if (d <= NEAREST_MIDDLE) return false;
+    if (d <= MIN_CENTRE_DISTANCE_RATIO) return false;
     h = (2.0 * h + k * (s * s + h * h)) / (w + 1.0);
     way = t * t > TINY ? atan2(t, d) / k : s / d;
     sine = t / w, cosine = d / w;
@@ -140,7 +140,7 @@ struct Curved {
     double outward = 0, ahead = 0;
     bool beyond = false;
     for (int i = 0; i < 3; i++) outward += d[i] * n[i], ahead += d[i] * e[i], out[i] = -radius * n[i];
-    if (moved <= 0 || sqrt(outward * outward + ahead * ahead) <= SIDEWAYS) return;
+    if (moved <= 0 || sqrt(outward * outward + ahead * ahead) <= MIN_ARC_COMPONENT) return;
     const double a = Round::bounded(atan2(ahead, outward), row[8], radius + moved, beyond);
     for (int i = 0; i < 3; i++) out[i] += moved * (sin(a) * e[i] + (cos(a) - 1.0) * n[i]);
   }
@@ -171,12 +171,12 @@ struct Curved {
   CUDA_CALLABLE static inline bool meet(const double *round, const double *p, const double *S, const double *face,
                                         const double *q, const double *R, const double *apart, double reach,
                                         double *x, double *m, double &gap) {
-    const double radius = ball(round), spread = CURVED_SPREAD * face[8];
+    const double radius = ball(round), spread = CURVED_PATCH_RATIO * face[8];
     double n[3], c[3], d[3], h = 0, aside = 0;
     turn(R, face, m);
     turn(S, round, n);
-    if (m[0] * n[0] + m[1] * n[1] + m[2] * n[2] > -FACING) return false;
-    for (int k = 0; k < CURVED_TURNS; k++) {
+    if (m[0] * n[0] + m[1] * n[1] + m[2] * n[2] > -FACING_POINTS_COSINE) return false;
+    for (int k = 0; k < CURVED_CONTACT_ITERATIONS; k++) {
       turn_back(S, m, d);
       for (int i = 0; i < 3; i++) d[i] = -d[i];
       middle(round, d, x);
@@ -199,13 +199,13 @@ struct Curved {
   CUDA_CALLABLE static inline bool taken(const double *round, double own, const double *x, const double *other, const double *o) {
     double square = 0, alike = 0;
     for (int i = 0; i < 3; i++) square += (x[i] - o[i]) * (x[i] - o[i]), alike += round[i] * other[i];
-    return OWN_PLACE * OWN_PLACE * square < own && alike > 0 && ball(other) > 0;
+    return NEAREST_POINT_FACTOR * NEAREST_POINT_FACTOR * square < own && alike > 0 && ball(other) > 0;
   }
   // How far from there nodes misjudge the gap by more than it is: they take both surfaces for planes.
   CUDA_CALLABLE static inline double misjudged(const double *round, const double *row, double dx) {
     const double least = row[10] < row[11] ? row[10] : row[11], most = row[10] < row[11] ? row[11] : row[10];
     const double own = 1.0 / ball(round), bent = own + (-least > most ? -least : most);
-    return FACET_NODES * dx + sqrt((0.5 * dx + BENT_NODES * bent * dx * dx) / (own + least));
+    return FACET_REPLACES_NODES_DX * dx + sqrt((0.5 * dx + CURVED_GAP_ERROR_DX2 * bent * dx * dx) / (own + least));
   }
   // Speed at which a way straight ahead leads into a hollow within a step, from the square of the speed along it.
   CUDA_CALLABLE static inline double inward(const double *round, const double *row, double square, double dt) {
@@ -242,7 +242,7 @@ struct Facet {
   }
   // How far from there nodes misjudge the gap of a ball of this radius by more than it is: they take it for a plane, too.
   CUDA_CALLABLE static inline double misjudged(double radius, double dx) {
-    return FACET_NODES * dx + sqrt((0.5 * radius + BENT_NODES * dx) * dx);
+    return FACET_REPLACES_NODES_DX * dx + sqrt((0.5 * radius + CURVED_GAP_ERROR_DX2 * dx) * dx);
   }
   // Whether a contact on a node, apart from that on the face by d with normals that have this cosine, is the same as it.
   CUDA_CALLABLE static inline bool replaces(const double *d, double cosine, double reach, double alike) {
@@ -275,21 +275,21 @@ struct SeenFaces {
   // How far its mean offset lies aside from a normal, squared, and what any may.
   CUDA_CALLABLE inline double aside(const double *n) const {
     const double along = dot(mean, n);
-    return dot(mean, mean) - along * along + SEEN_ASIDE * SEEN_ASIDE;
+    return dot(mean, mean) - along * along + FACE_SCATTER_DX * FACE_SCATTER_DX;
   }
-  // Two faces that look at one another, from which n leans less than FACES_MEET, and which are farthest apart
+  // Two faces that look at one another, from which n leans less than OPPOSED_FACES_COSINE, and which are farthest apart
   // by value; whether there are any.
   CUDA_CALLABLE static inline bool facing(const SeenFaces &A, const SeenFaces &C, const double *n, double dx, int &a, int &c) {
     double best = -VAST, p[3], d[3];
     for (int i = 0; i < A.count; i++) {
       A.outward(i, p);
       const double cosine = dot(p, n);
-      if (cosine <= FACES_MEET) continue;
+      if (cosine <= OPPOSED_FACES_COSINE) continue;
       Curved::turn_back(C.turn, p, d);
       for (int k = 0; k < C.count; k++) {
-        if (dot(C.row(k), d) >= -FACET_ALIKE) continue;
+        if (dot(C.row(k), d) >= -FACET_NORMAL_COSINE) continue;
         const double apart = (A.height(i) + C.height(k)) / dx;
-        if (apart < FLAT_APART && apart + cosine > best) best = apart + cosine, a = i, c = k;
+        if (apart < FLAT_BODY_GAP_DX && apart + cosine > best) best = apart + cosine, a = i, c = k;
       }
     }
     return best > -VAST;
@@ -299,12 +299,12 @@ struct SeenFaces {
   CUDA_CALLABLE static inline void along(const SeenFaces &A, const SeenFaces &C, const double *u, double dx, double *n) {
     double cosine, other, p[3], q[3], found[3], square = 0;
     int a = A.most(n, 1.0, cosine), c = C.most(n, -1.0, other);
-    if (cosine <= FACET_ALIKE && other <= FACET_ALIKE) {
+    if (cosine <= FACET_NORMAL_COSINE && other <= FACET_NORMAL_COSINE) {
       if (!facing(A, C, n, dx, a, c)) return;
       cosine = other = 1.0;
     }
     A.outward(a, p), C.outward(c, q);
-    const double one = cosine > FACET_ALIKE ? C.aside(q) : 0.0, two = other > FACET_ALIKE ? A.aside(p) : 0.0;
+    const double one = cosine > FACET_NORMAL_COSINE ? C.aside(q) : 0.0, two = other > FACET_NORMAL_COSINE ? A.aside(p) : 0.0;
     for (int i = 0; i < 3; i++) found[i] = one * p[i] - two * q[i], square += found[i] * found[i];
     const double size = sqrt(square);
     const double approach = dot(u, n), real = dot(u, found) / size;
@@ -325,14 +325,14 @@ struct Wetted {
   }
   // Whether a row may belong to another face than a known one: it looks another way, at the liquid.
   static CUDA_CALLABLE inline bool other(const double *p, const double *X, const Wetted &known) {
-    return dot(p + 3, known.normal) <= WETTED_TURN && dot(X, p + 3) > dot(p, p + 3);
+    return dot(p + 3, known.normal) <= WETTED_NORMAL_COSINE && dot(X, p + 3) > dot(p, p + 3);
   }
   // Find the faces around X, the nearest first; how many. Rows gives each row, how far it lies from X,
   // squared, and whether it may belong to a face that is not yet known.
   template <class Rows>
   static CUDA_CALLABLE inline int faces(Rows &rows, const double *x, const double *X, double dx, Wetted *face) {
-    for (int f = 0; f < WETTED_FACES; f++) {
-      double near = WETTED_REACH * dx * WETTED_REACH * dx;
+    for (int f = 0; f < MAX_WETTED_FACES; f++) {
+      double near = WETTED_REACH_DX * dx * WETTED_REACH_DX * dx;
       const double *first = 0;
       rows.know(X, face, f);
       for (int i = 0; i < rows.count; i++) {
@@ -340,11 +340,11 @@ struct Wetted {
         if (d < near && rows.open(i)) near = d, first = rows.at(i);
       }
       if (!first) return f;
-      const double root = sqrt(near) + WETTED_PATCH * dx, far = root * root;
+      const double root = sqrt(near) + WETTED_PATCH_DX * dx, far = root * root;
       double n[3] = {0, 0, 0}, above = 0, weight = 0;
       for (int i = 0; i < rows.count; i++) {
         const double *p = rows.at(i), d = rows.square(i);
-        if (d > far || dot(p + 3, first + 3) < WETTED_TURN || !rows.open(i)) continue;
+        if (d > far || dot(p + 3, first + 3) < WETTED_NORMAL_COSINE || !rows.open(i)) continue;
         const double u = 1.0 - (d - near) / (far - near), w = u * u;
         for (int k = 0; k < 3; k++) n[k] += w * p[3 + k], above += w * (x[k] - p[k]) * p[3 + k];
         weight += w;
@@ -353,7 +353,7 @@ struct Wetted {
       for (int k = 0; k < 3; k++) face[f].normal[k] = n[k] / size;
       face[f].height = above / weight;
     }
-    return WETTED_FACES;
+    return MAX_WETTED_FACES;
   }
 };
 // All rows of a surface, one after the other, in no memory of their own.
@@ -372,8 +372,8 @@ struct AllWetted {
 };
 // Those that are near, with how far they are: what belongs to a known face is dropped.
 struct NearWetted {
-  const double *row[WETTED_ROWS];
-  double away[WETTED_ROWS];
+  const double *row[MAX_WETTED_POINTS];
+  double away[MAX_WETTED_POINTS];
   int count;
   inline void add(const double *p, double d) { row[count] = p, away[count++] = d; }
   inline const double *at(int i) const { return row[i]; }

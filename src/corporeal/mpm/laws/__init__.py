@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from corporeal.core.types import Law
-from corporeal.mpm.constants import BULK_ROUNDING, OWN_BULK
+from corporeal.mpm.constants import BULK_ROUNDING_FRACTION, LOCAL_BULK_RATIO
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors, stretches
-from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Numbers
 
 
-def _written(law: Law) -> ConstitutiveLaw:
+def _load_law(law: Law) -> ConstitutiveLaw:
     name = law.name.lower()
     try:
         return import_module(f"{__name__}.{name}").LAW
@@ -26,20 +26,20 @@ def _written(law: Law) -> ConstitutiveLaw:
         ) from error
 
 
-MENU: dict[Law, ConstitutiveLaw] = {law: _written(law) for law in Law}
-FLOWING = tuple(law.value for law in Law if MENU[law].flows)
+CONSTITUTIVE_LAWS: dict[Law, ConstitutiveLaw] = {law: _load_law(law) for law in Law}
+PLASTIC_LAWS = tuple(law.value for law in Law if CONSTITUTIVE_LAWS[law].flows)
 """Numbers of laws with a return map: shape is then not only elastic deformation."""
-GRANULAR = tuple(law.value for law in Law if MENU[law].granular)
+GRANULAR_LAWS = tuple(law.value for law in Law if CONSTITUTIVE_LAWS[law].granular)
 """Numbers of laws of grains."""
-LIQUID = tuple(law.value for law in Law if MENU[law].liquid)
+LIQUID_LAWS = tuple(law.value for law in Law if CONSTITUTIVE_LAWS[law].liquid)
 """Numbers of laws of what takes any shape."""
-_BULKY = tuple(law.value for law in Law if MENU[law].volumetric)
+_VOLUMETRIC_LAWS = tuple(law.value for law in Law if CONSTITUTIVE_LAWS[law].volumetric)
 
-Laws = Int[np.ndarray, " P"]
+LawNumbers = Int[np.ndarray, " P"]
 """``types.Law`` values."""
 
 
-def psi(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+def psi(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Give the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
     out = np.empty(len(F))
     for rule, k in _by_law(law):
@@ -47,7 +47,7 @@ def psi(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     return out
 
 
-def tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+def tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """Give the Kirchhoff stress τ [Pa] of particles with different laws."""
     out = np.empty_like(F)
     for rule, k in _by_law(law):
@@ -55,7 +55,7 @@ def tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     return out
 
 
-def principal_tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Vectors:
+def principal_tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Vectors:
     """Give the principal Kirchhoff stresses of ``tau`` [Pa], in no order, far faster."""
     out = np.empty(F.shape[:2])
     for rule, k in _by_law(law):
@@ -66,7 +66,7 @@ def principal_tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Vectors:
     return out
 
 
-def wave_modulus(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+def wave_modulus(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Bound ρ₀ c² [Pa] of the waves in particles with different laws."""
     out = np.empty(len(F))
     for rule, k in _by_law(law):
@@ -74,7 +74,9 @@ def wave_modulus(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     return out
 
 
-def flow(law: Laws, F: Matrices, numbers: Numbers, plastic: Scalars, volume: Scalars) -> Flow:
+def flow(
+    law: LawNumbers, F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
+) -> ReturnMapResult:
     """Bring granular and plastic matter back to what it can bear.
 
     Args:
@@ -85,7 +87,7 @@ def flow(law: Laws, F: Matrices, numbers: Numbers, plastic: Scalars, volume: Sca
         volume: Volume correction so far.
 
     """
-    out = Flow(F.copy(), np.zeros(len(F)), volume.copy(), np.zeros(len(F)))
+    out = ReturnMapResult(F.copy(), np.zeros(len(F)), volume.copy(), np.zeros(len(F)))
     for rule, k in _by_law(law):
         if rule.flow is not None:
             here = rule.flow(F[k], numbers.of(k), plastic[k], volume[k])
@@ -94,30 +96,32 @@ def flow(law: Laws, F: Matrices, numbers: Numbers, plastic: Scalars, volume: Sca
     return out
 
 
-def is_stiff_in_bulk(law: Laws, mu: Scalars, lam: Scalars) -> Bool[np.ndarray, " P"]:
+def is_stiff_in_bulk(law: LawNumbers, mu: Scalars, lam: Scalars) -> Bool[np.ndarray, " P"]:
     """Whether matter is elastic and its ν above 0.4: splines lock unless pressure is a mean.
 
     Where ν is 0.4 to within rounding it is not above.
     """
-    return np.isin(law, _BULKY) & (lam > OWN_BULK * (1.0 + BULK_ROUNDING) * mu)
+    return np.isin(law, _VOLUMETRIC_LAWS) & (
+        lam > LOCAL_BULK_RATIO * (1.0 + BULK_ROUNDING_FRACTION) * mu
+    )
 
 
-def mean_pressure(law: Laws, J: Scalars, bulk: Scalars) -> Scalars:
+def mean_pressure(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
     """Kirchhoff pressure [Pa] of a mean volume J̄; bulk: the part of λ that acts on it [Pa]."""
-    return bulk * _of_volume("pressure", law, J)
+    return bulk * _volumetric_by_law("pressure", law, J)
 
 
-def psi_mean(law: Laws, J: Scalars, bulk: Scalars) -> Scalars:
+def psi_mean(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
     """Give the stored energy [J/m³] of a mean volume J̄: ``mean_pressure`` is its slope."""
-    return bulk * _of_volume("psi", law, J)
+    return bulk * _volumetric_by_law("psi", law, J)
 
 
-def mean_modulus(law: Laws, J: Scalars, bulk: Scalars) -> Scalars:
+def mean_modulus(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
     """Give what a mean volume J̄ adds to the bound on ρ₀ c² [Pa]."""
-    return bulk * _of_volume("modulus", law, J)
+    return bulk * _volumetric_by_law("modulus", law, J)
 
 
-def _of_volume(measure: str, law: Laws, J: Scalars) -> Scalars:
+def _volumetric_by_law(measure: str, law: LawNumbers, J: Scalars) -> Scalars:
     out = np.zeros(len(J))
     for rule, k in _by_law(law):
         if rule.volumetric is not None:
@@ -125,6 +129,9 @@ def _of_volume(measure: str, law: Laws, J: Scalars) -> Scalars:
     return out
 
 
-def _by_law(law: Laws) -> list[tuple[ConstitutiveLaw, np.ndarray]]:
+def _by_law(law: LawNumbers) -> list[tuple[ConstitutiveLaw, np.ndarray]]:
     """List the laws that occur, each with the particles that follow it."""
-    return [(MENU[Law(value)], np.flatnonzero(law == value)) for value in np.unique(law).tolist()]
+    return [
+        (CONSTITUTIVE_LAWS[Law(value)], np.flatnonzero(law == value))
+        for value in np.unique(law).tolist()
+    ]

@@ -2,20 +2,20 @@
 
 import numpy as np
 
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw
 from corporeal.mpm.laws.kinematics import (
     Matrices,
     Scalars,
     Vectors,
     determinant,
     inverse_transpose,
-    isotropic,
-    per,
+    isotropic_tensors,
+    per_particle,
     polar,
     stretches,
     transpose,
 )
-from corporeal.mpm.laws.law import ConstitutiveLaw
-from corporeal.mpm.laws.volumetric import QUADRATIC
+from corporeal.mpm.laws.volumetric_energy import QUADRATIC_VOLUMETRIC
 
 
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
@@ -28,7 +28,9 @@ def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """τ = 2μ (F - R) Fᵀ + λ J (J - 1) 1."""
     J = determinant(F)
-    return 2.0 * per(mu) * (F - polar(F)[0]) @ transpose(F) + isotropic(lam * J * (J - 1.0))
+    return 2.0 * per_particle(mu) * (F - polar(F)[0]) @ transpose(F) + isotropic_tensors(
+        lam * J * (J - 1.0)
+    )
 
 
 def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
@@ -40,7 +42,9 @@ def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
 def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = 2μ (F - R) + λ J (J - 1) F⁻ᵀ."""
     J = determinant(F)
-    return 2.0 * per(mu) * (F - polar(F)[0]) + per(lam * J * (J - 1.0)) * inverse_transpose(F)
+    return 2.0 * per_particle(mu) * (F - polar(F)[0]) + per_particle(
+        lam * J * (J - 1.0)
+    ) * inverse_transpose(F)
 
 
 def wave_modulus(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
@@ -58,5 +62,5 @@ LAW = ConstitutiveLaw(
     principal_tau=principal_tau,
     pk1=pk1,
     wave_modulus=wave_modulus,
-    volumetric=QUADRATIC,
+    volumetric=QUADRATIC_VOLUMETRIC,
 )

@@ -3,11 +3,21 @@
 import numpy as np
 
 from corporeal.mpm.laws import hencky
+from corporeal.mpm.laws.constitutive_law import (
+    ConstitutiveLaw,
+    Number,
+    ReturnMapResult,
+    YieldParameters,
+)
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
-from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Number, Numbers
-from corporeal.mpm.laws.return_map import Returned, along, deviator, flow_by
+from corporeal.mpm.laws.return_map import (
+    PrincipalReturn,
+    apply_return_map,
+    deviator,
+    scaled_deviator,
+)
 
-SMALLEST_ANGLE = 1e-4
+MIN_FRICTION_ANGLE_RAD = 1e-4
 """Friction angle [rad] below which a cone is taken for a cylinder; its apex is at infinity."""
 
 
@@ -18,18 +28,18 @@ def cone_slope(friction_angle: Number) -> Number:
     instead, as in Klar et al. 2016, a slope of φ = 30° would be as strong as one of 44°, and sand
     pushed aside, in extension, stronger still (decision 6).
     """
-    return np.sqrt(2.0) / 3.0 * np.sin(np.maximum(friction_angle, SMALLEST_ANGLE))
+    return np.sqrt(2.0) / 3.0 * np.sin(np.maximum(friction_angle, MIN_FRICTION_ANGLE_RAD))
 
 
 def apex_strain(friction_angle: Number, cohesion: Number, mu: Number, lam: Number) -> Number:
     """Return tr ε = p₀/K at the apex, with p₀ = c cot φ and the bulk modulus K = λ + 2μ/3 [-]."""
     bulk = np.maximum(lam + 2.0 * mu / 3.0, 1e-30)
-    return cohesion / np.tan(np.maximum(friction_angle, SMALLEST_ANGLE)) / bulk
+    return cohesion / np.tan(np.maximum(friction_angle, MIN_FRICTION_ANGLE_RAD)) / bulk
 
 
 def return_drucker_prager(
     strain: Vectors, mu: Scalars, lam: Scalars, cone: Scalars, apex: Scalars, volume: Scalars
-) -> Returned:
+) -> PrincipalReturn:
     """Return to the Drucker–Prager cone ‖s‖ ≤ 3α (p₀ - p), without dilation.
 
     ε is first corrected by the expansion that carried no stress, ε ← ε + v_c/3, or sand that was
@@ -51,19 +61,21 @@ def return_drucker_prager(
     trace = np.sum(strain, axis=1)
     part, size = deviator(strain)
     slip = size + cone * (3.0 * lam + 2.0 * mu) / (2.0 * mu) * (trace - apex)
-    on_cone = strain - along(part, np.clip(slip, 0.0, size), size)
+    on_cone = strain - scaled_deviator(part, np.clip(slip, 0.0, size), size)
     returned = np.where((trace > apex)[:, None], apex[:, None] / 3.0, on_cone)
     # Beyond the apex what was open before is no new slip: only the change is.
     opened = np.where(trace > apex, volume, 0.0)[:, None] / 3.0
     excess = strain - returned - opened
     equivalent = np.sqrt(2.0 / 3.0) * np.linalg.norm(excess, axis=1)
-    return Returned(returned, excess, equivalent, trace - np.sum(returned, axis=1))
+    return PrincipalReturn(returned, excess, equivalent, trace - np.sum(returned, axis=1))
 
 
-def flow(F: Matrices, numbers: Numbers, plastic: Scalars, volume: Scalars) -> Flow:
+def flow(
+    F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
+) -> ReturnMapResult:
     """Apply ``return_drucker_prager`` to trial deformation gradients; grains do not harden."""
     n = numbers
-    return flow_by(
+    return apply_return_map(
         F, n, lambda trial: return_drucker_prager(trial, n.mu, n.lam, n.cone, n.apex, volume)
     )
 

@@ -9,17 +9,22 @@ however long the step.
 import numpy as np
 
 from corporeal.mpm.laws import hencky
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
-from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Numbers
-from corporeal.mpm.laws.return_map import Returned, along, deviator, flow_by
+from corporeal.mpm.laws.return_map import (
+    PrincipalReturn,
+    apply_return_map,
+    deviator,
+    scaled_deviator,
+)
 
-NEWTON_STEPS = 12
+SLIP_NEWTON_ITERATIONS = 12
 """Newton's steps for the slip of a step where n is not 1: monotone, from a side of the root."""
-LEAST_SHEAR = 1e-30
+MIN_SHEAR_STRAIN = 1e-30
 """Slips below it are none [-]."""
 
 
-def slip_of(excess: Scalars, mu: Scalars, drag: Scalars, index: Scalars) -> Scalars:
+def shear_slip(excess: Scalars, mu: Scalars, drag: Scalars, index: Scalars) -> Scalars:
     """Shear Δ of a step [-]: μ Δ + (K_c/dtⁿ) Δⁿ = excess, which is √2 μ ‖ε̂‖ - τ_y [Pa].
 
     The left side is concave in Δ for n < 1: Newton's steps from below stay below and rise.
@@ -30,28 +35,30 @@ def slip_of(excess: Scalars, mu: Scalars, drag: Scalars, index: Scalars) -> Scal
     if len(bent) == 0:
         return plain
     q, mu, drag, n = q[bent], mu[bent], drag[bent], index[bent]
-    slip = np.maximum(np.minimum(q / (2.0 * mu), (q / (2.0 * drag)) ** (1.0 / n)), LEAST_SHEAR)
-    for _ in range(NEWTON_STEPS):
+    slip = np.maximum(np.minimum(q / (2.0 * mu), (q / (2.0 * drag)) ** (1.0 / n)), MIN_SHEAR_STRAIN)
+    for _ in range(SLIP_NEWTON_ITERATIONS):
         power = drag * slip**n
         slip = slip - (mu * slip + power - q) / (mu + n * power / slip)
-        slip = np.maximum(slip, LEAST_SHEAR)
+        slip = np.maximum(slip, MIN_SHEAR_STRAIN)
     plain[bent] = slip
     return plain
 
 
-def return_fluid(strain: Vectors, numbers: Numbers) -> Returned:
+def return_fluid(strain: Vectors, numbers: YieldParameters) -> PrincipalReturn:
     """Let principal trial strains relax to what the law bears at their rate; volume is kept."""
     part, size = deviator(strain)
     excess = np.sqrt(2.0) * numbers.mu * size - numbers.yield_stress / np.sqrt(3.0)
-    slip = slip_of(excess, numbers.mu, numbers.drag, numbers.flow_index) / np.sqrt(2.0)
-    returned = strain - along(part, slip, size)
+    slip = shear_slip(excess, numbers.mu, numbers.drag, numbers.flow_index) / np.sqrt(2.0)
+    returned = strain - scaled_deviator(part, slip, size)
     equivalent = np.sqrt(2.0 / 3.0) * slip
-    return Returned(returned, strain - returned, equivalent, np.zeros(len(strain)))
+    return PrincipalReturn(returned, strain - returned, equivalent, np.zeros(len(strain)))
 
 
-def flow(F: Matrices, numbers: Numbers, plastic: Scalars, volume: Scalars) -> Flow:
+def flow(
+    F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
+) -> ReturnMapResult:
     """Apply ``return_fluid`` to trial deformation gradients; no volume opens."""
-    return flow_by(F, numbers, lambda trial: return_fluid(trial, numbers))
+    return apply_return_map(F, numbers, lambda trial: return_fluid(trial, numbers))
 
 
 LAW = ConstitutiveLaw(

@@ -6,6 +6,7 @@ law is quadratic in Green's strain.
 
 import numpy as np
 
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw
 from corporeal.mpm.laws.kinematics import (
     Matrices,
     Scalars,
@@ -15,8 +16,7 @@ from corporeal.mpm.laws.kinematics import (
     signed_svd,
     stretches,
 )
-from corporeal.mpm.laws.law import ConstitutiveLaw
-from corporeal.mpm.laws.volumetric import LOGARITHMIC
+from corporeal.mpm.laws.volumetric_energy import LOGARITHMIC_VOLUMETRIC
 
 
 def principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
@@ -60,5 +60,5 @@ LAW = ConstitutiveLaw(
     principal_tau=stretched_tau,
     pk1=pk1,
     wave_modulus=wave_modulus,
-    volumetric=LOGARITHMIC,
+    volumetric=LOGARITHMIC_VOLUMETRIC,
 )

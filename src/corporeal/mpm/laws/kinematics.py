@@ -10,7 +10,7 @@ Matrices = Float[np.ndarray, "P 3 3"]
 Vectors = Float[np.ndarray, "P 3"]
 Scalars = Float[np.ndarray, " P"]
 
-FLAT = 1e-4
+MIN_STRETCH_RATIO2 = 1e-4
 """Square of the ratio of two stretches below which the closed form loses too many digits."""
 
 
@@ -56,7 +56,7 @@ def stretches(F: Matrices) -> Vectors:
     squares = 1.0 + np.stack([largest, 3.0 * mean - largest - least, least], axis=1)
     out = np.sqrt(np.maximum(squares, 0.0))
     out[:, 2] *= np.sign(determinant(F))
-    flat = ~(squares[:, 2] > FLAT * squares[:, 0])
+    flat = ~(squares[:, 2] > MIN_STRETCH_RATIO2 * squares[:, 0])
     out[flat] = signed_svd(F[flat])[1]
     return out
 
@@ -99,11 +99,11 @@ def inverse_transpose(F: Matrices) -> Matrices:
     return transpose(np.linalg.inv(F))
 
 
-def per(scalar: Scalars) -> Float[np.ndarray, "P 1 1"]:
+def per_particle(scalar: Scalars) -> Float[np.ndarray, "P 1 1"]:
     """Shape one number per particle so that it multiplies matrices."""
     return scalar[:, None, None]
 
 
-def isotropic(scalar: Scalars) -> Matrices:
+def isotropic_tensors(scalar: Scalars) -> Matrices:
     """Return s 1."""
-    return per(scalar) * np.eye(3)
+    return per_particle(scalar) * np.eye(3)

@@ -2,20 +2,20 @@
 
 import numpy as np
 
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw
 from corporeal.mpm.laws.kinematics import (
     Matrices,
     Scalars,
     Vectors,
     inverse_transpose,
-    isotropic,
+    isotropic_tensors,
     log_j,
     log_strain,
-    per,
+    per_particle,
     stretches,
     transpose,
 )
-from corporeal.mpm.laws.law import ConstitutiveLaw
-from corporeal.mpm.laws.volumetric import LOGARITHMIC
+from corporeal.mpm.laws.volumetric_energy import LOGARITHMIC_VOLUMETRIC
 
 
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
@@ -27,7 +27,7 @@ def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 
 def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """τ = μ (F Fᵀ - 1) + λ ln J 1."""
-    return per(mu) * (F @ transpose(F)) + isotropic(lam * log_j(F) - mu)
+    return per_particle(mu) * (F @ transpose(F)) + isotropic_tensors(lam * log_j(F) - mu)
 
 
 def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
@@ -39,7 +39,7 @@ def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
 def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = μ (F - F⁻ᵀ) + λ ln J F⁻ᵀ."""
     inverse = inverse_transpose(F)
-    return per(mu) * (F - inverse) + per(lam * log_j(F)) * inverse
+    return per_particle(mu) * (F - inverse) + per_particle(lam * log_j(F)) * inverse
 
 
 def wave_modulus(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
@@ -55,5 +55,5 @@ LAW = ConstitutiveLaw(
     principal_tau=principal_tau,
     pk1=pk1,
     wave_modulus=wave_modulus,
-    volumetric=LOGARITHMIC,
+    volumetric=LOGARITHMIC_VOLUMETRIC,
 )

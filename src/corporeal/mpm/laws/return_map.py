@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from corporeal.mpm.laws.constitutive_law import ReturnMapResult, YieldParameters
 from corporeal.mpm.laws.hencky import principal_tau
 from corporeal.mpm.laws.kinematics import (
     Matrices,
@@ -18,10 +19,9 @@ from corporeal.mpm.laws.kinematics import (
     log_strain,
     signed_svd,
 )
-from corporeal.mpm.laws.law import Flow, Numbers
 
 
-class Returned(NamedTuple):
+class PrincipalReturn(NamedTuple):
     """What a return map gives back."""
 
     strain: Vectors
@@ -34,7 +34,9 @@ class Returned(NamedTuple):
     """Volume correction v_c: logarithmic expansion that carried no stress [-]."""
 
 
-def flow_by(F: Matrices, numbers: Numbers, back: Callable[[Vectors], Returned]) -> Flow:
+def apply_return_map(
+    F: Matrices, numbers: YieldParameters, back: Callable[[Vectors], PrincipalReturn]
+) -> ReturnMapResult:
     """Apply a return map of principal strains to deformation gradients.
 
     Args:
@@ -49,7 +51,9 @@ def flow_by(F: Matrices, numbers: Numbers, back: Callable[[Vectors], Returned]) 
     moved = np.any(new.strain != strain, axis=1)
     rebuilt = from_stretches(U, np.exp(new.strain), V)
     loss = np.sum(principal_tau(new.strain, numbers.mu, numbers.lam) * new.slip, axis=1)
-    return Flow(np.where(moved[:, None, None], rebuilt, F), new.plastic_strain, new.volume, loss)
+    return ReturnMapResult(
+        np.where(moved[:, None, None], rebuilt, F), new.plastic_strain, new.volume, loss
+    )
 
 
 def deviator(strain: Vectors) -> tuple[Vectors, Scalars]:
@@ -58,6 +62,6 @@ def deviator(strain: Vectors) -> tuple[Vectors, Scalars]:
     return part, np.linalg.norm(part, axis=1)
 
 
-def along(part: Vectors, slip: Scalars, size: Scalars) -> Vectors:
+def scaled_deviator(part: Vectors, slip: Scalars, size: Scalars) -> Vectors:
     """δγ ε̂/‖ε̂‖; 0 where there is no direction."""
     return part * (slip / np.where(size > 0.0, size, 1.0))[:, None]

@@ -3,14 +3,19 @@
 import numpy as np
 
 from corporeal.mpm.laws import hencky
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
-from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Numbers
-from corporeal.mpm.laws.return_map import Returned, along, deviator, flow_by
+from corporeal.mpm.laws.return_map import (
+    PrincipalReturn,
+    apply_return_map,
+    deviator,
+    scaled_deviator,
+)
 
 
 def return_von_mises(
     strain: Vectors, mu: Scalars, yield_stress: Scalars, hardening: Scalars, plastic: Scalars
-) -> Returned:
+) -> PrincipalReturn:
     """Radial return to von Mises' cylinder with linear isotropic hardening.
 
     δγ = (‖ε̂‖ - √(2/3) (σ_y + H ε_p) / 2μ) / (1 + H / 3μ);  ε ← ε - δγ ε̂/‖ε̂‖ where δγ > 0
@@ -29,15 +34,17 @@ def return_von_mises(
     part, size = deviator(strain)
     radius = np.sqrt(2.0 / 3.0) * (yield_stress + hardening * plastic) / (2.0 * mu)
     slip = np.maximum(size - radius, 0.0) / (1.0 + hardening / (3.0 * mu))
-    returned = strain - along(part, slip, size)
+    returned = strain - scaled_deviator(part, slip, size)
     equivalent = np.sqrt(2.0 / 3.0) * slip
-    return Returned(returned, strain - returned, equivalent, np.zeros(len(strain)))
+    return PrincipalReturn(returned, strain - returned, equivalent, np.zeros(len(strain)))
 
 
-def flow(F: Matrices, numbers: Numbers, plastic: Scalars, volume: Scalars) -> Flow:
+def flow(
+    F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
+) -> ReturnMapResult:
     """Apply ``return_von_mises`` to trial deformation gradients; no volume opens."""
     n = numbers
-    return flow_by(
+    return apply_return_map(
         F, n, lambda trial: return_von_mises(trial, n.mu, n.yield_stress, n.hardening, plastic)
     )
 

@@ -12,28 +12,28 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.mpm.constants import (
-    DEEPEST,
-    FACE_STEPS,
-    FILLED,
+    FACE_TABLE_INTERVALS,
     FIRST_BIAS,
-    HELD_BY_WALL,
-    KEPT_STEPS,
-    KEPT_TRAVEL,
-    LATTICE_GAP,
+    HALF_SPACE_TOLERANCE_DX,
+    LATTICE_GAP_DX,
     LATTICE_ROWS,
     LATTICE_SLOPE,
-    LATTICE_START,
-    LIKE_HALF_SPACE,
-    OPPOSITE,
+    LATTICE_START_DX,
+    LIQUID_WALL_REACH_DX,
+    MAX_FACE_DEPTH_DX,
+    MAX_WETTED_FACES,
+    MIN_FILLED_FRACTION,
+    MIN_HALF_SPACE_WEIGHT,
+    NORMAL_CACHE_STEPS,
+    NORMAL_CACHE_TRAVEL_DX,
     OTHER_BIAS,
-    PARTICLE_RADIUS,
-    SMALLEST_WEIGHT,
+    PARALLEL_EDGE_SINE2,
+    PARTICLE_RADIUS_DX,
     TINY,
     WALL_REACH,
-    WETTED_FACES,
-    WETTED_PATCH,
-    WETTED_REACH,
-    WETTED_TURN,
+    WETTED_NORMAL_COSINE,
+    WETTED_PATCH_DX,
+    WETTED_REACH_DX,
 )
 from corporeal.mpm.problem import Body, WettedSurface
 
@@ -66,7 +66,9 @@ def half_space_mean(face: np.ndarray) -> np.ndarray:
     inner = -13.0 / 64.0 + 0.375 * near**2 - 0.25 * near**4
     moment = np.where(near < -0.5, w**4 / 8.0 - w**3 / 4.0, inner)
     weight = half_space_weight(s)
-    return np.where(weight > SMALLEST_WEIGHT, moment / np.maximum(weight, SMALLEST_WEIGHT), near)
+    return np.where(
+        weight > MIN_HALF_SPACE_WEIGHT, moment / np.maximum(weight, MIN_HALF_SPACE_WEIGHT), near
+    )
 
 
 def lattice_mean(face: np.ndarray) -> np.ndarray:
@@ -77,12 +79,12 @@ def lattice_mean(face: np.ndarray) -> np.ndarray:
     s = ½.
     """
     s = np.minimum(np.asarray(face, dtype=np.float64), 1.5)
-    u = s[..., None] - PARTICLE_RADIUS * (1.0 + 2.0 * np.arange(LATTICE_ROWS))
+    u = s[..., None] - PARTICLE_RADIUS_DX * (1.0 + 2.0 * np.arange(LATTICE_ROWS))
     tail = 0.5 * np.maximum(1.5 - np.abs(u), 0.0) ** 2
     w = np.where(np.abs(u) < 0.5, 0.75 - u**2, tail)
     weight = w.sum(axis=-1)
-    found = (w * u).sum(axis=-1) / np.maximum(weight, SMALLEST_WEIGHT)
-    return np.where(weight > SMALLEST_WEIGHT, found, s - PARTICLE_RADIUS)
+    found = (w * u).sum(axis=-1) / np.maximum(weight, MIN_HALF_SPACE_WEIGHT)
+    return np.where(weight > MIN_HALF_SPACE_WEIGHT, found, s - PARTICLE_RADIUS_DX)
 
 
 _FACES = np.linspace(-1.5, 1.5, 6001)
@@ -95,8 +97,8 @@ def half_space_face(mean: np.ndarray) -> np.ndarray:
 
 
 def face_table() -> Float[np.ndarray, " K"]:
-    """D at ``FACE_STEPS`` + 1 mean offsets from -1½ to 0 [dx]: what fast engines interpolate."""
-    return half_space_face(np.linspace(-1.5, 0.0, FACE_STEPS + 1))
+    """D at ``FACE_TABLE_INTERVALS`` + 1 mean offsets from -1½ to 0 [dx]: what fast engines interpolate."""
+    return half_space_face(np.linspace(-1.5, 0.0, FACE_TABLE_INTERVALS + 1))
 
 
 def touching_distance(face: np.ndarray) -> np.ndarray:
@@ -105,8 +107,8 @@ def touching_distance(face: np.ndarray) -> np.ndarray:
     t(s) = -e(s) - e(-s) + .05 + .25 max(0, s - .7): .84 with the face on the node, .95 mid-cell,
     1.27 one cell off. A constant would start contact early or sink heavy bodies.
     """
-    s = np.minimum(np.abs(face), DEEPEST)
-    lattice = LATTICE_GAP + LATTICE_SLOPE * np.maximum(0.0, s - LATTICE_START)
+    s = np.minimum(np.abs(face), MAX_FACE_DEPTH_DX)
+    lattice = LATTICE_GAP_DX + LATTICE_SLOPE * np.maximum(0.0, s - LATTICE_START_DX)
     return -half_space_mean(s) - half_space_mean(-s) + lattice
 
 
@@ -166,7 +168,7 @@ def surface_begins(
     return np.where(np.isfinite(least), least, nearest)
 
 
-def thin_there(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, " E"]:
+def sees_thin_place(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, " E"]:
     """Tell which nodes see a place where a rigid body is thin.
 
     Args:
@@ -179,7 +181,7 @@ def thin_there(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, "
     return np.any(square < far**2, axis=1)
 
 
-def touched(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> Vectors:
+def touching_offset(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> Vectors:
     """Say how far from a node two rigid bodies touch that meet there [m].
 
     A node is felt up to 1½ cells beyond a body's edge, where nothing can be pushed at. So the
@@ -193,11 +195,11 @@ def touched(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> V
         cell: dx [m].
 
     """
-    (far, p), (other, q) = (_to_edge(mean / cell, normal) for mean in (mean_a, mean_c))
+    (far, p), (other, q) = (_edge_distance(mean / cell, normal) for mean in (mean_a, mean_c))
     cosine = np.sum(p * q, axis=1)
     apart = 1.0 - cosine**2
     both = (far * cosine < other) & (other * cosine < far)
-    crossing = both & (apart > OPPOSITE)
+    crossing = both & (apart > PARALLEL_EDGE_SINE2)
     share = np.where(crossing, apart, 1.0)
     first = np.where(both, 0.5 * far, np.where(far >= other, far, 0.0))
     second = np.where(both, 0.5 * other, np.where(far >= other, 0.0, other))
@@ -206,7 +208,7 @@ def touched(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> V
     return (first[:, None] * p + second[:, None] * q) * cell
 
 
-def _to_edge(mean: Vectors, normal: Vectors) -> tuple[Scalars, Vectors]:
+def _edge_distance(mean: Vectors, normal: Vectors) -> tuple[Scalars, Vectors]:
     """How far the edge of a body is that does not reach a node [cells], else 0; and which way."""
     aside = mean - np.sum(mean * normal, axis=1)[:, None] * normal
     size = np.linalg.norm(aside, axis=1)
@@ -230,7 +232,7 @@ def gap_to_thin(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) ->
     return np.where(begins > WALL_REACH * cell, np.inf, gap)
 
 
-def full_cell(body: Body, cell: float) -> float:
+def full_cell_mass(body: Body, cell: float) -> float:
     """Mass of a cell that is full of a body [kg]."""
     return float(body.volume @ body.density / body.volume.sum()) * cell**3
 
@@ -242,14 +244,16 @@ def gap_of_liquid(
 
     Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
     face alone would let the first layer of a liquid be squeezed along it. So nodes up to
-    ``HELD_BY_WALL`` above are in contact too, where the liquid fills the half space up to the face
+    ``LIQUID_WALL_REACH_DX`` above are in contact too, where the liquid fills the half space up to the face
     as far as the node can tell: by its mean place, and by how ``full`` the node is, its mass over
     that of a full cell. A sheet or a drop would hover at such a node otherwise.
     """
     h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
     deep = gap_to_plane(mean, height, normal, cell)
-    like = (np.abs(half_space_mean(h) - xi) < LIKE_HALF_SPACE) & (full >= FILLED)
-    held = (h > WALL_REACH) & (h <= HELD_BY_WALL) & like
+    like = (np.abs(half_space_mean(h) - xi) < HALF_SPACE_TOLERANCE_DX) & (
+        full >= MIN_FILLED_FRACTION
+    )
+    held = (h > WALL_REACH) & (h <= LIQUID_WALL_REACH_DX) & like
     return np.where(held, deep, gap_to_wall(mean, height, normal, cell))
 
 
@@ -269,7 +273,8 @@ def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: fl
 
     The surface point nearest to the liquid's own place decides which face of a thin wall it is; it
     and its neighbours that look alike are averaged, w = (1 - u)² with u from 0 at the nearest to 1
-    at ``WETTED_PATCH`` beyond it in squared distance. What looks another way, and at the liquid, is
+    at ``WETTED_PATCH_DX`` beyond it in squared distance. What looks another way, and at the
+    liquid, is
     one more face: walls of a vessel and its bottom hold a node together.
 
     Args:
@@ -280,23 +285,23 @@ def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: fl
 
     """
     rows: list[tuple[int, np.ndarray, float]] = []
-    around = KDTree(surface.point).query_ball_point(place, WETTED_REACH * cell)
+    around = KDTree(surface.point).query_ball_point(place, WETTED_REACH_DX * cell)
     for k, near in enumerate(around):
         point, normal = surface.point[near], surface.normal[near]
         square = np.sum((point - place[k]) ** 2, axis=1)
         left = np.ones(len(near), dtype=bool)
-        for _ in range(WETTED_FACES):
+        for _ in range(MAX_WETTED_FACES):
             if not left.any():
                 break
             first = np.flatnonzero(left)[np.argmin(square[left])]
-            far = (np.sqrt(square[first]) + WETTED_PATCH * cell) ** 2
-            mine = left & (square <= far) & (normal @ normal[first] >= WETTED_TURN)
+            far = (np.sqrt(square[first]) + WETTED_PATCH_DX * cell) ** 2
+            mine = left & (square <= far) & (normal @ normal[first] >= WETTED_NORMAL_COSINE)
             weight = (1.0 - (square[mine] - square[first]) / (far - square[first])) ** 2
             above = np.sum((node[k] - point[mine]) * normal[mine], axis=1)
             outward = unit(weight @ normal[mine])
             rows.append((k, outward, weight @ above / weight.sum()))
             looks = np.sum((place[k] - point) * normal, axis=1) > 0.0
-            left &= looks & (normal @ outward <= WETTED_TURN)
+            left &= looks & (normal @ outward <= WETTED_NORMAL_COSINE)
     return WettedFaces(
         np.array([k for k, _, _ in rows], dtype=np.int64),
         np.array([n for _, n, _ in rows]).reshape(-1, 3),
@@ -325,15 +330,15 @@ def separating_normal(
     cell: float,
 ) -> Vectors:
     """Take the candidate along which the two fields are farthest apart (separating axis)."""
-    return taken(candidates, widest(candidates, reach_a, reach_c, cell))
+    return take_candidate(candidates, widest_candidate(candidates, reach_a, reach_c, cell))
 
 
-def taken(candidates: Float[np.ndarray, "E 3 3"], which: Indices) -> Vectors:
+def take_candidate(candidates: Float[np.ndarray, "E 3 3"], which: Indices) -> Vectors:
     """Take one of three candidate normals at every node."""
     return np.take_along_axis(candidates, which[:, None, None], axis=1)[:, 0]
 
 
-def widest(
+def widest_candidate(
     candidates: np.ndarray,
     reach_a: Float[np.ndarray, "E 3"],
     reach_c: Float[np.ndarray, "E 3"],
@@ -354,14 +359,14 @@ def widest(
     return np.argmax(width, axis=1)
 
 
-def steps_kept(travel: float) -> int:
+def normal_cache_steps(travel: float) -> int:
     """For how many steps what is widest is kept, where something moves so far in a step [cells].
 
     Candidates themselves follow their fields in every step, and contacts that are new are looked
     at at once: what may be out of date is only which of three is taken (decision 52).
     """
-    count = KEPT_STEPS
-    while count > 1 and count * travel > KEPT_TRAVEL:
+    count = NORMAL_CACHE_STEPS
+    while count > 1 and count * travel > NORMAL_CACHE_TRAVEL_DX:
         count //= 2
     return count
 

@@ -12,18 +12,18 @@ from jaxtyping import Bool, Float, Int
 from numba import njit
 
 from corporeal.mpm.constants import (
-    IMPACTS,
-    PATCH,
-    SCATTER,
-    SLOWEST_BOUNCE,
-    SMALLEST_SLIP,
-    SWEEPS_AT_ONCE,
-    SWEEPS_OF_A_HIT,
-    SWEEPS_OF_A_HOLD,
+    IMPACT_PATCH_DX,
+    IMPACT_SWEEPS,
+    MAX_IMPACTS_PER_STEP,
+    MIN_REBOUND_SPEED,
+    MIN_SLIP_SPEED,
+    SIMULTANEOUS_SWEEPS,
+    SUPPORTED_IMPACT_SWEEPS,
+    SWEEP_STRIDE_FRACTION,
 )
-from corporeal.mpm.physics import backing
+from corporeal.mpm.physics import impact_support
 from corporeal.mpm.physics.contact import Indices, Scalars, Vectors
-from corporeal.mpm.physics.wall_stress import drag
+from corporeal.mpm.physics.wall_stress import drag_impulse
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Movers:
         return self.velocity[mover] + turning
 
 
-class Contacts(NamedTuple):
+class ContactList(NamedTuple):
     """E places where two movers touch or are about to."""
 
     a: Indices
@@ -78,13 +78,13 @@ class Contacts(NamedTuple):
         """Slip and approach together: u = v_a - v_c [m/s]."""
         return movers.velocity_at(self.a, self.point) - movers.velocity_at(self.c, self.point)
 
-    def repeated(self, times: int) -> "Contacts":
+    def repeated(self, times: int) -> "ContactList":
         """Say everything several times, one block after the other."""
         columns = {k: column for k, column in self._asdict().items() if column is not None}
-        return Contacts(**{k: np.concatenate([column] * times) for k, column in columns.items()})
+        return ContactList(**{k: np.concatenate([column] * times) for k, column in columns.items()})
 
 
-class Rebound(NamedTuple):
+class ReboundRules(NamedTuple):
     """What decides whether rigid contacts bounce in this step."""
 
     pair: Indices
@@ -97,12 +97,12 @@ class Rebound(NamedTuple):
     feigned: Scalars
     """Speed at which a body that rolls on its surface points meets the next one [m/s]: its spin
     times their distance. What closes no faster than that and .05 m/s does not rebound."""
-    bodies: backing.Bodies | None = None
+    bodies: impact_support.ImpactBodies | None = None
     """What may hold them from behind; None: nothing does."""
 
 
 def target_speeds(
-    contacts: Contacts, speed: Scalars, rebound: Rebound, cell: float, dt: float
+    contacts: ContactList, speed: Scalars, rebound: ReboundRules, cell: float, dt: float
 ) -> tuple[Scalars, Bool[np.ndarray, " E"]]:
     """Give the normal speed each contact may keep [m/s], and whose pairs are in an impact.
 
@@ -120,28 +120,28 @@ def target_speeds(
     """
     approach = approach_of(speed, rebound)
     closing = speed * dt > contacts.gap
-    fast = (approach > SLOWEST_BOUNCE + rebound.feigned) & (rebound.restitution > 0.0)
+    fast = (approach > MIN_REBOUND_SPEED + rebound.feigned) & (rebound.restitution > 0.0)
     hit = np.isin(rebound.pair, rebound.pair[closing_fast(contacts, speed, rebound, dt)])
-    bounces = hit & fast & (closing | (contacts.gap < PATCH * cell))
+    bounces = hit & fast & (closing | (contacts.gap < IMPACT_PATCH_DX * cell))
     target = np.maximum(contacts.gap, 0.0) / dt
     return np.where(bounces, -rebound.restitution * approach, target), hit
 
 
-def approach_of(speed: Scalars, rebound: Rebound) -> Scalars:
+def approach_of(speed: Scalars, rebound: ReboundRules) -> Scalars:
     """Approach speed without this step's forces [m/s], so that nothing gains from them."""
     return speed - np.maximum(rebound.kick, 0.0)
 
 
 def closing_fast(
-    contacts: Contacts, speed: Scalars, rebound: Rebound, dt: float
+    contacts: ContactList, speed: Scalars, rebound: ReboundRules, dt: float
 ) -> Bool[np.ndarray, " E"]:
     """Which contacts close within the step fast enough to begin an impact."""
-    fast = approach_of(speed, rebound) > SLOWEST_BOUNCE + rebound.feigned
+    fast = approach_of(speed, rebound) > MIN_REBOUND_SPEED + rebound.feigned
     return (speed * dt > contacts.gap) & fast & (rebound.restitution > 0.0)
 
 
 def solve_impacts(
-    contacts: Contacts, movers: Movers, rebound: Rebound, cell: float, dt: float
+    contacts: ContactList, movers: Movers, rebound: ReboundRules, cell: float, dt: float
 ) -> Vectors:
     """Let rigid pairs that are hit rebound, one impact after the other, and move the movers.
 
@@ -156,27 +156,29 @@ def solve_impacts(
 
     """
     total = np.zeros((len(contacts.a), 3))
-    for _ in range(IMPACTS):
+    for _ in range(MAX_IMPACTS_PER_STEP):
         speed = np.sum(contacts.approach(movers) * contacts.normal, axis=1)
         target, hit = target_speeds(contacts, speed, rebound, cell, dt)
         if not hit.any():
             break
-        sweeps = SWEEPS_OF_A_HIT
+        sweeps = IMPACT_SWEEPS
         if rebound.bodies is not None:
             c = contacts
             blow = np.where(closing_fast(c, speed, rebound, dt), approach_of(speed, rebound), 0.0)
-            seen = backing.Seen(rebound.pair, c.point, c.normal, c.gap, speed, hit, blow)
-            now = backing.Round.of(rebound.bodies, seen, cell)
+            seen = impact_support.ImpactContacts(
+                rebound.pair, c.point, c.normal, c.gap, speed, hit, blow
+            )
+            now = impact_support.ImpactRound.of(rebound.bodies, seen, cell)
             bounces = rebound._replace(restitution=now.bounce(rebound.restitution))
             target, _ = target_speeds(contacts, speed, bounces, cell, dt)
-            target = np.where(now.held & (contacts.gap < PATCH * cell), 0.0, target)
-            hit, sweeps = hit | now.held, SWEEPS_OF_A_HOLD if now.held.any() else sweeps
+            target = np.where(now.held & (contacts.gap < IMPACT_PATCH_DX * cell), 0.0, target)
+            hit, sweeps = hit | now.held, SUPPORTED_IMPACT_SWEEPS if now.held.any() else sweeps
         total += solve(contacts, movers, target, sweeps, hit)
     return total
 
 
 def solve(
-    contacts: Contacts,
+    contacts: ContactList,
     movers: Movers,
     target: Scalars,
     sweeps: int,
@@ -191,7 +193,7 @@ def solve(
     that are not among ``only``, whole groups, wait.
     """
     impulse = np.zeros((len(contacts.a), 3))
-    orders = _orders(contacts, movers, sweeps)
+    orders = _sweep_orders(contacts, movers, sweeps)
     if only is not None:
         orders = np.stack([order[only[order]] for order in orders])
     layer = np.zeros((len(target), 4)) if contacts.layer is None else contacts.layer
@@ -205,11 +207,11 @@ def solve(
     _sweep(*given, orders)
     # What moves as told may leave no room between: sweeps then end as the last contacts have it.
     if contacts.guided is not None and contacts.guided[orders[0]].any():
-        _at_once(*given, orders[0])
+        _solve_simultaneously(*given, orders[0])
     return impulse
 
 
-def _orders(contacts: Contacts, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
+def _sweep_orders(contacts: ContactList, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
     """Give the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
 
     In the order in which the contacts of a rigid body lie next to one another the first would carry
@@ -226,16 +228,16 @@ def _orders(contacts: Contacts, movers: Movers, sweeps: int) -> Int[np.ndarray, 
     backward = [*forward]
     for number in np.unique(group[either]):
         own = np.flatnonzero(either & (group == number))
-        own = own[scattered(len(own))]
+        own = own[golden_section_order(len(own))]
         forward.append(own)
         backward.append(own[::-1] if turns[own].all() else own)
     to, fro = np.concatenate(forward), np.concatenate(backward)
     return np.stack([to, fro] * ((sweeps + 1) // 2))[:sweeps]
 
 
-def scattered(count: int) -> Int[np.ndarray, " E"]:
+def golden_section_order(count: int) -> Int[np.ndarray, " E"]:
     """Give numbers in strides of the golden section of how many they are, modulo that many."""
-    stride = max(1, int(SCATTER * count))
+    stride = max(1, int(SWEEP_STRIDE_FRACTION * count))
     while stride > 1 and gcd(stride, count) > 1:
         stride -= 1
     return np.arange(count) * stride % max(count, 1)
@@ -286,7 +288,9 @@ def _tangential(impulse, slip, softness, limit, layer):
     if along_slip > 0.0:
         impulse = _plus(impulse, 1.0 / along_slip, slip)
     if layer[0] > 0.0:
-        stopped = drag(np.array(impulse), along_slip if along_slip > 0.0 else along_n, layer)
+        stopped = drag_impulse(
+            np.array(impulse), along_slip if along_slip > 0.0 else along_n, layer
+        )
         return stopped[0], stopped[1], stopped[2]
     size = np.sqrt(_dot(impulse, impulse))
     return _plus((0.0, 0.0, 0.0), min(1.0, limit / size) if size > 0.0 else 1.0, impulse)
@@ -333,7 +337,7 @@ def _sweep(contacts, rules, masses, motion, impulse, orders):
                 continue
             slip = _plus(slip, -speed, n)
             size, along_d = np.sqrt(_dot(slip, slip)), 0.0
-            if size > SMALLEST_SLIP:
+            if size > MIN_SLIP_SPEED:
                 along = _plus((0.0, 0.0, 0.0), 1.0 / size, slip)
                 along_d = _softness(inverse_mass[a], inverse_inertia[a], arm_a, along)
                 along_d += _softness(inverse_mass[c], inverse_inertia[c], arm_c, along)
@@ -348,12 +352,12 @@ def _sweep(contacts, rules, masses, motion, impulse, orders):
 
 
 @njit(cache=True)
-def _at_once(contacts, rules, masses, motion, impulse, order):
+def _solve_simultaneously(contacts, rules, masses, motion, impulse, order):
     """Solve all contacts from the same motion, each with an equal share of what it would change."""
     first, second, point, _ = contacts
     velocity, spin = motion
     one = np.zeros((1, 1), np.int64)
-    for _ in range(SWEEPS_AT_ONCE):
+    for _ in range(SIMULTANEOUS_SWEEPS):
         before, many = impulse.copy(), 0
         for e in order:
             a, c, one[0, 0] = first[e], second[e], e

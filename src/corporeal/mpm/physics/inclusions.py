@@ -10,17 +10,17 @@ import numpy as np
 from jaxtyping import Int
 from scipy.spatial import KDTree
 
-from corporeal.mpm.constants import HELD_LAYER, HELD_REACH, PARTICLES_PER_CELL
+from corporeal.mpm.constants import FRAME_LAYER_DX, FRAME_REACH_DX, PARTICLES_PER_CELL
 from corporeal.mpm.problem import Body
 
 
-def densities(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
+def frame_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
     """Mean densities [kg/m³] of a frame and of the soft matter around it; masses give volumes.
 
     On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin
     as in life it would hold nothing.
     """
-    far = KDTree(frame.position).query(soft.position, distance_upper_bound=HELD_LAYER * cell)[0]
+    far = KDTree(frame.position).query(soft.position, distance_upper_bound=FRAME_LAYER_DX * cell)[0]
     near = np.isfinite(far)
     near = near if near.any() else np.ones(len(near), bool)
     held = float(soft.volume[near] @ soft.density[near] / soft.volume[near].sum())
@@ -28,7 +28,7 @@ def densities(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
     return float(frame.volume @ frame.density) / max(float(frame.volume.sum()), layer), held
 
 
-def around(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
+def frame_particles_near(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
     """Particles of a frame that what it holds could ever meet; those far inside don't matter."""
-    far = KDTree(soft.position).query(frame.position, distance_upper_bound=HELD_REACH * cell)[0]
+    far = KDTree(soft.position).query(frame.position, distance_upper_bound=FRAME_REACH_DX * cell)[0]
     return np.flatnonzero(np.isfinite(far))

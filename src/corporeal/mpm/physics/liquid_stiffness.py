@@ -8,7 +8,7 @@ spring that a Maxwell branch needs within a step; what is transmitted slowly is 
 
 from math import sqrt
 
-from corporeal.mpm.constants import LIQUID_SHEAR, SOUND_OVER_SPEED
+from corporeal.mpm.constants import LIQUID_SHEAR_TO_BULK_RATIO, SOUND_TO_FLOW_SPEED_RATIO
 
 
 def bulk_modulus(density: float, speed: float) -> float:
@@ -19,7 +19,7 @@ def bulk_modulus(density: float, speed: float) -> float:
         speed: Largest speed that is expected [m/s].
 
     """
-    return density * (SOUND_OVER_SPEED * speed) ** 2
+    return density * (SOUND_TO_FLOW_SPEED_RATIO * speed) ** 2
 
 
 def fall_speed(gravity: float, height: float) -> float:
@@ -27,11 +27,11 @@ def fall_speed(gravity: float, height: float) -> float:
     return sqrt(2.0 * gravity * height)
 
 
-def elastic_numbers(bulk: float) -> tuple[float, float]:
+def elastic_moduli(bulk: float) -> tuple[float, float]:
     """Young's modulus [Pa] and Poisson's ratio [-] of a bulk modulus K [Pa] and G = K/8.
 
     E = 9 K G/(3 K + G),  ν = (3 K - 2 G)/2 (3 K + G)
     """
-    shear = LIQUID_SHEAR * bulk
+    shear = LIQUID_SHEAR_TO_BULK_RATIO * bulk
     young = 9.0 * bulk * shear / (3.0 * bulk + shear)
     return young, (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))

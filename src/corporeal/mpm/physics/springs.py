@@ -8,16 +8,21 @@ constraints: Catto 2011, "Soft Constraints", Game Developers Conference).
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.constants import JOINT_STEP, SMALLEST_SINE, TETHER_STEP, TINY
+from corporeal.mpm.constants import (
+    JOINT_STEP_FRACTION,
+    MIN_ROTATION_SINE,
+    TETHER_STEP_FRACTION,
+    TINY,
+)
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.problem import Problem
 
 
-def turn_of(R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
+def rotation_vector(R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
     """Rotation vector of a rotation by less than half a turn [rad]."""
     axis = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(R)) - 1.0)
-    return axis * (np.arctan2(sine, cosine) / sine if sine > SMALLEST_SINE else 1.0)
+    return axis * (np.arctan2(sine, cosine) / sine if sine > MIN_ROTATION_SINE else 1.0)
 
 
 def has_springs(problem: Problem) -> bool:
@@ -25,7 +30,7 @@ def has_springs(problem: Problem) -> bool:
     return bool(problem.joints) or any(body.tether is not None for body in problem.bodies)
 
 
-def stored(
+def stored_spring_energy(
     problem: Problem,
     position: Float[np.ndarray, "P 3"],
     bodies: dict[int, rigid.RigidBody],
@@ -49,7 +54,7 @@ def stored(
             held = mass * (body.tether.rate > 0)
             energy[b] += float(held @ (position[mine] - anchor) @ np.array(problem.gravity))
     for joint in problem.joints if problem.contact == "multi" else ():
-        turn = turn_of(bodies[joint.second].rotation @ bodies[joint.first].rotation.T)
+        turn = rotation_vector(bodies[joint.second].rotation @ bodies[joint.first].rotation.T)
         energy[joint.second] += 0.5 * joint.stiffness * float(turn @ turn)
     return energy
 
@@ -57,10 +62,12 @@ def stored(
 def longest_step(problem: Problem) -> float:
     """Longest step [s] that follows every spring's oscillation."""
     tethers = [body.tether for body in problem.bodies if body.tether is not None]
-    rates = [float(tether.rate.max()) / TETHER_STEP for tether in tethers]
+    rates = [float(tether.rate.max()) / TETHER_STEP_FRACTION for tether in tethers]
     for joint in problem.joints:
         pair = [problem.bodies[b] for b in (joint.first, joint.second)]
-        inertia = [rigid.mass_of(b.position, b.volume * b.density, b.volume).inertia for b in pair]
+        inertia = [
+            rigid.mass_and_inertia(b.position, b.volume * b.density, b.volume).inertia for b in pair
+        ]
         lightest = min(float(np.linalg.eigvalsh(i)[0]) for i in inertia)
-        rates.append(float(np.sqrt(joint.stiffness / lightest)) / JOINT_STEP)
+        rates.append(float(np.sqrt(joint.stiffness / lightest)) / JOINT_STEP_FRACTION)
     return 1.0 / max([*rates, TINY])

@@ -11,34 +11,34 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import (
-    FLAT_APART,
-    HELD_BY_WALL,
-    SHOWN_AROUND,
-    SIGHT,
+    FLAT_BODY_GAP_DX,
+    IMPACT_SWEEPS,
+    LIQUID_WALL_REACH_DX,
+    NODE_SIGHT_DX,
+    SURFACE_SEARCH_RADIUS_DX,
     SWEEPS,
-    SWEEPS_OF_A_HIT,
     VAST,
     WALL_REACH,
 )
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.physics import backing, contact, contact_impulses
-from corporeal.mpm.physics.facets import along_faces
-from corporeal.mpm.physics.spline import Stencil
-from corporeal.mpm.reference.contact_scene import Scene, friction_table
-from corporeal.mpm.reference.kept_choices import KeptChoices
+from corporeal.mpm.physics import contact, contact_impulses, impact_support
+from corporeal.mpm.physics.flat_facets import facet_normals
+from corporeal.mpm.physics.grid_spline import Stencil
+from corporeal.mpm.reference.contact_scene import ContactScene, friction_table
+from corporeal.mpm.reference.curved_contacts import list_curved_contacts
+from corporeal.mpm.reference.normal_cache import NormalCache
+from corporeal.mpm.reference.possible_contacts import PossibleContacts
 from corporeal.mpm.reference.rolling_contacts import brake_rolling
-from corporeal.mpm.reference.round_contacts import on_curves
-from corporeal.mpm.reference.surface_points import (
-    in_order,
-    instead_of_nodes,
-    on_facets,
-    on_planes,
+from corporeal.mpm.reference.surface_point_contacts import (
+    drop_replaced_nodes,
+    list_facet_contacts,
+    list_plane_contacts,
+    sort_by_pair,
 )
-from corporeal.mpm.reference.touch import Touch
 
 
 @dataclass(frozen=True)
-class Meeting:
+class ContactOutcome:
     """What came of it."""
 
     velocity: Float[np.ndarray, "A 3"]
@@ -48,32 +48,34 @@ class Meeting:
     spin: Float[np.ndarray, "B 3"]
     """Of rigid bodies [rad/s]."""
     pair: Int[np.ndarray, "E 2"]
-    contacts: contact_impulses.Contacts
+    contacts: contact_impulses.ContactList
     impulse: Float[np.ndarray, "E 3"]
     """-J on the first and +J on the second of each pair [N s]."""
     friction_loss: float
     """[J]"""
     impact_loss: Float[np.ndarray, " E"]
     """Of each contact [J]."""
-    kept: KeptChoices
+    kept: NormalCache
     """For the next step."""
     moment: Float[np.ndarray, "B 3"]
     """Angular impulse of rolling friction on each body [N m s]."""
 
 
-def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meeting:
+def resolve_contacts(
+    scene: ContactScene, velocity: Float[np.ndarray, "A 3"], dt: float
+) -> ContactOutcome:
     """Let everything that touches exchange impulses."""
-    possible = find(scene)
-    touches = [_possible(touch) for touch in possible]
+    possible = find_contacts(scene)
+    touches = [_drop_impossible(touch) for touch in possible]
     problem = scene.problem
     pair = np.array([t.pair for t in touches for _ in range(len(t.gap))], dtype=np.int64)
     pair = pair.reshape(-1, 2)
-    contacts = contact_impulses.Contacts(
-        *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
+    contacts = contact_impulses.ContactList(
+        *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _CONTACT_COLUMNS),
         friction=friction_table(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
-        group=_groups(touches),
-        guided=_guided(scene, pair),
+        group=_contact_groups(touches),
+        guided=_touches_prescribed_body(scene, pair),
         layer=_joined([t.layers for t in touches], (0, 4)),
     )
     movers = scene.movers(velocity)
@@ -91,7 +93,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     impulse = impulse + braked.impulse
     before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)
     bodies = len(problem.bodies)
-    return Meeting(
+    return ContactOutcome(
         velocity=movers.velocity[bodies : scene.wall_mover],
         speed=movers.velocity[:bodies],
         spin=movers.spin[:bodies],
@@ -101,12 +103,14 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after)
         + braked.energy,
         impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
-        kept=KeptChoices.of_all(touch.kept for touch in possible),
+        kept=NormalCache.of_all(touch.kept for touch in possible),
         moment=braked.moment,
     )
 
 
-def _guided(scene: Scene, pair: Int[np.ndarray, "E 2"]) -> Bool[np.ndarray, " E"]:
+def _touches_prescribed_body(
+    scene: ContactScene, pair: Int[np.ndarray, "E 2"]
+) -> Bool[np.ndarray, " E"]:
     """Tell which contacts are of a rigid body with one that moves as told."""
     bodies, walls = scene.problem.bodies, len(scene.problem.planes)
     rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
@@ -115,14 +119,14 @@ def _guided(scene: Scene, pair: Int[np.ndarray, "E 2"]) -> Bool[np.ndarray, " E"
     return rigid[one] & rigid[other] & (told[one] | told[other])
 
 
-def _groups(touches: list[Touch]) -> Int[np.ndarray, " E"]:
+def _contact_groups(touches: list[PossibleContacts]) -> Int[np.ndarray, " E"]:
     """Give contacts of one pair one number, on nodes and on surface points another."""
     number: dict[tuple[tuple[int, int], bool], int] = {}
     found = [number.setdefault((t.pair, t.rolls >= 0), len(number)) for t in touches]
     return np.repeat(np.array(found, dtype=np.int64), [len(t.gap) for t in touches])
 
 
-def _sweeps(scene: Scene, contacts: contact_impulses.Contacts, hit: bool) -> int:
+def _sweeps(scene: ContactScene, contacts: contact_impulses.ContactList, hit: bool) -> int:
     """One sweep is exact where nothing that can move has more than one contact.
 
     Rigid bodies on one another have only each other to yield: with few sweeps stacks creep.
@@ -132,22 +136,22 @@ def _sweeps(scene: Scene, contacts: contact_impulses.Contacts, hit: bool) -> int
     bodies = len(scene.problem.bodies)
     stacked = bool(np.any((contacts.a < bodies) & (contacts.c < bodies)))
     if hit or stacked:
-        return SWEEPS_OF_A_HIT
+        return IMPACT_SWEEPS
     return SWEEPS if shared else 1
 
 
-def _possible(touch: Touch) -> Touch:
+def _drop_impossible(touch: PossibleContacts) -> PossibleContacts:
     """Leave out what is no contact at all; what only drags never pushes."""
     drags = touch.layers[:, 0] > 0.0
     real = np.isfinite(touch.gap) | drags
-    columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
+    columns = {name: getattr(touch, name)[real] for name, _ in _CONTACT_COLUMNS}
     columns["gap"] = np.minimum(columns["gap"], VAST)
     slips = None if touch.slips is None else touch.slips[real]
     corner = None if touch.corner is None else touch.corner[real]
     return replace(touch, **columns, slips=slips, layer=touch.layers[real], corner=corner)
 
 
-_COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
+_CONTACT_COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
 
 
 def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
@@ -157,12 +161,12 @@ def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
 
 
 def _rebound(
-    scene: Scene,
+    scene: ContactScene,
     movers: contact_impulses.Movers,
     pair: Int[np.ndarray, "E 2"],
-    contacts: contact_impulses.Contacts,
+    contacts: contact_impulses.ContactList,
     rolls: Int[np.ndarray, " E"],
-) -> contact_impulses.Rebound:
+) -> contact_impulses.ReboundRules:
     problem = scene.problem
     bodies, planes = len(problem.bodies), len(problem.planes)
     stiff = np.array([scene.is_rigid(b) for b in range(bodies)] + [True] * planes)
@@ -170,12 +174,12 @@ def _rebound(
     light = movers.inverse_mass[:bodies]
     first, second = pair.T
     both = stiff[first] & stiff[second]
-    return contact_impulses.Rebound(
+    return contact_impulses.ReboundRules(
         pair=first * (bodies + planes) + second,
         restitution=np.where(both, np.asarray(problem.restitution)[first, second], 0.0),
         kick=np.sum((kick[first] - kick[second]) * contacts.normal, axis=1),
         feigned=np.where(rolls >= 0, scene.feigned[rolls], 0.0),
-        bodies=backing.Bodies(
+        bodies=impact_support.ImpactBodies(
             np.concatenate([np.where(stiff[:bodies], light, -1.0), np.zeros(planes)]),
             np.asarray(problem.restitution, dtype=float),
             problem.blow_laws,
@@ -186,26 +190,32 @@ def _rebound(
 # ---------------------------------------------------------------- finding contacts
 
 
-def find(scene: Scene) -> list[Touch]:
+def find_contacts(scene: ContactScene) -> list[PossibleContacts]:
     """List everything that touches or may touch in this step."""
     fields = np.unique(scene.grid.field).tolist()
     rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
     bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
     apart = [p for p in combinations(fields, 2) if p not in bonded]
-    pairs = {p: _common(scene.grid, rows, p) for p in apart}
+    pairs = {p: _common_slots(scene.grid, rows, p) for p in apart}
     shared = [np.zeros(0, np.int64), *(slot for both in pairs.values() for slot in both)]
     alone = np.setdiff1d(np.arange(scene.grid.count), np.concatenate(shared))
-    walls = {(f, w): _near(scene, rows[f], alone, (f, w)) for f in fields for w in _walls(scene, f)}
+    walls = {
+        (f, w): _slots_near_wall(scene, rows[f], alone, (f, w))
+        for f in fields
+        for w in _walls_on_nodes(scene, f)
+    }
     shown = [*shared, *walls.values()]
-    look = Look.at(scene, np.concatenate(shown))
-    touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
-    touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
-    faces = on_facets(scene) + on_curves(scene)
-    nodes = [touch.placed for touch in instead_of_nodes(scene, touches, faces)]
-    return nodes + in_order(faces + on_planes(scene))
+    look = NodeSamples.at(scene, np.concatenate(shown))
+    touches = [
+        _field_contacts(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])
+    ]
+    touches += [_wall_contacts(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
+    faces = list_facet_contacts(scene) + list_curved_contacts(scene)
+    nodes = [touch.placed for touch in drop_replaced_nodes(scene, touches, faces)]
+    return nodes + sort_by_pair(faces + list_plane_contacts(scene))
 
 
-def _common(
+def _common_slots(
     grid: Stencil, rows: dict[int, np.ndarray], pair: tuple[int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Slots of two fields at the nodes where both have mass."""
@@ -216,15 +226,15 @@ def _common(
     return a[in_a], c[in_c]
 
 
-def _walls(scene: Scene, field: int) -> range:
+def _walls_on_nodes(scene: ContactScene, field: int) -> range:
     """Planes that a field meets on nodes: none with surface points or prescribed motion."""
     body = scene.problem.bodies[field]
     spared = scene.is_rigid(field) and (len(body.surface) > 0 or body.path is not None)
     return range(0 if spared else len(scene.problem.planes))
 
 
-def _near(
-    scene: Scene, slot: np.ndarray, alone: np.ndarray, pair: tuple[int, int]
+def _slots_near_wall(
+    scene: ContactScene, slot: np.ndarray, alone: np.ndarray, pair: tuple[int, int]
 ) -> Int[np.ndarray, " E"]:
     """Slots of a field that a plane may touch.
 
@@ -235,17 +245,17 @@ def _near(
     height = _height(scene, slot, pair[1]) / scene.problem.cell
     near = height <= WALL_REACH
     if scene.pours(pair[0]):
-        near |= (height <= HELD_BY_WALL) & np.isin(slot, alone)
+        near |= (height <= LIQUID_WALL_REACH_DX) & np.isin(slot, alone)
     return slot[near]
 
 
-def _height(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
+def _height(scene: ContactScene, slot: np.ndarray, wall: int) -> np.ndarray:
     plane = scene.problem.planes[wall]
     return scene.grid.index[slot] @ np.array(plane.normal) * scene.problem.cell - plane.offset
 
 
 @dataclass(frozen=True)
-class Look:
+class NodeSamples:
     """How fields look from some slots. M links, each one particle seen from one slot."""
 
     mean: Float[np.ndarray, "A 3"]
@@ -258,7 +268,7 @@ class Look:
     """x_p - x_i [m]."""
 
     @classmethod
-    def at(cls, scene: Scene, slots: Int[np.ndarray, " S"]) -> "Look":
+    def at(cls, scene: ContactScene, slots: Int[np.ndarray, " S"]) -> "NodeSamples":
         """Visit once more the particles around the slots, and only them."""
         grid, matter = scene.grid, scene.matter
         wanted = np.zeros(grid.count, dtype=bool)
@@ -277,7 +287,7 @@ class Look:
         return cls(mean, total(gradient), slot, particle, offset)
 
     def reach(
-        self, scene: Scene, slots: Int[np.ndarray, " E"], normals: Float[np.ndarray, "E 3 3"]
+        self, scene: ContactScene, slots: Int[np.ndarray, " E"], normals: Float[np.ndarray, "E 3 3"]
     ) -> Float[np.ndarray, "E 3"]:
         """How far the fields at some slots reach along candidate normals [m]: max x·n + R."""
         order = np.argsort(slots)
@@ -293,11 +303,14 @@ class Look:
         return out
 
 
-def _between(
-    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
-) -> Touch:
+def _field_contacts(
+    scene: ContactScene,
+    look: NodeSamples,
+    pair: tuple[int, int],
+    slots: tuple[np.ndarray, np.ndarray],
+) -> PossibleContacts:
     """Contacts of two fields on their common nodes, with separating-axis normals, smoothed."""
-    wet = _wet(scene, look, pair, slots)
+    wet = _liquid_contacts(scene, look, pair, slots)
     if wet is not None:
         return wet
     a, c = slots
@@ -306,32 +319,32 @@ def _between(
     candidates = _candidates(look, slots, thin)
     reach_a = look.reach(scene, a, candidates)
     reach_c = -look.reach(scene, c, -candidates)
-    which = contact.widest(candidates, reach_a, reach_c, cell)
-    kept = KeptChoices.none()
+    which = contact.widest_candidate(candidates, reach_a, reach_c, cell)
+    kept = NormalCache.none()
     if not any(scene.is_rigid(body) for body in pair):
         known = scene.kept.of(pair, index)
         which = np.where(known >= 0, known, which)
-        kept = KeptChoices.of_pair(pair, index, which)
-    normal = contact.taken(candidates, which)
+        kept = NormalCache.of_pair(pair, index, which)
+    normal = contact.take_candidate(candidates, which)
     normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
-    normal = _along_faces(scene, look, pair, slots, normal)
+    normal = _facet_normals(scene, look, pair, slots, normal)
     gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
     asked = np.full(len(a), max(thin) > 0)
     if all(map(scene.flat, pair)):
-        asked |= gap <= FLAT_APART * cell
+        asked |= gap <= FLAT_BODY_GAP_DX * cell
     if not asked.all():
         asked |= _thin_there(scene, pair, index * cell)
     if asked.any():
-        gap[asked] = _between_surfaces(scene, look, pair, (a[asked], c[asked]), normal[asked])
+        gap[asked] = _surface_gap(scene, look, pair, (a[asked], c[asked]), normal[asked])
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers, acts = (scene.mover_of_slot(a), scene.mover_of_slot(c)), None
     if all(map(scene.is_rigid, pair)):
-        acts = index * cell + _to_edges(scene, look, pair, slots, normal)
-    return Touch(pair, *movers, index * cell, normal, gap, kept=kept, acts=acts)
+        acts = index * cell + _edge_distances(scene, look, pair, slots, normal)
+    return PossibleContacts(pair, *movers, index * cell, normal, gap, kept=kept, acts=acts)
 
 
 def _candidates(
-    look: Look, slots: tuple[np.ndarray, np.ndarray], thin: list[int]
+    look: NodeSamples, slots: tuple[np.ndarray, np.ndarray], thin: list[int]
 ) -> Float[np.ndarray, "E 3 3"]:
     """Candidate normals; what is small against the cell has no face of its own."""
     found = contact.candidate_normals(*(look.outward[slot] for slot in slots))
@@ -340,9 +353,9 @@ def _candidates(
     return found
 
 
-def _along_faces(
-    scene: Scene,
-    look: Look,
+def _facet_normals(
+    scene: ContactScene,
+    look: NodeSamples,
     pair: tuple[int, int],
     slots: tuple[np.ndarray, np.ndarray],
     normal: Float[np.ndarray, "E 3"],
@@ -357,12 +370,12 @@ def _along_faces(
     )
     slip = scene.speed_at(pair[0], node) - scene.speed_at(pair[1], node)
     known = np.any(normal != 0.0, axis=1)[:, None]
-    return np.where(known, along_faces(normal, slip, first, second), normal)
+    return np.where(known, facet_normals(normal, slip, first, second), normal)
 
 
-def _to_edges(
-    scene: Scene,
-    look: Look,
+def _edge_distances(
+    scene: ContactScene,
+    look: NodeSamples,
     pair: tuple[int, int],
     slots: tuple[np.ndarray, np.ndarray],
     normal: Float[np.ndarray, "E 3"],
@@ -370,12 +383,15 @@ def _to_edges(
     """How far from nodes two rigid bodies touch [m]; what is round all over has no edges."""
     edged = scene.matter.edged
     first, second = (edged[b] * look.mean[slot] for b, slot in zip(pair, slots, strict=True))
-    return contact.touched(first, second, normal, scene.problem.cell)
+    return contact.touching_offset(first, second, normal, scene.problem.cell)
 
 
-def _wet(
-    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
-) -> Touch | None:
+def _liquid_contacts(
+    scene: ContactScene,
+    look: NodeSamples,
+    pair: tuple[int, int],
+    slots: tuple[np.ndarray, np.ndarray],
+) -> PossibleContacts | None:
     """Contacts of a liquid with a rigid body that says where liquids touch it; None: another pair.
 
     Its walls may be thinner than a cell, and its corners concave: its surface says how high a node
@@ -401,24 +417,24 @@ def _wet(
     normal = out if rigid_side == 0 else -out
     movers = scene.mover_of_slot(slots[0][k]), scene.mover_of_slot(slots[1][k])
     slips = face.height > WALL_REACH * cell
-    return Touch(pair, *movers, node[k], normal, gap, slips, layer)
+    return PossibleContacts(pair, *movers, node[k], normal, gap, slips, layer)
 
 
 def _thin_there(
-    scene: Scene, pair: tuple[int, int], node: Float[np.ndarray, "E 3"]
+    scene: ContactScene, pair: tuple[int, int], node: Float[np.ndarray, "E 3"]
 ) -> Bool[np.ndarray, " E"]:
     """Tell at which nodes rigid bodies meet where one is thin, though not as a whole."""
     there = np.zeros(len(node), dtype=bool)
     if all(scene.is_rigid(body) and len(scene.surface(body)) for body in pair):
         for body in pair:
             places = scene.thin_places(body)
-            there |= contact.thin_there(places, node, SIGHT * scene.problem.cell)
+            there |= contact.sees_thin_place(places, node, NODE_SIGHT_DX * scene.problem.cell)
     return there
 
 
-def _between_surfaces(
-    scene: Scene,
-    look: Look,
+def _surface_gap(
+    scene: ContactScene,
+    look: NodeSamples,
     pair: tuple[int, int],
     slots: tuple[np.ndarray, np.ndarray],
     normal: Float[np.ndarray, "E 3"],
@@ -432,7 +448,7 @@ def _between_surfaces(
     found: list[np.ndarray | None] = []
     for body, way in zip(pair, (-normal, normal), strict=True):
         points = scene.surface(body) if scene.is_rigid(body) else np.zeros((0, 3))
-        limits = SHOWN_AROUND * cell, SIGHT * cell
+        limits = SURFACE_SEARCH_RADIUS_DX * cell, NODE_SIGHT_DX * cell
         shown = len(points) > 0
         found.append(contact.surface_begins(points, node, way, *limits) if shown else None)
     first, second = found
@@ -443,7 +459,9 @@ def _between_surfaces(
     return np.asarray(first) + np.asarray(second)
 
 
-def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) -> Touch:
+def _wall_contacts(
+    scene: ContactScene, look: NodeSamples, pair: tuple[int, int], slot: np.ndarray
+) -> PossibleContacts:
     """Contacts of a field with a plane, on nodes."""
     field, wall = pair
     cell, bodies = scene.problem.cell, len(scene.problem.bodies)
@@ -459,4 +477,4 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
     movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
-    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips, layer)
+    return PossibleContacts((field, bodies + wall), movers, there, point, normal, gap, slips, layer)

@@ -6,17 +6,17 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm.constants import STICKS, TINY_DOUBLE
+from corporeal.mpm.constants import STICKING_FRICTION, TINY_DOUBLE
 from corporeal.mpm.physics import contact, contact_impulses, wall_stress
-from corporeal.mpm.physics.facets import SeenFaces
-from corporeal.mpm.physics.rounding import shift_to_contact
-from corporeal.mpm.physics.spline import Stencil
+from corporeal.mpm.physics.flat_facets import FacetsAtNodes
+from corporeal.mpm.physics.grid_spline import Stencil
+from corporeal.mpm.physics.rounded_surface import support_point_shift
 from corporeal.mpm.problem import Problem, WettedSurface
-from corporeal.mpm.reference.kept_choices import KeptChoices
-from corporeal.mpm.state import Matter, State
+from corporeal.mpm.reference.normal_cache import NormalCache
+from corporeal.mpm.state import ParticleConstants, State
 
 
-class Stand(Protocol):
+class BodyStandIn(Protocol):
     """Something that moves in a rigid body's stead."""
 
     def act(self, movers: contact_impulses.Movers) -> None:
@@ -25,11 +25,11 @@ class Stand(Protocol):
 
 
 @dataclass(frozen=True)
-class Scene:
+class ContactScene:
     """One step's stage."""
 
     problem: Problem
-    matter: Matter
+    matter: ParticleConstants
     state: State
     grid: Stencil
     mass: Float[np.ndarray, " A"]
@@ -40,9 +40,9 @@ class Scene:
     """Velocity of every slot before this step's forces [m/s]."""
     dt: float
     """[s]"""
-    kept: KeptChoices
+    kept: NormalCache
     """Candidate normals that were taken in the last step; none: all are looked at anew."""
-    composites: tuple["Stand", ...] = ()
+    composites: tuple["BodyStandIn", ...] = ()
     """Rigid bodies that move as one with what they hold."""
 
     @property
@@ -77,7 +77,7 @@ class Scene:
         """
         R = self.state.rotation[body]
         rows = self.matter.rounding[body]
-        shift, own = shift_to_contact(rows, np.tile(towards @ R, (len(rows), 1)))
+        shift, own = support_point_shift(rows, np.tile(towards @ R, (len(rows), 1)))
         return self.surface(body) + shift @ R.T, own
 
     def wetted(self, body: int) -> WettedSurface | None:
@@ -98,7 +98,7 @@ class Scene:
     def full(self, field: int, slot: Int[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
         """Masses of a field's nodes over that of a cell full of its body [-]."""
         body = self.problem.bodies[field]
-        return self.mass[slot] / contact.full_cell(body, self.problem.cell)
+        return self.mass[slot] / contact.full_cell_mass(body, self.problem.cell)
 
     def slides(self, field: int, wall: int) -> bool:
         """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
@@ -106,7 +106,9 @@ class Scene:
 
     def sticks(self, field: int, other: int) -> bool:
         """Whether a field is a liquid on which a body, or B + plane, drags by a viscous stress."""
-        return self.pours(field) and bool(friction_table(self.problem)[field, other] >= STICKS)
+        return self.pours(field) and bool(
+            friction_table(self.problem)[field, other] >= STICKING_FRICTION
+        )
 
     def layer(
         self, field: int, slot: np.ndarray, mean: np.ndarray, height: np.ndarray, normal: np.ndarray
@@ -122,9 +124,9 @@ class Scene:
 
         """
         body, cell = self.problem.bodies[field], self.problem.cell
-        full = contact.full_cell(body, cell)
-        span = wall_stress.span(self.mass[slot], full, height, cell, self.dt)
-        touches = wall_stress.touches(mean, height, normal, cell)
+        full = contact.full_cell_mass(body, cell)
+        span = wall_stress.drag_span(self.mass[slot], full, height, cell, self.dt)
+        touches = wall_stress.touches_wall(mean, height, normal, cell)
         curve = np.tile(np.array(wall_stress.flow_curve(body, cell)), (len(slot), 1))
         return np.column_stack([np.where(touches, span, 0.0), curve])
 
@@ -140,12 +142,12 @@ class Scene:
 
     def seen_faces(
         self, body: int, node: Float[np.ndarray, "E 3"], mean: Float[np.ndarray, "E 3"]
-    ) -> SeenFaces:
+    ) -> FacetsAtNodes:
         """Flat faces of a rigid body now, from some nodes [m] with its mean offsets there [m]."""
         rows, cell = self.matter.facets[body].row, self.problem.cell
         outward = rows[:, :3] @ self.state.rotation[body].T
         height = ((node - self.state.centre[body]) @ outward.T - rows[:, 3]) / cell
-        return SeenFaces(outward, height, mean / cell)
+        return FacetsAtNodes(outward, height, mean / cell)
 
     def speed_at(self, body: int, node: Float[np.ndarray, "E 3"]) -> Float[np.ndarray, "E 3"]:
         """Velocity of a rigid body at some places [m/s]."""

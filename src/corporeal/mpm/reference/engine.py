@@ -13,59 +13,59 @@ from jaxtyping import Float, Int
 from corporeal.core.errors import SimulationError
 from corporeal.mpm import laws
 from corporeal.mpm.constants import (
-    FALL,
-    FARTHEST,
-    LONGEST_STEP,
+    FREE_FALL_STEP_FRACTION,
+    MAX_DISTANCE_FROM_ORIGIN_DX,
+    MAX_STEP_S,
+    MAX_WALL_DEPTH_DX,
     RIGID_COURANT,
     STEP_ROUNDING,
-    SUNK,
     TINY,
     TINY_DOUBLE,
 )
-from corporeal.mpm.interaction import Interaction
-from corporeal.mpm.ledger import Ledger
-from corporeal.mpm.measure import Energy, Sums
+from corporeal.mpm.diagnostics import BodySums, ParticleEnergy
+from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics import contact, rigid
-from corporeal.mpm.physics.branches import follow
-from corporeal.mpm.physics.grips import Grip
-from corporeal.mpm.physics.spline import Stencil, stencil
+from corporeal.mpm.physics.grid_spline import Stencil, stencil
+from corporeal.mpm.physics.maxwell_branches import advance_branches
+from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.physics.springs import longest_step
-from corporeal.mpm.problem import Problem, Snapshot, Steps
-from corporeal.mpm.reference.contact import Meeting, resolve
-from corporeal.mpm.reference.contact_scene import Scene
-from corporeal.mpm.reference.forces import Drive
-from corporeal.mpm.reference.guided import Guides
-from corporeal.mpm.reference.inclusions import Bonds, without
-from corporeal.mpm.reference.kept_choices import KeptChoices
-from corporeal.mpm.reference.mean_dilatation import Clusters, clusters
-from corporeal.mpm.reference.springs import struck
+from corporeal.mpm.problem import Problem, Snapshot, StepStatistics
+from corporeal.mpm.reference.contact import ContactOutcome, resolve_contacts
+from corporeal.mpm.reference.contact_scene import ContactScene
+from corporeal.mpm.reference.inclusions import FrameBonds, without_held_nodes
+from corporeal.mpm.reference.mean_dilatation import DilatationClusters, group_clusters
+from corporeal.mpm.reference.normal_cache import NormalCache
+from corporeal.mpm.reference.prescribed_bodies import PrescribedBodies
+from corporeal.mpm.reference.springs import add_impulse
+from corporeal.mpm.reference.step_forces import StepForces
 from corporeal.mpm.state import (
-    Matter,
-    Motion,
+    ParticleConstants,
     State,
+    Velocities,
     branch_energy,
     branch_stress,
     elastic_stress,
-    flowed,
     mean_pressure,
     mean_volume,
+    return_to_yield_surface,
     strain_energy,
 )
 
 
-class ReferenceEngine(Interaction):
+class ReferenceEngine(EngineInteraction):
     """Steps one problem with NumPy in double precision."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.steps = Steps()
-        self.matter = Matter.of(problem)
+        self.steps = StepStatistics()
+        self.matter = ParticleConstants.of(problem)
         self.state = State.start(problem, self.matter)
-        self.bonds = Bonds(problem)
-        self.guides = Guides(problem)
+        self.bonds = FrameBonds(problem)
+        self.guides = PrescribedBodies(problem)
         self.grips: dict[int, Grip] = {}
-        self.kept = KeptChoices.none()
-        self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
+        self.kept = NormalCache.none()
+        self.ledger = EngineLedger.blank(len(problem.bodies), len(problem.planes))
         self.lost = np.zeros(len(self.matter.mass), dtype=bool)
 
     @property
@@ -88,29 +88,29 @@ class ReferenceEngine(Interaction):
         self.state, guided = self.guides.steer(before, matter, dt)
         grid = stencil(self.state.position, self._field, cell)
         kick, push = self._kicks(dt)
-        groups = clusters(matter, self.state, self._field, cell)
+        groups = group_clusters(matter, self.state, self._field, cell)
         mass, old, new = self._to_grid(grid, groups, kick, dt)
-        drive = Drive(self.problem, matter, self.state, grid, self.grips)
+        drive = StepForces(self.problem, matter, self.state, grid, self.grips)
         loaded, damped = drive.act((mass, new), (kick, push), dt)
         state, new = loaded.state, loaded.velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
-        scene = Scene(
+        scene = ContactScene(
             self.problem,
             matter,
             state,
             grid,
-            without(mass, held),
+            without_held_nodes(mass, held),
             kick,
             old,
             dt,
             self._kept_choices(dt),
             held,
         )
-        meeting = resolve(scene, new, dt)
+        meeting = resolve_contacts(scene, new, dt)
         for composite in held:
             meeting = composite.split(meeting)
         moved, viscous_work = self._from_grid(grid, groups, old, meeting.velocity, dt)
-        settled, plastic_loss = flowed(matter, moved, dt)
+        settled, plastic_loss = return_to_yield_surface(matter, moved, dt)
         turned = self.guides.place(self._move_rigid(settled, meeting, dt), matter, guided)
         self._check(turned)
         self.kept = meeting.kept
@@ -151,16 +151,19 @@ class ReferenceEngine(Interaction):
             limits.append(RIGID_COURANT * cell / max(speed[m.rigid].max(), TINY))
         pulls = [body.push.acceleration for body in self.problem.bodies if body.push is not None]
         strongest = max(float(np.linalg.norm(p)) for p in [self.problem.gravity, *pulls])
-        limits += [FALL * np.sqrt(cell / max(strongest, TINY)), longest_step(self.problem)]
+        limits += [
+            FREE_FALL_STEP_FRACTION * np.sqrt(cell / max(strongest, TINY)),
+            longest_step(self.problem),
+        ]
         limits.append(self.guides.longest_step)
-        return float(min(min(limits), LONGEST_STEP))
+        return float(min(min(limits), MAX_STEP_S))
 
-    def _kept_choices(self, dt: float) -> KeptChoices:
+    def _kept_choices(self, dt: float) -> NormalCache:
         """Candidate normals of the last step; none where all are looked at anew."""
         soft = ~self.matter.rigid
         speed = np.linalg.norm(self.state.velocity[soft], axis=1).max(initial=0.0)
-        anew = self.steps.count % contact.steps_kept(speed * dt / self.problem.cell) == 0
-        return KeptChoices.none() if anew else self.kept
+        anew = self.steps.count % contact.normal_cache_steps(speed * dt / self.problem.cell) == 0
+        return NormalCache.none() if anew else self.kept
 
     # ------------------------------------------------------------ forces
 
@@ -185,7 +188,7 @@ class ReferenceEngine(Interaction):
     # ------------------------------------------------------------ particles to grid and back
 
     def _to_grid(
-        self, grid: Stencil, groups: Clusters, kick: np.ndarray, dt: float
+        self, grid: Stencil, groups: DilatationClusters, kick: np.ndarray, dt: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Scatter mass and momentum; give mass, velocity before forces and velocity after.
 
@@ -201,14 +204,14 @@ class ReferenceEngine(Interaction):
         full = np.maximum(mass, TINY_DOUBLE)[:, None]
         return mass, old / full, (old + gained) / full
 
-    def _stress(self, groups: Clusters) -> Float[np.ndarray, "P 3 3"]:
+    def _stress(self, groups: DilatationClusters) -> Float[np.ndarray, "P 3 3"]:
         """Kirchhoff stress τ, of the laws and of branches [Pa]; none in rigid bodies."""
         shared = groups.mean(mean_pressure(self.matter, self.state))[:, None, None] * np.eye(3)
         stress = elastic_stress(self.matter, self.state) + shared
         return stress + branch_stress(self.matter, self.state.memory)
 
     def _from_grid(
-        self, grid: Stencil, groups: Clusters, old: np.ndarray, new: np.ndarray, dt: float
+        self, grid: Stencil, groups: DilatationClusters, old: np.ndarray, new: np.ndarray, dt: float
     ) -> tuple[State, float]:
         """Gather what the particle's own field says, and remember what the grid cannot see.
 
@@ -229,7 +232,7 @@ class ReferenceEngine(Interaction):
         lost_v, lost_c = state.velocity - v_old, state.affine - gradient_old
         step = np.eye(3) + dt * gradient
         k, branches = m.relaxing, m.branches
-        memory = follow(state.memory, dt * gradient[k], branches.time, dt)
+        memory = advance_branches(state.memory, dt * gradient[k], branches.time, dt)
         grown = np.where(m.swells, dt * np.trace(gradient, axis1=1, axis2=2), 0.0)
         after = replace(
             state,
@@ -245,7 +248,7 @@ class ReferenceEngine(Interaction):
         work = dt * np.sum(branch_stress(m, state.memory) * gradient, axis=(1, 2)) * m.volume
         return after, float(np.sum(work))
 
-    def _move_rigid(self, state: State, meeting: Meeting, dt: float) -> State:
+    def _move_rigid(self, state: State, meeting: ContactOutcome, dt: float) -> State:
         """Move and turn rigid bodies: X += dt V, R ← exp(ω dt) R; their particles follow.
 
         In the single field they have no velocity of their own: V and ω fit what they gathered.
@@ -261,7 +264,7 @@ class ReferenceEngine(Interaction):
                 speed[b] = meeting.speed[b]
                 momentum[b] = R @ matter.inertia[b] @ R.T @ meeting.spin[b]
             centre[b] = centre[b] + dt * speed[b]
-            turned[b] = rigid.turned(R, matter.inertia[b], momentum[b], dt)
+            turned[b] = rigid.integrate_rotation(R, matter.inertia[b], momentum[b], dt)
         moved = replace(state, centre=centre, speed=speed, spin_momentum=momentum, rotation=turned)
         return moved.follow_rigid(matter)
 
@@ -284,14 +287,16 @@ class ReferenceEngine(Interaction):
         cell, prescribed = self.problem.cell, np.isin(self.matter.body, list(self.guides.guide))
         finite = np.isfinite(state.position).all(axis=1) & np.isfinite(state.F).all(axis=(1, 2))
         with np.errstate(invalid="ignore"):
-            inside = finite & (np.abs(state.position) < FARTHEST * cell).all(axis=1)
+            inside = finite & (np.abs(state.position) < MAX_DISTANCE_FROM_ORIGIN_DX * cell).all(
+                axis=1
+            )
             for plane in self.problem.planes:
                 height = state.position @ np.array(plane.normal) - plane.offset
-                inside &= (height > -SUNK * cell) | prescribed
+                inside &= (height > -MAX_WALL_DEPTH_DX * cell) | prescribed
         return np.logical_not(inside)
 
     def _book_step(
-        self, meeting: Meeting, grid: Stencil, kick: np.ndarray, push: np.ndarray
+        self, meeting: ContactOutcome, grid: Stencil, kick: np.ndarray, push: np.ndarray
     ) -> None:
         """Book the step: impulses, work and losses."""
         m, s, book = self.matter, self.state, self.ledger
@@ -307,7 +312,7 @@ class ReferenceEngine(Interaction):
         where = meeting.contacts
         book.enter(meeting.pair, meeting.impulse, where.normal, where.point, self.time)
 
-    def _shared(self, meeting: Meeting, grid: Stencil) -> Meeting:
+    def _shared(self, meeting: ContactOutcome, grid: Stencil) -> ContactOutcome:
         """Give each body its part, by mass, of the impulses on the field that all share."""
         m, bodies = self.matter, len(self.problem.bodies)
         slot = meeting.contacts.a - bodies
@@ -340,10 +345,10 @@ class ReferenceEngine(Interaction):
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
         self.state = State(**_of("state.", saved))
-        self.ledger = Ledger(**_of("ledger.", saved))
-        self.kept = KeptChoices(**_of("kept.", saved))
+        self.ledger = EngineLedger(**_of("ledger.", saved))
+        self.kept = NormalCache(**_of("kept.", saved))
         count, smallest, largest = saved["steps"].tolist()
-        self.steps = Steps(int(count), smallest, largest)
+        self.steps = StepStatistics(int(count), smallest, largest)
         self.lost = self._lost(self.state)
 
     # ------------------------------------------------------------ accessors of what is common
@@ -353,10 +358,10 @@ class ReferenceEngine(Interaction):
         copies = (s.position, s.velocity, s.F, s.motion, s.plastic)
         return Snapshot(self.time, *(np.array(array) for array in copies))
 
-    def _sums(self) -> Sums:
+    def _sums(self) -> BodySums:
         m, s = self.matter, self.state
-        energy = Energy(strain_energy(m, s.F, s.relief), branch_energy(m, s.memory))
-        return Sums.of(m, self._particles(), s.affine, energy, self.problem.cell)
+        energy = ParticleEnergy(strain_energy(m, s.F, s.relief), branch_energy(m, s.memory))
+        return BodySums.of(m, self._particles(), s.affine, energy, self.problem.cell)
 
     def _rigid_bodies(self) -> dict[int, rigid.RigidBody]:
         m, s, spin = self.matter, self.state, self.state.spin(self.matter)
@@ -375,7 +380,7 @@ class ReferenceEngine(Interaction):
             if body.rigid
         }
 
-    def _booked(self) -> Ledger:
+    def _booked(self) -> EngineLedger:
         return self.ledger
 
     def _enter(self, body: int, impulse: np.ndarray, work: float) -> None:
@@ -388,7 +393,7 @@ class ReferenceEngine(Interaction):
         self.state = replace(self.state, velocity=velocity)
 
     def _add_momentum(self, body: int, momentum: np.ndarray, angular: np.ndarray) -> None:
-        after = struck(self.state, self.matter, body, momentum, angular)
+        after = add_impulse(self.state, self.matter, body, momentum, angular)
         self.state = after.follow_rigid(self.matter)
 
     def _take_grips(self) -> None:
@@ -397,13 +402,13 @@ class ReferenceEngine(Interaction):
     def _take_loads(self) -> None:
         """Do nothing: a step reads ``problem``."""
 
-    def _set_motion(self, bodies: Collection[int], motion: Motion) -> None:
+    def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         self.state = self.state.moving(motion, self.matter, bodies)
 
     def _place_as(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
         there = State(**_of("state.", saved))
         self.state = self.state.placed_as(there, self.matter, bodies)
-        self.kept = KeptChoices.none()
+        self.kept = NormalCache.none()
 
 
 def _of(kind: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

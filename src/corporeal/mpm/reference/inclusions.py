@@ -5,25 +5,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm.constants import HELD_SHARE
+from corporeal.mpm.constants import MIN_FRAME_VOLUME_FRACTION
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact_impulses import Movers
-from corporeal.mpm.physics.inclusions import densities
-from corporeal.mpm.physics.spline import Stencil
+from corporeal.mpm.physics.grid_spline import Stencil
+from corporeal.mpm.physics.inclusions import frame_and_soft_density
 from corporeal.mpm.problem import Problem
-from corporeal.mpm.reference.contact import Meeting
-from corporeal.mpm.state import Matter, State
+from corporeal.mpm.reference.contact import ContactOutcome
+from corporeal.mpm.state import ParticleConstants, State
 
 
 @dataclass(frozen=True)
-class Composite:
+class FrameComposite:
     """A frame and what it holds, as one rigid body; R nodes."""
 
     frame: int
     """Body."""
-    own: rigid.Mass
+    own: rigid.BodyInertia
     """Of the frame alone, in the world's axes now."""
-    whole: rigid.Mass
+    whole: rigid.BodyInertia
     """Of both."""
     speed: Float[np.ndarray, "3"]
     """Of the common centre [m/s]."""
@@ -43,7 +43,7 @@ class Composite:
         movers.velocity[self.frame] = self.speed
         movers.spin[self.frame] = inverse @ self.moment
 
-    def split(self, meeting: Meeting) -> Meeting:
+    def split(self, meeting: ContactOutcome) -> ContactOutcome:
         """Give the nodes and the frame their parts of the motion: v = V + ω × r."""
         velocity, speed = meeting.velocity.copy(), meeting.speed.copy()
         spin = meeting.spin[self.frame]
@@ -53,13 +53,13 @@ class Composite:
         return replace(meeting, velocity=velocity, speed=speed)
 
 
-def join(
-    own: rigid.Mass,
+def join_bodies(
+    own: rigid.BodyInertia,
     motion: tuple[np.ndarray, np.ndarray],
     mass: Float[np.ndarray, " R"],
     place: Float[np.ndarray, "R 3"],
     velocity: Float[np.ndarray, "R 3"],
-) -> tuple[rigid.Mass, Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+) -> tuple[rigid.BodyInertia, Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """One rigid body of a frame and moving points: mass, velocity of its centre, L about it.
 
     Args:
@@ -79,26 +79,28 @@ def join(
     inertia = own.inertia + np.trace(spread) * np.eye(3) - spread
     about = np.cross(r, mass[:, None] * velocity).sum(axis=0)
     moment = moment + own.total * np.cross(d, speed) + about
-    return rigid.Mass(total, centre, inertia), common, moment
+    return rigid.BodyInertia(total, centre, inertia), common, moment
 
 
-class Bonds:
+class FrameBonds:
     """All bonds of a problem."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         bodies = problem.bodies
-        self.density = [densities(bodies[f], bodies[s], problem.cell) for f, s in problem.bonds]
+        self.density = [
+            frame_and_soft_density(bodies[f], bodies[s], problem.cell) for f, s in problem.bonds
+        ]
         self.pairs = problem.bonds if problem.contact == "multi" else ()
 
     def compose(
         self,
-        matter: Matter,
+        matter: ParticleConstants,
         state: State,
         grid: Stencil,
         mass: Float[np.ndarray, " A"],
         velocity: Float[np.ndarray, "A 3"],
-    ) -> list[Composite]:
+    ) -> list[FrameComposite]:
         """Make one rigid body of every frame and what it holds now.
 
         Args:
@@ -109,19 +111,19 @@ class Bonds:
             velocity: Of every slot, after forces [m/s].
 
         """
-        made: list[Composite] = []
+        made: list[FrameComposite] = []
         taken = np.zeros(grid.count, bool)
         for frame in sorted({f for f, _ in self.pairs}):
             R = state.rotation[frame]
             inertia = R @ matter.inertia[frame] @ R.T
-            own = rigid.Mass(float(matter.total[frame]), state.centre[frame], inertia)
+            own = rigid.BodyInertia(float(matter.total[frame]), state.centre[frame], inertia)
             slot = self._held(frame, grid, mass)
             slot = slot[~taken[slot]]
             taken[slot] = True
             place = grid.index[slot] * self.problem.cell
             motion = state.speed[frame], state.spin_momentum[frame]
-            joined = join(own, motion, mass[slot], place, velocity[slot])
-            made.append(Composite(frame, own, *joined, slot, place))
+            joined = join_bodies(own, motion, mass[slot], place, velocity[slot])
+            made.append(FrameComposite(frame, own, *joined, slot, place))
         return made
 
     def _held(self, frame: int, grid: Stencil, mass: np.ndarray) -> Int[np.ndarray, " R"]:
@@ -136,11 +138,13 @@ class Bonds:
                 grid.key[mine], grid.key[other], assume_unique=True, return_indices=True
             )
             stiff, yielding = mass[mine[a]] / density, mass[other[c]] / held
-            slots.append(other[c[stiff >= HELD_SHARE * (stiff + yielding)]])
+            slots.append(other[c[stiff >= MIN_FRAME_VOLUME_FRACTION * (stiff + yielding)]])
         return np.concatenate(slots)
 
 
-def without(mass: Float[np.ndarray, " A"], made: tuple[Composite, ...]) -> Float[np.ndarray, " A"]:
+def without_held_nodes(
+    mass: Float[np.ndarray, " A"], made: tuple[FrameComposite, ...]
+) -> Float[np.ndarray, " A"]:
     """Leave held nodes out of contact: there the frame's surface is felt."""
     free: Bool[np.ndarray, " A"] = np.ones(len(mass), bool)
     for composite in made:

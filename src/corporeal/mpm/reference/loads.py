@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import TINY_DOUBLE
-from corporeal.mpm.physics import wind
-from corporeal.mpm.physics.spline import Stencil
+from corporeal.mpm.physics import wind_pressure
+from corporeal.mpm.physics.grid_spline import Stencil
 from corporeal.mpm.problem import Problem
-from corporeal.mpm.state import Matter, State
+from corporeal.mpm.state import ParticleConstants, State
 
 
 @dataclass(frozen=True)
-class Load:
+class ParticleLoads:
     """What some particles are given in one step; M of them, a particle more than once at times."""
 
     particle: Int[np.ndarray, " M"]
@@ -25,25 +25,25 @@ class Load:
     """[N s]"""
 
     @classmethod
-    def none(cls) -> "Load":
+    def none(cls) -> "ParticleLoads":
         """Give nothing to nobody."""
         return cls(np.zeros(0, np.int64), np.zeros((0, 3)))
 
-    def joined(self, other: "Load") -> "Load":
+    def joined(self, other: "ParticleLoads") -> "ParticleLoads":
         """Give both."""
-        return Load(
+        return ParticleLoads(
             np.concatenate([self.particle, other.particle]),
             np.concatenate([self.impulse, other.impulse]),
         )
 
-    def of(self, chosen: Bool[np.ndarray, " P"]) -> "Load":
+    def of(self, chosen: Bool[np.ndarray, " P"]) -> "ParticleLoads":
         """Give to some of the particles only."""
         mine = chosen[self.particle]
-        return Load(self.particle[mine], self.impulse[mine])
+        return ParticleLoads(self.particle[mine], self.impulse[mine])
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedMotion:
     """One step's motion after the loads; A slots, B bodies."""
 
     velocity: Float[np.ndarray, "A 3"]
@@ -56,9 +56,13 @@ class Loaded:
     """[J]"""
 
 
-def carry(
-    load: Load, matter: Matter, state: State, grid: Stencil, slots: tuple[np.ndarray, np.ndarray]
-) -> Loaded:
+def apply_loads(
+    load: ParticleLoads,
+    matter: ParticleConstants,
+    state: State,
+    grid: Stencil,
+    slots: tuple[np.ndarray, np.ndarray],
+) -> LoadedMotion:
     """Hand loads to the grid and to rigid bodies with a field of their own.
 
     Args:
@@ -72,7 +76,7 @@ def carry(
     mass, velocity = slots
     bodies = len(state.centre)
     if not len(load.particle):
-        return Loaded(velocity, state, np.zeros((bodies, 3)), 0.0)
+        return LoadedMotion(velocity, state, np.zeros((bodies, 3)), 0.0)
     single = len(np.unique(grid.field)) < bodies
     free = matter.rigid & (not single)
     impulse = np.zeros((bodies, 3))
@@ -83,11 +87,13 @@ def carry(
     given = grid.scatter(given)
     gained = given / np.maximum(mass, TINY_DOUBLE)[:, None]
     work = float(np.sum(given * (velocity + 0.5 * gained)))
-    turned, rigid_work = _on_rigid(load.of(free), matter, state)
-    return Loaded(velocity + gained, turned, impulse, work + rigid_work)
+    turned, rigid_work = _load_rigid(load.of(free), matter, state)
+    return LoadedMotion(velocity + gained, turned, impulse, work + rigid_work)
 
 
-def _on_rigid(load: Load, matter: Matter, state: State) -> tuple[State, float]:
+def _load_rigid(
+    load: ParticleLoads, matter: ParticleConstants, state: State
+) -> tuple[State, float]:
     """Add a load up to force and torque; give the state after it and the work [J]."""
     body = matter.body[load.particle]
     force, moment = np.zeros_like(state.speed), np.zeros_like(state.speed)
@@ -104,23 +110,33 @@ def _on_rigid(load: Load, matter: Matter, state: State) -> tuple[State, float]:
     return after, float(np.sum(force * mean) + np.sum(moment * spin))
 
 
-def blow(problem: Problem, matter: Matter, state: State, dt: float) -> Load:
+def wind_loads(
+    problem: Problem, matter: ParticleConstants, state: State, dt: float
+) -> ParticleLoads:
     """Let the wind press on every body that is in it."""
-    load, first = Load.none(), 0
+    load, first = ParticleLoads.none(), 0
     for b, body in enumerate(problem.bodies):
-        moving = None if body.wind is None else wind.air(body.wind, float(state.time) + 0.5 * dt)
+        moving = (
+            None
+            if body.wind is None
+            else wind_pressure.air_velocity(body.wind, float(state.time) + 0.5 * dt)
+        )
         particle = first + body.faces.particle
         first += len(body.position)
         if moving is None or not len(particle):
             continue
         F = state.rotation[[b]] if body.rigid else state.motion[particle]
         seen = moving - state.velocity[particle]
-        area = turned(body.faces.area, F)
-        load = load.joined(Load(particle, wind.pressed(area, seen, matter.mass[particle], dt)))
+        area = deformed_area(body.faces.area, F)
+        load = load.joined(
+            ParticleLoads(
+                particle, wind_pressure.wind_impulses(area, seen, matter.mass[particle], dt)
+            )
+        )
     return load
 
 
-def turned(
+def deformed_area(
     area: Float[np.ndarray, "A 3"], F: Float[np.ndarray, "K 3 3"]
 ) -> Float[np.ndarray, "A 3"]:
     """Area vectors after a deformation: n da = cof(F) N dA (Nanson's formula)."""

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.mpm.constants import TINY_DOUBLE
-from corporeal.mpm.state import Matter, State
+from corporeal.mpm.state import ParticleConstants, State
 
 
 @dataclass(frozen=True)
-class Clusters:
+class DilatationClusters:
     """Groups of nearly incompressible particles: those of one field in 2 x 2 x 2 cells."""
 
     chosen: Int[np.ndarray, " M"]
@@ -38,10 +38,12 @@ class Clusters:
         return out
 
 
-def clusters(matter: Matter, state: State, field: Int[np.ndarray, " P"], cell: float) -> Clusters:
+def group_clusters(
+    matter: ParticleConstants, state: State, field: Int[np.ndarray, " P"], cell: float
+) -> DilatationClusters:
     """Group particles by the pair of cells, along each axis, that their splines are centred in."""
     chosen = np.flatnonzero(matter.swells)
     place = np.floor(state.position[chosen] / cell - 0.5).astype(np.int64) >> 1
     rows = np.column_stack([field[chosen], place])
     of = np.unique(rows, axis=0, return_inverse=True)[1] if len(rows) else np.zeros(0, np.int64)
-    return Clusters(chosen, of.reshape(-1), matter.volume[chosen])
+    return DilatationClusters(chosen, of.reshape(-1), matter.volume[chosen])

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm.physics.contact_impulses import Contacts, Movers
-from corporeal.mpm.physics.rolling import RollingSide, brake
+from corporeal.mpm.physics.contact_impulses import ContactList, Movers
+from corporeal.mpm.physics.rolling_friction import RollingSide, brake_roll
 from corporeal.mpm.problem import Problem
 
 
 @dataclass(frozen=True)
-class Braked:
+class RollingOutcome:
     """What rolling friction did in a step."""
 
     impulse: Float[np.ndarray, "E 3"]
@@ -25,11 +25,11 @@ class Braked:
 def brake_rolling(
     problem: Problem,
     movers: Movers,
-    contacts: Contacts,
+    contacts: ContactList,
     pair: Int[np.ndarray, "E 2"],
     impulse: Float[np.ndarray, "E 3"],
     rounds: Bool[np.ndarray, " E"],
-) -> Braked:
+) -> RollingOutcome:
     """Brake what rolls, and move the movers.
 
     Args:
@@ -48,9 +48,12 @@ def brake_rolling(
         push = float(impulse[e] @ n)
         if push <= 0.0 or problem.rolling is None:
             continue
-        one, other = _side(movers, a, contacts.point[e]), _side(movers, c, contacts.point[e])
+        one, other = (
+            _rolling_side(movers, a, contacts.point[e]),
+            _rolling_side(movers, c, contacts.point[e]),
+        )
         bounds = float(contacts.friction[e]), float(problem.rolling[tuple(pair[e])]) * push
-        done = brake(one, other, movers.spin[a] - movers.spin[c], n, impulse[e], bounds)
+        done = brake_roll(one, other, movers.spin[a] - movers.spin[c], n, impulse[e], bounds)
         for m, side, sign in ((a, one, -1.0), (c, other, 1.0)):
             given = done.moment + np.cross(side.arm, done.impulse)
             movers.velocity[m] += sign * side.light * done.impulse
@@ -59,9 +62,9 @@ def brake_rolling(
         for body, sign in zip(pair[e], (-1.0, 1.0), strict=True):
             if body < len(moment):
                 moment[body] += sign * done.moment
-    return Braked(extra, moment, energy)
+    return RollingOutcome(extra, moment, energy)
 
 
-def _side(movers: Movers, mover: int, point: Float[np.ndarray, "3"]) -> RollingSide:
+def _rolling_side(movers: Movers, mover: int, point: Float[np.ndarray, "3"]) -> RollingSide:
     arm = point - movers.centre[mover]
     return RollingSide(float(movers.inverse_mass[mover]), movers.inverse_inertia[mover], arm)

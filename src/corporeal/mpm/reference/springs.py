@@ -5,33 +5,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.constants import CLOSING
+from corporeal.mpm.constants import JOINT_GAP_FRACTION_PER_STEP
 from corporeal.mpm.physics import rigid
-from corporeal.mpm.physics.springs import turn_of
+from corporeal.mpm.physics.springs import rotation_vector
 from corporeal.mpm.problem import Joint, Problem, Tether
-from corporeal.mpm.reference.loads import Load
-from corporeal.mpm.state import Matter, State
+from corporeal.mpm.reference.loads import ParticleLoads
+from corporeal.mpm.state import ParticleConstants, State
 
 
 @dataclass(frozen=True)
-class Pulled:
+class SpringOutcome:
     """What the springs gave in one step."""
 
     state: State
     """With the impulses on rigid bodies in their velocities."""
-    load: Load
+    load: ParticleLoads
     """What other bodies' particles get."""
     loss: float
     """What dampers took [J]."""
 
 
-def pull(
+def apply_springs(
     problem: Problem,
-    matter: Matter,
+    matter: ParticleConstants,
     state: State,
     kicks: tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]],
     dt: float,
-) -> Pulled:
+) -> SpringOutcome:
     """Let tethers and joints act; they do nothing in a field that all share.
 
     Args:
@@ -45,20 +45,22 @@ def pull(
     """
     kick, push = kicks
     if problem.contact == "single":
-        return Pulled(replace(state, speed=state.speed + kick), Load.none(), 0.0)
-    pulled, first = Pulled(state, Load.none(), 0.0), 0
+        return SpringOutcome(replace(state, speed=state.speed + kick), ParticleLoads.none(), 0.0)
+    pulled, first = SpringOutcome(state, ParticleLoads.none(), 0.0), 0
     for body in problem.bodies:
         if body.tether is not None:
-            pulled = tethered(pulled, body.tether, first, matter, dt)
-            pulled = borne(pulled, body.tether, first, matter, (kick - push)[0])
+            pulled = pull_tethered(pulled, body.tether, first, matter, dt)
+            pulled = load_holder(pulled, body.tether, first, matter, (kick - push)[0])
         first += len(body.position)
     pulled = replace(pulled, state=replace(pulled.state, speed=pulled.state.speed + kick))
     for joint in problem.joints:
-        pulled = joined(pulled, joint, matter, dt)
+        pulled = hold_joint(pulled, joint, matter, dt)
     return pulled
 
 
-def tethered(pulled: Pulled, tether: Tether, first: int, matter: Matter, dt: float) -> Pulled:
+def pull_tethered(
+    pulled: SpringOutcome, tether: Tether, first: int, matter: ParticleConstants, dt: float
+) -> SpringOutcome:
     """Pull every tethered particle back; the holder gets the reaction where the particle is."""
     state, h = pulled.state, tether.holder
     own = first + np.flatnonzero(tether.rate)
@@ -73,13 +75,19 @@ def tethered(pulled: Pulled, tether: Tether, first: int, matter: Matter, dt: flo
     middle = v + 0.5 * impulse / mass[:, None]
     loss = float(np.sum(mass * dt * brake * np.sum(v * middle, axis=1)))
     place = state.position[own] - state.centre[h]
-    after = struck(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
-    return Pulled(after, pulled.load.joined(Load(own, impulse)), pulled.loss + loss)
+    after = add_impulse(
+        state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0)
+    )
+    return SpringOutcome(after, pulled.load.joined(ParticleLoads(own, impulse)), pulled.loss + loss)
 
 
-def borne(
-    pulled: Pulled, tether: Tether, first: int, matter: Matter, gained: Float[np.ndarray, "3"]
-) -> Pulled:
+def load_holder(
+    pulled: SpringOutcome,
+    tether: Tether,
+    first: int,
+    matter: ParticleConstants,
+    gained: Float[np.ndarray, "3"],
+) -> SpringOutcome:
     """Let the holder bear the weight of what is tethered to it.
 
     Args:
@@ -94,13 +102,15 @@ def borne(
     own = first + np.flatnonzero(tether.rate)
     impulse = -matter.mass[own][:, None] * gained
     place = state.position[own] - state.centre[h]
-    after = struck(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
-    return replace(pulled, state=after, load=pulled.load.joined(Load(own, impulse)))
+    after = add_impulse(
+        state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0)
+    )
+    return replace(pulled, state=after, load=pulled.load.joined(ParticleLoads(own, impulse)))
 
 
-def struck(
+def add_impulse(
     state: State,
-    matter: Matter,
+    matter: ParticleConstants,
     body: int,
     impulse: Float[np.ndarray, "3"],
     moment: Float[np.ndarray, "3"],
@@ -112,7 +122,9 @@ def struck(
     return replace(state, speed=speed, spin_momentum=spin)
 
 
-def joined(pulled: Pulled, joint: Joint, matter: Matter, dt: float) -> Pulled:
+def hold_joint(
+    pulled: SpringOutcome, joint: Joint, matter: ParticleConstants, dt: float
+) -> SpringOutcome:
     """Keep a joint's point together and spring its turn, both at once and implicitly.
 
     [A  B     ] [J]   [-v - .2 e/dt      ]
@@ -127,18 +139,21 @@ def joined(pulled: Pulled, joint: Joint, matter: Matter, dt: float) -> Pulled:
     crossed = [rigid.cross_matrix(arm) for arm in arms]
     gap = state.centre[c] + arms[1] - state.centre[a] - arms[0]
     v = state.speed[c] + np.cross(spin[c], arms[1]) - state.speed[a] - np.cross(spin[a], arms[0])
-    turn = turn_of(state.rotation[c] @ state.rotation[a].T)
+    turn = rotation_vector(state.rotation[c] @ state.rotation[a].T)
     lever = [R @ W for R, W in zip(crossed, inverse, strict=True)]
     stiff = joint.damping + 0.5 * joint.stiffness * dt
     light = 1 / matter.total[a] + 1 / matter.total[c]
     A = light * np.eye(3) - lever[0] @ crossed[0] - lever[1] @ crossed[1]
     B = -lever[0] - lever[1]
     D = inverse[0] + inverse[1] + np.eye(3) / (dt * stiff)
-    wanted = [-v - CLOSING / dt * gap, spin[a] - spin[c] - joint.stiffness / stiff * turn]
+    wanted = [
+        -v - JOINT_GAP_FRACTION_PER_STEP / dt * gap,
+        spin[a] - spin[c] - joint.stiffness / stiff * turn,
+    ]
     given = np.linalg.solve(np.block([[A, B], [B.T, D]]), np.concatenate(wanted))
     J, T = given[:3], given[3:]
-    after = struck(state, matter, a, -J, -np.cross(arms[0], J) - T)
-    after = struck(after, matter, c, J, np.cross(arms[1], J) + T)
+    after = add_impulse(state, matter, a, -J, -np.cross(arms[0], J) - T)
+    after = add_impulse(after, matter, c, J, np.cross(arms[1], J) + T)
     relative = after.spin(matter)[c] - after.spin(matter)[a]
     loss = joint.damping * dt * float(relative @ relative)
     return replace(pulled, state=after, loss=pulled.loss + loss)

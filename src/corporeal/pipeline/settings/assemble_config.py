@@ -5,7 +5,7 @@ from typing import Literal
 
 from corporeal.core import store
 from corporeal.core.errors import check_range
-from corporeal.io.unit import Unit
+from corporeal.io.length_units import LengthUnit
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class AssembleConfig:
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
     """Raise each object above what it stands on by this many times its own size."""
-    lift: tuple[str, ...] = field(default=(), metadata=store.LATER)
+    lift: tuple[str, ...] = field(default=(), metadata=store.ADDED_LATER)
     """Raise an object above where it stands, such as "duck=0.5" [m]."""
-    velocity: tuple[str, ...] = field(default=(), metadata=store.LATER)
+    velocity: tuple[str, ...] = field(default=(), metadata=store.ADDED_LATER)
     """An object's initial velocity, such as "duck=1,0,-2" [m/s]."""
     extent: tuple[str, ...] = ()
     """Largest real extent of an object, such as "duck=0.1" [m]."""
-    unit: Unit = "auto"
+    unit: LengthUnit = "auto"
     """Length of one unit of a mesh file; auto: as stated, else what its size makes likely."""
     working_extent: float | None = None
     """Scale the whole scene so that its largest extent is this [m]."""
@@ -38,16 +38,19 @@ class AssembleConfig:
 
 def validate(config: AssembleConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
-    from corporeal.discretization.sizes import said_extent
-    from corporeal.scene.beginnings import said_lift, said_velocity  # NumPy: help needs none
+    from corporeal.discretization.object_scaling import parse_extent
+    from corporeal.scene.initial_state import (  # NumPy: help needs none
+        parse_initial_velocity,
+        parse_lift,
+    )
 
     check_range("The drop", config.drop, 0.0, 100.0)
     check_range("The working extent", config.working_extent, 1e-3, 1e3)
     check_range("The duration", config.duration, 0.01, 60.0)
     check_range("The fps", config.fps, 1, 1000)
     for text in config.extent:
-        said_extent(text, "it")
+        parse_extent(text, "it")
     for text in config.lift:
-        said_lift(text)
+        parse_lift(text)
     for text in config.velocity:
-        said_velocity(text)
+        parse_initial_velocity(text)

@@ -22,10 +22,12 @@ class GroundConfig:
 
 def validate(config: GroundConfig) -> None:
     """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
-    from corporeal.fields.specification import asked  # help reads no library
-    from corporeal.materials.placement import entry_of
+    from corporeal.fields.field_specification import (
+        parse_field_specification,  # help reads no library
+    )
+    from corporeal.materials.range_placement import library_entry
 
-    entry_of(config.floor, config.library)
-    if entry_of(config.neutral, config.library).group == "liquid":
+    library_entry(config.floor, config.library)
+    if library_entry(config.neutral, config.library).group == "liquid":
         raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
-    asked(config.field)
+    parse_field_specification(config.field)

@@ -18,7 +18,7 @@ class SimulateConfig:
     contact: Literal["multi", "single"] = "multi"
     """multi: one velocity field per object, with friction between them; single: one field for all,
     a control in which touching objects stick together."""
-    breaking: bool = field(default=False, metadata=store.LATER)
+    breaking: bool = field(default=False, metadata=store.ADDED_LATER)
     """Brittle things that are struck with ten times the energy that they bear break into pieces;
     else they stay whole, and it is said what would break."""
 
@@ -29,13 +29,13 @@ class SimulateConfig:
             object.__setattr__(self, "engine", "cpu")
 
 
-def as_kept(config: SimulateConfig) -> dict[str, Any]:
+def settings_for_key(config: SimulateConfig) -> dict[str, Any]:
     """Return the settings as results on disk are named by them (``store.kept``).
 
     The first were kept when the engine `cpu` was called `warp`; they stay what they are.
     """
     engine = "warp" if config.engine == "cpu" else config.engine
-    return store.kept(config) | {"engine": engine}
+    return store.settings_for_key(config) | {"engine": engine}
 
 
 def validate(config: SimulateConfig) -> None:
@@ -46,4 +46,6 @@ def validate(config: SimulateConfig) -> None:
             "--engine and --contact."
         )
     if config.engine == "cuda":
-        registry.load("engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:present"})("cuda")
+        registry.load_backend(
+            "engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:require_device"}
+        )("cuda")

@@ -8,39 +8,44 @@ from pathlib import Path
 import numpy as np
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.core.types import Objects, Scene, SceneObject
-from corporeal.discretization.sizes import said_extent
-from corporeal.geometry import placing
-from corporeal.geometry.arrangement import (
-    box_of,
-    boxes_of,
-    in_unit,
-    intersecting,
-    moved,
-    resized,
-    scaled,
+from corporeal.core.types import ObjectGrouping, Scene, SceneObject
+from corporeal.discretization.object_scaling import parse_extent
+from corporeal.geometry import box_placement
+from corporeal.geometry.gaussian_transforms import UpAxis
+from corporeal.geometry.scene_transforms import (
+    convert_scene_unit,
+    move_scene,
+    object_boxes,
+    overlapping_objects,
+    resize_object,
+    scale_scene,
+    surfaces_bounding_box,
 )
-from corporeal.geometry.gaussians import Up
-from corporeal.io.any_model import READ, Frame, read_model
-from corporeal.io.scene_file import ObjectEntry, SceneFile, read_scene_file
-from corporeal.io.sources import films_in, models_in, pictures_in
+from corporeal.io.input_files import images_in_folder, model_files_in, videos_in_folder
+from corporeal.io.load_model import READABLE_MODEL_FORMATS, MeshFrame, load_model
+from corporeal.io.scene_toml import ObjectEntry, SceneFile, read_scene_file
 from corporeal.pipeline.settings.assemble_config import AssembleConfig, validate
-from corporeal.recognition.likely_unit import LikelyUnit, in_shared_unit, likely_unit, sentences
-from corporeal.recognition.typical_extents import doubt
-from corporeal.recognition.words import safe, unique
-from corporeal.scene.beginnings import begun
+from corporeal.recognition.length_unit_inference import (
+    InferredUnit,
+    infer_length_unit,
+    infer_shared_unit,
+    unit_notes,
+)
+from corporeal.recognition.readable_names import safe_name, unique_names
+from corporeal.recognition.typical_extents import extent_warning
+from corporeal.scene.initial_state import with_initial_state
 
-SHORTEST, LONGEST = 1.0, 3.0
+MIN_DURATION_S, MAX_DURATION_S = 1.0, 3.0
 """Bounds of the time that is watched when nobody says how long [s]."""
-FPS = 30
+DEFAULT_FPS = 30
 """Frames per second of the film when nobody says."""
 
 
-DEFAULT = AssembleConfig()
+DEFAULT_CONFIG = AssembleConfig()
 
 
 @dataclass(frozen=True)
-class _Block:
+class _FileObjects:
     """The objects of one file, which keep their arrangement among themselves."""
 
     scene: Scene
@@ -52,7 +57,7 @@ class _Block:
 
 
 def assemble(
-    inputs: Sequence[Path], config: AssembleConfig = DEFAULT, up: Up | None = None
+    inputs: Sequence[Path], config: AssembleConfig = DEFAULT_CONFIG, up: UpAxis | None = None
 ) -> Scene:
     """Return one scene from models, a folder of them, or one ``scene.toml``.
 
@@ -66,19 +71,19 @@ def assemble(
 
     """
     validate(config)
-    plan = _plan([Path(p) for p in inputs])
-    frame = Frame(up, config.unit)
-    blocks = _sized(_named(_read(plan, config.objects, frame)), config.extent)
-    scene = _merged(plan, _placed(blocks, plan, config.stack))
+    plan = _scene_file_for([Path(p) for p in inputs])
+    frame = MeshFrame(up, config.unit)
+    blocks = _apply_extents(_unique_names(_read(plan, config.objects, frame)), config.extent)
+    scene = _merge_blocks(plan, _place_blocks(blocks, plan, config.stack))
     scene = _at_working_extent(scene, config.working_extent)
-    scene = begun(_dropped(scene, config.drop), config.lift, config.velocity)
-    return _timed(_with_overlaps_named(scene), blocks, plan, config)
+    scene = with_initial_state(_lift_objects(scene, config.drop), config.lift, config.velocity)
+    return _with_timing(_with_overlaps_named(scene), blocks, plan, config)
 
 
 # ---------------------------------------------------------------- what the files hold
 
 
-def _plan(inputs: list[Path]) -> SceneFile:
+def _scene_file_for(inputs: list[Path]) -> SceneFile:
     """Return the inputs as if somebody had written a scene file for them."""
     if not inputs:
         raise UserError("No input. Name a model, several of them, or a scene.toml.")
@@ -94,10 +99,10 @@ def _plan(inputs: list[Path]) -> SceneFile:
 
 
 def _models_in(folder: Path) -> list[Path]:
-    found = models_in(folder)
+    found = model_files_in(folder)
     if found:
         return found
-    if pictures := pictures_in(folder):
+    if pictures := images_in_folder(folder):
         places = list(dict.fromkeys(str(picture.parent) for picture in pictures))
         what = f"the folder holds {len(pictures)} pictures and no model. They lie in {places[0]}"
         step = "Name that folder, to reconstruct what they show."
@@ -105,34 +110,36 @@ def _models_in(folder: Path) -> list[Path]:
             what += f" and {len(places) - 1} more folders"
             step = "Put the photographs of one thing into one folder, and name that."
         raise BadFileError(folder, f"{what}.", step)
-    if films := films_in(folder):
+    if films := videos_in_folder(folder):
         what = f"the folder holds {len(films)} films and no model."
         raise BadFileError(folder, what, f"Name the film itself: {films[0]}.")
     step = "Name a model, or a folder that holds some, or photographs with poses."
-    raise BadFileError(folder, f"the folder holds no model ({READ}) and no pictures.", step)
+    raise BadFileError(
+        folder, f"the folder holds no model ({READABLE_MODEL_FORMATS}) and no pictures.", step
+    )
 
 
-def _read(plan: SceneFile, objects: Objects, frame: Frame) -> list[_Block]:
+def _read(plan: SceneFile, objects: ObjectGrouping, frame: MeshFrame) -> list[_FileObjects]:
     """Read every file once per use, with what the scene file states of its objects."""
     blocks = []
     if plan.file is not None:
-        model = read_model(plan.file, objects, frame)
-        blocks.append(_Block(model.scene, model.ours, None, model.metric))
+        model = load_model(plan.file, objects, frame)
+        blocks.append(_FileObjects(model.scene, model.ours, None, model.metric))
     for entry in plan.objects:
         if entry.file is None:
-            blocks[0] = replace(blocks[0], scene=_told(blocks[0].scene, entry, plan))
+            blocks[0] = replace(blocks[0], scene=_apply_entry(blocks[0].scene, entry, plan))
             continue
         single = entry.name or entry.class_name or entry.extent
-        model = read_model(entry.file, "one" if single else objects, frame)
+        model = load_model(entry.file, "one" if single else objects, frame)
         scene = model.scene
         for k in range(len(scene.objects)):
             scene = _with_object(scene, k, entry)
         metric = model.metric or entry.extent is not None
-        blocks.append(_Block(scene, model.ours, entry, metric))
+        blocks.append(_FileObjects(scene, model.ours, entry, metric))
     return blocks
 
 
-def _told(scene: Scene, entry: ObjectEntry, plan: SceneFile) -> Scene:
+def _apply_entry(scene: Scene, entry: ObjectEntry, plan: SceneFile) -> Scene:
     """Apply an entry to the object of the scene's own file that it names."""
     names = [o.name for o in scene.objects]
     if entry.name not in names:
@@ -154,12 +161,12 @@ def _with_object(scene: Scene, k: int, entry: ObjectEntry) -> Scene:
     )
     objects = (*scene.objects[:k], obj, *scene.objects[k + 1 :])
     scene = replace(scene, objects=objects)
-    return scene if entry.extent is None else resized(scene, k, entry.extent)
+    return scene if entry.extent is None else resize_object(scene, k, entry.extent)
 
 
-def _named(blocks: list[_Block]) -> list[_Block]:
+def _unique_names(blocks: list[_FileObjects]) -> list[_FileObjects]:
     """Return the blocks with names that occur once in the whole scene."""
-    names = iter(unique([safe(o.name) for b in blocks for o in b.scene.objects]))
+    names = iter(unique_names([safe_name(o.name) for b in blocks for o in b.scene.objects]))
     return [
         replace(
             b,
@@ -174,23 +181,23 @@ def _named(blocks: list[_Block]) -> list[_Block]:
 # ---------------------------------------------------------------- how large
 
 
-def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
+def _apply_extents(blocks: list[_FileObjects], extents: tuple[str, ...]) -> list[_FileObjects]:
     """Give objects the extents asked for, and tell where the others look implausible."""
     alone = len(blocks) == len(blocks[0].scene.objects) == 1
     only = blocks[0].scene.objects[0].name if alone else ""
-    wanted = [said_extent(text, only) for text in extents]
+    wanted = [parse_extent(text, only) for text in extents]
     used, blocks = set(), _in_metres(blocks, dict(wanted))
     for i, block in enumerate(blocks):
         scene, messages = block.scene, []
         for k, obj in enumerate(scene.objects):
-            hits = [w for w in wanted if _means(w[0], obj)]
+            hits = [w for w in wanted if _matches_object(w[0], obj)]
             used.update(hits)
             said = block.entry is not None and block.entry.extent is not None
             if hits:
-                scene = resized(scene, k, hits[-1][1])
+                scene = resize_object(scene, k, hits[-1][1])
             elif said:  # by the scene file, and there is nothing to ask
                 continue
-            elif sentence := doubt(obj.name, obj.class_name, obj.real_extent):
+            elif sentence := extent_warning(obj.name, obj.class_name, obj.real_extent):
                 messages.append(sentence)
         messages = [s for s in messages if not block.ours]
         blocks[i] = replace(block, scene=replace(scene, warnings=(*scene.warnings, *messages)))
@@ -201,48 +208,48 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
     return blocks
 
 
-def _in_metres(blocks: list[_Block], wanted: Mapping[str, float]) -> list[_Block]:
+def _in_metres(blocks: list[_FileObjects], wanted: Mapping[str, float]) -> list[_FileObjects]:
     """Find the units of files that state none, by an extent asked for or by their sizes."""
-    blocks = [b if b.metric else _as_asked(b, wanted) for b in blocks]
-    alone = {i: _likely(b) for i, b in enumerate(blocks) if not b.metric}
+    blocks = [b if b.metric else _scaled_to_extent(b, wanted) for b in blocks]
+    alone = {i: _with_likely_unit(b) for i, b in enumerate(blocks) if not b.metric}
     found = []
     for i, guess in alone.items():
         block, largest = blocks[i], _largest_object(blocks[i])
         file = Path(block.scene.source)
         if block.entry is not None and block.entry.position is not None:
             others = (other for k, other in alone.items() if k != i)
-            guess = in_shared_unit(guess, file, largest.real_extent, others)
+            guess = infer_shared_unit(guess, file, largest.real_extent, others)
         if guess is None:
             what = f"states no unit, and {largest.name} is {largest.real_extent:.4g} units large."
             step = "Give --unit, or --extent NAME=METRES."
             raise BadFileError(file, what, step)
         found.append(guess)
-        blocks[i] = replace(block, scene=in_unit(block.scene, guess.metres), metric=True)
+        blocks[i] = replace(block, scene=convert_scene_unit(block.scene, guess.metres), metric=True)
     first = blocks[0].scene
-    told = (*first.warnings, *sentences(found))
+    told = (*first.warnings, *unit_notes(found))
     return [replace(blocks[0], scene=replace(first, warnings=told)), *blocks[1:]]
 
 
-def _as_asked(block: _Block, wanted: Mapping[str, float]) -> _Block:
+def _scaled_to_extent(block: _FileObjects, wanted: Mapping[str, float]) -> _FileObjects:
     """Return a block in metres where somebody says how large one of its objects is."""
     for thing in block.scene.objects:
-        asked = [extent for name, extent in wanted.items() if _means(name, thing)]
+        asked = [extent for name, extent in wanted.items() if _matches_object(name, thing)]
         if asked:
-            scene = in_unit(block.scene, asked[-1] / thing.real_extent)
+            scene = convert_scene_unit(block.scene, asked[-1] / thing.real_extent)
             return replace(block, scene=scene, metric=True)
     return block
 
 
-def _likely(block: _Block) -> LikelyUnit | None:
+def _with_likely_unit(block: _FileObjects) -> InferredUnit | None:
     thing = _largest_object(block)
-    return likely_unit(Path(block.scene.source), thing.class_name, thing.real_extent)
+    return infer_length_unit(Path(block.scene.source), thing.class_name, thing.real_extent)
 
 
-def _largest_object(block: _Block) -> SceneObject:
+def _largest_object(block: _FileObjects) -> SceneObject:
     return max(block.scene.objects, key=lambda o: o.real_extent)
 
 
-def _means(words: str, obj: SceneObject) -> bool:
+def _matches_object(words: str, obj: SceneObject) -> bool:
     """Tell whether somebody who types these words means this object."""
     asked = set(words.lower().replace("_", " ").split())
     exactly = words in (obj.name, Path(obj.source).stem)
@@ -253,62 +260,64 @@ def _at_working_extent(scene: Scene, extent: float | None) -> Scene:
     """Scale everything about the origin, which lies on the floor."""
     if extent is None:
         return scene
-    return scaled(scene, extent / float(np.ptp(box_of(scene.surfaces), axis=0).max()))
+    return scale_scene(
+        scene, extent / float(np.ptp(surfaces_bounding_box(scene.surfaces), axis=0).max())
+    )
 
 
 # ---------------------------------------------------------------- where
 
 
-def _placed(blocks: list[_Block], plan: SceneFile, stack: bool) -> list[_Block]:
+def _place_blocks(blocks: list[_FileObjects], plan: SceneFile, stack: bool) -> list[_FileObjects]:
     """Move each block to its position, or onto the floor beside or above the others."""
     free = [i for i, b in enumerate(blocks) if b.entry and b.entry.position is None]
     fixed = [i for i in range(len(blocks)) if i not in free]
     for i in fixed:
-        blocks[i] = replace(blocks[i], scene=_fixed(blocks[i], plan))
+        blocks[i] = replace(blocks[i], scene=_place_as_stated(blocks[i], plan))
     if not free:
         return blocks
-    boxes = np.stack([box_of(blocks[i].scene.surfaces) for i in free])
-    shifts = placing.stacked(boxes) if stack else placing.side_by_side(boxes)
+    boxes = np.stack([surfaces_bounding_box(blocks[i].scene.surfaces) for i in free])
+    shifts = box_placement.stack_shifts(boxes) if stack else box_placement.row_shifts(boxes)
     if fixed:
-        right = max(box_of(blocks[i].scene.surfaces)[1, 0] for i in fixed)
+        right = max(surfaces_bounding_box(blocks[i].scene.surfaces)[1, 0] for i in fixed)
         width = (boxes + shifts[:, None])[..., 0]
-        shifts[:, 0] += right - width.min() + placing.GAP * np.ptp(width)
+        shifts[:, 0] += right - width.min() + box_placement.ROW_GAP_FRACTION * np.ptp(width)
     for i, shift in zip(free, shifts, strict=True):
-        blocks[i] = replace(blocks[i], scene=moved(blocks[i].scene, shift))
+        blocks[i] = replace(blocks[i], scene=move_scene(blocks[i].scene, shift))
     return blocks
 
 
-def _fixed(block: _Block, plan: SceneFile) -> Scene:
+def _place_as_stated(block: _FileObjects, plan: SceneFile) -> Scene:
     """Return a block where the scene file puts it, or as its own file poses it, above the floor."""
     scene = block.scene
-    box = box_of(scene.surfaces)
+    box = surfaces_bounding_box(scene.surfaces)
     if block.entry is not None and block.entry.position is not None:
-        return moved(scene, placing.onto_floor(box[None])[0] + block.entry.position)
+        return move_scene(scene, box_placement.floor_shifts(box[None])[0] + block.entry.position)
     if len(scene.objects) == 1 and not block.ours:
-        scene = moved(scene, placing.onto_floor(box[None])[0])
+        scene = move_scene(scene, box_placement.floor_shifts(box[None])[0])
     elif box[0, 2] < 0 or not block.ours:
-        scene = moved(scene, np.array([0.0, 0.0, -box[0, 2]]))
+        scene = move_scene(scene, np.array([0.0, 0.0, -box[0, 2]]))
     names = [o.name for o in scene.objects]
     for entry in plan.objects:
         if entry.file is None and entry.position is not None:
-            k = names.index(safe(entry.name or ""))
-            own = box_of([s for s in scene.surfaces if s.object == k])
-            scene = moved(scene, placing.onto_floor(own[None])[0] + entry.position, k)
+            k = names.index(safe_name(entry.name or ""))
+            own = surfaces_bounding_box([s for s in scene.surfaces if s.object == k])
+            scene = move_scene(scene, box_placement.floor_shifts(own[None])[0] + entry.position, k)
     return scene
 
 
-def _dropped(scene: Scene, drop: float) -> Scene:
+def _lift_objects(scene: Scene, drop: float) -> Scene:
     """Hang every object a number of times its size above what it stands on."""
     if drop == 0:
         return scene
-    for k, rise in enumerate(placing.lifted(boxes_of(scene), drop)):
-        scene = moved(scene, np.array([0.0, 0.0, rise]), k)
+    for k, rise in enumerate(box_placement.lift_heights(object_boxes(scene), drop)):
+        scene = move_scene(scene, np.array([0.0, 0.0, rise]), k)
     return scene
 
 
 def _with_overlaps_named(scene: Scene) -> Scene:
     """Warn of objects that stand in each other: they would burst apart."""
-    pairs = ((scene.objects[a].name, scene.objects[b].name) for a, b in intersecting(scene))
+    pairs = ((scene.objects[a].name, scene.objects[b].name) for a, b in overlapping_objects(scene))
     messages = tuple(f"{a} and {b} overlap at the start." for a, b in pairs)
     return replace(scene, warnings=scene.warnings + messages)
 
@@ -316,7 +325,7 @@ def _with_overlaps_named(scene: Scene) -> Scene:
 # ---------------------------------------------------------------- the whole, and how long
 
 
-def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
+def _merge_blocks(plan: SceneFile, blocks: list[_FileObjects]) -> Scene:
     objects, surfaces, finishes, warnings, hints = [], [], [], [], []
     for scene in (b.scene for b in blocks):
         o, f = len(objects), len(finishes)
@@ -337,39 +346,41 @@ def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
     )
 
 
-def _title(plan: SceneFile, blocks: list[_Block]) -> str:
+def _title(plan: SceneFile, blocks: list[_FileObjects]) -> str:
     """Return the scene's name: the scene file's, or its folder's, or the models'."""
     if plan.path.suffix.lower() == ".toml":
-        return titled(plan.path)
-    return safe("-".join(b.scene.name for b in blocks))[:60] or "scene"
+        return scene_title(plan.path)
+    return safe_name("-".join(b.scene.name for b in blocks))[:60] or "scene"
 
 
-def titled(path: Path) -> str:
+def scene_title(path: Path) -> str:
     """Return what the scene of a scene file is called."""
-    return safe(path.resolve().parent.name if path.stem == "scene" else path.stem) or "scene"
+    return safe_name(path.resolve().parent.name if path.stem == "scene" else path.stem) or "scene"
 
 
-def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: AssembleConfig) -> Scene:
+def _with_timing(
+    scene: Scene, blocks: list[_FileObjects], plan: SceneFile, config: AssembleConfig
+) -> Scene:
     """Say gravity, duration and the like: the options first, then the scene file, then our GLB."""
     own = blocks[0].scene if len(blocks) == 1 and blocks[0].ours else None
     scene = replace(
         scene,
         gravity=plan.gravity or (own or scene).gravity,
         walls=(*scene.walls, *(own.walls if own else ())),
-        fps=config.fps or plan.fps or (own.fps if own else FPS),
+        fps=config.fps or plan.fps or (own.fps if own else DEFAULT_FPS),
         settled=(own or scene).settled if plan.settled is None else plan.settled,
     )
     raised = config.drop or config.lift  # what is dropped needs its time
     known = own.duration if own and not raised else None
     stated = config.duration or plan.duration or known
-    return replace(scene, duration=stated or _watched(scene))
+    return replace(scene, duration=stated or _default_duration(scene))
 
 
-def _watched(scene: Scene) -> float:
+def _default_duration(scene: Scene) -> float:
     """Return three times the longest fall and a second more [s], and never less than the forces."""
     fall = 0.0
     g = -scene.gravity[2]
-    for obj, height in zip(scene.objects, boxes_of(scene)[:, 0, 2], strict=True):
+    for obj, height in zip(scene.objects, object_boxes(scene)[:, 0, 2], strict=True):
         v = obj.velocity[2]
         if g > 0:
             fall = max(fall, (v + math.sqrt(v * v + 2 * g * max(height, 0.0))) / g)
@@ -377,4 +388,4 @@ def _watched(scene: Scene) -> float:
     ends = [f.end for f in forces if math.isfinite(f.end)]
     ends += [o.path.time[-1] for o in scene.objects if o.path is not None]
     forced = max(ends, default=0.0) + 0.5
-    return round(max(min(max(3 * fall + 1, SHORTEST), LONGEST), forced), 1)
+    return round(max(min(max(3 * fall + 1, MIN_DURATION_S), MAX_DURATION_S), forced), 1)

@@ -13,19 +13,24 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.errors import UserError
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Camera, Scene, Views
-from corporeal.geometry.arrangement import boxes_of
-from corporeal.render.camera import VIEW, Aim, around, camera_of
-from corporeal.render.embree import first_seen, render
-from corporeal.render.kernels import NOTHING
-from corporeal.render.stage import Light, Stage
+from corporeal.geometry.scene_transforms import object_boxes
+from corporeal.render.camera_placement import (
+    VIEW_DIRECTION,
+    CameraAim,
+    camera_from_aim,
+    fit_cameras_around,
+)
+from corporeal.render.embree import first_seen, render_image
+from corporeal.render.kernels_hits import HIT_NOTHING
+from corporeal.render.ray_scene import RayScene, StudioLight
 
 Progress = Callable[[float, str], None]
 
-FILL = 0.9
+PICTURE_FILL_FRACTION = 0.9
 """Share of the picture that the objects take at most."""
-LARGEST = 2**28
+MAX_TOTAL_PIXELS = 2**28
 """Pixels of all views together."""
 
 
@@ -43,12 +48,12 @@ class CaptureConfig:
     """Threads; None: one per core."""
 
 
-DEFAULT = CaptureConfig()
+DEFAULT_CONFIG = CaptureConfig()
 
 
 def capture(
     scene: Scene,
-    config: CaptureConfig = DEFAULT,
+    config: CaptureConfig = DEFAULT_CONFIG,
     progress: Progress = lambda fraction, words: None,
 ) -> Views:
     """Picture a scene from all sides above the floor, which is in the pictures.
@@ -59,14 +64,16 @@ def capture(
     """
     _check(scene, config)
     progress(0.0, "placing the cameras")
-    aims = around(boxes_of(scene)[None], config.views, config.size, FILL)
-    return pictures(scene, aims, config, progress)
+    aims = fit_cameras_around(
+        object_boxes(scene)[None], config.views, config.size, PICTURE_FILL_FRACTION
+    )
+    return render_views(scene, aims, config, progress)
 
 
-def pictures(
+def render_views(
     scene: Scene,
-    aims: Sequence[Aim],
-    config: CaptureConfig = DEFAULT,
+    aims: Sequence[CameraAim],
+    config: CaptureConfig = DEFAULT_CONFIG,
     progress: Progress = lambda fraction, words: None,
 ) -> Views:
     """Picture a scene from where somebody stands; all pictures have one size.
@@ -78,11 +85,13 @@ def pictures(
         progress: Told the fraction done and what is being done.
 
     """
-    stage = Stage(scene, Light(front=VIEW))  # shadows stay where they are from view to view
+    stage = RayScene(
+        scene, StudioLight(front=VIEW_DIRECTION)
+    )  # shadows stay where they are from view to view
     shape = (len(aims), aims[0].height, aims[0].width)
     views = Views(
         rgb=np.empty((*shape, 3), np.uint8),
-        cameras=tuple(camera_of(aim) for aim in aims),
+        cameras=tuple(camera_from_aim(aim) for aim in aims),
         depth=np.empty(shape, np.float32),
         normals=np.empty((*shape, 3), np.float32),
         object_of_pixel=np.empty(shape, np.int32),
@@ -91,16 +100,16 @@ def pictures(
 
     def take(k: int) -> None:
         # One thread a picture: the renderer's bands depend on how many there are.
-        views.rgb[k] = render(stage, aims[k], config.quality, threads=1)
+        views.rgb[k] = render_image(stage, aims[k], config.quality, threads=1)
         _measure(scene, stage, aims[k], views, k)
 
-    with ThreadPoolExecutor(config.threads or cores()) as pool:
+    with ThreadPoolExecutor(config.threads or usable_cores()) as pool:
         for k, _ in enumerate(pool.map(take, range(len(aims)))):
             progress((k + 1) / len(aims), f"view {k + 1} of {len(aims)}")
     return views
 
 
-def stretch(camera: Camera) -> Float[np.ndarray, "H W"]:
+def ray_length_per_depth(camera: Camera) -> Float[np.ndarray, "H W"]:
     """Return the length of each pixel's ray per metre of depth [-]."""
     u, v = np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5
     K = camera.K
@@ -108,12 +117,12 @@ def stretch(camera: Camera) -> Float[np.ndarray, "H W"]:
     return np.sqrt(1 + x[None] ** 2 + y[:, None] ** 2)
 
 
-def _measure(scene: Scene, stage: Stage, aim: Aim, views: Views, k: int) -> None:
+def _measure(scene: Scene, stage: RayScene, aim: CameraAim, views: Views, k: int) -> None:
     """Fill in what is not colour."""
     seen = first_seen(stage, aim)
     shape = aim.height, aim.width
-    nothing = (seen.kind == NOTHING).reshape(shape)
-    depth = seen.depth.reshape(shape) / stretch(views.cameras[k])
+    nothing = (seen.kind == HIT_NOTHING).reshape(shape)
+    depth = seen.depth.reshape(shape) / ray_length_per_depth(views.cameras[k])
     counts = [len(s.triangles) for s in scene.surfaces]
     surface_of_triangle = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
     part = np.where(seen.triangle < 0, -1, surface_of_triangle[seen.triangle]).reshape(shape)
@@ -132,8 +141,8 @@ def _check(scene: Scene, config: CaptureConfig) -> None:
     width, height = config.size
     if config.views < 1 or min(width, height) < 8:
         raise UserError("Ask for at least 1 view, and for pictures of at least 8 × 8 pixels.")
-    if config.views * width * height > LARGEST:
+    if config.views * width * height > MAX_TOTAL_PIXELS:
         raise UserError(
             f"{config.views} views of {width} × {height} pixels do not fit into memory. "
-            f"Ask for at most {LARGEST >> 20} million pixels in all."
+            f"Ask for at most {MAX_TOTAL_PIXELS >> 20} million pixels in all."
         )

@@ -14,43 +14,51 @@ from typing import Literal
 import numpy as np
 
 from corporeal.core.errors import UnknownChoiceError, UserError
-from corporeal.core.types import DOWNWARDS
-from corporeal.discretization.sizes import Sizing, scene_extents
-from corporeal.geometry.convex_decompose import decompose
-from corporeal.geometry.mesh import joined
-from corporeal.io.glb import read_model
-from corporeal.io.glb_merge import Member, merge
-from corporeal.io.scene_file import SceneFile, write_scene_file
-from corporeal.materials import find, friction_between
-from corporeal.pool.asset import UNKNOWN, Asset, Pool
-from corporeal.pool.draw import counts, draw
-from corporeal.recognition.words import numbered
-from corporeal.scene.arrange import Arrangement
-from corporeal.scene.begin import Begun, drop_and_begin
-from corporeal.scene.body import Body, Pose
-from corporeal.scene.breeze import slowest_wind
-from corporeal.scene.certificate import Certificate
-from corporeal.scene.composition import (
+from corporeal.core.types import GRAVITY_VECTOR
+from corporeal.discretization.object_scaling import SceneSizing, scene_extents
+from corporeal.geometry.convex_decomposition import decompose_convex
+from corporeal.geometry.mesh import join_meshes
+from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
+from corporeal.io.gltf.gltf_reader import read_gltf_model
+from corporeal.io.scene_toml import SceneFile, write_scene_file
+from corporeal.materials import find_material, friction_between
+from corporeal.pool.asset_draw import draw_least_used, parse_count_range
+from corporeal.pool.asset_pool import UNKNOWN_LICENCE, AssetPool, PoolAsset
+from corporeal.recognition.readable_names import numbered_names
+from corporeal.scene.arrange_bodies import BodyArrangement
+from corporeal.scene.interactions import (
+    ARRANGEMENTS_OF_KIND,
+    INTERACTION_KINDS,
+    MAX_WIND_SPEED_M_S,
+    MIN_OBJECTS_OF_KIND,
+    WIND_SPEED_RATIO_RANGE,
+    InteractionKind,
+    SceneInteraction,
+)
+from corporeal.scene.mass_properties import MassProperties
+from corporeal.scene.rest_certificate import RestCertificate
+from corporeal.scene.scene_composition import (
     ComposedObject,
-    Composition,
+    SceneComposition,
     write_certificate,
     write_composition,
 )
-from corporeal.scene.interactions import KINDS, NEEDS, STANDING, STORM, WIND, Action, Kind
-from corporeal.scene.mass_properties import MassProperties
-from corporeal.scene.rest import RestConfig, SettlingEngine
-from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
+from corporeal.scene.settle_bodies import SettleConfig, SettlingEngine
+from corporeal.scene.settle_for_interaction import SettledInteraction, settle_for_interaction
+from corporeal.scene.settling_body import BodyPose, SettlingBody
+from corporeal.scene.wind_threshold import lowest_wind_threshold
+from corporeal.vlm.real_sizes import RealExtent, estimate_real_extent, find_class_sizes
 
 Progress = Callable[[float, str], None]
-Weigh = Callable[[Asset, float], MassProperties]
+Weigh = Callable[[PoolAsset, float], MassProperties]
 """Given an asset and its real extent [m], says how its mass lies: at that size, about the middle of
 its box."""
 
-FINEST = 48
+CELLS_ALONG_LARGEST_OBJECT = 48
 """Cells along the largest object at draft detail: half of one is the penetration allowed."""
-PIECES = "pieces"
+CONVEX_PIECES_FOLDER = "pieces"
 """Folder of the pool that keeps convex pieces."""
-AT_REST = 1.0
+DURATION_AT_REST_S = 1.0
 """How long to film a scene in which nothing happens [s]."""
 
 
@@ -68,42 +76,42 @@ class ComposeConfig:
     """Allow several objects of one class."""
     seed: int = 0
     """Seed of all random numbers."""
-    arrangement: Arrangement | Literal["auto"] = "auto"
+    arrangement: BodyArrangement | Literal["auto"] = "auto"
     """Arrangement at rest: side by side, stacked, dropped onto one, or in a row."""
     settle_with: SettlingEngine = "mujoco"
     """Rigid-body engine: MuJoCo, or Blender through the program blenderproc on the PATH."""
-    interaction: Kind | Literal["auto", "none"] = "auto"
+    interaction: InteractionKind | Literal["auto", "none"] = "auto"
     """Interaction that starts at time 0."""
-    sizing: Sizing = field(default_factory=Sizing)
+    sizing: SceneSizing = field(default_factory=SceneSizing)
     vlm: str = "metadata"
     """Source of usual sizes of classes, as --vlm of `describe`; by default a table."""
     record: Path | None = None
     """Folder to record a model's answers in, for --vlm replay:FOLDER."""
 
 
-DEFAULT = ComposeConfig()
+DEFAULT_CONFIG = ComposeConfig()
 
 
 @dataclass(frozen=True)
-class Composed:
+class ComposedScene:
     """A scene that was composed."""
 
     folder: Path
     names: tuple[str, ...]
     """Of its objects."""
-    arrangement: Arrangement
-    action: Action | None
-    certificate: Certificate
+    arrangement: BodyArrangement
+    action: SceneInteraction | None
+    certificate: RestCertificate
     warnings: tuple[str, ...]
 
 
 def compose(
-    pool: Pool,
+    pool: AssetPool,
     folder: Path,
-    config: ComposeConfig = DEFAULT,
+    config: ComposeConfig = DEFAULT_CONFIG,
     progress: Progress | None = None,
     weigh: Weigh | None = None,
-) -> Composed:
+) -> ComposedScene:
     """Compose one scene and write it into a folder; the same pool and seed give the same bytes.
 
     Args:
@@ -123,24 +131,26 @@ def compose(
     # Which assets, how large, and what may happen.
     tell(0.0, "choosing")
     kind = None if config.interaction in ("auto", "none") else config.interaction
-    assets = _chosen(pool, config, kind, rng)
-    kinds: list[Kind] = [kind] if kind else _possible_kinds(config, len(assets), rng)
-    sizes = _sized(assets, config)
+    assets = _choose_assets(pool, config, kind, rng)
+    kinds: list[InteractionKind] = [kind] if kind else _possible_kinds(config, len(assets), rng)
+    sizes = _asset_sizes(assets, config)
     tell(0.1, "cutting into convex pieces")
-    objects = _weighed(_objects(pool, assets, sizes, config.sizing), weigh)
+    objects = _with_mass_properties(_objects(pool, assets, sizes, config.sizing), weigh)
     tell(0.3, "settling")
-    deepest = 0.5 * max(t.extent for t in objects) / FINEST
-    bodies, rest = [t.body for t in objects], RestConfig(engine=config.settle_with)
-    settled = drop_and_begin(bodies, config.arrangement, kinds, rng, deepest, rest)
+    deepest = 0.5 * max(t.extent for t in objects) / CELLS_ALONG_LARGEST_OBJECT
+    bodies, rest = [t.body for t in objects], SettleConfig(engine=config.settle_with)
+    settled = settle_for_interaction(bodies, config.arrangement, kinds, rng, deepest, rest)
     tell(0.9, "writing")
     warnings = _write(folder, objects, settled, config)
     stated = tuple(dict.fromkeys([*(w for s in sizes for w in s.warnings), *warnings]))
-    _keep(folder, objects, settled, config, stated)
+    _write_certificate(folder, objects, settled, config, stated)
     names = tuple(t.name for t in objects)
-    return Composed(folder, names, settled.arrangement, settled.action, settled.certificate, stated)
+    return ComposedScene(
+        folder, names, settled.arrangement, settled.action, settled.certificate, stated
+    )
 
 
-def moved_by_wind(assets: Sequence[Asset], config: ComposeConfig, weigh: Weigh) -> bool:
+def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: Weigh) -> bool:
     """Tell whether any of the objects of a scene could be moved by a wind, standing alone.
 
     Args:
@@ -149,12 +159,12 @@ def moved_by_wind(assets: Sequence[Asset], config: ComposeConfig, weigh: Weigh) 
         weigh: Says how the mass of an object lies.
 
     """
-    real = [s.extent for s in _sized(assets, config)]
+    real = [s.extent for s in _asset_sizes(assets, config)]
     for asset, size, extent in zip(assets, real, scene_extents(real, config.sizing), strict=True):
         points, triangles, _ = _shape(asset, float(extent))
         inertial = weigh(asset, size).scaled(float(extent) / size)
-        body = Body(asset.name, points, triangles, (), inertial=inertial)
-        if WIND[1] * slowest_wind(body) <= STORM:
+        body = SettlingBody(asset.name, points, triangles, (), inertial=inertial)
+        if WIND_SPEED_RATIO_RANGE[1] * lowest_wind_threshold(body) <= MAX_WIND_SPEED_M_S:
             return True
     return False
 
@@ -162,23 +172,28 @@ def moved_by_wind(assets: Sequence[Asset], config: ComposeConfig, weigh: Weigh) 
 # ---------------------------------------------------------------- what is in it
 
 
-def _possible_kinds(config: ComposeConfig, count: int, rng: np.random.Generator) -> list[Kind]:
+def _possible_kinds(
+    config: ComposeConfig, count: int, rng: np.random.Generator
+) -> list[InteractionKind]:
     """Return what so many objects, standing as asked, can do, in an order of chance."""
     if config.interaction == "none":
         return []
     stands = config.arrangement
-    able: list[Kind] = [
-        k for k in KINDS if NEEDS[k] <= count and (count == 1 or stands in ("auto", *STANDING[k]))
+    able: list[InteractionKind] = [
+        k
+        for k in INTERACTION_KINDS
+        if MIN_OBJECTS_OF_KIND[k] <= count
+        and (count == 1 or stands in ("auto", *ARRANGEMENTS_OF_KIND[k]))
     ]
     return [able[k] for k in rng.permutation(len(able))] or ["fall"]
 
 
-def _chosen(
-    pool: Pool, config: ComposeConfig, kind: Kind | None, rng: np.random.Generator
-) -> list[Asset]:
+def _choose_assets(
+    pool: AssetPool, config: ComposeConfig, kind: InteractionKind | None, rng: np.random.Generator
+) -> list[PoolAsset]:
     """Return the assets named, or draw classes and one asset of each."""
     if config.assets:
-        return [_named(pool, name) for name in config.assets]
+        return [_asset_by_name(pool, name) for name in config.assets]
     by_class = pool.classes
     if not by_class:
         raise UserError(
@@ -188,8 +203,8 @@ def _chosen(
         if name not in by_class:
             raise UnknownChoiceError("class", name, list(by_class))
     offered = list(dict.fromkeys(config.classes)) or list(by_class)
-    low, high = counts(config.count)
-    low = max(low, NEEDS[kind]) if kind else low
+    low, high = parse_count_range(config.count)
+    low = max(low, MIN_OBJECTS_OF_KIND[kind]) if kind else low
     most = high if config.repeat else min(high, len(offered))
     if most < low:
         raise UserError(
@@ -198,11 +213,11 @@ def _chosen(
             "say --repeat."
         )
     count = int(rng.integers(low, most + 1))
-    classes = draw(offered, {}, count, rng, config.repeat)
+    classes = draw_least_used(offered, {}, count, rng, config.repeat)
     return [by_class[c][rng.integers(len(by_class[c]))] for c in classes]
 
 
-def _named(pool: Pool, name: str) -> Asset:
+def _asset_by_name(pool: AssetPool, name: str) -> PoolAsset:
     found = pool.asset(name)
     if found is None:
         raise UnknownChoiceError("asset", name, [a.name for a in pool.assets])
@@ -213,15 +228,15 @@ def _named(pool: Pool, name: str) -> Asset:
 
 
 @dataclass(frozen=True)
-class _Placed:
+class _ObjectToPlace:
     """One object of the scene to be."""
 
     name: str
-    asset: Asset
+    asset: PoolAsset
     real: RealExtent
     extent: float
     """In the scene [m]."""
-    body: Body
+    body: SettlingBody
     centre: np.ndarray
     """Of the file's box [its own unit]: the origin of the body."""
 
@@ -231,46 +246,48 @@ class _Placed:
         return self.extent / self.asset.extent
 
 
-def _sized(assets: Sequence[Asset], config: ComposeConfig) -> list[RealExtent]:
-    known = usual_sizes((a.class_name for a in assets), config.vlm, config.record)
-    sizes = [real_extent(a.name, a.class_name, a.extent, a.metric, known) for a in assets]
+def _asset_sizes(assets: Sequence[PoolAsset], config: ComposeConfig) -> list[RealExtent]:
+    known = find_class_sizes((a.class_name for a in assets), config.vlm, config.record)
+    sizes = [estimate_real_extent(a.name, a.class_name, a.extent, a.metric, known) for a in assets]
     if sizes and known.warnings:
         sizes[0] = replace(sizes[0], warnings=(*sizes[0].warnings, *known.warnings))
     return sizes
 
 
 def _objects(
-    pool: Pool, assets: Sequence[Asset], sizes: Sequence[RealExtent], sizing: Sizing
-) -> list[_Placed]:
+    pool: AssetPool, assets: Sequence[PoolAsset], sizes: Sequence[RealExtent], sizing: SceneSizing
+) -> list[_ObjectToPlace]:
     """Give every asset its name, its size in the scene and a body."""
-    names = numbered([a.class_name for a in assets])
+    names = numbered_names([a.class_name for a in assets])
     extents = scene_extents([s.extent for s in sizes], sizing)
     objects = []
     for name, asset, size, extent in zip(names, assets, sizes, extents, strict=True):
         points, triangles, centre = _shape(asset, float(extent))
         try:
-            pieces = decompose(points, triangles, pool.folder / PIECES)
+            pieces = decompose_convex(points, triangles, pool.folder / CONVEX_PIECES_FOLDER)
         except UserError as problem:
             raise UserError(f"{asset.name}: {problem}") from None
-        body = Body(name, points, triangles, pieces)
-        objects.append(_Placed(name, asset, size, float(extent), body, centre))
+        body = SettlingBody(name, points, triangles, pieces)
+        objects.append(_ObjectToPlace(name, asset, size, float(extent), body, centre))
     return objects
 
 
-def _weighed(objects: list[_Placed], weigh: Weigh | None) -> list[_Placed]:
+def _with_mass_properties(
+    objects: list[_ObjectToPlace], weigh: Weigh | None
+) -> list[_ObjectToPlace]:
     """Let bodies know how their mass lies, walls being as thick as the object is large."""
     if weigh is None:
         return objects
     matters = [weigh(t.asset, t.real.extent).scaled(t.extent / t.real.extent) for t in objects]
     bodies = [
-        replace(t.body, inertial=m, grips=_grips(k, objects, matters))
+        replace(t.body, inertial=m, grips=_least_friction(k, objects, matters))
         for k, (t, m) in enumerate(zip(objects, matters, strict=True))
     ]
     return [replace(t, body=b) for t, b in zip(objects, bodies, strict=True)]
 
 
-def _grips(
-    number: int, objects: Sequence[_Placed], matters: Sequence[MassProperties]
+def _least_friction(
+    number: int, objects: Sequence[_ObjectToPlace], matters: Sequence[MassProperties]
 ) -> dict[str, float]:
     """Return the least friction of any two parts of an object and of each other one, by name [-].
 
@@ -279,15 +296,17 @@ def _grips(
     found = {}
     for k, (other, matter) in enumerate(zip(objects, matters, strict=True)):
         meeting = product(matters[number].materials, matter.materials)
-        pairs = [friction_between(find(a), find(b)).sliding.typical for a, b in meeting]
+        pairs = [
+            friction_between(find_material(a), find_material(b)).sliding.typical for a, b in meeting
+        ]
         if k != number and pairs:
             found[other.name] = min(pairs)
     return found
 
 
-def _shape(asset: Asset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _shape(asset: PoolAsset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices about the middle of the box [m], triangles, and that middle in the file."""
-    mesh = joined(read_model(asset.file, "one").scene.surfaces)
+    mesh = join_meshes(read_gltf_model(asset.file, "one").scene.surfaces)
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return (mesh.vertices - centre) * (extent / asset.extent), mesh.triangles, centre
 
@@ -296,14 +315,22 @@ def _shape(asset: Asset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def _write(
-    folder: Path, objects: Sequence[_Placed], settled: Begun, config: ComposeConfig
+    folder: Path,
+    objects: Sequence[_ObjectToPlace],
+    settled: SettledInteraction,
+    config: ComposeConfig,
 ) -> tuple[str, ...]:
     """Write ``scene.glb`` and ``scene.toml``; return what was left out of the files."""
     action = settled.action
-    duration = action.duration if action else AT_REST
+    duration = action.duration if action else DURATION_AT_REST_S
     members = [_member(t, p) for t, p in zip(objects, settled.poses, strict=True)]
-    extras = {"gravity_m_s2": list(DOWNWARDS), "duration_s": duration, "fps": 30, "settled": True}
-    warnings = merge(folder / "scene.glb", members, "scene", extras)
+    extras = {
+        "gravity_m_s2": list(GRAVITY_VECTOR),
+        "duration_s": duration,
+        "fps": 30,
+        "settled": True,
+    }
+    warnings = merge_glb_files(folder / "scene.glb", members, "scene", extras)
     scene_file = SceneFile(
         folder / "scene.toml",
         file=folder / "scene.glb",
@@ -315,7 +342,7 @@ def _write(
     return warnings
 
 
-def _member(obj: _Placed, pose: Pose) -> Member:
+def _member(obj: _ObjectToPlace, pose: BodyPose) -> MergeMember:
     asset, scale = obj.asset, obj.scale_of_file
     x, y, z = pose.world(-scale * obj.centre[None])[0].tolist()
     extras = {
@@ -329,21 +356,21 @@ def _member(obj: _Placed, pose: Pose) -> Member:
         "sized_by": obj.real.by,
     }
     known = {"licence": asset.licence, "attribution": asset.attribution}
-    extras |= {key: words for key, words in known.items() if words not in ("", UNKNOWN)}
-    return Member(asset.file, obj.name, (x, y, z), pose.quaternion, scale, extras)
+    extras |= {key: words for key, words in known.items() if words not in ("", UNKNOWN_LICENCE)}
+    return MergeMember(asset.file, obj.name, (x, y, z), pose.quaternion, scale, extras)
 
 
-def _keep(
+def _write_certificate(
     folder: Path,
-    objects: Sequence[_Placed],
-    settled: Begun,
+    objects: Sequence[_ObjectToPlace],
+    settled: SettledInteraction,
     config: ComposeConfig,
     warnings: tuple[str, ...],
 ) -> None:
     """Write ``certificate.json`` and ``composition.json``."""
     write_certificate(folder, settled.certificate)
     action = settled.action
-    composition = Composition(
+    composition = SceneComposition(
         seed=config.seed,
         arrangement=settled.arrangement,
         settled_with=config.settle_with,

@@ -5,27 +5,27 @@ from dataclasses import replace
 
 from corporeal.core.types import (
     Inventory,
-    ObjectWords,
-    PartWords,
+    ObjectDescription,
+    PartDescription,
     Scene,
 )
-from corporeal.description.annotated import annotations_of, with_annotations
-from corporeal.description.asking import Asking
-from corporeal.description.describe_config import DEFAULT, DescribeConfig, validate
-from corporeal.description.file_words import open_ware, words_of_file
-from corporeal.recognition.identity import identify
-from corporeal.recognition.metadata import (
-    matter_hint,
+from corporeal.description.apply_annotations import apply_annotations, load_annotations
+from corporeal.description.describe_config import DEFAULT_DESCRIBE_CONFIG, DescribeConfig, validate
+from corporeal.description.describe_from_file import open_ware_notes, parts_from_file
+from corporeal.description.query_scene import SceneQuery
+from corporeal.recognition.contents_from_name import unused_contents_notes
+from corporeal.recognition.metadata_recognition import (
+    substance_hint,
 )
-from corporeal.recognition.said_contents import not_filled
-from corporeal.vlm import connect, critic_of
+from corporeal.recognition.parts_by_name import identify_parts
+from corporeal.vlm import choose_critic, connect_vlm
 
 Progress = Callable[[float, str], None]
 
 
 def describe(
     scene: Scene,
-    config: DescribeConfig = DEFAULT,
+    config: DescribeConfig = DEFAULT_DESCRIBE_CONFIG,
     library: str = "default",
     progress: Progress = lambda fraction, words: None,
     from_pictures: Collection[int] = (),
@@ -50,22 +50,22 @@ def describe(
             questions wait for a person's answers.
 
     """
-    made = _described(scene, config, library, progress, from_pictures)
-    told = (_pictured(o) if k in from_pictures else o for k, o in enumerate(made.objects))
+    made = _describe_scene(scene, config, library, progress, from_pictures)
+    told = (_with_unseen_walls(o) if k in from_pictures else o for k, o in enumerate(made.objects))
     return replace(made, objects=tuple(told))
 
 
-def _pictured(thing: ObjectWords) -> ObjectWords:
+def _with_unseen_walls(thing: ObjectDescription) -> ObjectDescription:
     """Say of all parts, in each answer, that pictures need not show the inside of their walls."""
-    answers = (replace(one, parts=tuple(map(_unseen, one.parts))) for one in thing.answers)
-    return replace(thing, parts=tuple(map(_unseen, thing.parts)), answers=tuple(answers))
+    answers = (replace(one, parts=tuple(map(_wall_unseen, one.parts))) for one in thing.answers)
+    return replace(thing, parts=tuple(map(_wall_unseen, thing.parts)), answers=tuple(answers))
 
 
-def _unseen(words: PartWords) -> PartWords:
-    return replace(words, wall_unseen=True, pieces=tuple(map(_unseen, words.pieces)))
+def _wall_unseen(words: PartDescription) -> PartDescription:
+    return replace(words, wall_unseen=True, pieces=tuple(map(_wall_unseen, words.pieces)))
 
 
-def _described(
+def _describe_scene(
     scene: Scene,
     config: DescribeConfig,
     library: str,
@@ -73,21 +73,23 @@ def _described(
     from_pictures: Collection[int],
 ) -> Inventory:
     validate(config)
-    identity = identify(scene, matter_hint)
-    annotations = annotations_of(scene, identity, config, library, from_pictures)
-    model = connect(config.vlm, config.record)
-    file = words_of_file(scene, identity, library, from_pictures, unasked=model is None)
+    identity = identify_parts(scene, substance_hint)
+    annotations = load_annotations(scene, identity, config, library, from_pictures)
+    model = connect_vlm(config.vlm, config.record)
+    file = parts_from_file(scene, identity, library, from_pictures, unasked=model is None)
     if model is None:
         objects = [
-            ObjectWords(
+            ObjectDescription(
                 obj.name,
                 obj.class_name,
-                tuple(with_annotations(words, annotations, obj.name, config, obj.real_extent)),
+                tuple(apply_annotations(words, annotations, obj.name, config, obj.real_extent)),
             )
             for obj, words in zip(scene.objects, file, strict=True)
         ]
-        open_made = open_ware([o for k, o in enumerate(objects) if k in from_pictures])
-        return Inventory(tuple(objects), warnings=(*open_made, *not_filled(scene, objects)))
-    critic = connect(critic_of(config.vlm, config.critic), config.record) or model
-    asking = Asking(scene, identity, config, library, model, critic)
+        open_made = open_ware_notes([o for k, o in enumerate(objects) if k in from_pictures])
+        return Inventory(
+            tuple(objects), warnings=(*open_made, *unused_contents_notes(scene, objects))
+        )
+    critic = connect_vlm(choose_critic(config.vlm, config.critic), config.record) or model
+    asking = SceneQuery(scene, identity, config, library, model, critic)
     return asking.inventory(file, annotations, progress)

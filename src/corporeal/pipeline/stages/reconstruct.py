@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Int
 
 from corporeal.core.errors import UserError, with_notes
-from corporeal.core.progress import Progress, within
+from corporeal.core.progress import Progress, subprogress
 from corporeal.core.types import (
     Camera,
     Finish,
@@ -23,76 +23,87 @@ from corporeal.core.types import (
     Scene,
     SceneObject,
     Surface,
-    reworded,
+    with_text,
 )
-from corporeal.geometry.gaussians import only
+from corporeal.geometry.gaussian_transforms import gaussian_subset
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.srgb import linear
-from corporeal.io.sources import called
-from corporeal.multiview.local_shape import neighbours, normals
-from corporeal.multiview.metric import MetricScale
-from corporeal.multiview.similarity import moved_gaussians, moved_points, similarity
-from corporeal.recognition.words import everyday, safe
-from corporeal.reconstruction.features.clouds import with_features
-from corporeal.reconstruction.found_objects import FoundObjects, named_objects, recognised
-from corporeal.reconstruction.gaussians.closed import apart, closed
-from corporeal.reconstruction.gaussians.depth_rendering import render_depth
-from corporeal.reconstruction.gaussians.discs import backed
-from corporeal.reconstruction.gaussians.foreground import sunk
-from corporeal.reconstruction.gaussians.intake import Intake, turned_upright
-from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.worth import (
-    falls_apart,
-    goes_beyond,
-    not_worth,
-    told_otherwise,
-    unlike_masks,
+from corporeal.geometry.srgb import srgb_to_linear
+from corporeal.io.input_files import scene_name
+from corporeal.multiview.metric_scale import MetricScale
+from corporeal.multiview.point_cloud_geometry import nearest_neighbours, point_normals
+from corporeal.multiview.similarity_transform import (
+    apply_similarity_to_gaussians,
+    apply_similarity_to_points,
+    similarity_matrix,
 )
-from corporeal.reconstruction.masks.grown_masks import lying_in
-from corporeal.reconstruction.masks_figure import FIGURE, drawn_over
-from corporeal.reconstruction.object_points import drawn_masks, foreground_of, points_on_objects
-from corporeal.reconstruction.picture_intake import take_pictures
+from corporeal.recognition.readable_names import everyday_words, safe_name
+from corporeal.reconstruction.features.point_features import add_point_features
+from corporeal.reconstruction.found_objects import FoundObjects, named_objects, recognise_objects
+from corporeal.reconstruction.gaussian_source import gaussians_from_source
+from corporeal.reconstruction.gaussians.depth_rendering import render_depth
+from corporeal.reconstruction.gaussians.foreground import gaussians_below_floor
+from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene, turn_upright
+from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
+from corporeal.reconstruction.masks.grown_masks import describe_masks_in
+from corporeal.reconstruction.masks_figure import MASKS_FIGURE_FILE, draw_masks_over
+from corporeal.reconstruction.object_points import (
+    foreground_of,
+    labels_from_masks,
+    points_on_objects,
+)
 from corporeal.reconstruction.reconstruct_config import (
-    DEFAULT,
+    DEFAULT_RECONSTRUCT,
     ReconstructConfig,
     metric_scale,
-    validate,
+    validate_reconstruct,
 )
 from corporeal.reconstruction.segment.instance_assignment import assign_instances
-from corporeal.reconstruction.segment.space import Space
-from corporeal.render.camera import cameras_around
-from corporeal.vlm.seen_objects import (
-    UNKNOWN,
+from corporeal.reconstruction.segment.space_pieces import SpacePieces
+from corporeal.reconstruction.surface.backing_surfels import add_backing_surfels
+from corporeal.reconstruction.surface.object_surfaces import (
+    build_object_surfaces,
+    pieces_of_objects,
+)
+from corporeal.reconstruction.surface.reconstruction_acceptance import (
+    boxes_rejection_reason,
+    colour_rejection_reason,
+    cropping_rejection_reason,
+    overlap_rejection_reason,
+    pieces_rejection_reason,
+)
+from corporeal.render.camera_placement import cameras_around
+from corporeal.vlm.photographed_objects import (
+    UNKNOWN_CLASS,
+    PhotoInterview,
     SeenObject,
-    Viewer,
-    metres,
-    names_of,
-    of_name,
-    said_by_class,
-    said_by_name,
-    telling,
+    class_extent_note,
+    decide_metric_scale,
+    named_object_note,
+    object_from_name,
+    object_names,
+    telling_words,
 )
 
-ROUGHNESS = 0.8
+SURFACE_ROUGHNESS = 0.8
 """Of surfaces: pictures do not tell it apart from light."""
-OWN_VIEWS, OWN_SIZE = 48, (384, 384)
+RENDERED_VIEWS, RENDERED_SIZE_PX = 48, (384, 384)
 """Of a splat that comes without cameras."""
-AROUND = 16
+NORMAL_NEIGHBOURS = 16
 """Points that a normal is found from."""
-BY_PLACE = "What belongs to it was told by where it is alone, without masks."
-NOBODY = Viewer("", "metadata")
-DISCS = (
+SPLIT_BY_PLACE_WARNING = "What belongs to it was told by where it is alone, without masks."
+NO_VIEWER = PhotoInterview("", "metadata")
+BACKING_SURFELS_STATEMENT = (
     "were laid along the closed surface, below what was learned: they show where that is thin, "
     "and what no photograph shows."
 )
 """Said of the film, and of gaussians.ply."""
-TRAINED, LOOKED, FOUND = 0.6, 0.66, 0.7
+PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS, PROGRESS_AFTER_OBJECTS = 0.6, 0.66, 0.7
 """Share of the work that is done after each step. Surfaces took 27 to 38 % of it at preset normal
 (docs/inputs.md)."""
 
 
 @dataclass(frozen=True)
-class Reconstructed:
+class ReconstructedScene:
     """What was found in pictures or in a splat."""
 
     found: Reconstruction
@@ -103,12 +114,12 @@ class Reconstructed:
 
 def reconstruct(
     source: Path,
-    config: ReconstructConfig = DEFAULT,
+    config: ReconstructConfig = DEFAULT_RECONSTRUCT,
     extents: Sequence[str] = (),
-    viewer: Viewer = NOBODY,
+    viewer: PhotoInterview = NO_VIEWER,
     folder: Path | None = None,
     progress: Progress = lambda fraction, words: None,
-) -> Reconstructed:
+) -> ReconstructedScene:
     """Find the objects of a scene in photographs, or in a splat.
 
     Args:
@@ -124,48 +135,66 @@ def reconstruct(
             does not fit it.
 
     """
-    validate(config, extents, viewer.model is not None, called(source))
+    validate_reconstruct(config, extents, viewer.model is not None, scene_name(source))
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
-    taken, masked = take_pictures(source, config, folder, within(progress, 0.0, TRAINED))
+    taken, masked = gaussians_from_source(
+        source, config, folder, subprogress(progress, 0.0, PROGRESS_AFTER_TRAINING)
+    )
     grown = taken.masks is not None and not masked  # of what all cameras look at: one thing
-    taken = _upright(source, taken, config, folder)
+    taken = _align_upright(source, taken, config, folder)
     photographers = taken.cameras
     if not taken.cameras:
-        taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
+        taken = replace(
+            taken, cameras=cameras_around(taken.solid, RENDERED_VIEWS, RENDERED_SIZE_PX)
+        )
     # Points of the foreground, with features of what the pictures show.
-    progress(TRAINED, "segmenting foreground from background")
+    progress(PROGRESS_AFTER_TRAINING, "segmenting foreground from background")
     front = foreground_of(source, taken)
     placed = points_on_objects(
-        taken, front.shown, front.on_objects, config, folder, within(progress, TRAINED, LOOKED)
+        taken,
+        front.shown,
+        front.on_objects,
+        config,
+        folder,
+        subprogress(progress, PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS),
     )
     specs, maps = (config.semantic, config.structural), None if folder is None else folder / "maps"
-    cloud = with_features(placed, taken.pictures, specs, maps)
+    cloud = add_point_features(placed, taken.pictures, specs, maps)
     # Objects among them.
-    progress(LOOKED, "finding objects")
+    progress(PROGRESS_AFTER_VIEWS, "finding objects")
     wanted = named_objects(config, viewer, taken)
-    normal = normals(cloud.position, neighbours(cloud.position, AROUND), placed.outside)
-    count, drawn = config.count or len(wanted) or None, drawn_masks(taken, cloud, front.on_objects)
-    space = Space(apart(taken, front.on_objects, cloud.position), alone=grown)
+    normal = point_normals(
+        cloud.position, nearest_neighbours(cloud.position, NORMAL_NEIGHBOURS), placed.outside
+    )
+    count, drawn = (
+        config.count or len(wanted) or None,
+        labels_from_masks(taken, cloud, front.on_objects),
+    )
+    space = SpacePieces(pieces_of_objects(taken, front.on_objects, cloud.position), alone=grown)
     split = assign_instances(cloud, config.apart, count, normal, drawn, space)
     # One closed surface for each object.
-    progress(FOUND, "closing surfaces")
+    progress(PROGRESS_AFTER_OBJECTS, "closing surfaces")
     found = FoundObjects(
-        taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
+        taken,
+        cloud,
+        build_object_surfaces(taken, front.on_objects, cloud.position, split.object_of_point),
     )
-    if not config.force and (why := _why_not(found, photographers, masked, count)):
-        raise _refusal(source, why, lying_in(None if masked else folder), taken)
+    if not config.force and (why := _reason_not_worth(found, photographers, masked, count)):
+        raise _not_worth_error(source, why, describe_masks_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
-    known = _known(source, found, recognised(wanted, found, config, viewer), config, extents)
+    known = _name_objects(
+        source, found, recognise_objects(wanted, found, config, viewer), config, extents
+    )
     warnings = [*known.warnings, *viewer.asked().warnings, *taken.warnings, *split.warnings]
-    shown = _shown(found, photographers)
+    shown = _video_gaussians(found, photographers)
     said = (*placed.statements, split.statement, *shown.statements, *known.statements)
     statements = (*taken.statements, *said)
-    result = _in_metres(found, shown, known, statements, tuple(dict.fromkeys(warnings)))
-    return Reconstructed(result, _scene(source, found, known))
+    result = _metric_reconstruction(found, shown, known, statements, tuple(dict.fromkeys(warnings)))
+    return ReconstructedScene(result, _scene(source, found, known))
 
 
 @dataclass(frozen=True)
-class _Known:
+class _NamedObjects:
     """What objects are, and how large."""
 
     objects: Sequence[SeenObject]
@@ -182,13 +211,13 @@ class _Known:
         return [self.scale.reason] * (self.scale.source != "nobody")
 
 
-def _known(
+def _name_objects(
     source: Path,
     found: FoundObjects,
     objects: Sequence[SeenObject],
     config: ReconstructConfig,
     extents: Sequence[str],
-) -> _Known:
+) -> _NamedObjects:
     """Name objects, and decide how large they are; a lone one may be called as its folder.
 
     Args:
@@ -199,26 +228,28 @@ def _known(
         extents: Real largest extents, such as "duck=0.1" [m].
 
     """
-    measured, z_up, title = metric_scale(config), found.taken.z_up, called(source)
-    unnamed = [obj.class_name for obj in objects] == [UNKNOWN]
-    by_name = of_name(title) if unnamed else None
+    measured, z_up, title = metric_scale(config), found.taken.z_up, scene_name(source)
+    unnamed = [obj.class_name for obj in objects] == [UNKNOWN_CLASS]
+    by_name = object_from_name(title) if unnamed else None
     if by_name is not None:
         if extents or measured is not None or z_up:
             by_name = replace(by_name, extent=None)  # somebody knows better
         objects = [by_name]
-    names = names_of(objects)
+    names = object_names(objects)
     sizes = dict(zip(names, found.extents, strict=True))
-    scale = metres(sizes, objects, extents, measured, z_up)
-    told = [] if by_name is None else [said_by_name(title, by_name, names[0])]
+    scale = decide_metric_scale(sizes, objects, extents, measured, z_up)
+    told = [] if by_name is None else [named_object_note(title, by_name, names[0])]
     if scale.source == "extent" and not extents and by_name is None:
-        told = [said_by_class(objects, names)]
+        told = [class_extent_note(objects, names)]
     pairs = zip(names, found.solids, strict=True)
-    unsound = [reworded(w, f"{name}: {w}") for name, solid in pairs for w in solid.warnings]
+    unsound = [with_text(w, f"{name}: {w}") for name, solid in pairs for w in solid.warnings]
     doubts = [*found.taken.doubts, *unsound]
-    return _Known(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
+    return _NamedObjects(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
 
 
-def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Path | None) -> Intake:
+def _align_upright(
+    source: Path, taken: GaussianScene, config: ReconstructConfig, folder: Path | None
+) -> GaussianScene:
     """Turn what was learned upright, and tell objects in photographs that have no masks.
 
     Args:
@@ -231,28 +262,30 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Pat
         UserError: These are the room.
 
     """
-    made = turned_upright(taken, config.up, config.floor_at)
+    made = turn_upright(taken, config.up, config.floor_at)
     cut_out = None if taken.masks is not None else made.masks
     if cut_out is not None and not config.force:
-        why = goes_beyond(cut_out) or told_otherwise(cut_out, made.coloured)
+        why = cropping_rejection_reason(cut_out) or colour_rejection_reason(cut_out, made.coloured)
         if why is not None:
-            raise _refusal(source, why, lying_in(folder), taken)
+            raise _not_worth_error(source, why, describe_masks_in(folder), taken)
     if cut_out is not None and made.views is not None and folder is not None:
         numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
-        drawn_over(list(made.views.rgb), cut_out, numbers, folder / FIGURE)
+        draw_masks_over(list(made.views.rgb), cut_out, numbers, folder / MASKS_FIGURE_FILE)
     if cut_out is not None and made.coloured is not None:
-        told = Note(f"{BY_PLACE} {lying_in(folder)}".rstrip(), NoteKind.GRAVE)
+        told = Note(
+            f"{SPLIT_BY_PLACE_WARNING} {describe_masks_in(folder)}".rstrip(), NoteKind.GRAVE
+        )
         made = replace(made, doubts=(*made.doubts, told))
     return made
 
 
-def _refusal(source: Path, why: str, lie: str, taken: Intake) -> UserError:
+def _not_worth_error(source: Path, why: str, lie: str, taken: GaussianScene) -> UserError:
     """Make an error of why things are not worth simulating, with what was noticed before."""
     noticed = dict.fromkeys((*taken.doubts, *taken.warnings))
     return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), noticed)
 
 
-def _why_not(
+def _reason_not_worth(
     found: FoundObjects, photographers: Sequence[Camera], masked: bool, count: int | None
 ) -> str | None:
     """Say why what was found is not worth simulating, if it is not.
@@ -265,18 +298,18 @@ def _why_not(
 
     """
     taken = found.taken
-    why = not_worth(found.boxes, photographers, masked, taken.quality)
+    why = boxes_rejection_reason(found.boxes, photographers, masked, taken.quality)
     if why is not None or taken.masks is None or not photographers:
         return why
     meshes = [Mesh(solid.vertices, solid.triangles) for solid in found.solids]
     pieces = [solid.pieces for solid in found.solids]
     most = sum(pieces) if count is None else max(pieces)
-    apart = None if masked else falls_apart(most, photographers)
-    return apart or unlike_masks(meshes, photographers, taken.masks, given=masked)
+    apart = None if masked else pieces_rejection_reason(most, photographers)
+    return apart or overlap_rejection_reason(meshes, photographers, taken.masks, given=masked)
 
 
 @dataclass(frozen=True)
-class _Shown:
+class _VideoGaussians:
     """What films show of objects and of what is about them."""
 
     gaussians: Gaussians
@@ -284,36 +317,38 @@ class _Shown:
     statements: tuple[str, ...] = ()
 
 
-def _shown(found: FoundObjects, photographers: tuple[Camera, ...]) -> _Shown:
+def _video_gaussians(found: FoundObjects, photographers: tuple[Camera, ...]) -> _VideoGaussians:
     """Leave out what is below the floor, and fill what photographs leave thin.
 
     A splat stays as it came.
     """
     own, owner = found.taken.gaussians, found.closed.owner
-    kept = ~sunk(own, owner, float(max(found.extents)))
+    kept = ~gaussians_below_floor(own, owner, float(max(found.extents)))
     if not photographers:
-        return _Shown(only(own, kept), owner[kept])
+        return _VideoGaussians(gaussian_subset(own, kept), owner[kept])
     with ThreadPool() as pool:
-        rendering = render_depth(only(own, owner >= 0), photographers, pool)
-    gaussians, whose = backed(only(own, kept), owner[kept], found.solids, rendering)
-    said = f"{gaussians.count - np.count_nonzero(kept):,} discs {DISCS}"
-    return _Shown(gaussians, whose, (said,))
+        rendering = render_depth(gaussian_subset(own, owner >= 0), photographers, pool)
+    gaussians, whose = add_backing_surfels(
+        gaussian_subset(own, kept), owner[kept], found.solids, rendering
+    )
+    said = f"{gaussians.count - np.count_nonzero(kept):,} discs {BACKING_SURFELS_STATEMENT}"
+    return _VideoGaussians(gaussians, whose, (said,))
 
 
-def _in_metres(
+def _metric_reconstruction(
     found: FoundObjects,
-    shown: _Shown,
-    known: _Known,
+    shown: _VideoGaussians,
+    known: _NamedObjects,
     statements: tuple[str, ...],
     warnings: tuple[str, ...],
 ) -> Reconstruction:
     scale = known.scale
-    made = similarity(scale=scale.metres_per_unit)
+    made = similarity_matrix(scale=scale.metres_per_unit)
     boxes = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in found.solids]
     return Reconstruction(
-        gaussians=moved_gaussians(shown.gaussians, made),
+        gaussians=apply_similarity_to_gaussians(shown.gaussians, made),
         object_of_gaussian=shown.owner,
-        cloud=replace(found.cloud, position=moved_points(found.cloud.position, made)),
+        cloud=replace(found.cloud, position=apply_similarity_to_points(found.cloud.position, made)),
         object_of_point=found.closed.object_of_point,
         names=tuple(known.names),
         boxes=scale.metres_per_unit * np.array(boxes),
@@ -325,23 +360,23 @@ def _in_metres(
     )
 
 
-def _scene(source: Path, found: FoundObjects, known: _Known) -> Scene:
+def _scene(source: Path, found: FoundObjects, known: _NamedObjects) -> Scene:
     """Make one object of each solid, coloured as its Gaussians are."""
     factor, by = known.scale.metres_per_unit, known.scale.reason
-    said = telling(called(source))
+    said = telling_words(scene_name(source))
     # A folder called "photos" makes nothing one of paper.
-    own = str(source) if said == everyday(called(source)) else said or UNKNOWN
+    own = str(source) if said == everyday_words(scene_name(source)) else said or UNKNOWN_CLASS
     objects, surfaces = [], []
     things = zip(known.names, known.objects, found.solids, strict=True)
     for k, (name, obj, solid) in enumerate(things):
         extent = factor * found.extents[k]
         objects.append(SceneObject(name, obj.class_name, extent, source=own, sized_by=by))
-        colours, vertices = linear(solid.colours), factor * solid.vertices
+        colours, vertices = srgb_to_linear(solid.colours), factor * solid.vertices
         surfaces.append(Surface(name, k, 0, vertices, solid.triangles, colours=colours))
     return Scene(
-        name=safe(called(source)) or "scene",
+        name=safe_name(scene_name(source)) or "scene",
         source=str(source),
         objects=tuple(objects),
         surfaces=tuple(surfaces),
-        finishes=(Finish("as seen", roughness=ROUGHNESS),),
+        finishes=(Finish("as seen", roughness=SURFACE_ROUGHNESS),),
     )

@@ -10,34 +10,40 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.core.findings import Breakage, Expectation, RunAudit
+from corporeal.core.audit_data import Expectation, PredictedBreakage, RunAudit
 from corporeal.core.types import (
-    Film,
-    Ground,
+    Discretization,
     Material,
     MaterialField,
+    ModelUsage,
+    PartComponent,
+    PartDescription,
     Particles,
     Parts,
-    PartWords,
-    Piece,
+    Provenance,
     Push,
     Scene,
     SceneObject,
     Structure,
-    Treatment,
-    Usage,
+    Video,
     Wind,
 )
-from corporeal.discretization.sizes import how_heavy, how_scaled
-from corporeal.materials.scale import fraction_of, logarithmic
-from corporeal.mpm.laws import MENU
-from corporeal.render.mass_tables import weighed
-from corporeal.render.page import cells, figure, inlined, page, safe
-from corporeal.render.subject import parts_named
-from corporeal.simulation.audit_words import breakage_words, equilibrium_words
-from corporeal.simulation.closing_words import Section, closing_words, parted
+from corporeal.discretization.object_scaling import describe_mass, describe_scales
+from corporeal.materials.range_fraction import fraction_of, is_logarithmic
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
+from corporeal.render.html_page import (
+    data_url_of_file,
+    escape_html,
+    fill_page,
+    html_figure,
+    table_cells,
+)
+from corporeal.render.mass_tables import mass_table
+from corporeal.render.warning_subjects import parts_named_in
+from corporeal.simulation.audit_messages import breakage_message, equilibrium_message
+from corporeal.simulation.summary_text import SummarySection, split_advice, summary_sections
 
-UNITS = {
+VALUE_UNITS = {
     "young": ("Young's modulus E", "Pa"),
     "poisson": ("Poisson's ratio ν", ""),
     "density": ("density ρ", "kg/m³"),
@@ -55,15 +61,15 @@ UNITS = {
     "flow_index": ("flow index n", ""),
     "yield_shear": ("yield shear stress τ_y", "Pa"),
 }
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-WHO = {
+SI_PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
+SOURCE_WORDS = {
     "annotation": "your annotation",
     "recording": "a recorded answer",
     "model": "a model",
     "metadata": "metadata of the file",
     "unknown": "unknown: neutral material",
 }
-CHOSEN = {
+CHOICE_WORDS = {
     "typical": "typical value",
     "fallback": "typical value: no answer that could be used",
     "model": "a model",
@@ -73,19 +79,19 @@ CHOSEN = {
     "field": "another method",
     "borrowed": "ours, which the other method does not tell",
 }
-LONG_REASON = 60
+LONG_REASON_CHARACTERS = 60
 """Letters of a reason that is not printed at every value."""
 
 
 @dataclass(frozen=True)
-class Story:
+class ReportContent:
     """Everything that the page shows."""
 
     scene: Scene
     parts: Parts
     field: MaterialField
     particles: Particles
-    film: Film
+    film: Video
     audit: RunAudit
     figures: Mapping[str, Path]
     """Caption → picture, in order."""
@@ -97,23 +103,25 @@ class Story:
     """The 3D view as HTML (``render.viewer_page``), or why there is none."""
 
 
-def report(story: Story, path: Path) -> None:
+def report(story: ReportContent, path: Path) -> None:
     """Write the page to ``path``."""
     audit = story.audit
-    text = page(
+    text = fill_page(
         "corporeal.pipeline.stages",
         "report.html",
-        title=safe(story.scene.name),
+        title=escape_html(story.scene.name),
         summary=_summary(story),
         view=story.view,
-        film=inlined(story.film.path),
+        film=data_url_of_file(story.film.path),
         width=story.film.width,
         caption=_caption(audit.breakage),
-        figures="".join(figure(caption, inlined(file)) for caption, file in story.figures.items()),
+        figures="".join(
+            html_figure(caption, data_url_of_file(file)) for caption, file in story.figures.items()
+        ),
         verdict=_verdict(story),
         expectations=_expectations(audit.expectations),
         parts="".join(_part_row(story, k) for k in range(len(story.parts.catalogue))),
-        masses=weighed(story.field.mixtures),
+        masses=mass_table(story.field.mixtures),
         grounds="".join(_grounds(story, k) for k in range(len(story.parts.catalogue))),
         audit=_audit_table(audit),
         sources=_sources(story),
@@ -126,19 +134,19 @@ def report(story: Story, path: Path) -> None:
 # ---------------------------------------------------------------- sentences
 
 
-def _summary(story: Story) -> str:
+def _summary(story: ReportContent) -> str:
     """Say in a line or two what was simulated, and in lists what to think of it, by weight."""
-    lists = "".join(_said(k, s, story) for k, s in closing_words(story.audit).items() if s)
+    lists = "".join(_section(k, s, story) for k, s in summary_sections(story.audit).items() if s)
     return (
         f'<p class="lead">{_lead(story)}</p>'
         + (f'<div class="said" id="said">{lists}</div>' if lists else "")
-        + _how(story)
+        + _origin_list(story)
     )
 
 
-def _lead(story: Story) -> str:
+def _lead(story: ReportContent) -> str:
     scene, field = story.scene, story.field
-    objects = ", ".join(safe(o.name.replace("_", " ")) for o in scene.objects)
+    objects = ", ".join(escape_html(o.name.replace("_", " ")) for o in scene.objects)
     seen = any(w.answered_by in ("model", "recording") for w in field.words)
     counted = (
         f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({objects}), "
@@ -151,42 +159,42 @@ def _lead(story: Story) -> str:
             "from metadata of the file."
         )
     answers = max((len(m.answers) for m in field.mixtures), default=0)
-    return f"{counted} {_looked(story.audit.questions, answers)}"
+    return f"{counted} {_answer_source_words(story.audit.questions, answers)}"
 
 
-def _said(section: Section, sentences: Sequence[str], story: Story) -> str:
+def _section(section: SummarySection, sentences: Sequence[str], story: ReportContent) -> str:
     """List the sentences of a section: what is the matter, then why, what to do, which part."""
     rows = "".join(f"<li>{_item(sentence, story)}</li>" for sentence in sentences)
-    return f"<h3>{safe(section.head)}</h3><ul>{rows}</ul>"
+    return f"<h3>{escape_html(section.head)}</h3><ul>{rows}</ul>"
 
 
-def _item(sentence: str, story: Story) -> str:
-    first, rest = parted(sentence)
-    following = f" <span>{safe(rest)}</span>" if rest else ""
-    return f"{safe(first)}{following}{_subject(sentence, story)}"
+def _item(sentence: str, story: ReportContent) -> str:
+    first, rest = split_advice(sentence)
+    following = f" <span>{escape_html(rest)}</span>" if rest else ""
+    return f"{escape_html(first)}{following}{_subject(sentence, story)}"
 
 
-def _how(story: Story) -> str:
+def _origin_list(story: ReportContent) -> str:
     """List how the scene came about, for whoever wants to know."""
     scene = story.scene
     forced = [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
-    settled = equilibrium_words(story.audit.settling)
+    settled = equilibrium_message(story.audit.settling)
     told = [
-        *map(safe, story.origin),
+        *map(escape_html, story.origin),
         *forced,
-        *map(safe, filter(None, [how_scaled(scene.objects), settled])),
+        *map(escape_html, filter(None, [describe_scales(scene.objects), settled])),
     ]
     rows = "".join(f"<li>{sentence}</li>" for sentence in told)
     return f"<details><summary>How it came about</summary><ul>{rows}</ul></details>" * bool(told)
 
 
-def _looked(questions: Usage, answers: int) -> str:
+def _answer_source_words(questions: ModelUsage, answers: int) -> str:
     """Say who chose the materials from pictures, and how often, where more often than once."""
     times = f", asked for {answers} answers each" if answers else ""
-    return f"Materials were recognised in pictures by {safe(_answerers(questions))}{times}."
+    return f"Materials were recognised in pictures by {escape_html(_answerers(questions))}{times}."
 
 
-def _answerers(questions: Usage) -> str:
+def _answerers(questions: ModelUsage) -> str:
     """Name who answered: a model, or who gave the answers that were recorded."""
     models = ", ".join(questions.models) or "source not recorded"
     return models if questions.calls else f"recorded answers ({models})"
@@ -205,7 +213,7 @@ def _forced(obj: SceneObject) -> str:
         gusts = f" with gusts of ± {obj.wind.gust:.0%}" if obj.wind.gust else ""
         size = math.hypot(*obj.wind.velocity)
         forces.append(f"is exposed to wind of {size:.3g} m/s{gusts} {_window(obj.wind)}")
-    return f"{safe(obj.name.replace('_', ' '))} {' and '.join(forces)}."
+    return f"{escape_html(obj.name.replace('_', ' '))} {' and '.join(forces)}."
 
 
 def _window(force: Push | Wind) -> str:
@@ -213,30 +221,30 @@ def _window(force: Push | Wind) -> str:
     return f"from {force.start:g} s {until}"
 
 
-def _caption(found: Sequence[Breakage]) -> str:
+def _caption(found: Sequence[PredictedBreakage]) -> str:
     """Say below the film what it shows whole although it may not stay so."""
     doubted = [b for b in found if b.word != "holds"]
-    return "".join(f"<p>{safe(breakage_words(b))}</p>" for b in doubted)
+    return "".join(f"<p>{escape_html(breakage_message(b))}</p>" for b in doubted)
 
 
-def _struck(story: Story, k: int) -> str:
+def _impact_words(story: ReportContent, k: int) -> str:
     """Say what the hardest blow does to a brittle part; "" of all others."""
     owner = story.scene.objects[story.parts.catalogue[k].object].name
     mine = (owner, story.field.words[k].name)
     broken = [b for b in story.audit.breakage if (b.object, b.part) == mine]
-    return "".join(f"<br>{safe(breakage_words(b))}" for b in broken)
+    return "".join(f"<br>{escape_html(breakage_message(b))}" for b in broken)
 
 
-def _verdict(story: Story) -> str:
+def _verdict(story: ReportContent) -> str:
     if not story.audit.warnings:
         return '<p class="good">The audit found no violations.</p>'
     return '<p>What limits this result stands at the <a href="#said">top of the page</a>.</p>'
 
 
-def _subject(sentence: str, story: Story) -> str:
+def _subject(sentence: str, story: ReportContent) -> str:
     """Link a sentence to the parts that it names."""
-    named = parts_named(sentence, story.scene, story.parts)
-    links = [f'<a href="#part-{k}">{safe(story.parts.catalogue[k].name)}</a>' for k in named]
+    named = parts_named_in(sentence, story.scene, story.parts)
+    links = [f'<a href="#part-{k}">{escape_html(story.parts.catalogue[k].name)}</a>' for k in named]
     return f" ({', '.join(links)})" if links else ""
 
 
@@ -245,7 +253,7 @@ def _expectations(expectations: Sequence[Expectation]) -> str:
         return ""
     rows = "".join(
         f'<tr><td class="{"yes" if e.met else "no"}">{"✓" if e.met else "✗"}</td>'
-        f"<td>{safe(e.sentence)}</td><td>{safe(e.value)}</td><td>{safe(e.target)}</td></tr>"
+        f"<td>{escape_html(e.sentence)}</td><td>{escape_html(e.value)}</td><td>{escape_html(e.target)}</td></tr>"
         for e in expectations
     )
     head = "<tr><th></th><th></th><th>measured</th><th>expected</th></tr>"
@@ -255,31 +263,37 @@ def _expectations(expectations: Sequence[Expectation]) -> str:
 # ---------------------------------------------------------------- tables
 
 
-def _part_row(story: Story, k: int) -> str:
+def _part_row(story: ReportContent, k: int) -> str:
     part, material = story.parts.catalogue[k], story.field.materials[k]
     treatment, words = story.particles.treatments[k], story.field.words[k]
-    yields = "–" if material.yield_stress is None else si(material.yield_stress, "Pa")
+    yields = "–" if material.yield_stress is None else si_text(material.yield_stress, "Pa")
     names = (story.scene.objects[part.object].name, part.name)
-    liquid = MENU[material.law].liquid
+    liquid = CONSTITUTIVE_LAWS[material.law].liquid
     numbers = (
-        "–" if liquid else si(material.young, "Pa"),
+        "–" if liquid else si_text(material.young, "Pa"),
         "–" if liquid else f"{material.poisson:.3g}",
         f"{material.density:.4g}",
         yields,
-        how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
+        describe_mass(story.particles.mass_real[k], story.scene.objects[part.object].scale),
     )
     row = (
-        cells(*map(safe, names), wrap=True),
-        cells(f"<b>{safe(material.name)}</b>"),
-        cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
-        cells(*numbers),
-        cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
-        cells(simulated(treatment, liquid=liquid), wrap=True),
+        table_cells(*map(escape_html, names), wrap=True),
+        table_cells(f"<b>{escape_html(material.name)}</b>"),
+        table_cells(
+            SOURCE_WORDS[words.answered_by], CONSTITUTIVE_LAWS[material.law].full_name, wrap=True
+        ),
+        table_cells(*numbers),
+        table_cells(
+            escape_html(structure_words(story.field.structures[k])),
+            escape_html(treatment.kind),
+            wrap=True,
+        ),
+        table_cells(stiffness_words(treatment, liquid=liquid), wrap=True),
     )
     return f"<tr>{''.join(row)}</tr>"
 
 
-def built(structure: Structure) -> str:
+def structure_words(structure: Structure) -> str:
     """Say how a part is built, and what is in it."""
     if structure.contents is None:
         packed = f"packed, {structure.solidity:.0%} of it matter"
@@ -287,7 +301,7 @@ def built(structure: Structure) -> str:
     return f"{structure.kind} with {structure.contents.name}"
 
 
-def simulated(treatment: Treatment, *, liquid: bool = False) -> str:
+def stiffness_words(treatment: Discretization, *, liquid: bool = False) -> str:
     """Say which Young's modulus was simulated, and how far it is from the real one.
 
     A liquid has none: its pressure is that of its volume, with a speed of sound of our own.
@@ -298,39 +312,39 @@ def simulated(treatment: Treatment, *, liquid: bool = False) -> str:
         return f"liquid, its sound slowed to {treatment.wave_speed:.2g} m/s"
     ratio = treatment.young / treatment.young_real
     factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
-    return f"{si(treatment.young, 'Pa')} ({factor})"
+    return f"{si_text(treatment.young, 'Pa')} ({factor})"
 
 
-def _grounds(story: Story, k: int) -> str:
+def _grounds(story: ReportContent, k: int) -> str:
     part, field = story.parts.catalogue[k], story.field
     material, words, structure = field.materials[k], field.words[k], field.structures[k]
     pieces = field.pieces[k] if field.pieces else ()
     usual = (material.shell_thickness or 0.0) * story.scene.objects[part.object].scale
-    own = _values(material, structure, _walled(story.particles, k, usual))
+    own = _values(material, structure, _wall_at_usual_thickness(story.particles, k, usual))
     tables = "".join(_piece_grounds(p) for p in pieces) or own
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
-        f'<details id="part-{k}"><summary><b>{safe(part.name)}</b> of '
-        f"{safe(story.scene.objects[part.object].name)}: {safe(material.name)}</summary>"
-        f"<p>{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
-        f"{others(words)}<br>{safe(structure.reason)} {safe(fill)}<br>"
-        f"{safe(story.particles.treatments[k].why)}{_struck(story, k)}</p>{tables}</details>"
+        f'<details id="part-{k}"><summary><b>{escape_html(part.name)}</b> of '
+        f"{escape_html(story.scene.objects[part.object].name)}: {escape_html(material.name)}</summary>"
+        f"<p>{escape_html(words.reason)} (margin {words.margin:.2f}; {SOURCE_WORDS[words.answered_by]})"
+        f"{alternative_words(words)}<br>{escape_html(structure.reason)} {escape_html(fill)}<br>"
+        f"{escape_html(story.particles.treatments[k].why)}{_impact_words(story, k)}</p>{tables}</details>"
     )
 
 
-def _piece_grounds(piece: Piece) -> str:
+def _piece_grounds(piece: PartComponent) -> str:
     """Tell of one of several objects that share a part's mesh why it is as it is."""
     words = piece.words
     return (
-        f"<p><b>{safe(words.name)}</b>: {safe(piece.material.name)}, "
+        f"<p><b>{escape_html(words.name)}</b>: {escape_html(piece.material.name)}, "
         f"{words.volume_share:.0%} of the volume, {words.surface_share:.0%} of the surface. "
-        f"{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
-        f"{others(words)} {safe(piece.structure.reason)}</p>"
+        f"{escape_html(words.reason)} (margin {words.margin:.2f}; {SOURCE_WORDS[words.answered_by]})"
+        f"{alternative_words(words)} {escape_html(piece.structure.reason)}</p>"
         f"{_values(piece.material, piece.structure, piece.structure.kind != 'solid')}"
     )
 
 
-def _walled(particles: Particles, k: int, usual: float) -> bool:
+def _wall_at_usual_thickness(particles: Particles, k: int, usual: float) -> bool:
     """Whether a wall or a sheet of a part is as thick as its material says it is here [m]."""
     made = particles.walls[k] if particles.walls else ()
     return any(t > 0 and math.isclose(t, usual, rel_tol=1e-6) for t in made)
@@ -341,14 +355,14 @@ def _values(material: Material, structure: Structure, walled: bool) -> str:
     shown = [
         (name, ground, "")
         for name, ground in material.grounds.items()
-        if name in UNITS and (walled or name != "shell_thickness")
+        if name in VALUE_UNITS and (walled or name != "shell_thickness")
     ]
     inner = structure.contents
     if inner is not None and "density" in inner.grounds:
         shown.append(("density", inner.grounds["density"], f" of the {inner.name} in it"))
     shared = _shared_reason([ground.reason for _, ground, _ in shown])
     rows = "".join(_ground_row(name, ground, of, shared) for name, ground, of in shown)
-    above = f"<p>Reason where none is stated: {safe(shared)}</p>" if shared else ""
+    above = f"<p>Reason where none is stated: {escape_html(shared)}</p>" if shared else ""
     return (
         f"{above}<table><tr><th>quantity</th><th>value</th><th>position in range</th>"
         f"<th>chosen by</th><th>reason</th><th>source of range</th></tr>{rows}</table>"
@@ -358,10 +372,10 @@ def _values(material: Material, structure: Structure, walled: bool) -> str:
 def _shared_reason(reasons: Sequence[str]) -> str:
     """Return a long reason that several values have: it is said once, above their table."""
     often, count = Counter(reasons).most_common(1)[0] if reasons else ("", 0)
-    return often if count > 1 and len(often) > LONG_REASON else ""
+    return often if count > 1 and len(often) > LONG_REASON_CHARACTERS else ""
 
 
-def others(words: PartWords) -> str:
+def alternative_words(words: PartDescription) -> str:
     """Return alternatives to a part's material, and its components."""
     maybe = [f"{name} ({p:.0%})" for name, p in words.alternatives]
     pieces = [
@@ -369,22 +383,22 @@ def others(words: PartWords) -> str:
         for p in words.pieces
     ]
     rest = f" Alternatives: {', '.join(maybe)}." if maybe else ""
-    return safe(rest + (f" Components: {'; '.join(pieces)}." if pieces else ""))
+    return escape_html(rest + (f" Components: {'; '.join(pieces)}." if pieces else ""))
 
 
-def _ground_row(name: str, ground: Ground, of: str, shared: str) -> str:
-    label, unit = UNITS[name]
-    label += safe(of)
+def _ground_row(name: str, ground: Provenance, of: str, shared: str) -> str:
+    label, unit = VALUE_UNITS[name]
+    label += escape_html(of)
     low, high = ground.range.low, ground.range.high
     place = min(max(fraction_of(ground.range, ground.value), 0), 1)
     bar = f'<div class="bar"><i style="left:{place:.1%}"></i></div>'
-    scale = " (log)" if logarithmic(ground.range) else ""
+    scale = " (log)" if is_logarithmic(ground.range) else ""
     return (
-        f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
-        f'<td class="place">{si(low, unit)} {bar} {si(high, unit)}{scale}</td>'
-        f"<td>{safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
-        f"<td>{'' if ground.reason == shared else safe(ground.reason)}</td>"
-        f"<td>{safe(ground.range.source)}</td></tr>"
+        f"<tr><td>{label}</td><td>{si_text(ground.value, unit)}</td>"
+        f'<td class="place">{si_text(low, unit)} {bar} {si_text(high, unit)}{scale}</td>'
+        f"<td>{escape_html(CHOICE_WORDS.get(ground.chosen_by, ground.chosen_by))}</td>"
+        f"<td>{'' if ground.reason == shared else escape_html(ground.reason)}</td>"
+        f"<td>{escape_html(ground.range.source)}</td></tr>"
     )
 
 
@@ -414,32 +428,37 @@ def _audit_table(audit: RunAudit) -> str:
     )
 
 
-def _sources(story: Story) -> str:
+def _sources(story: ReportContent) -> str:
     pieces = [p for shared in story.field.pieces for p in shared]
     made = [*story.field.structures, *(p.structure for p in pieces)]
     held = [s.contents for s in made if s.contents is not None]
     known = [*story.field.materials, *(p.material for p in pieces), *held]
     used = sorted({g.range.source for m in known for g in m.grounds.values()})
-    return "".join(f"<dt>{safe(k)}</dt><dd>{safe(story.sources.get(k, k))}</dd>" for k in used)
+    return "".join(
+        f"<dt>{escape_html(k)}</dt><dd>{escape_html(story.sources.get(k, k))}</dd>" for k in used
+    )
 
 
 def _credits(scene: Scene) -> str:
     credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)
-    return "".join(f"<li>{safe(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
+    return (
+        "".join(f"<li>{escape_html(c)}</li>" for c in credits)
+        or "<li>none stated in the files</li>"
+    )
 
 
 def _settings(audit: RunAudit) -> str:
     spent = ", ".join(f"{verb} {value:.1f} s" for verb, value in audit.seconds.items())
-    settings = ", ".join(f"{name} {safe(value)}" for name, value in audit.settings.items())
+    settings = ", ".join(f"{name} {escape_html(value)}" for name, value in audit.settings.items())
     peak = f"Peak memory {audit.peak_memory_mb:,.0f} MB."
-    return f"{settings}.<br>Time: {spent}. {peak}{asked(audit.questions)}"
+    return f"{settings}.<br>Time: {spent}. {peak}{usage_words(audit.questions)}"
 
 
-def asked(questions: Usage) -> str:
+def usage_words(questions: ModelUsage) -> str:
     """Say what the questions to models took."""
     if not questions.questions:
         return ""
-    who, number = safe(_answerers(questions)), questions.questions
+    who, number = escape_html(_answerers(questions)), questions.questions
     if not questions.calls:
         return f"<br>{number} questions, answered from the disk by {who}, at no cost."
     cost = questions.dollars
@@ -458,7 +477,7 @@ def asked(questions: Usage) -> str:
 # ---------------------------------------------------------------- small functions
 
 
-def si(value: float, unit: str) -> str:
+def si_text(value: float, unit: str) -> str:
     """Write a number with three digits, a prefix where the unit takes one, angles in degrees."""
     if unit == "rad":
         return f"{math.degrees(value):.3g}°"
@@ -466,7 +485,7 @@ def si(value: float, unit: str) -> str:
         return f"{value:.4g} {unit}"
     if unit not in ("Pa", "m") or value == 0:
         return f"{value:.3g} {unit}".strip()
-    for size, prefix in PREFIXES:
+    for size, prefix in SI_PREFIXES:
         if abs(value) >= size * 0.9995:
             return f"{value / size:.3g} {prefix}{unit}"
     return f"{value:.3g} {unit}"

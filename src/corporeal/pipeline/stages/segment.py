@@ -9,37 +9,37 @@ from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import (
-    Cloud,
+    FeatureCloud,
     Inventory,
     Note,
     NoteKind,
-    ObjectWords,
+    ObjectDescription,
     Part,
     Parts,
     Reconstruction,
     Scene,
-    reworded,
+    with_text,
 )
 from corporeal.pipeline.settings.segment_config import SegmentConfig
-from corporeal.recognition.identity import identify
-from corporeal.recognition.metadata import matter_hint
-from corporeal.reconstruction.features import Reader, connect
-from corporeal.reconstruction.segment.naming import Named, name_parts, phrases
-from corporeal.reconstruction.segment.parts import PartsConfig
+from corporeal.recognition.metadata_recognition import substance_hint
+from corporeal.recognition.parts_by_name import identify_parts
+from corporeal.reconstruction.features import TextPictureEncoder, connect_encoder
+from corporeal.reconstruction.segment.part_clusters import PartsConfig
+from corporeal.reconstruction.segment.part_naming import NamedParts, name_parts, part_phrases
 
-VOTERS = 5
+NEAREST_VOTING_POINTS = 5
 """Points nearest to a triangle that say what part it is of."""
 
 
-DEFAULT = SegmentConfig()
-UNSEEN = ("metadata", "unknown")
+DEFAULT_CONFIG = SegmentConfig()
+UNSEEN_SOURCES = ("metadata", "unknown")
 """Who says of parts what words say, and has seen none."""
 
 
 def segment(
     scene: Scene,
     inventory: Inventory,
-    config: SegmentConfig = DEFAULT,
+    config: SegmentConfig = DEFAULT_CONFIG,
     found: Reconstruction | None = None,
     semantic: str = "descriptor",
 ) -> Parts:
@@ -60,7 +60,7 @@ def segment(
         UserError: The inventory describes another scene.
 
     """
-    identity = identify(scene, matter_hint)
+    identity = identify_parts(scene, substance_hint)
     _agree(scene, inventory, [p.name for p in identity.catalogue])
     triangles = [len(s.triangles) for s in scene.surfaces]
     part_of_point = np.repeat(identity.part_of_surface, triangles)
@@ -82,8 +82,10 @@ def segment(
             cloud = _of_object(found.cloud, found.object_of_point == number)
             vectors = _vectors(semantic, obj)
             named = name_parts(cloud, obj, vectors, PartsConfig(config.position_weight))
-            parts = _taken_apart(parts, number, obj, named, cloud, middle)
-    return replace(parts, warnings=(*parts.warnings, *_unparted([obj for _, obj in shown])))
+            parts = _replace_with_pieces(parts, number, obj, named, cloud, middle)
+    return replace(
+        parts, warnings=(*parts.warnings, *_undivided_objects_warning([obj for _, obj in shown]))
+    )
 
 
 def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
@@ -98,7 +100,7 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 # ---------------------------------------------------------------- objects from pictures
 
 
-def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
+def _undivided_objects_warning(objects: Sequence[ObjectDescription]) -> list[str]:
     """Say which objects have unknown pieces: a chair from pictures may be all foam.
 
     Where nothing is known of the matter, ``ground`` says so, and how to say it.
@@ -106,7 +108,7 @@ def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
     names = [
         obj.name
         for obj in objects
-        if not any(p.pieces or p.answered_by not in UNSEEN for p in obj.parts)
+        if not any(p.pieces or p.answered_by not in UNSEEN_SOURCES for p in obj.parts)
         and any(p.answered_by != "unknown" for p in obj.parts)
     ]
     if not names:
@@ -122,7 +124,7 @@ def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
     ]
 
 
-def _of_object(cloud: Cloud, mine: Bool[np.ndarray, " N"]) -> Cloud:
+def _of_object(cloud: FeatureCloud, mine: Bool[np.ndarray, " N"]) -> FeatureCloud:
     return replace(
         cloud,
         position=cloud.position[mine],
@@ -134,25 +136,25 @@ def _of_object(cloud: Cloud, mine: Bool[np.ndarray, " N"]) -> Cloud:
     )
 
 
-def _vectors(semantic: str, obj: ObjectWords) -> Float[np.ndarray, "K S"] | None:
+def _vectors(semantic: str, obj: ObjectDescription) -> Float[np.ndarray, "K S"] | None:
     """Return what the parts' names are among features; None where these know no words."""
-    encoder = connect(semantic)
-    if not isinstance(encoder, Reader):
+    encoder = connect_encoder(semantic)
+    if not isinstance(encoder, TextPictureEncoder):
         return None
-    return encoder.words(phrases(obj))
+    return encoder.words(part_phrases(obj))
 
 
-def _taken_apart(
+def _replace_with_pieces(
     parts: Parts,
     number: int,
-    obj: ObjectWords,
-    named: Named,
-    cloud: Cloud,
+    obj: ObjectDescription,
+    named: NamedParts,
+    cloud: FeatureCloud,
     middle: Float[np.ndarray, "T 3"],
 ) -> Parts:
     """Put the pieces that were found in the place of the object's only part."""
     own = np.flatnonzero(parts.object_of_point == number)
-    share = _voted(middle[own], cloud.position, named, len(obj.parts))
+    share = _nearest_votes(middle[own], cloud.position, named, len(obj.parts))
     best = share.argmax(axis=1)
     kept = np.unique(best)
     place = next(k for k, p in enumerate(parts.catalogue) if p.object == number)
@@ -163,7 +165,7 @@ def _taken_apart(
     confidence = parts.confidence.copy()
     confidence[own] = share[np.arange(len(own)), best]
     told = _doubts(named, obj, kept.tolist())
-    doubts = [reworded(words, f"{obj.name}: {words}") for words in told]
+    doubts = [with_text(words, f"{obj.name}: {words}") for words in told]
     return replace(
         parts,
         part_of_point=of_point,
@@ -173,14 +175,14 @@ def _taken_apart(
     )
 
 
-def _voted(
+def _nearest_votes(
     places: Float[np.ndarray, "T 3"],
     points: Float[np.ndarray, "N 3"],
-    named: Named,
+    named: NamedParts,
     count: int,
 ) -> Float[np.ndarray, "T K"]:
     """Return how sure the nearest points are, together, that each place is of each part."""
-    near = np.asarray(KDTree(points).query(places, k=min(VOTERS, len(points)))[1])
+    near = np.asarray(KDTree(points).query(places, k=min(NEAREST_VOTING_POINTS, len(points)))[1])
     near = near.reshape(len(places), -1)
     share = np.zeros((len(places), count))
     rows = np.arange(len(places))
@@ -189,7 +191,7 @@ def _voted(
     return share
 
 
-def _doubts(named: Named, obj: ObjectWords, kept: Sequence[int]) -> list[str]:
+def _doubts(named: NamedParts, obj: ObjectDescription, kept: Sequence[int]) -> list[str]:
     lost = [p.name for k, p in enumerate(obj.parts) if k not in kept]
     gone = Note(
         f"{', '.join(lost)} has no place on its surface, and is left out.", NoteKind.LEFT_OUT

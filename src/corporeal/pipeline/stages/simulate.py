@@ -13,44 +13,48 @@ from pathlib import Path
 import numpy as np
 
 from corporeal.core import registry, store
+from corporeal.core.audit_data import SettledObjectOutcome, SettlingOutcome
+from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import SimulationError
-from corporeal.core.findings import Settled, SettledObject
-from corporeal.core.typed import typed
-from corporeal.core.types import Break, Frame, MaterialField, Particles, Scene, Trajectory
+from corporeal.core.types import FractureEvent, Frame, MaterialField, Particles, Scene, Trajectory
 from corporeal.core.version import __version__
-from corporeal.discretization.problem_from_scene import Posed, pose, standing
+from corporeal.discretization.build_model import ModelMapping, build_model, standing_objects
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import MENU, Engine, Problem
-from corporeal.pipeline.settings.simulate_config import SimulateConfig, as_kept, validate
+from corporeal.mpm.problem import ENGINES, Engine, Problem
+from corporeal.pipeline.settings.simulate_config import SimulateConfig, settings_for_key, validate
 from corporeal.simulation.audit import audit
 from corporeal.simulation.audit_file import write_audit
-from corporeal.simulation.breaking import break_up, next_blow
-from corporeal.simulation.breaking_stage import Stage
-from corporeal.simulation.broken_books import retell
 from corporeal.simulation.checkpoint import Checkpoints, fingerprint
 from corporeal.simulation.energy_gain import EnergyWatch
-from corporeal.simulation.frames import (
-    BREAKS,
-    FOLDER,
-    Layout,
+from corporeal.simulation.equivalent_stress import VonMises
+from corporeal.simulation.fracture_simulation import fracture_body, next_breaking_impact
+from corporeal.simulation.fracture_state import FractureState
+from corporeal.simulation.ledger_row import ledger_row
+from corporeal.simulation.rewrite_history import rewrite_history
+from corporeal.simulation.static_equilibrium import (
+    DynamicRelaxation,
+    StaticEquilibrium,
+    settling_problem,
+)
+from corporeal.simulation.trajectory_files import (
+    BREAKS_FILE,
+    FRAMES_FOLDER,
+    FrameLayout,
     frame_path,
-    gather,
+    gather_ledgers,
     write_frame,
     write_layout,
 )
-from corporeal.simulation.ledger_row import ledger_row
-from corporeal.simulation.static_equilibrium import Balance, Relaxation, before
-from corporeal.simulation.stress import VonMises
 
-SETTLING = "settling.json"
+SETTLING_FILE = "settling.json"
 """How static equilibrium was found before time 0."""
 
 Progress = Callable[[float, str], None]
-Build = Callable[[Problem], Engine]
+EngineBuilder = Callable[[Problem], Engine]
 Relax = Callable[[], dict[str, np.ndarray]]
 
 
-DEFAULT = SimulateConfig()
+DEFAULT_CONFIG = SimulateConfig()
 
 
 def simulate(
@@ -79,21 +83,23 @@ def simulate(
 
     """
     validate(config)
-    posed = pose(scene, particles, field, config.contact)
-    build: Build = registry.load("engine", config.engine, MENU)
+    posed = build_model(scene, particles, field, config.contact)
+    build: EngineBuilder = registry.load_backend("engine", config.engine, ENGINES)
     times = frame_times(scene)
-    lying = relaxed_first(scene, particles, posed)
+    lying = bodies_to_relax(scene, particles, posed)
     if lying:
         posed = replace(posed, problem=replace(posed.problem, gravity_ramp=0.0))
-    name = fingerprint(__version__, posed.problem, as_kept(config), times, lying)
-    with store.writing(folder):
+    name = fingerprint(__version__, posed.problem, settings_for_key(config), times, lying)
+    with store.disk_errors(folder):
         kept, slept = Checkpoints(folder, name), Checkpoints(folder / "settling", name)
-        relax = partial(relaxed, scene, posed, lying, build, slept, progress)
-        begun = Stage.at_start(scene, particles, field, posed)
-        run = Run(build(posed.problem), begun, folder, times, kept, config.breaking)
+        relax = partial(relax_to_equilibrium, scene, posed, lying, build, slept, progress)
+        begun = FractureState.at_start(scene, particles, field, posed)
+        run = SimulationRun(build(posed.problem), begun, folder, times, kept, config.breaking)
         run.through(progress, lying, relax)
-        trajectory = gather(folder, len(times))
-        found = typed(Settled, store.read_json(folder / SETTLING)) if lying else None
+        trajectory = gather_ledgers(folder, len(times))
+        found = (
+            from_plain(SettlingOutcome, store.read_json(folder / SETTLING_FILE)) if lying else None
+        )
         end = run.stage
         write_audit(folder, audit(end.scene, end.particles, end.field, trajectory, found))
         kept.forget()
@@ -104,31 +110,31 @@ def simulate(
 # ------------------------------------------------------------------ before time 0
 
 
-def relaxed_first(scene: Scene, particles: Particles, posed: Posed) -> tuple[int, ...]:
+def bodies_to_relax(scene: Scene, particles: Particles, posed: ModelMapping) -> tuple[int, ...]:
     """Return bodies to bring to static equilibrium: all supported ones, if any deforms."""
     if not scene.settled or not any(scene.gravity):
         return ()
-    carried = standing(scene, particles)
+    carried = standing_objects(scene, particles)
     lying = [b for b, k in enumerate(posed.object_of_body) if int(k) in carried]
     return tuple(lying) if not posed.rigid[lying].all() else ()
 
 
-def relaxed(
+def relax_to_equilibrium(
     scene: Scene,
-    posed: Posed,
+    posed: ModelMapping,
     lying: tuple[int, ...],
-    build: Build,
+    build: EngineBuilder,
     kept: Checkpoints,
     progress: Progress,
 ) -> dict[str, np.ndarray]:
     """Find static equilibrium, or go on with it; return the state of the engine in it."""
-    record = kept.folder.parent / SETTLING
+    record = kept.folder.parent / SETTLING_FILE
     state = kept.newest().state
     if state and record.exists():
         return state
     hung = set(range(len(posed.problem.bodies))) - set(lying)
-    problem = before(posed.problem, hung)
-    relaxation = Relaxation(build(problem), problem, hung)
+    problem = settling_problem(posed.problem, hung)
+    relaxation = DynamicRelaxation(build(problem), problem, hung)
     if state:
         relaxation.restore(state)
     good = {"state": relaxation.saved()}
@@ -151,15 +157,17 @@ def relaxed(
     return balance.state
 
 
-def equilibrium_found(scene: Scene, posed: Posed, balance: Balance) -> Settled:
+def equilibrium_found(
+    scene: Scene, posed: ModelMapping, balance: StaticEquilibrium
+) -> SettlingOutcome:
     """Return how equilibrium was found, by object."""
     cell = posed.problem.cell
     moved = zip(scene.objects, balance.moved.tolist(), balance.farthest.tolist(), strict=True)
     objects = [
-        SettledObject(obj.name, (x, y, z), float(np.linalg.norm([x, y, z])) / cell, far)
+        SettledObjectOutcome(obj.name, (x, y, z), float(np.linalg.norm([x, y, z])) / cell, far)
         for obj, (x, y, z), far in moved
     ]
-    return Settled(balance.seconds, balance.found, tuple(objects))
+    return SettlingOutcome(balance.seconds, balance.found, tuple(objects))
 
 
 # ------------------------------------------------------------------ from time 0 on
@@ -170,13 +178,13 @@ def frame_times(scene: Scene) -> np.ndarray:
     return np.arange(round(scene.duration * scene.fps) + 1) / scene.fps
 
 
-class Run:
+class SimulationRun:
     """One simulation in one folder, from its start or from a checkpoint."""
 
     def __init__(
         self,
         engine: Engine,
-        stage: Stage,
+        stage: FractureState,
         folder: Path,
         times: np.ndarray,
         checkpoints: Checkpoints,
@@ -184,17 +192,17 @@ class Run:
     ) -> None:
         self.engine, self.folder, self.breaking = engine, folder, breaking
         self.times, self.checkpoints = times, checkpoints
-        self.breaks: tuple[Break, ...] = ()
+        self.breaks: tuple[FractureEvent, ...] = ()
         self.whole: set[int] = set()
         self._take(stage)
 
-    def _take(self, stage: Stage) -> None:
+    def _take(self, stage: FractureState) -> None:
         """Keep the books of what is simulated now."""
         self.stage, self.posed = stage, stage.posed
         order = stage.posed.order
         self.place = np.empty_like(order)
         self.place[order] = np.arange(len(order))
-        self.layout = Layout.of(stage.posed)
+        self.layout = FrameLayout.of(stage.posed)
         self.watch = EnergyWatch.of(stage.posed.problem)
         self.stress = VonMises(stage.posed.problem)
 
@@ -240,21 +248,23 @@ class Run:
 
         """
         while True:
-            blow = next_blow(self.stage, self.breaks, self.whole, self.folder, number, since)
+            blow = next_breaking_impact(
+                self.stage, self.breaks, self.whole, self.folder, number, since
+            )
             if blow is None:
                 return
             self.engine.restore(saved)
             assert isinstance(self.engine, CpuEngine)
-            broken = break_up(self.stage, self.engine, blow, self.breaks)
+            broken = fracture_body(self.stage, self.engine, blow, self.breaks)
             if broken is None:
                 # What cannot be cut stays whole.
                 self.whole.add(blow.object)
             else:
                 self.checkpoints.forget()
-                retell(self.folder, number, self.stage, broken.stage, broken.breaks[-1])
+                rewrite_history(self.folder, number, self.stage, broken.stage, broken.breaks[-1])
                 self.engine, self.breaks = broken.engine, broken.breaks
                 self._take(broken.stage)
-                store.save(self.folder / BREAKS, self.breaks)
+                store.save(self.folder / BREAKS_FILE, self.breaks)
                 since, saved = self.engine.time, self.engine.save()
             self.engine.advance(float(self.times[number]))
             self.keep_frame(number)
@@ -269,15 +279,15 @@ class Run:
             self.engine.restore(state)
         elif lying:
             self.engine.start_from(relax(), lying)
-        for frame in (self.folder / FOLDER).glob("[0-9]*.npz"):
+        for frame in (self.folder / FRAMES_FOLDER).glob("[0-9]*.npz"):
             if int(frame.stem) >= done:
                 frame.unlink()
         if not done:
-            (self.folder / BREAKS).unlink(missing_ok=True)
+            (self.folder / BREAKS_FILE).unlink(missing_ok=True)
             write_layout(self.folder, self.layout)
             self.keep_frame(0)
         frame = frame_path(self.folder, 0).stat().st_size
-        store.require_room(self.folder, frame * (len(self.times) - max(done, 1)))
+        store.require_disk_space(self.folder, frame * (len(self.times) - max(done, 1)))
         return max(done, 1)
 
     def words(self) -> str:

@@ -11,19 +11,19 @@ from jaxtyping import Float16, Float32, UInt8
 from corporeal.core import registry
 from corporeal.core.errors import UnknownChoiceError, UserError
 
-MENU = {
+ENCODER_REGISTRY = {
     "clip": "corporeal.reconstruction.features.clip:Clip",
     "dinov2": "corporeal.reconstruction.features.dinov2:Dinov2",
 }
 """Models that look at pictures: name before the colon → class that takes what stands after it."""
-NOBODY = "descriptor"
+NO_ENCODER = "descriptor"
 """No model: colour and shape decide, see ``features.descriptor``."""
-PACKAGES = ("torch", "transformers")
+ENCODER_PACKAGES = ("torch", "transformers")
 """Which the core does without."""
 
 
 @runtime_checkable
-class Encoder(Protocol):
+class PictureEncoder(Protocol):
     """The whole contract: one picture in, one map out."""
 
     def name(self) -> str:
@@ -36,7 +36,7 @@ class Encoder(Protocol):
 
 
 @runtime_checkable
-class Reader(Encoder, Protocol):
+class TextPictureEncoder(PictureEncoder, Protocol):
     """An encoder whose features are comparable with words."""
 
     def words(self, names: Sequence[str]) -> Float32[np.ndarray, "M D"]:
@@ -44,7 +44,7 @@ class Reader(Encoder, Protocol):
         ...
 
 
-def connect(spec: str, folder: Path | None = None) -> Encoder | None:
+def connect_encoder(spec: str, folder: Path | None = None) -> PictureEncoder | None:
     """Connect to ``"clip"`` and the like; ``"descriptor"`` is no model and gives None.
 
     Args:
@@ -57,20 +57,22 @@ def connect(spec: str, folder: Path | None = None) -> Encoder | None:
 
     """
     name, _, rest = spec.partition(":")
-    if name == NOBODY:
+    if name == NO_ENCODER:
         return None
-    if name not in MENU:
-        raise UnknownChoiceError("picture encoder", name, [NOBODY, *MENU])
-    missing = [package for package in PACKAGES if find_spec(package) is None]
+    if name not in ENCODER_REGISTRY:
+        raise UnknownChoiceError("picture encoder", name, [NO_ENCODER, *ENCODER_REGISTRY])
+    missing = [package for package in ENCODER_PACKAGES if find_spec(package) is None]
     if missing:
         raise UserError(
             f"The picture encoder {spec!r} needs {' and '.join(missing)}, not installed here. "
             "Type: pip install 'corporeal[learned]'. Without it there is 'descriptor', which needs "
             "no model."
         )
-    encoder = registry.load("picture encoder", name, MENU)(rest)
+    encoder = registry.load_backend("picture encoder", name, ENCODER_REGISTRY)(rest)
     if folder is None:
         return encoder
-    return registry.load(
-        "wrapper", "kept", {"kept": "corporeal.reconstruction.features.saved_maps:Kept"}
+    return registry.load_backend(
+        "wrapper",
+        "kept",
+        {"kept": "corporeal.reconstruction.features.feature_map_cache:CachedEncoder"},
     )(encoder, folder)

@@ -15,16 +15,16 @@ from PIL import Image
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.core.machine import cores
-from corporeal.reconstruction.features.maskers import Instance
+from corporeal.core.process_resources import usable_cores
+from corporeal.reconstruction.features.mask_models import MaskInstance
 
-FILES = ("model.onnx", "onnx/model.onnx")
-MEAN = np.array([0.485, 0.456, 0.406], np.float32)
-DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
+MODEL_FILES = ("model.onnx", "onnx/model.onnx")
+IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
+IMAGENET_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 """Of ImageNet, in which its authors state colours."""
-SIDE = 1024
+TRAINED_SIDE_PX = 1024
 """Of the pictures it was trained on [px], where the file does not fix it."""
-RANGE, HALF = 255.0, 0.5
+MAX_U8, MASK_THRESHOLD = 255.0, 0.5
 
 
 class BiRefNet:
@@ -33,22 +33,22 @@ class BiRefNet:
     needs_words = False
 
     def __init__(self, folder: Path) -> None:
-        found = [folder / name for name in FILES if (folder / name).is_file()]
+        found = [folder / name for name in MODEL_FILES if (folder / name).is_file()]
         if not found:
             raise BadFileError(
-                folder, f"there is no {' or '.join(FILES)}.", "Fetch BiRefNet as ONNX."
+                folder, f"there is no {' or '.join(MODEL_FILES)}.", "Fetch BiRefNet as ONNX."
             )
         self.file = found[0]
 
     def name(self) -> str:
         """Name the weights exactly."""
-        return f"birefnet@{store.digest(self.file)}"
+        return f"birefnet@{store.path_digest(self.file)}"
 
     @cached_property
     def session(self) -> Any:
         """The loaded model."""
         options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = cores()
+        options.intra_op_num_threads = usable_cores()
         providers = ["CPUExecutionProvider"]
         try:
             return onnxruntime.InferenceSession(str(self.file), options, providers=providers)
@@ -59,7 +59,7 @@ class BiRefNet:
 
     def instances(
         self, picture: UInt8[np.ndarray, "H W 3"], words: Sequence[str], at: tuple[float, float]
-    ) -> list[Instance]:
+    ) -> list[MaskInstance]:
         """Return the foreground; words and place are not looked at.
 
         Raises:
@@ -68,21 +68,21 @@ class BiRefNet:
         """
         height, width = picture.shape[:2]
         entry = self.session.get_inputs()[0]
-        side = entry.shape[-1] if isinstance(entry.shape[-1], int) else SIDE
-        said = self.session.run(None, {entry.name: _prepared(picture, side)})[-1]
+        side = entry.shape[-1] if isinstance(entry.shape[-1], int) else TRAINED_SIDE_PX
+        said = self.session.run(None, {entry.name: _prepare_picture(picture, side)})[-1]
         if said.ndim != 4 or said.shape[:2] != (1, 1):
             what = f"its last output has the shape {list(said.shape)}, not 1 × 1 × H × W."
             raise BadFileError(self.file, what, "Name BiRefNet as ONNX.")
         share = _sigmoid(said[0, 0].astype(np.float32))
         large = Image.fromarray(share).resize((width, height), Image.Resampling.BILINEAR)
         inside = np.asarray(large)
-        mask = inside > HALF
-        return [Instance(mask, float(inside[mask].mean()))] if mask.any() else []
+        mask = inside > MASK_THRESHOLD
+        return [MaskInstance(mask, float(inside[mask].mean()))] if mask.any() else []
 
 
-def _prepared(picture: np.ndarray, side: int) -> Float32[np.ndarray, "1 3 h w"]:
+def _prepare_picture(picture: np.ndarray, side: int) -> Float32[np.ndarray, "1 3 h w"]:
     small = Image.fromarray(picture).resize((side, side), Image.Resampling.BILINEAR)
-    values = (np.asarray(small, np.float32) / RANGE - MEAN) / DEVIATION
+    values = (np.asarray(small, np.float32) / MAX_U8 - IMAGENET_MEAN) / IMAGENET_DEVIATION
     return np.ascontiguousarray(values.transpose(2, 0, 1)[None])
 
 

@@ -15,14 +15,14 @@ from jaxtyping import Float16, Float32, UInt8
 from transformers import CLIPModel, CLIPTokenizer  # pyright: ignore[reportMissingImports]
 from transformers.utils import logging  # pyright: ignore[reportMissingImports]
 
-from corporeal.reconstruction.features.pictures import as_map, grid, prepared
-from corporeal.reconstruction.features.vectors import unit
-from corporeal.reconstruction.features.weights import PREPROCESSOR, find
+from corporeal.reconstruction.features.model_weights import PREPROCESSOR_FILE, find_weights
+from corporeal.reconstruction.features.unit_vectors import unit_rows
+from corporeal.reconstruction.features.vit_pictures import feature_map, patch_grid, prepare_picture
 
-DEFAULT = "openai/clip-vit-large-patch14-336"
-TOKENIZER = ("tokenizer.json", "vocab.json")
+DEFAULT_CLIP = "openai/clip-vit-large-patch14-336"
+TOKENIZER_FILES = ("tokenizer.json", "vocab.json")
 """Files that words are cut into tokens by: one is enough."""
-TEMPLATES = (
+PROMPT_TEMPLATES = (
     "a photo of a {}.",
     "itap of a {}.",
     "a bad photo of the {}.",
@@ -39,8 +39,8 @@ class Clip:
     """CLIP with a vision transformer; ``spec`` as in ``features.connect``."""
 
     def __init__(self, spec: str = "") -> None:
-        self.weights = find("clip", spec, DEFAULT)
-        self.weights.holds(TOKENIZER)
+        self.weights = find_weights("clip", spec, DEFAULT_CLIP)
+        self.weights.holds(TOKENIZER_FILES)
 
     @cached_property
     def model(self) -> Any:
@@ -64,17 +64,17 @@ class Clip:
 
         """
         vision = self.model.config.vision_config
-        rows, columns = grid(picture, vision.image_size, vision.patch_size)
+        rows, columns = patch_grid(picture, vision.image_size, vision.patch_size)
         size = rows * vision.patch_size, columns * vision.patch_size
-        pixels = prepared(picture, size, self._statistics)
-        return as_map(dense(self.model, pixels), (rows, columns))
+        pixels = prepare_picture(picture, size, self._statistics)
+        return feature_map(dense_features(self.model, pixels), (rows, columns))
 
     @cached_property
     def _statistics(self) -> dict[str, Any]:
-        return self.weights.read(PREPROCESSOR)
+        return self.weights.read(PREPROCESSOR_FILE)
 
     def words(self, names: Sequence[str]) -> Float32[np.ndarray, "M D"]:
-        """Return one unit vector per name: the mean over ``TEMPLATES``.
+        """Return one unit vector per name: the mean over ``PROMPT_TEMPLATES``.
 
         Raises:
             UserError: The weights cannot be had.
@@ -84,7 +84,7 @@ class Clip:
         made = np.zeros((len(names), self.model.config.projection_dim), np.float32)
         for k, name in enumerate(names):
             tokens = self._tokenizer(
-                [template.format(name) for template in TEMPLATES],
+                [template.format(name) for template in PROMPT_TEMPLATES],
                 padding=True,
                 truncation=True,
                 max_length=longest,
@@ -93,12 +93,12 @@ class Clip:
             with torch.inference_mode():
                 pooled = self.model.text_model(**tokens).pooler_output
                 vectors = self.model.text_projection(pooled).numpy()
-            made[k] = unit(unit(vectors).mean(axis=0)[None])[0]
+            made[k] = unit_rows(unit_rows(vectors).mean(axis=0)[None])[0]
         return made
 
 
 @torch.inference_mode()
-def dense(model: Any, pixels: torch.Tensor) -> torch.Tensor:
+def dense_features(model: Any, pixels: torch.Tensor) -> torch.Tensor:
     """Return B x (h w) x D features of patches in the space that words share.
 
     All layers but the last as they are; of that one ``layer_norm1 → v_proj → out_proj``, then

@@ -9,17 +9,17 @@ from jaxtyping import Float16, UInt8
 from transformers import Dinov2Model  # pyright: ignore[reportMissingImports]
 from transformers.utils import logging  # pyright: ignore[reportMissingImports]
 
-from corporeal.reconstruction.features.pictures import as_map, grid, prepared
-from corporeal.reconstruction.features.weights import PREPROCESSOR, find
+from corporeal.reconstruction.features.model_weights import PREPROCESSOR_FILE, find_weights
+from corporeal.reconstruction.features.vit_pictures import feature_map, patch_grid, prepare_picture
 
-DEFAULT = "facebook/dinov2-base"
+DEFAULT_DINOV2 = "facebook/dinov2-base"
 
 
 class Dinov2:
     """DINOv2 without registers; ``spec`` as in ``features.connect``."""
 
     def __init__(self, spec: str = "") -> None:
-        self.weights = find("dinov2", spec, DEFAULT)
+        self.weights = find_weights("dinov2", spec, DEFAULT_DINOV2)
 
     @cached_property
     def model(self) -> Any:
@@ -39,13 +39,13 @@ class Dinov2:
 
         """
         config = self.model.config
-        rows, columns = grid(picture, config.image_size, config.patch_size)
+        rows, columns = patch_grid(picture, config.image_size, config.patch_size)
         size = rows * config.patch_size, columns * config.patch_size
-        pixels = prepared(picture, size, self._statistics)
+        pixels = prepare_picture(picture, size, self._statistics)
         with torch.inference_mode():
             tokens = self.model(pixel_values=pixels).last_hidden_state
-        return as_map(tokens[:, 1:], (rows, columns))
+        return feature_map(tokens[:, 1:], (rows, columns))
 
     @cached_property
     def _statistics(self) -> dict[str, Any]:
-        return self.weights.read(PREPROCESSOR)
+        return self.weights.read(PREPROCESSOR_FILE)

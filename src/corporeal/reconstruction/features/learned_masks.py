@@ -10,27 +10,32 @@ from jaxtyping import Int, UInt8
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.io.images import decode_image
-from corporeal.io.mask_files import (
-    RECORD,
-    corrected,
-    file_names,
-    read_record,
+from corporeal.io.image_decoder import decode_image
+from corporeal.io.photos.image_loader import PosedPhotoFile, exif_quarter_turns_of_file, stored_size
+from corporeal.io.photos.mask_files import (
+    MASK_RECORD_FILE,
+    edited_masks,
+    mask_file_names,
+    read_mask_record,
     write_instances,
     write_mask,
-    write_record,
+    write_mask_record,
 )
-from corporeal.io.photographs import INSTANCES, MASKS, listed, read_photographs
-from corporeal.io.shots import Shot, asked_of, stored
-from corporeal.multiview.epipolar import projection
-from corporeal.multiview.region import region
-from corporeal.reconstruction.features.maskers import Instance, Masker
+from corporeal.io.photos.posed_photos import (
+    INSTANCE_FOLDERS,
+    MASK_FOLDERS,
+    list_posed_photos,
+    read_posed_photos,
+)
+from corporeal.multiview.epipolar import projection_matrix
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.features.mask_models import MaskInstance, MaskModel
 
 Progress = Callable[[float, str], None]
 
-SMALL = 64
+CAMERA_PICTURE_PX = 64
 """Pictures from which only cameras are wanted are read so small [px]."""
-LONGEST = 2048
+MAX_MODEL_PICTURE_PX = 2048
 """Larger photographs are halved before the model sees them [px]."""
 
 
@@ -46,7 +51,7 @@ class LearnedMasks:
 def learned_masks(
     source: Path,
     folder: Path,
-    masker: Masker,
+    masker: MaskModel,
     words: Sequence[str],
     progress: Progress = lambda fraction, words: None,
 ) -> LearnedMasks:
@@ -67,41 +72,41 @@ def learned_masks(
     """
     if masker.needs_words and not words:
         raise UserError("These masks are found by words: name the objects with --things.")
-    made_by = store.key("learned masks", masker.name(), [store.digest(source), *words])
-    record = read_record(folder)
+    made_by = store.result_key("learned masks", masker.name(), [store.path_digest(source), *words])
+    record = read_mask_record(folder)
     if record is not None and record.made_by == made_by:
-        count = len(corrected(folder))
+        count = len(edited_masks(folder))
         more = [f"{count} of the masks were corrected by hand."] * bool(count)
         return LearnedMasks(folder, (*record.said, *more))
-    for name in (MASKS[0], INSTANCES[0]):
+    for name in (MASK_FOLDERS[0], INSTANCE_FOLDERS[0]):
         shutil.rmtree(folder / name, ignore_errors=True)
-    (folder / RECORD).unlink(missing_ok=True)
-    counts = _written(source, folder, masker, words, progress)
+    (folder / MASK_RECORD_FILE).unlink(missing_ok=True)
+    counts = _ask_for_masks(source, folder, masker, words, progress)
     found = np.count_nonzero(counts)
     if found <= len(counts) / 2:
         what = f"{masker.name()} found nothing in {len(counts) - found} of {len(counts)} of them."
         raise BadFileError(source, what, "Choose other words, or other weights.")
     said = (f"Masks of {found} of {len(counts)} photographs were found by {masker.name()}.",)
-    write_record(folder, made_by, said)
+    write_mask_record(folder, made_by, said)
     return LearnedMasks(folder, said)
 
 
-def _written(
-    source: Path, folder: Path, masker: Masker, words: Sequence[str], progress: Progress
+def _ask_for_masks(
+    source: Path, folder: Path, masker: MaskModel, words: Sequence[str], progress: Progress
 ) -> list[int]:
     """Ask for every photograph; return how many objects were found in each."""
-    shots, middles = listed(source).shots, _middles(source)
+    shots, middles = list_posed_photos(source).shots, _gaze_points(source)
     counts, several = [], {}
-    with store.writing(folder):
-        for k, (shot, name) in enumerate(zip(shots, file_names(shots), strict=True)):
+    with store.disk_errors(folder):
+        for k, (shot, name) in enumerate(zip(shots, mask_file_names(shots), strict=True)):
             progress(k / len(shots), f"finding objects in photograph {k + 1} of {len(shots)}")
             if shot.name not in middles:
                 continue  # whoever reads the photographs says why it cannot be used
-            picture = _picture(shot)
+            picture = _read_picture(shot)
             column, row = middles[shot.name]
             at = column * picture.shape[1], row * picture.shape[0]
             found = masker.instances(picture, words, at)
-            number = numbered(found, picture.shape[:2])
+            number = number_instances(found, picture.shape[:2])
             counts.append(len(np.unique(number[number > 0])))
             write_mask(folder, name, (number > 0).astype(np.float32))
             several[name] = number
@@ -111,7 +116,9 @@ def _written(
     return counts
 
 
-def numbered(found: Sequence[Instance], size: tuple[int, int]) -> Int[np.ndarray, "H W"]:
+def number_instances(
+    found: Sequence[MaskInstance], size: tuple[int, int]
+) -> Int[np.ndarray, "H W"]:
     """Return which object each pixel shows, 1 for the surest; 0: none. Surer ones are in front."""
     number = np.zeros(size, np.int64)
     for k, instance in reversed([*enumerate(found)]):
@@ -119,22 +126,24 @@ def numbered(found: Sequence[Instance], size: tuple[int, int]) -> Int[np.ndarray
     return number
 
 
-def _middles(source: Path) -> dict[str, tuple[float, float]]:
+def _gaze_points(source: Path) -> dict[str, tuple[float, float]]:
     """Return where each photograph shows what all look at, in shares of width and height."""
-    seen = read_photographs(source, SMALL, bare=True)
-    centre = np.array([*region(seen.views.cameras).centre, 1.0])
+    seen = read_posed_photos(source, CAMERA_PICTURE_PX, bare=True)
+    centre = np.array([*find_viewed_region(seen.views.cameras).centre, 1.0])
     made = {}
     for name, camera in zip(seen.names, seen.views.cameras, strict=True):
-        x, y, depth = projection(camera) @ centre
+        x, y, depth = projection_matrix(camera) @ centre
         place = np.array([x / depth / camera.width, y / depth / camera.height])
         inside = depth > 0 and bool(((place >= 0) & (place < 1)).all())
         made[name] = (float(place[0]), float(place[1])) if inside else (0.5, 0.5)
     return made
 
 
-def _picture(shot: Shot) -> UInt8[np.ndarray, "H W 3"]:
+def _read_picture(shot: PosedPhotoFile) -> UInt8[np.ndarray, "H W 3"]:
     assert shot.picture is not None, "it was read"
-    picture = decode_image(shot.picture.read_bytes(), LONGEST)[..., :3]
-    size = stored(shot)
+    picture = decode_image(shot.picture.read_bytes(), MAX_MODEL_PICTURE_PX)[..., :3]
+    size = stored_size(shot)
     turned = size is not None and (size[0] > size[1]) != (picture.shape[1] > picture.shape[0])
-    return np.ascontiguousarray(np.rot90(picture, asked_of(shot.picture)) if turned else picture)
+    return np.ascontiguousarray(
+        np.rot90(picture, exif_quarter_turns_of_file(shot.picture)) if turned else picture
+    )

@@ -11,11 +11,11 @@ from jaxtyping import UInt8
 from transformers import Sam2Model  # pyright: ignore[reportMissingImports]
 from transformers.utils import logging  # pyright: ignore[reportMissingImports]
 
-from corporeal.reconstruction.features.maskers import Instance
-from corporeal.reconstruction.features.pictures import enlarged, prepared
-from corporeal.reconstruction.features.weights import in_folder, statistics
+from corporeal.reconstruction.features.mask_models import MaskInstance
+from corporeal.reconstruction.features.model_weights import picture_statistics, weights_in_folder
+from corporeal.reconstruction.features.vit_pictures import enlarge_logits, prepare_picture
 
-KINDS = ("sam2", "sam2_video")
+SAM2_KINDS = ("sam2", "sam2_video")
 """What its checkpoints call themselves: those for films hold the same model."""
 
 
@@ -25,8 +25,8 @@ class Sam2:
     needs_words = False
 
     def __init__(self, folder: Path) -> None:
-        self.weights = in_folder(folder, KINDS)
-        self.statistics = statistics(self.weights)
+        self.weights = weights_in_folder(folder, SAM2_KINDS)
+        self.statistics = picture_statistics(self.weights)
 
     def name(self) -> str:
         """Name the weights exactly."""
@@ -40,7 +40,7 @@ class Sam2:
 
     def instances(
         self, picture: UInt8[np.ndarray, "H W 3"], words: Sequence[str], at: tuple[float, float]
-    ) -> list[Instance]:
+    ) -> list[MaskInstance]:
         """Return what is at a place: of the model's three answers the one that it is surest of.
 
         Raises:
@@ -49,13 +49,13 @@ class Sam2:
         """
         height, width = picture.shape[:2]
         side = self.model.prompt_encoder.image_embedding_size[0] * self._patch
-        pixels = prepared(picture, (side, side), self.statistics)
+        pixels = prepare_picture(picture, (side, side), self.statistics)
         place = torch.tensor([[[[at[0] * side / width, at[1] * side / height]]]])
         with torch.inference_mode():
             said = self.model(pixel_values=pixels, input_points=place.float())
         best = int(said.iou_scores[0, 0].argmax())
-        mask = enlarged(said.pred_masks[0, 0, best], (height, width)) > 0
-        return [Instance(mask, float(said.iou_scores[0, 0, best].clamp(0, 1)))]
+        mask = enlarge_logits(said.pred_masks[0, 0, best], (height, width)) > 0
+        return [MaskInstance(mask, float(said.iou_scores[0, 0, best].clamp(0, 1)))]
 
     @property
     def _patch(self) -> int:

@@ -11,14 +11,14 @@ from jaxtyping import UInt8
 from transformers import CLIPTokenizer, Sam3Model  # pyright: ignore[reportMissingImports]
 from transformers.utils import logging  # pyright: ignore[reportMissingImports]
 
-from corporeal.reconstruction.features.clip import TOKENIZER
-from corporeal.reconstruction.features.maskers import Instance
-from corporeal.reconstruction.features.pictures import enlarged, prepared
-from corporeal.reconstruction.features.weights import in_folder, statistics
+from corporeal.reconstruction.features.clip import TOKENIZER_FILES
+from corporeal.reconstruction.features.mask_models import MaskInstance
+from corporeal.reconstruction.features.model_weights import picture_statistics, weights_in_folder
+from corporeal.reconstruction.features.vit_pictures import enlarge_logits, prepare_picture
 
-KINDS = ("sam3", "sam3_video")
+SAM3_KINDS = ("sam3", "sam3_video")
 """What its checkpoints call themselves: those for films hold the same detector."""
-SURE = 0.3
+MIN_SCORE = 0.3
 """Score from which on an answer counts, as its authors have it."""
 
 
@@ -28,9 +28,9 @@ class Sam3:
     needs_words = True
 
     def __init__(self, folder: Path) -> None:
-        self.weights = in_folder(folder, KINDS)
-        self.weights.holds(TOKENIZER)
-        self.statistics = statistics(self.weights)
+        self.weights = weights_in_folder(folder, SAM3_KINDS)
+        self.weights.holds(TOKENIZER_FILES)
+        self.statistics = picture_statistics(self.weights)
 
     def name(self) -> str:
         """Name the weights exactly."""
@@ -48,7 +48,7 @@ class Sam3:
 
     def instances(
         self, picture: UInt8[np.ndarray, "H W 3"], words: Sequence[str], at: tuple[float, float]
-    ) -> list[Instance]:
+    ) -> list[MaskInstance]:
         """Return all objects that words name, the surest first; the place is not looked at.
 
         Raises:
@@ -56,13 +56,13 @@ class Sam3:
 
         """
         side = self.model.config.image_size
-        pixels = prepared(picture, (side, side), self.statistics)
+        pixels = prepare_picture(picture, (side, side), self.statistics)
         with torch.inference_mode():
             seen = self.model.get_vision_features(pixel_values=pixels)
             found = [i for word in words for i in self._named(seen, word, picture.shape[:2])]
         return sorted(found, key=lambda instance: -instance.score)
 
-    def _named(self, seen: Any, word: str, size: tuple[int, int]) -> list[Instance]:
+    def _named(self, seen: Any, word: str, size: tuple[int, int]) -> list[MaskInstance]:
         longest = self.model.config.text_config.max_position_embeddings
         tokens = self._tokenizer(
             [word], padding="max_length", truncation=True, max_length=longest, return_tensors="pt"
@@ -71,8 +71,8 @@ class Sam3:
         score = said.pred_logits[0].sigmoid()
         if said.presence_logits is not None:
             score = score * said.presence_logits[0].sigmoid()
-        found = torch.nonzero(score > SURE)[:, 0].tolist()
+        found = torch.nonzero(score > MIN_SCORE)[:, 0].tolist()
         return [
-            Instance(enlarged(said.pred_masks[0, k], size) > 0, float(score[k]), word)
+            MaskInstance(enlarge_logits(said.pred_masks[0, k], size) > 0, float(score[k]), word)
             for k in found
         ]

@@ -11,22 +11,22 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from corporeal.core.types import Camera
-from corporeal.multiview.ground_plane import Plane, Search, ground_plane
-from corporeal.multiview.region import region
-from corporeal.reconstruction.gaussians.start import Points
+from corporeal.multiview.ground_plane import GroundPlane, GroundSearch, find_ground_plane
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints
 
-ABOUT = 2.0
+FLOOR_SEARCH_RADII = 2.0
 """The floor is looked for among points that near, in radii of what the cameras look at."""
-DOME = 8.0
+DOME_RADIUS_RADII = 8.0
 """Radius of the dome, in the same radii, ..."""
-BEYOND = 1.5
+MIN_DOME_TO_CAMERA_RATIO = 1.5
 """... but at least that many times as far as the farthest camera."""
-ON = 0.02
+BACKGROUND_FLOOR_RADII = 0.02
 """Distance from the floor of what is on it, in these radii."""
-ALIKE = 30
+BACKGROUND_COLOUR_PIXELS = 30
 """Pixels whose mean is the colour of a place that no view shows, maybe."""
-OPAQUE = 0.95
-WIDE = 1.2
+BACKGROUND_OPACITY = 0.95
+BACKGROUND_SCALE_RATIO = 1.2
 """Scale of what covers floor and dome, over the distance from one to the next."""
 
 
@@ -37,7 +37,7 @@ class BackgroundModel:
     centre: Float[np.ndarray, "3"]
     radius: float
     """Of the dome [m]."""
-    ground: Plane | None
+    ground: GroundPlane | None
     thick: float
     """Distance from the floor of what is on it [m]."""
 
@@ -74,47 +74,47 @@ def background_model(
     points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...], rng: np.random.Generator
 ) -> BackgroundModel:
     """Fit floor and dome to a scene; points: on what is in it, some of them on its floor."""
-    around = region(cameras)
+    around = find_viewed_region(cameras)
     centre = np.array(around.centre)
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
-    near = points[np.linalg.norm(points - centre, axis=1) < ABOUT * around.radius]
-    search = Search(np.array([0.0, 0.0, 1.0]), np.pi, around.radius, eyes)
+    near = points[np.linalg.norm(points - centre, axis=1) < FLOOR_SEARCH_RADII * around.radius]
+    search = GroundSearch(np.array([0.0, 0.0, 1.0]), np.pi, around.radius, eyes)
     farthest = float(np.linalg.norm(eyes - centre, axis=1).max())
     return BackgroundModel(
         centre,
-        max(DOME * around.radius, BEYOND * farthest),
-        ground_plane(near, search, rng),
-        ON * around.radius,
+        max(DOME_RADIUS_RADII * around.radius, MIN_DOME_TO_CAMERA_RATIO * farthest),
+        find_ground_plane(near, search, rng),
+        BACKGROUND_FLOOR_RADII * around.radius,
     )
 
 
-def cover(
+def cover_background(
     about: BackgroundModel,
     cameras: tuple[Camera, ...],
     count: int,
     seen: Float[np.ndarray, "M 3"],
     colour: Float[np.ndarray, "M 3"],
-) -> Points:
+) -> StartPoints:
     """Return points all over floor and dome, wide enough to leave no gap, as seen nearby.
 
     seen, colour: places on floor or dome, and the colours that views show there.
     """
     middle = np.mean([c.world_from_camera[:3, 3] for c in cameras], axis=0)
-    ray = directions(count)
+    ray = fibonacci_directions(count)
     far = about.reach(np.tile(middle, (count, 1)), ray)
     position = middle + far[:, None] * ray
     towards = (seen - middle) / np.linalg.norm(seen - middle, axis=1, keepdims=True)
-    _, near = KDTree(towards).query(ray, k=min(ALIKE, len(seen)))
-    return Points(
+    _, near = KDTree(towards).query(ray, k=min(BACKGROUND_COLOUR_PIXELS, len(seen)))
+    return StartPoints(
         position,
         colour[near.reshape(count, -1)].mean(axis=1),
-        np.full(count, OPAQUE),
+        np.full(count, BACKGROUND_OPACITY),
         about.normals(position),
-        WIDE * far * np.sqrt(4 * np.pi / count),
+        BACKGROUND_SCALE_RATIO * far * np.sqrt(4 * np.pi / count),
     )
 
 
-def directions(count: int) -> Float[np.ndarray, "N 3"]:
+def fibonacci_directions(count: int) -> Float[np.ndarray, "N 3"]:
     """Return unit vectors to all sides: a spiral of equal areas (Fibonacci lattice)."""
     z = 1 - 2 * (np.arange(count) + 0.5) / count
     turn = np.pi * (3 - np.sqrt(5)) * np.arange(count)

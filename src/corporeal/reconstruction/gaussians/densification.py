@@ -9,42 +9,44 @@ from math import comb
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.reconstruction.gaussians.parameters import (
-    OPACITY,
-    ROTATION,
-    SCALE,
-    Parameters,
-    opacity,
+from corporeal.reconstruction.gaussians.gaussian_parameters import (
+    PARAM_OPACITY,
+    PARAM_ROTATION,
+    PARAM_SCALE,
+    ParameterMatrix,
+    opacities,
 )
 
-DEAD = 0.005
+DEAD_OPACITY = 0.005
 """A Gaussian less opaque than this is dead."""
-PACE = 1.05
+GROWTH_FACTOR = 1.05
 """Factor by which their number grows a round."""
-CROWD = 51
+MAX_COPIES = 51
 """As many stand in for one at most."""
-BINOMIAL = np.array([[comb(i, k) * (-1.0) ** k for k in range(CROWD)] for i in range(CROWD)])
+BINOMIAL_COEFFICIENTS = np.array(
+    [[comb(i, k) * (-1.0) ** k for k in range(MAX_COPIES)] for i in range(MAX_COPIES)]
+)
 
 
-def moved(
-    theta: Parameters, moments: list[Parameters], most: int, rng: np.random.Generator
-) -> tuple[Parameters, list[Parameters]]:
+def densify(
+    theta: ParameterMatrix, moments: list[ParameterMatrix], most: int, rng: np.random.Generator
+) -> tuple[ParameterMatrix, list[ParameterMatrix]]:
     """Return the Gaussians after one round, and the optimiser's moments with them.
 
     Those that come and those that make room begin with moments of 0.
     """
-    o = opacity(theta).astype(np.float64)
-    dead = np.flatnonzero(~(o > DEAD))
-    joining = max(0, min(int(PACE * len(theta)), most) - len(theta))
-    chance = np.where(o > DEAD, o, 0)
+    o = opacities(theta).astype(np.float64)
+    dead = np.flatnonzero(~(o > DEAD_OPACITY))
+    joining = max(0, min(int(GROWTH_FACTOR * len(theta)), most) - len(theta))
+    chance = np.where(o > DEAD_OPACITY, o, 0)
     if len(dead) + joining == 0 or not chance.sum() > 0:
         return theta, moments
     source = rng.choice(len(theta), len(dead) + joining, p=chance / chance.sum())
-    crowd = np.minimum(np.bincount(source, minlength=len(theta))[source] + 1, CROWD)
-    share, shrink = shared(o[source], crowd)
+    crowd = np.minimum(np.bincount(source, minlength=len(theta))[source] + 1, MAX_COPIES)
+    share, shrink = split_opacity_and_scale(o[source], crowd)
     theta = theta.copy()
-    theta[source, OPACITY] = np.log(share / (1 - share))
-    theta[source, SCALE:OPACITY] += np.log(shrink)[:, None]
+    theta[source, PARAM_OPACITY] = np.log(share / (1 - share))
+    theta[source, PARAM_SCALE:PARAM_OPACITY] += np.log(shrink)[:, None]
     theta[dead] = theta[source[: len(dead)]]
     grown = np.concatenate([theta, theta[source[len(dead) :]]])
     fresh = []
@@ -55,7 +57,7 @@ def moved(
     return grown, fresh
 
 
-def shared(
+def split_opacity_and_scale(
     o: Float[np.ndarray, " N"], crowd: np.ndarray
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """Return opacity and factor of the scale of each of a crowd that replaces one Gaussian.
@@ -63,27 +65,36 @@ def shared(
     o' = 1 - (1 - o)^(1/C);  s'/s = o / Σ_{i=1..C} Σ_{k<i} binom(i-1, k) (-1)^k o'^(k+1) / √(k+1)
     (equation 9 of the paper).
     """
-    new = np.clip(1 - (1 - o) ** (1 / crowd), DEAD, 0.995)
-    k = np.arange(CROWD)
+    new = np.clip(1 - (1 - o) ** (1 / crowd), DEAD_OPACITY, 0.995)
+    k = np.arange(MAX_COPIES)
     powers = new[:, None] ** (k + 1) / np.sqrt(k + 1)
-    terms = powers @ BINOMIAL.T  # term i - 1 of the outer sum
+    terms = powers @ BINOMIAL_COEFFICIENTS.T  # term i - 1 of the outer sum
     total = np.where(k < crowd[:, None], terms, 0).sum(axis=1)
     return new, np.clip(o / total, 1e-3, 1)
 
 
-def jitter(theta: Parameters, reach: float, rng: np.random.Generator) -> Parameters:
+def random_steps(theta: ParameterMatrix, reach: float, rng: np.random.Generator) -> ParameterMatrix:
     """Return steps at random for the means, in the shape of each Gaussian; opaque ones stay.
 
     reach: in standard deviations. Σ^½ η reach / (1 + exp(100 (o - 0.005))), η normal. The paper has
     Σ for Σ^½, which makes the reach depend on the unit of length.
     """
-    q = theta[:, ROTATION:SCALE] / np.linalg.norm(theta[:, ROTATION:SCALE], axis=1)[:, None]
-    loose = reach / (1 + np.exp(np.minimum(100 * (opacity(theta) - DEAD), 80)))
-    step = loose[:, None] * np.exp(theta[:, SCALE:OPACITY]) * rng.normal(size=(len(theta), 3))
-    return turn(q, step).astype(np.float32)
+    q = (
+        theta[:, PARAM_ROTATION:PARAM_SCALE]
+        / np.linalg.norm(theta[:, PARAM_ROTATION:PARAM_SCALE], axis=1)[:, None]
+    )
+    loose = reach / (1 + np.exp(np.minimum(100 * (opacities(theta) - DEAD_OPACITY), 80)))
+    step = (
+        loose[:, None]
+        * np.exp(theta[:, PARAM_SCALE:PARAM_OPACITY])
+        * rng.normal(size=(len(theta), 3))
+    )
+    return rotate_by_quaternions(q, step).astype(np.float32)
 
 
-def turn(q: Float[np.ndarray, "N 4"], x: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
+def rotate_by_quaternions(
+    q: Float[np.ndarray, "N 4"], x: Float[np.ndarray, "N 3"]
+) -> Float[np.ndarray, "N 3"]:
     """Return vectors turned by unit quaternions."""
     t = 2 * np.cross(q[:, 1:], x)
     return x + q[:, :1] * t + np.cross(q[:, 1:], t)

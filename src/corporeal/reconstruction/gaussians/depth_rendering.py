@@ -7,11 +7,16 @@ from jaxtyping import Bool, Float, Float32, Int
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Camera, Gaussians
-from corporeal.reconstruction.gaussians.kernels_carve import meet, slopes
-from corporeal.reconstruction.gaussians.kernels_project import Pinhole
-from corporeal.reconstruction.gaussians.parameters import parameters
-from corporeal.reconstruction.gaussians.raster import dealt, draw, picture_of, pinhole
-from corporeal.reconstruction.gaussians.start import clearance
+from corporeal.reconstruction.gaussians.gaussian_initialisation import free_depths
+from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
+from corporeal.reconstruction.gaussians.kernels_project import PinholeCamera
+from corporeal.reconstruction.gaussians.kernels_space_carving import depth_slopes, meet_surfaces
+from corporeal.reconstruction.gaussians.rasteriser_numba import (
+    deal_tiles,
+    draw,
+    picture_of_drawing,
+    pinhole_of_camera,
+)
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 
@@ -35,8 +40,8 @@ def render_depth(
     gaussians: Gaussians, cameras: tuple[Camera, ...], pool: ThreadPool
 ) -> DepthRendering:
     """Render Gaussians, and their depth, from every camera."""
-    theta, clear = parameters(gaussians), clearance(cameras)
-    eyes = [pinhole(c, near=near) for c, near in zip(cameras, clear, strict=True)]
+    theta, clear = parameters_of_gaussians(gaussians), free_depths(cameras)
+    eyes = [pinhole_of_camera(c, near=near) for c, near in zip(cameras, clear, strict=True)]
     shape = len(eyes), max(e.height for e in eyes), max(e.width for e in eyes)
     rgb = np.zeros((*shape, 3), np.float32)
     depth, far = (np.full(shape, np.inf, np.float32) for _ in range(2))
@@ -45,20 +50,20 @@ def render_depth(
     for k, eye in enumerate(eyes):
         # Colours, and which Gaussians each tile meets.
         drawing = draw(theta, eye, np.zeros(3), pool)
-        picture = picture_of(drawing)
+        picture = picture_of_drawing(drawing)
         own = k, slice(eye.height), slice(eye.width)
         rgb[own] = np.clip(picture.rgb / np.maximum(picture.alpha, 1e-3)[..., None], 0, 1)
         # How depth varies across each Gaussian; then the surface that each ray meets first.
         slope = np.empty((gaussians.count, 4), np.float32)
         seen = gaussians.mean, spread, drawing.ellipses, eye, slope
-        pool.each(slopes, [(*span, *seen) for span in pool.spans(gaussians.count)])
+        pool.each(depth_slopes, [(*span, *seen) for span in pool.spans(gaussians.count)])
         found = depth[own], far[own], met[own]
         rest = drawing.first, drawing.ids, drawing.ellipses, slope, *found
-        pool.each(meet, [(t, *rest) for t in dealt(drawing.first, pool)])
+        pool.each(meet_surfaces, [(t, *rest) for t in deal_tiles(drawing.first, pool)])
     return DepthRendering(rgb, depth, far, met, np.stack([_row(eye) for eye in eyes]))
 
 
-def within(
+def restrict_depth_to_objects(
     rendering: DepthRendering,
     of_object: Bool[np.ndarray, " N"],
     masks: Bool[np.ndarray, "V H W"] | None,
@@ -84,6 +89,6 @@ def covariances(gaussians: Gaussians) -> Float[np.ndarray, "N 3 3"]:
     return half @ half.transpose(0, 2, 1)
 
 
-def _row(eye: Pinhole) -> Float[np.ndarray, "18"]:
+def _row(eye: PinholeCamera) -> Float[np.ndarray, "18"]:
     pose = np.concatenate([eye.turn, eye.shift[:, None]], axis=1)
     return np.array([*pose.ravel(), eye.fx, eye.fy, eye.cx, eye.cy, eye.width, eye.height])

@@ -15,26 +15,30 @@ from scipy.sparse import csr_array, vstack
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera
-from corporeal.geometry.interpolation import between, within
+from corporeal.geometry.grid_interpolation import bilinear_weights, trilinear_weights
 from corporeal.reconstruction.gaussians import kernels_radiance
-from corporeal.reconstruction.gaussians.carve import Grid
-from corporeal.reconstruction.gaussians.radiance import Field, camera_rows, parted
+from corporeal.reconstruction.gaussians.radiance_field import (
+    RadianceField,
+    field_arrays,
+    field_camera_rows,
+)
+from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
-COARSER = 2
+NODE_SPACING_RATIO = 2
 """Distance between nodes, in those of the field: maps of features are no finer."""
-ROUNDS = 2
+DISTILLATION_ITERATIONS = 2
 """Of moving features towards the maps; the first is the mean over all rays. With more, features are
 sharper, and so is noise: of maps that disagree."""
-ACROSS = 96
+RAYS_ACROSS_PICTURE = 96
 """Rays along a picture's shorter side."""
-LEAST = 0.02
+MIN_LIGHT_FRACTION = 0.02
 """Share of a ray's light from which on a place counts."""
-MOST = 48
+MAX_PLACES_PER_RAY = 48
 """Places along a ray that do."""
-COVERED = 0.8
+MIN_ABSORBED_FRACTION = 0.8
 """Rays that lose less light look past the objects."""
-CHANNELS = 64
+CHANNELS_PER_BATCH = 64
 """That are worked on at a time: what bounds the memory beside maps and result."""
 
 
@@ -42,14 +46,16 @@ CHANNELS = 64
 class FeatureField:
     """Features in space; M nodes of a grid have them."""
 
-    grid: Grid
+    grid: VoxelGrid
     row: Int[np.ndarray, " X_Y_Z"]
     """Where a node's features are; -1: it has none."""
     values: Float16[np.ndarray, "M D"]
 
     def at(self, position: Float[np.ndarray, "N 3"]) -> Float32[np.ndarray, "N D"]:
         """Return features at places [m], between nodes that have some; 0 where none around has."""
-        share = within((position - np.array(self.grid.low)) / self.grid.cell, self.grid.shape)
+        share = trilinear_weights(
+            (position - np.array(self.grid.low)) / self.grid.cell, self.grid.shape
+        )
         known = np.flatnonzero(self.row >= 0)
         own = csr_array(share[:, known], dtype=np.float32)
         total = np.asarray(own.sum(axis=1))[:, None]
@@ -60,7 +66,7 @@ class FeatureField:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _ViewRays:
     """Some rays of one view; R of them."""
 
     share: csr_array
@@ -69,11 +75,11 @@ class _Seen:
     """Of each ray (row), how much of each place of the map (column) it sees."""
 
 
-def distilled(
-    field: Field,
+def distil_features(
+    field: RadianceField,
     cameras: Sequence[Camera],
     maps: Sequence[np.ndarray],
-    rounds: int = ROUNDS,
+    rounds: int = DISTILLATION_ITERATIONS,
     threads: int | None = None,
 ) -> FeatureField:
     """Distil maps of features into a field.
@@ -90,11 +96,13 @@ def distilled(
 
     """
     _check(cameras, maps)
-    x, y, z = (-(-(n - 1) // COARSER) + 1 for n in field.row.shape)
-    grid = Grid(field.grid.low, COARSER * field.grid.cell, (max(x, 2), max(y, 2), max(z, 2)))
+    x, y, z = (-(-(n - 1) // NODE_SPACING_RATIO) + 1 for n in field.row.shape)
+    grid = VoxelGrid(
+        field.grid.low, NODE_SPACING_RATIO * field.grid.cell, (max(x, 2), max(y, 2), max(z, 2))
+    )
     # What each ray sees of the nodes, weighted as its colours are, and of the map.
     with ThreadPool(threads) as pool:
-        seen = _seen(field, grid, cameras, [m.shape[:2] for m in maps], pool)
+        seen = _view_rays(field, grid, cameras, [m.shape[:2] for m in maps], pool)
     share = csr_array(vstack([one.share for one in seen]))
     total = np.asarray(share.sum(axis=0)).ravel()
     known = np.flatnonzero(total > 0)
@@ -129,25 +137,27 @@ def _check(cameras: Sequence[Camera], maps: Sequence[np.ndarray]) -> None:
         )
 
 
-def _seen(
-    field: Field,
-    grid: Grid,
+def _view_rays(
+    field: RadianceField,
+    grid: VoxelGrid,
     cameras: Sequence[Camera],
     sizes: Sequence[tuple[int, int]],
     pool: ThreadPool,
-) -> list[_Seen]:
-    rows, walk = camera_rows(field.grid, tuple(cameras)), parted(field)
+) -> list[_ViewRays]:
+    rows, walk = field_camera_rows(field.grid, tuple(cameras)), field_arrays(field)
     made = []
     for camera, row, size in zip(cameras, rows, sizes, strict=True):
-        pixels = _spread(camera)
+        pixels = _spread_pixels(camera)
         count = np.zeros(len(pixels), np.int32)
-        place = np.zeros((len(pixels), MOST, 3), np.float32)
-        weight = np.zeros((len(pixels), MOST), np.float32)
-        rest = row, camera.width, walk, np.float32(LEAST)
+        place = np.zeros((len(pixels), MAX_PLACES_PER_RAY, 3), np.float32)
+        weight = np.zeros((len(pixels), MAX_PLACES_PER_RAY), np.float32)
+        rest = row, camera.width, walk, np.float32(MIN_LIGHT_FRACTION)
         spans = [slice(*span) for span in pool.spans(len(pixels))]
         deals = [(pixels[d], *rest, count[d], place[d], weight[d]) for d in spans]
-        pool.each(kernels_radiance.weigh, deals)
-        made.append(_ray_by_ray(camera, pixels, place / COARSER, weight, grid.shape, size))
+        pool.each(kernels_radiance.light_sources, deals)
+        made.append(
+            _ray_by_ray(camera, pixels, place / NODE_SPACING_RATIO, weight, grid.shape, size)
+        )
     return made
 
 
@@ -158,21 +168,21 @@ def _ray_by_ray(
     weight: Float[np.ndarray, "R M"],
     nodes: tuple[int, int, int],
     size: tuple[int, int],
-) -> _Seen:
+) -> _ViewRays:
     """Return what rays see: of the grid's nodes (their number each way), and of the map."""
-    on = np.flatnonzero(weight.sum(axis=1) >= COVERED)
+    on = np.flatnonzero(weight.sum(axis=1) >= MIN_ABSORBED_FRACTION)
     ray, entry = np.nonzero(weight[on])
     own = weight[on] / weight[on].sum(axis=1, keepdims=True)
     per = csr_array((own[ray, entry], (ray, np.arange(len(ray)))), shape=(len(on), len(ray)))
     v, u = np.divmod(pixels[on], camera.width)
     flat = np.stack([(u + 0.5) / camera.width, (v + 0.5) / camera.height], axis=1)
-    shown = between(flat, np.ones(len(on), np.bool_), size)
-    return _Seen(csr_array(per @ within(place[on][ray, entry], nodes)), shown)
+    shown = bilinear_weights(flat, np.ones(len(on), np.bool_), size)
+    return _ViewRays(csr_array(per @ trilinear_weights(place[on][ray, entry], nodes)), shown)
 
 
-def _spread(camera: Camera) -> Int[np.ndarray, " R"]:
+def _spread_pixels(camera: Camera) -> Int[np.ndarray, " R"]:
     """Return pixels all over a picture."""
-    apart = max(1, min(camera.height, camera.width) // ACROSS)
+    apart = max(1, min(camera.height, camera.width) // RAYS_ACROSS_PICTURE)
     v, u = np.arange(apart // 2, camera.height, apart), np.arange(apart // 2, camera.width, apart)
     return (v[:, None] * camera.width + u).ravel().astype(np.int32)
 
@@ -182,4 +192,6 @@ def _flat(pixels: np.ndarray) -> Float32[np.ndarray, "P C"]:
 
 
 def _batches(count: int) -> list[slice]:
-    return [slice(k, min(k + CHANNELS, count)) for k in range(0, count, CHANNELS)]
+    return [
+        slice(k, min(k + CHANNELS_PER_BATCH, count)) for k in range(0, count, CHANNELS_PER_BATCH)
+    ]

@@ -9,40 +9,43 @@ from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Gaussians
-from corporeal.multiview.region import region
-from corporeal.reconstruction.gaussians.raster import contributions, weights
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.rasteriser_numba import (
+    gaussian_contributions,
+    gaussian_weights,
+)
 
-CELL, WHOLE = 4, 16
+CELL_WITH_MASKS_PX, CELL_WITHOUT_MASKS_PX = 4, 16
 """Pixels along a cell in which contributions are summed, with masks and without."""
-VISIBLE = 0.1
+MIN_VISIBLE_CONTRIBUTION = 0.1
 """Least contribution to a picture, in pixels, for a view to count as having seen it. Where there
 are more Gaussians than pixels, this share of what those that show contribute in the mean."""
-INSIDE = 0.5
+MIN_INSIDE_MASKS_FRACTION = 0.5
 """Share of what shows of a Gaussian that must be inside masks."""
-FAINT = 0.05
+FAINT_OPACITY = 0.05
 """Opacity below which it is haze."""
-THICK = 0.01
+FLOOR_LAYER_RADII = 0.01
 """Height of the layer that is the floor, in radii of what the cameras look at."""
-AROUND = 1.1
+MAX_OBJECT_RADII = 1.1
 """Radius of what may be an object, in those."""
-COMMON = 0.2
+MIN_VIEWS_FRACTION = 0.2
 """Share of the views that must see it, where there are no masks."""
-WIDE = 0.5
+HAZE_WIDTH_RADII = 0.5
 """Standard deviation of haze, in those radii."""
-HALF = 0.5
+COVERED_PIXEL_FRACTION = 0.5
 """Share of a pixel from which on it is an object's."""
-SUNK = 0.01
+MIN_SUNK_DEPTH_FRACTION = 0.01
 """Below the floor, in the longest side of the objects: less may be error of the floor."""
-TINY = 1e-12
+MIN_CONTRIBUTION_PX = 1e-12
 """Contribution that can be divided by [px]."""
-REACH = 2.0
+FAINT_REACH_SIGMAS = 2.0
 """Standard deviations to which a faint Gaussian reaches."""
-NEAR = 3.0
+NEAR_NEIGHBOUR_DISTANCES = 3.0
 """Distances between neighbours within which a Gaussian, or a place, goes with an object."""
 
 
 @dataclass(frozen=True)
-class Shown:
+class GaussianVisibility:
     """What the pictures show of each of N Gaussians."""
 
     weight: Float[np.ndarray, " N"]
@@ -57,12 +60,12 @@ class Shown:
     """What it must contribute to a picture for that to count, in the mean [px]."""
 
 
-def shown(
+def gaussian_visibility(
     gaussians: Gaussians,
     cameras: Sequence[Camera],
     masks: Bool[np.ndarray, "V H W"] | None = None,
     threads: int | None = None,
-) -> Shown:
+) -> GaussianVisibility:
     """Say what cameras see of each Gaussian.
 
     Raises:
@@ -74,22 +77,22 @@ def shown(
     total, inside = np.zeros(gaussians.count), np.zeros(gaussians.count)
     views, least = np.zeros(gaussians.count, np.int64), []
     share = np.zeros((len(cameras), gaussians.count), np.float16)
-    cell = WHOLE if masks is None else CELL
+    cell = CELL_WITHOUT_MASKS_PX if masks is None else CELL_WITH_MASKS_PX
     for k, camera in enumerate(cameras):
-        shares, unhidden = contributions(gaussians, camera, cell, threads)
+        shares, unhidden = gaussian_contributions(gaussians, camera, cell, threads)
         own = np.asarray(shares.sum(axis=1)).ravel()
-        least.append(VISIBLE * min(1.0, own.sum() / max(np.count_nonzero(own), 1)))
+        least.append(MIN_VISIBLE_CONTRIBUTION * min(1.0, own.sum() / max(np.count_nonzero(own), 1)))
         total += own
         views += own > least[-1]
-        share[k] = np.minimum(own / np.maximum(unhidden, TINY), 1)
+        share[k] = np.minimum(own / np.maximum(unhidden, MIN_CONTRIBUTION_PX), 1)
         if masks is not None:
-            inside += shares @ _shrunk(masks[k]).ravel()
+            inside += shares @ _inside_fraction(masks[k]).ravel()
     within = None if masks is None else inside
-    return Shown(total, within, views, share, float(np.mean(least)))
+    return GaussianVisibility(total, within, views, share, float(np.mean(least)))
 
 
-def foreground(
-    gaussians: Gaussians, cameras: Sequence[Camera], seen: Shown, floor: bool = True
+def foreground_gaussians(
+    gaussians: Gaussians, cameras: Sequence[Camera], seen: GaussianVisibility, floor: bool = True
 ) -> Bool[np.ndarray, " N"]:
     """Tell which Gaussians belong to the objects.
 
@@ -104,29 +107,34 @@ def foreground(
         floor: Whether a floor is among the Gaussians; masks leave none.
 
     """
-    kept = (seen.weight > seen.least) & (gaussians.opacity > FAINT)
+    kept = (seen.weight > seen.least) & (gaussians.opacity > FAINT_OPACITY)
     if seen.inside is not None:
-        return kept & (seen.inside > INSIDE * seen.weight)
-    around = region(tuple(cameras), gaussians.mean)
+        return kept & (seen.inside > MIN_INSIDE_MASKS_FRACTION * seen.weight)
+    around = find_viewed_region(tuple(cameras), gaussians.mean)
     distance = np.linalg.norm(gaussians.mean - np.array(around.centre), axis=1)
-    kept &= distance < AROUND * around.radius
-    kept &= gaussians.scale.max(axis=1) < WIDE * around.radius
-    kept &= seen.views >= COMMON * len(cameras)
+    kept &= distance < MAX_OBJECT_RADII * around.radius
+    kept &= gaussians.scale.max(axis=1) < HAZE_WIDTH_RADII * around.radius
+    kept &= seen.views >= MIN_VIEWS_FRACTION * len(cameras)
     if floor:
-        kept &= gaussians.mean[:, 2] > THICK * around.radius
+        kept &= gaussians.mean[:, 2] > FLOOR_LAYER_RADII * around.radius
     return kept
 
 
-def covered(
+def pixels_covered(
     gaussians: Gaussians, cameras: Sequence[Camera], of_objects: Int[np.ndarray, " M"]
 ) -> Bool[np.ndarray, "V H W"]:
     """Return the pixels that show mostly Gaussians of objects."""
-    shares = [weights(gaussians, c, 1)[of_objects].sum(axis=0) for c in cameras]
+    shares = [gaussian_weights(gaussians, c, 1)[of_objects].sum(axis=0) for c in cameras]
     pairs = zip(shares, cameras, strict=True)
-    return np.stack([np.asarray(share).reshape(c.height, c.width) > HALF for share, c in pairs])
+    return np.stack(
+        [
+            np.asarray(share).reshape(c.height, c.width) > COVERED_PIXEL_FRACTION
+            for share, c in pairs
+        ]
+    )
 
 
-def near(
+def places_near_objects(
     gaussians: Gaussians, of_objects: Int[np.ndarray, " M"], position: Float[np.ndarray, "N 3"]
 ) -> Bool[np.ndarray, " N"]:
     """Tell which places are at a Gaussian of objects, within a few distances or widths of it."""
@@ -134,10 +142,10 @@ def near(
     tree = KDTree(mean)
     apart = float(np.median(np.asarray(tree.query(mean, k=2)[0])[:, 1]))
     distance, nearest = map(np.asarray, tree.query(position))
-    return distance < NEAR * np.maximum(apart, widest[nearest])
+    return distance < NEAR_NEIGHBOUR_DISTANCES * np.maximum(apart, widest[nearest])
 
 
-def with_company(
+def assign_hidden_gaussians(
     gaussians: Gaussians, owner: Int[np.ndarray, " N"], floor: bool
 ) -> Int[np.ndarray, " N"]:
     """Let faint and hidden Gaussians go with the object they are near, or they would stay behind.
@@ -149,15 +157,21 @@ def with_company(
     tree = KDTree(mean[own])
     apart = float(np.median(np.asarray(tree.query(mean[own], k=2)[0])[:, 1]))
     distance, nearest = map(np.asarray, tree.query(mean[rest]))
-    reach = REACH * gaussians.scale[rest].max(axis=1) * (gaussians.opacity[rest] < HALF)
-    goes = (distance < np.maximum(NEAR * apart, reach)) & (mean[rest, 2] > NEAR * apart)
+    reach = (
+        FAINT_REACH_SIGMAS
+        * gaussians.scale[rest].max(axis=1)
+        * (gaussians.opacity[rest] < COVERED_PIXEL_FRACTION)
+    )
+    goes = (distance < np.maximum(NEAR_NEIGHBOUR_DISTANCES * apart, reach)) & (
+        mean[rest, 2] > NEAR_NEIGHBOUR_DISTANCES * apart
+    )
     goes |= not floor
     made = owner.copy()
     made[rest[goes]] = owner[own[nearest[goes]]]
     return made
 
 
-def sunk(
+def gaussians_below_floor(
     gaussians: Gaussians, owner: Int[np.ndarray, " N"], longest: float
 ) -> Bool[np.ndarray, " N"]:
     """Tell which Gaussians of objects are below the floor.
@@ -171,12 +185,15 @@ def sunk(
         longest: Side of the objects' boxes [in the unit of the Gaussians].
 
     """
-    return (owner >= 0) & (gaussians.mean[:, 2] < -SUNK * longest)
+    return (owner >= 0) & (gaussians.mean[:, 2] < -MIN_SUNK_DEPTH_FRACTION * longest)
 
 
-def _shrunk(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "h w"]:
+def _inside_fraction(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "h w"]:
     """Return the share of each cell that is inside."""
-    rows, columns = np.arange(0, mask.shape[0], CELL), np.arange(0, mask.shape[1], CELL)
+    rows, columns = (
+        np.arange(0, mask.shape[0], CELL_WITH_MASKS_PX),
+        np.arange(0, mask.shape[1], CELL_WITH_MASKS_PX),
+    )
     sums = np.add.reduceat(np.add.reduceat(mask.astype(float), rows, axis=0), columns, axis=1)
     ones = np.ones(mask.shape)
     return sums / np.add.reduceat(np.add.reduceat(ones, rows, axis=0), columns, axis=1)

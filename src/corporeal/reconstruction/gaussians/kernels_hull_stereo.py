@@ -3,24 +3,24 @@
 import numba
 import numpy as np
 
-from corporeal.reconstruction.gaussians.kernels_basis import JIT
-from corporeal.reconstruction.gaussians.kernels_camera import between
-from corporeal.reconstruction.gaussians.kernels_sweep import depth_there
+from corporeal.reconstruction.gaussians.kernels_camera import sample_colour
+from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
+from corporeal.reconstruction.gaussians.kernels_plane_sweep import depth_at_point
 
 f4 = np.float32
-REACH = 2
+PATCH_RADIUS_PX = 2
 """Patches are that many pixels wide to each side of their middle."""
-SIDE = 2 * REACH + 1
-STEP = 0.5
+PATCH_SIDE_PX = 2 * PATCH_RADIUS_PX + 1
+RAY_STEP_CELLS = 0.5
 """Between places on a ray that are looked at [cells]."""
-SHIFT, MOST = 0.7, 64
+DEPTH_STEP_PX, MAX_DEPTHS_PER_RAY = 0.7, 64
 """Pixels of the widest mate from one depth to the next, and most depths of a ray."""
-SEEN = f4(-2)
+NO_CORRELATION = f4(-2)
 """Below any correlation."""
 
 
-@numba.njit(**JIT)
-def chords(first, last, eye, rays, low, side, inside, out):
+@numba.njit(**JIT_OPTIONS)
+def hull_chords(first, last, eye, rays, low, side, inside, out):
     """Fill out (N, 2), first to last, with the depths at which rays enter and leave a hull [m].
 
     rays (N, 3): of one view, with depth 1; low: middle of the hull's first cell; inside (X, Y, Z).
@@ -37,7 +37,7 @@ def chords(first, last, eye, rays, low, side, inside, out):
             one = (low[a] - 0.5 * side - eye[a]) / ray[a]
             two = (low[a] + (shape[a] - 0.5) * side - eye[a]) / ray[a]
             begin, end = max(begin, min(one, two)), min(end, max(one, two))
-        step = STEP * side / np.sqrt((ray * ray).sum())
+        step = RAY_STEP_CELLS * side / np.sqrt((ray * ray).sum())
         z = begin
         while z < end:
             x = int(np.floor((eye[0] + z * ray[0] - low[0]) / side + 0.5))
@@ -48,34 +48,34 @@ def chords(first, last, eye, rays, low, side, inside, out):
             z += step
 
 
-@numba.njit(**JIT)
-def _normalised(patch):
+@numba.njit(**JIT_OPTIONS)
+def _normalise_patch(patch):
     """Take the mean of each channel off a patch (SIDE, SIDE, 3) and return its deviation."""
     total = f4(0)
     for q in range(3):
         middle = f4(0)
-        for j in range(SIDE):
-            for i in range(SIDE):
+        for j in range(PATCH_SIDE_PX):
+            for i in range(PATCH_SIDE_PX):
                 middle += patch[j, i, q]
-        middle /= f4(SIDE * SIDE)
-        for j in range(SIDE):
-            for i in range(SIDE):
+        middle /= f4(PATCH_SIDE_PX * PATCH_SIDE_PX)
+        for j in range(PATCH_SIDE_PX):
+            for i in range(PATCH_SIDE_PX):
                 patch[j, i, q] -= middle
                 total += patch[j, i, q] * patch[j, i, q]
-    return np.sqrt(total / f4(3 * SIDE * SIDE))
+    return np.sqrt(total / f4(3 * PATCH_SIDE_PX * PATCH_SIDE_PX))
 
 
-@numba.njit(**JIT)
-def _seen(ray, z, turn, shift, lens, picture, step, patch):
+@numba.njit(**JIT_OPTIONS)
+def _sample_mate_patch(ray, z, turn, shift, lens, picture, step, patch):
     """Fill in what a mate shows of a patch at depth z that faces its own camera; whether it does.
 
     turn, shift: mate from the patch's camera; step (2,): a pixel of that camera at depth 1.
     """
     height, width, _ = picture.shape
-    for j in range(SIDE):
-        for i in range(SIDE):
-            x = z * (ray[0] + (i - REACH) * step[0])
-            y = z * (ray[1] + (j - REACH) * step[1])
+    for j in range(PATCH_SIDE_PX):
+        for i in range(PATCH_SIDE_PX):
+            x = z * (ray[0] + (i - PATCH_RADIUS_PX) * step[0])
+            y = z * (ray[1] + (j - PATCH_RADIUS_PX) * step[1])
             ahead = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z + shift[2]
             if not ahead > 1e-6:
                 return False
@@ -85,34 +85,36 @@ def _seen(ray, z, turn, shift, lens, picture, step, patch):
             v = lens[1] * down / ahead + lens[3] - 0.5
             if not (0 <= u < width - 1 and 0 <= v < height - 1):
                 return False
-            between(picture, u, v, patch[j, i])
+            sample_colour(picture, u, v, patch[j, i])
     return True
 
 
-@numba.njit(**JIT)
-def _agreement(own, deviation, ray, z, mates, turns, shifts, lenses, pictures, step, patch):
+@numba.njit(**JIT_OPTIONS)
+def _mate_correlation(own, deviation, ray, z, mates, turns, shifts, lenses, pictures, step, patch):
     """Return the mean of the two best correlations with mates: others may look past something."""
-    best, second = SEEN, SEEN
+    best, second = NO_CORRELATION, NO_CORRELATION
     for m in range(len(mates)):
         n = mates[m]
-        if not _seen(ray, z, turns[m], shifts[m], lenses[n], pictures[n], step, patch):
+        if not _sample_mate_patch(ray, z, turns[m], shifts[m], lenses[n], pictures[n], step, patch):
             continue
-        other = _normalised(patch)
+        other = _normalise_patch(patch)
         total = f4(0)
-        for j in range(SIDE):
-            for i in range(SIDE):
+        for j in range(PATCH_SIDE_PX):
+            for i in range(PATCH_SIDE_PX):
                 for q in range(3):
                     total += own[j, i, q] * patch[j, i, q]
-        found = total / (f4(3 * SIDE * SIDE) * deviation * max(other, f4(1e-4)))
+        found = total / (f4(3 * PATCH_SIDE_PX * PATCH_SIDE_PX) * deviation * max(other, f4(1e-4)))
         if found > best:
             best, second = found, best
         elif found > second:
             second = found
-    return f4(0.5) * (best + second) if second > SEEN else SEEN
+    return f4(0.5) * (best + second) if second > NO_CORRELATION else NO_CORRELATION
 
 
-@numba.njit(**JIT)
-def search(k, first, last, places, pictures, lenses, mates, turns, shifts, chord, rule, depth):
+@numba.njit(**JIT_OPTIONS)
+def search_depths(
+    k, first, last, places, pictures, lenses, mates, turns, shifts, chord, rule, depth
+):
     """Fill depth[first:last] of view k's places (N, 2), column and row, with what mates agree on.
 
     chord (N, 2): depths between which is looked; rule: least deviation of a patch [0–1], least
@@ -122,8 +124,11 @@ def search(k, first, last, places, pictures, lenses, mates, turns, shifts, chord
     picture = pictures[k]
     height, width, _ = picture.shape
     ray, step = np.ones(3), np.array([1 / lenses[k, 0], 1 / lenses[k, 1]])
-    own, patch = np.empty((SIDE, SIDE, 3), np.float32), np.empty((SIDE, SIDE, 3), np.float32)
-    curve, widest = np.empty(MOST + 1, np.float32), 0.0
+    own, patch = (
+        np.empty((PATCH_SIDE_PX, PATCH_SIDE_PX, 3), np.float32),
+        np.empty((PATCH_SIDE_PX, PATCH_SIDE_PX, 3), np.float32),
+    )
+    curve, widest = np.empty(MAX_DEPTHS_PER_RAY + 1, np.float32), 0.0
     for m in range(len(mates)):
         widest = max(widest, np.sqrt((shifts[m] * shifts[m]).sum()))
     for n in range(first, last):
@@ -132,25 +137,31 @@ def search(k, first, last, places, pictures, lenses, mates, turns, shifts, chord
         near, far = chord[n]
         if not far < np.inf:
             continue
-        if not (REACH <= x < width - REACH and REACH <= y < height - REACH):
+        if not (
+            PATCH_RADIUS_PX <= x < width - PATCH_RADIUS_PX
+            and PATCH_RADIUS_PX <= y < height - PATCH_RADIUS_PX
+        ):
             continue
         ray[0] = (x + 0.5 - lenses[k, 2]) / lenses[k, 0]
         ray[1] = (y + 0.5 - lenses[k, 3]) / lenses[k, 1]
-        own[:] = picture[y - REACH : y + REACH + 1, x - REACH : x + REACH + 1]
-        deviation = _normalised(own)
+        own[:] = picture[
+            y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1,
+            x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1,
+        ]
+        deviation = _normalise_patch(own)
         if deviation < rule[0]:
             continue
-        most = int(np.ceil(lenses[k, 0] * widest * (1 / near - 1 / far) / SHIFT))
-        count = max(1, min(MOST, most))
+        most = int(np.ceil(lenses[k, 0] * widest * (1 / near - 1 / far) / DEPTH_STEP_PX))
+        count = max(1, min(MAX_DEPTHS_PER_RAY, most))
         apart = (1 / far - 1 / near) / count
         for s in range(count + 1):
-            curve[s] = _agreement(
+            curve[s] = _mate_correlation(
                 own, deviation, ray, 1 / (1 / near + s * apart),
                 mates, turns, shifts, lenses, pictures, step, patch,
             )  # fmt: skip
         at = int(np.argmax(curve[: count + 1]))
         best, between = curve[at], 0.0
-        if 0 < at < count and min(curve[at - 1], curve[at + 1]) > SEEN:
+        if 0 < at < count and min(curve[at - 1], curve[at + 1]) > NO_CORRELATION:
             bend = 2 * best - curve[at - 1] - curve[at + 1]
             if bend > 1e-6:
                 between = 0.5 * (curve[at + 1] - curve[at - 1]) / bend
@@ -160,8 +171,8 @@ def search(k, first, last, places, pictures, lenses, mates, turns, shifts, chord
         depth[n] = 1 / (1 / near + (at + between) * apart) if deeper else near
 
 
-@numba.njit(**JIT)
-def past(points, first, last, cameras, depths, pace, margin, votes):
+@numba.njit(**JIT_OPTIONS)
+def count_past_votes(points, first, last, cameras, depths, pace, margin, votes):
     """Count for points first to last the views that see something there, and that see past it.
 
     cameras (V, 16): ``hull.camera_rows``; depths (V, h, w) [m], inf: unknown; pace: pixels from one
@@ -171,7 +182,7 @@ def past(points, first, last, cameras, depths, pace, margin, votes):
     for n in range(first, last):
         votes[n] = 0
         for k in range(views):
-            shown, ahead, z = depth_there(cameras[k], points[n], depths[k], pace)
+            shown, ahead, z = depth_at_point(cameras[k], points[n], depths[k], pace)
             if not (shown and z < np.inf):
                 continue
             votes[n, 0] += abs(ahead - z) <= margin

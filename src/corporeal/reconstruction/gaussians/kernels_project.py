@@ -10,26 +10,46 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from corporeal.reconstruction.gaussians.kernels_basis import JIT, basis, slopes
-from corporeal.reconstruction.gaussians.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
+from corporeal.reconstruction.gaussians.gaussian_parameters import (
+    PARAM_COLOUR,
+    PARAM_MEAN,
+    PARAM_OPACITY,
+    PARAM_ROTATION,
+    PARAM_SCALE,
+)
+from corporeal.reconstruction.gaussians.kernels_harmonics import (
+    JIT_OPTIONS,
+    harmonics,
+    harmonics_gradient,
+)
 
-U, V, A, B, C, O, RED, Z, REACH = 0, 1, 2, 3, 4, 5, 6, 9, 10
+COL_U, COL_V, COL_A, COL_B, COL_C, COL_OPACITY, COL_RED, COL_DEPTH, COL_EXTENT = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    9,
+    10,
+)
 """Columns of an ellipse: middle (2) [px], inverse covariance (3) [1/px²], opacity, colour (3),
 depth [m], half extents (2) [px], negative where it is not in the picture."""
-WIDTH = 12
-GRADIENTS = 9
+ELLIPSE_COLUMNS = 12
+GRADIENT_COLUMNS = 9
 """Of an ellipse: middle, inverse covariance, opacity, colour."""
-DILATION = 0.3
+DILATION_PX2 = 0.3
 """Added to variances [px²]: about a pixel's own extent."""
-THINNEST = 2.5e-5
+MIN_DILATED_OPACITY_SQ = 2.5e-5
 """Least share of the opacity, squared, that dilation leaves."""
-FAINTEST = 1 / 255
+MIN_DRAWN_OPACITY = 1 / 255
 """Less opaque is not drawn."""
-HUGE = 1e6
+MAX_ELLIPSE_PX = 1e6
 """Wider ones are not drawn [px]."""
 
 
-class Pinhole(NamedTuple):
+class PinholeCamera(NamedTuple):
     """A camera in numbers that kernels read."""
 
     turn: np.ndarray
@@ -48,11 +68,11 @@ class Pinhole(NamedTuple):
     """What is nearer is not drawn [m]"""
 
 
-@numba.njit(**JIT)
+@numba.njit(**JIT_OPTIONS)
 def _rotation(theta, i, R):
     """Rotation of the quaternion, which need not be of unit length; returns one over its length."""
-    w, x = np.float64(theta[i, ROTATION]), np.float64(theta[i, ROTATION + 1])
-    y, z = np.float64(theta[i, ROTATION + 2]), np.float64(theta[i, ROTATION + 3])
+    w, x = np.float64(theta[i, PARAM_ROTATION]), np.float64(theta[i, PARAM_ROTATION + 1])
+    y, z = np.float64(theta[i, PARAM_ROTATION + 2]), np.float64(theta[i, PARAM_ROTATION + 3])
     n = 1 / np.sqrt(w * w + x * x + y * y + z * z + 1e-30)
     w, x, y, z = w * n, x * n, y * n, z * n
     R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
@@ -61,23 +81,23 @@ def _rotation(theta, i, R):
     return n
 
 
-@numba.njit(**JIT)
-def _limit(ratio, centre, focal, size):
+@numba.njit(**JIT_OPTIONS)
+def _limit_slope(ratio, centre, focal, size):
     """Keep a slope within the picture and a little more, where J is a fair approximation."""
     low, high = -(centre + 0.15 * size) / focal, (size - centre + 0.15 * size) / focal
     return min(max(ratio, low), high), low < ratio < high
 
 
-@numba.njit(**JIT)
-def _flatten(theta, i, camera, p, T, R, P, scale):
+@numba.njit(**JIT_OPTIONS)
+def _flatten_gaussian(theta, i, camera, p, T, R, P, scale):
     """Fill T = J W, R, the scales and P = T R diag(scale); returns one over |q|, slope inside."""
     W = camera.turn
-    sx, in_x = _limit(p[0] / p[2], camera.cx, camera.fx, camera.width)
-    sy, in_y = _limit(p[1] / p[2], camera.cy, camera.fy, camera.height)
+    sx, in_x = _limit_slope(p[0] / p[2], camera.cx, camera.fx, camera.width)
+    sy, in_y = _limit_slope(p[1] / p[2], camera.cy, camera.fy, camera.height)
     for a in range(3):
         T[0, a] = camera.fx / p[2] * (W[0, a] - sx * W[2, a])
         T[1, a] = camera.fy / p[2] * (W[1, a] - sy * W[2, a])
-        scale[a] = np.exp(np.float64(theta[i, SCALE + a]))
+        scale[a] = np.exp(np.float64(theta[i, PARAM_SCALE + a]))
     n = _rotation(theta, i, R)
     for r in range(2):
         for a in range(3):
@@ -85,78 +105,78 @@ def _flatten(theta, i, camera, p, T, R, P, scale):
     return n, sx, sy, in_x, in_y
 
 
-@numba.njit(**JIT)
-def _seen(theta, i, camera, p):
+@numba.njit(**JIT_OPTIONS)
+def _mean_in_camera(theta, i, camera, p):
     """Camera coordinates of the mean."""
     W = camera.turn
     for a in range(3):
         p[a] = camera.shift[a]
         for b in range(3):
-            p[a] += W[a, b] * theta[i, MEAN + b]
+            p[a] += W[a, b] * theta[i, PARAM_MEAN + b]
 
 
-@numba.njit(**JIT)
-def _towards(theta, i, camera, d):
+@numba.njit(**JIT_OPTIONS)
+def _view_direction(theta, i, camera, d):
     """Unit direction from the eye to the mean; returns its length."""
     for a in range(3):
-        d[a] = theta[i, MEAN + a] - camera.eye[a]
+        d[a] = theta[i, PARAM_MEAN + a] - camera.eye[a]
     length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     for a in range(3):
         d[a] /= length
     return length
 
 
-@numba.njit(**JIT)
+@numba.njit(**JIT_OPTIONS)
 def project(theta, first, last, camera, ellipses):
     """Fill in the ellipses of Gaussians first to last."""
-    coefficients = (theta.shape[1] - COLOUR) // 3
+    coefficients = (theta.shape[1] - PARAM_COLOUR) // 3
     T, R, P = np.empty((2, 3)), np.empty((3, 3)), np.empty((2, 3))
     p, scale, d, Y = np.empty(3), np.empty(3), np.empty(3), np.empty(16)
     for i in range(first, last):
         e = ellipses[i]
-        e[REACH] = e[REACH + 1] = -1
-        _seen(theta, i, camera, p)
+        e[COL_EXTENT] = e[COL_EXTENT + 1] = -1
+        _mean_in_camera(theta, i, camera, p)
         if not p[2] >= camera.near:
             continue
-        _flatten(theta, i, camera, p, T, R, P, scale)
+        _flatten_gaussian(theta, i, camera, p, T, R, P, scale)
         a0 = P[0, 0] * P[0, 0] + P[0, 1] * P[0, 1] + P[0, 2] * P[0, 2]
         b = P[0, 0] * P[1, 0] + P[0, 1] * P[1, 1] + P[0, 2] * P[1, 2]
         c0 = P[1, 0] * P[1, 0] + P[1, 1] * P[1, 1] + P[1, 2] * P[1, 2]
-        a, c = a0 + DILATION, c0 + DILATION
+        a, c = a0 + DILATION_PX2, c0 + DILATION_PX2
         det = a * c - b * b
-        kept = max((a0 * c0 - b * b) / det, THINNEST)
-        o = np.sqrt(kept) / (1 + np.exp(-np.float64(theta[i, OPACITY])))
-        if not o > FAINTEST:
+        kept = max((a0 * c0 - b * b) / det, MIN_DILATED_OPACITY_SQ)
+        o = np.sqrt(kept) / (1 + np.exp(-np.float64(theta[i, PARAM_OPACITY])))
+        if not o > MIN_DRAWN_OPACITY:
             continue
         u, v = camera.fx * p[0] / p[2] + camera.cx, camera.fy * p[1] / p[2] + camera.cy
-        reach = 2 * np.log(o / FAINTEST)
+        reach = 2 * np.log(o / MIN_DRAWN_OPACITY)
         ex, ey = np.sqrt(reach * a), np.sqrt(reach * c)
         if not (-ex <= u <= camera.width + ex and -ey <= v <= camera.height + ey):
             continue
-        if not (ex < HUGE and ey < HUGE):
+        if not (ex < MAX_ELLIPSE_PX and ey < MAX_ELLIPSE_PX):
             continue
-        e[U], e[V], e[A], e[B], e[C] = u, v, c / det, -b / det, a / det
-        e[O], e[Z], e[REACH], e[REACH + 1] = o, p[2], ex, ey
-        _towards(theta, i, camera, d)
-        basis(d[0], d[1], d[2], coefficients, Y)
+        e[COL_U], e[COL_V], e[COL_A], e[COL_B], e[COL_C] = u, v, c / det, -b / det, a / det
+        e[COL_OPACITY], e[COL_DEPTH], e[COL_EXTENT], e[COL_EXTENT + 1] = o, p[2], ex, ey
+        _view_direction(theta, i, camera, d)
+        harmonics(d[0], d[1], d[2], coefficients, Y)
         for q in range(3):
             s = 0.5
             for k in range(coefficients):
-                s += Y[k] * theta[i, COLOUR + 3 * k + q]
-            e[RED + q] = max(s, 0.0)
+                s += Y[k] * theta[i, PARAM_COLOUR + 3 * k + q]
+            e[COL_RED + q] = max(s, 0.0)
 
 
-@numba.njit(**JIT)
+@numba.njit(**JIT_OPTIONS)
 def project_back(theta, first, last, camera, ellipses, entries, places, spans, gradient):
     """Fill in dL/dθ of Gaussians first to last.
 
     entries: dL/d(ellipse) of each Gaussian in each tile; places[spans[i, 0] : spans[i, 1]] says
     which of them are Gaussian i's.
     """
-    coefficients = (theta.shape[1] - COLOUR) // 3
+    coefficients = (theta.shape[1] - PARAM_COLOUR) // 3
     T, R, P = np.empty((2, 3)), np.empty((3, 3)), np.empty((2, 3))
     p, scale, d, Y, S = np.empty(3), np.empty(3), np.empty(3), np.empty(16), np.empty((16, 3))
-    g, gR, gT = np.empty(GRADIENTS), np.empty((3, 3)), np.empty((2, 3))
+    g, gR, gT = np.empty(GRADIENT_COLUMNS), np.empty((3, 3)), np.empty((2, 3))
     gp, gd, gP = np.empty(3), np.empty(3), np.empty((2, 3))
     W = camera.turn
     for i in range(first, last):
@@ -166,15 +186,15 @@ def project_back(theta, first, last, camera, ellipses, entries, places, spans, g
             continue
         g[:] = 0
         for s in range(spans[i, 0], spans[i, 1]):
-            for k in range(GRADIENTS):
+            for k in range(GRADIENT_COLUMNS):
                 g[k] += entries[places[s], k]
         # The ellipse's covariance: from its inverse, and from the opacity that dilation leaves.
-        _seen(theta, i, camera, p)
-        n, sx, sy, in_x, in_y = _flatten(theta, i, camera, p, T, R, P, scale)
+        _mean_in_camera(theta, i, camera, p)
+        n, sx, sy, in_x, in_y = _flatten_gaussian(theta, i, camera, p, T, R, P, scale)
         a0 = P[0, 0] * P[0, 0] + P[0, 1] * P[0, 1] + P[0, 2] * P[0, 2]
         b = P[0, 0] * P[1, 0] + P[0, 1] * P[1, 1] + P[0, 2] * P[1, 2]
         c0 = P[1, 0] * P[1, 0] + P[1, 1] * P[1, 1] + P[1, 2] * P[1, 2]
-        a, c = a0 + DILATION, c0 + DILATION
+        a, c = a0 + DILATION_PX2, c0 + DILATION_PX2
         det, det0 = a * c - b * b, a0 * c0 - b * b
         iA, iB, iC = c / det, -b / det, a / det
         gA, gB, gC = g[2], 0.5 * g[3], g[4]
@@ -183,11 +203,11 @@ def project_back(theta, first, last, camera, ellipses, entries, places, spans, g
         h00 = -(m00 * iA + m01 * iB)
         h01 = -(m00 * iB + m01 * iC)
         h11 = -(m10 * iB + m11 * iC)
-        opaque = 1 / (1 + np.exp(-np.float64(theta[i, OPACITY])))
+        opaque = 1 / (1 + np.exp(-np.float64(theta[i, PARAM_OPACITY])))
         kept = det0 / det
-        comp = np.sqrt(max(kept, THINNEST))
-        out[OPACITY] = g[5] * comp * opaque * (1 - opaque)
-        if kept > THINNEST:
+        comp = np.sqrt(max(kept, MIN_DILATED_OPACITY_SQ))
+        out[PARAM_OPACITY] = g[5] * comp * opaque * (1 - opaque)
+        if kept > MIN_DILATED_OPACITY_SQ:
             half = 0.5 * g[5] * opaque * comp
             h00 += half * (c0 / det0 - c / det)
             h11 += half * (a0 / det0 - a / det)
@@ -204,8 +224,8 @@ def project_back(theta, first, last, camera, ellipses, entries, places, spans, g
                 gR[k, j] = t * scale[j]
                 gT[0, k] += gP[0, j] * R[k, j] * scale[j]
                 gT[1, k] += gP[1, j] * R[k, j] * scale[j]
-            out[SCALE + j] = along * scale[j]
-        _to_quaternion(theta, i, n, gR, out)
+            out[PARAM_SCALE + j] = along * scale[j]
+        _quaternion_gradient(theta, i, n, gR, out)
         # Through T = J W and the middle to the mean.
         z = p[2]
         gsx = gsy = gz = 0.0
@@ -222,28 +242,28 @@ def project_back(theta, first, last, camera, ellipses, entries, places, spans, g
             gp[1] += gsy / z
             gp[2] -= gsy * sy / z
         # Colour: to its coefficients, and to the mean through the direction it is seen along.
-        length = _towards(theta, i, camera, d)
-        basis(d[0], d[1], d[2], coefficients, Y)
-        slopes(d[0], d[1], d[2], coefficients, S)
+        length = _view_direction(theta, i, camera, d)
+        harmonics(d[0], d[1], d[2], coefficients, Y)
+        harmonics_gradient(d[0], d[1], d[2], coefficients, S)
         gd[:] = 0
         for q in range(3):
-            if not ellipses[i, RED + q] > 0:
+            if not ellipses[i, COL_RED + q] > 0:
                 continue
             for k in range(coefficients):
-                out[COLOUR + 3 * k + q] = g[6 + q] * Y[k]
+                out[PARAM_COLOUR + 3 * k + q] = g[6 + q] * Y[k]
                 for x in range(3):
-                    gd[x] += g[6 + q] * theta[i, COLOUR + 3 * k + q] * S[k, x]
+                    gd[x] += g[6 + q] * theta[i, PARAM_COLOUR + 3 * k + q] * S[k, x]
         radial = gd[0] * d[0] + gd[1] * d[1] + gd[2] * d[2]
         for x in range(3):
-            out[MEAN + x] = W[0, x] * gp[0] + W[1, x] * gp[1] + W[2, x] * gp[2]
-            out[MEAN + x] += (gd[x] - radial * d[x]) / length
+            out[PARAM_MEAN + x] = W[0, x] * gp[0] + W[1, x] * gp[1] + W[2, x] * gp[2]
+            out[PARAM_MEAN + x] += (gd[x] - radial * d[x]) / length
 
 
-@numba.njit(**JIT)
-def _to_quaternion(theta, i, n, g, out):
+@numba.njit(**JIT_OPTIONS)
+def _quaternion_gradient(theta, i, n, g, out):
     """From dL/dR to the quaternion that is brought to unit length by the factor n."""
-    w, x = theta[i, ROTATION] * n, theta[i, ROTATION + 1] * n
-    y, z = theta[i, ROTATION + 2] * n, theta[i, ROTATION + 3] * n
+    w, x = theta[i, PARAM_ROTATION] * n, theta[i, PARAM_ROTATION + 1] * n
+    y, z = theta[i, PARAM_ROTATION + 2] * n, theta[i, PARAM_ROTATION + 3] * n
     gw = -z * g[0, 1] + y * g[0, 2] + z * g[1, 0] - x * g[1, 2] - y * g[2, 0] + x * g[2, 1]
     gx = y * (g[0, 1] + g[1, 0]) + z * (g[0, 2] + g[2, 0]) + w * (g[2, 1] - g[1, 2])
     gx -= 2 * x * (g[1, 1] + g[2, 2])
@@ -252,7 +272,7 @@ def _to_quaternion(theta, i, n, g, out):
     gz = x * (g[0, 2] + g[2, 0]) + y * (g[1, 2] + g[2, 1]) + w * (g[1, 0] - g[0, 1])
     gz -= 2 * z * (g[0, 0] + g[1, 1])
     along = gw * w + gx * x + gy * y + gz * z
-    out[ROTATION] = 2 * n * (gw - along * w)
-    out[ROTATION + 1] = 2 * n * (gx - along * x)
-    out[ROTATION + 2] = 2 * n * (gy - along * y)
-    out[ROTATION + 3] = 2 * n * (gz - along * z)
+    out[PARAM_ROTATION] = 2 * n * (gw - along * w)
+    out[PARAM_ROTATION + 1] = 2 * n * (gx - along * x)
+    out[PARAM_ROTATION + 2] = 2 * n * (gy - along * y)
+    out[PARAM_ROTATION + 3] = 2 * n * (gz - along * z)

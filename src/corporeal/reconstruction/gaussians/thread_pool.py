@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
-from corporeal.core.machine import cores
+from corporeal.core.process_resources import usable_cores
 
 
 class ThreadPool:
@@ -15,7 +15,7 @@ class ThreadPool:
 
     def __init__(self, threads: int | None = None) -> None:
         """None: one thread per core that this process may use."""
-        self.threads = threads or cores()
+        self.threads = threads or usable_cores()
         self.others = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
     def __enter__(self) -> "ThreadPool":

@@ -7,29 +7,29 @@ import numpy as np
 from jaxtyping import Bool, UInt8
 
 from corporeal.core.errors import UserError
-from corporeal.core.registry import load
+from corporeal.core.registry import load_backend
 from corporeal.core.types import Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
-from corporeal.multiview.region import region
-from corporeal.reconstruction.gaussians import saved
-from corporeal.reconstruction.gaussians.hull import Outlines
-from corporeal.reconstruction.gaussians.kernels_project import Pinhole
-from corporeal.reconstruction.gaussians.raster import pinhole
-from corporeal.reconstruction.gaussians.start import Points, clearance
-from corporeal.reconstruction.gaussians.surfaces import Surfaces
+from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians import training_checkpoint
+from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, free_depths
+from corporeal.reconstruction.gaussians.kernels_project import PinholeCamera
+from corporeal.reconstruction.gaussians.rasteriser_numba import pinhole_of_camera
+from corporeal.reconstruction.gaussians.view_depths import ViewDepths
+from corporeal.reconstruction.gaussians.visual_hull import CarvedVolume
 
 Masks = Bool[np.ndarray, "V H W"]
 
-COARSE, COARSE_WHOLE = 0.4, 0.55
+COARSE_STEPS_FRACTION, COARSE_STEPS_FRACTION_UNMASKED = 0.4, 0.55
 """Share of the steps that look at pictures of half the size, with masks and without."""
-COARSE_COST = 0.4
+COARSE_STEP_COST = 0.4
 """Time that such a step takes, in steps."""
-SMALLEST = 64
+MIN_HALVED_WIDTH_PX = 64
 """Narrower pictures are not halved [px]."""
 
 
 @dataclass(frozen=True)
-class Preset:
+class TrainingPreset:
     """How much work."""
 
     gaussians: int
@@ -40,10 +40,10 @@ class Preset:
     """Larger pictures are shrunk by a whole number until no side is longer [px]."""
 
 
-PRESETS = {
-    "preview": Preset(4000, 1, 300, 128),
-    "draft": Preset(20_000, 1, 1000, 256),
-    "normal": Preset(30_000, 2, 2500, 512),
+TRAINING_PRESETS = {
+    "preview": TrainingPreset(4000, 1, 300, 128),
+    "draft": TrainingPreset(20_000, 1, 1000, 256),
+    "normal": TrainingPreset(30_000, 2, 2500, 512),
 }
 
 
@@ -75,21 +75,21 @@ class TrainConfig:
     """Where pictures are drawn while learning: on the processor, or on a card with CUDA."""
 
 
-DEFAULT = TrainConfig()
-RASTERISERS = {
-    "numba": "corporeal.reconstruction.gaussians.raster",
-    "gsplat": "corporeal.reconstruction.gaussians.gsplat",
+DEFAULT_TRAINING = TrainConfig()
+RASTERISER_REGISTRY = {
+    "numba": "corporeal.reconstruction.gaussians.rasteriser_numba",
+    "gsplat": "corporeal.reconstruction.gaussians.rasteriser_gsplat",
 }
 """Modules with the verbs draw and back."""
 
 
-def validate(rasteriser: str) -> None:
+def validate_rasteriser(rasteriser: str) -> None:
     """Raise UserError where there is no such rasteriser here."""
     if rasteriser == "gsplat":
-        load(
+        load_backend(
             "rasteriser",
             rasteriser,
-            {"gsplat": "corporeal.reconstruction.gaussians.gsplat:present"},
+            {"gsplat": "corporeal.reconstruction.gaussians.rasteriser_gsplat:require_cuda"},
         )()
 
 
@@ -100,11 +100,11 @@ class TrainingSchedule:
         self,
         views: Views,
         masks: Masks | None,
-        points: Points | LinesOfSight | None,
+        points: StartPoints | LinesOfSight | None,
         config: TrainConfig,
     ) -> None:
-        check(views, masks)
-        preset = PRESETS[config.preset]
+        check_training_views(views, masks)
+        preset = TRAINING_PRESETS[config.preset]
         self.preset = replace(
             preset,
             gaussians=config.gaussians or preset.gaussians,
@@ -114,7 +114,11 @@ class TrainingSchedule:
         self.config = config
         self.seed, self.rasteriser = config.seed, config.rasteriser
         self.draw, self.back = (
-            load("rasteriser", self.rasteriser, {k: f"{m}:{do}" for k, m in RASTERISERS.items()})
+            load_backend(
+                "rasteriser",
+                self.rasteriser,
+                {k: f"{m}:{do}" for k, m in RASTERISER_REGISTRY.items()},
+            )
             for do in ("draw", "back")
         )
         self.views, self.masks, self.points = views, masks, points
@@ -122,14 +126,18 @@ class TrainingSchedule:
         every = config.held_out
         self.held_out = tuple(range(every // 2, count, every)) if every and count > every else ()
         self.learned = [k for k in range(count) if k not in self.held_out]
-        self.radius = region(views.cameras).radius
-        self.clear = clearance(views.cameras)
+        self.radius = find_viewed_region(views.cameras).radius
+        self.clear = free_depths(views.cameras)
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
-        halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
-        self.surfaces: Surfaces | None = None
-        self.outlines: Outlines | None = None
-        self.coarse = (COARSE_WHOLE if masks is None else COARSE) * self.preset.steps
-        self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
+        halves = min(views.rgb.shape[1:3]) // factor >= MIN_HALVED_WIDTH_PX
+        self.surfaces: ViewDepths | None = None
+        self.outlines: CarvedVolume | None = None
+        self.coarse = (
+            COARSE_STEPS_FRACTION_UNMASKED if masks is None else COARSE_STEPS_FRACTION
+        ) * self.preset.steps
+        self.sizes = [_PictureSize(self, factor)] + (
+            [_PictureSize(self, 2 * factor)] if halves else []
+        )
 
     @property
     def name(self) -> str:
@@ -139,33 +147,35 @@ class TrainingSchedule:
         begin = () if p is None else vars(p).values()
         how = self.seed, self.held_out, self.rasteriser, self.config.begin
         rest = cameras, self.preset, *how
-        return saved.fingerprint(self.views.rgb, self.masks, *begin, *rest)
+        return training_checkpoint.fingerprint(self.views.rgb, self.masks, *begin, *rest)
 
-    def size(self, step: int) -> "_Size":
+    def size(self, step: int) -> "_PictureSize":
         """Return the pictures that a step looks at."""
         return self.sizes[-1] if step < self.coarse else self.sizes[0]
 
     def cost(self, step: int) -> float:
         """Return the time that the steps before this one take, in steps."""
         coarse = self.coarse if len(self.sizes) > 1 else 0.0
-        return min(step, coarse) * COARSE_COST + max(0.0, step - coarse)
+        return min(step, coarse) * COARSE_STEP_COST + max(0.0, step - coarse)
 
 
-class _Size:
+class _PictureSize:
     """The pictures, shrunk by a whole number."""
 
     def __init__(self, schedule: TrainingSchedule, factor: int) -> None:
         views, masks = schedule.views, schedule.masks
-        self.rgb = {k: shrunk(views.rgb[k], factor) for k in schedule.learned}
+        self.rgb = {k: shrink_picture(views.rgb[k], factor) for k in schedule.learned}
         full = {} if masks is None else {k: masks[k] * np.uint8(255) for k in schedule.learned}
-        self.masks = {k: shrunk(mask[..., None], factor)[..., 0] for k, mask in full.items()}
-        self.cameras: dict[int, Pinhole] = {}
+        self.masks = {
+            k: shrink_picture(mask[..., None], factor)[..., 0] for k, mask in full.items()
+        }
+        self.cameras: dict[int, PinholeCamera] = {}
         for k, picture in self.rgb.items():
-            eye = pinhole(views.cameras[k], 1 / factor, schedule.clear[k])
+            eye = pinhole_of_camera(views.cameras[k], 1 / factor, schedule.clear[k])
             self.cameras[k] = eye._replace(height=picture.shape[0], width=picture.shape[1])
 
 
-def shrunk(picture: UInt8[np.ndarray, "H W C"], factor: int) -> UInt8[np.ndarray, "h w C"]:
+def shrink_picture(picture: UInt8[np.ndarray, "H W C"], factor: int) -> UInt8[np.ndarray, "h w C"]:
     """Return a picture of means over squares of pixels; what is left over at the rim is cut off."""
     if factor == 1:
         return picture
@@ -174,7 +184,7 @@ def shrunk(picture: UInt8[np.ndarray, "H W C"], factor: int) -> UInt8[np.ndarray
     return np.round(cut.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
 
 
-def check(views: Views, masks: Masks | None) -> None:
+def check_training_views(views: Views, masks: Masks | None) -> None:
     """Raise UserError where views cannot be learned from."""
     if len(views.cameras) < 2:
         raise UserError("One picture shows no depth. Give at least two, from several sides.")

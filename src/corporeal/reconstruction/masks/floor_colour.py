@@ -13,32 +13,39 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
 
 from corporeal.core.types import Camera, Views
-from corporeal.multiview.ground_plane import Plane
-from corporeal.multiview.region import Region
-from corporeal.multiview.robust import NORMAL
-from corporeal.reconstruction.masks.floor_square import WITNESSES, Square, square, witnessed
+from corporeal.multiview.ground_plane import GroundPlane
+from corporeal.multiview.robust_statistics import SIGMA_PER_MEDIAN_DEVIATION
+from corporeal.multiview.viewed_region import ViewedRegion
+from corporeal.reconstruction.masks.floor_grid import (
+    MIN_AGREEING_PARTNERS,
+    FloorGrid,
+    floor_grid,
+    pixels_on_agreed_floor,
+)
 
-PATCH = 5
+COLOUR_PATCH_CELLS = 5
 """Cells whose mean colour is compared."""
-SPREAD = 2.5
+MAX_SHADE_SIGMAS = 2.5
 """Standard deviations of the floor's own ratios and lightness that shades may be off by."""
-LEAST = 0.03
+MIN_SHADE_SIGMA_LOG = 0.03
 """Least such deviation, in logarithms."""
-COLOURFUL = 2.0
+MIN_COLOURFUL_RATIO = 2.0
 """A floor is grey if no ratio of its channels is so many times farther off 1 than shades may be."""
-SHADE = 0.12
+MAX_VIEW_DIFFERENCE_LOG = 0.12
 """Difference of lightness, and half of that of ratios, up to which views agree, in logarithms."""
-DARK = 4.0
+DARK_FLOOR_U8 = 4.0
 """What is darker [of 255] is as dark where logarithms are compared: noise has no ratios."""
-DARKEST = -1.6
+MIN_SHADOW_LOG = -1.6
 """Logarithm of the least share of the floor's light that a shadow leaves."""
-APART = 4
+SAMPLE_SPACING_CELLS = 4
 """Cells from one that gains and ratios are measured at to the next."""
-ROUNDS = 3
+GAIN_ITERATIONS = 3
 """Of finding the pictures' gains, by the median of all, and that median."""
 
 
-def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.ndarray, "V H W"]:
+def shaded_floor(
+    views: Views, floor: GroundPlane | None, around: ViewedRegion
+) -> Bool[np.ndarray, "V H W"]:
     """Tell which pixels show the floor's own colour, or a shade of it, on the floor.
 
     None where nobody knows the floor, or where it is grey.
@@ -50,27 +57,31 @@ def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.n
 
     """
     nowhere = np.zeros(views.rgb.shape[:3], np.bool_)
-    if floor is None or len(views.cameras) <= WITNESSES:
+    if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:
         return nowhere
-    ground = square(views.cameras, floor, around)
+    ground = floor_grid(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
-    colours = np.stack([colours_on(ground, rgb, c, PATCH, 1.0) for rgb, c in pairs])
-    light, ratios = parted(evened(colours))
-    like = _like_floor(light, ratios)
+    colours = np.stack(
+        [floor_cell_colours(ground, rgb, c, COLOUR_PATCH_CELLS, 1.0) for rgb, c in pairs]
+    )
+    light, ratios = lightness_and_ratios(equalise_floor_colour(colours))
+    like = _is_floor_coloured(light, ratios)
     if like is None:
         return nowhere
 
     def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
         with np.errstate(invalid="ignore"):
-            agreed = np.abs(light[others] - light[k]) < SHADE
-            agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * SHADE).all(axis=-1)
+            agreed = np.abs(light[others] - light[k]) < MAX_VIEW_DIFFERENCE_LOG
+            agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * MAX_VIEW_DIFFERENCE_LOG).all(
+                axis=-1
+            )
         return agreed & like[k]
 
-    return witnessed(views.cameras, floor, around, agreeing, wide=True)
+    return pixels_on_agreed_floor(views.cameras, floor, around, agreeing, wide=True)
 
 
-def colours_on(
-    ground: Square, rgb: np.ndarray, camera: Camera, patch: int, darkest: float
+def floor_cell_colours(
+    ground: FloorGrid, rgb: np.ndarray, camera: Camera, patch: int, darkest: float
 ) -> Float[np.ndarray, "n n 3"]:
     """Return the logarithm of the colour around each cell; nan: not in the picture.
 
@@ -91,19 +102,19 @@ def colours_on(
     return np.log(np.maximum(out, darkest) / 255)
 
 
-def evened(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
+def equalise_floor_colour(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
     """Take every picture's own exposure and white balance off, as the floor shows them."""
-    return colour - gains(colour)[:, None, None]
+    return colour - picture_gains(colour)[:, None, None]
 
 
-def gains(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V 3"]:
+def picture_gains(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V 3"]:
     """Return by how much pictures differ from the median of all, in logarithms."""
-    few = colour[:, ::APART, ::APART].reshape(len(colour), -1, 3)
-    few = few[:, np.isfinite(few).all(axis=-1).sum(axis=0) >= WITNESSES]
+    few = colour[:, ::SAMPLE_SPACING_CELLS, ::SAMPLE_SPACING_CELLS].reshape(len(colour), -1, 3)
+    few = few[:, np.isfinite(few).all(axis=-1).sum(axis=0) >= MIN_AGREEING_PARTNERS]
     gain = np.zeros((len(colour), 1, 3))
     if not few.size:
         return gain[:, 0]
-    for _ in range(ROUNDS):
+    for _ in range(GAIN_ITERATIONS):
         usual = np.nanmedian(few - gain, axis=0)
         away = few - usual
         some = np.isfinite(away).any(axis=(1, 2))
@@ -111,26 +122,30 @@ def gains(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V 3"]:
     return gain[:, 0]
 
 
-def parted(
+def lightness_and_ratios(
     colour: Float[np.ndarray, "V n n 3"],
 ) -> tuple[Float[np.ndarray, "V n n"], Float[np.ndarray, "V n n 2"]]:
     """Return lightness, and red and blue against green, all as logarithms."""
     return colour.mean(axis=-1), colour[..., [0, 2]] - colour[..., 1:2]
 
 
-def _like_floor(
+def _is_floor_coloured(
     light: Float[np.ndarray, "V n n"], ratios: Float[np.ndarray, "V n n 2"]
 ) -> Bool[np.ndarray, "V n n"] | None:
     """Return where the floor's own ratios are seen, no lighter than it; None: it is grey."""
-    few = np.concatenate([light[..., None], ratios], axis=-1)[:, ::APART, ::APART].reshape(-1, 3)
+    few = np.concatenate([light[..., None], ratios], axis=-1)[
+        :, ::SAMPLE_SPACING_CELLS, ::SAMPLE_SPACING_CELLS
+    ].reshape(-1, 3)
     few = few[np.isfinite(few).all(axis=1)]
     if not len(few):
         return None
     usual = np.median(few, axis=0)
-    spread = SPREAD * np.maximum(NORMAL * np.median(np.abs(few - usual), axis=0), LEAST)
-    if (np.abs(usual[1:]) < COLOURFUL * spread[1:]).all():
+    spread = MAX_SHADE_SIGMAS * np.maximum(
+        SIGMA_PER_MEDIAN_DEVIATION * np.median(np.abs(few - usual), axis=0), MIN_SHADE_SIGMA_LOG
+    )
+    if (np.abs(usual[1:]) < MIN_COLOURFUL_RATIO * spread[1:]).all():
         return None
     with np.errstate(invalid="ignore"):
         like = (np.abs(ratios - usual[1:]) < spread[1:]).all(axis=-1)
         darker = light - usual[0]
-        return like & (darker > DARKEST) & (darker < spread[0])
+        return like & (darker > MIN_SHADOW_LOG) & (darker < spread[0])

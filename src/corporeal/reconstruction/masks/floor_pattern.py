@@ -13,19 +13,26 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
 
 from corporeal.core.types import Camera, Views
-from corporeal.multiview.ground_plane import Plane
-from corporeal.multiview.region import Region
-from corporeal.reconstruction.masks.floor_square import WITNESSES, Square, square, witnessed
+from corporeal.multiview.ground_plane import GroundPlane
+from corporeal.multiview.viewed_region import ViewedRegion
+from corporeal.reconstruction.masks.floor_grid import (
+    MIN_AGREEING_PARTNERS,
+    FloorGrid,
+    floor_grid,
+    pixels_on_agreed_floor,
+)
 
-PATCH = 7
+PATTERN_PATCH_CELLS = 7
 """Cells along a patch that is compared."""
-CONTRAST = 3.0
+MIN_PATTERN_CONTRAST_U8 = 3.0
 """Standard deviation of the greys of a patch, of 255, below which it has no pattern."""
-AGREE = 0.8
+MIN_PATTERN_CORRELATION = 0.8
 """Correlation from which on two patches are one pattern."""
 
 
-def shows_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.ndarray, "V H W"]:
+def shows_floor_pattern(
+    views: Views, floor: GroundPlane | None, around: ViewedRegion
+) -> Bool[np.ndarray, "V H W"]:
     """Tell which pixels show a pattern that lies on the floor; none where nobody knows the floor.
 
     Args:
@@ -34,19 +41,21 @@ def shows_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.nd
         around: The ball that all look at.
 
     """
-    if floor is None or len(views.cameras) <= WITNESSES:
+    if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:
         return np.zeros(views.rgb.shape[:3], np.bool_)
-    ground = square(views.cameras, floor, around)
-    seen = [_seen(rgb, c, ground) for rgb, c in zip(views.rgb, views.cameras, strict=True)]
+    ground = floor_grid(views.cameras, floor, around)
+    seen = [_floor_view(rgb, c, ground) for rgb, c in zip(views.rgb, views.cameras, strict=True)]
 
     def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
-        return np.stack([_correlation(seen[k], seen[p]) > AGREE for p in others])
+        return np.stack(
+            [_patch_correlation(seen[k], seen[p]) > MIN_PATTERN_CORRELATION for p in others]
+        )
 
-    return witnessed(views.cameras, floor, around, agreeing)
+    return pixels_on_agreed_floor(views.cameras, floor, around, agreeing)
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _FloorView:
     """The floor as one view has it; black where it is not in its picture."""
 
     grey: Float[np.ndarray, "n n"]
@@ -56,20 +65,20 @@ class _Seen:
     """0: a part of the patch is not in the picture."""
 
 
-def _seen(rgb: np.ndarray, camera: Camera, ground: Square) -> _Seen:
+def _floor_view(rgb: np.ndarray, camera: Camera, ground: FloorGrid) -> _FloorView:
     size, at = (ground.count, ground.count), ground.seen_by(camera)
     grey = map_coordinates(rgb.mean(axis=-1), at, order=1, cval=np.nan).reshape(size)
-    shown = minimum_filter(np.isfinite(grey), PATCH)
+    shown = minimum_filter(np.isfinite(grey), PATTERN_PATCH_CELLS)
     grey = np.nan_to_num(grey)  # running sums would carry what is no number along
-    mean = uniform_filter(grey, PATCH)
-    square = uniform_filter(grey * grey, PATCH) - mean * mean
-    return _Seen(grey, mean, np.where(shown, np.sqrt(np.maximum(square, 0)), 0.0))
+    mean = uniform_filter(grey, PATTERN_PATCH_CELLS)
+    square = uniform_filter(grey * grey, PATTERN_PATCH_CELLS) - mean * mean
+    return _FloorView(grey, mean, np.where(shown, np.sqrt(np.maximum(square, 0)), 0.0))
 
 
-def _correlation(a: _Seen, b: _Seen) -> Float[np.ndarray, "n n"]:
+def _patch_correlation(a: _FloorView, b: _FloorView) -> Float[np.ndarray, "n n"]:
     """Return the normalised cross-correlation of patches; -1 where there is no pattern."""
-    product = uniform_filter(a.grey * b.grey, PATCH) - a.mean * b.mean
+    product = uniform_filter(a.grey * b.grey, PATTERN_PATCH_CELLS) - a.mean * b.mean
     with np.errstate(divide="ignore", invalid="ignore"):
         found = product / (a.deviation * b.deviation)
-    clear = (a.deviation > CONTRAST) & (b.deviation > CONTRAST)
+    clear = (a.deviation > MIN_PATTERN_CONTRAST_U8) & (b.deviation > MIN_PATTERN_CONTRAST_U8)
     return np.where(clear, found, -1.0)

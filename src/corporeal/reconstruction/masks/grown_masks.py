@@ -6,50 +6,68 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core import store
-from corporeal.core.progress import Progress, within
+from corporeal.core.progress import Progress, subprogress
 from corporeal.core.types import Views
-from corporeal.io.mask_files import (
-    RECORD,
-    corrected,
-    file_names,
-    in_own_pixels,
-    read_record,
+from corporeal.io.photos.mask_files import (
+    MASK_RECORD_FILE,
+    edited_masks,
+    mask_file_names,
+    mask_in_photo_pixels,
+    read_mask_record,
     write_mask,
-    write_record,
+    write_mask_record,
 )
-from corporeal.io.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.reconstruction.masks.doubt import (
-    ALIKE,
-    bordering,
-    contradict,
-    doubt,
-    incomplete,
-    lacking,
-    too_thin,
+from corporeal.io.photos.posed_photos import (
+    MASK_FOLDERS,
+    PosedPhotos,
+    list_posed_photos,
+    read_posed_photos,
 )
-from corporeal.reconstruction.masks.grow import FINE, ROUGH, Grown, grow
-from corporeal.reconstruction.masks.pointed import Pointed, pointed_at, spot_of
-from corporeal.reconstruction.masks.reduced import reduced
-from corporeal.reconstruction.masks.seeds import Seeds, looked_at
-from corporeal.reconstruction.masks.taken_in import taken_in
+from corporeal.reconstruction.masks.mask_prompts import (
+    MaskPrompt,
+    picture_prompt,
+    seeds_from_prompt,
+)
+from corporeal.reconstruction.masks.mask_quality import (
+    MAX_COLOUR_OVERLAP,
+    bordering_fraction,
+    incompleteness_reason,
+    lacking_attachment_reason,
+    mask_doubt,
+    outlines_contradict,
+    thinness_reason,
+)
+from corporeal.reconstruction.masks.mask_seeds import MaskSeeds, seeds_from_cameras
+from corporeal.reconstruction.masks.merge_attachments import merge_attachments
+from corporeal.reconstruction.masks.reduce_views import reduce_views
+from corporeal.reconstruction.masks.region_growing import (
+    MASK_PICTURE_PX,
+    ROUND_PICTURE_PX,
+    RegionGrowingResult,
+    grow_masks,
+)
 
-FLAT = "What has their colours and lies flat on the floor was taken for objects, too."
-OTHER_COLOURS = "What stands there and borders on it in other colours was taken in."
-BY_FLOOR = "It was told from a floor of its colours by what the floor shows at each of its places."
-DOUBTED = "doubted"
+FLAT_TAKEN_STATEMENT = (
+    "What has their colours and lies flat on the floor was taken for objects, too."
+)
+OTHER_COLOURS_STATEMENT = "What stands there and borders on it in other colours was taken in."
+BY_FLOOR_STATEMENT = (
+    "It was told from a floor of its colours by what the floor shows at each of its places."
+)
+DOUBTED_FOLDER = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
-METHOD = 15
+MASKS_METHOD_VERSION = 15
 """Raised when other masks would be grown: those of an older method are grown again."""
-HAVE_IT = (
+PAINT_MASKS_HINT = (
     "If it is meant, too, paint it white in the masks, or give masks of all (a folder 'masks' with "
     "the names of the pictures); 'corporeal masks' with --at grows masks of it alone."
 )
-UNSURE = 0.5
+UNSURE_OVERLAP_FRACTION = 0.5
 """Share of the overlap of colours that is doubted, from which on the floor is asked, too. Not where
 masks test poses: outlines of what was turned over leave some of it in what is around it."""
-GROWN = 0.8
+GROWN_PROGRESS = 0.8
 """Share of the work that is done when masks are grown."""
-ONCE, TWICE, THRICE = 0.4, 0.6, 0.8
+GROWN_ONCE_PROGRESS, GROWN_TWICE_PROGRESS, GROWN_THRICE_PROGRESS = 0.4, 0.6, 0.8
 """Share of growing them that is done when they were grown once, with what lies flat, and with what
 borders on them."""
 
@@ -76,7 +94,7 @@ class GrownMasks:
 def grown_masks(
     source: Path,
     folder: Path,
-    pointed: Pointed | None = None,
+    pointed: MaskPrompt | None = None,
     progress: Progress = lambda fraction, words: None,
     testing: bool = False,
     doubted: bool = False,
@@ -98,66 +116,77 @@ def grown_masks(
         UserError: The photographs cannot be used, or nothing is at the place that is pointed at.
 
     """
-    made_by = store.key(
-        f"grown masks {METHOD}", (pointed, testing, *("doubted",) * doubted), [store.digest(source)]
+    made_by = store.result_key(
+        f"grown masks {MASKS_METHOD_VERSION}",
+        (pointed, testing, *("doubted",) * doubted),
+        [store.path_digest(source)],
     )
-    if (kept := _kept(folder, made_by)) is not None:
+    if (kept := _load_kept_masks(folder, made_by)) is not None:
         return kept
     progress(0.0, "reading photographs")
-    shown = read_photographs(source, FINE, bare=True)
-    rough = reduced(shown.views, ROUGH)
-    seeds = _seeds(source, shown, rough, pointed)
+    shown = read_posed_photos(source, MASK_PICTURE_PX, bare=True)
+    rough = reduce_views(shown.views, ROUND_PICTURE_PX)
+    seeds = _seeds_of_growing(source, shown, rough, pointed)
     alone = pointed is not None
-    growing, unsure = within(progress, 0.0, GROWN), 1.0 if testing else UNSURE
-    grown, more = _grown(shown.views, seeds, alone, growing, unsure, doubted)
-    why = doubt(grown)
-    lacks = incomplete(grown) or ("" if alone or why else lacking(grown) or too_thin(grown)) or ""
-    for name in (MASKS[0], DOUBTED, RECORD):
-        _forget(folder / name)
+    growing, unsure = (
+        subprogress(progress, 0.0, GROWN_PROGRESS),
+        1.0 if testing else UNSURE_OVERLAP_FRACTION,
+    )
+    grown, more = _grow_and_describe(shown.views, seeds, alone, growing, unsure, doubted)
+    why = mask_doubt(grown)
+    lacks = (
+        incompleteness_reason(grown)
+        or ("" if alone or why else lacking_attachment_reason(grown) or thinness_reason(grown))
+        or ""
+    )
+    for name in (MASK_FOLDERS[0], DOUBTED_FOLDER, MASK_RECORD_FILE):
+        _remove_masks(folder / name)
     if grown is None or (why is not None and pointed is None):
         said = (f"No masks were grown from what all photographs show: {why}.",)
         if grown is not None:
-            _written(source, shown, grown, folder / DOUBTED, progress)
-        apart = contradict(grown)
-        write_record(folder, made_by, said, lacks, contradict=apart)
-        return GrownMasks(None, said, _doubted(folder), lacks, contradict=apart)
-    _written(source, shown, grown, folder, progress)
+            _write_masks(source, shown, grown, folder / DOUBTED_FOLDER, progress)
+        apart = outlines_contradict(grown)
+        write_mask_record(folder, made_by, said, lacks, contradict=apart)
+        return GrownMasks(None, said, _doubted_folder(folder), lacks, contradict=apart)
+    _write_masks(source, shown, grown, folder, progress)
     said = (
-        _told(grown, pointed),
+        _mask_statements(grown, pointed),
         *more,
         *(f"Check them: {w}." for w in (why, lacks) if w),
     )
-    other = _beside(grown, shown.names) if pointed is None else ""
-    write_record(folder, made_by, said, lacks, other)
+    other = _beside_sentence(grown, shown.names) if pointed is None else ""
+    write_mask_record(folder, made_by, said, lacks, other)
     return GrownMasks(folder, said, incomplete=lacks, beside=other)
 
 
-def _kept(folder: Path, made_by: str) -> GrownMasks | None:
+def _load_kept_masks(folder: Path, made_by: str) -> GrownMasks | None:
     """Return masks that lie there and were made so, with what somebody corrected; None: others."""
-    record = read_record(folder)
+    record = read_mask_record(folder)
     if record is None or record.made_by != made_by:
         return None
-    changes = _changes(folder)
+    changes = _corrections(folder)
     lacks, other = ("", "") if changes else (record.incomplete, record.beside)
     believed = folder if record.digest_of else None
     said = (*record.said, *changes)
-    return GrownMasks(believed, said, _doubted(folder), lacks, other, record.contradict)
+    return GrownMasks(believed, said, _doubted_folder(folder), lacks, other, record.contradict)
 
 
-def _seeds(source: Path, shown: Photographs, rough: Views, pointed: Pointed | None) -> Seeds:
+def _seeds_of_growing(
+    source: Path, shown: PosedPhotos, rough: Views, pointed: MaskPrompt | None
+) -> MaskSeeds:
     if pointed is None:
-        return looked_at(rough, shown.points)
-    return pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
+        return seeds_from_cameras(rough, shown.points)
+    return seeds_from_prompt(rough, shown.points, picture_prompt(source, shown, rough, pointed))
 
 
-def _grown(
+def _grow_and_describe(
     views: Views,
-    seeds: Seeds,
+    seeds: MaskSeeds,
     alone: bool,
     progress: Progress,
-    unsure: float = UNSURE,
+    unsure: float = UNSURE_OVERLAP_FRACTION,
     doubted_poses: bool = False,
-) -> tuple[Grown | None, list[str]]:
+) -> tuple[RegionGrowingResult | None, list[str]]:
     """Grow masks, and say what is in them beside what has their colours and stands.
 
     Plates are as flat as print on paper, which is no object. Where so much of the colours of
@@ -168,43 +197,59 @@ def _grown(
     masks are right by it, and better than masks that were not doubted. None of that mends outlines
     that contradict each other under poses that something else speaks against, too.
     """
-    grown, flat = grow(views, seeds, within(progress, 0.0, ONCE)), False
-    if doubted_poses and contradict(grown):
+    grown, flat = grow_masks(views, seeds, subprogress(progress, 0.0, GROWN_ONCE_PROGRESS)), False
+    if doubted_poses and outlines_contradict(grown):
         return grown, []
-    if incomplete(grown) is not None:
-        again = within(progress, ONCE, TWICE, ", with what lies flat on the floor")
-        wider = grow(views, seeds, again, flat=True)
-        flat = doubt(wider) is None and incomplete(wider) is None
+    if incompleteness_reason(grown) is not None:
+        again = subprogress(
+            progress,
+            GROWN_ONCE_PROGRESS,
+            GROWN_TWICE_PROGRESS,
+            ", with what lies flat on the floor",
+        )
+        wider = grow_masks(views, seeds, again, flat=True)
+        flat = mask_doubt(wider) is None and incompleteness_reason(wider) is None
         grown = wider if flat else grown
-    said = [FLAT] if flat else []
+    said = [FLAT_TAKEN_STATEMENT] if flat else []
     if grown is not None and alone:
-        return grown, [*said, *_part(bordering(grown))]
-    last = within(progress, TWICE, THRICE, ", with what borders on it in other colours")
-    whole = grown and taken_in(views, seeds, grown, last, flat)
-    said = said if whole is grown else [*said, OTHER_COLOURS]
-    doubted = doubt(whole) is not None
-    if incomplete(whole) is not None and not doubted:
+        return grown, [*said, *_part_sentence(bordering_fraction(grown))]
+    last = subprogress(
+        progress,
+        GROWN_TWICE_PROGRESS,
+        GROWN_THRICE_PROGRESS,
+        ", with what borders on it in other colours",
+    )
+    whole = grown and merge_attachments(views, seeds, grown, last, flat)
+    said = said if whole is grown else [*said, OTHER_COLOURS_STATEMENT]
+    doubted = mask_doubt(whole) is not None
+    if incompleteness_reason(whole) is not None and not doubted:
         return whole, said
-    bad = doubted or lacking(whole) is not None
-    if whole is None or bad or whole.alike > unsure * ALIKE:
-        by_floor = within(progress, THRICE, 1.0, ", by what the floor shows at each place")
-        fitted = grow(views, seeds, by_floor, fitting=True)
-        if fitted is not None and _sound(fitted):
-            if whole is None or bad or _better(fitted, whole):
-                return fitted, [BY_FLOOR]
+    bad = doubted or lacking_attachment_reason(whole) is not None
+    if whole is None or bad or whole.alike > unsure * MAX_COLOUR_OVERLAP:
+        by_floor = subprogress(
+            progress, GROWN_THRICE_PROGRESS, 1.0, ", by what the floor shows at each place"
+        )
+        fitted = grow_masks(views, seeds, by_floor, fitting=True)
+        if fitted is not None and _is_sound(fitted):
+            if whole is None or bad or _is_better(fitted, whole):
+                return fitted, [BY_FLOOR_STATEMENT]
     return whole, said
 
 
-def _sound(grown: Grown) -> bool:
-    return doubt(grown) is None and incomplete(grown) is None and lacking(grown) is None
+def _is_sound(grown: RegionGrowingResult) -> bool:
+    return (
+        mask_doubt(grown) is None
+        and incompleteness_reason(grown) is None
+        and lacking_attachment_reason(grown) is None
+    )
 
 
-def _better(one: Grown, other: Grown) -> bool:
+def _is_better(one: RegionGrowingResult, other: RegionGrowingResult) -> bool:
     """Tell whether colours are told apart better, and masks agree better with their hull."""
     return one.alike < other.alike and one.coherence > other.coherence
 
 
-def _part(much: float) -> list[str]:
+def _part_sentence(much: float) -> list[str]:
     """Say that what was pointed at may be a part of something."""
     if not much:
         return []
@@ -214,21 +259,21 @@ def _part(much: float) -> list[str]:
     ]
 
 
-def _written(
-    source: Path, shown: Photographs, grown: Grown, folder: Path, progress: Progress
+def _write_masks(
+    source: Path, shown: PosedPhotos, grown: RegionGrowingResult, folder: Path, progress: Progress
 ) -> None:
-    shots = listed(source).shots
-    file_of = dict(zip((shot.name for shot in shots), file_names(shots), strict=True))
+    shots = list_posed_photos(source).shots
+    file_of = dict(zip((shot.name for shot in shots), mask_file_names(shots), strict=True))
     shot_of = {shot.name: shot for shot in shots}
-    with store.writing(folder):
+    with store.disk_errors(folder):
         for k, (name, inside) in enumerate(zip(shown.names, grown.inside, strict=True)):
-            progress(GROWN + (1 - GROWN) * k / len(shown.names), "writing masks")
-            own = in_own_pixels(inside, shot_of[name])
+            progress(GROWN_PROGRESS + (1 - GROWN_PROGRESS) * k / len(shown.names), "writing masks")
+            own = mask_in_photo_pixels(inside, shot_of[name])
             if own is not None:
                 write_mask(folder, file_of[name], own)
 
 
-def _told(grown: Grown, pointed: Pointed | None) -> str:
+def _mask_statements(grown: RegionGrowingResult, pointed: MaskPrompt | None) -> str:
     what = "what all cameras look at" if pointed is None else "what was pointed at"
     return (
         f"Masks were grown from colours and the visual hull of {what}; {grown.coherence:.0%} of "
@@ -236,40 +281,40 @@ def _told(grown: Grown, pointed: Pointed | None) -> str:
     )
 
 
-def _beside(grown: Grown, names: Sequence[str]) -> str:
+def _beside_sentence(grown: RegionGrowingResult, names: Sequence[str]) -> str:
     if (other := grown.beside) is None:
         return ""
     return (
         f"Something else stands on the floor beside it and was left out: about {other.as_large:.0%}"
         f" as large in the pictures, in {names[other.view]} at {other.across:.0%} of the width from"
-        f" the left and {other.down:.0%} of the height from the top. {HAVE_IT}"
+        f" the left and {other.down:.0%} of the height from the top. {PAINT_MASKS_HINT}"
     )
 
 
-def _changes(folder: Path) -> list[str]:
-    count = len(corrected(folder))
+def _corrections(folder: Path) -> list[str]:
+    count = len(edited_masks(folder))
     return [f"{count} of the masks were corrected by hand."] * bool(count)
 
 
-def lying_in(folder: Path | None) -> str:
+def describe_masks_in(folder: Path | None) -> str:
     """Say in a sentence where masks lie that were grown, for correction; "": there are none."""
     if folder is None:
         return ""
-    place = folder if (folder / MASKS[0]).is_dir() else _doubted(folder)
+    place = folder if (folder / MASK_FOLDERS[0]).is_dir() else _doubted_folder(folder)
     if place is None:
         return ""
     how = "" if place == folder else ", and not believed,"
     return (
-        f"Masks that were grown from colours{how} lie in {place / MASKS[0]}: look at them, correct "
+        f"Masks that were grown from colours{how} lie in {place / MASK_FOLDERS[0]}: look at them, correct "
         f"what is wrong, and give them with --masks {place}."
     )
 
 
-def _doubted(folder: Path) -> Path | None:
-    return folder / DOUBTED if (folder / DOUBTED / MASKS[0]).is_dir() else None
+def _doubted_folder(folder: Path) -> Path | None:
+    return folder / DOUBTED_FOLDER if (folder / DOUBTED_FOLDER / MASK_FOLDERS[0]).is_dir() else None
 
 
-def _forget(path: Path) -> None:
+def _remove_masks(path: Path) -> None:
     if path.is_dir():
         shutil.rmtree(path)
     else:

@@ -1,6 +1,6 @@
-"""Cut proposals: two sets of ways to cut a graph in two, ``Sweep`` and ``Tree``.
+"""Cut proposals: two sets of ways to cut a graph in two, ``SweepProposals`` and ``MergeTreeProposals``.
 
-``Sweep``: nodes sorted by a number, cut between each two. ``Tree``: nodes merged pair by pair, what
+``SweepProposals``: nodes sorted by a number, cut between each two. ``MergeTreeProposals``: nodes merged pair by pair, what
 holds best first, and each of what they merge into cut from the rest.
 """
 
@@ -11,12 +11,12 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-BY_SIZE = 0.5
+MERGE_SIZE_POWER = 0.5
 """Small objects merge sooner: their cost counts by this power of the smaller one's size."""
 
 
 @dataclass(frozen=True)
-class Graph:
+class PatchGraph:
     """M nodes, E weighted pairs."""
 
     first: Int[np.ndarray, " E"]
@@ -27,17 +27,17 @@ class Graph:
     size: Float[np.ndarray, " M"]
     appearance: Float[np.ndarray, "M C"]
 
-    def only(self, nodes: Int[np.ndarray, " m"]) -> "Graph":
+    def only(self, nodes: Int[np.ndarray, " m"]) -> "PatchGraph":
         """Return what some of the nodes make up, in their order."""
         number = np.full(len(self.size), -1)
         number[nodes] = np.arange(len(nodes))
         i, j = number[self.first], number[self.second]
         kept = (i >= 0) & (j >= 0)
         edges = i[kept], j[kept], self.weight[kept], self.whole[kept]
-        return Graph(*edges, self.size[nodes], self.appearance[nodes])
+        return PatchGraph(*edges, self.size[nodes], self.appearance[nodes])
 
 
-class Proposals(Protocol):
+class CutProposals(Protocol):
     """Candidates 0 … K - 1, each a set of nodes."""
 
     def sums(self, values: Float[np.ndarray, "M C"]) -> Float[np.ndarray, "K C"]:
@@ -53,10 +53,10 @@ class Proposals(Protocol):
         ...
 
 
-class Sweep:
+class SweepProposals:
     """Nodes in an order, cut between each two."""
 
-    def __init__(self, graph: Graph, order: Int[np.ndarray, " M"]) -> None:
+    def __init__(self, graph: PatchGraph, order: Int[np.ndarray, " M"]) -> None:
         self.order = order
         rank = np.empty(len(order), np.int64)
         rank[order] = np.arange(len(order))
@@ -80,7 +80,7 @@ class Sweep:
         return made
 
 
-class Tree:
+class MergeTreeProposals:
     """What nodes merge into, neighbours at the least cost first.
 
     cost = (1 - weight / whole) min(size_i, size_j)^½, the first factor being the mean over their
@@ -88,8 +88,8 @@ class Tree:
     2004, where small regions also merge sooner).
     """
 
-    def __init__(self, graph: Graph) -> None:
-        self.pairs, held = _merged(graph)
+    def __init__(self, graph: PatchGraph) -> None:
+        self.pairs, held = _merge_order(graph)
         self.leaves = len(graph.size)
         outward = np.bincount(graph.first, graph.weight, self.leaves)
         outward += np.bincount(graph.second, graph.weight, self.leaves)
@@ -122,7 +122,7 @@ class Tree:
         return total[self.leaves : -1]
 
 
-def _merged(graph: Graph) -> tuple[list[tuple[int, int]], list[float]]:
+def _merge_order(graph: PatchGraph) -> tuple[list[tuple[int, int]], list[float]]:
     """Return which two groups merge, one after the other, and the weight between them."""
     count = len(graph.size)
     size = [*graph.size.tolist(), *[0.0] * count]
@@ -133,7 +133,7 @@ def _merged(graph: Graph) -> tuple[list[tuple[int, int]], list[float]]:
 
     def entry(a: int, b: int) -> tuple[float, int, int]:
         weight, whole = near[a][b]
-        return (1 - weight / whole) * min(size[a], size[b]) ** BY_SIZE, a, b
+        return (1 - weight / whole) * min(size[a], size[b]) ** MERGE_SIZE_POWER, a, b
 
     heap = [entry(a, b) for a in range(count) for b in near[a] if a < b]
     heapq.heapify(heap)
@@ -143,7 +143,7 @@ def _merged(graph: Graph) -> tuple[list[tuple[int, int]], list[float]]:
         if a not in alive or b not in alive:
             continue
         held.append(near[a][b][0])
-        new = _join(near, a, b, count + len(pairs))
+        new = _join_groups(near, a, b, count + len(pairs))
         size[new] = size[a] + size[b]
         pairs.append((a, b))
         alive -= {a, b}
@@ -158,7 +158,7 @@ def _merged(graph: Graph) -> tuple[list[tuple[int, int]], list[float]]:
     return pairs, held
 
 
-def _join(near: list[dict[int, tuple[float, float]]], a: int, b: int, new: int) -> int:
+def _join_groups(near: list[dict[int, tuple[float, float]]], a: int, b: int, new: int) -> int:
     """Give two groups' neighbours to a new one."""
     more, less = (near[a], near[b]) if len(near[a]) >= len(near[b]) else (near[b], near[a])
     for other, (weight, whole) in less.items():

@@ -11,12 +11,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial.distance import pdist, squareform
 
-NOISE = -1
-Selection = Literal["mass", "leaf"]
+NOISE_LABEL = -1
+ClusterSelection = Literal["mass", "leaf"]
 
 
 @dataclass(frozen=True)
-class Dense:
+class DenseClusters:
     """Which point belongs to which cluster; N points."""
 
     cluster_of_point: Int[np.ndarray, " N"]
@@ -26,7 +26,7 @@ class Dense:
 
 
 @dataclass
-class _Tree:
+class _CondensedTree:
     """Clusters of the condensed tree, parents before children; the first is everything."""
 
     parent: list[int]
@@ -47,8 +47,8 @@ def hdbscan(
     points: Float[np.ndarray, "N D"],
     smallest: int = 20,
     samples: int = 5,
-    selection: Selection = "mass",
-) -> Dense:
+    selection: ClusterSelection = "mass",
+) -> DenseClusters:
     """Find dense clusters. Everything is never one cluster; where nothing parts, all is noise.
 
     Args:
@@ -60,13 +60,13 @@ def hdbscan(
 
     """
     if len(points) < 2:
-        return Dense(np.full(len(points), NOISE), np.zeros(len(points)))
-    tree = _condensed(_merges(points, samples), len(points), smallest)
-    chosen = _leaves(tree) if selection == "leaf" else _longest(tree)
-    return _labelled(tree, chosen)
+        return DenseClusters(np.full(len(points), NOISE_LABEL), np.zeros(len(points)))
+    tree = _condense_tree(_single_linkage(points, samples), len(points), smallest)
+    chosen = _leaf_clusters(tree) if selection == "leaf" else _clusters_of_most_mass(tree)
+    return _label_points(tree, chosen)
 
 
-def _merges(points: np.ndarray, samples: int) -> np.ndarray:
+def _single_linkage(points: np.ndarray, samples: int) -> np.ndarray:
     """Return the single-linkage merges of mutual reachability: two nodes, distance, size."""
     from scipy.cluster.hierarchy import linkage  # models are never divided by clusters
 
@@ -78,10 +78,10 @@ def _merges(points: np.ndarray, samples: int) -> np.ndarray:
     return linkage(squareform(reach, checks=False), "single")
 
 
-def _condensed(merges: np.ndarray, count: int, smallest: int) -> _Tree:
+def _condense_tree(merges: np.ndarray, count: int, smallest: int) -> _CondensedTree:
     """Walk the merges from the top: only splits into two large halves make clusters."""
-    members = _members(merges, count)
-    tree = _Tree([-1], [0.0], [0.0], np.zeros(count), np.zeros(count, np.int64))
+    members = _members_of_nodes(merges, count)
+    tree = _CondensedTree([-1], [0.0], [0.0], np.zeros(count), np.zeros(count, np.int64))
     at = [(len(members) - 1, 0)]
     while at:
         node, cluster = at.pop()
@@ -92,13 +92,15 @@ def _condensed(merges: np.ndarray, count: int, smallest: int) -> _Tree:
         large = [int(h) for h in halves if len(members[int(h)]) >= smallest]
         staying = len(members[large[0]]) if len(large) == 1 else 0
         tree.mass[cluster] += (len(members[node]) - staying) * (density - tree.birth[cluster])
-        rows = members[node] if not large else _other(members, halves, large)
+        rows = members[node] if not large else _small_half(members, halves, large)
         tree.left[rows], tree.last[rows] = density, cluster
-        at += [(h, _born(tree, cluster, density) if len(large) == 2 else cluster) for h in large]
+        at += [
+            (h, _add_cluster(tree, cluster, density) if len(large) == 2 else cluster) for h in large
+        ]
     return tree
 
 
-def _members(merges: np.ndarray, count: int) -> list[np.ndarray]:
+def _members_of_nodes(merges: np.ndarray, count: int) -> list[np.ndarray]:
     """Return the points below every node: slices of one order, in which each node is a run."""
     start, size = np.zeros(2 * count - 1, np.int64), np.ones(2 * count - 1, np.int64)
     size[count:] = merges[:, 3].astype(np.int64)
@@ -109,24 +111,24 @@ def _members(merges: np.ndarray, count: int) -> list[np.ndarray]:
     return [order[s : s + n] for s, n in zip(start, size, strict=True)]
 
 
-def _other(members: list[np.ndarray], halves: list[float], large: list[int]) -> np.ndarray:
+def _small_half(members: list[np.ndarray], halves: list[float], large: list[int]) -> np.ndarray:
     """Return the points of the half that is too small to go on; none where both are large."""
     rest = [members[int(h)] for h in halves if int(h) not in large]
     return np.concatenate(rest) if rest else np.zeros(0, np.int64)
 
 
-def _born(tree: _Tree, parent: int, density: float) -> int:
+def _add_cluster(tree: _CondensedTree, parent: int, density: float) -> int:
     tree.parent.append(parent)
     tree.birth.append(density)
     tree.mass.append(0.0)
     return len(tree.parent) - 1
 
 
-def _leaves(tree: _Tree) -> list[int]:
+def _leaf_clusters(tree: _CondensedTree) -> list[int]:
     return sorted(set(range(1, len(tree.parent))) - set(tree.parent))
 
 
-def _longest(tree: _Tree) -> list[int]:
+def _clusters_of_most_mass(tree: _CondensedTree) -> list[int]:
     """Choose clusters, none inside another, with the most excess of mass in sum."""
     best, chosen = list(tree.mass), {k: [k] for k in range(len(tree.parent))}
     for k in range(len(tree.parent) - 1, -1, -1):
@@ -138,15 +140,15 @@ def _longest(tree: _Tree) -> list[int]:
     return sorted(set(chosen[0]) - {0})
 
 
-def _labelled(tree: _Tree, chosen: list[int]) -> Dense:
+def _label_points(tree: _CondensedTree, chosen: list[int]) -> DenseClusters:
     """Give each point the chosen cluster that it was last in, or was in above its last."""
-    number = np.full(len(tree.parent), NOISE)
+    number = np.full(len(tree.parent), NOISE_LABEL)
     for k in range(len(tree.parent)):
-        inherited = number[tree.parent[k]] if k else NOISE
+        inherited = number[tree.parent[k]] if k else NOISE_LABEL
         number[k] = chosen.index(k) if k in chosen else inherited
     cluster = number[tree.last]
     strength = np.zeros(len(cluster))
     for k in range(len(chosen)):
         own = cluster == k
         strength[own] = tree.left[own] / tree.left[own].max()
-    return Dense(cluster, strength)
+    return DenseClusters(cluster, strength)

@@ -5,38 +5,42 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import Cloud
-from corporeal.io.photographs import NO_INSTANCES
-from corporeal.reconstruction.segment.masks import renumbered
-from corporeal.reconstruction.segment.objects import (
-    DEFAULT,
-    MOST,
-    TOUCHING_IS_ONE,
-    Split,
-    components,
-    objects,
+from corporeal.core.types import FeatureCloud
+from corporeal.io.photos.posed_photos import NO_INSTANCES_MESSAGE
+from corporeal.reconstruction.segment.instance_masks import renumber_labels
+from corporeal.reconstruction.segment.object_segmentation import (
+    DEFAULT_OBJECT_SEGMENTATION,
+    MAX_OBJECTS,
+    TOUCHING_IS_ONE_CONFIG,
+    ObjectSegmentation,
+    nearest_neighbour_components,
+    segment_objects,
 )
-from corporeal.reconstruction.segment.rule import Rule
-from corporeal.reconstruction.segment.space import Space
+from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
+from corporeal.reconstruction.segment.space_pieces import SpacePieces
 
-SAME = 0.9
+MIN_SAME_NUMBER_FRACTION = 0.9
 """Share of what views say of points that must be one number each, for numbers to mean the same in
 all views; two objects numbered at random in each view give 0.6."""
-CRUMB = 0.003
+MIN_OBJECT_POINTS_FRACTION = 0.003
 """Share of the points below which what masks or neighbours separate is no object."""
-PUBLISHED = "the connected components of each point's 20 nearest, as published: a control"
-NUMBERED = "instance masks, whose numbers mean the same in all pictures"
-MATCHED = "instance masks, matched from picture to picture by the points that they share"
+FOUND_BY_PUBLISHED_RULE = (
+    "the connected components of each point's 20 nearest, as published: a control"
+)
+FOUND_BY_NUMBERS = "instance masks, whose numbers mean the same in all pictures"
+FOUND_BY_MATCHED_MASKS = (
+    "instance masks, matched from picture to picture by the points that they share"
+)
 
 
 def assign_instances(
-    cloud: Cloud,
-    rule: Rule = "auto",
+    cloud: FeatureCloud,
+    rule: SegmentationRule = "auto",
     count: int | None = None,
     normals: Float[np.ndarray, "N 3"] | None = None,
     masks: Int[np.ndarray, "V N"] | None = None,
-    space: Space | None = None,
-) -> Split:
+    space: SpacePieces | None = None,
+) -> ObjectSegmentation:
     """Segment objects.
 
     Args:
@@ -54,22 +58,22 @@ def assign_instances(
 
     """
     if rule == "components":
-        return _by_neighbours(cloud, count)
+        return _assign_by_neighbours(cloud, count)
     if rule == "masks" and masks is None:
-        raise UserError(NO_INSTANCES)
+        raise UserError(NO_INSTANCES_MESSAGE)
     pieces = None if space is None else space.piece_of_point
     if masks is None or rule == "look":
         whole = space is not None and space.alone and rule == "auto"
-        config = TOUCHING_IS_ONE if whole else DEFAULT
-        return objects(cloud, count, normals, config=config, piece_of_point=pieces)
-    named = by_numbers(cloud, masks, count, NUMBERED)
-    named = named or by_numbers(cloud, renumbered(masks), count, MATCHED)
-    return named or _by_masks(cloud, masks, count, normals, pieces)
+        config = TOUCHING_IS_ONE_CONFIG if whole else DEFAULT_OBJECT_SEGMENTATION
+        return segment_objects(cloud, count, normals, config=config, piece_of_point=pieces)
+    named = assign_by_numbers(cloud, masks, count, FOUND_BY_NUMBERS)
+    named = named or assign_by_numbers(cloud, renumber_labels(masks), count, FOUND_BY_MATCHED_MASKS)
+    return named or _assign_by_masks(cloud, masks, count, normals, pieces)
 
 
-def by_numbers(
-    cloud: Cloud, masks: Int[np.ndarray, "V N"], count: int | None, found_by: str
-) -> Split | None:
+def assign_by_numbers(
+    cloud: FeatureCloud, masks: Int[np.ndarray, "V N"], count: int | None, found_by: str
+) -> ObjectSegmentation | None:
     """Give each point the number that most views give it; None: numbers differ between views.
 
     What no view says anything of goes with the nearest that some view does.
@@ -87,37 +91,43 @@ def by_numbers(
         votes[np.arange(cloud.count), view] += 1
     votes = votes[:, known >= 0]
     best, total = votes.max(axis=1, initial=0), votes.sum(axis=1)
-    if not total.any() or best.sum() < SAME * total.sum():
+    if not total.any() or best.sum() < MIN_SAME_NUMBER_FRACTION * total.sum():
         return None
     sure = np.where(total > 0, best / np.maximum(total, 1), 0.0)
     owner = _without_crumbs(cloud, np.where(total > 0, votes.argmax(axis=1), -1))
-    return Split(owner, sure, tuple(_otherwise(count, owner, "instance masks")), found_by)
+    return ObjectSegmentation(
+        owner, sure, tuple(_other_count_warnings(count, owner, "instance masks")), found_by
+    )
 
 
-def _by_masks(
-    cloud: Cloud,
+def _assign_by_masks(
+    cloud: FeatureCloud,
     masks: Int[np.ndarray, "V N"],
     count: int | None,
     normals: Float[np.ndarray, "N 3"] | None,
     pieces: Int[np.ndarray, " N"] | None,
-) -> Split:
+) -> ObjectSegmentation:
     """Let masks whose numbers differ from view to view say where patches hold together."""
     seen = max((len(np.unique(view[view >= 0])) for view in masks), default=0)
-    most = min(seen, MOST, cloud.count) or None
-    return objects(cloud, count or most, normals, masks, piece_of_point=pieces)
+    most = min(seen, MAX_OBJECTS, cloud.count) or None
+    return segment_objects(cloud, count or most, normals, masks, piece_of_point=pieces)
 
 
-def _by_neighbours(cloud: Cloud, count: int | None) -> Split:
-    owner = _without_crumbs(cloud, components(cloud.position))
-    doubts = tuple(_otherwise(count, owner, "nearest neighbours"))
-    return Split(owner, np.ones(cloud.count), doubts, PUBLISHED)
+def _assign_by_neighbours(cloud: FeatureCloud, count: int | None) -> ObjectSegmentation:
+    owner = _without_crumbs(cloud, nearest_neighbour_components(cloud.position))
+    doubts = tuple(_other_count_warnings(count, owner, "nearest neighbours"))
+    return ObjectSegmentation(owner, np.ones(cloud.count), doubts, FOUND_BY_PUBLISHED_RULE)
 
 
-def _without_crumbs(cloud: Cloud, number: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+def _without_crumbs(cloud: FeatureCloud, number: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
     """Return objects from 0, what has most points first; crumbs and -1 go with what is nearest."""
     known, index, sizes = np.unique(number, return_inverse=True, return_counts=True)
     sizes = np.where(known < 0, 0, sizes)
-    kept = [k for k in np.argsort(-sizes, kind="stable") if sizes[k] >= CRUMB * cloud.count]
+    kept = [
+        k
+        for k in np.argsort(-sizes, kind="stable")
+        if sizes[k] >= MIN_OBJECT_POINTS_FRACTION * cloud.count
+    ]
     rank = np.full(len(known), -1, np.int64)
     rank[kept] = np.arange(len(kept))
     owner = rank[index]
@@ -128,7 +138,7 @@ def _without_crumbs(cloud: Cloud, number: Int[np.ndarray, " N"]) -> Int[np.ndarr
     return owner
 
 
-def _otherwise(count: int | None, owner: Int[np.ndarray, " N"], who: str) -> list[str]:
+def _other_count_warnings(count: int | None, owner: Int[np.ndarray, " N"], who: str) -> list[str]:
     found = int(owner.max()) + 1
     if count is None or count == found:
         return []

@@ -10,15 +10,15 @@ from jaxtyping import Float, Int
 from numba import njit
 from scipy.spatial import KDTree
 
-ROUNDS = 5
+ASSIGNMENT_ITERATIONS = 5
 """Of assigning points to patches and moving patches to their points."""
-CANDIDATES = 8
+CANDIDATE_PATCHES = 8
 """Patches that a point may go to: those that began nearest to it."""
-HALVINGS = 24
+WIDTH_BISECTION_STEPS = 24
 """Of the interval in which the grid's width is looked for."""
-NEARLY = 0.9
+MIN_COUNT_FRACTION = 0.9
 """This share of the patches asked for is enough."""
-ALIKE = 0.3
+APPEARANCE_SCALE = 0.3
 """Difference of appearance that counts as much as one patch's width."""
 
 
@@ -26,7 +26,7 @@ def superpoints(
     position: Float[np.ndarray, "N 3"],
     appearance: Float[np.ndarray, "N D"] | None,
     count: int = 2000,
-    alike: float = ALIKE,
+    alike: float = APPEARANCE_SCALE,
 ) -> Int[np.ndarray, " N"]:
     """Return each point's patch, 0 … M - 1; M is about ``count``, and no more than N.
 
@@ -42,25 +42,25 @@ def superpoints(
 
     """
     place = np.asarray(position, np.float64)
-    first, width = _cells(place, count)
+    first, width = _grid_cells(place, count)
     z = (place - place.mean(axis=0)) / width
     if appearance is not None:
         z = np.concatenate([z, np.asarray(appearance, np.float64) / alike], axis=1)
     z = z.astype(np.float32)
     patches = int(first.max()) + 1
-    near = min(CANDIDATES, patches)
+    near = min(CANDIDATE_PATCHES, patches)
     _, candidates = KDTree(_means(place, first, patches)).query(place, k=near, workers=-1)
     candidates = np.asarray(candidates, np.int64).reshape(-1, near)
     patch = first
-    for _ in range(ROUNDS):
-        moved = _nearest(z, candidates, _means(z, patch, patches))
+    for _ in range(ASSIGNMENT_ITERATIONS):
+        moved = _nearest_candidate(z, candidates, _means(z, patch, patches))
         if np.array_equal(moved, patch):
             break
         patch = moved
     return np.unique(patch, return_inverse=True)[1].reshape(-1)
 
 
-def _cells(place: np.ndarray, count: int) -> tuple[np.ndarray, float]:
+def _grid_cells(place: np.ndarray, count: int) -> tuple[np.ndarray, float]:
     """Return each point's cell of a grid with about so many cells, and the cells' width.
 
     Only cells that hold points count.
@@ -70,21 +70,21 @@ def _cells(place: np.ndarray, count: int) -> tuple[np.ndarray, float]:
         return np.zeros(len(place), np.int64), extent or 1.0
     wanted = min(count, len(place))
     fine, coarse = extent / (4.0 * count), 2 * extent
-    cell = _grid(place, coarse)
-    for _ in range(HALVINGS):
+    cell = _cells_of_width(place, coarse)
+    for _ in range(WIDTH_BISECTION_STEPS):
         width = float(np.sqrt(fine * coarse))
-        tried = _grid(place, width)
+        tried = _cells_of_width(place, width)
         made = int(tried.max()) + 1
         if made > count:
             fine = width
             continue
         cell, coarse = tried, width
-        if made >= NEARLY * wanted:
+        if made >= MIN_COUNT_FRACTION * wanted:
             break
     return cell, coarse
 
 
-def _grid(place: np.ndarray, width: float) -> np.ndarray:
+def _cells_of_width(place: np.ndarray, width: float) -> np.ndarray:
     cell = np.floor((place - place.min(axis=0)) / width).astype(np.int64)
     flat = np.ravel_multi_index(tuple(cell.T), tuple(cell.max(axis=0) + 1))
     return np.unique(flat, return_inverse=True)[1].reshape(-1)
@@ -99,7 +99,7 @@ def _means(rows: np.ndarray, patch: np.ndarray, count: int) -> np.ndarray:
 
 
 @njit(cache=True)
-def _nearest(z, candidates, means):  # pragma: no cover (compiled)
+def _nearest_candidate(z, candidates, means):  # pragma: no cover (compiled)
     count, near = candidates.shape
     found = np.empty(count, np.int64)
     for i in range(count):

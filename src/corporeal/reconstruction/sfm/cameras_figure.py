@@ -4,18 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.core.store import writing
-from corporeal.io.photographs import Photographs
-from corporeal.multiview.level import level
-from corporeal.multiview.region import region
+from corporeal.core.store import disk_errors
+from corporeal.io.photos.posed_photos import PosedPhotos
+from corporeal.multiview.up_direction import estimate_up_direction
+from corporeal.multiview.viewed_region import find_viewed_region
 
-MOST = 20_000
+MAX_DRAWN_POINTS = 20_000
 """Points that are drawn."""
-REACH = 3.0
+DRAWN_RADII = 3.0
 """Radii of the cameras' places within which points are drawn."""
 
 
-def cameras_figure(seen: Photographs, path: Path) -> None:
+def cameras_figure(seen: PosedPhotos, path: Path) -> None:
     """Draw where photographs were taken from.
 
     Args:
@@ -27,24 +27,24 @@ def cameras_figure(seen: Photographs, path: Path) -> None:
     from matplotlib.figure import Figure
 
     cameras = seen.views.cameras
-    up = level(cameras).up
+    up = estimate_up_direction(cameras).up
     across = np.cross(up, np.eye(3)[np.abs(up).argmin()])
     across /= np.linalg.norm(across)
     frame = np.stack([across, np.cross(up, across), up])
-    centre = np.array(region(cameras).centre)
+    centre = np.array(find_viewed_region(cameras).centre)
     eyes = (np.stack([c.world_from_camera[:3, 3] for c in cameras]) - centre) @ frame.T
     ahead = np.stack([c.world_from_camera[:3, 2] for c in cameras]) @ frame.T
-    reach = REACH * float(np.linalg.norm(eyes, axis=1).mean())
+    reach = DRAWN_RADII * float(np.linalg.norm(eyes, axis=1).mean())
     points = np.zeros((0, 3)) if seen.points is None else (seen.points - centre) @ frame.T
     colours = np.zeros((0, 3)) if seen.colours is None else seen.colours / 255
     near = np.flatnonzero(np.linalg.norm(points, axis=1) < reach)
-    near = near[:: max(1, len(near) // MOST)]
+    near = near[:: max(1, len(near) // MAX_DRAWN_POINTS)]
     figure = Figure(figsize=(10, 5), layout="constrained")
     FigureCanvasAgg(figure)
     for place, (x, y, title) in enumerate(((0, 1, "from above"), (0, 2, "from the side"))):
         axes = figure.add_subplot(1, 2, place + 1)
         axes.scatter(points[near, x], points[near, y], s=1, c=colours[near], linewidths=0)
-        arrows = 0.15 * reach / REACH * ahead
+        arrows = 0.15 * reach / DRAWN_RADII * ahead
         axes.quiver(
             eyes[:, x], eyes[:, y], arrows[:, x], arrows[:, y],
             angles="xy", scale_units="xy", scale=1, width=0.004, color="#c0392b",
@@ -53,5 +53,5 @@ def cameras_figure(seen: Photographs, path: Path) -> None:
         axes.set_title(f"{len(cameras)} photographs {title}")
         axes.set_aspect("equal")
         axes.set_axis_off()
-    with writing(path):
+    with disk_errors(path):
         figure.savefig(path, dpi=110)

@@ -13,27 +13,29 @@ from jaxtyping import Bool, Float
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-EXACT = 0.0025
+MAX_POINT_SHIFT_FRACTION = 0.0025
 """Median distance of points after a similarity, in the longer side of pictures, up to which two
 were taken from one place: compression and noise move points by less."""
-MOST = 0.8
+MIN_EXPLAINED_PAIRS_FRACTION = 0.8
 """Share of the pairs of pictures with points in common that one place explains, from which on all
 were taken there. Of bursts on a way around a thing few pairs are of one burst."""
-FEWEST = 10
+MIN_PAIRS = 10
 """Pairs without which nothing is said."""
-HALF = 0.5
+MIN_PICTURES_FRACTION = 0.5
 """Of all pictures that must be of that place."""
-ROUNDS = 3
+REFIT_ROUNDS = 3
 """Of fitting again to the half that agrees best."""
-FOCALS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.7, 2.0, 2.5, 3.0)
+TRIED_FOCAL_RATIOS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.7, 2.0, 2.5, 3.0)
 """Focal lengths that are tried, in the longer side: the right one is not known."""
-SAMPLED = 200
+FOCAL_SAMPLE_PAIRS = 200
 """Pairs by which one of them is chosen for all."""
-Pair = tuple[Float[np.ndarray, "M 2"], Float[np.ndarray, "M 2"]]
+PointPair = tuple[Float[np.ndarray, "M 2"], Float[np.ndarray, "M 2"]]
 """Points of one picture and the same of another, from the middle of each, in its longer side."""
 
 
-def same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int) -> bool:
+def is_same_viewpoint(
+    a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int
+) -> bool:
     """Tell whether a shift, a turn and a scale take points of one picture to those of another.
 
     Args:
@@ -44,7 +46,7 @@ def same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], lon
     """
     x, y = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
     kept, off = np.ones(len(x), bool), np.zeros(len(x))
-    for _ in range(ROUNDS):
+    for _ in range(REFIT_ROUNDS):
         middle = x[kept].mean(), y[kept].mean()
         spread = float(np.square(np.abs(x[kept] - middle[0])).sum())
         if spread == 0:
@@ -52,23 +54,30 @@ def same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], lon
         turn = (np.conj(x[kept] - middle[0]) * (y[kept] - middle[1])).sum() / spread
         off = np.abs(turn * (x - middle[0]) + middle[1] - y)
         kept = off <= np.median(off)
-    return float(np.median(off)) < EXACT * longest
+    return float(np.median(off)) < MAX_POINT_SHIFT_FRACTION * longest
 
 
-def turned(pairs: Sequence[Pair]) -> Bool[np.ndarray, " P"]:
+def pairs_of_rotation(pairs: Sequence[PointPair]) -> Bool[np.ndarray, " P"]:
     """Tell which pairs a rotation of one camera explains, whose focal length explains the most."""
-    some = pairs[:: max(1, len(pairs) // SAMPLED)]
-    counts = [sum(_off_turned(a, b, focal) < EXACT for a, b in some) for focal in FOCALS]
-    focal = FOCALS[int(np.argmax(counts))]
-    return np.array([_off_turned(a, b, focal) < EXACT for a, b in pairs], bool)
+    some = pairs[:: max(1, len(pairs) // FOCAL_SAMPLE_PAIRS)]
+    counts = [
+        sum(_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in some)
+        for focal in TRIED_FOCAL_RATIOS
+    ]
+    focal = TRIED_FOCAL_RATIOS[int(np.argmax(counts))]
+    return np.array(
+        [_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in pairs], bool
+    )
 
 
-def _off_turned(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], focal: float) -> float:
+def _rotation_error(
+    a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], focal: float
+) -> float:
     """Return the median distance after the best rotation, in the longer side."""
     x, y = (np.c_[points / focal, np.ones(len(points))] for points in (a, b))
     x, y = (rays / np.linalg.norm(rays, axis=1, keepdims=True) for rays in (x, y))
     kept, off = np.ones(len(x), bool), np.zeros(len(x))
-    for _ in range(ROUNDS):
+    for _ in range(REFIT_ROUNDS):
         left, _, right = np.linalg.svd(y[kept].T @ x[kept])  # Kabsch 1976
         proper = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
         off = focal * np.linalg.norm(y - x @ (left @ proper @ right).T, axis=1)
@@ -76,7 +85,7 @@ def _off_turned(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], focal:
     return float(np.median(off))
 
 
-def stood_still(
+def describe_one_viewpoint(
     joined: Bool[np.ndarray, "N N"],
     same: Bool[np.ndarray, "N N"],
     by: str = "a shift, a turn and a scale alone",
@@ -90,10 +99,10 @@ def stood_still(
 
     """
     pairs, alike = (int(np.triu(which, 1).sum()) for which in (joined, joined & same))
-    if pairs < FEWEST or alike < MOST * pairs:
+    if pairs < MIN_PAIRS or alike < MIN_EXPLAINED_PAIRS_FRACTION * pairs:
         return None
     _, label = connected_components(csr_array(joined & same), directed=False)
     together = int(np.bincount(label).max())
-    if together < HALF * len(joined):
+    if together < MIN_PICTURES_FRACTION * len(joined):
         return None
     return f"{together} of {len(joined)} were taken from one place: what they share differs by {by}"

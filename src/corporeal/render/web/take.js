@@ -1,4 +1,4 @@
-// A take (render/take.py): header, arrays, and where every vertex is in every frame. Knows no WebGL.
+// A take (render/recording_format.py): header, arrays, and where every vertex is in every frame. Knows no WebGL.
 
 const KINDS = {f4: Float32Array, u4: Uint32Array, u2: Uint16Array, i2: Int16Array, i1: Int8Array, u1: Uint8Array}
 const SIGNED = 127 // octahedral normals

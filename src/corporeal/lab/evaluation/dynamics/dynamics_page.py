@@ -5,18 +5,18 @@ from tempfile import TemporaryDirectory
 
 from corporeal.core import store
 from corporeal.lab.evaluation.dynamics import dynamics_figure
+from corporeal.lab.evaluation.dynamics.compared_methods import METHOD_WORDS
+from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary
 from corporeal.lab.evaluation.dynamics.dynamics_tables import (
-    as_markdown,
+    dynamics_tables,
+    markdown_table,
     missing_references,
-    tables,
-    verdicts,
+    ranking_sentences,
 )
-from corporeal.lab.evaluation.dynamics.methods import WORDS
-from corporeal.lab.evaluation.dynamics.summary import Summary
-from corporeal.lab.evaluation.result_table import Table
-from corporeal.render.page import inlined, page, safe
+from corporeal.lab.evaluation.result_table import ResultTable
+from corporeal.render.html_page import data_url_of_file, escape_html, fill_page
 
-COLUMNS = {
+COLUMN_EXPLANATIONS = {
     "expected": "expectations of the showcase that are met; none is in a run that gained energy.",
     "path": (
         "distance of the centres of mass from the reference's until .2 s after an object's first "
@@ -35,7 +35,7 @@ COLUMNS = {
     ),
     "mean distance": "of the restitution from its published range.",
 }
-RULE = (
+RANKING_RULE = (
     "Columns are expectations, audit, path, contacts and separation; ours is first where no "
     "baseline that was run is better in more of them than it is worse. What is better than ours is "
     "named. Means are over the scenes that a method was run in: compare them only where these are "
@@ -43,7 +43,7 @@ RULE = (
 )
 
 
-def write_page(found: Summary, path: Path) -> None:
+def write_dynamics_page(found: DynamicsSummary, path: Path) -> None:
     """Write a page that holds all it shows.
 
     Raises:
@@ -52,47 +52,50 @@ def write_page(found: Summary, path: Path) -> None:
     """
     with TemporaryDirectory() as folder:
         drawing = Path(folder) / "figure.png"
-        dynamics_figure.draw(found, drawing)
-        figure = inlined(drawing)
-    missing = "".join(f'<p class="warn">{safe(s)}</p>' for s in missing_references(found))
-    text = page(
+        dynamics_figure.draw_dynamics(found, drawing)
+        figure = data_url_of_file(drawing)
+    missing = "".join(f'<p class="warn">{escape_html(s)}</p>' for s in missing_references(found))
+    text = fill_page(
         "corporeal.lab.evaluation.dynamics",
         "dynamics.html",
-        summary=safe(summed(found)),
-        rule=safe(RULE),
-        verdicts="".join(f"<li>{safe(s)}</li>" for s in verdicts(found)),
+        summary=escape_html(summary_sentence(found)),
+        rule=escape_html(RANKING_RULE),
+        verdicts="".join(f"<li>{escape_html(s)}</li>" for s in ranking_sentences(found)),
         missing=missing,
         figure=figure,
-        tables="".join(_html(t) for t in tables(found) if t.rows),
-        columns="".join(f"<dt>{safe(k)}</dt><dd>{safe(v)}</dd>" for k, v in COLUMNS.items()),
-        notes="".join(f"<li>{safe(s)}</li>" for s in borrowed(found)),
+        tables="".join(_html(t) for t in dynamics_tables(found) if t.rows),
+        columns="".join(
+            f"<dt>{escape_html(k)}</dt><dd>{escape_html(v)}</dd>"
+            for k, v in COLUMN_EXPLANATIONS.items()
+        ),
+        notes="".join(f"<li>{escape_html(s)}</li>" for s in borrowed_numbers(found)),
     )
     store.write_bytes(path, text.encode())
 
 
-def summed(found: Summary) -> str:
+def summary_sentence(found: DynamicsSummary) -> str:
     """Say in a sentence what was compared."""
     run = [r for r in found.rows if r.numbers is not None]
     failed = sum(r.error.startswith("failed") for r in found.rows)
     scenes = len({r.scene for r in found.rows})
-    said = "; ".join(f"{m}: {WORDS[m]}" for m in found.methods)
+    said = "; ".join(f"{m}: {METHOD_WORDS[m]}" for m in found.methods)
     return (
         f"{len(run)} of {len(found.rows)} runs of {scenes} scenes at {found.detail} are done, "
-        f"{failed} failed, against ours at {found.reference}. {said}.{_older(found)}"
+        f"{failed} failed, against ours at {found.reference}. {said}.{_outdated_runs(found)}"
     )
 
 
-def _older(found: Summary) -> str:
+def _outdated_runs(found: DynamicsSummary) -> str:
     """Say how many runs the present code has not made; a finished run is kept when it changes."""
     numbers = [r.numbers for r in (*found.rows, *found.references) if r.numbers is not None]
-    older = sum(n.source != store.source() for n in numbers)
+    older = sum(n.source != store.source_digest() for n in numbers)
     if not older:
         return ""
     which = f"{older} of {len(numbers)} runs, references included,"
     return f" {which} were made by an earlier state of the code."
 
 
-def borrowed(found: Summary) -> list[str]:
+def borrowed_numbers(found: DynamicsSummary) -> list[str]:
     """Say which numbers of which method are ours, each sentence once."""
     said = [
         f"{row.method}: {note}" for row in found.rows if row.numbers for note in row.numbers.notes
@@ -100,17 +103,15 @@ def borrowed(found: Summary) -> list[str]:
     return list(dict.fromkeys(said)) or ["Nothing: no method brought numbers of its own."]
 
 
-def _html(table: Table) -> str:
-    heads = "".join(f"<th>{safe(h)}</th>" for h in table.heads)
+def _html(table: ResultTable) -> str:
+    heads = "".join(f"<th>{escape_html(h)}</th>" for h in table.heads)
     rows = "".join(
-        f"<tr>{''.join(f'<td>{safe(cell)}</td>' for cell in row)}</tr>" for row in table.rows
+        f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows
     )
-    return (
-        f'<h2>{safe(table.title)}</h2><div class="wide"><table><tr>{heads}</tr>{rows}</table></div>'
-    )
+    return f'<h2>{escape_html(table.title)}</h2><div class="wide"><table><tr>{heads}</tr>{rows}</table></div>'
 
 
-def write_docs(found: Summary, command: str, path: Path) -> None:
+def write_dynamics_docs(found: DynamicsSummary, command: str, path: Path) -> None:
     """Write the measured rows as a page of the documentation; what was not run is left out.
 
     Args:
@@ -119,14 +120,24 @@ def write_docs(found: Summary, command: str, path: Path) -> None:
         path: Of the page (Markdown).
 
     """
-    lines = ["# Dynamics against baselines", "", f"Written by `{command}`. {summed(found)}", ""]
-    lines += [RULE, "", *(f"- {s}" for s in verdicts(found)), ""]
+    lines = [
+        "# Dynamics against baselines",
+        "",
+        f"Written by `{command}`. {summary_sentence(found)}",
+        "",
+    ]
+    lines += [RANKING_RULE, "", *(f"- {s}" for s in ranking_sentences(found)), ""]
     lines += [f"- {s}" for s in missing_references(found)] + [""]
     done = {(r.scene, r.method) for r in found.rows if r.numbers or r.error.startswith("failed")}
-    for table in tables(found):
+    for table in dynamics_tables(found):
         rows = [r for r in table.rows if table.heads[0] != "scene" or (r[0], r[1]) in done]
         if rows:
-            text = as_markdown(Table(table.title, table.heads, rows))
+            text = markdown_table(ResultTable(table.title, table.heads, rows))
             lines += [f"## {table.title}", "", text, ""]
-    lines += ["## What the columns are", "", *(f"- **{k}**: {v}" for k, v in COLUMNS.items()), ""]
+    lines += [
+        "## What the columns are",
+        "",
+        *(f"- **{k}**: {v}" for k, v in COLUMN_EXPLANATIONS.items()),
+        "",
+    ]
     store.write_bytes(path, "\n".join(lines).encode())

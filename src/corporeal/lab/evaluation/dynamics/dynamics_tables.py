@@ -2,51 +2,62 @@
 
 from collections.abc import Sequence
 
-from corporeal.lab.evaluation.dynamics.first_place import Row
-from corporeal.lab.evaluation.dynamics.places import OURS
-from corporeal.lab.evaluation.dynamics.summary import Mean, Summary
-from corporeal.lab.evaluation.result_table import Table
+from corporeal.lab.evaluation.dynamics.dynamics_folders import OURS_NAME
+from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary, MethodMean
+from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult
+from corporeal.lab.evaluation.result_table import ResultTable
 
-NONE = "–"
-HEADS = ("scene", "method", "expected", "path", "contacts", "parted", "audit")
-MEAN_HEADS = ("method", "scenes", "expected", "clean", "path", "contacts", "Δt [ms]", "parted")
-MEAN_HEADS = (*MEAN_HEADS, "shape", "rebound")
+NO_VALUE = "–"
+SCENE_HEADS = ("scene", "method", "expected", "path", "contacts", "parted", "audit")
+MEAN_TABLE_HEADS = (
+    "method",
+    "scenes",
+    "expected",
+    "clean",
+    "path",
+    "contacts",
+    "Δt [ms]",
+    "parted",
+)
+MEAN_TABLE_HEADS = (*MEAN_TABLE_HEADS, "shape", "rebound")
 
 
-def tables(found: Summary) -> list[Table]:
+def dynamics_tables(found: DynamicsSummary) -> list[ResultTable]:
     """Return all tables of an evaluation."""
     return [scene_table(found), *group_tables(found), rank_table(found), life_table(found)]
 
 
-def scene_table(found: Summary) -> Table:
+def scene_table(found: DynamicsSummary) -> ResultTable:
     """Return one row per scene and method."""
-    rows = [_cells(row, found.row(row.scene, OURS)) for row in found.rows]
-    return Table(f"Scenes at {found.detail}, against ours at {found.reference}", HEADS, rows)
+    rows = [_cells(row, found.row(row.scene, OURS_NAME)) for row in found.rows]
+    return ResultTable(
+        f"Scenes at {found.detail}, against ours at {found.reference}", SCENE_HEADS, rows
+    )
 
 
-def _cells(row: Row, ours: Row) -> tuple[str, ...]:
+def _cells(row: MethodResult, ours: MethodResult) -> tuple[str, ...]:
     if row.numbers is None:
-        return (row.scene, row.method, *(NONE,) * 4, row.error)
+        return (row.scene, row.method, *(NO_VALUE,) * 4, row.error)
     count = len(row.numbers.expectations)
-    expected = f"{row.met} of {count}" if count else NONE
+    expected = f"{row.met} of {count}" if count else NO_VALUE
     audit = row.error or ("clean" if row.clean else row.numbers.faults[0])
     if row.against is None:
-        return (row.scene, row.method, expected, NONE, NONE, NONE, audit)
+        return (row.scene, row.method, expected, NO_VALUE, NO_VALUE, NO_VALUE, audit)
     path = f"{row.against.path:.2f}"
     yardstick = ours.against
-    if row.method != OURS and yardstick is not None and row.against.path <= yardstick.path:
+    if row.method != OURS_NAME and yardstick is not None and row.against.path <= yardstick.path:
         path = f"= ({path})"
-    contacts, parted = f"{row.against.contacts:.2f}", number(row.against.parted)
+    contacts, parted = f"{row.against.contacts:.2f}", number_text(row.against.parted)
     return (row.scene, row.method, expected, path, contacts, parted, audit)
 
 
-def group_tables(found: Summary) -> list[Table]:
+def group_tables(found: DynamicsSummary) -> list[ResultTable]:
     """Return means of all scenes, and per material class and law."""
     titles = {"all": "All scenes", "material class": "By material class", "law": "By law"}
     return [
-        Table(
+        ResultTable(
             titles[kind],
-            MEAN_HEADS if kind == "all" else (kind, *MEAN_HEADS),
+            MEAN_TABLE_HEADS if kind == "all" else (kind, *MEAN_TABLE_HEADS),
             [
                 mean_cells(m) if kind == "all" else (m.group, *mean_cells(m))
                 for m in means
@@ -57,51 +68,51 @@ def group_tables(found: Summary) -> list[Table]:
     ]
 
 
-def mean_cells(mean: Mean) -> tuple[str, ...]:
+def mean_cells(mean: MethodMean) -> tuple[str, ...]:
     """Return one line of means as text."""
     return (
         mean.method,
         str(mean.scenes),
-        share(mean.met),
-        share(mean.clean) if mean.scenes else NONE,
-        number(mean.path),
-        number(mean.contacts),
-        NONE if mean.delay is None else f"{1e3 * mean.delay:.0f}",
-        number(mean.parted),
-        number(mean.shape),
-        number(mean.rebound),
+        percent_text(mean.met),
+        percent_text(mean.clean) if mean.scenes else NO_VALUE,
+        number_text(mean.path),
+        number_text(mean.contacts),
+        NO_VALUE if mean.delay is None else f"{1e3 * mean.delay:.0f}",
+        number_text(mean.parted),
+        number_text(mean.shape),
+        number_text(mean.rebound),
     )
 
 
-def rank_table(found: Summary) -> Table:
+def rank_table(found: DynamicsSummary) -> ResultTable:
     """Return how far each method keeps the order of stiffness and of restitution."""
     heads = ("method", "τ of stiffness", "pairs", "τ of restitution", "pairs")
     rows = [
         (
             r.method,
-            number(r.stiffness.tau),
+            number_text(r.stiffness.tau),
             str(r.stiffness.pairs),
-            number(r.restitution.tau),
+            number_text(r.restitution.tau),
             str(r.restitution.pairs),
         )
         for r in found.ranks
         if r.stiffness.pairs or r.restitution.pairs
     ]
-    return Table("Ranks: 1 keeps the real order", heads, rows)
+    return ResultTable("Ranks: 1 keeps the real order", heads, rows)
 
 
-def life_table(found: Summary) -> Table:
+def life_table(found: DynamicsSummary) -> ResultTable:
     """Return how each method does against published rebounds."""
     heads = ("method", "dropped", "in their range", "mean distance")
     rows = [(f.method, str(f.drops), str(f.inside), f"{f.off:.3f}") for f in found.life]
-    return Table("Rebound against life", heads, rows)
+    return ResultTable("Rebound against life", heads, rows)
 
 
-def verdicts(found: Summary) -> list[str]:
+def ranking_sentences(found: DynamicsSummary) -> list[str]:
     """Say scene by scene whether ours comes first, and where it does not, why."""
     said = []
     for s in found.standings:
-        ours = found.row(s.scene, OURS)
+        ours = found.row(s.scene, OURS_NAME)
         where = f"Better than ours: {'; '.join(s.lost)}." if s.lost else ""
         unmet = [e for e in (ours.numbers.expectations if ours.numbers else ()) if not e.met]
         why = [f"{e.sentence}: {e.value}, asked {e.target}" for e in unmet]
@@ -114,22 +125,22 @@ def verdicts(found: Summary) -> list[str]:
     return said
 
 
-def missing_references(found: Summary) -> list[str]:
+def missing_references(found: DynamicsSummary) -> list[str]:
     """Say which scenes have no reference, and why."""
     return [f"{r.scene}: no reference ({r.error})" for r in found.references if r.numbers is None]
 
 
-def number(value: float | None) -> str:
+def number_text(value: float | None) -> str:
     """Write a number with two digits after the point."""
-    return NONE if value is None else f"{value:.2f}"
+    return NO_VALUE if value is None else f"{value:.2f}"
 
 
-def share(value: float | None) -> str:
+def percent_text(value: float | None) -> str:
     """Write a share as a percentage."""
-    return NONE if value is None else f"{value:.0%}"
+    return NO_VALUE if value is None else f"{value:.0%}"
 
 
-def as_markdown(table: Table) -> str:
+def markdown_table(table: ResultTable) -> str:
     """Write a table for the documentation."""
     lines: list[Sequence[str]] = [table.heads, ["---"] * len(table.heads), *table.rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in x) + " |" for x in lines)

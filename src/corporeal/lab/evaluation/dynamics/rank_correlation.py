@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from math import sqrt
 
-Pair = tuple[float, float]
+RankedPair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class RankCorrelation:
     """Pairs that are untied in x."""
 
 
-def rank_correlation(groups: Iterable[Sequence[Pair]]) -> RankCorrelation:
+def rank_correlation(groups: Iterable[Sequence[RankedPair]]) -> RankCorrelation:
     """Correlate the ranks of x and y within each group, all groups counted together.
 
     Args:

@@ -5,20 +5,20 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.lab.evaluation.judge.filmed_motion import FilmedMotion, sizes
+from corporeal.lab.evaluation.judge.video_motion import VideoMotion, object_diagonals
 
-TIMES_YARDSTICK = 2.0
+MIN_YARDSTICK_RATIO = 2.0
 """A control must differ by more than so many times what a finer run does."""
-VISIBLE_PATH, VISIBLE_SHAPE = 0.02, 0.01
+MIN_VISIBLE_PATH, MIN_VISIBLE_SHAPE = 0.02, 0.01
 """Least difference that pictures can show, over an object's diagonal [-]: one or two pixels of an
 object 100 pixels wide."""
-AFTER_CONTACT = 0.2
+COMPARED_AFTER_CONTACT_S = 0.2
 """Draft and finer paths are compared until so long after an object's first contact [s]: from there
 on small differences of a rebound part them."""
 
 
 @dataclass(frozen=True)
-class Difference:
+class MotionDifference:
     """How far a film is from the reference, at most over objects [diagonals of the object]."""
 
     path: float
@@ -27,28 +27,28 @@ class Difference:
     """Largest change of a principal width (standard deviation of its matter)."""
 
     @property
-    def limit(self) -> "Difference":
+    def limit(self) -> "MotionDifference":
         """What a control must exceed in one of the two, where this is the yardstick."""
-        return Difference(
-            max(TIMES_YARDSTICK * self.path, VISIBLE_PATH),
-            max(TIMES_YARDSTICK * self.shape, VISIBLE_SHAPE),
+        return MotionDifference(
+            max(MIN_YARDSTICK_RATIO * self.path, MIN_VISIBLE_PATH),
+            max(MIN_YARDSTICK_RATIO * self.shape, MIN_VISIBLE_SHAPE),
         )
 
-    def exceeds(self, limit: "Difference") -> bool:
+    def exceeds(self, limit: "MotionDifference") -> bool:
         """Whether path or shape is beyond a limit."""
         return self.path > limit.path or self.shape > limit.shape
 
 
-UNMEASURED = Difference(0.0, 0.0)
+NO_DIFFERENCE = MotionDifference(0.0, 0.0)
 """Yardstick of a scene without a finer run: what is visible decides alone."""
 
 
-def difference(
-    reference: FilmedMotion,
-    other: FilmedMotion,
+def compare_motions(
+    reference: VideoMotion,
+    other: VideoMotion,
     times: Float[np.ndarray, " T"],
     until: Float[np.ndarray, " B"] | None = None,
-) -> Difference:
+) -> MotionDifference:
     """Compare two films of the same objects at the same instants.
 
     Args:
@@ -58,18 +58,23 @@ def difference(
         until: Instant of each object after which it is not compared [s]; None: all are.
 
     """
-    size = np.maximum(sizes(reference.prepared), 1e-12)
+    size = np.maximum(object_diagonals(reference.prepared), 1e-12)
     counted = np.ones((len(times), len(size)), bool)
     if until is not None:
         counted = times[:, None] <= until[None]
     weight = counted / np.maximum(counted.sum(axis=0), 1)
     apart = np.linalg.norm(other.centres(times) - reference.centres(times), axis=-1) / size
     path = np.sqrt((apart**2 * weight).sum(axis=0))
-    changed = np.abs(widths(other, times) - widths(reference, times)).max(axis=-1) / size
-    return Difference(float(path.max()), float((changed * counted).max()))
+    changed = (
+        np.abs(principal_widths(other, times) - principal_widths(reference, times)).max(axis=-1)
+        / size
+    )
+    return MotionDifference(float(path.max()), float((changed * counted).max()))
 
 
-def widths(film: FilmedMotion, times: Float[np.ndarray, " T"]) -> Float[np.ndarray, "T B 3"]:
+def principal_widths(
+    film: VideoMotion, times: Float[np.ndarray, " T"]
+) -> Float[np.ndarray, "T B 3"]:
     """Return standard deviations of every object's matter along its principal axes [m]."""
     mass = film.prepared.particles.mass
     rows = []

@@ -8,27 +8,27 @@ import numpy as np
 from PIL import Image
 
 from corporeal.core.store import write_bytes
-from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, tables
-from corporeal.lab.evaluation.judge.put_to_judge import Judged
-from corporeal.lab.evaluation.judge.staging import DATED
-from corporeal.lab.evaluation.judge.telling import FilmVerdict
-from corporeal.lab.evaluation.result_table import Table
-from corporeal.render.page import figure, held, page, safe
+from corporeal.lab.evaluation.judge.camera_staging import DATED_PICTURES
+from corporeal.lab.evaluation.judge.detectability import VideoVerdict
+from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts
+from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, judge_tables
+from corporeal.lab.evaluation.result_table import ResultTable
+from corporeal.render.html_page import data_url, escape_html, fill_page, html_figure
 
 Progress = Callable[[float, str], None]
-ROW = 6
+PICTURES_PER_VIDEO = 6
 """Pictures of a film on the page."""
-QUALITY = 80
+JPEG_QUALITY = 80
 """Of their JPEG."""
 
 
-def write_page(
-    judged: Judged,
+def write_judge_page(
+    judged: JudgeVerdicts,
     result: JudgeResult,
     path: Path,
     progress: Progress = lambda fraction, words: None,
 ) -> None:
-    """Write the page; ``ROW`` pictures of every film's first look are rendered for it.
+    """Write the page; ``PICTURES_PER_VIDEO`` pictures of every film's first look are rendered for it.
 
     Args:
         judged: What was said of which films.
@@ -51,20 +51,20 @@ def write_page(
         motion = question.scene, question.prompt
         if motion not in strips:
             strips[motion] = _strip(question.pictures)
-        films.append(_film(verdict, strips[motion], trusted))
-    text = page(
+        films.append(_video_section(verdict, strips[motion], trusted))
+    text = fill_page(
         "corporeal.lab.evaluation.judge",
         "judge.html",
-        summary=safe(_summary(judged)),
-        cannot=safe(cannot_tell(result)),
-        tables="\n".join(_table(t) for t in tables(judged, result) if t.rows),
+        summary=escape_html(_summary(judged)),
+        cannot=escape_html(blind_spots_sentence(result)),
+        tables="\n".join(_table(t) for t in judge_tables(judged, result) if t.rows),
         films="\n".join(films),
-        footer=safe(f"Judge: {judged.judge}"),
+        footer=escape_html(f"Judge: {judged.judge}"),
     )
     write_bytes(path, text.encode())
 
 
-def cannot_tell(result: JudgeResult) -> str:
+def blind_spots_sentence(result: JudgeResult) -> str:
     """Say in a sentence which laws of physics the judge cannot tell."""
     none = [law for law, questions in result.believed.items() if not questions]
     if not none:
@@ -75,37 +75,37 @@ def cannot_tell(result: JudgeResult) -> str:
     )
 
 
-def _summary(judged: Judged) -> str:
+def _summary(judged: JudgeVerdicts) -> str:
     by = ", ".join(judged.answered_by) or "nobody"
     scenes = len({v.scene for v in judged.verdicts})
     missing = f" {judged.unanswered} looks have no usable answer." if judged.unanswered else ""
     return f"{len(judged.verdicts)} films of {scenes} scenes, answered by {by}.{missing}"
 
 
-def _table(table: Table) -> str:
-    heads = "".join(f"<th>{safe(h)}</th>" for h in table.heads)
+def _table(table: ResultTable) -> str:
+    heads = "".join(f"<th>{escape_html(h)}</th>" for h in table.heads)
     rows = "".join(
-        f"<tr>{''.join(f'<td>{safe(cell)}</td>' for cell in row)}</tr>" for row in table.rows
+        f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows
     )
-    return f"<h2>{safe(table.title)}</h2><table><tr>{heads}</tr>{rows}</table>"
+    return f"<h2>{escape_html(table.title)}</h2><table><tr>{heads}</tr>{rows}</table>"
 
 
-def _film(verdict: FilmVerdict, row: bytes, trusted: set[str]) -> str:
+def _video_section(verdict: VideoVerdict, row: bytes, trusted: set[str]) -> str:
     alarms = [
-        f"<b>{safe(q)}</b>" if q in trusted else safe(q)
+        f"<b>{escape_html(q)}</b>" if q in trusted else escape_html(q)
         for q, share in verdict.alarm.items()
         if share > 0
     ]
-    said = "; ".join(safe(words) for words in verdict.happens)
+    said = "; ".join(escape_html(words) for words in verdict.happens)
     name = f"{verdict.scene}: {verdict.condition}"
-    strip = figure(name, held(row, "image/jpeg"))
+    strip = html_figure(name, data_url(row, "image/jpeg"))
     reported = ", ".join(alarms) or "no violation"
     return f"{strip}<p>{reported}; whole {verdict.whole:.1f} of 5. “{said}”</p>"
 
 
 def _strip(pictures: Sequence[np.ndarray]) -> bytes:
-    chosen = np.linspace(0, DATED - 1, ROW).round().astype(int)
+    chosen = np.linspace(0, DATED_PICTURES - 1, PICTURES_PER_VIDEO).round().astype(int)
     out = io.BytesIO()
     row = np.hstack([pictures[int(k)] for k in chosen])
-    Image.fromarray(row).save(out, "JPEG", quality=QUALITY)
+    Image.fromarray(row).save(out, "JPEG", quality=JPEG_QUALITY)
     return out.getvalue()

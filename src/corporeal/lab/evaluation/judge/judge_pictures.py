@@ -7,19 +7,25 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from corporeal.core.machine import cores
-from corporeal.lab.evaluation.judge.filmed_motion import FilmedMotion
-from corporeal.lab.evaluation.judge.path_picture import path_picture
-from corporeal.lab.evaluation.judge.staging import CLOSE, DATED, SIZE, TURNS, Staging
-from corporeal.render import key
-from corporeal.render.camera import Aim
-from corporeal.render.embree import render
-from corporeal.render.stage import Light, Stage
+from corporeal.core.process_resources import usable_cores
+from corporeal.lab.evaluation.judge.camera_staging import (
+    CLOSE_UP_PICTURES,
+    DATED_PICTURES,
+    LOOK_TURNS_DEG,
+    PICTURE_SIZE_PX,
+    Staging,
+)
+from corporeal.lab.evaluation.judge.path_diagram import path_diagram
+from corporeal.lab.evaluation.judge.video_motion import VideoMotion
+from corporeal.render import video_overlay
+from corporeal.render.camera_placement import CameraAim
+from corporeal.render.embree import render_image
+from corporeal.render.ray_scene import RayScene, StudioLight
 
-PICTURES = DATED + CLOSE + 1
+PICTURES_PER_LOOK = DATED_PICTURES + CLOSE_UP_PICTURES + 1
 
 
-class TakenSingly(Sequence[np.ndarray]):
+class SequentialPictures(Sequence[np.ndarray]):
     """Pictures each of which is rendered when somebody first looks at it."""
 
     def __init__(self, takes: Sequence[Callable[[], np.ndarray]]) -> None:
@@ -38,24 +44,28 @@ class TakenSingly(Sequence[np.ndarray]):
         return self._taken[number]
 
 
-def shown(film: FilmedMotion, staging: Staging, look: int) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
+def judge_pictures(
+    film: VideoMotion, staging: Staging, look: int
+) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
     """Show a film: dated pictures, close-ups, and the diagram of its paths.
 
     Args:
         film: What moves.
         staging: When and from where.
-        look: Which of ``TURNS``.
+        look: Which of ``LOOK_TURNS_DEG``.
 
     Returns:
-        ``PICTURES`` pictures, each rendered when it is looked at.
+        ``PICTURES_PER_LOOK`` pictures, each rendered when it is looked at.
 
     """
-    stage = Stage(film.prepared.scene, Light(front=staging.view))
+    stage = RayScene(film.prepared.scene, StudioLight(front=staging.view))
     wide = staging.wide(look)
 
-    def picture(time: float, camera: Aim, words: str) -> np.ndarray:
+    def picture(time: float, camera: CameraAim, words: str) -> np.ndarray:
         posed = stage.posed(*film.cast.skin.pose(film.at(time)))
-        return key.caption(render(posed, camera, "draft", cores()), words)
+        return video_overlay.draw_caption(
+            render_image(posed, camera, "draft", usable_cores()), words
+        )
 
     dated = [
         partial(picture, time, wide, f"{number}   t = {time:.3f} s")
@@ -65,10 +75,10 @@ def shown(film: FilmedMotion, staging: Staging, look: int) -> Sequence[UInt8[np.
         partial(picture, c.time, staging.near(c, look), f"close   t = {c.time:.3f} s")
         for c in staging.closes
     ]
-    return TakenSingly([*dated, *close, partial(path_picture, film, staging, wide)])
+    return SequentialPictures([*dated, *close, partial(path_diagram, film, staging, wide)])
 
 
-def how(look: int) -> str:
+def pictures_description(look: int) -> str:
     """Say in words how the pictures of a look are taken; recordings compare this."""
-    size = f"{SIZE[0]} x {SIZE[1]}"
-    return f"{DATED} dated pictures, {CLOSE} close-ups, paths; {size}; turned {TURNS[look]:+g}°"
+    size = f"{PICTURE_SIZE_PX[0]} x {PICTURE_SIZE_PX[1]}"
+    return f"{DATED_PICTURES} dated pictures, {CLOSE_UP_PICTURES} close-ups, paths; {size}; turned {LOOK_TURNS_DEG[look]:+g}°"

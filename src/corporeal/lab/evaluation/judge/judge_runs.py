@@ -5,11 +5,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.dynamics.places import METHODS, OURS, reference_folder, run_folder
-from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig, SceneRuns, gather_films
+from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+    METHOD_NAMES,
+    OURS_NAME,
+    reference_folder,
+    run_folder,
+)
+from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts, check_judging, query_judge
+from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig, SceneRuns, gather_videos
 from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, weigh_judge
-from corporeal.lab.evaluation.judge.put_to_judge import Judged, check_judging, put_to_judge
-from corporeal.pipeline.runner import RUN
+from corporeal.pipeline.run_pipeline import RUN_FILE
 
 Progress = Callable[[float, str], None]
 
@@ -18,7 +23,7 @@ Progress = Callable[[float, str], None]
 class JudgedRuns:
     """What a judge said, and what follows."""
 
-    judged: Judged
+    judged: JudgeVerdicts
     result: JudgeResult
 
 
@@ -38,13 +43,13 @@ def judge_runs(
 
     """
     check_judging(config)
-    scenes = scenes_in(out)
-    films = gather_films(scenes, out, config, progress)
-    judged = put_to_judge(films, config, say, progress)
+    scenes = judged_scenes_in(out)
+    films = gather_videos(scenes, out, config, progress)
+    judged = query_judge(films, config, say, progress)
     return JudgedRuns(judged, weigh_judge(judged))
 
 
-def scenes_in(out: Path) -> list[SceneRuns]:
+def judged_scenes_in(out: Path) -> list[SceneRuns]:
     """Find the scenes of an evaluation that have our own run.
 
     Raises:
@@ -53,21 +58,23 @@ def scenes_in(out: Path) -> list[SceneRuns]:
     """
     folders = sorted(p for p in out.iterdir() if p.is_dir()) if out.is_dir() else []
     scenes = [
-        _scene(out, p.name) for p in folders if (run_folder(out, p.name, OURS) / RUN).exists()
+        _scene(out, p.name)
+        for p in folders
+        if (run_folder(out, p.name, OURS_NAME) / RUN_FILE).exists()
     ]
     if not scenes:
         raise UserError(
-            f"{out} holds no runs to judge: it has no SCENE/{OURS}. Make them with: corporeal "
+            f"{out} holds no runs to judge: it has no SCENE/{OURS_NAME}. Make them with: corporeal "
             "evaluate dynamics."
         )
     return scenes
 
 
 def _scene(out: Path, name: str) -> SceneRuns:
-    runs = {m: run_folder(out, name, m) for m in METHODS}
+    runs = {m: run_folder(out, name, m) for m in METHOD_NAMES}
     finer = [reference_folder(out, name, detail) for detail in ("fine", "normal")]
     return SceneRuns(
         name,
-        {m: folder for m, folder in runs.items() if (folder / RUN).exists()},
-        next((folder for folder in finer if (folder / RUN).exists()), None),
+        {m: folder for m, folder in runs.items() if (folder / RUN_FILE).exists()},
+        next((folder for folder in finer if (folder / RUN_FILE).exists()), None),
     )

@@ -6,33 +6,33 @@ from pathlib import Path
 
 import numpy as np
 
+from corporeal.core.audit_data import Audit
 from corporeal.core.errors import UserError, check_range
-from corporeal.core.findings import Audit
-from corporeal.lab.evaluation.dynamics.places import OURS
+from corporeal.lab.evaluation.dynamics.dynamics_folders import OURS_NAME
+from corporeal.lab.evaluation.judge.camera_staging import LOOK_TURNS_DEG, Staging, stage_scene
 from corporeal.lab.evaluation.judge.control_effect import (
-    AFTER_CONTACT,
-    UNMEASURED,
-    Difference,
-    difference,
+    COMPARED_AFTER_CONTACT_S,
+    NO_DIFFERENCE,
+    MotionDifference,
+    compare_motions,
 )
-from corporeal.lab.evaluation.judge.controls import EDITED, edited
-from corporeal.lab.evaluation.judge.film_question import FilmAsked, question
-from corporeal.lab.evaluation.judge.filmed_motion import FilmedMotion, simulated
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED, simulate_control
-from corporeal.lab.evaluation.judge.staging import TURNS, Staging, stage_scene
-from corporeal.lab.evaluation.judge.told_facts import facts
-from corporeal.materials import named
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import FOLDERS
+from corporeal.lab.evaluation.judge.edited_controls import EDITED_CONTROLS, edit_motion
+from corporeal.lab.evaluation.judge.prompt_context import scene_facts
+from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
+from corporeal.lab.evaluation.judge.video_motion import VideoMotion, motion_of_run
+from corporeal.lab.evaluation.judge.video_question import VideoQuestion, video_question
+from corporeal.materials import find_material_or_default
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import STAGE_FOLDERS
 from corporeal.simulation.audit_file import read_audit
-from corporeal.simulation.audit_words import ALLOWED, passage
-from corporeal.simulation.played import Played
-from corporeal.vlm import NOBODY
+from corporeal.simulation.audit_messages import ALLOWED_BREACHES, passage_message
+from corporeal.simulation.simulation_result import SimulationResult
+from corporeal.vlm import NO_MODEL
 
 Progress = Callable[[float, str], None]
-REFERENCE = OURS
-CONTROLS = (*EDITED, *SIMULATED)
-WITH_CONTROLS = 12
+REFERENCE_METHOD = OURS_NAME
+CONTROL_NAMES = (*EDITED_CONTROLS, *SIMULATED_CONTROLS)
+DEFAULT_CONTROL_SCENES = 12
 """Scenes whose controls are judged unless more are asked for."""
 
 
@@ -40,14 +40,14 @@ WITH_CONTROLS = 12
 class JudgeConfig:
     """Who judges, how often, and what it may cost."""
 
-    judge: str = NOBODY
+    judge: str = NO_MODEL
     """Model that judges the films: as --vlm."""
     record: Path | None = None
     """Folder where its answers are recorded, for replay:FOLDER."""
     looks: int = 1
     """Times that each film is judged, each from another side and with questions in another order:
     1 to 3."""
-    control_scenes: int = WITH_CONTROLS
+    control_scenes: int = DEFAULT_CONTROL_SCENES
     """Scenes of which controls are judged."""
     yes: bool = False
     """Ask a judge that costs more than 5 US$, or whose price is not known."""
@@ -65,7 +65,7 @@ class SceneRuns:
 
 
 @dataclass(frozen=True)
-class Failed:
+class FailedVideo:
     """A film that nobody judges, and why."""
 
     scene: str
@@ -89,18 +89,18 @@ class ControlEffect:
 
     scene: str
     control: str
-    difference: Difference
-    limit: Difference
+    difference: MotionDifference
+    limit: MotionDifference
     effective: bool
 
 
 @dataclass(frozen=True)
-class Films:
+class JudgedVideos:
     """All that a judge is asked about, and what was left out."""
 
-    asked: list[FilmAsked]
+    asked: list[VideoQuestion]
     effects: list[ControlEffect]
-    failed: list[Failed]
+    failed: list[FailedVideo]
     groups: dict[str, SceneGroups]
     """By scene."""
     methods: list[str]
@@ -109,19 +109,19 @@ class Films:
 
 def check_judging(config: JudgeConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scenes."""
-    check_range("--looks", config.looks, 1, len(TURNS))
+    check_range("--looks", config.looks, 1, len(LOOK_TURNS_DEG))
     check_range("--control-scenes", config.control_scenes, 0, 10_000)
 
 
 # ---------------------------------------------------------------- films
 
 
-def gather_films(
+def gather_videos(
     scenes: Sequence[SceneRuns],
     out: Path,
     config: JudgeConfig,
     progress: Progress = lambda fraction, words: None,
-) -> Films:
+) -> JudgedVideos:
     """Make all films: read runs back, simulate and edit controls.
 
     Args:
@@ -131,7 +131,7 @@ def gather_films(
         progress: Told the fraction done and what is being done.
 
     """
-    films = Films([], [], [], {}, methods_of(scenes))
+    films = JudgedVideos([], [], [], {}, methods_of(scenes))
     for number, scene in enumerate(scenes):
         progress(number / len(scenes), scene.name)
         _gather_scene(scene, out / scene.name, number < config.control_scenes, config, films)
@@ -140,59 +140,59 @@ def gather_films(
 
 def methods_of(scenes: Sequence[SceneRuns]) -> list[str]:
     """Return all methods, the reference first."""
-    others = {m for s in scenes for m in s.runs} - {REFERENCE}
-    return [REFERENCE, *sorted(others)]
+    others = {m for s in scenes for m in s.runs} - {REFERENCE_METHOD}
+    return [REFERENCE_METHOD, *sorted(others)]
 
 
 def _gather_scene(
-    scene: SceneRuns, folder: Path, with_controls: bool, config: JudgeConfig, films: Films
+    scene: SceneRuns, folder: Path, with_controls: bool, config: JudgeConfig, films: JudgedVideos
 ) -> None:
     """Add the films of one scene; a reference that is not clean leaves it out."""
-    reference, why = _run(scene, REFERENCE)
+    reference, why = _run(scene, REFERENCE_METHOD)
     if reference is None:
-        films.failed.append(Failed(scene.name, REFERENCE, why))
+        films.failed.append(FailedVideo(scene.name, REFERENCE_METHOD, why))
         return
-    library = runner.reopen(scene.runs[REFERENCE]).settings.ground.library
-    films.groups[scene.name] = groups_of(reference, library)
-    staging, told = stage_scene(reference), facts(reference.prepared)
-    shown = {REFERENCE: simulated(reference), **_methods(scene, films)}
+    library = run_pipeline.read_run_request(scene.runs[REFERENCE_METHOD]).settings.ground.library
+    films.groups[scene.name] = scene_groups(reference, library)
+    staging, told = stage_scene(reference), scene_facts(reference.prepared)
+    shown = {REFERENCE_METHOD: motion_of_run(reference), **_methods(scene, films)}
     if with_controls:
         limit = _yardstick(scene, reference, staging).limit
         for control, film in _controls(scene, reference, folder, films).items():
-            far = difference(shown[REFERENCE], film, staging.times)
+            far = compare_motions(shown[REFERENCE_METHOD], film, staging.times)
             effect = ControlEffect(scene.name, control, far, limit, far.exceeds(limit))
             films.effects.append(effect)
             if effect.effective:
                 same = film.prepared is reference.prepared
-                bound = shown[REFERENCE] if same else None
+                bound = shown[REFERENCE_METHOD] if same else None
                 shown[control_name(control)] = replace(film, bound_as=bound)
     films.asked.extend(
-        FilmAsked(scene.name, condition, look, question(film, staging, told, look))
+        VideoQuestion(scene.name, condition, look, video_question(film, staging, told, look))
         for condition, film in shown.items()
         for look in range(config.looks)
     )
 
 
-def _methods(scene: SceneRuns, films: Films) -> dict[str, FilmedMotion]:
+def _methods(scene: SceneRuns, films: JudgedVideos) -> dict[str, VideoMotion]:
     """Return the films of all methods but the reference; what cannot be judged is a row."""
-    shown = {m: _read(scene, m, films) for m in scene.runs if m != REFERENCE}
+    shown = {m: _read(scene, m, films) for m in scene.runs if m != REFERENCE_METHOD}
     return {m: film for m, film in shown.items() if film is not None}
 
 
-def _read(scene: SceneRuns, method: str, films: Films) -> FilmedMotion | None:
+def _read(scene: SceneRuns, method: str, films: JudgedVideos) -> VideoMotion | None:
     played, why = _run(scene, method)
     if played is None:
-        failed = Failed(scene.name, method, why)
+        failed = FailedVideo(scene.name, method, why)
         films.failed.extend([failed] if failed not in films.failed else [])
         return None
-    return simulated(played)
+    return motion_of_run(played)
 
 
 def _controls(
-    scene: SceneRuns, reference: Played, folder: Path, films: Films
-) -> dict[str, FilmedMotion]:
+    scene: SceneRuns, reference: SimulationResult, folder: Path, films: JudgedVideos
+) -> dict[str, VideoMotion]:
     """Return the films of all controls that have a place in the scene."""
-    found = {c: _control(c, scene, reference, folder, films) for c in CONTROLS}
+    found = {c: _control(c, scene, reference, folder, films) for c in CONTROL_NAMES}
     return {c: film for c, film in found.items() if film is not None}
 
 
@@ -201,56 +201,58 @@ def control_name(control: str) -> str:
     return f"control:{control}"
 
 
-def _run(scene: SceneRuns, method: str) -> tuple[Played | None, str]:
+def _run(scene: SceneRuns, method: str) -> tuple[SimulationResult | None, str]:
     """Read a run back, or say why it is not judged."""
     folder = scene.runs.get(method)
     if folder is None:
         return None, "was not run"
     try:
-        played = runner.read_back(folder).played
-        why = breach(read_audit(folder / FOLDERS["simulate"]))
+        played = run_pipeline.read_run(folder).played
+        why = audit_breach(read_audit(folder / STAGE_FOLDERS["simulate"]))
     except (UserError, LookupError) as error:
         return None, str(error)
     return (None, why) if why else (played, "")
 
 
-def breach(audit: Audit) -> str:
+def audit_breach(audit: Audit) -> str:
     """Say what keeps a run from being judged as physics; "": nothing."""
     if audit.nan_count or audit.particles_out_of_domain:
         return "the simulation lost particles"
-    if audit.mechanical_growth > ALLOWED["mechanical_growth"]:
+    if audit.mechanical_growth > ALLOWED_BREACHES["mechanical_growth"]:
         return f"energy grew by {audit.mechanical_growth:.1%}"
-    through = [passage(pair) for pair in audit.surfaces if pair.passed]
+    through = [passage_message(pair) for pair in audit.surfaces if pair.passed]
     return through[0] if through else ""
 
 
 def _control(
-    control: str, scene: SceneRuns, reference: Played, folder: Path, films: Films
-) -> FilmedMotion | None:
-    if control in EDITED:
-        return edited(control, reference)
+    control: str, scene: SceneRuns, reference: SimulationResult, folder: Path, films: JudgedVideos
+) -> VideoMotion | None:
+    if control in EDITED_CONTROLS:
+        return edit_motion(control, reference)
     if control in scene.runs:  # also a method, so it was run
         return _read(scene, control, films)
     try:
-        played = simulate_control(control, scene.runs[REFERENCE], folder / f"control-{control}")
+        played = simulate_control(
+            control, scene.runs[REFERENCE_METHOD], folder / f"control-{control}"
+        )
     except UserError as error:
-        films.failed.append(Failed(scene.name, control_name(control), str(error)))
+        films.failed.append(FailedVideo(scene.name, control_name(control), str(error)))
         return None
-    return None if played is None else simulated(played)
+    return None if played is None else motion_of_run(played)
 
 
-def _yardstick(scene: SceneRuns, reference: Played, staging: Staging) -> Difference:
+def _yardstick(scene: SceneRuns, reference: SimulationResult, staging: Staging) -> MotionDifference:
     """Measure how far the reference is from a finer run of the same scene."""
     if scene.yardstick is None:
-        return UNMEASURED
-    finer = runner.read_back(scene.yardstick).played
+        return NO_DIFFERENCE
+    finer = run_pipeline.read_run(scene.yardstick).played
     met = np.array(reference.trajectory.ledger.first_contact[-1], dtype=float)
     met = np.where(met > 0, met, np.inf)[: len(reference.prepared.scene.objects)]
-    until = met.min(axis=1, initial=np.inf) + AFTER_CONTACT
-    return difference(simulated(reference), simulated(finer), staging.times, until)
+    until = met.min(axis=1, initial=np.inf) + COMPARED_AFTER_CONTACT_S
+    return compare_motions(motion_of_run(reference), motion_of_run(finer), staging.times, until)
 
 
-def groups_of(played: Played, library: str) -> SceneGroups:
+def scene_groups(played: SimulationResult, library: str) -> SceneGroups:
     """Return which classes of materials and which constitutive laws occur in a scene.
 
     Args:
@@ -262,5 +264,5 @@ def groups_of(played: Played, library: str) -> SceneGroups:
 
     """
     made = played.prepared.field.materials
-    kinds = sorted({named(m.name, library).group for m in made})
+    kinds = sorted({find_material_or_default(m.name, library).group for m in made})
     return SceneGroups(tuple(kinds), tuple(sorted({m.law.name.lower() for m in made})))

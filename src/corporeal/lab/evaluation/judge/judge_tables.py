@@ -5,54 +5,62 @@ from dataclasses import asdict, dataclass
 from statistics import fmean
 from typing import Any
 
-from corporeal.lab.evaluation.judge.judge_scenes import CONTROLS, REFERENCE, control_name
-from corporeal.lab.evaluation.judge.put_to_judge import Judged
-from corporeal.lab.evaluation.judge.subquestions import catalogue
-from corporeal.lab.evaluation.judge.telling import (
-    WHOLE,
-    FilmVerdict,
-    Interval,
-    Mark,
-    Telling,
-    believed,
-    mark_of,
-    tellings,
+from corporeal.lab.evaluation.judge.detectability import (
+    WHOLE_MARK,
+    ConfidenceInterval,
+    Detectability,
+    MethodMark,
+    VideoVerdict,
+    measure_detectability,
+    method_mark,
+    trusted_questions,
 )
-from corporeal.lab.evaluation.result_table import Table
+from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts
+from corporeal.lab.evaluation.judge.judge_scenes import (
+    CONTROL_NAMES,
+    REFERENCE_METHOD,
+    control_name,
+)
+from corporeal.lab.evaluation.judge.subquestions import question_catalogue
+from corporeal.lab.evaluation.result_table import ResultTable
 
-CANNOT = "this judge cannot tell"
+CANNOT_TELL_TEXT = "this judge cannot tell"
 
 
 @dataclass(frozen=True)
 class JudgeResult:
     """What follows from a judge's answers."""
 
-    rows: tuple[Telling, ...]
+    rows: tuple[Detectability, ...]
     """Every question against every control."""
     believed: Mapping[str, list[str]]
     """Law of physics → questions that tell a control they are meant for."""
     false_alarms: Mapping[str, float]
     """Law of physics → alarms of its questions on references, over how often they were asked."""
-    by_law_of_physics: tuple[Mark, ...]
-    by_class: tuple[Mark, ...]
-    by_law: tuple[Mark, ...]
+    by_law_of_physics: tuple[MethodMark, ...]
+    by_class: tuple[MethodMark, ...]
+    by_law: tuple[MethodMark, ...]
     wholes: Mapping[str, float]
     """Method → mean mark, 1 to 5."""
 
 
-def weigh_judge(judged: Judged) -> JudgeResult:
+def weigh_judge(judged: JudgeVerdicts) -> JudgeResult:
     """Find what the judge can tell, and mark methods by that alone."""
     effective = {(e.scene, control_name(e.control)) for e in judged.films.effects if e.effective}
-    names = [control_name(c) for c in CONTROLS]
+    names = [control_name(c) for c in CONTROL_NAMES]
     usable = [
         v
         for v in judged.verdicts
         if v.condition not in names or (v.scene, v.condition) in effective
     ]
-    rows = tellings(usable, REFERENCE, dict(zip(CONTROLS, names, strict=True)))
-    trusted = believed(rows)
+    rows = measure_detectability(
+        usable, REFERENCE_METHOD, dict(zip(CONTROL_NAMES, names, strict=True))
+    )
+    trusted = trusted_questions(rows)
     methods, all_questions = judged.films.methods, [q for qs in trusted.values() for q in qs]
-    by_physics = [mark_of(usable, m, law, qs) for law, qs in trusted.items() if qs for m in methods]
+    by_physics = [
+        method_mark(usable, m, law, qs) for law, qs in trusted.items() if qs for m in methods
+    ]
     groups = judged.films.groups
     return JudgeResult(
         rows=tuple(rows),
@@ -68,26 +76,28 @@ def weigh_judge(judged: Judged) -> JudgeResult:
 
 
 def _grouped(
-    films: Sequence[FilmVerdict],
+    films: Sequence[VideoVerdict],
     methods: Sequence[str],
     questions: Sequence[str],
     groups: Mapping[str, Sequence[str]],
-) -> tuple[Mark, ...]:
+) -> tuple[MethodMark, ...]:
     """Mark every method in the scenes in which something occurs."""
     found = []
     for name in sorted({g for kinds in groups.values() for g in kinds}):
         mine = [f for f in films if name in groups.get(f.scene, ())]
-        found += [mark_of(mine, m, name, questions) for m in methods]
+        found += [method_mark(mine, m, name, questions) for m in methods]
     return tuple(m for m in found if m)
 
 
-def _false_alarms(films: Sequence[FilmVerdict], law: str) -> float:
-    asked = [q.id for q in catalogue().question if q.law == law]
-    given = [f.alarm[q] for f in films if f.condition == REFERENCE for q in asked if q in f.alarm]
+def _false_alarms(films: Sequence[VideoVerdict], law: str) -> float:
+    asked = [q.id for q in question_catalogue().question if q.law == law]
+    given = [
+        f.alarm[q] for f in films if f.condition == REFERENCE_METHOD for q in asked if q in f.alarm
+    ]
     return fmean(given) if given else 0.0
 
 
-def _whole(films: Sequence[FilmVerdict], method: str) -> float | None:
+def _whole(films: Sequence[VideoVerdict], method: str) -> float | None:
     given = [f.whole for f in films if f.condition == method]
     return fmean(given) if given else None
 
@@ -95,7 +105,7 @@ def _whole(films: Sequence[FilmVerdict], method: str) -> float | None:
 # ---------------------------------------------------------------- tables
 
 
-def tables(judged: Judged, result: JudgeResult) -> list[Table]:
+def judge_tables(judged: JudgeVerdicts, result: JudgeResult) -> list[ResultTable]:
     """Return the tables: laws, controls, methods, classes, constitutive laws, what was left out."""
     return [
         _laws(result),
@@ -103,7 +113,7 @@ def tables(judged: Judged, result: JudgeResult) -> list[Table]:
         _marks("Methods by what the judge can tell", result.by_law_of_physics, result.wholes),
         _marks("Methods by class of material", result.by_class),
         _marks("Methods by constitutive law", result.by_law),
-        Table(
+        ResultTable(
             "Not judged",
             ("scene", "film", "why"),
             [(f.scene, f.condition, f.reason) for f in judged.films.failed],
@@ -111,18 +121,20 @@ def tables(judged: Judged, result: JudgeResult) -> list[Table]:
     ]
 
 
-def _laws(result: JudgeResult) -> Table:
+def _laws(result: JudgeResult) -> ResultTable:
     rows = [
-        (law, CANNOT if not told else f"believed by: {', '.join(told)}", f"{alarms:.0%}")
+        (law, CANNOT_TELL_TEXT if not told else f"believed by: {', '.join(told)}", f"{alarms:.0%}")
         for law, told in result.believed.items()
         for alarms in [result.false_alarms[law]]
     ]
-    return Table("What this judge can tell", ("law of physics", "", "alarms on references"), rows)
+    return ResultTable(
+        "What this judge can tell", ("law of physics", "", "alarms on references"), rows
+    )
 
 
-def _controls(judged: Judged, result: JudgeResult) -> Table:
+def _controls(judged: JudgeVerdicts, result: JudgeResult) -> ResultTable:
     rows = []
-    for control in catalogue().control:
+    for control in question_catalogue().control:
         effects = [e for e in judged.films.effects if e.control == control.id]
         effective = sum(e.effective for e in effects)
         if not effective:
@@ -131,15 +143,15 @@ def _controls(judged: Judged, result: JudgeResult) -> Table:
             continue
         rows += [_telling_row(r) for r in result.rows if r.control == control.id and _worth(r)]
     heads = ("control", "question", "scenes", "hits", "false alarms", "accuracy, 90 %", "")
-    return Table("Controls (* meant to be told by this question)", heads, rows)
+    return ResultTable("Controls (* meant to be told by this question)", heads, rows)
 
 
-def _worth(row: Telling) -> bool:
+def _worth(row: Detectability) -> bool:
     """Whether a row says anything: meant, hit, or the whole mark."""
-    return row.meant or row.hits > 0 or row.question == WHOLE
+    return row.meant or row.hits > 0 or row.question == WHOLE_MARK
 
 
-def _telling_row(row: Telling) -> tuple[str, ...]:
+def _telling_row(row: Detectability) -> tuple[str, ...]:
     return (
         row.control,
         row.question + " *" * row.meant,
@@ -151,19 +163,21 @@ def _telling_row(row: Telling) -> tuple[str, ...]:
     )
 
 
-def _marks(title: str, marks: Sequence[Mark], wholes: Mapping[str, float] | None = None) -> Table:
+def _marks(
+    title: str, marks: Sequence[MethodMark], wholes: Mapping[str, float] | None = None
+) -> ResultTable:
     rows = [
         (m.group, m.method, str(m.scenes), f"{m.mark:.2f} {_interval(m.interval)}") for m in marks
     ]
     rows += [("whole mark, 1 to 5", m, "", f"{w:.2f}") for m, w in (wholes or {}).items()]
-    return Table(title, ("of", "method", "scenes", "without alarm, 90 %"), rows)
+    return ResultTable(title, ("of", "method", "scenes", "without alarm, 90 %"), rows)
 
 
-def _interval(interval: Interval) -> str:
+def _interval(interval: ConfidenceInterval) -> str:
     return f"[{interval.low:.2f}, {interval.high:.2f}]"
 
 
-def record(judged: Judged, result: JudgeResult) -> dict[str, Any]:
+def judge_record(judged: JudgeVerdicts, result: JudgeResult) -> dict[str, Any]:
     """Return all of it as plain data."""
     return {
         "judge": judged.judge,

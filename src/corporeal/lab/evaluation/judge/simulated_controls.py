@@ -13,31 +13,31 @@ import yaml
 
 from corporeal.core import store
 from corporeal.core.types import MaterialField, Parts, Scene
-from corporeal.io.glb_writer import write_glb
-from corporeal.mpm.laws import MENU
-from corporeal.pipeline import runner
-from corporeal.pipeline.runner import Settings
-from corporeal.simulation.played import Played
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import Settings
+from corporeal.simulation.simulation_result import SimulationResult
 
 Progress = Callable[[float, str], None]
-SIMULATED = ("halfgravity", "wrong", "single", "capped")
-GRAVITY_SHARE = 0.5
+SIMULATED_CONTROLS = ("halfgravity", "wrong", "single", "capped")
+REMAINING_GRAVITY_FRACTION = 0.5
 """Of gravity that is left in the control "halfgravity" [-]."""
 
 
 @dataclass(frozen=True)
-class Order:
+class ControlRequest:
     """What a control's run is asked to do."""
 
     inputs: list[Path]
     settings: Settings
 
 
-def order_control(control: str, reference: Path, folder: Path) -> Order | None:
+def order_control(control: str, reference: Path, folder: Path) -> ControlRequest | None:
     """Write down how a control of a reference run is simulated; None: it does not apply.
 
     Args:
-        control: One of ``SIMULATED``.
+        control: One of ``SIMULATED_CONTROLS``.
         reference: Folder of our own run.
         folder: Where files that only the control needs are kept.
 
@@ -45,34 +45,37 @@ def order_control(control: str, reference: Path, folder: Path) -> Order | None:
         UserError: The reference is not a finished run.
 
     """
-    asked = runner.reopen(reference)
+    asked = run_pipeline.read_run_request(reference)
     settings = asked.settings
     if control == "single":
-        return Order(
+        return ControlRequest(
             asked.inputs, replace(settings, simulate=replace(settings.simulate, contact="single"))
         )
     if control == "capped":
-        return Order(
+        return ControlRequest(
             asked.inputs, replace(settings, fill=replace(settings.fill, stiffness="capped"))
         )
-    made = runner.read_back(reference)
+    made = run_pipeline.read_run(reference)
     if control == "halfgravity":
-        return Order([_lighter(made.scene, folder)], settings)
-    said = exchanged(made.scene, made.parts, made.field)
+        return ControlRequest([_lighter(made.scene, folder)], settings)
+    said = exchange_materials(made.scene, made.parts, made.field)
     if not said:
         return None
     store.write_bytes(folder / "exchanged.yaml", yaml.safe_dump(said).encode())
     describe = replace(settings.describe, annotations=folder / "exchanged.yaml")
-    return Order(asked.inputs, replace(settings, describe=describe))
+    return ControlRequest(asked.inputs, replace(settings, describe=describe))
 
 
 def simulate_control(
-    control: str, reference: Path, folder: Path, tell: runner.Tell = runner.quiet
-) -> Played | None:
+    control: str,
+    reference: Path,
+    folder: Path,
+    tell: run_pipeline.ProgressOfStage = run_pipeline.no_progress_of_stage,
+) -> SimulationResult | None:
     """Simulate a control, or read it back where it is finished; None: it does not apply.
 
     Args:
-        control: One of ``SIMULATED``.
+        control: One of ``SIMULATED_CONTROLS``.
         reference: Folder of our own run.
         folder: Of the control's run.
         tell: Whom to tell about progress.
@@ -84,16 +87,16 @@ def simulate_control(
     order = order_control(control, reference, folder.parent / f"{folder.name}-input")
     if order is None:
         return None
-    runner.run(order.inputs, folder, order.settings, tell, until="simulate")
-    return runner.read_back(folder).played
+    run_pipeline.run(order.inputs, folder, order.settings, tell, until="simulate")
+    return run_pipeline.read_run(folder).played
 
 
-def exchanged(scene: Scene, parts: Parts, field: MaterialField) -> dict[str, dict]:
+def exchange_materials(scene: Scene, parts: Parts, field: MaterialField) -> dict[str, dict]:
     """Give the stiffest part the softest part's material, and so on; annotations of all parts.
 
     Parts of liquids and grains keep theirs. Nothing is said where all others are alike.
     """
-    solid = [k for k, m in enumerate(field.materials) if not MENU[m.law].loose]
+    solid = [k for k, m in enumerate(field.materials) if not CONSTITUTIVE_LAWS[m.law].loose]
     order = sorted(solid, key=lambda k: (field.materials[k].young, k))
     said: dict[str, dict] = {}
     for mine, theirs in zip(order, reversed(order), strict=True):
@@ -109,9 +112,9 @@ def exchanged(scene: Scene, parts: Parts, field: MaterialField) -> dict[str, dic
 
 
 def _lighter(scene: Scene, folder: Path) -> Path:
-    x, y, z = (GRAVITY_SHARE * g for g in scene.gravity)
+    x, y, z = (REMAINING_GRAVITY_FRACTION * g for g in scene.gravity)
     path = folder / f"{scene.name}.glb"
-    with store.writing(path):
+    with store.disk_errors(path):
         folder.mkdir(parents=True, exist_ok=True)
         write_glb(path, replace(scene, gravity=(x, y, z)))
     return path

@@ -8,12 +8,12 @@ from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from corporeal.core.typed import typed
+from corporeal.core.deserialize import from_plain
 
-Said = Literal["yes", "no", "unclear", "na"]
-MOST_WORDS = 1000
+QuestionAnswer = Literal["yes", "no", "unclear", "na"]
+MAX_DESCRIPTION_CHARACTERS = 1000
 """Longest description of a film [characters]."""
-LOWEST, HIGHEST = 1, 5
+MIN_MARK, MAX_MARK = 1, 5
 """Of the mark for a whole film."""
 
 
@@ -30,7 +30,7 @@ class SubQuestion:
 
 
 @dataclass(frozen=True)
-class Control:
+class ControlFault:
     """A known fault, and which questions are meant to report it."""
 
     id: str
@@ -39,11 +39,11 @@ class Control:
 
 
 @dataclass(frozen=True)
-class Catalogue:
+class QuestionCatalogue:
     """All of them, in order."""
 
     question: tuple[SubQuestion, ...]
-    control: tuple[Control, ...]
+    control: tuple[ControlFault, ...]
 
     def laws(self) -> list[str]:
         """Return the laws of physics, in the order of their first question."""
@@ -55,31 +55,31 @@ class Catalogue:
 
 
 @cache
-def catalogue() -> Catalogue:
+def question_catalogue() -> QuestionCatalogue:
     """Read questions and controls."""
     file = files("corporeal.lab.evaluation.judge").joinpath("questions.toml")
-    return typed(Catalogue, tomllib.loads(file.read_text(encoding="utf-8")))
+    return from_plain(QuestionCatalogue, tomllib.loads(file.read_text(encoding="utf-8")))
 
 
-class FilmAnswers(BaseModel):
+class VideoAnswers(BaseModel):
     """One answer a question: the fields are those of ``catalogue()``."""
 
     model_config = ConfigDict(extra="forbid")
 
 
-def _answers() -> type[FilmAnswers]:
+def _answers() -> type[VideoAnswers]:
     """Make a field a question: in a mapping a model could leave questions out."""
-    fields: dict[str, Any] = {q.id: (Said, ...) for q in catalogue().question}
-    return create_model("Answers", __base__=FilmAnswers, **fields)
+    fields: dict[str, Any] = {q.id: (QuestionAnswer, ...) for q in question_catalogue().question}
+    return create_model("Answers", __base__=VideoAnswers, **fields)
 
 
 class Verdict(BaseModel):
     """What is said of one film after one look."""
 
-    happens: str = Field(min_length=1, max_length=MOST_WORDS)
+    happens: str = Field(min_length=1, max_length=MAX_DESCRIPTION_CHARACTERS)
     answers: _answers()  # type: ignore[valid-type]
-    whole: int = Field(ge=LOWEST, le=HIGHEST)
+    whole: int = Field(ge=MIN_MARK, le=MAX_MARK)
 
-    def said(self) -> dict[str, Said]:
+    def said(self) -> dict[str, QuestionAnswer]:
         """Return question → answer."""
-        return {q: a for q, a in self.answers.model_dump().items() if a in get_args(Said)}
+        return {q: a for q, a in self.answers.model_dump().items() if a in get_args(QuestionAnswer)}

@@ -20,9 +20,9 @@ struct Runs {
     double low[RUNS_HELD], least = mpm::VAST;
     int held[RUNS_HELD], count = 0;
     for (int s = 0; s < F.shows; s++) {
-      const double *run = look(s), reach = around + run[5], from = along - run[5] * mpm::REACH_MARGIN;
-      if (aside > reach * reach * mpm::REACH_MARGIN || from > least) continue;
-      if (along + run[5] * mpm::REACH_MARGIN < -behind) continue;
+      const double *run = look(s), reach = around + run[5], from = along - run[5] * mpm::REACH_BOUND_FACTOR;
+      if (aside > reach * reach * mpm::REACH_BOUND_FACTOR || from > least) continue;
+      if (along + run[5] * mpm::REACH_BOUND_FACTOR < -behind) continue;
       if (count < RUNS_HELD)
         held[count] = s, low[count++] = from;
       else
@@ -41,7 +41,7 @@ struct Runs {
   inline double by_line() {
     double nearest = mpm::VAST, there = mpm::VAST;
     for (int s = 0; s < F.shows; s++) {
-      const double *run = look(s), off = sqrt(aside > 0 ? aside : 0.0) - run[5] * mpm::REACH_MARGIN;
+      const double *run = look(s), off = sqrt(aside > 0 ? aside : 0.0) - run[5] * mpm::REACH_BOUND_FACTOR;
       if (off > 0 && off * off > nearest) continue;
       mpm::Surface::by_line(F.shown + 3 * (int)run[0], (int)(run[1] - run[0]), x, n, behind, nearest, there);
     }

@@ -1,6 +1,6 @@
 // Of three candidates, the one along which two fields are farthest apart, unless one is kept.
-const int begun = (int)((long long)stage->junctions * index / PARTS),
-          ended = (int)((long long)stage->junctions * (index + 1) / PARTS);
+const int begun = (int)((long long)stage->junctions * index / LIST_PARTS),
+          ended = (int)((long long)stage->junctions * (index + 1) / LIST_PARTS);
 for (int j = begun; j < ended; j++) {
   const Junction &J = junctions[j];
   for (int t = J.touch; t < J.last && J.chosen; t++) {

@@ -9,8 +9,8 @@ struct Candidate {
     for (int d = 0; d < 3; d++) n[d] = (float)v[d];
   }
 };
-const int from = (int)((long long)stage->touches * index / PARTS),
-          to = (int)((long long)stage->touches * (index + 1) / PARTS);
+const int from = (int)((long long)stage->touches * index / LIST_PARTS),
+          to = (int)((long long)stage->touches * (index + 1) / LIST_PARTS);
 for (int t = from; t < to; t++) {
   const Touch &T = touches[t];
   Aim &aim = aims[t];

@@ -61,9 +61,9 @@ struct Around {
   }
   // Whether the particles of two fields are so far apart along an axis that no gap closes in a step.
   static inline bool apart(const Field &F, const Around &A, const Field &G, const Around &B, double far) {
-    far += F.flows || G.flows ? mpm::LOOSE_REACH : mpm::DENSE_REACH;
+    far += F.flows || G.flows ? mpm::LOOSE_CONTACT_REACH_DX : mpm::DENSE_CONTACT_REACH_DX;
     for (int d = 0; d < 3; d++)
-      if (B.low[d] - A.high[d] > far * UNIT || A.low[d] - B.high[d] > far * UNIT) return true;
+      if (B.low[d] - A.high[d] > far * CELL_UNITS || A.low[d] - B.high[d] > far * CELL_UNITS) return true;
     return false;
   }
 };
@@ -134,7 +134,7 @@ for (int f = 0; f < fields; f++) {
         pairs += !A.rigids && !C.rigids;
         J.several |= both;
         const bool wet = (A.patches && C.pours) || (C.patches && A.pours);
-        found += Grid::count(both) * (wet ? mpm::WETTED_FACES : 1);
+        found += Grid::count(both) * (wet ? mpm::MAX_WETTED_FACES : 1);
       }
     J.mask = J.several;
     // Planes, where a field may touch more than one; else they cost nothing but here: contact_stand.
@@ -180,7 +180,7 @@ stage->meets = world->full ? 0 : meet;
 stage->sides = world->full ? 0 : side;
 stage->touches = world->full ? 0 : touch;
 stage->choices = world->full ? 0 : choice;
-world->parts = stage->junctions ? PARTS : 0;
+world->parts = stage->junctions ? LIST_PARTS : 0;
 world->turns = stage->junctions ? world->rigids : 0;
 for (int k = 0; k < COLOURS; k++) {
   world->looks[k] = stage->junctions ? world->colour[k] : 0;

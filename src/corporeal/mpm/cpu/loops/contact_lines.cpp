@@ -10,7 +10,7 @@ struct List {
     }
     const int at[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
     for (int k = 0; k < 6; k++)
-      K[k] += Vec::dot(A[at[k][0]], B[at[k][1]]) + (at[k][0] == at[k][1]) * s[LIGHT];
+      K[k] += Vec::dot(A[at[k][0]], B[at[k][1]]) + (at[k][0] == at[k][1]) * s[INVERSE_MASS];
   }
   static inline double along(const double *K, const double *e) {
     return K[0] * e[0] * e[0] + K[3] * e[1] * e[1] + K[5] * e[2] * e[2] +
@@ -36,8 +36,8 @@ struct List {
       for (int i = 0; i < 3; i++) s[i] += sign * m * J[i];
       return;
     }
-    if (s[LIGHT] == 0) return;
-    double t[3], u[3], each = sign * s[LIGHT];
+    if (s[INVERSE_MASS] == 0) return;
+    double t[3], u[3], each = sign * s[INVERSE_MASS];
     Vec::cross(r, J, t);
     Vec::apply(s + INERTIA, t, u);
     for (int i = 0; i < 3; i++) {
@@ -57,7 +57,7 @@ struct List {
       t[i] = R.J[i] - old * R.n[i];
     }
     double size = sqrt(Vec::dot(d, d)), soft = R.inverse;
-    if (size > mpm::SMALLEST_SLIP) {
+    if (size > mpm::MIN_SLIP_SPEED) {
       double e[3] = {d[0] / size, d[1] / size, d[2] / size};
       soft = along(R.K, e);
       for (int i = 0; i < 3; i++) t[i] += d[i] / soft;
@@ -122,14 +122,14 @@ struct List {
   }
   // Whether a rigid body meets one there that moves as told.
   static inline bool guided(const Line &R) {
-    return !R.waits && R.ma < 0 && R.c && R.mc < 0 && (R.a[LIGHT] == 0 || R.c[LIGHT] == 0);
+    return !R.waits && R.ma < 0 && R.c && R.mc < 0 && (R.a[INVERSE_MASS] == 0 || R.c[INVERSE_MASS] == 0);
   }
   // What moves as told may leave no room between: then sweeps do not come to rest, and end as the last
   // contacts have it. All contacts at once give what is in between the same from all sides.
   MPM_RARE static void at_once(Line *lines, int n) {
     bool any = false;
     for (int i = 0; i < n && !any; i++) any = guided(lines[i]);
-    for (int s = 0; s < mpm::SWEEPS_AT_ONCE && any; s++) {
+    for (int s = 0; s < mpm::SIMULTANEOUS_SWEEPS && any; s++) {
       double u[3];
       int count = 0;
       for (int i = 0; i < n; i++)

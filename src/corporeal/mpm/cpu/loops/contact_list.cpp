@@ -1,6 +1,6 @@
 // Write down the nodes of some blocks, the fields there and their possible contacts.
-int from = (int)((long long)stage->junctions * index / PARTS),
-    to = (int)((long long)stage->junctions * (index + 1) / PARTS);
+int from = (int)((long long)stage->junctions * index / LIST_PARTS),
+    to = (int)((long long)stage->junctions * (index + 1) / LIST_PARTS);
 bool asked = false;
 for (int j = from; j < to; j++) {
   Junction &J = junctions[j];
@@ -70,7 +70,7 @@ for (int j = from; j < to; j++) {
           T.fc = sides[T.c].field;
           if (number[here[a]][here[c]] == Pairs::NONE) continue;
           const Field &G = world->field[T.fc];
-          if ((F.patches && G.pours) || (G.patches && F.pours)) faces = mpm::WETTED_FACES;
+          if ((F.patches && G.pours) || (G.patches && F.pours)) faces = mpm::MAX_WETTED_FACES;
         }
         const int pair = w >= 0 ? -1 : number[here[a]][here[c]];
         T.choice = pair < 0 ? -1 : choice_of[pair];

@@ -103,7 +103,7 @@ for (int number = chore[0]; number < chore[1]; number++) {
   const int *task = world->task + 4 * number;
   const Field &field = world->field[task[0]];
   for (int b = task[1]; b < task[2]; b++) {
-    const int *record = field.block + BLOCK * b;
+    const int *record = field.block + BLOCK_INTEGERS * b;
     for (int s = record[0]; s < record[1] && s < record[0] + 16; s += 8) Shares::ahead(field.part + (size_t)s * CHANNELS);
     const Asked asked(stage, field, task[0], record);
     if (!asked.count) continue;
@@ -113,7 +113,7 @@ for (int number = chore[0]; number < chore[1]; number++) {
       Shares::ahead(q + 8 * 2 * CHANNELS);
       i8 cell[3], place = i8{0, 0, 0, 0, 0, 0, 0, 0};   // in the arena
       for (int d = 0; d < 3; d++) {
-        cell[d] = (*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE;
+        cell[d] = (*(const i8u *)(q + 8 * (XI + d)) - HALF_CELL_UNITS) >> PLACE;
         place = place * 8 + (cell[d] - (4 * record[2 + d] - 1));
       }
       const int live = record[1] - s < 8 ? record[1] - s : 8;

@@ -16,7 +16,7 @@ struct Marks {
   }
   // Whether a body's particles, in their box, may reach a block's nodes.
   static inline bool near(const double *s, const double *mid, double dx) {
-    const double *R = s + TURN, *box = s + BOX;
+    const double *R = s + TURN, *box = s + LOCAL_BOX;
     for (int i = 0; i < 3; i++) {
       double r = 0, e = 0;
       for (int j = 0; j < 3; j++) {
@@ -71,8 +71,8 @@ struct Mates {
         out[9 + i] += R[3 * j + i] * (s[CENTRE + j] - g[CENTRE + j]);
         e += fabs(R[3 * j + i]) * 3.0 * dx;
       }
-      out[12 + i] = g[BOX + i] - e;
-      out[15 + i] = g[BOX + 3 + i] + e;
+      out[12 + i] = g[LOCAL_BOX + i] - e;
+      out[15 + i] = g[LOCAL_BOX + 3 + i] + e;
     }
   }
   // Whether a ball reaches a mate's box.

@@ -5,7 +5,7 @@ struct Points {
   // there, from that of the point itself; whether it is below reach.
   static inline bool touching(const Field &F, int p, const double *towards, double reach, double &gap,
                               double *at) {
-    const double *row = F.rounding + mpm::ROUNDING * p;
+    const double *row = F.rounding + mpm::CURVATURE_ROW * p;
     double shift[3] = {0, 0, 0};
     if (row[6] + row[7] > 0) {
       if (gap >= reach + 2 * row[8]) return false;   // neither part goes farther than the point's reach
@@ -41,13 +41,13 @@ struct Points {
   static inline const Field *rolls(const World *w, const Touch &T) {
     return T.meet >= 0 ? 0 : &w->field[T.face ? T.fc : T.fa];
   }
-  static inline bool has(const Field &F) { return F.rigids && F.surfaces && F.rigid[LIGHT] != 0; }
+  static inline bool has(const Field &F) { return F.rigids && F.surfaces && F.rigid[INVERSE_MASS] != 0; }
   static inline bool low(const World *w, const Field &F, int v) {
     const double *P = w->plane + 4 * v;
-    return Vec::dot(P, F.rigid + CENTRE) - P[3] <= F.rigid[RADIUS] + mpm::POINT_REACH * w->dx;
+    return Vec::dot(P, F.rigid + CENTRE) - P[3] <= F.rigid[RADIUS] + mpm::SURFACE_POINT_REACH_DX * w->dx;
   }
   MPM_RARE static int on_planes(const World *w, Touch *list) {
-    const double reach = mpm::POINT_REACH * w->dx;
+    const double reach = mpm::SURFACE_POINT_REACH_DX * w->dx;
     int count = 0;
     for (int f = 0; f < w->fields; f++) {
       const Field &F = w->field[f];
@@ -75,7 +75,7 @@ struct Points {
     const Field &F = w->field[f], &G = w->field[g];
     if (f == g || !has(F) || !F.rolls || !G.rigids || !(G.facets || G.bends)) return false;
     if (w->friction[f * (w->fields + w->planes) + g] < 0) return false;   // never in contact
-    double square = 0, most = F.rigid[RADIUS] + G.rigid[RADIUS] + mpm::POINT_REACH * w->dx;
+    double square = 0, most = F.rigid[RADIUS] + G.rigid[RADIUS] + mpm::SURFACE_POINT_REACH_DX * w->dx;
     for (int i = 0; i < 3; i++) {
       const double d = F.rigid[CENTRE + i] - G.rigid[CENTRE + i];
       square += d * d;
@@ -91,7 +91,7 @@ struct Points {
   }
   MPM_RARE static int with_facets(const World *w, int f, int g, Touch *list, int room) {
     const Field &F = w->field[f], &G = w->field[g];
-    const double *s = F.rigid, *t = G.rigid, reach = mpm::POINT_REACH * w->dx;
+    const double *s = F.rigid, *t = G.rigid, reach = mpm::SURFACE_POINT_REACH_DX * w->dx;
     double apart[3], centre[3];
     for (int i = 0; i < 3; i++) apart[i] = s[CENTRE + i] - t[CENTRE + i];
     turn_back(t, apart, centre);
@@ -104,7 +104,7 @@ struct Points {
       turn_back(s, n, up);
       const double towards[3] = {-up[0], -up[1], -up[2]}, height = Vec::dot(row, centre) - row[3];
       for (int p = 0; p < F.surfaces && count < room; p++) {
-        const double *rounding = F.rounding + mpm::ROUNDING * p;
+        const double *rounding = F.rounding + mpm::CURVATURE_ROW * p;
         double gap = height + Vec::dot(up, F.surface + 3 * p);
         const double radius = rounding[6] + rounding[7];   // its middle is on this side of the face
         if (radius <= 0 || !touching(F, p, towards, reach, gap, at) || gap <= -reach || gap <= -radius) continue;
@@ -135,10 +135,10 @@ struct Points {
     int f, g, nears, near[MOST_BENT];
     double apart[3], low[3], high[3];
     Meets(const World *w, int f, int g)
-        : w(w), F(w->field[f]), G(w->field[g]), s(F.rigid), t(G.rigid), reach(mpm::POINT_REACH * w->dx), f(f), g(g) {
+        : w(w), F(w->field[f]), G(w->field[g]), s(F.rigid), t(G.rigid), reach(mpm::SURFACE_POINT_REACH_DX * w->dx), f(f), g(g) {
       for (int i = 0; i < 3; i++) apart[i] = s[CENTRE + i] - t[CENTRE + i];
     }
-    const double *row(int q) const { return G.rounding + mpm::ROUNDING * q; }
+    const double *row(int q) const { return G.rounding + mpm::CURVATURE_ROW * q; }
     // List curved points of g near f, and the box around them, in the world from f's centre.
     bool find() {
       double centre[3], x[3];
@@ -170,14 +170,14 @@ struct Points {
     }
     // Whether a place in f's frame belongs to point p and not to its neighbours.
     bool owns(int p, const double *x) const {
-      const double *round = F.rounding + mpm::ROUNDING * p, *at = F.surface + 3 * p;
+      const double *round = F.rounding + mpm::CURVATURE_ROW * p, *at = F.surface + 3 * p;
       const double d[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]}, own = Vec::dot(d, d);
       for (int o = 0; o < F.surfaces; o++)
-        if (mpm::Curved::taken(round, own, x, F.rounding + mpm::ROUNDING * o, F.surface + 3 * o)) return false;
+        if (mpm::Curved::taken(round, own, x, F.rounding + mpm::CURVATURE_ROW * o, F.surface + 3 * o)) return false;
       return true;
     }
     bool meet(int p, Touch &T) const {
-      const double *round = F.rounding + mpm::ROUNDING * p, radius = mpm::Curved::ball(round);
+      const double *round = F.rounding + mpm::CURVATURE_ROW * p, radius = mpm::Curved::ball(round);
       double x[3], y[3], m[3], gap;
       turn(s, F.surface + 3 * p, y);
       for (int i = 0; i < 3; i++)
@@ -210,7 +210,7 @@ struct Points {
       int count = 0;
       if (!find()) return 0;
       for (int p = 0; p < F.surfaces && count < room; p++)
-        if (mpm::Curved::ball(F.rounding + mpm::ROUNDING * p) > 0) count += meet(p, list[count]);
+        if (mpm::Curved::ball(F.rounding + mpm::CURVATURE_ROW * p) > 0) count += meet(p, list[count]);
       return count;
     }
   };
@@ -235,7 +235,7 @@ struct Points {
       const Touch &P = touches[q];
       const double reach = instead(w, P);
       const bool bent = P.instead > 0 || w->field[P.face ? P.fa : P.fc].thin;
-      const double alike = bent ? mpm::ROUND_ALIKE : mpm::FACET_ALIKE;
+      const double alike = bent ? mpm::CURVED_NORMAL_COSINE : mpm::FACET_NORMAL_COSINE;
       for (int t = 0; t < nodes; t++) {
         Touch &T = touches[t];
         if (!T.active || T.fa != P.fa || T.fc != P.fc) continue;
@@ -251,7 +251,7 @@ struct Points {
       Touch &T = touches[t];
       if (!T.active || T.c < 0 || !w->field[T.fa].rigids || !w->field[T.fc].rigids) continue;
       double rest[3] = {T.normal[0], T.normal[1], T.normal[2]};
-      for (int turn = 0; turn < mpm::VALLEY_TURNS; turn++) {
+      for (int turn = 0; turn < mpm::VALLEY_ITERATIONS; turn++) {
         const Touch *best = 0;
         double most = 0;
         for (int q = first; q < all; q++) {
@@ -265,7 +265,7 @@ struct Points {
         if (!best) break;
         for (int i = 0; i < 3; i++) rest[i] -= most * best->normal[i];
       }
-      if (Vec::dot(rest, rest) < 1.0 - mpm::FACET_ALIKE * mpm::FACET_ALIKE) T.active = 0;
+      if (Vec::dot(rest, rest) < 1.0 - mpm::FACET_NORMAL_COSINE * mpm::FACET_NORMAL_COSINE) T.active = 0;
     }
   }
 };

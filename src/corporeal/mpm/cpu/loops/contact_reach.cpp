@@ -42,7 +42,7 @@ struct Support {
       rows = Simd::high(rows, Simd::size(F[3 * i]) + Simd::size(F[3 * i + 1]) + Simd::size(F[3 * i + 2]));
       columns = Simd::high(columns, Simd::size(F[i]) + Simd::size(F[3 + i]) + Simd::size(F[6 + i]));
     }
-    most = reach * Simd::root(rows * columns) * (float)mpm::REACH_MARGIN;
+    most = reach * Simd::root(rows * columns) * (float)mpm::REACH_BOUND_FACTOR;
   }
 };
 if (index >= world->chores) {
@@ -90,7 +90,7 @@ for (int number = chore[0]; number < chore[1]; number++) {
   const int *task = world->task + 4 * number;
   const Field &field = world->field[task[0]];
   for (int b = task[1]; b < task[2]; b++) {
-    const int *record = field.block + BLOCK * b;
+    const int *record = field.block + BLOCK_INTEGERS * b;
     int any = 0;
     for (int i = 0; i < 27; i++) any |= field.where[4 * record[NEIGHBOURS + i] + 3];
     if (!any) continue;

@@ -2,7 +2,7 @@
 // points. Then the books, and rigid bodies move.
 
 struct Rounds {
-  static_assert(PAIR == Backing::ROW, "one row of a pair");
+  static_assert(PAIR_COLUMNS == Backing::ROW, "one row of a pair");
   static inline bool both_rigid(const Line &R) { return R.ma < 0 && (R.mc < 0 || !R.c); }
   // Where two rigid bodies touch that meet at a node: not beyond the edge of one of them.
   static inline void place(const World *w, const Side *sides, Touch &T, double dx) {
@@ -24,8 +24,8 @@ struct Rounds {
       if (R.e <= 0) continue;
       const double speed = List::closing(R, Points::rolls(w, T), approach);
       if (!Impact::begins(approach, speed, T.gap, dt)) continue;
-      for (int k = 0; k < PAIR * all * all && !any; k++) pair[k] = 0;
-      double *row = pair + PAIR * (T.fa * all + T.fc);
+      for (int k = 0; k < PAIR_COLUMNS * all * all && !any; k++) pair[k] = 0;
+      double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc);
       row[Backing::ROLE] = Backing::STRUCK;
       row[Backing::LEAST] = mpm::VAST_DOUBLE;
       if (approach > row[Backing::SPEED]) row[Backing::SPEED] = approach;
@@ -34,13 +34,13 @@ struct Rounds {
     if (!any) return false;
     for (int i = 0; i < n; i++) {
       const Touch &T = stage->touch[stage->line[i].touch];
-      double *row = pair + PAIR * (T.fa * all + T.fc);
+      double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc);
       if (row[Backing::ROLE] == Backing::STRUCK && T.gap < row[Backing::LEAST]) row[Backing::LEAST] = T.gap;
     }
     for (int i = 0; i < n; i++) {
       const Line &R = stage->line[i];
       const Touch &T = stage->touch[R.touch];
-      double *row = pair + PAIR * (T.fa * all + T.fc), sums[Backing::ROW - Backing::COUNT];
+      double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc), sums[Backing::ROW - Backing::COUNT];
       if (!both_rigid(R)) continue;
       const double speed = List::closing(R, 0, approach);
       if (!Backing::near(T.gap, row[Backing::LEAST], speed, dx)) continue;
@@ -48,14 +48,14 @@ struct Rounds {
       for (int k = Backing::COUNT; k < Backing::ROW; k++) row[k] += sums[k - Backing::COUNT];
     }
     for (int f = 0; f < all; f++)
-      stage->light[f] = f >= w->fields ? 0.0 : w->field[f].rigids ? w->field[f].rigid[LIGHT] : -1.0;
+      stage->light[f] = f >= w->fields ? 0.0 : w->field[f].rigids ? w->field[f].rigid[INVERSE_MASS] : -1.0;
     Backing::hold(pair, w->restitution, w->bounces, stage->light, all, dx);
     return true;
   }
 };
 Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
-double *pair = stage->pair;   // [all][all][PAIR]
+double *pair = stage->pair;   // [all][all][PAIR_COLUMNS]
 nt += Points::on_planes(world, touches + nt);
 const int faces = nt;   // contacts of what is round with faces of others begin here
 nt += Points::on_facets(world, touches + nt, stage->most_touches - nt);
@@ -122,13 +122,13 @@ if (n) {
   // In every round the pairs that approach now rebound together, those behind hold what is light, and
   // all others wait.
   int impacts = 0;
-  for (; impacts < mpm::IMPACTS && Rounds::find(world, stage, n, all, dt, dx); impacts++) {
+  for (; impacts < mpm::MAX_IMPACTS_PER_STEP && Rounds::find(world, stage, n, all, dt, dx); impacts++) {
     double approach;
     bool holds = false;
     for (int i = 0; i < n; i++) {
       Line &R = lines[i];
       const Touch &T = touches[R.touch];
-      const double *row = pair + PAIR * (T.fa * all + T.fc);
+      const double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc);
       R.waits = row[Backing::ROLE] == Backing::WAITS;
       if (R.waits) continue;
       for (int d = 0; d < 3; d++) R.J[d] = 0;
@@ -138,8 +138,8 @@ if (n) {
       const double speed = List::closing(R, Points::rolls(world, T), approach);
       R.target = Impact::target(row[Backing::BOUNCE], approach, speed, T.gap, dt, dx);
     }
-    const int most = holds ? mpm::SWEEPS_OF_A_HOLD : mpm::SWEEPS_OF_A_HIT;
-    List::sweep(lines, order, place, n, most, mpm::SWEEPS, mpm::STILL_OF_A_HIT * dx, stacked);
+    const int most = holds ? mpm::SUPPORTED_IMPACT_SWEEPS : mpm::IMPACT_SWEEPS;
+    List::sweep(lines, order, place, n, most, mpm::SWEEPS, mpm::IMPACT_SWEEP_TOLERANCE_DX * dx, stacked);
     for (int i = 0; i < n; i++)
       for (int d = 0; d < 3 && !lines[i].waits; d++) touches[lines[i].touch].J[d] += lines[i].J[d];
   }
@@ -151,7 +151,7 @@ if (n) {
   // Then all contacts together. Rigid bodies on one another have only each other to yield: with few
   // sweeps stacks creep. So contacts begin with the forces of the last step, and sweeps end when what
   // they change would creep by less than a few thousandths of a cell per second.
-  const int sweeps = impacts || stacked ? mpm::SWEEPS_OF_A_HIT : mpm::SWEEPS;
+  const int sweeps = impacts || stacked ? mpm::IMPACT_SWEEPS : mpm::SWEEPS;
   const bool known = stage->pasts > 0;
   if (known) {
     int *slot = stage->slot, last = stage->slots - 1;
@@ -167,8 +167,8 @@ if (n) {
       if (slot[at]) List::remember(lines[i], stage->past[slot[at] - 1].force, dt);
     }
   }
-  const int least = known && !impacts ? mpm::SWEEPS_REMEMBERED : mpm::SWEEPS;
-  const double still = (impacts ? mpm::STILL_OF_A_HIT : mpm::STILL) * dx;
+  const int least = known && !impacts ? mpm::WARM_START_MIN_SWEEPS : mpm::SWEEPS;
+  const double still = (impacts ? mpm::IMPACT_SWEEP_TOLERANCE_DX : mpm::SWEEP_TOLERANCE_DX) * dx;
   stage->sweeps = List::sweep(lines, order, place, n, sweeps, least, still, stacked);
   stage->pasts = 0;
   for (int i = 0; i < n; i++) {
@@ -190,14 +190,14 @@ if (n) {
 // Rolling friction, after all that touches is solved; in single contacts, one after the other.
 struct Rolls {
   static inline void side(const double *s, const double *r, mpm::RollingSide &out) {
-    out.light = s ? s[LIGHT] : 0.0;
+    out.light = s ? s[INVERSE_MASS] : 0.0;
     for (int i = 0; i < 9; i++) out.inertia[i] = out.light > 0 ? s[INERTIA + i] : 0.0;
     for (int i = 0; i < 3; i++) out.arm[i] = s ? r[i] : 0.0;
   }
   static inline void give(World *w, double *s, const double *r, const double *M, const double *f, double sign) {
     if (!s) return;
-    if (s[LIGHT] == 0) *w->clock->push_work -= sign * Vec::dot(M, s + SPIN);
-    if (s[LIGHT] == 0) return;
+    if (s[INVERSE_MASS] == 0) *w->clock->push_work -= sign * Vec::dot(M, s + SPIN);
+    if (s[INVERSE_MASS] == 0) return;
     double u[3];
     List::hit(s, -1, r, f, sign);
     Vec::apply(s + INERTIA, M, u);
@@ -210,7 +210,7 @@ struct Rolls {
     const Field *F = Points::rolls(w, T);
     const double most = w->rolling[T.fa * all + T.fc] * Vec::dot(T.J, T.normal);
     if (!F || most <= 0 || !F->rolls) return;
-    const double *round = F->rounding + mpm::ROUNDING * (T.a % F->surfaces);
+    const double *round = F->rounding + mpm::CURVATURE_ROW * (T.a % F->surfaces);
     if (round[6] + round[7] <= 0) return;
     mpm::RollingSide a, c;
     side(R.a, R.ra, a);
@@ -228,7 +228,7 @@ struct Books {
   // What a contact's impulse J on a body that moves as told takes of its mover.
   static inline void react(World *w, const double *s, int body, const double *x, const double *J,
                            double sign) {
-    if (s[LIGHT] != 0) return;
+    if (s[INVERSE_MASS] != 0) return;
     double v[3];
     Body6::velocity(s, x, v);
     *w->clock->push_work -= sign * Vec::dot(J, v);
@@ -236,7 +236,7 @@ struct Books {
   }
   static inline bool any(const Entry &e) { return e.normal > 0 || Vec::dot(e.J, e.J) > 0; }
   static inline void enter(World *w, double *pair, int all, const Entry &e) {
-    double *row = pair + (e.a * all + e.c) * PAIR;
+    double *row = pair + (e.a * all + e.c) * PAIR_COLUMNS;
     row[1] += e.normal;
     for (int i = 0; i < 3; i++) row[2 + i] += e.place[i];
     *w->friction_loss += e.loss;
@@ -250,11 +250,11 @@ struct Books {
   }
 };
 for (int i = 0; i < all * all; i++)
-  for (int d = 1; d < 5; d++) pair[PAIR * i + d] = 0;
+  for (int d = 1; d < 5; d++) pair[PAIR_COLUMNS * i + d] = 0;
 for (int i = 0; i < world->stands; i++)
   if (Books::any(stage->stand[i])) Books::enter(world, pair, all, stage->stand[i]);
 for (int p = 0; p < world->parts; p++) {
-  int from = (int)((long long)stage->junctions * p / PARTS);
+  int from = (int)((long long)stage->junctions * p / LIST_PARTS);
   for (int e = 0; e < stage->entries[p]; e++)
     Books::enter(world, pair, all, stage->entry[junctions[from].touch + e]);
 }
@@ -273,7 +273,7 @@ for (int i = 0; i < n; i++) {
 const int bodies = world->names - planes;
 for (int a = 0; a < fields; a++)
   for (int c = a + 1; c < all; c++) {
-    const double *row = pair + (a * all + c) * PAIR;
+    const double *row = pair + (a * all + c) * PAIR_COLUMNS;
     if (row[1] <= 0) continue;
     if (c < fields) {
       world->pair_impulse[a * bodies + c] += row[1];
@@ -301,20 +301,20 @@ for (int f = 0; f < fields; f++) {
   const Field &F = world->field[f];
   if (!F.rigids) continue;
   double *s = F.rigid, Q[9];
-  if (s[LIGHT] == 0) {
+  if (s[INVERSE_MASS] == 0) {
     double inertia[9], moment[3], work = 0;
-    mpm::Body::inverse_inertia(s + NEXT, s + HEAVY, inertia);
+    mpm::Body::inverse_inertia(s + NEXT_ROTATION, s + REST_INERTIA, inertia);
     Vec::apply(inertia, s + SPIN, moment);
     for (int i = 0; i < 3; i++) {
       work += 0.5 * s[SPIN + i] * (moment[i] - s[MOMENT + i]);
       s[MOMENT + i] = moment[i];
       s[CENTRE + i] += dt * s[SPEED + i];
     }
-    for (int i = 0; i < 9; i++) s[TURN + i] = s[NEXT + i];
+    for (int i = 0; i < 9; i++) s[TURN + i] = s[NEXT_ROTATION + i];
     *world->clock->push_work += work;
     continue;
   }
-  mpm::Body::advance(s + TURN, s + REST, s + MOMENT, s + SPIN, dt, Q);
+  mpm::Body::advance(s + TURN, s + REST_INVERSE_INERTIA, s + MOMENT, s + SPIN, dt, Q);
   for (int i = 0; i < 9; i++) s[TURN + i] = Q[i];
   Body6::spin_up(s);
   for (int i = 0; i < 3; i++) s[CENTRE + i] += dt * s[SPEED + i];

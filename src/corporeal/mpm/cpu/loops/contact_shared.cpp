@@ -15,8 +15,8 @@ using mpm::WallStress;
 struct Body6 {            // a rigid body's state
   // What moves as told keeps the spin that it was given.
   static inline void spin_up(double *s) {
-    if (s[LIGHT] == 0) return;
-    mpm::Body::inverse_inertia(s + TURN, s + REST, s + INERTIA);
+    if (s[INVERSE_MASS] == 0) return;
+    mpm::Body::inverse_inertia(s + TURN, s + REST_INVERSE_INERTIA, s + INERTIA);
     Vec::apply(s + INERTIA, s + MOMENT, s + SPIN);
   }
   static inline void velocity(const double *s, const double *x, double *v) {
@@ -56,15 +56,15 @@ struct Grid {
   // reaches the plane.
   static inline bool slides(const World *w, int field, int plane) {
     const int all = w->fields + w->planes;
-    return w->field[field].pours && w->friction[field * all + w->fields + plane] < mpm::STICKS;
+    return w->field[field].pours && w->friction[field * all + w->fields + plane] < mpm::STICKING_FRICTION;
   }
   // Whether a liquid sticks to another field or to a plane, which then drags on it.
   static inline bool sticks(const World *w, int field, int other) {
-    return w->field[field].pours && w->friction[field * (w->fields + w->planes) + other] >= mpm::STICKS;
+    return w->field[field].pours && w->friction[field * (w->fields + w->planes) + other] >= mpm::STICKING_FRICTION;
   }
   // How high nodes of a field can touch a plane [cells].
   static inline double reach(const World *w, int field) {
-    return w->field[field].pours ? mpm::HELD_BY_WALL : mpm::WALL_REACH;
+    return w->field[field].pours ? mpm::LIQUID_WALL_REACH_DX : mpm::WALL_REACH;
   }
   // Whether a block lies so high over a plane that none of its nodes can touch it.
   static inline bool over(const double *P, const int *at, double dx, double reach) {
@@ -117,9 +117,9 @@ struct Walls {
   Walls(const World *w, const int *at) : count(0) {
     for (int v = 0; v < w->planes && count < WALLS; v++) {
       const double *P = w->plane + 4 * v;
-      if (Grid::over(P, at, w->dx, mpm::HELD_BY_WALL)) continue;
+      if (Grid::over(P, at, w->dx, mpm::LIQUID_WALL_REACH_DX)) continue;
       near[count] = Grid::wall(P, at, w->dx, mpm::WALL_REACH);
-      wide[count] = Grid::wall(P, at, w->dx, mpm::HELD_BY_WALL);
+      wide[count] = Grid::wall(P, at, w->dx, mpm::LIQUID_WALL_REACH_DX);
       plane[count++] = v;
     }
   }
@@ -137,7 +137,7 @@ struct Nearby {
   int low[3], high[3];      // cells in it
   // Cells of a batch in their block's arena.
   static inline i8 cells(const int *record, const float *q, int d) {
-    return ((*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE) - (4 * record[2 + d] - 1);
+    return ((*(const i8u *)(q + 8 * (XI + d)) - HALF_CELL_UNITS) >> PLACE) - (4 * record[2 + d] - 1);
   }
   // Layers: nodes of the arena that are asked for, a bit for each.
   inline bool find(const int *record, const float *q, int s, const u64 *layers) {
@@ -168,12 +168,12 @@ struct Nearby {
 struct Reached {
   u64 axis[3][3];
   Reached(const Field &field, const int *record) {
-    const int *box = field.box + 6 * ((record - field.block) / BLOCK);
+    const int *box = field.box + 6 * ((record - field.block) / BLOCK_INTEGERS);
     const u64 layer[3] = {0xffffull, 0x000f000f000f000full, 0x1111111111111111ull};
     const int step[3] = {16, 4, 1};
     for (int d = 0; d < 3; d++) {
       const int first = 4 * (record[2 + d] - 1);   // of the neighbour below
-      const int low = ((box[d] - HALF) >> PLACE) - first, high = ((box[3 + d] - HALF) >> PLACE) - first + 2;
+      const int low = ((box[d] - HALF_CELL_UNITS) >> PLACE) - first, high = ((box[3 + d] - HALF_CELL_UNITS) >> PLACE) - first + 2;
       for (int n = 0; n < 3; n++) {
         axis[d][n] = 0;
         for (int k = 0; k < 4; k++)

@@ -18,11 +18,11 @@ struct Solver {
     const Field &F = w->field[A.field], &G = w->field[C.field];
     if (liquid(F, G)) {
       const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
-      return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
+      return T.mu < mpm::STICKING_FRICTION ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
     }
     if (!F.thin && !G.thin) {
       const double apart = Face::gap(w->face, pa, pc);
-      const bool flat = F.flat && G.flat && apart <= mpm::FLAT_APART;
+      const bool flat = F.flat && G.flat && apart <= mpm::FLAT_BODY_GAP_DX;
       if (!flat && !thin_there(w, F, G, T)) return apart;
     }
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
@@ -36,7 +36,7 @@ struct Solver {
       const Field &B = side ? G : F;
       double q[3], d[3];
       inside(B, T.x, T.normal, q, d);
-      if (mpm::Surface::thin_there(B.slim, B.slims, q, mpm::SIGHT * w->dx)) return true;
+      if (mpm::Surface::thin_there(B.slim, B.slims, q, mpm::NODE_SIGHT_DX * w->dx)) return true;
     }
     return false;
   }
@@ -86,7 +86,7 @@ struct Solver {
     const Side &S = sides[side == 1 ? T.a : T.c];
     const double sign = side == 1 ? 1.0 : -1.0;
     const double mean = sign * (S.mean[0] * T.normal[0] + S.mean[1] * T.normal[1] + S.mean[2] * T.normal[2]);
-    if (h > mpm::HELD_BY_WALL || Face::gap_to_plane(mean, h) >= mpm::LIQUID_TOUCHES) return 0.0;
+    if (h > mpm::LIQUID_WALL_REACH_DX || Face::gap_to_plane(mean, h) >= mpm::LIQUID_TOUCH_DX) return 0.0;
     return WallStress::span(S.m, w->field[S.field].full, h, w->dx, w->dt);
   }
   // Whether a liquid meets a rigid body that says where liquids touch it.
@@ -122,15 +122,15 @@ struct Solver {
     }
     mpm::NearWetted rows;
     rows.count = 0;
-    const double reach = mpm::WETTED_REACH * w->dx;
+    const double reach = mpm::WETTED_REACH_DX * w->dx;
     for (int p = 0; p < F.patches; p++) {
       const double *patch = F.patch + 6 * p;
       if (mpm::Wetted::square(patch + 2, X) > (patch[5] + reach) * (patch[5] + reach)) continue;
       for (int start = (int)patch[0], end = (int)patch[1]; start < end; start += 8) {
         // Eight at once in single precision, which lets some more through than are near.
-        int left = close(F, start, X, mpm::WETTED_SLACK * reach);
+        int left = close(F, start, X, mpm::WETTED_SEARCH_FACTOR * reach);
         if (end - start < 8) left &= (1 << (end - start)) - 1;
-        for (; left && rows.count < mpm::WETTED_ROWS; left &= left - 1) {
+        for (; left && rows.count < mpm::MAX_WETTED_POINTS; left &= left - 1) {
           const double *row = F.wetted + 6 * (start + __builtin_ctz(left));
           const double d = mpm::Wetted::square(row, X);
           if (d <= reach * reach) rows.add(row, d);
@@ -151,7 +151,7 @@ struct Solver {
     double q[3], d[3];
     inside(F, x, n, q, d);
     for (int i = 0; i < 3 && scale < 0; i++) d[i] = -d[i];
-    Runs runs = {F, q, d, mpm::SHOWN_AROUND * w->dx, mpm::SIGHT * w->dx, 0, 0};
+    Runs runs = {F, q, d, mpm::SURFACE_SEARCH_RADIUS_DX * w->dx, mpm::NODE_SIGHT_DX * w->dx, 0, 0};
     return mpm::Surface::begins(runs) * (scale < 0 ? -scale : scale);
   }
   // Relative velocity as the step began, before its forces: what friction's work is booked with.
@@ -317,8 +317,8 @@ struct Together {
     count = 0;
   }
 };
-const int from = (int)((long long)stage->junctions * index / PARTS),
-          to = (int)((long long)stage->junctions * (index + 1) / PARTS);
+const int from = (int)((long long)stage->junctions * index / LIST_PARTS),
+          to = (int)((long long)stage->junctions * (index + 1) / LIST_PARTS);
 int entries = 0;
 Smooth smooth;
 Together together = {};
@@ -371,7 +371,7 @@ if (from < to) {
     for (int k = J.meet; k < end; k++) {
       Meet &M = meets[k];
       int active = 0, nears = M.stiff, faces = 0;
-      mpm::Wetted face[mpm::WETTED_FACES];
+      mpm::Wetted face[mpm::MAX_WETTED_FACES];
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         Touch &T = touches[t];
         for (int d = 0; d < 3; d++) T.J[d] = 0;

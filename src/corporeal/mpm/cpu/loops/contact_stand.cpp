@@ -27,7 +27,7 @@ if (F.floor >= 0) {
       const double gap = (slides ? Face::gap_of_liquid(-node[7], h, node[0] / F.full)
                           : h > mpm::WALL_REACH ? mpm::VAST : near) * dx;
       const double push = m * (fall - (gap > 0 ? gap * per : 0.0)), jn = push > 0 ? push : 0.0;
-      const bool drags = sticks && near < mpm::LIQUID_TOUCHES;
+      const bool drags = sticks && near < mpm::LIQUID_TOUCH_DX;
       if (jn <= 0 && !drags) continue;
       double slip[3], size = 0, u[3], was[3], scale;
       for (int d = 0; d < 3; d++) {

@@ -19,7 +19,7 @@ for (int b = task[1]; b < task[2]; b++) {
   for (int i = 0; i < 64; i++) {
     f8 a = node[i];
     float m = a[0];
-    if (m > (float)mpm::SMALLEST_MASS) {
+    if (m > (float)mpm::MIN_NODE_MASS_KG) {
       f8 p = __builtin_shufflevector(a, a, 0, 1, 2, 3, 1, 2, 3, 7);
       f8 f = __builtin_shufflevector(a, a, 0, 4, 5, 6, 0, 0, 0, 0);
       a = (p + h * f) * (1.0f / m) + g;

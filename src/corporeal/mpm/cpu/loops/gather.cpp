@@ -6,13 +6,13 @@ struct LaneMaterial : mpm::Material<f8> {
     f8 *to = &t.law;
     i8 all = *(const i8u *)kind;
     if (!Simd::any(all != kind[0])) {
-      const float *row = field.material + MATERIAL * kind[0];
+      const float *row = field.material + MATERIAL_COLUMNS * kind[0];
       for (int k = LAW; k <= RIGID; k++) to[k] = Simd::all(row[k]);
       return t;
     }
     alignas(32) float lane[RIGID + 1][8];
     for (int l = 0; l < 8; l++) {
-      const float *row = field.material + MATERIAL * kind[l];
+      const float *row = field.material + MATERIAL_COLUMNS * kind[l];
       for (int k = LAW; k <= RIGID; k++) lane[k][l] = row[k];
     }
     for (int k = LAW; k <= RIGID; k++) to[k] = *(f8 *)lane[k];
@@ -36,7 +36,7 @@ struct Gather {
       f8 s[3];
 #pragma unroll
       for (int j = 0; j < 3; j++) {
-        const f8 *h = g + i * LAYER + j * 8;
+        const f8 *h = g + i * ARENA_LAYER_NODES + j * 8;
         const Row *w = W + (i * 3 + j) * 3;
         f8 b = w[2][l] * h[2], t = w[1][l] * h[1] + b;
         s[j] = w[0][l] * h[0] + t;
@@ -58,7 +58,7 @@ struct Gather {
       f8 s[TOGETHER][3];
 #pragma unroll
       for (int j = 0; j < 3; j++) {
-        const f8 *h = g + i * LAYER + j * 8, h0 = h[0], h1 = h[1], h2 = h[2];
+        const f8 *h = g + i * ARENA_LAYER_NODES + j * 8, h0 = h[0], h1 = h[1], h2 = h[2];
         const Row *w = W + (i * 3 + j) * 3;
 #pragma unroll
         for (int n = l; n < l + TOGETHER; n++) {
@@ -83,11 +83,11 @@ struct Gather {
   }
   static inline void fill(const Field &field, const int *block, f8 *arena) {
     int low[3], high[3];
-    Simd::range(block, field.box + 6 * ((block - field.block) / BLOCK), low, high);   // as they were laid
+    Simd::range(block, field.box + 6 * ((block - field.block) / BLOCK_INTEGERS), low, high);   // as they were laid
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + NEIGHBOURS + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
-        f8 *h = arena + i * LAYER + j * 8;
+        f8 *h = arena + i * ARENA_LAYER_NODES + j * 8;
         size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
         const f8 *g0 = (f8 *)field.node + (size_t)near[0] * 64 + row;
         const f8 *g1 = (f8 *)field.node + (size_t)near[1] * 64 + row;
@@ -112,33 +112,33 @@ struct Gather {
     typedef mpm::Branch<f8> Branch;
     f8 A[9], trace = Branch::deviator(L, A), work = Simd::all(0.0f);
     f8 d[6] = {L[0], L[1] + L[3], L[2] + L[6], L[4], L[5] + L[7], L[8]};
-    for (int b = 0; b < mpm::BRANCHES; b++, branch += 8 * BRANCH) {
-      f8 E[6], theta = *(f8u *)(branch + 8 * SWOLLEN), old[6], G, K, kept, fresh;
+    for (int b = 0; b < mpm::BRANCHES; b++, branch += 8 * BRANCH_CHANNELS) {
+      f8 E[6], theta = *(f8u *)(branch + 8 * BRANCH_DILATATION), old[6], G, K, kept, fresh;
       for (int l = 0; l < 8; l++) {
-        const float *row = field.material + MATERIAL * kind[l];
-        G[l] = row[SHEAR + b], K[l] = row[BULK + b], kept[l] = row[KEPT + b], fresh[l] = row[FRESH + b];
+        const float *row = field.material + MATERIAL_COLUMNS * kind[l];
+        G[l] = row[SHEAR + b], K[l] = row[BULK + b], kept[l] = row[BRANCH_KEPT + b], fresh[l] = row[BRANCH_FRESH + b];
       }
-      for (int k = 0; k < 6; k++) E[k] = *(f8u *)(branch + 8 * (CONFORMATION + k)), old[k] = Simd::all(0.0f);
+      for (int k = 0; k < 6; k++) E[k] = *(f8u *)(branch + 8 * (BRANCH_STRAIN + k)), old[k] = Simd::all(0.0f);
       Branch::press(G, K, E, theta, old);
       for (int k = 0; k < 6; k++) work += old[k] * d[k];
       Branch::follow(A, kept, fresh, E);
       theta = kept * theta + fresh * trace;
       Branch::press(G, K, E, theta, stress);
-      for (int k = 0; k < 6; k++) *(f8u *)(branch + 8 * (CONFORMATION + k)) = E[k];
-      *(f8u *)(branch + 8 * SWOLLEN) = theta;
+      for (int k = 0; k < 6; k++) *(f8u *)(branch + 8 * (BRANCH_STRAIN + k)) = E[k];
+      *(f8u *)(branch + 8 * BRANCH_DILATATION) = theta;
     }
     return work;
   }
   // How many times stiffer waves find each lane's matter with branches than without.
   static inline f8 stiffening(const Field &field, const int *kind) {
     f8 times;
-    for (int l = 0; l < 8; l++) times[l] = field.material[MATERIAL * kind[l] + STIFFENING];
+    for (int l = 0; l < 8; l++) times[l] = field.material[MATERIAL_COLUMNS * kind[l] + STIFFENING];
     return times;
   }
   inline void batch(const World *world, const Field &field, const int *block, int s, const f8 *arena,
                     ClusterMean &dilatation, const int *least, const int *most) {
     const float dt = (float)world->dt, step = (float)(world->dt / world->dx), dx = (float)world->dx;
-    float *q = field.part + (size_t)s * CHANNELS, *past = field.history + (size_t)s * HISTORY;
+    float *q = field.part + (size_t)s * CHANNELS, *past = field.history + (size_t)s * HISTORY_CHANNELS;
     for (int k = 0; k < CHANNELS * 8; k += 16) __builtin_prefetch(q + 2 * CHANNELS * 8 + k, 1, 3);
     int live = block[1] - s < 8 ? block[1] - s : 8;
     alignas(64) float W[27][8];
@@ -187,12 +187,12 @@ struct Gather {
         *c = grad + keep * (*c - 4.0f * col_old[j]);
         L[3 * k + j] = grad;
       }
-      f8 move = u[1 + k] * on * (step * (float)UNIT);
+      f8 move = u[1 + k] * on * (step * (float)CELL_UNITS);
       move += Simd::pick(move < 0.0f, Simd::all(-0.5f), Simd::all(0.5f));
       i8u *x = (i8u *)(q + 8 * (XI + k));
       i8 next = *x + Simd::whole(move);
       *x = next;
-      i8 inside = ((next - HALF) >> PLACE) - (4 * block[2 + k] - 1);
+      i8 inside = ((next - HALF_CELL_UNITS) >> PLACE) - (4 * block[2 + k] - 1);
       off |= (inside < least[k]) | (inside > most[k]);
     }
     if (Simd::any(off & alive)) astray = 1;
@@ -231,12 +231,12 @@ struct Gather {
     if (field.swells) {   // the rest of lambda waits for what the whole cluster does
       const f8 grown = A[0] + A[4] + A[8];
       dilatation.add(cluster, live, volume, grown);
-      *(f8u *)(past + 8 * GROWN) = grown;
+      *(f8u *)(past + 8 * OWN_DILATATION) = grown;
       *(i8u *)(past + 8 * CLUSTER) = cluster;
-      *(f8u *)(past + 8 * BOUND) = wave;
+      *(f8u *)(past + 8 * WAVE_BOUND) = wave;
     }
     if (field.relaxes) {
-      float *branch = field.branch + (size_t)s * MEMORY;
+      float *branch = field.branch + (size_t)s * MAXWELL_CHANNELS;
       f8 w = relax(field, (const int *)(q + 8 * MT), A, branch, stress) * volume;
       for (int l = 0; l < 8; l++) viscous += w[l];
       wave *= stiffening(field, (const int *)(q + 8 * MT));
@@ -248,23 +248,23 @@ struct Gather {
   }
   // Pressure of the mean dilatation, once all particles of the block's clusters are known.
   inline void press(const Field &field, const int *block, int s, const ClusterMean &dilatation) {
-    float *q = field.part + (size_t)s * CHANNELS, *past = field.history + (size_t)s * HISTORY;
+    float *q = field.part + (size_t)s * CHANNELS, *past = field.history + (size_t)s * HISTORY_CHANNELS;
     const int live = block[1] - s < 8 ? block[1] - s : 8;
     const LaneMaterial t = LaneMaterial::of(field, (const int *)(q + 8 * MT));
     const f8 zero = Simd::all(0.0f);
     const f8 on = Simd::pick(i8{0, 1, 2, 3, 4, 5, 6, 7} < live, zero + 1.0f, zero);
-    f8 H[9], wave = *(f8u *)(past + 8 * BOUND);
+    f8 H[9], wave = *(f8u *)(past + 8 * WAVE_BOUND);
     for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
     const f8 grown = dilatation.mean(*(i8u *)(past + 8 * CLUSTER), live);
-    const f8 relief = *(f8u *)(past + 8 * RELIEF) + (grown - *(f8u *)(past + 8 * GROWN)) * on;
+    const f8 relief = *(f8u *)(past + 8 * LOG_VOLUME_RATIO) + (grown - *(f8u *)(past + 8 * OWN_DILATATION)) * on;
     const f8 p = Laws::mean_pressure(t, Laws::mean_bulk(t), Strain::volume(H), relief, wave);
-    *(f8u *)(past + 8 * RELIEF) = relief;
+    *(f8u *)(past + 8 * LOG_VOLUME_RATIO) = relief;
     *(f8u *)(past + 8 * PRESSURE) = p * on;
     if (field.relaxes) wave *= stiffening(field, (const int *)(q + 8 * MT));
     wave2 = Simd::high(wave2, on * wave / t.rho);
   }
   void block(const World *world, const Field &field, const int *block) {
-    alignas(64) f8 arena[ARENA];
+    alignas(64) f8 arena[ARENA_FLOATS];
     int least[3], most[3];
     ClusterMean dilatation;
     allowed(field, block, least, most);
@@ -285,6 +285,6 @@ struct Gather {
     row[WAVE2] = fast;
     row[PLASTIC] += plastic;
     row[VISCOUS] += viscous;
-    row[ASTRAY] = astray;
+    row[REPORT_ASTRAY] = astray;
   }
 };

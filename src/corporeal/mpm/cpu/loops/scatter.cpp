@@ -5,8 +5,8 @@ struct Scatter {
     alignas(32) float push[3][8];
     double work = 0;
     for (int l = 0; l < 8; l++) {
-      const float *t = field.material + MATERIAL * ((const int *)(q + 8 * MT))[l];
-      for (int k = 0; k < 3; k++) push[k][l] = t[PUSH + k];
+      const float *t = field.material + MATERIAL_COLUMNS * ((const int *)(q + 8 * MT))[l];
+      for (int k = 0; k < 3; k++) push[k][l] = t[PUSH_VELOCITY + k];
     }
     for (int k = 0; k < 3; k++) {
       f8 g = *(f8 *)push[k];  // velocity that the push gives in this step
@@ -23,7 +23,7 @@ struct Scatter {
       f8 r = r0;
 #pragma unroll
       for (int j = 0; j < 3; j++) {
-        f8 *h = g + i * LAYER + j * 8;
+        f8 *h = g + i * ARENA_LAYER_NODES + j * 8;
         const Row *w = W + (i * 3 + j) * 3;
         f8 s = r + a2, t = s + a2;
         h[0] += w[0][l] * r;
@@ -45,7 +45,7 @@ struct Scatter {
       for (int n = 0; n < TOGETHER; n++) r[n] = first[n];
 #pragma unroll
       for (int j = 0; j < 3; j++) {
-        f8 *h = g + i * LAYER + j * 8, h0 = h[0], h1 = h[1], h2 = h[2];
+        f8 *h = g + i * ARENA_LAYER_NODES + j * 8, h0 = h[0], h1 = h[1], h2 = h[2];
         const Row *w = W + (i * 3 + j) * 3;
 #pragma unroll
         for (int n = 0; n < TOGETHER; n++) {
@@ -118,29 +118,29 @@ struct Scatter {
   // Mean pressures of the block's clusters.
   static void sum(const Field &field, const int *block, ClusterMean &pressure) {
     for (int s = block[0]; s < block[1]; s += 8) {
-      const float *q = field.part + (size_t)s * CHANNELS, *past = field.history + (size_t)s * HISTORY;
+      const float *q = field.part + (size_t)s * CHANNELS, *past = field.history + (size_t)s * HISTORY_CHANNELS;
       pressure.add(ClusterMean::of(q, block), block[1] - s < 8 ? block[1] - s : 8,
                    *(f8u *)(q + 8 * VO), *(f8u *)(past + 8 * PRESSURE));
     }
   }
   static double block(const World *world, const Field &field, const int *block, float *node) {
-    alignas(64) f8 arena[ARENA];
+    alignas(64) f8 arena[ARENA_FLOATS];
     double work = 0;
     int low[3], high[3];
     ClusterMean pressure;
     if (field.swells) sum(field, block, pressure);
-    int *box = field.box + 6 * ((block - field.block) / BLOCK);
+    int *box = field.box + 6 * ((block - field.block) / BLOCK_INTEGERS);
     Simd::box(field, block, box);
     Simd::range(block, box, low, high);
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++)
-        for (int k = 0; k < 8; k++) arena[i * LAYER + j * 8 + k] = Simd::all(0.0f);
+        for (int k = 0; k < 8; k++) arena[i * ARENA_LAYER_NODES + j * 8 + k] = Simd::all(0.0f);
     for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena, pressure, work);
     mark(field, block, low, high, node);
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + NEIGHBOURS + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
-        const f8 *h = arena + i * LAYER + j * 8;
+        const f8 *h = arena + i * ARENA_LAYER_NODES + j * 8;
         size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
         f8 *g0 = (f8 *)node + (size_t)near[0] * 64 + row;
         f8 *g1 = (f8 *)node + (size_t)near[1] * 64 + row;

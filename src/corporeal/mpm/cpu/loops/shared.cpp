@@ -10,7 +10,7 @@ typedef unsigned long long u64;
 typedef float Row[8];
 typedef int Call(void);
 const int TOGETHER = 2;   // lanes in one cell that are moved at once
-constexpr float PER_UNIT = 1.0f / UNIT;
+constexpr float PER_UNIT = 1.0f / CELL_UNITS;
 
 struct Simd : mpm::Lanes<f8> {
   // Rows of eight lanes to lanes of eight rows.
@@ -51,8 +51,8 @@ struct Simd : mpm::Lanes<f8> {
   static inline void range(const int *block, const int *box, int *low, int *high) {
     for (int d = 0; d < 3; d++) {
       const int first = 4 * block[2 + d] - 1;
-      low[d] = ((box[d] - HALF) >> PLACE) - first;
-      high[d] = ((box[3 + d] - HALF) >> PLACE) - first;
+      low[d] = ((box[d] - HALF_CELL_UNITS) >> PLACE) - first;
+      high[d] = ((box[3 + d] - HALF_CELL_UNITS) >> PLACE) - first;
       low[d] = low[d] < 0 ? 0 : low[d] > 5 ? 5 : low[d];
       high[d] = (high[d] < 0 ? 0 : high[d] > 5 ? 5 : high[d]) + 2;
     }
@@ -71,12 +71,12 @@ struct Simd : mpm::Lanes<f8> {
     const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
     i8 at = zero;
     for (int d = 0; d < 3; d++) {
-      i8 x = *(const i8u *)(q + 8 * (XI + d)), cell = (x - HALF) >> PLACE;
+      i8 x = *(const i8u *)(q + 8 * (XI + d)), cell = (x - HALF_CELL_UNITS) >> PLACE;
       D[d] = flo(x - (cell << PLACE)) * PER_UNIT;
       mpm::Spline<f8>::weights(D[d], w[d]);
       cell -= 4 * block[2 + d] - 1;
       cell = cell < 0 ? zero : cell > 5 ? zero + 5 : cell;
-      at += cell * (d == 0 ? LAYER : d == 1 ? 8 : 1);
+      at += cell * (d == 0 ? ARENA_LAYER_NODES : d == 1 ? 8 : 1);
     }
     *(i8 *)base = at;
     for (int i = 0; i < 3; i++)
@@ -98,7 +98,7 @@ struct ClusterMean {
     i8 at = i8{0, 0, 0, 0, 0, 0, 0, 0};
     for (int d = 0; d < 3; d++) {
       i8 x = *(const i8u *)(q + 8 * (XI + d));
-      i8 pair = (((x - HALF) >> PLACE) - 4 * block[2 + d] + 2) >> 1;
+      i8 pair = (((x - HALF_CELL_UNITS) >> PLACE) - 4 * block[2 + d] + 2) >> 1;
       pair = pair < 0 ? i8{0, 0, 0, 0, 0, 0, 0, 0} : pair > 3 ? i8{3, 3, 3, 3, 3, 3, 3, 3} : pair;
       at = 4 * at + pair;
     }

@@ -2,7 +2,7 @@
 Sorting &S = *(Sorting *)memory.data;
 struct Stage {
   static inline i8 block(const float *q, int d) {
-    return (*(const i8u *)(q + 8 * (XI + d)) - HALF) >> (PLACE + 2);
+    return (*(const i8u *)(q + 8 * (XI + d)) - HALF_CELL_UNITS) >> (PLACE + 2);
   }
   // Where blocks are, and whether somebody is lost.
   static void survey(Sorting &S) {
@@ -10,15 +10,15 @@ struct Stage {
     for (int d = 0; d < 3; d++) low[d] = i8{} + (1 << 30), high[d] = -low[d];
     i8 lost = i8{}, away = lost;
     for (int r = 0; r < S.olds; r++)
-      for (int s = S.old[RUN * r]; s < S.old[RUN * r + 1]; s += 8) {
+      for (int s = S.old[RUN_INTEGERS * r]; s < S.old[RUN_INTEGERS * r + 1]; s += 8) {
         const float *q = S.part + (size_t)s * CHANNELS;
-        i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < S.old[RUN * r + 1] - s;
+        i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < S.old[RUN_INTEGERS * r + 1] - s;
         f8 x[3], v = Simd::all(0.0f);
         i8 out = i8{};
         for (int d = 0; d < 3; d++) {
           i8 b = block(q, d), first = i8{} + b[0];
           b = alive ? b : first;
-          out |= alive & (b != S.old[RUN * r + 2 + d]);
+          out |= alive & (b != S.old[RUN_INTEGERS * r + 2 + d]);
           low[d] = b < low[d] ? b : low[d];
           high[d] = b > high[d] ? b : high[d];
           x[d] = Simd::flo(*(const i8u *)(q + 8 * (XI + d))) * PER_UNIT + 4.0f * S.origin[d];
@@ -47,16 +47,16 @@ struct Stage {
   // Keys, how many share one, blocks and slots needed.
   static void count(Sorting &S) {
     for (int r = 0; r < S.olds; r++)
-      for (int s = S.old[RUN * r]; s < S.old[RUN * r + 1]; s += 8) {
+      for (int s = S.old[RUN_INTEGERS * r]; s < S.old[RUN_INTEGERS * r + 1]; s += 8) {
         const float *q = S.part + (size_t)s * CHANNELS;
         i8 line = i8{}, inner = *(const i8u *)(q + 8 * MT);
         for (int d = 0; d < 3; d++) {
           line = line * S.dim[d] + (block(q, d) - S.low[d] + 1);
-          inner = inner * 4 + (((*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE) & 3);
+          inner = inner * 4 + (((*(const i8u *)(q + 8 * (XI + d)) - HALF_CELL_UNITS) >> PLACE) & 3);
         }
         *(i8u *)(S.line + s) = line;
         *(i8u *)(S.inner + s) = inner;
-        int live = S.old[RUN * r + 1] - s < 8 ? S.old[RUN * r + 1] - s : 8;
+        int live = S.old[RUN_INTEGERS * r + 1] - s < 8 ? S.old[RUN_INTEGERS * r + 1] - s : 8;
         for (int l = 0; l < live; l++) {
           S.count[S.line[s + l]]++;
           S.bin[S.inner[s + l]]++;
@@ -78,14 +78,14 @@ struct Stage {
       sum += n;
     }
     for (int r = 0; r < S.olds; r++)
-      for (int s = S.old[RUN * r]; s < S.old[RUN * r + 1]; s++) S.middle[S.bin[S.inner[s]]++] = s;
+      for (int s = S.old[RUN_INTEGERS * r]; s < S.old[RUN_INTEGERS * r + 1]; s++) S.middle[S.bin[S.inner[s]]++] = s;
     int line = 0, slot = 0, b = 0;
     for (int x = 0; x < S.dim[0]; x++)
       for (int y = 0; y < S.dim[1]; y++)
         for (int z = 0; z < S.dim[2]; z++, line++) {
           int n = S.count[line];
           if (!n) continue;
-          int *record = S.block + BLOCK * b++;
+          int *record = S.block + BLOCK_INTEGERS * b++;
           record[0] = slot;
           record[1] = slot + n;
           record[2] = x;
@@ -114,7 +114,7 @@ struct Stage {
     const int none = S.pool++;
     for (int d = 0; d < 4; d++) S.where[4 * none + d] = 0;
     for (b = 0; b < S.blocks; b++) {
-      int *record = S.block + BLOCK * b;
+      int *record = S.block + BLOCK_INTEGERS * b;
       line = (record[2] * S.dim[1] + record[3]) * S.dim[2] + record[4];
       for (int k = 0; k < 27; k++)
         record[NEIGHBOURS + k] = near(S.edge[line], k) ? S.table[reached(S, line, k)] : none;
@@ -139,21 +139,21 @@ struct Stage {
   // Copy some blocks' particles; what pads a batch stands where its block's first one does.
   static void copy(const Sorting &S, int low, int high) {
     for (int b = low; b < high; b++) {
-      const int *record = S.block + BLOCK * b;
+      const int *record = S.block + BLOCK_INTEGERS * b;
       for (int s = record[0]; s < record[1]; s += 8) {
-        float *q = S.to + (size_t)s * CHANNELS, *past = S.past_to + (size_t)s * HISTORY;
+        float *q = S.to + (size_t)s * CHANNELS, *past = S.past_to + (size_t)s * HISTORY_CHANNELS;
         for (int l = 0; l < 8; l++) {
           int source = S.order[s + l], there = source < 0 ? S.order[record[0]] : source;
           const float *p = S.part + (size_t)(there & ~7) * CHANNELS + (there & 7);
           for (int k = 0; k < CHANNELS; k++) q[8 * k + l] = p[8 * k];
           if (S.flows) {
-            const float *h = S.history + (size_t)(there & ~7) * HISTORY + (there & 7);
-            for (int k = 0; k < HISTORY; k++) past[8 * k + l] = h[8 * k];
+            const float *h = S.history + (size_t)(there & ~7) * HISTORY_CHANNELS + (there & 7);
+            for (int k = 0; k < HISTORY_CHANNELS; k++) past[8 * k + l] = h[8 * k];
           }
           if (S.relaxes) {
-            const float *e = S.branch + (size_t)(there & ~7) * MEMORY + (there & 7);
-            float *to = S.branch_to + (size_t)s * MEMORY;
-            for (int k = 0; k < MEMORY; k++) to[8 * k + l] = e[8 * k];
+            const float *e = S.branch + (size_t)(there & ~7) * MAXWELL_CHANNELS + (there & 7);
+            float *to = S.branch_to + (size_t)s * MAXWELL_CHANNELS;
+            for (int k = 0; k < MAXWELL_CHANNELS; k++) to[8 * k + l] = e[8 * k];
           }
           if (source >= 0) continue;
           q[8 * MA + l] = 0;
@@ -165,7 +165,7 @@ struct Stage {
     }
   }
 };
-if (stage == SURVEY) Stage::survey(S);
+if (stage == SORT_SURVEY) Stage::survey(S);
 if (stage == COUNT) Stage::count(S);
 if (stage == RANK) Stage::rank(S);
-if (stage == COPY) Stage::copy(S, low, high);
+if (stage == SORT_COPY) Stage::copy(S, low, high);

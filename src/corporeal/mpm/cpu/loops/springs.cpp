@@ -51,7 +51,7 @@ for (int n = 0; n < world->tethers; n++) {
   Field &field = world->field[T.field];
   double *s = T.holder, total[3] = {0, 0, 0}, moment[3] = {0, 0, 0};
   for (int b = 0; b < field.blocks; b++) {
-    const int *block = field.block + BLOCK * b;
+    const int *block = field.block + BLOCK_INTEGERS * b;
     for (int slot = block[0]; slot < block[1]; slot++) {
       const float *q = field.part + (size_t)(slot & ~7) * CHANNELS;
       const int lane = slot & 7, p = ((const int *)(q + 8 * ID))[lane] - T.first;
@@ -107,7 +107,7 @@ for (int n = 0; n < world->joints; n++) {
     }
   for (int i = 0; i < 3; i++) {
     double gap = c[CENTRE + i] + rc[i] - a[CENTRE + i] - ra[i];
-    M[i][6] = va[i] + a[KICK + i] - vc[i] - c[KICK + i] - mpm::CLOSING / dt * gap;
+    M[i][6] = va[i] + a[KICK + i] - vc[i] - c[KICK + i] - mpm::JOINT_GAP_FRACTION_PER_STEP / dt * gap;
     M[3 + i][6] = a[SPIN + i] - c[SPIN + i] - N.stiffness / stiff * angle * turn[i];
   }
   Spring::solve(M);
@@ -140,7 +140,7 @@ for (int n = 0; n < world->grips; n++) {
       for (int d = 0; d < 3; d++) x[d] = G.rigid[CENTRE + d] + arm[d];
     }
     for (int b = 0; !G.rigid && b < field.blocks; b++) {
-      const int *block = field.block + BLOCK * b;
+      const int *block = field.block + BLOCK_INTEGERS * b;
       for (int slot = block[0]; slot < block[1]; slot++) {
         const float *q = field.part + (size_t)(slot & ~7) * CHANNELS;
         const int lane = slot & 7, p = ((const int *)(q + 8 * ID))[lane] - G.first;

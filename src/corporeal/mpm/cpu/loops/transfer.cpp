@@ -9,11 +9,11 @@ for (int number = chore[0]; number < chore[1]; number++) {
   Gather gather;
   double work = 0;
   for (int b = task[1]; b < task[2]; b++) {
-    const int *block = field.block + BLOCK * b;
+    const int *block = field.block + BLOCK_INTEGERS * b;
     if (!bare) gather.block(world, field, block);
     if (bare || fused) work += Scatter::block(world, field, block, bare ? field.node : field.next);
   }
-  double *report = world->report + REPORT * task[3];
+  double *report = world->report + REPORT_COLUMNS * task[3];
   if (!bare) gather.report(report);
-  report[WORK] += work;
+  report[REPORT_WORK] += work;
 }

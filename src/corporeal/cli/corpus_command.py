@@ -1,0 +1,181 @@
+"""`corporeal corpus assemble | run | report`: many scenes at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from shlex import quote
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from corporeal.cli.parse import parse, run_subcommand
+from corporeal.core.errors import UserError
+from corporeal.core.process_resources import usable_cores
+from corporeal.core.terminal import console, progress_bars, show_table
+
+Corpus = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CORPUS")]
+
+
+@dataclass(frozen=True)
+class WorkerOptions:
+    """Who does the work."""
+
+    workers: int = 0
+    """Scenes at the same time, each in a process of its own; 0: one per core and --threads."""
+    threads: int = 1
+    """Of each scene."""
+    on: Literal["local", "ray"] = "local"
+    """Where: processes of this machine, or a Ray cluster (extra [cluster])."""
+    address: str = ""
+    """Of a running Ray cluster, "auto" for the one of this machine; by default one is started
+    here and ended again. The corpus must lie where every machine sees it."""
+    gpus: float = 0.0
+    """Share of a graphics card that each scene takes on Ray."""
+
+
+def command_corpus() -> None:
+    """Assemble, run and report many scenes: `corpus assemble`, `corpus run`, `corpus report`."""
+    run_subcommand("corpus", {"assemble": _assemble, "run": _run, "report": _report})
+
+
+def _assemble() -> None:
+    """Plan a balanced corpus and assemble its scenes.
+
+        corporeal corpus assemble corpus/ --pool pool/
+        corporeal corpus assemble showcase/ --preset seven
+
+    Classes, models, numbers of objects and interactions come out even. Each scene is made in a
+    process of its own and appears in CORPUS/scenes whole or not at all. Say the same again to go on
+    with what was interrupted and to try again what failed. CORPUS/manifest.json says what became of
+    each scene.
+    """
+    from corporeal.discretization.object_scaling import SceneSizing
+    from corporeal.lab.corpus.assemble_corpus import Sources, assemble_corpus
+    from corporeal.lab.corpus.corpus_plan import CorpusConfig
+    from corporeal.pipeline.stages.capture import CaptureConfig
+    from corporeal.pipeline.stages.compose import ComposeConfig
+    from corporeal.pool.pool_index import read_pool
+
+    @dataclass(frozen=True)
+    class Assemble:
+        corpus: Corpus
+        pool: Path = Path("pool")
+        """What scenes are made of, from `corporeal assets index`."""
+        plan: CorpusConfig = field(default_factory=CorpusConfig)
+        sizing: SceneSizing = field(default_factory=SceneSizing)
+        vlm: str = ComposeConfig.vlm
+        """Who says how large objects of a class are; by default a table."""
+        record: Path | None = None
+        """Keep a model's answers in this folder, for --vlm replay:FOLDER."""
+        views: int = CaptureConfig.views
+        """Posed pictures of each scene."""
+        size: tuple[int, int] = CaptureConfig.size
+        """Their width and height [px]."""
+        crew: WorkerOptions = WorkerOptions()
+
+    first = ("pool", "preset", "scenes", "seed", "views", "workers")
+    asked = parse(Assemble, "corpus assemble", _assemble.__doc__, words=2, first=first)
+    pool = read_pool(asked.pool) if asked.plan.preset == "fortytwo" else None
+    composing = ComposeConfig(sizing=asked.sizing, vlm=asked.vlm, record=asked.record)
+    capturing = CaptureConfig(views=asked.views, size=asked.size, threads=asked.crew.threads)
+    sources = Sources(pool, composing, capturing)
+    _execute(
+        asked,
+        "assemble",
+        lambda hands: assemble_corpus(asked.corpus, asked.plan, sources, hands),
+        f"Go on with: corporeal corpus run {quote(str(asked.corpus))}",
+    )
+
+
+def _run() -> None:
+    """Run every scene of a corpus to its film and report, several at a time.
+
+        corporeal corpus run corpus/ --detail draft --workers 4
+
+    CORPUS/runs/<scene> is a run like any other. A scene that fails or whose process is killed never
+    stops the others; what is finished is not done again, an interrupted simulation goes on from its
+    checkpoint. Say the same again to go on.
+    """
+    from corporeal.lab.corpus.run_corpus import RunConfig, run_corpus
+    from corporeal.pipeline.settings.settings import Settings
+
+    @dataclass(frozen=True)
+    class Run:
+        corpus: Corpus
+        scenes: RunConfig = field(default_factory=RunConfig)
+        crew: WorkerOptions = WorkerOptions()
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    first = ("detail", "vlm", "first", "workers", "threads", "on")
+    asked = parse(Run, "corpus run", _run.__doc__, words=2, first=first)
+    _execute(
+        asked,
+        "run",
+        lambda hands: run_corpus(asked.corpus, asked.scenes, asked.settings, hands),
+        f"Look at it: corporeal corpus report {quote(str(asked.corpus))}",
+    )
+
+
+def _report() -> None:
+    """Write CORPUS/report.html, report.csv and report.json of what was run so far."""
+    from corporeal.lab.corpus.collect_results import collect_results
+    from corporeal.lab.corpus.corpus_docs_page import write_corpus_page
+    from corporeal.lab.corpus.corpus_report import report_corpus
+
+    @dataclass(frozen=True)
+    class Report:
+        corpus: Corpus
+        docs: Path | None = None
+        """File for the measured rows as a page of documentation (Markdown)."""
+
+    asked = parse(Report, "corpus report", _report.__doc__, words=2)
+    with progress_bars() as tell:
+        written = report_corpus(asked.corpus, tell("report"))
+    if asked.docs is not None:
+        write_corpus_page(collect_results(asked.corpus), asked.docs)
+        written.append(asked.docs)
+    print(*written, sep="\n")
+
+
+# ---------------------------------------------------------------- how it is done
+
+
+def _execute(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: str) -> None:
+    """Do it with a bar or with lines, and say what came of it."""
+    from corporeal.jobs.executor import Executor
+    from corporeal.jobs.local_workers import LOG_FOLDER
+
+    with progress_bars() as tell:
+        rows = do(Executor(worker_factory(asked.crew, asked.corpus), tell(verb), log_event))
+    failed = {name: row for name, row in rows.items() if row.status == "failed"}
+    print(f"{len(rows) - len(failed)} of {len(rows)} scenes finished: {asked.corpus}")
+    if failed:
+        show_table(("scene", "why it failed"), [(n, r.error) for n, r in failed.items()])
+    if len(failed) == len(rows):
+        raise UserError(f"Not one scene finished. {asked.corpus / LOG_FOLDER} has their words.")
+    print(then)
+
+
+def log_event(words: str) -> None:
+    """Say an event as a line in a log; in a terminal the bar shows it, failures aside."""
+    if not console.is_terminal or "failed" in words or "again" in words:
+        console.print(words, markup=False, highlight=False, soft_wrap=True)
+
+
+def worker_factory(crew: WorkerOptions, folder: Path) -> Callable[[], Any]:
+    """Return what opens workers, whose words go to a folder of logs in ``folder``.
+
+    Raises:
+        UserError: A number of the crew makes no sense.
+
+    """
+    if crew.workers < 0 or crew.threads < 1 or crew.gpus < 0:
+        raise UserError("--workers, --threads and --gpus cannot be negative, --threads not 0.")
+    slots = crew.workers or max(1, usable_cores() // crew.threads)
+    if crew.on == "ray":
+        from corporeal.jobs.ray_workers import ray_worker_pool
+
+        return lambda: ray_worker_pool(slots, crew.threads, crew.gpus, crew.address)
+    from corporeal.jobs.local_workers import LOG_FOLDER, local_worker_pool
+
+    return lambda: local_worker_pool(slots, crew.threads, folder / LOG_FOLDER)

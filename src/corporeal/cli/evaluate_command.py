@@ -1,0 +1,336 @@
+"""`corporeal evaluate mass | materials | parts | objects | dynamics | judge`."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from corporeal.cli.corpus_command import WorkerOptions, log_event, worker_factory
+from corporeal.cli.parse import parse, run_subcommand
+from corporeal.core import store
+from corporeal.core.errors import UserError
+from corporeal.core.terminal import console, progress_bars, show_table
+from corporeal.lab.evaluation.result_table import ResultTable
+
+if TYPE_CHECKING:
+    from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary
+    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
+
+Folder = Annotated[
+    Path | None,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
+]
+Runs = Annotated[
+    Path | None,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="FOLDER", help="Runs, as evaluate dynamics leaves them."),
+]
+Target = Annotated[
+    str,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.'),
+]
+
+
+def command_evaluate() -> None:
+    """Compare predictions with what is known: mass, materials, parts, objects, dynamics, judge."""
+    run_subcommand("evaluate", EVALUATIONS)
+
+
+def _folder(folder: Path | None, what: str) -> Path:
+    if folder is None:
+        raise UserError(f"Name a folder: corporeal evaluate {what} FOLDER.")
+    return folder
+
+
+def evaluate_mass() -> None:
+    """Predict masses, and compare them with measured ones where --truth gives them.
+
+    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, optionally, fill
+    (solid, hollow, full), by which errors are grouped. Without --truth masses are
+    predicted only. A folder in the layout of ABO-500 needs no CSV: choose its --split.
+    """
+    from corporeal.description.describe_config import DescribeConfig
+    from corporeal.lab.evaluation import mass_evaluation, mass_report, measured_masses
+    from corporeal.pipeline.stages.ground import GroundConfig
+
+    @dataclass(frozen=True)
+    class Mass:
+        folder: Folder = None
+        truth: Path | None = None
+        """Table of measured masses (CSV)."""
+        split: str = "test"
+        """Of ABO-500; "all" for all."""
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        figure: Path | None = None
+        """File for a plot of predicted against measured mass (PNG)."""
+        how: mass_evaluation.MassConfig = field(default_factory=mass_evaluation.MassConfig)
+        describe: DescribeConfig = field(default_factory=DescribeConfig)
+        ground: GroundConfig = field(default_factory=GroundConfig)
+
+    first = ("truth", "vlm", "anonymous", "split", "json", "figure")
+    asked = parse(Mass, "evaluate mass", evaluate_mass.__doc__, words=2, first=first)
+    objects = measured_masses.objects_to_weigh(_folder(asked.folder, "mass"), asked.truth, asked.split)
+    with progress_bars() as tell:
+        done = tell("evaluate")
+        found = mass_evaluation.predict_masses(
+            objects, asked.describe, asked.ground, asked.how, done
+        )
+    result = mass_evaluation.compare_masses(found)
+    _show(mass_report.mass_tables(result))
+    if asked.json is not None:
+        store.write_json(asked.json, result)
+    if asked.figure is not None:
+        mass_report.mass_figure(result.rows, asked.figure)
+
+
+def evaluate_materials() -> None:
+    """Compare recognised materials with those that --truth TOML accepts.
+
+    FOLDER holds models; the table lists, per file and part, the accepted materials, the likeliest
+    first.
+    """
+    from corporeal.description.describe_config import DescribeConfig
+    from corporeal.lab.evaluation import material_evaluation
+    from corporeal.pipeline.stages.ground import GroundConfig
+
+    @dataclass(frozen=True)
+    class Materials:
+        folder: Folder = None
+        truth: Path | None = None
+        """What parts are made of (TOML)."""
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        describe: DescribeConfig = field(default_factory=DescribeConfig)
+        ground: GroundConfig = field(default_factory=GroundConfig)
+
+    first = ("truth", "vlm", "annotations", "record", "json", "library")
+    asked = parse(Materials, "evaluate materials", evaluate_materials.__doc__, words=2, first=first)
+    if asked.truth is None:
+        raise UserError(
+            f"Nothing to judge by. Say --truth TOML. {material_evaluation.TRUTH_FILE_ADVICE}"
+        )
+    library = asked.ground.library
+    truth = material_evaluation.read_material_truth(asked.truth, library)
+    folder = _folder(asked.folder, "materials")
+    with progress_bars() as tell:
+        rows = material_evaluation.evaluate_materials(
+            folder, truth, asked.describe, library, tell("evaluate")
+        )
+    _show(material_evaluation.recognition_tables(rows))
+    if asked.json is not None:
+        store.write_json(asked.json, material_evaluation.recognition_record(rows))
+
+
+def evaluate_parts() -> None:
+    """Compare the parts found in pictures of models with the files' own nodes and materials.
+
+    Each model is rendered from all sides, and its parts are segmented in the visible points;
+    without FOLDER, four models of the showcase are used. --structural dinov2 --semantic clip
+    selects learned features.
+    """
+    from corporeal.description.describe_config import DescribeConfig
+    from corporeal.lab.evaluation import parts_evaluation, parts_figure
+    from corporeal.reconstruction.segment.part_clusters import PartsConfig
+
+    @dataclass(frozen=True)
+    class PartsAsked:
+        folder: Folder = None
+        names: Path | None = None
+        """TOML with what parts are called: per file, the file's name of a part = another name."""
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        figure: Path | None = None
+        """File for a picture of the parts (PNG)."""
+        look: parts_evaluation.PartsEvaluationConfig = field(
+            default_factory=parts_evaluation.PartsEvaluationConfig
+        )
+        clusters: PartsConfig = field(default_factory=PartsConfig)
+        describe: DescribeConfig = field(default_factory=DescribeConfig)
+
+    first = ("structural", "semantic", "names", "lying", "json", "figure")
+    asked = parse(PartsAsked, "evaluate parts", evaluate_parts.__doc__, words=2, first=first)
+    names = {} if asked.names is None else parts_evaluation.read_names(asked.names)
+    with progress_bars() as tell:
+        how = parts_evaluation.PartsMethod(asked.look, asked.clusters, asked.describe)
+        found = parts_evaluation.evaluate_parts(asked.folder, names, how, tell("evaluate"))
+    rows = [judged.row for judged in found]
+    _show(parts_evaluation.parts_tables(rows))
+    if asked.json is not None:
+        store.write_json(asked.json, parts_evaluation.parts_record(rows))
+    if asked.figure is not None:
+        parts_figure.draw_parts(found, asked.figure)
+
+
+def evaluate_objects() -> None:
+    """Compare the objects segmented in pictures of settled scenes with the scenes' own.
+
+    FOLDER holds scenes that `assemble` wrote. Objects are segmented in points on the visible
+    surfaces, or in Gaussians: --points-from gaussians.
+    """
+    from corporeal.lab.evaluation import objects_evaluation, objects_figure
+
+    @dataclass(frozen=True)
+    class Objects:
+        folder: Folder = None
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        figure: Path | None = None
+        """File for a picture of the objects (PNG)."""
+        scenes: objects_evaluation.ObjectsEvaluationConfig = field(
+            default_factory=objects_evaluation.ObjectsEvaluationConfig
+        )
+
+    first = ("points-from", "surface-points", "pictures", "kept", "json", "figure")
+    asked = parse(Objects, "evaluate objects", evaluate_objects.__doc__, words=2, first=first)
+    with progress_bars() as tell:
+        found = objects_evaluation.evaluate_objects(
+            _folder(asked.folder, "objects"), asked.scenes, tell("evaluate")
+        )
+    rows = [judged.row for judged in found]
+    _show(objects_evaluation.objects_tables(rows))
+    if asked.json is not None:
+        store.write_json(asked.json, objects_evaluation.objects_record(rows))
+    if asked.figure is not None:
+        objects_figure.draw_objects(found, asked.figure)
+
+
+def evaluate_dynamics() -> None:
+    """Compare how scenes move with baselines, with a finer run of ours, and with life.
+
+        corporeal evaluate dynamics showcase --against single capped one
+        corporeal evaluate dynamics corpus/ --against vomp:fields/ --json d.json
+
+    TARGET is "showcase" or a corpus whose scenes are assembled. Each run lies in OUT/SCENE/METHOD,
+    is done in a process of its own, and is not done again; say the same again to go on. A run that
+    fails is a row. With --judge a vision-language model judges films of the runs, after proving
+    on control films what it can tell; corporeal evaluate judge OUT does the same later.
+    """
+    from corporeal.jobs.executor import Executor
+    from corporeal.lab.evaluation.dynamics import dynamics_tables
+    from corporeal.lab.evaluation.dynamics.dynamics_evaluation import DynamicsConfig
+    from corporeal.lab.evaluation.dynamics.dynamics_evaluation import evaluate_dynamics as evaluate
+    from corporeal.lab.evaluation.judge.judge_query import connect_judge
+    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
+    from corporeal.pipeline.settings.settings import Settings
+    from corporeal.vlm import NO_MODEL
+
+    @dataclass(frozen=True)
+    class Dynamics:
+        target: Target
+        how: DynamicsConfig = field(default_factory=DynamicsConfig)
+        out: Path | None = None
+        """Folder of the runs; by default dynamics/ here, of a corpus CORPUS/dynamics/."""
+        json: Path | None = None
+        """File for all numbers (JSON)."""
+        figure: Path | None = None
+        """File for a figure (PNG)."""
+        page: Path | None = None
+        """File of the report; by default OUT/report.html."""
+        docs: Path | None = None
+        """File for the measured rows as a page of documentation (Markdown)."""
+        judge: str = NO_MODEL
+        """Model that also judges films of the runs, as --vlm: see evaluate judge. Its page and
+        answers lie in OUT as judge.html and judge.json; --record keeps the answers for replay."""
+        looks: int = 1
+        """Times that the judge looks at each film, each from another side: 1 to 3."""
+        yes: bool = False
+        """Ask a judge that costs more than 5 US$, or whose price is not known."""
+        crew: WorkerOptions = field(default_factory=WorkerOptions)
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    first = ("against", "reference", "detail", "out", "json", "figure")
+    doc = evaluate_dynamics.__doc__
+    asked = parse(Dynamics, "evaluate dynamics", doc, words=2, first=first)
+    how = JudgeConfig(asked.judge, asked.settings.describe.record, asked.looks, yes=asked.yes)
+    connect_judge(how)  # a key that is absent is told before hours of simulation
+    here = Path() if asked.target == "showcase" else Path(asked.target)
+    out = asked.out or here / "dynamics"
+    with progress_bars() as tell:
+        hands = Executor(worker_factory(asked.crew, out), tell("evaluate"), log_event)
+        found = evaluate(asked.target, out, asked.how, asked.settings, hands)
+    _show(dynamics_tables.dynamics_tables(found))
+    for sentence in (
+        *dynamics_tables.ranking_sentences(found),
+        *dynamics_tables.missing_references(found),
+    ):
+        console.print(sentence, markup=False, highlight=False)
+    _write_dynamics(found, asked, out)
+    if asked.judge != NO_MODEL:  # pages and answers beside the runs
+        _judge(out, how, out / "judge.json", out / "judge.html")
+
+
+def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
+    """Write the report of an evaluation of dynamics, and the files that somebody asks for."""
+    from corporeal.lab.evaluation.dynamics import dynamics_figure, dynamics_page
+    from corporeal.lab.evaluation.dynamics.dynamics_summary import dynamics_record
+
+    page = asked.page or out / "report.html"
+    dynamics_page.write_dynamics_page(found, page)
+    print(page)
+    if asked.json is not None:
+        store.write_json(asked.json, dynamics_record(found))
+    if asked.figure is not None:
+        dynamics_figure.draw_dynamics(found, asked.figure)
+    if asked.docs is not None:
+        command = f"corporeal evaluate dynamics {asked.target} --against "
+        command += f"{' '.join(asked.how.against)} --docs {asked.docs}"
+        dynamics_page.write_dynamics_docs(found, command, asked.docs)
+
+
+def evaluate_judge() -> None:
+    """Let a vision-language model judge films of runs, after judging the model by control films.
+
+    FOLDER holds SCENE/METHOD, each a run, as evaluate dynamics leaves them. Controls are the run
+    "ours" with one known fault each. Of a law of physics the judge is believed only where its
+    answers tell the controls of that law; else the tables say that this judge cannot tell.
+    """
+    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
+
+    @dataclass(frozen=True)
+    class Judge:
+        folder: Runs = None
+        json: Path | None = None
+        """File for answers, intervals and marks (JSON)."""
+        page: Path | None = None
+        """File for a page with every film (HTML)."""
+        how: JudgeConfig = field(default_factory=JudgeConfig)
+
+    first = ("judge", "looks", "record", "yes", "json", "page")
+    asked = parse(Judge, "evaluate judge", evaluate_judge.__doc__, words=2, first=first)
+    _judge(_folder(asked.folder, "judge"), asked.how, asked.json, asked.page)
+
+
+def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) -> None:
+    """Judge the runs in OUT, show what follows, and keep it where somebody asks for it."""
+    from corporeal.lab.evaluation.judge import judge_page, judge_tables
+    from corporeal.lab.evaluation.judge.judge_runs import judge_runs
+
+    with progress_bars() as tell:
+        found = judge_runs(out, how, console.print, tell("judge"))
+    _show(judge_tables.judge_tables(found.judged, found.result))
+    if json is not None:
+        store.write_json(json, judge_tables.judge_record(found.judged, found.result))
+    if page is not None:
+        with progress_bars() as tell:
+            judge_page.write_judge_page(found.judged, found.result, page, tell("page"))
+
+
+def _show(tables: Sequence[ResultTable]) -> None:
+    for table in tables:
+        if table.rows:
+            show_table(table.heads, table.rows, table.title)
+
+
+EVALUATIONS = {
+    "mass": evaluate_mass,
+    "materials": evaluate_materials,
+    "parts": evaluate_parts,
+    "objects": evaluate_objects,
+    "dynamics": evaluate_dynamics,
+    "judge": evaluate_judge,
+}

@@ -1,0 +1,50 @@
+"""Settings are validated before a run keeps them."""
+
+from pathlib import Path
+
+from corporeal.description import describe_config
+from corporeal.description.describe_config import DescribeConfig
+from corporeal.pipeline.run_pipeline import RUN_FILE, Settings, read_run_request
+from corporeal.pipeline.settings import (
+    assemble_config,
+    fill_config,
+    ground_config,
+    segment_config,
+    simulate_config,
+    video_config,
+)
+from corporeal.reconstruction import reconstruct_config
+from corporeal.vlm import choose_critic, connect_vlm
+from corporeal.vlm.annotation_file import read_annotation_mapping
+
+
+def validate_settings(folder: Path, settings: Settings) -> None:
+    """Refuse settings that no scene could be run with: a model without its key, a missing library.
+
+    Settings that the run in ``folder`` already has are not validated again: its answers may be on
+    the disk, so that no model is needed.
+
+    Raises:
+        UserError: Something is missing or unknown; nothing was changed.
+
+    """
+    known = read_run_request(folder).settings if (folder / RUN_FILE).exists() else None
+    assemble_config.validate(settings.assemble)
+    segment_config.validate(settings.segment)
+    fill_config.validate(settings.fill)
+    simulate_config.validate(settings.simulate)
+    video_config.validate(settings.film)
+    if known is None or known.describe != settings.describe:
+        _validate_answers(settings.describe)
+    if known is None or known.ground != settings.ground:
+        ground_config.validate(settings.ground)
+    if known is None or known.reconstruct != settings.reconstruct:
+        reconstruct_config.validate_reconstruct(settings.reconstruct)
+
+
+def _validate_answers(config: DescribeConfig) -> None:
+    describe_config.validate(config)
+    if config.annotations is not None:
+        read_annotation_mapping(config.annotations)
+    for spec in (config.vlm, choose_critic(config.vlm, config.critic)):
+        connect_vlm(spec)

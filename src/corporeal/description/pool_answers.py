@@ -1,0 +1,202 @@
+"""Several answers to the same questions about one object, pooled: each counts the same.
+
+Wang, Wei, Schuurmans, Le, Chi, Narang, Chowdhery and Zhou (2022), *Self-consistency improves chain
+of thought reasoning in language models*, arXiv:2203.11171, ask a model several times and let the
+answers vote. Ours are distributions, so they are mixed instead of counted: a linear opinion pool
+(Stone 1961) with equal weights. Draws take one answer whole, with its own values; what is pooled
+here is the description that is shown, and that the scene is computed with.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp, hypot, log
+
+import numpy as np
+
+from corporeal.core.types import (
+    Hypothesis,
+    MassEvidence,
+    ObjectAnswer,
+    ObjectDescription,
+    PartDescription,
+    PrintedFact,
+    RangePlacement,
+    ScanThickening,
+    apply_hypothesis,
+)
+from corporeal.discretization.part_model import NORMAL_90_PERCENT_WIDTH_SIGMAS
+from corporeal.vlm.interpret_answers import merge_pieces
+
+LOOKING_SOURCES = ("model", "recording")
+FIELDS_NOT_ANSWERED = ("stated", "values", "inflation", "rebound")
+"""What no answer says of a part: its file or a person does."""
+SHARE_FIELDS = ("volume_share", "surface_share", "inner_share")
+
+
+@dataclass(frozen=True)
+class JudgedInterval:
+    """What one answer says of a positive quantity: 90 % of what it may be, and the likeliest."""
+
+    low: float
+    likely: float
+    high: float
+
+
+def pool_answers(thing: ObjectDescription, answers: Sequence[ObjectAnswer]) -> ObjectDescription:
+    """Describe an object by several answers, whose parts and pieces have the same names."""
+    answers = [replace(one, parts=_in_piece_order(one.parts, answers[0].parts)) for one in answers]
+    parts = tuple(_pool_part(same) for same in zip(*(one.parts for one in answers), strict=True))
+    said = [one.evidence for one in answers if one.evidence]
+    evidence = _pool_evidence(said) if said else None
+    return replace(thing, parts=parts, evidence=evidence, answers=tuple(answers))
+
+
+def _in_piece_order(
+    parts: Sequence[PartDescription], like: Sequence[PartDescription]
+) -> tuple[PartDescription, ...]:
+    """Put every part's pieces in the order of the first answer's."""
+    found = []
+    for part, first in zip(parts, like, strict=True):
+        by_name = {p.name: p for p in part.pieces}
+        found.append(replace(part, pieces=tuple(by_name[p.name] for p in first.pieces)))
+    return tuple(found)
+
+
+# ---------------------------------------------------------------- parts
+
+
+def _pool_part(same: Sequence[PartDescription]) -> PartDescription:
+    """Pool one part as every answer has it, or the pieces that share its mesh."""
+    if not same[0].pieces:
+        return _pool_leaf(same)
+    layouts = [tuple((p.inside, p.missing) for p in one.pieces) for one in same]
+    commonest = Counter(layouts).most_common(1)[0][0]
+    agreed = [one for one, layout in zip(same, layouts, strict=True) if layout == commonest]
+    pieces = [
+        replace(
+            _pool_leaf([one.pieces[k] for one in same]),
+            inside=commonest[k][0],
+            missing=commonest[k][1],
+            **{
+                name: _mean([getattr(one.pieces[k], name) for one in agreed])
+                for name in SHARE_FIELDS
+            },
+        )
+        for k in range(len(commonest))
+    ]
+    kept = {name: getattr(same[0], name) for name in FIELDS_NOT_ANSWERED}
+    return replace(merge_pieces(same[0].name, pieces), **kept)
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))
+
+
+def _pool_leaf(same: Sequence[PartDescription]) -> PartDescription:
+    """Pool the ways of one part, or of one piece of a mesh, over all answers."""
+    first = same[0]
+    said = [one.swelling for one in same if one.swelling]
+    first = replace(first, swelling=_pool_swelling(said) if said else None)
+    if not all(one.hypotheses for one in same):  # a person said what it is: values differ alone
+        places = [one.placements for one in same]
+        return replace(first, placements=_pool_placements(places, [1.0] * len(same)))
+    ways = _merge_hypotheses([way for one in same for way in one.hypotheses], len(same))
+    led = next(
+        (one for one in same if _hypothesis_key(one.hypotheses[0]) == _hypothesis_key(ways[0])),
+        first,
+    )
+    kept = {name: getattr(first, name) for name in ("swelling", *SHARE_FIELDS, "inside", "missing")}
+    found = replace(apply_hypothesis(led, ways[0]), hypotheses=ways, **kept)
+    if found.answered_by in LOOKING_SOURCES or ways[0].material is None:
+        found = replace(found, margin=ways[0].probability if ways[0].material else 0.0)
+    return found
+
+
+def _hypothesis_key(way: Hypothesis) -> tuple[str | None, ...]:
+    """Name a way: two of one name are the same, and only their values differ."""
+    return way.material, way.structure, way.contents
+
+
+def _merge_hypotheses(ways: Sequence[Hypothesis], count: int) -> tuple[Hypothesis, ...]:
+    """Merge what is the same way; each of ``count`` answers counts the same. Likeliest first."""
+    groups: dict[tuple, list[Hypothesis]] = {}
+    for way in ways:
+        groups.setdefault(_hypothesis_key(way), []).append(way)
+    merged = [_merge_group(group, count) for group in groups.values()]
+    return tuple(sorted(merged, key=lambda way: -way.probability))
+
+
+def _merge_group(group: Sequence[Hypothesis], count: int) -> Hypothesis:
+    best = max(group, key=lambda way: way.probability)
+    return replace(
+        best,
+        probability=sum(way.probability for way in group) / count,
+        fill=_weighted_mean(group, lambda way: way.fill),
+        solidity=_weighted_mean(group, lambda way: way.solidity),
+        placements=_pool_placements(
+            [way.placements for way in group], [way.probability for way in group]
+        ),
+    )
+
+
+def _weighted_mean(
+    group: Sequence[Hypothesis], share: Callable[[Hypothesis], float | None]
+) -> float | None:
+    """Return the mean of what some of the ways state, by their probabilities."""
+    known = [(value, way.probability) for way in group if (value := share(way)) is not None]
+    if not known:
+        return None
+    return sum(value * weight for value, weight in known) / sum(weight for _, weight in known)
+
+
+def _pool_placements(
+    said: Sequence[Mapping[str, RangePlacement]], weights: Sequence[float]
+) -> dict[str, RangePlacement]:
+    """Put every quantity where the answers do on average, on its range's own scale."""
+    found = {}
+    for name in dict.fromkeys(name for places in said for name in places):
+        own = [k for k, places in enumerate(said) if name in places]
+        total = sum(weights[k] for k in own)
+        leading = max(own, key=lambda k: weights[k])
+        fraction = sum(said[k][name].fraction * weights[k] for k in own) / total
+        found[name] = replace(said[leading][name], fraction=fraction)
+    return found
+
+
+# ---------------------------------------------------------------- judgements
+
+
+def _pool_evidence(said: Sequence[MassEvidence]) -> MassEvidence:
+    """Pool judgements of one mass, and keep the print that at least half of the answers read."""
+    whole = _pool_intervals([JudgedInterval(e.low, e.likely, e.high) for e in said])
+    nearest = min(said, key=lambda e: abs(log(e.likely / whole.likely)))
+    printed: tuple[PrintedFact, ...] = tuple(
+        fact
+        for one in said
+        for fact in one.printed
+        if 2 * sum(any(f.kind == fact.kind for f in e.printed) for e in said) >= len(said)
+    )
+    return replace(nearest, low=whole.low, likely=whole.likely, high=whole.high, printed=printed)
+
+
+def _pool_swelling(said: Sequence[ScanThickening]) -> ScanThickening:
+    """Pool judgements of how much of what a scan draws is real."""
+    whole = _pool_intervals([JudgedInterval(s.low, s.likely, s.high) for s in said])
+    nearest = min(said, key=lambda s: abs(log(s.likely / whole.likely)))
+    return replace(nearest, low=whole.low, likely=whole.likely, high=whole.high)
+
+
+def _pool_intervals(said: Sequence[JudgedInterval]) -> JudgedInterval:
+    """Pool N judgements, each log-normal, by the first two moments of their mixture.
+
+    ln m = mean(ln m_k)  and, by the law of total variance,  σ² = mean(σ_k²) + var(ln m_k):
+    the geometric mean, as wide as the answers say themselves and as they lie apart. It does not
+    shrink with N, since answers of one model (or of people who know the same things) share errors.
+    """
+    logs = np.log([s.likely for s in said])
+    widths = [log(s.high / s.low) / NORMAL_90_PERCENT_WIDTH_SIGMAS for s in said]
+    likely = exp(float(logs.mean()))
+    width = hypot(float(np.sqrt(np.mean(np.square(widths)))), float(logs.std()))
+    reach = exp(width * NORMAL_90_PERCENT_WIDTH_SIGMAS / 2)
+    return JudgedInterval(likely / reach, likely, likely * reach)

@@ -1,0 +1,178 @@
+"""A scene as one animated GLB: rigid things move as nodes, soft ones by a few morph targets.
+
+Morph targets are modes of the shapes (``geometry/shape_modes.py``), kept as normalised 16 and 8 bit
+integers (KHR_mesh_quantization): a film takes a sixth of what keyframes of all vertices would.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.core.errors import UserError
+from corporeal.core.store import write_bytes
+from corporeal.core.types import Surface
+from corporeal.export.export_target import ExportRequest, WrittenTarget
+from corporeal.export.exported_solids import ExportedSolid
+from corporeal.export.scene_motion import PosedSurfaces
+from corporeal.geometry.shape_modes import ShapeModes, fit_shape_modes, refit_shape_modes
+from corporeal.io.gltf.glb_writer import ACCESSOR_TYPE_OF_WIDTH, FLOAT, VERTEX_BUFFER, GlbDocument
+
+GLB_FILE_NAME = "film.glb"
+MAX_MORPH_TARGETS = 64
+"""Modes of one surface: with more a sequence of shapes is the better format."""
+QUANTIZATION_EXTENSION = "KHR_mesh_quantization"
+INTEGER_TYPES = {16: (5122, "<i2"), 8: (5120, "i1")}
+"""Bits → component type of glTF, and of NumPy."""
+TOLERANCE_RANGE = (1e-6, 1.0)
+
+
+def write_animated_glb(asked: ExportRequest, folder: Path) -> WrittenTarget:
+    """Write ``film.glb``.
+
+    Raises:
+        UserError: The tolerance makes no sense.
+
+    """
+    low, high = TOLERANCE_RANGE
+    if not low <= asked.config.tolerance <= high:
+        raise UserError(
+            f"--tolerance is {asked.config.tolerance:g} m. Give a length from {low:g} to {high:g}."
+        )
+    film = _AnimatedGlbDocument(asked)
+    write_bytes(folder / GLB_FILE_NAME, film.whole())
+    return WrittenTarget(tuple(film.unsaid), film.measured)
+
+
+class _AnimatedGlbDocument(GlbDocument):
+    """The scene's document, with motion."""
+
+    def __init__(self, asked: ExportRequest) -> None:
+        super().__init__(asked.motion.scene)
+        self.asked, self.motion = asked, asked.motion
+        self.unsaid: list[str] = []
+        self.measured: dict[str, float] = {"modes": 0.0, "vertex_error_m": 0.0}
+        self.samplers: list[dict] = []
+        self.channels: list[dict] = []
+        self.times = self._clock() if self.motion.moves else -1
+
+    def whole(self) -> bytes:
+        """Return the file."""
+        soft = [s for s in self.asked.scene.solids if not s.rigid] if self.motion.moves else []
+        shapes = self.motion.shapes(soft)
+        self.close([self._solid(s, shapes) for s in self.asked.scene.solids])
+        if self.channels:
+            animation = {"name": self.asked.scene.title, "samplers": self.samplers}
+            self.json["animations"] = [animation | {"channels": self.channels}]
+        if QUANTIZATION_EXTENSION in self.extensions:
+            self.json["extensionsRequired"] = [QUANTIZATION_EXTENSION]
+        return self.bytes()
+
+    def _clock(self) -> int:
+        time = self.motion.time - self.motion.time[0]
+        accessor = self._numbers(time[:, None])
+        low, high = time[[0, -1]].astype(np.float32).tolist()
+        self.json["accessors"][accessor] |= {"min": [low], "max": [high]}
+        return accessor
+
+    def _solid(self, solid: ExportedSolid, shapes: PosedSurfaces) -> int:
+        moving = self.motion.moves
+        rows = zip(solid.surface_numbers, solid.surfaces, strict=True)
+        if solid.rigid or not moving:
+            children = [self.surface_node(surface) for _, surface in rows]
+        else:
+            children = [self._soft(number, surface, shapes) for number, surface in rows]
+        matter = [self.asked.scene.matter[k] for k in solid.parts]
+        extras = {"mass_kg": solid.mass, "rigid": solid.rigid}
+        extras |= {"parts": [m.provenance for m in matter]}
+        node = self.add("nodes", {"name": solid.title, "children": children, "extras": extras})
+        if solid.rigid and moving:
+            self._carry(node, solid)
+        elif not moving:
+            self.json["nodes"][node]["translation"] = solid.origin.tolist()
+        return node
+
+    def _carry(self, node: int, solid: ExportedSolid) -> None:
+        """Let a rigid solid's node go where the solid went."""
+        poses = self.motion.poses(solid)
+        turned = poses.quaternion[:, [1, 2, 3, 0]]
+        first = {"translation": poses.position[0].tolist(), "rotation": turned[0].tolist()}
+        self.json["nodes"][node] |= first
+        self._track(node, "translation", poses.position)
+        self._track(node, "rotation", turned)
+
+    def _soft(self, number: int, surface: Surface, shapes: PosedSurfaces) -> int:
+        """Add a surface whose shape changes; its vertices are the world's."""
+        vertices, normals = shapes.of(number)
+        modes = fit_shape_modes(vertices, self.asked.config.tolerance, MAX_MORPH_TARGETS)
+        self._measure(surface, modes)
+        middle = modes.base.mean(axis=0)
+        # Base and targets share one scale, the node's, which undoes the quantisation.
+        largest = max(np.abs(modes.base - middle).max(), np.abs(modes.targets).max(initial=0.0))
+        scale = float(largest) or 1.0
+        unit = replace(modes, base=(modes.base - middle) / scale, targets=modes.targets / scale)
+        mesh = {"name": surface.name, "primitives": [self._morphing(surface, unit, normals)]}
+        if modes.count:
+            mesh["weights"] = modes.weights[0].tolist()
+        node = {"name": surface.name, "mesh": self.add("meshes", mesh)}
+        node |= {"translation": middle.tolist(), "scale": [scale] * 3}
+        place = self.add("nodes", node)
+        if modes.count:
+            self._track(place, "weights", modes.weights.reshape(-1, 1))
+        return place
+
+    def _morphing(self, surface: Surface, unit: ShapeModes, normals: np.ndarray) -> dict:
+        """Return the primitive of unit size, with its targets."""
+        attributes = {"POSITION": self._small(unit.base, 16)}
+        targets = [{"POSITION": self._small(t, 16)} for t in unit.targets]
+        if surface.normals is not None:
+            straight, turns = refit_shape_modes(unit, normals)
+            size = np.linalg.norm(straight, axis=1, keepdims=True)
+            attributes["NORMAL"] = self.array(np.where(size > 1e-6, straight / size, [0, 0, 1]))
+            for target, turn in zip(targets, turns, strict=True):
+                target["NORMAL"] = self._small(turn, 8)
+        for name, values in (("TEXCOORD_0", surface.uv), ("COLOR_0", surface.colours)):
+            if values is not None:
+                attributes[name] = self.array(values)
+        drawn = {
+            "attributes": attributes,
+            "indices": self.indices(surface.triangles, len(surface.vertices)),
+            "material": self.material(surface.finish),
+        }
+        return drawn | ({"targets": targets} if targets else {})
+
+    def _measure(self, surface: Surface, modes: ShapeModes) -> None:
+        kept = self.measured
+        kept["modes"] = max(kept["modes"], float(modes.count))
+        kept["vertex_error_m"] = max(kept["vertex_error_m"], modes.error)
+        if modes.error > self.asked.config.tolerance:
+            self.unsaid.append(
+                f"{surface.name} moves in more than {MAX_MORPH_TARGETS} modes: its vertices are up to "
+                f"{modes.error * 1e3:.2g} mm off. USD and Alembic keep all of its shapes."
+            )
+
+    def _numbers(self, values: np.ndarray) -> int:
+        """Add floats that no vertex has: times and keyframes."""
+        data = np.ascontiguousarray(values, "<f4")
+        view = self.view(data.tobytes())
+        item = {"bufferView": view, "componentType": FLOAT, "count": len(data)}
+        return self.add("accessors", item | {"type": ACCESSOR_TYPE_OF_WIDTH[data.shape[1]]})
+
+    def _small(self, values: np.ndarray, bits: int) -> int:
+        """Add numbers in [-1, 1] as normalised integers, each vertex on a four-byte boundary."""
+        component, kind = INTEGER_TYPES[bits]
+        data = np.zeros((len(values), 4), kind)
+        data[:, :3] = np.rint(np.clip(values, -1, 1) * (2 ** (bits - 1) - 1))
+        view = self.view(data.tobytes(), VERTEX_BUFFER)
+        self.json["bufferViews"][view]["byteStride"] = data.itemsize * 4
+        self.extensions.add(QUANTIZATION_EXTENSION)
+        item = {"bufferView": view, "componentType": component, "normalized": True}
+        item |= {"count": len(data), "type": "VEC3"}
+        item |= {"min": data[:, :3].min(axis=0).tolist(), "max": data[:, :3].max(axis=0).tolist()}
+        return self.add("accessors", item)
+
+    def _track(self, node: int, path: str, values: np.ndarray) -> None:
+        sampler = {"input": self.times, "output": self._numbers(values), "interpolation": "LINEAR"}
+        self.samplers.append(sampler)
+        target = {"node": node, "path": path}
+        self.channels.append({"sampler": len(self.samplers) - 1, "target": target})

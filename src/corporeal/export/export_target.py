@@ -1,0 +1,88 @@
+"""What a writer is asked for, what it returns, and the menu of writers."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Protocol
+
+from corporeal.core.errors import UserError
+from corporeal.export.exported_solids import PhysicalScene
+from corporeal.export.scene_motion import SceneMotion
+from corporeal.simulation.simulation_result import SimulationResult
+
+ExportTarget = Literal["usd", "mjcf", "urdf", "glb", "splats", "h5", "npz", "abc"]
+SoftRepresentation = Literal["particles", "tetrahedra", "none"]
+TargetEngine = Literal["physx", "newton-vbd", "newton-xpbd", "mujoco"]
+
+EXPORT_WRITERS: dict[str, str] = {
+    "usd": "corporeal.export.usd_writer:write_usd",
+    "mjcf": "corporeal.export.mjcf_writer:write_mjcf",
+    "urdf": "corporeal.export.urdf_writer:write_urdf",
+    "glb": "corporeal.export.animated_glb_writer:write_animated_glb",
+    "splats": "corporeal.export.splat_sequence_writer:write_splat_sequence",
+    "h5": "corporeal.export.particle_h5_npz_writer:write_h5",
+    "npz": "corporeal.export.particle_h5_npz_writer:write_npz",
+    "abc": "corporeal.export.alembic_writer:write_alembic",
+}
+"""Target → its writer."""
+
+
+@dataclass(frozen=True)
+class ExportConfig:
+    """What is exported, and how closely."""
+
+    at: str = "start"
+    """The instant that simulators start from: start, end, or seconds."""
+    soft: SoftRepresentation = "particles"
+    """How simulators get what can deform: material points (USD), tetrahedra (USD, MJCF), or not at
+    all. MJCF knows no material points and takes tetrahedra for them."""
+    tolerance: float = 1e-3
+    """Largest error of a vertex in the GLB film [m]."""
+    friction_for: TargetEngine = "physx"
+    """Whose rule makes one friction of two where a format has no pairs."""
+    hull_vertices: int = 0
+    """Largest number of corners of a convex collider in USD, 64 for PhysX on a card: hulls of more
+    are enclosed in coarser ones. 0: hulls stay as they are, so that what is settled stays put."""
+    check: bool = False
+    """Open the files again with real readers and measure what they hold."""
+
+
+DEFAULT_EXPORT = ExportConfig()
+
+
+@dataclass(frozen=True)
+class ExportRequest:
+    """One scene to be written; its motion where it has any."""
+
+    scene: PhysicalScene
+    motion: SceneMotion
+    config: ExportConfig
+    played: SimulationResult | None = None
+    """The run; None: a scene before any simulation."""
+
+
+@dataclass(frozen=True)
+class WrittenTarget:
+    """What a writer says of its files."""
+
+    unsaid: tuple[str, ...] = ()
+    """What the format could not say, in sentences."""
+    measured: dict[str, float] = field(default_factory=dict)
+    """By how much it is off: misfit of friction [-], error of vertices [m], modes."""
+
+
+class NothingToWriteError(UserError):
+    """The scene holds nothing that a format is for; other targets are written all the same."""
+
+
+class Writer(Protocol):
+    """Writes one target into a folder that is there and empty."""
+
+    def __call__(self, asked: ExportRequest, folder: Path) -> WrittenTarget:
+        """Write the files.
+
+        Raises:
+            NothingToWriteError: The scene has nothing that this format is for.
+            UserError: A setting makes no sense.
+
+        """
+        ...

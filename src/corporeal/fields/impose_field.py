@@ -1,0 +1,218 @@
+"""Let another method's field decide what parts are made of: its medians, in our parts and laws.
+
+What the other method does not tell (yield stress, friction, walls, contents) is borrowed from ours
+and marked so. A part that the field does not resolve keeps our numbers altogether.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
+    Law,
+    Material,
+    MaterialField,
+    MeasuredRange,
+    Parts,
+    Provenance,
+    Scene,
+    Structure,
+)
+from corporeal.fields.field_per_part import PartFieldNumbers, sum_up_per_part
+from corporeal.fields.field_registration import register_points
+from corporeal.fields.field_specification import UniformField, parse_field_specification
+from corporeal.geometry.mesh import Mesh, join_meshes
+from corporeal.geometry.point_sampling import sample_surface
+from corporeal.materials import find_material
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
+
+CHOSEN_BY_FIELD, CHOSEN_BY_LIBRARY = "field", "borrowed"
+"""Who chose a value: the other method, or we, where it tells none."""
+BORROWED_NUMBERS_NOTE = f"What the other method does not tell is ours, marked {CHOSEN_BY_LIBRARY}."
+POINTS_PER_PART = 400
+"""Points on a part's surface that its numbers are summed up over."""
+REGISTRATION_SURFACE_POINTS = 4000
+"""Points on the surface that a field is registered with."""
+LAW_OF_PIXIE_KIND: Mapping[str, tuple[Law, str]] = {
+    "jelly": (Law.COROTATED, ""),
+    "metal": (Law.VON_MISES, "steel"),
+    "visplas": (Law.VON_MISES, "plasticine"),
+    "sand": (Law.DRUCKER_PRAGER, "sand"),
+    "snow": (Law.DRUCKER_PRAGER, "snow"),
+}
+"""Kind of Pixie → our law, and whose strength stands in where our own material has none. What is
+"stationary" keeps our law and is judged like any part."""
+FIELD_RANGE_SOURCE = "field"
+"""Source of a band that a field spans, where the library has no range."""
+
+
+def impose_field(found: MaterialField, scene: Scene, parts: Parts, spec: str) -> MaterialField:
+    """Replace numbers by those of another field.
+
+    Args:
+        found: Ours.
+        scene: In metres, +Z up.
+        parts: Of its triangles.
+        spec: See ``specification``; empty: nothing is replaced.
+
+    Raises:
+        UserError: The field cannot be used with this scene.
+
+    """
+    field = parse_field_specification(spec)
+    if field is None:
+        return found
+    if isinstance(field, UniformField):
+        return _with_uniform_field(found, field)
+    told: dict[int, PartFieldNumbers] = {}
+    methods: set[str] = set()
+    for number in (None, *range(len(scene.objects))):
+        path = field.of(None if number is None else scene.objects[number].name)
+        if path is not None:
+            sampled = field.read(path)
+            methods.add(sampled.method)
+            chosen = _SurfaceSamples(scene, parts, number)
+            placed = register_points(sampled.position, chosen.surface, path)
+            told |= sum_up_per_part(sampled, placed, chosen.points, chosen.part_of_point)
+    if not told:
+        names = ", ".join(thing.name for thing in scene.objects)
+        raise UserError(f"{field.path} has no file for any object of the scene: {names}.")
+    return _with_part_numbers(found, parts, told, methods.pop())
+
+
+class _SurfaceSamples:
+    """Points on the surface of one object or of all of them, with their parts."""
+
+    def __init__(self, scene: Scene, parts: Parts, number: int | None) -> None:
+        whole = join_meshes(scene.surfaces)
+        own = np.ones(len(whole.triangles), bool) if number is None else (
+            parts.object_of_point == number
+        )  # fmt: skip
+        self.surface = _sample_mesh(whole.only(own), REGISTRATION_SURFACE_POINTS)
+        on_parts = [
+            (k, _sample_mesh(whole.only(own & (parts.part_of_point == k)), POINTS_PER_PART))
+            for k in np.unique(parts.part_of_point[own & (parts.part_of_point >= 0)]).tolist()
+        ]
+        self.points = np.concatenate([p for _, p in on_parts])
+        self.part_of_point = np.repeat([k for k, _ in on_parts], [len(p) for _, p in on_parts])
+
+
+def _sample_mesh(mesh: Mesh, count: int) -> np.ndarray:
+    return sample_surface(mesh, count, np.random.default_rng(0))[0]
+
+
+# ---------------------------------------------------------------- one material for everything
+
+
+def _with_uniform_field(found: MaterialField, field: UniformField) -> MaterialField:
+    note = f"Numbers are those of {field.method}: a baseline, not a prediction. {BORROWED_NUMBERS_NOTE}"
+    reason = f"{field.method} has it so everywhere"
+    made = [
+        _replaced_value(m, dict(field.value), {n: reason for n in field.value})
+        for m in found.materials
+    ]
+    if field.keeps_laws:
+        return replace(found, materials=tuple(made), pieces=(), notes=(*found.notes, note))
+    solid = Structure("solid", None, f"{field.method}: everything is solid.")
+    return replace(
+        found,
+        materials=tuple(_elastic_material(m) for m in made),
+        structures=(solid,) * len(made),
+        pieces=(),
+        notes=(*found.notes, note),
+    )
+
+
+def _elastic_material(material: Material) -> Material:
+    """Make a material fixed-corotated, which loses nothing."""
+    grounds = {name: g for name, g in material.grounds.items() if name != "loss"}
+    return replace(material, law=Law.COROTATED, loss=0.0, grounds=grounds)
+
+
+# ---------------------------------------------------------------- numbers of a field
+
+
+@dataclass(frozen=True)
+class _FieldUse:
+    """How a field was used."""
+
+    imposed: int
+    outside: int
+    """Values outside the library's ranges."""
+    kept: tuple[str, ...]
+    """Why parts kept our numbers, in clauses."""
+
+
+def _with_part_numbers(
+    found: MaterialField, parts: Parts, told: Mapping[int, PartFieldNumbers], method: str
+) -> MaterialField:
+    materials, pieces = list(found.materials), list(found.pieces)
+    outside, kept = 0, []
+    for k, part in enumerate(parts.catalogue):
+        numbers = told.get(k)
+        if numbers is None or numbers.unfit:
+            clause = numbers.unfit if numbers else "the field has no file for it"
+            kept.append(f"{part.name} ({clause})")
+            continue
+        ours = materials[k]
+        materials[k] = _imposed_material(ours, part.name, numbers, method)
+        outside += sum(
+            n in ours.grounds and v not in ours.grounds[n].range for n, v in numbers.value.items()
+        )
+        if pieces:
+            pieces[k] = ()
+    count = _FieldUse(len(materials) - len(kept), outside, tuple(kept))
+    notes = (*found.notes, _field_note(method, count))
+    return replace(found, materials=tuple(materials), pieces=tuple(pieces), notes=notes)
+
+
+def _field_note(method: str, count: _FieldUse) -> str:
+    all_of = count.imposed + len(count.kept)
+    said = f"Numbers of {count.imposed} of {all_of} parts are those of {method}. {BORROWED_NUMBERS_NOTE}"
+    if count.outside:
+        said += f" Values outside our measured ranges, used all the same: {count.outside}."
+    return said + (f" Ours are kept in: {'; '.join(count.kept)}." if count.kept else "")
+
+
+def _imposed_material(
+    ours: Material, part: str, numbers: PartFieldNumbers, method: str
+) -> Material:
+    reasons = {}
+    for name, (low, high) in numbers.band.items():
+        reasons[name] = (
+            f"median of {method} on this part (p10 to p90: {low:.3g} to {high:.3g}; "
+            f"{numbers.covered:.0%} of its surface covered)"
+        )
+    made = _replaced_value(ours, dict(numbers.value), reasons)
+    if numbers.kind == "fluid":
+        raise UserError(
+            f"{method} takes {part} for a fluid: no solid can be simulated as one. Leave its "
+            "points out of the file, and our numbers are kept."
+        )
+    law, stand_in = LAW_OF_PIXIE_KIND.get(numbers.kind or "", (None, ""))
+    return made if law is None else _under_law(law, made, stand_in)
+
+
+def _under_law(law: Law, material: Material, stand_in: str) -> Material:
+    """Put a material under a law, with what it needs and has not from the library's own kind."""
+    fields = CONSTITUTIVE_LAWS[law].fields
+    lacking = [n for n in fields if getattr(material, n) is None]
+    if not lacking:
+        return replace(material, law=law)
+    usual = find_material(stand_in).typical(f"{CHOSEN_BY_LIBRARY} from {stand_in}")
+    grounds = {n: replace(usual[n], chosen_by=CHOSEN_BY_LIBRARY) for n in lacking if n in usual}
+    values = {n: g.value for n, g in grounds.items()}
+    return replace(material, law=law, grounds=material.grounds | grounds, **values)
+
+
+def _replaced_value(
+    ours: Material, value: Mapping[str, float], reasons: Mapping[str, str]
+) -> Material:
+    grounds = {name: replace(g, chosen_by=CHOSEN_BY_LIBRARY) for name, g in ours.grounds.items()}
+    for name, number in value.items():
+        known = ours.grounds.get(name)
+        span = known.range if known else MeasuredRange(number, number, number, FIELD_RANGE_SOURCE)
+        grounds[name] = Provenance(number, span, CHOSEN_BY_FIELD, reasons[name])
+    return replace(ours, grounds=grounds, **value)

@@ -1,0 +1,1 @@
+"""glTF and GLB: reading, writing, skins, Draco compression."""

@@ -1,0 +1,1 @@
+"""Mesh formats: OBJ, PLY, STL, OFF, 3MF, DAE."""

@@ -1,0 +1,278 @@
+"""OBJ, PLY, STL, OFF, 3MF and DAE, read by trimesh, in the axes and the unit of the file.
+
+Companions (.mtl, pictures) are taken from the file's own folder only.
+"""
+
+import re
+import zipfile
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.resolvers import Resolver
+from trimesh.visual.color import to_rgba
+from trimesh.visual.material import PBRMaterial, SimpleMaterial
+
+from corporeal.core.errors import BadFileError
+from corporeal.core.types import Finish, Surface
+from corporeal.geometry.srgb import srgb_to_linear
+from corporeal.io.gltf.gltf_container import MAX_MODEL_FILE_BYTES, read_file_bytes
+from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
+from corporeal.io.image_decoder import as_reduced_array
+from corporeal.io.mesh.dae_names import read_dae_names
+from corporeal.io.mesh.obj_indices import with_absolute_indices
+from corporeal.io.mesh.ply_faces import triangulate_mixed_faces
+from corporeal.io.mesh.raw_mesh import MAX_PIECES, MESH_EXPORT_ADVICE, NODE_NAMES_KEY, RawMesh
+from corporeal.io.referenced_files import read_beside
+
+MAX_ZIP_UNPACKED_BYTES = 2**29
+"""What a ZIP may unpack to [bytes]."""
+UP_OF_DAE_AXIS = {"X_UP": "+x", "Y_UP": "+y", "Z_UP": "+z"}
+
+
+class _CompanionResolver(Resolver):
+    """Companions of a file: from its folder, and never from elsewhere."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def get(self, key: str) -> bytes:
+        return read_beside(self.folder, key.strip(), MAX_MODEL_FILE_BYTES)
+
+    def write(self, name: str, data) -> None:
+        raise PermissionError(f"{name} is not written: companions are only read")
+
+    def namespaced(self, namespace: str) -> "_CompanionResolver":
+        return self
+
+    def keys(self) -> list[str]:
+        return [p.name for p in self.folder.iterdir()]
+
+
+class _ObjMaterials(_CompanionResolver):
+    """Also what an OBJ calls materials that its .mtl does not have, if there is one."""
+
+    def __init__(self, folder: Path, used: set[bytes]) -> None:
+        super().__init__(folder)
+        self.used = used
+        self.lost: list[str] = []
+
+    def get(self, key: str) -> bytes:
+        if not key.strip().lower().endswith(".mtl"):
+            return super().get(key)
+        try:
+            text = super().get(key)
+        except ValueError as problem:
+            self.lost.append(f"colours and pictures ({problem})")
+            text = b""
+        colour = " ".join(f"{c:g}" for c in DEFAULT_FINISH.colour[:3])
+        unknown = self.used - _names_in_obj(text, b"newmtl")
+        named = [b"newmtl %b\nKd %b" % (name, colour.encode()) for name in sorted(unknown)]
+        return b"\n".join([text, *named])
+
+
+def read_obj(path: Path) -> RawMesh:
+    """Read a Wavefront OBJ with its materials; nobody says its unit, +y is up.
+
+    Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
+    but one of the two.
+    """
+    data = with_absolute_indices(bytes(read_file_bytes(path)))
+    named = b"o" if _names_in_obj(data, b"o") else b"g"
+    few = len(_names_in_obj(data, named)) <= MAX_PIECES
+    looks = _ObjMaterials(path.parent, _names_in_obj(data, b"usemtl"))
+    split = {"split_objects": named == b"o", "split_groups": named == b"g" and few}
+    scene = _load_with_trimesh(path, "obj", data, resolver=looks, **split)
+    return RawMesh(*_finished_meshes(scene, _object_and_material), up="+y", lost=tuple(looks.lost))
+
+
+def read_ply(path: Path) -> RawMesh:
+    """Read a PLY with faces; nobody says its unit, +z is up."""
+    data, lost = triangulate_mixed_faces(path, read_file_bytes(path))
+    scene = _load_with_trimesh(path, "ply", data)
+    return RawMesh(*_finished_meshes(scene, lambda *_: (path.stem,)), up="+z", lost=lost)
+
+
+def read_stl(path: Path) -> RawMesh:
+    """Read an STL, in text or in bytes; nobody says its unit, +z is up."""
+    return RawMesh(
+        *_finished_meshes(_load_with_trimesh(path, "stl"), lambda *_: (path.stem,)), up="+z"
+    )
+
+
+def read_off(path: Path) -> RawMesh:
+    """Read an OFF; nobody says its unit, +z is up."""
+    return RawMesh(
+        *_finished_meshes(_load_with_trimesh(path, "off"), lambda *_: (path.stem,)), up="+z"
+    )
+
+
+def read_3mf(path: Path) -> RawMesh:
+    """Read a 3MF: its unit is stated, millimetres where it is not (3MF core 1.3, 3.4); +z is up."""
+    _require(path, "lxml", "networkx")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(entry.file_size for entry in archive.infolist())
+    except zipfile.BadZipFile as problem:
+        raise BadFileError(
+            path, f"cannot be read as 3MF ({problem}).", MESH_EXPORT_ADVICE
+        ) from problem
+    if size > MAX_ZIP_UNPACKED_BYTES:
+        raise BadFileError(path, f"unpacks to {size / 2**30:.1f} GiB.", "Split it into several.")
+    scene = _load_with_trimesh(path, "3mf")
+    unit = trimesh.units.unit_conversion(scene.units or "millimeters", "meters")
+    return RawMesh(*_finished_meshes(scene), up="+z", unit=float(unit))
+
+
+def read_dae(path: Path) -> RawMesh:
+    """Read a COLLADA with its unit and its up axis, which is y where it states none (1.4.1)."""
+    _require(path, "lxml", "collada")
+    scene = _load_with_trimesh(path, "dae")
+    unit, axis = _asset_of_dae(path)
+    if axis not in UP_OF_DAE_AXIS:
+        raise BadFileError(path, f"states an unknown up axis {axis[:20]!r}.", MESH_EXPORT_ADVICE)
+    names = read_dae_names(bytes(read_file_bytes(path)))
+    for piece, (_, look) in names.items():
+        material = getattr(getattr(scene.geometry.get(piece), "visual", None), "material", None)
+        if material is not None and look:
+            material.name = look
+    named = _finished_meshes(scene, lambda piece, _: names[piece][0])
+    return RawMesh(*named, up=UP_OF_DAE_AXIS[axis], unit=unit)  # pyright: ignore[reportArgumentType]
+
+
+# ---------------------------------------------------------------- the file
+
+
+def _require(path: Path, *packages: str) -> None:
+    missing = [name for name in packages if find_spec(name) is None]
+    if missing:
+        what = f"reading {path.suffix} needs {' and '.join(missing)}."
+        raise BadFileError(path, what, "Install with: pip install 'corporeal[meshes]'.")
+
+
+def _load_with_trimesh(
+    path: Path,
+    kind: str,
+    data: bytes | None = None,
+    resolver: Resolver | None = None,
+    **options: Any,
+) -> trimesh.Scene:
+    data = bytes(read_file_bytes(path)) if data is None else data
+    return trimesh.load_scene(
+        trimesh.util.wrap_as_stream(data),
+        file_type=kind,
+        resolver=resolver or _CompanionResolver(path.parent),
+        process=False,
+        **options,
+    )
+
+
+def _asset_of_dae(path: Path) -> tuple[float | None, str]:
+    """Return what ``asset`` says of unit [m] and up axis."""
+    from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]
+
+    unit, axis = None, "Y_UP"
+    reading = etree.iterparse(str(path), resolve_entities=False, no_network=True, recover=True)
+    for _, element in reading:
+        name = etree.QName(element).localname
+        if name == "unit":
+            unit = float(element.get("meter", "1"))
+        elif name == "up_axis":
+            axis = (element.text or "").strip()
+        elif name == "asset":
+            break
+    if unit is not None and not 0 < unit < np.inf:
+        raise BadFileError(path, f"states that a unit is {unit:g} m.", MESH_EXPORT_ADVICE)
+    return unit, axis
+
+
+# ---------------------------------------------------------------- what it holds
+
+
+def _names_in_obj(data: bytes, keyword: bytes) -> set[bytes]:
+    """Return the names that stand after a keyword of an OBJ."""
+    return set(re.findall(rb"(?m)^" + keyword + rb"[ \t]+(\S[^\r\n]*?)[ \t\r]*$", data))
+
+
+def _object_and_material(node: str, mesh: trimesh.Trimesh) -> tuple[str, ...]:
+    """Return the names of an OBJ's thing and surface: trimesh joins them with the material's."""
+    material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")
+    owner = node.removesuffix(f"_{material}")
+    return (node,) if owner in ("", node) else (owner, node)
+
+
+def _finished_meshes(
+    scene: trimesh.Scene, named: Callable[[str, trimesh.Trimesh], tuple[str, ...]] | None = None
+) -> tuple[tuple[Surface, ...], tuple[Finish, ...]]:
+    """Return every mesh at every place where the scene shows it, and what each looks like."""
+    surfaces, finishes = [], []
+    for node, to_world, mesh in _placed_meshes(scene):
+        finishes.append(_finish(mesh.visual))
+        uv = getattr(mesh.visual, "uv", None)
+        along = named(node, mesh) if named else (node,)
+        triangles = np.asarray(mesh.faces, np.int64)
+        mirrored = np.linalg.det(to_world[:3, :3]) < 0
+        surfaces.append(
+            Surface(
+                name=along[-1],
+                object=0,
+                finish=len(finishes) - 1,
+                vertices=trimesh.transform_points(np.asarray(mesh.vertices, float), to_world),
+                triangles=np.ascontiguousarray(triangles[:, ::-1] if mirrored else triangles),
+                uv=None if uv is None or len(uv) != len(mesh.vertices) else _flip_v(uv),
+                colours=_colours(mesh.visual),
+                extras={NODE_NAMES_KEY: list(along)},
+            )
+        )
+    return tuple(surfaces), tuple(finishes)
+
+
+def _placed_meshes(scene: trimesh.Scene) -> Iterator[tuple[str, np.ndarray, trimesh.Trimesh]]:
+    for node in scene.graph.nodes_geometry:
+        to_world, name = scene.graph[node]
+        mesh = scene.geometry[name]
+        if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+            yield str(node), np.asarray(to_world, float), mesh
+
+
+def _flip_v(uv: np.ndarray) -> np.ndarray:
+    """Turn v, which runs up in these files, to run down as in glTF."""
+    return np.asarray(uv, np.float64) * (1, -1) + (0, 1)
+
+
+def _colours(visual) -> np.ndarray | None:
+    """Return colours of vertices, linear RGBA (V, 4), where the file has some."""
+    if visual.kind != "vertex":
+        return None
+    srgb = np.asarray(visual.vertex_colors, float) / 255
+    return np.concatenate([srgb_to_linear(srgb[:, :3]), srgb[:, 3:]], axis=1)
+
+
+def _finish(visual) -> Finish:
+    material = getattr(visual, "material", None)
+    if visual.kind == "vertex":
+        return Finish("painted", roughness=DEFAULT_FINISH.roughness)
+    if not isinstance(material, SimpleMaterial | PBRMaterial):
+        return DEFAULT_FINISH
+    name = str(material.name or DEFAULT_FINISH.name)[:120]
+    simple = isinstance(material, SimpleMaterial)
+    picture = _diffuse_image(material.image if simple else material.baseColorTexture)
+    if picture is not None:
+        return Finish(name, texture=picture, roughness=DEFAULT_FINISH.roughness)
+    colour = material.diffuse if simple else material.baseColorFactor
+    if colour is None:
+        return Finish(name, colour=DEFAULT_FINISH.colour, roughness=DEFAULT_FINISH.roughness)
+    r, g, b, a = (float(c) / 255 for c in to_rgba(colour))
+    return Finish(name, colour=(r, g, b, a), roughness=DEFAULT_FINISH.roughness)
+
+
+def _diffuse_image(image: Image.Image | None) -> np.ndarray | None:
+    """Return the picture of the diffuse colour; None where there is none that can be read."""
+    try:
+        return None if image is None else as_reduced_array(image)
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return None

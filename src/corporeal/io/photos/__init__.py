@@ -1,0 +1,1 @@
+"""Photographs: images, masks, camera poses of COLMAP and transforms.json."""

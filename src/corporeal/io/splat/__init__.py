@@ -1,0 +1,1 @@
+"""Gaussian splat formats: PLY, SPLAT, KSPLAT, SPZ, SOG."""

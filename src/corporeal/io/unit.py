@@ -1,8 +1,0 @@
-"""Units of length that a person may say a mesh file is in."""
-
-from typing import Literal
-
-Unit = Literal["auto", "m", "cm", "mm", "in", "ft"]
-"""auto: as the file states, else what its size makes likely."""
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
-"""Of each unit [m]."""

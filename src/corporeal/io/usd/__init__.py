@@ -1,0 +1,1 @@
+"""USD: text, meshes and rigid bodies."""

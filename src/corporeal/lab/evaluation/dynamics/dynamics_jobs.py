@@ -1,0 +1,95 @@
+"""Every run of an evaluation as a job in a process of its own, resumed where it was stopped."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+from corporeal.core import store
+from corporeal.jobs.job import Job, ProgressCallback
+from corporeal.lab.evaluation.dynamics.compared_methods import OUR_METHOD, Method, method_settings
+from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+    ReferenceDetail,
+    reference_folder,
+    run_folder,
+)
+from corporeal.lab.evaluation.dynamics.run_measures import measure_run, write_run_measures
+from corporeal.pipeline import run_pipeline
+from corporeal.pipeline.run_pipeline import Settings
+from corporeal.pipeline.settings.simulate_config import settings_for_key
+
+ORPHAN_WAIT_S = 60.0
+"""Longest wait for the process of an earlier call that was killed to be gone [s]."""
+
+
+@dataclass(frozen=True)
+class EvaluatedScene:
+    """A scene that is evaluated."""
+
+    name: str
+    path: Path
+    """Of its file."""
+
+
+@dataclass(frozen=True)
+class MethodComparison:
+    """Who is compared with what."""
+
+    out: Path
+    """Folder of the evaluation."""
+    methods: tuple[Method, ...]
+    """Ours first."""
+    reference: ReferenceDetail
+    settings: Settings
+    """Ours."""
+
+
+def dynamics_jobs(scenes: Sequence[EvaluatedScene], comparison: MethodComparison) -> list[Job]:
+    """Return all runs, those of one scene together: every method, then the reference."""
+    found = []
+    for scene in scenes:
+        for method in comparison.methods:
+            folder = run_folder(comparison.out, scene.name, method.name)
+            how = method_settings(method, comparison.settings, scene.name)
+            found.append(_job(scene, folder, how))
+        finer = replace(
+            comparison.settings, fill=replace(comparison.settings.fill, detail=comparison.reference)
+        )
+        folder = reference_folder(comparison.out, scene.name, comparison.reference)
+        found.append(_job(scene, folder, method_settings(OUR_METHOD, finer, scene.name)))
+    return found
+
+
+def _job(scene: EvaluatedScene, folder: Path, settings: Settings) -> Job:
+    configs = [getattr(settings, f.name) for f in fields(Settings)]
+    read = [name for config in configs for name in run_pipeline.digests_of_named_files(config)]
+    asked = replace(settings, describe=replace(settings.describe, record=None))
+    named = {**store.settings_for_key(asked), "simulate": settings_for_key(settings.simulate)}
+    return Job(
+        name=f"{scene.name}.{folder.name}",
+        function=run_and_measure,
+        folder=folder,
+        key=store.result_key("dynamics", named, [store.path_digest(scene.path), *read]),
+        arguments={"scene": scene.path.resolve(), "settings": settings},
+        resumable=True,
+    )
+
+
+def run_and_measure(
+    folder: Path, progress: ProgressCallback, scene: Path, settings: Settings
+) -> None:
+    """Run a scene up to simulate and keep what is compared, in the process of a worker."""
+    with store.lock_folder(folder, ORPHAN_WAIT_S):
+        pass
+    run_pipeline.run([scene], folder, settings, _only_simulation(progress), "simulate")
+    progress(0.99, "measuring")
+    write_run_measures(folder, measure_run(folder))
+
+
+def _only_simulation(progress: ProgressCallback) -> run_pipeline.ProgressOfStage:
+    """Show the progress of the simulation; what comes before takes little."""
+
+    def tell(verb: str) -> ProgressCallback:
+        share = 0.95 if verb == "simulate" else 0.0
+        return lambda done, words: progress(share * done, f"{verb} {words}")
+
+    return tell

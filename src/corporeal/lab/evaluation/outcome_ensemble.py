@@ -1,0 +1,258 @@
+"""How far the outcome is known: one run simulated again with other values from the ranges.
+
+Every member is drawn as a whole (materials/value_sampling.py), filled anew and simulated; its
+frames are dropped once its outcome is known. A member that is done is not done again, and one that
+was cut off goes on, as a run does.
+"""
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.core import store
+from corporeal.core.deserialize import from_plain
+from corporeal.core.errors import SimulationError, UserError
+from corporeal.materials.value_sampling import sample_material_field
+from corporeal.pipeline.mass_posterior import sample_hypotheses
+from corporeal.pipeline.results import StageResults
+from corporeal.pipeline.run_pipeline import (
+    Progress,
+    ProgressOfStage,
+    Settings,
+    no_progress_of_stage,
+    open_run,
+    read_run_request,
+)
+from corporeal.pipeline.stages.fill import fill
+from corporeal.pipeline.stages.ground import ground
+from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
+from corporeal.simulation.outcome import measure_outcome
+from corporeal.simulation.trajectory_files import FRAMES_FOLDER
+
+MEMBERS_FOLDER, MEMBER_FILE, SPREAD_FILE = "ensemble", "outcome.json", "ensemble.json"
+SPREAD_QUANTITIES = {
+    "mass_kg": "mass [kg]",
+    "rebound_m": "rebound [m]",
+    "rebound_ratio": "rebound over fall",
+    "dent_depth_m": "dent [m]",
+    "deepest_squeeze_m": "deepest squeeze [m]",
+    "moved_level_m": "moved across [m]",
+    "turned_deg": "turned [°]",
+}
+"""Outcome numbers whose spread is reported."""
+INTERVAL_LOW_QUANTILE, INTERVAL_HIGH_QUANTILE = 0.05, 0.95
+MAX_MEMBERS = 1000
+"""Members of one ensemble."""
+
+
+ObjectQuantities = Mapping[str, Mapping[str, float | None]]
+"""Object → quantity → what it was."""
+
+
+@dataclass(frozen=True)
+class QuantitySpread:
+    """How far one quantity of one object is known."""
+
+    chosen: float | None
+    """In the run's own simulation."""
+    count: int
+    """Members in which there was such a number."""
+    low: float | None = None
+    """5 % of these are below."""
+    median: float | None = None
+    high: float | None = None
+    """5 % are above."""
+    smallest: float | None = None
+    largest: float | None = None
+
+
+@dataclass(frozen=True)
+class MemberOutcome:
+    """What was drawn for one member, and what came of it."""
+
+    number: int
+    drawn: tuple[Mapping[str, str | float], ...]
+    """Per part: ``part``, ``material``, and field of ``Material`` → value [SI]."""
+    objects: ObjectQuantities
+    """Empty where it could not be simulated to the end."""
+    error: str = ""
+    """Why not."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """A run simulated again with other values from the ranges."""
+
+    samples: int
+    seed: int
+    interval: tuple[float, float]
+    """Shares of the members below ``Spread.low`` and ``Spread.high``."""
+    chosen: ObjectQuantities
+    """Of the run itself."""
+    members: tuple[MemberOutcome, ...]
+    spread: Mapping[str, Mapping[str, QuantitySpread]]
+    """Object → quantity → how far it is known."""
+
+    def of(self, obj: str, quantity: str) -> QuantitySpread:
+        """Return how far one of ``SPREAD_QUANTITIES`` of an object is known."""
+        return self.spread[obj][quantity]
+
+
+@dataclass(frozen=True)
+class EnsembleMember:
+    """One drawn set of values, and where its result goes."""
+
+    number: int
+    seed: int
+    folder: Path
+    key: str
+
+    @property
+    def random(self) -> np.random.Generator:
+        """Source of all that is drawn for it."""
+        return np.random.default_rng([self.seed, self.number])
+
+
+def simulate_ensemble(
+    folder: Path,
+    samples: int,
+    seed: int = 0,
+    config: SimulateConfig | None = None,
+    tell: ProgressOfStage = no_progress_of_stage,
+) -> Ensemble:
+    """Simulate a run again ``samples`` times over the ranges, and keep the spread in its folder.
+
+    Args:
+        folder: The run's; its own simulation is done first, where it is not done yet.
+        samples: How many sets of values are drawn.
+        seed: Of the draws.
+        config: How to simulate; None: as the run was.
+        tell: Whom to tell about progress.
+
+    Raises:
+        UserError: The folder is no run, or the number of samples makes no sense.
+
+    """
+    if not 1 <= samples <= MAX_MEMBERS:
+        raise UserError(f"--samples is {samples}. Give a number from 1 to {MAX_MEMBERS}.")
+    asked = read_run_request(folder)
+    settings = asked.settings
+    if config is not None:
+        settings = replace(settings, simulate=config)
+    with open_run(asked.inputs, folder, settings, tell, "simulate") as work:
+        made = work.made
+        progress = tell("ensemble")
+        chosen = outcome_row(made)
+        rows = []
+        for number in range(samples):
+            name = store.result_key("member", {"seed": seed, "number": number}, [work.key])
+            member = EnsembleMember(number, seed, folder / MEMBERS_FOLDER / f"{number:03d}", name)
+            rows.append(_member(member, made, settings, _share(progress, number, samples)))
+        known = outcome_spread(chosen, rows)
+        result = Ensemble(
+            samples,
+            seed,
+            (INTERVAL_LOW_QUANTILE, INTERVAL_HIGH_QUANTILE),
+            chosen,
+            tuple(rows),
+            known,
+        )
+        store.write_json(folder / SPREAD_FILE, result)
+    return result
+
+
+def _share(progress: Progress, number: int, samples: int) -> Progress:
+    def tell(fraction: float, words: str) -> None:
+        progress((number + fraction) / samples, f"{number + 1} of {samples}: {words}")
+
+    return tell
+
+
+def _member(
+    member: EnsembleMember, made: StageResults, settings: Settings, progress: Progress
+) -> MemberOutcome:
+    """Return a member's outcome, from disk where it is done."""
+    place = member.folder
+    if store.is_fresh(place, member.key):
+        progress(1.0, "done before")
+        return from_plain(MemberOutcome, store.read_json(place / MEMBER_FILE))
+    started = place / "started.json"
+    if place.exists() and not (started.exists() and store.read_json(started) == member.key):
+        shutil.rmtree(place)
+    store.begin_result(place)
+    store.write_json(started, member.key)
+    row = _simulated(member, made, settings, progress)
+    store.write_json(place / MEMBER_FILE, row)
+    shutil.rmtree(place / FRAMES_FOLDER, ignore_errors=True)
+    store.finish_result(place, member.key, {"number": member.number, "seed": member.seed}, 0.0)
+    return row
+
+
+def _simulated(
+    member: EnsembleMember, made: StageResults, settings: Settings, progress: Progress
+) -> MemberOutcome:
+    random = member.random
+    scene, parts, _ = made.assembled.all
+    library, floor = settings.ground.library, settings.ground.floor
+    words = sample_hypotheses(made.inventory, made.field.mixtures, random, library)
+    field = ground(scene, parts, words, settings.ground)
+    field = sample_material_field(
+        field, [p.object for p in parts.catalogue], random, library, floor
+    )
+    progress(0.0, "filling")
+    particles = fill(scene, parts, field, settings.fill)
+    drawn = tuple(
+        {"part": w.name, "material": m.name} | {f: g.value for f, g in m.grounds.items()}
+        for w, m in zip(field.words, field.materials, strict=True)
+    )
+    try:
+        trajectory = simulate(scene, particles, field, settings.simulate, member.folder, progress)
+    except SimulationError as error:
+        return MemberOutcome(member.number, drawn, {}, str(error))
+    again = made.having("ground", field).having("fill", particles).having("simulate", trajectory)
+    return MemberOutcome(member.number, drawn, outcome_row(again))
+
+
+def outcome_row(made: StageResults) -> ObjectQuantities:
+    """Return what happened to every object, what moved in vessels and broke off included."""
+    scene, particles = made.scene, made.particles
+    happened = measure_outcome(scene, particles, made.field, made.trajectory).objects
+    mass = np.bincount(particles.object, particles.mass, len(scene.objects))
+    return {
+        obj.name: {
+            q: float(mass[k]) if q == "mass_kg" else getattr(happened[obj.name], q)
+            for q in SPREAD_QUANTITIES
+        }
+        for k, obj in enumerate(scene.objects)
+    }
+
+
+def outcome_spread(
+    chosen: ObjectQuantities, rows: Sequence[MemberOutcome]
+) -> Mapping[str, Mapping[str, QuantitySpread]]:
+    """Say how far each outcome number is spread over the members that came through."""
+    return {
+        name: {
+            q: _spread(own[q], [r.objects[name][q] for r in rows if name in r.objects]) for q in own
+        }
+        for name, own in chosen.items()
+    }
+
+
+def _spread(chosen: float | None, values: Sequence[float | None]) -> QuantitySpread:
+    known = np.array([v for v in values if v is not None])
+    if not len(known):
+        return QuantitySpread(chosen, 0)
+    low, median, high = np.quantile(known, [INTERVAL_LOW_QUANTILE, 0.5, INTERVAL_HIGH_QUANTILE])
+    return QuantitySpread(
+        chosen=chosen,
+        count=len(known),
+        low=float(low),
+        median=float(median),
+        high=float(high),
+        smallest=float(known.min()),
+        largest=float(known.max()),
+    )

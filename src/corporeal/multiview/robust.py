@@ -1,5 +1,0 @@
-"""Statistics that a few wrong values do not move."""
-
-NORMAL = 1.4826
-"""Standard deviation over the median distance from the median, where errors are normal:
-1/Φ⁻¹(3/4) (Hampel 1974)."""

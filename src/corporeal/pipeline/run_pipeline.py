@@ -1,0 +1,517 @@
+"""The order of the verbs: the only file that knows it.
+
+A run is a folder. Each verb leaves its result in a numbered folder inside, named by a key that
+covers everything it depends on: what is fresh is read back, what is stale is done again, what was
+interrupted goes on. ``run.json`` says how far the run came.
+
+What does a verb is imported when it is done: a run that is read back, or not begun, waits for none.
+"""
+
+import shutil
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass, fields, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, Literal
+
+from corporeal.core import store
+from corporeal.core.deserialize import from_plain
+from corporeal.core.errors import UserError
+from corporeal.core.types import (
+    Inventory,
+    MaterialField,
+    Particles,
+    Parts,
+    Reconstruction,
+    Scene,
+    Trajectory,
+    Video,
+)
+from corporeal.fields.field_specification import FIELD_READERS
+from corporeal.geometry.gaussian_transforms import chosen_up_axis
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.io.input_files import input_kind, list_input_files, photographed_input, scene_name
+from corporeal.io.scene_toml import read_scene_file, write_scene_file
+from corporeal.pipeline.results import RUN_FILES, StageResults
+from corporeal.pipeline.settings.settings import Settings
+from corporeal.pipeline.settings.simulate_config import SimulateConfig, settings_for_key
+from corporeal.recognition.readable_names import safe_name
+from corporeal.reconstruction.features import ENCODER_REGISTRY as ENCODERS
+from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
+
+Progress = Callable[[float, str], None]
+"""Told the fraction done and what is being done."""
+ProgressOfStage = Callable[[str], Progress]
+"""Given a verb, returns whom to tell about its progress."""
+
+STAGE_FOLDERS = {
+    "reconstruct": "0-reconstruct",
+    "assemble": "1-assemble",
+    "describe": "4-describe",
+    "segment": "5-segment",
+    "ground": "6-ground",
+    "fill": "7-fill",
+    "simulate": "8-simulate",
+    "film": "9-film",
+    "report": "10-report",
+}
+STAGES = tuple(STAGE_FOLDERS)
+RUN_FILE = "run.json"
+OUTPUT_PATH_SETTINGS = ("record",)
+"""Settings that name what is written, not what is read."""
+PATH_PREFIXES = ("replay", *FIELD_READERS, *ENCODERS, *MASKERS)
+"""What stands before a colon and a path."""
+GAUSSIANS_FILE = "gaussians.ply"
+
+
+DEFAULT_SETTINGS = Settings()
+
+
+def no_progress_of_stage(verb: str) -> Progress:
+    """Tell nobody about progress."""
+    return lambda fraction, words: None
+
+
+def run(
+    inputs: Sequence[str | Path],
+    folder: str | Path,
+    settings: Settings = DEFAULT_SETTINGS,
+    tell: ProgressOfStage = no_progress_of_stage,
+    until: str = "report",
+) -> Path:
+    """Do every verb up to ``until``; return the run's folder.
+
+    Args:
+        inputs: What a person typed: scene files, a folder of photographs, or a splat.
+        folder: The run's folder; made when absent.
+        settings: Configuration of every verb.
+        tell: Whom to tell about progress.
+        until: The last verb to do.
+
+    Raises:
+        UserError: An input cannot be used, the disk is full, another process works in the folder,
+            or the simulation cannot go on.
+
+    """
+    folder = Path(folder)
+    with open_run([Path(path) for path in inputs], folder, settings, tell, until):
+        return folder
+
+
+@dataclass(frozen=True)
+class OpenRun:
+    """A run whose verbs are done."""
+
+    made: StageResults
+    key: str
+    """Of the last verb's result: names all that it depends on."""
+
+
+@contextmanager
+def open_run(
+    inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage, until: str
+) -> Iterator[OpenRun]:
+    """Do every verb up to ``until`` and keep the run's folder from others meanwhile.
+
+    Yields:
+        What each verb made, under which key.
+
+    """
+    with store.lock_folder(folder), store.disk_errors(folder):
+        work = _Run(inputs, folder, settings, tell)
+        work.through(until)
+        yield OpenRun(work.made, work.key)
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """What a run was asked to do."""
+
+    inputs: list[Path]
+    settings: Settings
+
+
+def read_run_request(folder: Path) -> RunRequest:
+    """Read back what a run was asked to do.
+
+    Raises:
+        UserError: The folder is not a run.
+
+    """
+    if not folder.exists():
+        raise UserError(f"{folder} is not a run: there is no such folder. Check the path.")
+    if not (folder / RUN_FILE).exists():
+        raise UserError(
+            f"{folder} is not a run: it has no {RUN_FILE}. Start one with: corporeal run."
+        )
+    return from_plain(RunRequest, store.read_json(folder / RUN_FILE))
+
+
+def read_run(folder: Path) -> StageResults:
+    """Read what the finished verbs of a run made; nothing is done, and nothing in it changes.
+
+    Raises:
+        UserError: The folder is not a run.
+
+    """
+    read_run_request(folder)
+    made = StageResults()
+    for verb, name in STAGE_FOLDERS.items():
+        if (folder / name / store.META_FILE).exists():
+            made = made.having(verb, _read_stage_result(verb, folder / name))
+    return made
+
+
+def _read_stage_result(verb: str, folder: Path) -> Any:
+    if verb == "simulate":
+        from corporeal.simulation.trajectory_files import read_trajectory
+
+        return read_trajectory(folder)
+    if verb == "report":
+        return None
+    found = store.load(folder / store.DATA_FILE)
+    # A run may have been moved, or is named from elsewhere: its film lies beside what says so.
+    return replace(found, path=folder / found.path.name) if verb == "film" else found
+
+
+def digests_of_named_files(config: Any) -> list[str]:
+    """Name the content of every file that a configuration points to."""
+    named = [f.name for f in fields(config) if f.name not in OUTPUT_PATH_SETTINGS] if config else []
+    values = [str(getattr(config, name)) for name in named]
+    paths = [_named(value) for value in values if value]
+    return [store.path_digest(path) for path in paths if path.exists()]
+
+
+def _named(value: str) -> Path:
+    kind, colon, rest = value.partition(":")
+    return Path(rest if colon and kind in PATH_PREFIXES else value).expanduser()
+
+
+@dataclass(frozen=True)
+class StageState:
+    """How far a run came with one verb."""
+
+    verb: str
+    state: Literal["finished", "unfinished", "not yet"]
+    seconds: float | None = None
+    """What it took [s]; None: it is not finished."""
+
+
+def stage_states(folder: Path) -> list[StageState]:
+    """Return the state of every verb of a run, in their order.
+
+    Raises:
+        UserError: The folder is not a run.
+
+    """
+    inputs = read_run_request(folder).inputs
+    rows = []
+    for verb in stages_for(inputs):
+        name = STAGE_FOLDERS[verb]
+        if (folder / name / store.META_FILE).exists():
+            rows.append(StageState(verb, "finished", store.read_meta(folder / name).seconds))
+        else:
+            begun = (folder / name).exists()
+            rows.append(StageState(verb, "unfinished" if begun else "not yet"))
+    return rows
+
+
+def stages_for(inputs: list[Path]) -> tuple[str, ...]:
+    """Return what is to be done with an input: models need no reconstruction.
+
+    Raises:
+        UserError: The inputs don't go together.
+
+    """
+    return STAGES[1:] if input_kind(inputs) == "model" else STAGES
+
+
+def invalidate_stage(folder: Path, verb: str) -> None:
+    """Declare one verb's result stale, so that it is done again even with the same settings."""
+    with store.lock_folder(folder):
+        (folder / STAGE_FOLDERS[verb] / store.META_FILE).unlink(missing_ok=True)
+
+
+def delete_simulation(folder: Path) -> None:
+    """Drop a simulation, finished or not, so that the next run starts it again."""
+    with store.lock_folder(folder):
+        shutil.rmtree(folder / STAGE_FOLDERS["simulate"], ignore_errors=True)
+
+
+def write_showcase(name: str, folder: Path) -> Path:
+    """Write one of our own scenes as a GLB; return its path.
+
+    Raises:
+        UnknownChoiceError: There is no such scene.
+
+    """
+    from corporeal.showcase.showcase_scenes import build_showcase_scene
+
+    path = folder / f"{name}.glb"
+    with store.disk_errors(path):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_glb(path, build_showcase_scene(name))
+    return path
+
+
+SHOWCASE_PACKAGES = (
+    "numpy",
+    "scipy",
+    "manifold3d",
+    "scikit-image",
+    "fast-simplification",
+    "pillow",
+)
+"""Packages whose versions decide what one of our own scenes is, beside this one's code."""
+
+
+def write_cached_showcase(name: str, folder: Path) -> Path:
+    """Write one of our own scenes as ``write_showcase`` does, from what an earlier call built.
+
+    It is kept with the caches of the system (``store.cache_folder``), named by all it depends on;
+    what cannot be kept there is built each time.
+
+    Raises:
+        UnknownChoiceError: There is no such scene.
+
+    """
+    recipe = store.result_key(
+        "showcase", {p: version(p) for p in SHOWCASE_PACKAGES}, [name, store.source_digest()]
+    )
+    kept = store.cache_folder("scenes") / f"{name}-{recipe}.glb"
+    try:
+        data = kept.read_bytes()
+    except OSError:
+        path = write_showcase(name, folder)
+        with suppress(OSError, store.DiskError):
+            for old in kept.parent.glob(f"{name}-*.glb"):
+                old.unlink()
+            store.write_bytes(kept, path.read_bytes())
+        return path
+    path = folder / f"{name}.glb"
+    store.write_bytes(path, data)
+    return path
+
+
+class _Run:
+    """One pass over the verbs; holds what earlier verbs made for later ones."""
+
+    def __init__(
+        self, inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage
+    ) -> None:
+        self.inputs, self.folder, self.settings, self.tell = inputs, folder, settings, tell
+        self.key = ""
+        self.seconds: dict[str, float] = {}
+        self.made = StageResults()
+
+    def through(self, until: str) -> None:
+        """Do all verbs up to ``until`` and say in ``run.json`` how it went."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._declare("running")
+        try:
+            todo = stages_for(self.inputs)
+            if until not in todo:
+                raise UserError("A model needs no reconstruction: run the other verbs.")
+            for verb in todo[: todo.index(until) + 1]:
+                self._do(verb)
+        except KeyboardInterrupt:
+            self._declare("interrupted")
+            raise
+        except Exception as error:
+            self._declare("failed", str(error))
+            raise
+        last = self.folder / STAGE_FOLDERS["report"] / store.META_FILE
+        self._declare("finished" if last.exists() else f"done up to {until}")
+
+    def _declare(self, state: str, error: str = "") -> None:
+        settings = {f.name: asdict(getattr(self.settings, f.name)) for f in fields(Settings)}
+        asked = {"inputs": [str(path.resolve()) for path in self.inputs], "settings": settings}
+        store.write_json(self.folder / RUN_FILE, {"state": state, **asked, "error": error})
+
+    def _do(self, verb: str) -> None:
+        config = getattr(self.settings, verb, None)
+        before = [self.key] if self.key else [store.path_digest(p) for p in self._files()]
+        named = settings_for_key(config) if isinstance(config, SimulateConfig) else config
+        self.key = store.result_key(
+            verb, named, before + digests_of_named_files(config) + self._borrowed(verb)
+        )
+        folder = self.folder / STAGE_FOLDERS[verb]
+        step = getattr(self, f"_{verb}")
+        if store.is_fresh(folder, self.key):
+            self.made = self.made.having(verb, _read_stage_result(verb, folder))
+            self.seconds[verb] = store.read_meta(folder).seconds
+            return
+        self._clear(verb, folder)
+        store.begin_result(folder)
+        start = time.perf_counter()
+        self.made = self.made.having(verb, step(folder, self.tell(verb)))
+        self.seconds[verb] = time.perf_counter() - start
+        store.finish_result(folder, self.key, config, self.seconds[verb])
+
+    def _borrowed(self, verb: str) -> list[str]:
+        """Name what a verb takes from another verb's settings."""
+        if verb == "reconstruct":
+            from corporeal.io.photos.mask_files import edited_masks
+
+            asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
+            by_hand = sorted(edited_masks(self.folder / STAGE_FOLDERS[verb]).items())
+            return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
+        if verb == "assemble":
+            return [up for up in [self.settings.reconstruct.up] if up != "auto"]
+        if verb != "describe":
+            return []
+        library = self.settings.ground.library
+        return [library, *(store.path_digest(p) for p in [Path(library)] if p.exists())]
+
+    def _files(self) -> list[Path]:
+        missing = [str(p) for p in self.inputs if not p.exists()]
+        if missing:
+            raise UserError(f"No such file: {', '.join(missing)}. Check the path.")
+        return list_input_files(self.inputs)
+
+    def _clear(self, verb: str, folder: Path) -> None:
+        """Remove results that no longer follow from the settings.
+
+        An unfinished simulation is kept, and what a reconstruction learned: both go on from there,
+        a training only if it is of the same pictures.
+        """
+        for name in RUN_FILES:
+            (self.folder / name).unlink(missing_ok=True)
+        for later in STAGES[STAGES.index(verb) + 1 :]:
+            (self.folder / STAGE_FOLDERS[later] / store.META_FILE).unlink(missing_ok=True)
+        started = folder / "started.json"
+        unfinished = started.exists() and store.read_json(started).get("key") == self.key
+        kept = verb == "reconstruct" or (verb == "simulate" and unfinished)
+        if not kept and folder.exists():
+            shutil.rmtree(folder)
+        store.write_json(started, {"key": self.key})
+
+    def _keep(self, folder: Path, value: Any) -> Any:
+        store.save(folder / store.DATA_FILE, value)
+        return value
+
+    # ------------------------------------------------------------ the verbs
+
+    def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
+        from corporeal.io.splat.splat_ply import write_splat_ply
+        from corporeal.pipeline.stages.reconstruct import reconstruct
+        from corporeal.vlm.photographed_objects import PhotoInterview
+
+        source, asked = photographed_input(self.inputs), self.settings.describe
+        assert source is not None, "models need no reconstruction"
+        config, extents = self.settings.reconstruct, self.settings.assemble.extent
+        if self.settings.assemble.objects != "auto":
+            raise UserError("--objects is for models. Say what tells objects apart with --apart.")
+        viewer = PhotoInterview(safe_name(scene_name(source)), asked.vlm, asked.record)
+        result = reconstruct(source, config, extents, viewer, folder, progress)
+        made, scene = result.found, result.scene
+        if viewer.asked().transcript:
+            store.write_json(folder / "transcript.json", viewer.asked().transcript)
+        write_splat_ply(folder / GAUSSIANS_FILE, made.gaussians)
+        write_glb(folder / f"{scene.name}.glb", scene)
+        return self._keep(folder, made)
+
+    def _assemble(self, folder: Path, progress: Progress) -> Scene:
+        from corporeal.pipeline.stages.assemble import assemble, scene_title
+
+        progress(0.0, "reading the scene")
+        inputs, config = self.inputs, self.settings.assemble
+        if self.made.reconstruct is not None:
+            inputs = [
+                _reconstructed_model(self.inputs[0], self.folder / STAGE_FOLDERS["reconstruct"])
+            ]
+            config = replace(config, extent=())  # the reconstruction has its size from them
+            scene = assemble(inputs, config)
+            if self.inputs[0].suffix.lower() == ".toml":
+                scene = replace(scene, name=scene_title(self.inputs[0]))
+            return self._keep(folder, scene)
+        return self._keep(
+            folder, assemble(inputs, config, chosen_up_axis(self.settings.reconstruct.up))
+        )
+
+    def _describe(self, folder: Path, progress: Progress) -> Inventory:
+        from corporeal.pipeline.stages.describe import describe
+
+        progress(0.0, "recognising")
+        config, library = self.settings.describe, self.settings.ground.library
+        found = self.made.reconstruct
+        shown = range(0 if found is None else len(found.names))  # models beside them come after
+        made = describe(self.made.scene, config, library, progress, shown)
+        if made.transcript:
+            store.write_json(folder / "transcript.json", made.transcript)
+        return self._keep(folder, made)
+
+    def _segment(self, folder: Path, progress: Progress) -> Parts:
+        from corporeal.pipeline.stages.segment import segment
+
+        progress(0.0, "finding parts")
+        made, config = self.made, self.settings.segment
+        semantic = self.settings.reconstruct.semantic
+        parts = segment(made.scene, made.inventory, config, made.reconstruction, semantic)
+        return self._keep(folder, parts)
+
+    def _ground(self, folder: Path, progress: Progress) -> MaterialField:
+        from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
+
+        progress(0.0, "looking numbers up")
+        made = self.made
+        found = ground_with_mass_posterior(
+            made.scene, made.parts, made.inventory, self.settings.ground
+        )
+        return self._keep(folder, found)
+
+    def _fill(self, folder: Path, progress: Progress) -> Particles:
+        from corporeal.pipeline.stages.fill import fill
+
+        progress(0.0, "filling with particles")
+        made = self.made
+        return self._keep(folder, fill(made.scene, made.parts, made.field, self.settings.fill))
+
+    def _simulate(self, folder: Path, progress: Progress) -> Trajectory:
+        from corporeal.pipeline.stages.simulate import simulate
+
+        made, config = self.made, self.settings.simulate
+        return simulate(made.scene, made.particles, made.field, config, folder, progress)
+
+    def _film(self, folder: Path, progress: Progress) -> Video:
+        from corporeal.pipeline.stages.video import render_video
+
+        return self._keep(
+            folder, render_video(self.made.played, self.settings.film, folder, progress)
+        )
+
+    def _report(self, folder: Path, progress: Progress) -> None:
+        from corporeal.pipeline.run_files import RunCost, write_run_files
+        from corporeal.simulation.audit_file import read_audit
+
+        progress(0.0, "writing the report")
+        audit = read_audit(self.folder / STAGE_FOLDERS["simulate"])
+        divided = self.settings.assemble.objects != "auto"
+        spent = RunCost(_settings_for_report(self.settings), self.seconds, divided)
+        figures: dict[str, Path] = {}
+        if self.made.reconstruct is not None:
+            from corporeal.reconstruction.reconstruction_figures import figures_of_reconstruction
+
+            figures = figures_of_reconstruction(self.folder / STAGE_FOLDERS["reconstruct"])
+        write_run_files(self.folder, self.made, audit, spent, progress, figures)
+
+
+def _reconstructed_model(asked: Path, folder: Path) -> Path:
+    """Return the model that was reconstructed, with all that a scene file says beside it."""
+    model = next(folder.glob("*.glb"))
+    if asked.suffix.lower() != ".toml":
+        return model
+    write_scene_file(folder / "scene.toml", replace(read_scene_file(asked), file=model))
+    return folder / "scene.toml"
+
+
+def _settings_for_report(settings: Settings) -> dict[str, str]:
+    fill_, simulate_ = settings.fill, settings.simulate
+    return {
+        "detail": fill_.detail,
+        "stiffness": fill_.stiffness,
+        "contact": simulate_.contact,
+        "engine": simulate_.engine,
+    }

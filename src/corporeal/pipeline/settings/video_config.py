@@ -1,0 +1,55 @@
+"""Camera, size and quality of a film: what a person may ask."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from corporeal.core.errors import UserError, check_range
+from corporeal.core.types import Vector
+from corporeal.render.video_choices import CameraShot, ColourQuantity
+
+MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.01, 100.0
+MAX_SLOW_MOTION_RATIO = 100.0
+
+
+@dataclass(frozen=True)
+class VideoConfig:
+    """Camera, size and quality of the film."""
+
+    width: int = 1280
+    """[px]"""
+    height: int = 720
+    """[px]"""
+    quality: Literal["draft", "normal", "fine"] = "draft"
+    """Rays per pixel; draft casts none where nothing moves, and more at edges."""
+    speed: float = 1.0
+    """Playback speed; 1: real time, 0.25: four times slower."""
+    view: Vector | None = None
+    """Direction from the scene to the camera; None: where objects occlude each other least."""
+    stills: bool = False
+    """Also keep every frame as PNG."""
+    look: Literal["surfaces", "gaussians"] | None = None
+    """What is rendered; None: Gaussians where the scene was reconstructed, else surfaces."""
+    colour_by: Literal["itself", "speed"] | ColourQuantity = "itself"
+    """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
+    shot: CameraShot = "wide"
+    """wide: everything, all the time, but for what goes farther than 2.5 sizes of the scene; close:
+    what is struck first, or moves most; follow: the camera goes along with what moves."""
+    slow: float = 1.0
+    """How many times slower the film is about the first contact."""
+    caption: bool = True
+    """Write the time into the picture."""
+
+
+def validate(config: VideoConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    from corporeal.render.video_file import (
+        check_size,  # and with it the encoder, which help needs not
+    )
+
+    check_size(config.width, config.height)
+    check_range("--speed", config.speed, MIN_SPEED_RATIO, MAX_SPEED_RATIO)
+    check_range("--slow", config.slow, 1.0, MAX_SLOW_MOTION_RATIO)
+    if config.view is not None and not 0 < math.hypot(*config.view) < math.inf:
+        given = " ".join(f"{x:g}" for x in config.view)
+        raise UserError(f"--view is {given}, which is no direction. Give one: --view 1 -1 0.5.")

@@ -1,5 +1,0 @@
-"""What a person may ask that objects are told apart by."""
-
-from typing import Literal
-
-Rule = Literal["auto", "masks", "look", "components"]

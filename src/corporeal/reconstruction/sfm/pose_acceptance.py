@@ -1,0 +1,138 @@
+"""Whether a model that COLMAP found can be believed, and what to photograph next time.
+
+A wrong model looks like a model: low reprojection error says nothing. What speaks against one was
+found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
+"""
+
+from dataclasses import replace
+
+from corporeal.core.types import Note, NoteKind
+from corporeal.multiview.silhouette_coherence import MIN_MASK_FILLED_FRACTION
+from corporeal.reconstruction.sfm.sfm_run import MIN_REGISTERED_FRACTION, SfmRun
+
+MIN_POINTS_PER_PICTURE = 30
+"""Points per registered picture, at least."""
+FOCAL_RANGE_RATIO = 0.45, 3.0
+"""Focal lengths over the longer side that lenses have."""
+MAX_RADIAL_DISTORTION = 0.25
+"""Largest |k1| of a lens that is no fisheye."""
+RIVAL_GROUP_FRACTION = 1 / 3
+"""Share of the first group from which on a second one rivals it."""
+MIN_PLACED_FRACTION = 0.5
+"""Share of all photographs of a folder that must be placed, those counted, too, that were left out
+before the search: of a television 8 of 18 were, from a fifth of the circle."""
+MIN_JOINED_BY_PLAIN_FRACTION = 0.4
+"""Share of the pictures that the plain attempt must join by points, or the thorough one is in vain:
+of sets that it posed alone all 15, 20 and 24 were joined."""
+MAX_BLURRED_FRACTION = 0.5
+"""Share of heavily blurred pictures from which on there is no use in looking longer."""
+HOLD_STILL_HINT = (
+    "Hold the camera still, in more light, let it focus on the thing, and look at the pictures at "
+    "full size before you leave."
+)
+MAX_NAMED_PICTURES = 8
+MORE_OVERLAP_HINT = (
+    "Neighbouring pictures share too few points. Put the thing on something with a pattern, such "
+    "as a newspaper; take 40 to 80 pictures at most 15° apart; move neither thing nor light."
+)
+
+
+def model_doubts(told: SfmRun) -> list[str]:
+    """Return what speaks against a model, in clauses; nothing: it can be believed."""
+    if not told.registered and 0 < (told.joined or 0) < MIN_REGISTERED_FRACTION * told.pictures:
+        return [f"only {told.joined} of {told.pictures} pictures share points with one another"]
+    if not told.registered:
+        return ["no two pictures share enough points"]
+    found = []
+    if told.registered < MIN_REGISTERED_FRACTION * told.pictures:
+        beside = ""
+        if told.misplaced:
+            beside = f" ({len(told.misplaced)} more only where another side looks alike)"
+        found.append(f"only {told.registered} of {told.pictures} pictures fit together{beside}")
+    if told.points < MIN_POINTS_PER_PICTURE * told.registered:
+        each = told.points / told.registered
+        found.append(f"there are {each:.0f} points per picture, too few to trust")
+    if (
+        not FOCAL_RANGE_RATIO[0] < told.focal < FOCAL_RANGE_RATIO[1]
+        or told.bent > MAX_RADIAL_DISTORTION
+    ):
+        found.append(
+            f"it takes a lens that nobody has (focal length {told.focal:g} × the longer side, "
+            f"k1 {told.bent:g})"
+        )
+    if told.others and told.others[0] > RIVAL_GROUP_FRACTION * told.registered:
+        groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
+        found.append(f"the pictures fall into groups of {groups} that share nothing")
+    return found
+
+
+def only_sparse(told: SfmRun) -> bool:
+    """Tell whether nothing speaks against a model but that its points are few."""
+    enough = replace(told, points=MIN_POINTS_PER_PICTURE * told.registered)
+    return bool(model_doubts(told)) and not model_doubts(enough)
+
+
+def too_few_placed(told: SfmRun, others: int) -> str | None:
+    """Say in a clause that most of a folder was not placed, if so.
+
+    Args:
+        told: An attempt that is believed.
+        others: Photographs that were left out before it.
+
+    """
+    total = told.pictures + others
+    if told.registered >= MIN_PLACED_FRACTION * total:
+        return None
+    return f"only {told.registered} of {total} pictures fit together"
+
+
+def thorough_in_vain(told: SfmRun, blurred: int) -> bool:
+    """Tell whether a thorough attempt cannot mend what was doubted.
+
+    Args:
+        told: What came of the plain attempt.
+        blurred: Pictures that are heavily blurred.
+
+    """
+    if blurred >= MAX_BLURRED_FRACTION * told.pictures:
+        return True
+    return told.joined is not None and told.joined < MIN_JOINED_BY_PLAIN_FRACTION * told.pictures
+
+
+def neighbour_doubt(told: SfmRun) -> str:
+    """Say in a clause that pictures stand side by side that share too little; "": they do not."""
+    if not told.parted:
+        return ""
+    sizes = " and ".join(str(n) for n in told.parted[:3])
+    return (
+        f"pictures that would have been taken side by side, in groups of {sizes}, share too little "
+        "of what both show: they were put in wrong places, as where a pattern repeats or two sides "
+        "look alike; or they show several things, or one that was moved"
+    )
+
+
+def mask_contradiction_doubt(told: SfmRun) -> str | None:
+    """Say that masks contradict one another, if they do: right poses and poor masks do that, too.
+
+    Args:
+        told: What came of an attempt, after its outliers were left out.
+
+    """
+    if told.filled >= MIN_MASK_FILLED_FRACTION:
+        return None
+    placed = "some pictures were put in wrong places, " if told.parted else ""
+    return Note(
+        f"All masks together leave {told.filled:.0%} of what each shows: {placed}the object was "
+        "moved or turned over between the pictures, or masks miss parts of it. Look at the masks.",
+        NoteKind.GRAVE,
+    )
+
+
+def some_names(left_out: tuple[str, ...]) -> str:
+    """Return up to eight names and how many more there are."""
+    more = (
+        f" and {len(left_out) - MAX_NAMED_PICTURES} more"
+        if len(left_out) > MAX_NAMED_PICTURES
+        else ""
+    )
+    return ", ".join(left_out[:MAX_NAMED_PICTURES]) + more

@@ -1,0 +1,1 @@
+"""Closed surfaces of objects from Gaussians and photographs, and their acceptance checks."""

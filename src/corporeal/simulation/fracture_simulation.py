@@ -1,0 +1,197 @@
+"""Breaking, simulated: what is struck with ten times the energy that it bears becomes pieces.
+
+The run is taken back to just before the two touch, what the wall bears until it breaks is taken
+from the blow, and the thing becomes rigid pieces that move on as it did (decision 39). The momentum
+of the pieces is that of the whole.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.core.types import FractureEvent, Surface
+from corporeal.geometry.mesh import join_meshes
+from corporeal.geometry.point_sampling import sample_surface
+from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
+from corporeal.mpm.cpu.engine import CpuEngine
+from corporeal.mpm.problem import Snapshot
+from corporeal.mpm.split_body import BodySplit, ParentMap, can_split, split_problem
+from corporeal.simulation.fracture_prediction import (
+    BrittleImpact,
+    encloses_cavity,
+    first_impacts,
+    piece_objects,
+)
+from corporeal.simulation.fracture_state import FractureState
+from corporeal.simulation.impact_fracture import CERTAIN_BREAK_ENERGY_RATIO
+from corporeal.simulation.trajectory_files import gather_ledgers, read_ledger
+
+STEPS_BEFORE_IMPACT = 2.0
+"""Steps before the first touch in which the pieces are made."""
+PIECE_CONTACT_POINTS = 1200
+"""Contact points on all pieces together, beside their corners."""
+
+
+@dataclass(frozen=True)
+class FracturedRun:
+    """A thing that has just broken."""
+
+    stage: FractureState
+    engine: CpuEngine
+    breaks: tuple[FractureEvent, ...]
+    heirs: ParentMap
+
+
+def next_breaking_impact(
+    stage: FractureState,
+    breaks: Sequence[FractureEvent],
+    whole: set[int],
+    folder: Path,
+    number: int,
+    since: float,
+) -> BrittleImpact | None:
+    """Return the first blow since a time [s] under which something breaks; None: there is none.
+
+    Args:
+        stage: What is simulated.
+        breaks: What has broken, which breaks no more.
+        whole: Objects that cannot be cut.
+        folder: Where the frames are.
+        number: Of the last one.
+        since: [s]
+
+    """
+    now = read_ledger(folder, number).first_contact
+    if not np.any(now > since):
+        return None
+    trajectory = gather_ledgers(folder, number + 1)
+    spared = piece_objects(breaks, len(stage.scene.objects)) | whole
+    found = [
+        blow
+        for blow in first_impacts(stage.scene, stage.particles, stage.field, trajectory)
+        if blow.found.time > since
+        and blow.found.ratio > CERTAIN_BREAK_ENERGY_RATIO
+        and blow.object not in spared
+    ]
+    return min(found, key=lambda blow: blow.found.time, default=None)
+
+
+def fracture_body(
+    stage: FractureState, engine: CpuEngine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
+) -> FracturedRun | None:
+    """Make pieces of what a blow is about to strike; None: it cannot be cut, and stays whole.
+
+    Args:
+        stage: What is simulated.
+        engine: At an instant before the blow; goes on to just before it.
+        blow: Which.
+        breaks: What broke before.
+
+    """
+    owner = stage.posed.object_of_body
+    (bodies,) = np.nonzero(owner == blow.object)
+    parts = np.unique(stage.particles.part[stage.particles.object == blow.object])
+    if len(bodies) != 1 or len(parts) != 1 or not can_split(engine.problem, int(bodies[0])):
+        return None
+    body = int(bodies[0])
+    before = blow.found.time - STEPS_BEFORE_IMPACT * engine.steps.largest
+    if before > engine.time:
+        engine.advance(before)
+    now = engine.snapshot()
+    pieces = _pieces(stage, blow, body, now)
+    if pieces is None:
+        return None
+    _take_energy(engine, stage, blow)
+    one = _break(blow, pieces)
+    split = _split(stage, engine, body, one)
+    heirs, problem = ParentMap.of(engine.problem, split), split_problem(engine.problem, split)
+    after = CpuEngine(problem, engine.threads)
+    after.inherit(engine.save(), heirs)
+    return FracturedRun(stage.with_pieces(one, split, problem, now), after, (*breaks, one), heirs)
+
+
+# ---------------------------------------------------------------- the pieces
+
+
+@dataclass(frozen=True)
+class _CutPieces:
+    """Pieces of a thing, where it was at the start."""
+
+    of_particle: np.ndarray
+    surfaces: tuple[Surface, ...]
+
+
+def _pieces(
+    stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot
+) -> _CutPieces | None:
+    """Cut a thing into cells around the blow; None: its surface is not closed."""
+    scene, particles = stage.scene, stage.particles
+    own = [s for s in scene.surfaces if s.object == blow.object]
+    if len({s.finish for s in own}) != 1:
+        return None
+    start = particles.position[particles.object == blow.object].astype(float)
+    mine = stage.rows(body)
+    place = now.position[mine].mean(axis=0)
+    struck = (blow.point - place) @ now.motion[mine][0] + start.mean(axis=0)
+    rng = np.random.default_rng([blow.object, 11])
+    seed = fragment_seeds(start, struck, rng)
+    outside = own[0] if len(own) == 1 else _as_one_surface(own)
+    wall = max(particles.walls[blow.part]) if particles.walls else 0.0
+    wall = wall if encloses_cavity(scene, blow.object) else 0.0
+    found = cut_fragments(outside, wall, seed) if len(seed) > 1 else None
+    return None if found is None else _CutPieces(fragment_cells(start, seed), found)
+
+
+def _as_one_surface(surfaces: Sequence[Surface]) -> Surface:
+    mesh = join_meshes(surfaces)
+    plain = replace(surfaces[0], uv=None, colours=None, normals=None)
+    return replace(plain, vertices=mesh.vertices, triangles=mesh.triangles)
+
+
+def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
+    said = blow.found
+    return FractureEvent(
+        object=blow.object,
+        part=blow.part,
+        time=said.time,
+        energy=said.energy / said.ratio,
+        ratio=said.ratio,
+        by=said.by,
+        speed=said.speed,
+        blow=said.energy,
+        piece=pieces.of_particle,
+        surfaces=pieces.surfaces,
+    )
+
+
+def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -> None:
+    """Slow the blow down by what the wall bears until it breaks; a body it strikes is pushed back.
+
+    J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
+    """
+    said = blow.found
+    mass = 2.0 * said.energy / said.speed**2
+    impulse = mass * said.speed * (1.0 - np.sqrt(1.0 - 1.0 / said.ratio)) * blow.away
+    x, y, z = blow.point.tolist()
+    for number, sign in ((blow.object, 1.0), (blow.other, -1.0)):
+        if number is not None and stage.scene.objects[number].path is None:
+            body = int(np.flatnonzero(stage.posed.object_of_body == number)[0])
+            a, b, c = (sign * impulse).tolist()
+            engine.apply_impulse(body, (x, y, z), (a, b, c))
+
+
+def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEvent) -> BodySplit:
+    """Say where the pieces are and how they move."""
+    now, mine = engine.snapshot(), stage.rows(body)
+    start = stage.particles.position[stage.particles.object == one.object].astype(float)
+    turn, place = now.motion[mine][0], now.position[mine].mean(axis=0)
+    rng = np.random.default_rng([one.object, 13])
+    meshes = [join_meshes([surface]) for surface in one.surfaces]
+    area = np.array([mesh.areas.sum() for mesh in meshes])
+    points = []
+    for mesh, count in zip(meshes, np.ceil(PIECE_CONTACT_POINTS * area / area.sum()), strict=True):
+        spread = np.concatenate([mesh.vertices, sample_surface(mesh, int(count), rng)[0]])
+        points.append((spread - start.mean(axis=0)) @ turn.T + place)
+    return BodySplit(body, one.piece, now.position[mine], now.velocity[mine], tuple(points))

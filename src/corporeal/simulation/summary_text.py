@@ -1,0 +1,54 @@
+"""What a finished run says last, by weight: what may be wrong, what was assumed, what was left out.
+
+Sentences get their kind where something is noticed (``types.notes``); here they are only put in
+order, for the report and for the terminal.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from corporeal.core.audit_data import RunAudit
+from corporeal.core.types import Note, NoteKind
+
+
+@dataclass(frozen=True)
+class SummarySection:
+    """Sentences that are listed together."""
+
+    word: str
+    """Before each of them in a log."""
+    head: str
+    """Above them in the report."""
+    several: str
+    """More than one of them."""
+    kinds: tuple[NoteKind, ...]
+    """Which they are, the gravest first."""
+
+
+WARNINGS_SECTION = SummarySection(
+    "warning", "What may be wrong", "warnings", (NoteKind.GRAVE, NoteKind.DOUBT)
+)
+ASSUMPTIONS_SECTION = SummarySection(
+    "hint", "What was assumed, and what changes it", "hints", (NoteKind.ASSUMED,)
+)
+LEFT_OUT_SECTION = SummarySection("left out", "What was left out", "left out", (NoteKind.LEFT_OUT,))
+SECTIONS = (WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SECTION)
+"""The gravest first."""
+
+
+def summary_sections(audit: RunAudit) -> dict[SummarySection, tuple[str, ...]]:
+    """Return what a run says last, each sentence once, sections and sentences by weight."""
+    told = (*audit.notes, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
+    return {s: tuple(dict.fromkeys(_of(s, told))) for s in SECTIONS}
+
+
+def split_advice(sentences: str) -> tuple[str, str]:
+    """Part what is the matter, the first sentence, from what follows: why, and what to do."""
+    first, *rest = re.split(r"(?<=[a-z0-9)%°][.:]) (?=[A-Z])", sentences, maxsplit=1)
+    return first, " ".join(rest)
+
+
+def _of(section: SummarySection, told: tuple[Note, ...]) -> Iterator[str]:
+    for kind in section.kinds:
+        yield from (str(note) for note in told if note.kind is kind)

@@ -1,0 +1,87 @@
+"""Answers that were paid for once: asked again with nothing changed, they come from the disk.
+
+One JSON file per validated answer, named by all that it depends on. It appears by an atomic rename:
+several processes may share the folder, and one that is killed leaves no half answer.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from corporeal.core import store
+from corporeal.vlm import Answer, AnswerCheck, Question, Reply, VlmClient, no_complaints
+from corporeal.vlm.recordings import schema_digest
+
+ANSWER_CACHE_VERSION = 1
+
+
+def answer_cache_folder() -> Path:
+    """Return where answers are kept: as the environment says, else where the system has such."""
+    return store.cache_folder("answers")
+
+
+class CachingClient:
+    """Ask a model only what it has not answered before."""
+
+    looks = True
+
+    def __init__(
+        self, model: VlmClient, name: str, settings: Mapping[str, Any], at: Path | None = None
+    ) -> None:
+        self.model, self.name, self.settings = model, name, dict(settings)
+        self.folder = at or answer_cache_folder()
+        self._locks: dict[str, Lock] = {}
+        self._one = Lock()
+
+    def ask(
+        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer] = no_complaints
+    ) -> Reply[Answer]:
+        """Return the kept answer, or the model's, which is then kept.
+
+        Threads that ask the same at the same time wait for one answer.
+        """
+        key = self.key(question, answer)
+        path = self.folder / key[:2] / f"{key}.json"
+        with self._one:
+            lock = self._locks.setdefault(key, Lock())
+        with lock:
+            kept = _read_cached(path, answer, check)
+            if kept is not None:
+                return Reply(kept, "model", self.name)
+            reply = self.model.ask(question, answer, check)
+            about = {"task": question.task, "scene": question.scene, "model": self.name}
+            store.write_json(path, about | {"answer": reply.answer.model_dump()})
+            return reply
+
+    def key(self, question: Question, answer: type[BaseModel]) -> str:
+        """Name a question by task, model, text, pictures, shape of the answer, and settings."""
+        pictures = [
+            hashlib.sha256(str(p.shape).encode() + p.tobytes()).hexdigest()
+            for p in question.pictures
+        ]
+        asked = {
+            "version": ANSWER_CACHE_VERSION,
+            "task": question.task,
+            "model": self.name,
+            "text": question.text,
+            "pictures": pictures,
+            "schema": schema_digest(answer),
+            "settings": self.settings,
+        }
+        if question.turn.number > 1:
+            asked["answer_number"] = question.turn.number
+        return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+
+
+def _read_cached(path: Path, answer: type[Answer], check: AnswerCheck[Answer]) -> Answer | None:
+    """Return a kept answer; a damaged file, or one that no longer fits, is as good as none."""
+    try:
+        kept = answer.model_validate(json.loads(path.read_text(encoding="utf-8"))["answer"])
+    except (OSError, ValueError, KeyError, TypeError, ValidationError):
+        return None
+    return None if check(kept) else kept

@@ -1,0 +1,219 @@
+"""How large real objects are: asked of a model in words, or read in a table, never computed.
+
+Each class is a question of its own, so that its answer is recorded, replayed and paid for once,
+whatever else stands in a scene.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+from corporeal.core.types import NO_USAGE, ModelUsage, Note, NoteKind
+from corporeal.recognition.typical_extents import TYPICAL_EXTENT_MARGIN_RATIO, typical_extent
+from corporeal.vlm import VlmClient, connect_vlm
+from corporeal.vlm.human_client import is_not_pending, refuse_pending
+from corporeal.vlm.interpret_answers import extent_text, sum_usage
+from corporeal.vlm.interview import Interview, InterviewSubject
+from corporeal.vlm.thread_map import thread_map
+
+UNKNOWN_EXTENT_M = 0.3
+"""Stands in for the size of what nobody knows [m]: between a mug and a chair."""
+EXTENT_TABLE_SOURCE = "the table of typical extents"
+MAX_PARALLEL_SIZE_QUESTIONS = 4
+"""Questions that are asked at the same time."""
+
+SizeSource = Literal["file", "model", "recording", "table", "nobody"]
+ANSWER_SOURCE_TEXT = {"model": "a model", "recording": "a recorded answer"}
+
+
+@dataclass(frozen=True)
+class ClassSize:
+    """How large one class of objects usually is along its longest side."""
+
+    class_name: str
+    low: float
+    """The smallest that one commonly meets [m]."""
+    usual: float
+    """[m]"""
+    high: float
+    """The largest that one commonly meets [m]."""
+    said_by: SizeSource
+    who: str
+    """The model, whoever gave the recorded answer, or the table."""
+    reason: str
+
+
+@dataclass(frozen=True)
+class ClassSizes:
+    """What was found out about the sizes of some classes."""
+
+    usual: Mapping[str, ClassSize]
+    """Class → its usual size; a class that nobody knows is not in it."""
+    transcript: tuple[dict, ...] = ()
+    """Every question put to a model with its answer, as data."""
+    usage: ModelUsage = NO_USAGE
+    """What the questions took."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about the answers, in sentences."""
+
+
+@dataclass(frozen=True)
+class RealExtent:
+    """How large one real object is, and by whose estimate."""
+
+    extent: float
+    """Largest extent [m]."""
+    said_by: SizeSource
+    by: str
+    """Whose estimate it is, in a clause: "a model (openai:gpt-5.4)"."""
+    reason: str
+    """Why, in one sentence."""
+    warnings: tuple[str, ...] = ()
+    """What speaks against it, in sentences."""
+
+
+def find_class_sizes(
+    classes: Iterable[str], vlm: str = "metadata", record: Path | None = None
+) -> ClassSizes:
+    """Find out how large objects of each class usually are: a model first, then the table.
+
+    Args:
+        classes: What objects are, in words; doubles are asked about once.
+        vlm: Whom to ask, as a person types it; "metadata": nobody.
+        record: Folder where every answer is kept for "replay:FOLDER".
+
+    Raises:
+        UserError: Nobody can be asked, a recording is missing, or questions wait for a person's
+            answers.
+
+    """
+    named = list(dict.fromkeys(classes))
+    model = connect_vlm(vlm, record)
+    interviews = [] if model is None else [_interview(model, name) for name in named]
+    answers = thread_map(
+        [partial(_size_from_model, interview) for interview in interviews],
+        MAX_PARALLEL_SIZE_QUESTIONS,
+        fatal=is_not_pending,
+    )
+    answered = [a for a in refuse_pending(answers, vlm) if isinstance(a, ClassSize)]
+    known = {name: size for name in named if (size := _size_from_table(name))}
+    rows = tuple(row for interview in interviews for row in interview.transcript)
+    warnings = [w for interview in interviews for w in interview.warnings]
+    warnings += [
+        w for size in answered if (w := _table_disagreement_text(size, known.get(size.class_name)))
+    ]
+    asked = {size.class_name: size for size in answered}
+    return ClassSizes(known | asked, rows, sum_usage(rows), tuple(warnings))
+
+
+def estimate_real_extent(
+    name: str, class_name: str, extent: float, metric: bool, sizes: ClassSizes
+) -> RealExtent:
+    """Say how large the real object is of which a file holds a model.
+
+    A file in metres counts; the usual size of its class can only cast doubt on it. Otherwise the
+    usual size of its class counts, and where nobody knows that, a neutral stand-in.
+
+    Args:
+        name: Of the asset, for the sentences.
+        class_name: What it is, in words.
+        extent: Largest extent in the file [its own unit].
+        metric: Whether that unit is the metre.
+        sizes: What is known of its class, among others.
+
+    """
+    known = sizes.usual.get(class_name)
+    if metric:
+        doubt = _class_disagreement_text(name, extent, known)
+        warnings = (doubt,) if doubt else ()
+        return RealExtent(extent, "file", "its file", "The file is in metres.", warnings)
+    if known is not None:
+        return RealExtent(known.usual, known.said_by, _size_source_text(known), known.reason)
+    warning = Note(
+        f"Nobody knows how large {name} ({class_name}) is: its file is not in metres, and its "
+        f"class is not in {EXTENT_TABLE_SOURCE}. It is taken as {extent_text(UNKNOWN_EXTENT_M)}. Name a model with --vlm.",
+        NoteKind.ASSUMED,
+    )
+    return RealExtent(UNKNOWN_EXTENT_M, "nobody", "nobody", "A neutral stand-in.", (warning,))
+
+
+# ---------------------------------------------------------------- a model's answers
+
+
+def _interview(model: VlmClient, class_name: str) -> Interview:
+    prompt = files("corporeal.vlm").joinpath("prompts", "sizes.md").read_text(encoding="utf-8")
+    subject = InterviewSubject(class_name, class_name, class_name, "")
+    return Interview(model, model, {"sizes": prompt}, subject)
+
+
+def _size_from_model(interview: Interview) -> ClassSize | None:
+    reply = interview.size()
+    if reply is None:
+        return None
+    found = reply.answer
+    return ClassSize(
+        class_name=interview.subject.class_name,
+        low=found.smallest,
+        usual=found.usual,
+        high=found.largest,
+        said_by=reply.by,
+        who=reply.model,
+        reason=found.reason,
+    )
+
+
+# ---------------------------------------------------------------- the table, and doubts
+
+
+def _size_from_table(class_name: str) -> ClassSize | None:
+    found = typical_extent(class_name)
+    if found is None:
+        return None
+    reason = f"{extent_text(found.usual)} is usual for such objects: {found.words}."
+    return ClassSize(
+        class_name, found.low, found.usual, found.high, "table", EXTENT_TABLE_SOURCE, reason
+    )
+
+
+def _size_source_text(size: ClassSize) -> str:
+    """Name the source of a size: a table is its own name."""
+    return (
+        EXTENT_TABLE_SOURCE
+        if size.said_by == "table"
+        else f"{ANSWER_SOURCE_TEXT[size.said_by]} ({size.who})"
+    )
+
+
+def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> str:
+    """Say where a model's size is beyond the table's; "" where it is not."""
+    if (
+        known is None
+        or known.low / TYPICAL_EXTENT_MARGIN_RATIO
+        <= answered.usual
+        <= known.high * TYPICAL_EXTENT_MARGIN_RATIO
+    ):
+        return ""
+    return (
+        f"According to {_size_source_text(answered)}, {extent_text(answered.usual)} is usual for objects like "
+        f"this: {answered.class_name}; {EXTENT_TABLE_SOURCE} knows {extent_text(known.low)} to {extent_text(known.high)}. "
+        "The former was believed."
+    )
+
+
+def _class_disagreement_text(name: str, extent: float, known: ClassSize | None) -> str:
+    """Say where a file's own size is beyond its class's; "" where it is not."""
+    if (
+        known is None
+        or known.low / TYPICAL_EXTENT_MARGIN_RATIO
+        <= extent
+        <= known.high * TYPICAL_EXTENT_MARGIN_RATIO
+    ):
+        return ""
+    return (
+        f"{name} is {extent_text(extent)} large in its file, which is in metres; {_size_source_text(known)} knows "
+        f"such objects ({known.class_name}) from {extent_text(known.low)} to {extent_text(known.high)}. The "
+        "file was believed."
+    )
