@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -74,6 +74,28 @@ def test_other_weights_in_a_folder_make_what_they_saw_stale(tmp_path):
     before = run_pipeline.digests_of_named_files(config)
     (tmp_path / "model.safetensors").write_text("2")
     assert before and run_pipeline.digests_of_named_files(config) != before
+
+
+def test_a_finished_run_stays_fresh_whatever_lies_in_the_working_directory(tmp_path, monkeypatch):
+    """Values such as the engine "cpu" were looked for on the disk, as if each named a file."""
+    monkeypatch.chdir(tmp_path)
+    path = cube().save(tmp_path / "cube.glb")
+    done = []
+
+    def tell(verb):
+        return lambda fraction, words: done.append(verb)
+
+    run([path], tmp_path / "run", Settings(), tell, until="fill")
+    assert done
+    done.clear()
+    values = {v for f in fields(Settings) for v in asdict(getattr(Settings(), f.name)).values()}
+    for value in values | {"cpu"}:
+        if isinstance(value, str) and value:
+            Path(value).write_text("in the way")
+    run([path], tmp_path / "run", Settings(), tell, until="fill")
+    assert not done
+    for f in fields(Settings):
+        assert run_pipeline.digests_of_named_files(getattr(Settings(), f.name)) == []
 
 
 def test_memory_is_counted_in_megabytes():

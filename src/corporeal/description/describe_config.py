@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from corporeal.core import store
 from corporeal.core.errors import check_range
+from corporeal.core.setting_types import ReadsPath, WritesPath
 
 MAX_ANSWERS = 40
 """To one question: Wang et al. (2022) sampled so many."""
@@ -17,14 +18,14 @@ class DescribeConfig:
 
     annotations: Path | None = None
     """YAML file with materials of parts; it takes precedence over every other answer."""
-    vlm: str = "metadata"
+    vlm: Annotated[str, ReadsPath(prefixes=("replay",))] = "metadata"
     """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL",
     "google:MODEL", "ollama:MODEL", or "openai:MODEL@http://host/v1" for any compatible server.
     "ask:FOLDER": you answer. "replay:FOLDER": recorded answers."""
-    critic: str = ""
+    critic: Annotated[str, ReadsPath(prefixes=("replay",))] = ""
     """Model that ranks proposed decompositions into parts, as --vlm; "": the same model, or a
     cheaper one of OpenAI's."""
-    record: Path | None = None
+    record: Annotated[Path | None, WritesPath()] = None
     """Folder to record every answer in, for --vlm replay:FOLDER."""
     sampling: Literal["fraction", "value"] = "fraction"
     """Ask a model for fractions of the measured ranges, or for values, which are then checked."""

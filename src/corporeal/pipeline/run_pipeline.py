@@ -19,6 +19,7 @@ from typing import Any, Literal
 from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
+from corporeal.core.setting_types import paths_read
 from corporeal.core.types import (
     Inventory,
     MaterialField,
@@ -29,17 +30,15 @@ from corporeal.core.types import (
     Trajectory,
     Video,
 )
-from corporeal.fields.field_specification import FIELD_READERS
 from corporeal.geometry.gaussian_transforms import chosen_up_axis
 from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.io.input_files import input_kind, list_input_files, photographed_input, scene_name
 from corporeal.io.scene_toml import read_scene_file, write_scene_file
 from corporeal.pipeline.results import RUN_FILES, StageResults
+from corporeal.pipeline.settings.ground_config import GroundConfig
 from corporeal.pipeline.settings.settings import Settings
 from corporeal.pipeline.settings.simulate_config import SimulateConfig, settings_for_key
 from corporeal.recognition.readable_names import safe_name
-from corporeal.reconstruction.features import ENCODER_REGISTRY as ENCODERS
-from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
 
 Progress = Callable[[float, str], None]
 """Told the fraction done and what is being done."""
@@ -59,10 +58,6 @@ STAGE_FOLDERS = {
 }
 STAGES = tuple(STAGE_FOLDERS)
 RUN_FILE = "run.json"
-OUTPUT_PATH_SETTINGS = ("record",)
-"""Settings that name what is written, not what is read."""
-PATH_PREFIXES = ("replay", *FIELD_READERS, *ENCODERS, *MASKERS)
-"""What stands before a colon and a path."""
 GAUSSIANS_FILE = "gaussians.ply"
 
 
@@ -177,16 +172,9 @@ def _read_stage_result(verb: str, folder: Path) -> Any:
 
 
 def digests_of_named_files(config: Any) -> list[str]:
-    """Name the content of every file that a configuration points to."""
-    named = [f.name for f in fields(config) if f.name not in OUTPUT_PATH_SETTINGS] if config else []
-    values = [str(getattr(config, name)) for name in named]
-    paths = [_named(value) for value in values if value]
+    """Name the content of every file that a configuration declares to be read."""
+    paths = paths_read(config) if config else []
     return [store.path_digest(path) for path in paths if path.exists()]
-
-
-def _named(value: str) -> Path:
-    kind, colon, rest = value.partition(":")
-    return Path(rest if colon and kind in PATH_PREFIXES else value).expanduser()
 
 
 @dataclass(frozen=True)
@@ -363,7 +351,7 @@ class _Run:
         if verb != "describe":
             return []
         library = self.settings.ground.library
-        return [library, *(store.path_digest(p) for p in [Path(library)] if p.exists())]
+        return [library, *digests_of_named_files(GroundConfig(library=library))]
 
     def _files(self) -> list[Path]:
         missing = [str(p) for p in self.inputs if not p.exists()]

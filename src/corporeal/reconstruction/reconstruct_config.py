@@ -3,17 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from corporeal.core.errors import UserError, check_range
+from corporeal.core.setting_types import ReadsPath
 from corporeal.geometry.gaussian_transforms import MAX_COORDINATE_UNITS, UpAxisChoice
 from corporeal.multiview.metric_scale import MeasuredDistance, MetricScale, stated_metric_scale
+from corporeal.reconstruction.features import ENCODER_REGISTRY as ENCODERS
 from corporeal.reconstruction.features import connect_encoder
 from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
 from corporeal.reconstruction.features.mask_models import connect_mask_model, split_model_spec
 from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
 
 MASKS_AUTO, MASKS_NONE = "auto", "none"
+EncoderSpec = Annotated[str, ReadsPath(prefixes=tuple(ENCODERS))]
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,9 @@ class ReconstructConfig:
     apart: SegmentationRule = "auto"
     """What objects are segmented by; auto: instance masks where there are any, else appearance
     features and concavity (look)."""
-    masks: str = "auto"
+    masks: Annotated[str, ReadsPath(prefixes=tuple(MASKERS), names=(MASKS_AUTO, MASKS_NONE))] = (
+        "auto"
+    )
     """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER"
     with weights of such a model; auto: those beside the photographs, else grown from what all
     cameras look at; none: objects are what stands on the floor."""
@@ -44,10 +49,10 @@ class ReconstructConfig:
     """Length of training on photographs: seconds, about one minute, or four, on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
     """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
-    semantic: str = "descriptor"
+    semantic: EncoderSpec = "descriptor"
     """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
     needs no weights."""
-    structural: str = "descriptor"
+    structural: EncoderSpec = "descriptor"
     """Features that parts are segmented by: "dinov2", "dinov2:FOLDER", or "descriptor"."""
     lifting: Literal["uplift", "back-projection", "radiance"] = "uplift"
     """How image features are lifted to points: to Gaussians by their blending weights (uplift) or

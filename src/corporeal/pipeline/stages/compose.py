@@ -9,11 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from corporeal.core.errors import UnknownChoiceError, UserError
+from corporeal.core.setting_types import ReadsPath, WritesPath
 from corporeal.core.types import GRAVITY_VECTOR
 from corporeal.discretization.object_scaling import SceneSizing, scene_extents
 from corporeal.geometry.convex_decomposition import decompose_convex
@@ -83,9 +84,9 @@ class ComposeConfig:
     interaction: InteractionKind | Literal["auto", "none"] = "auto"
     """Interaction that starts at time 0."""
     sizing: SceneSizing = field(default_factory=SceneSizing)
-    vlm: str = "metadata"
+    vlm: Annotated[str, ReadsPath(prefixes=("replay",))] = "metadata"
     """Source of usual sizes of classes, as --vlm of `describe`; by default a table."""
-    record: Path | None = None
+    record: Annotated[Path | None, WritesPath()] = None
     """Folder to record a model's answers in, for --vlm replay:FOLDER."""
 
 
