@@ -14,8 +14,9 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from corporeal import vlm
 from corporeal.core.errors import UserError
@@ -41,6 +42,7 @@ With each way, give also, for this very part, judged from the pictures, its use 
 - wall_mm: how thick its wall is [mm], where it is a sheet, hollow or filled; otherwise null;
 - contents_density: of what fills it, as it lies in there [kg/m³]; otherwise null.
 """
+VALUES_VERSION = "values/1"
 NAMES = {
     "density": "density",
     "shell_thickness": "wall_mm",
@@ -64,9 +66,10 @@ class ValuedPart(PartAnswer):
     ways: list[ValuedWay]  # pyright: ignore[reportIncompatibleVariableOverride]
 
 
-class ValuedAnswer(BaseModel):
+class ValuedAnswer(vlm.AnswerSchema):
     """Materials and placement in one."""
 
+    SCHEMA: ClassVar[str] = "materials-with-values/1"
     parts: list[ValuedPart]
 
 
@@ -90,7 +93,11 @@ class OneQuestion:
         return self.asked.ask(question, answer, check)
 
     def _materials(self, question, check):
-        wanted = replace(question, prompt=question.prompt + VALUES)
+        wanted = replace(
+            question,
+            prompt=question.prompt + VALUES,
+            prompt_version=f"{question.prompt_version} {VALUES_VERSION}",
+        )
 
         def plain(found: ValuedAnswer) -> MaterialsAnswer:
             return MaterialsAnswer.model_validate(found.model_dump())

@@ -47,7 +47,7 @@ def test_the_provider_answers_and_is_held_to_its_answers(tmp_path, monkeypatch):
     made = {}
     exec(connect, made)
     assert isinstance(made["model"], vlm.VlmClient)
-    shape = pydantic.create_model("Size", largest_m=(float, ...))
+    shape = pydantic.create_model("Size", __base__=vlm.AnswerSchema, largest_m=(float, ...))
     question = vlm.Question("size", "How large is it?", "a crate")
     reply = made["model"].ask(question, shape)
     assert (reply.answer.largest_m, reply.model) == (0.2, "mine:small")

@@ -8,13 +8,13 @@ import time
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from fake_server import FakeServer
-from pydantic import BaseModel
 
-from corporeal.vlm import AnswerCost, Question, Reply, connect_vlm
+from corporeal.vlm import AnswerCost, AnswerSchema, Question, Reply, connect_vlm
 from corporeal.vlm import answer_cache as cache_module
 from corporeal.vlm.answer_cache import CachingClient
 from corporeal.vlm.api_clients import OpenAIClient
@@ -25,11 +25,13 @@ PICTURE = np.zeros((4, 4, 3), np.uint8)
 ASKED = Question("colours", "Which of {names}?", "s/o", "1", (PICTURE,), {"names": "red, blue"})
 
 
-class Colour(BaseModel):
+class Colour(AnswerSchema):
+    SCHEMA: ClassVar[str] = "colour/1"
     name: str
 
 
-class Other(BaseModel):
+class Other(AnswerSchema):
+    SCHEMA: ClassVar[str] = "colour/2"
     name: str
     sure: bool = True
 

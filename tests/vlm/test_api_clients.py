@@ -1,6 +1,7 @@
 import json
 import time
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from pydantic import BaseModel
 
 import corporeal
 from corporeal.core.errors import UserError
-from corporeal.vlm import Question, UnansweredError, VlmClient, connect_vlm
+from corporeal.vlm import AnswerSchema, Question, UnansweredError, VlmClient, connect_vlm
 from corporeal.vlm.api_clients import AnthropicClient, GoogleClient, OllamaClient, OpenAIClient
 from corporeal.vlm.retry import RetryPolicy
 
@@ -28,7 +29,8 @@ class Part(BaseModel):
     share: float
 
 
-class Colours(BaseModel):
+class Colours(AnswerSchema):
+    SCHEMA: ClassVar[str] = "colours/1"
     parts: list[Part]
 
 

@@ -1,22 +1,31 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
-from pydantic import BaseModel
 
 from corporeal.core.errors import UnknownChoiceError, UserError
-from corporeal.vlm import Question, VlmClient, connect_vlm
+from corporeal.vlm import AnswerSchema, Question, VlmClient, connect_vlm
 from corporeal.vlm.recordings import RecordingClient, write_recording
 
 ASKED = Question("materials", "What is it made of?", "scene/duck_0", "4 views, 512 px")
 
 
-class Colour(BaseModel):
+class Colour(AnswerSchema):
+    SCHEMA: ClassVar[str] = "colour/1"
     name: str
 
 
-class Wider(BaseModel):
+class Renamed(AnswerSchema):
+    """The same fields under another name of the class, and with a docstring."""
+
+    SCHEMA: ClassVar[str] = "colour/1"
+    name: str
+
+
+class Wider(AnswerSchema):
+    SCHEMA: ClassVar[str] = "colour/2"
     name: str
     sure: bool = True
 
@@ -36,12 +45,42 @@ def test_a_recording_does_not_go_stale_with_the_pictures(tmp_path):
     assert connect_vlm(f"replay:{tmp_path}").ask(seen, Colour).answer.name == "red"
 
 
-@pytest.mark.parametrize("field", ["task", "prompt", "scene", "views"])
+@pytest.mark.parametrize("field", ["task", "prompt_version", "scene", "views"])
 def test_a_mismatch_names_the_field_that_differs(tmp_path, field):
     write_recording(tmp_path, ASKED, Colour(name="red"), "some-model")
     other = replace(ASKED, **{field: "something else"})
     with pytest.raises(UserError, match=f"differs in '{field}'.*something else"):
         connect_vlm(f"replay:{tmp_path}").ask(other, Colour)
+
+
+VERSIONED = replace(ASKED, prompt_version="colour/1", facts={"parts": "seat, legs", "count": "4"})
+
+
+def test_a_reworded_prompt_of_the_same_version_finds_its_recording(tmp_path):
+    write_recording(tmp_path, VERSIONED, Colour(name="red"), "some-model")
+    reworded = replace(VERSIONED, prompt="Of what is it made?")
+    assert connect_vlm(f"replay:{tmp_path}").ask(reworded, Colour).answer.name == "red"
+    another = replace(VERSIONED, prompt_version="colour/2")
+    with pytest.raises(UserError, match=r"another wording.*'prompt_version'.*colour/1.*colour/2"):
+        connect_vlm(f"replay:{tmp_path}").ask(another, Colour)
+
+
+def test_other_facts_in_a_prompt_are_another_question_and_the_first_is_named(tmp_path):
+    write_recording(tmp_path, VERSIONED, Colour(name="red"), "some-model")
+    other = replace(VERSIONED, facts={"parts": "seat", "count": "4"})
+    with pytest.raises(UserError, match="differs in 'parts': recorded 'seat, legs', asked 'seat'"):
+        connect_vlm(f"replay:{tmp_path}").ask(other, Colour)
+
+
+def test_a_prompt_without_a_version_is_named_by_its_text(tmp_path):
+    write_recording(tmp_path, ASKED, Colour(name="red"), "some-model")
+    with pytest.raises(UserError, match=r"differs in 'prompt_version'.*Of what is it made"):
+        connect_vlm(f"replay:{tmp_path}").ask(replace(ASKED, prompt="Of what is it made?"), Colour)
+
+
+def test_a_class_of_answers_may_be_renamed(tmp_path):
+    write_recording(tmp_path, ASKED, Colour(name="red"), "some-model")
+    assert connect_vlm(f"replay:{tmp_path}").ask(ASKED, Renamed).answer.name == "red"
 
 
 def test_a_new_shape_of_answer_never_replays_an_old_one(tmp_path):

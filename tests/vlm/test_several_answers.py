@@ -2,14 +2,14 @@
 
 import json
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 from fake_server import FakeServer
-from pydantic import BaseModel
 
 from corporeal.core.errors import UserError
-from corporeal.vlm import AnswerCost, AnswerNumber, Question
+from corporeal.vlm import AnswerCost, AnswerNumber, AnswerSchema, Question
 from corporeal.vlm.answer_cache import CachingClient
 from corporeal.vlm.api_clients import AnthropicClient, OpenAIClient
 from corporeal.vlm.recordings import RecordingClient, ReplayClient, write_recording
@@ -19,7 +19,8 @@ QUICK = RetryPolicy(tries=4, corrections=2, timeout=30.0, first_wait=0.02, longe
 ASKED = Question("materials", "How heavy?", "s/chair", "1", (np.full((8, 8, 3), 100, np.uint8),))
 
 
-class Heavy(BaseModel):
+class Heavy(AnswerSchema):
+    SCHEMA: ClassVar[str] = "heavy/1"
     kilograms: float
 
 

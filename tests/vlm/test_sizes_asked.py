@@ -21,7 +21,6 @@ from corporeal.vlm.real_sizes import (
     estimate_real_extent,
     find_class_sizes,
 )
-from corporeal.vlm.recordings import schema_digest
 
 RECORDED = Path(__file__).parents[1] / "recordings" / "sizes"
 COUCH = {"smallest": 1.3, "usual": 2.1, "largest": 3.2, "reason": "Three people sit on it."}
@@ -189,7 +188,7 @@ def test_what_nobody_knows_gets_a_stand_in_and_a_warning():
 
 def test_the_recorded_answers_fit_the_question_of_today():
     rows = [json.loads(p.read_text(encoding="utf-8")) for p in RECORDED.glob("*.json")]
-    assert {row["schema"] for row in rows} == {schema_digest(SizeAnswer)}
+    assert {row["schema"] for row in rows} == {SizeAnswer.SCHEMA}
     classes = [row["scene"] for row in rows]
     sizes = find_class_sizes(classes, f"replay:{RECORDED}")
     assert sorted(sizes.usual) == sorted(classes)

@@ -21,6 +21,7 @@ from corporeal.vlm.answer_checks import thickness_complaints
 from corporeal.vlm.answer_schemas import AllowedNames, MaterialsAnswer, ThicknessAnswer
 from corporeal.vlm.interpret_answers import apply_real_shares, millimetres_text, strange_share_notes
 from corporeal.vlm.interview import NO_SHARES_INSTRUCTION, Interview, InterviewSubject
+from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.recordings import ReplayClient, write_recording
 
 OLD = Path(__file__).parent / "wording_2026_11b" / "materials.md"
@@ -62,7 +63,7 @@ def about_materials(drawing, text):
     subject = InterviewSubject(
         "s", FACTS["name"], FACTS["class_name"], FACTS["sides"], drawn=drawing
     )
-    prompts = {"materials": text.read_text(encoding="utf-8")}
+    prompts = {"materials": read_prompt(text)}
     Interview(model, model, prompts, replace(subject, count=4)).materials(
         {"thing": ""}, NAMES, {}, shared=False
     )
@@ -188,7 +189,7 @@ def test_an_answer_to_the_old_wording_is_refused_with_one_sentence(tmp_path):
     shown = replace(NO_DRAWN_SHAPE, hollowed=True)
     subject = InterviewSubject("s", "thing", "object", "9 × 9 × 9 cm", drawn=shown)
     for text in (OLD, NEW):
-        prompts = {"materials": text.read_text(encoding="utf-8")}
+        prompts = {"materials": read_prompt(text)}
         Interview(model, model, prompts, subject).materials({"thing": ""}, NAMES, {}, shared=False)
     old, new = model.asked
     write_recording(tmp_path, old, MaterialsAnswer(parts=[]), "nobody")

@@ -62,6 +62,7 @@ from corporeal.vlm.interpret_answers import (
     with_usual_extents,
 )
 from corporeal.vlm.interview import Interview, InterviewSubject
+from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.thread_map import thread_map
 
 INTERVIEW_TASKS = ("parts", "ranking", "materials", "thickness", "placement", "mass", "extents")
@@ -83,9 +84,7 @@ class SceneQuery:
         self.scene, self.identity, self.config, self.library = scene, identity, config, library
         self.model, self.critic = model, critic
         folder = files("corporeal.description").joinpath("prompts")
-        self.prompts = {
-            t: folder.joinpath(f"{t}.md").read_text(encoding="utf-8") for t in INTERVIEW_TASKS
-        }
+        self.prompts = {t: read_prompt(folder.joinpath(f"{t}.md")) for t in INTERVIEW_TASKS}
         self.lists = {
             "materials": part_materials_text(library),
             "contents": content_materials_text(library),

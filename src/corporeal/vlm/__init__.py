@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Lock
-from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
+from typing import ClassVar, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from pydantic import BaseModel
@@ -13,7 +13,16 @@ from pydantic import BaseModel
 from corporeal.core import registry
 from corporeal.core.errors import UnknownChoiceError, UserError
 
-Answer = TypeVar("Answer", bound=BaseModel)
+
+class AnswerSchema(BaseModel):
+    """Base of the answers to questions."""
+
+    SCHEMA: ClassVar[str]
+    """Name and version of its fields, such as "materials/1": answers are recorded under it, not
+    under the name of the class. Raise the version with every change of the fields."""
+
+
+Answer = TypeVar("Answer", bound=AnswerSchema)
 
 VLM_CLIENTS = {
     "replay": "corporeal.vlm.recordings:ReplayClient",
@@ -89,6 +98,10 @@ class Question:
     lists: Mapping[str, str] = field(default_factory=dict)
     """What the library in use offers, by name. A longer list does not make an answer stale."""
     turn: AnswerNumber = SINGLE_ANSWER
+    prompt_version: str = ""
+    """Names the wording, such as "materials/1"; "": the wording is named by its text."""
+    facts: Mapping[str, str] = field(default_factory=dict)
+    """What was put into the wording of a version: an answer to other facts is another answer."""
 
     @property
     def text(self) -> str:
@@ -125,7 +138,7 @@ AnswerCheck = Callable[[Answer], list[str]]
 """Returns what is wrong with an answer, one sentence each, as the model is to read it."""
 
 
-def no_complaints(answer: BaseModel) -> list[str]:
+def no_complaints(answer: AnswerSchema) -> list[str]:
     """Complain about nothing."""
     return []
 

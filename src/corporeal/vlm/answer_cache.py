@@ -11,11 +11,18 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from corporeal.core import store
-from corporeal.vlm import Answer, AnswerCheck, Question, Reply, VlmClient, no_complaints
-from corporeal.vlm.recordings import schema_digest
+from corporeal.vlm import (
+    Answer,
+    AnswerCheck,
+    AnswerSchema,
+    Question,
+    Reply,
+    VlmClient,
+    no_complaints,
+)
 
 ANSWER_CACHE_VERSION = 1
 
@@ -58,7 +65,7 @@ class CachingClient:
             store.write_json(path, about | {"answer": reply.answer.model_dump()})
             return reply
 
-    def key(self, question: Question, answer: type[BaseModel]) -> str:
+    def key(self, question: Question, answer: type[AnswerSchema]) -> str:
         """Name a question by task, model, text, pictures, shape of the answer, and settings."""
         pictures = [
             hashlib.sha256(str(p.shape).encode() + p.tobytes()).hexdigest()
@@ -70,7 +77,7 @@ class CachingClient:
             "model": self.name,
             "text": question.text,
             "pictures": pictures,
-            "schema": schema_digest(answer),
+            "schema": answer.SCHEMA,
             "settings": self.settings,
         }
         if question.turn.number > 1:

@@ -12,8 +12,7 @@ from threading import Lock
 from httpx2 import Response
 from pydantic import BaseModel, ValidationError
 
-from corporeal.vlm import Answer, AnswerCheck, Question
-from corporeal.vlm.recordings import schema_digest
+from corporeal.vlm import Answer, AnswerCheck, AnswerSchema, Question
 
 SAMPLING_TEMPERATURE = 0.7
 """At which several answers are sampled: Wang et al. (2022, arXiv:2203.11171) took .5 to .7."""
@@ -78,7 +77,7 @@ class SpareAnswers:
         self._kept: dict[str, list[str]] = {}
         self._one = Lock()
 
-    def keep(self, question: Question, answer: type[BaseModel], texts: list[str]) -> None:
+    def keep(self, question: Question, answer: type[AnswerSchema], texts: list[str]) -> None:
         """Keep what was said for those who ask the same."""
         with self._one:
             self._kept[_key(question, answer)] = list(texts)
@@ -98,10 +97,10 @@ class SpareAnswers:
         return None
 
 
-def _key(question: Question, answer: type[BaseModel]) -> str:
+def _key(question: Question, answer: type[AnswerSchema]) -> str:
     """Name what is asked, whichever of several answers is wanted."""
     pictures = [hashlib.sha256(p.tobytes()).hexdigest() for p in question.pictures]
-    row = [question.scene, question.task, question.text, schema_digest(answer), *pictures]
+    row = [question.scene, question.task, question.text, answer.SCHEMA, *pictures]
     return hashlib.sha256(json.dumps(row).encode()).hexdigest()
 
 

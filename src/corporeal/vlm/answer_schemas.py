@@ -1,14 +1,17 @@
 """The schemas of a model's answers.
 
 They do not change with the library or the scene, so that a recorded answer outlives both; names
-and bounds are checked against what was asked (``answer_checks``).
+and bounds are checked against what was asked (``answer_checks``). Names and docstrings of classes
+may change freely; a change of fields needs a new version in ``SCHEMA``.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BaseModel, Field, model_validator
+
+from corporeal.vlm import AnswerSchema
 
 UnitShare = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 NameLookup = Callable[[str], str | None]
@@ -36,8 +39,8 @@ LISTED_FORM_OF_UNIT = {
     "mg": ("g", 1e-3),
     "lbs": ("lb", 1.0),
 }
-"""Units that answers give, too: a listed one, and how many of it. To list them would change the
-schema, and so end every recorded answer about a mass."""
+"""Units that answers give, too: a listed one, and how many of it. To list them would need a new
+version of the schema, and so end every recorded answer about a mass."""
 
 
 class SeenPart(BaseModel):
@@ -57,9 +60,10 @@ class Decomposition(BaseModel):
     why: str
 
 
-class PartsAnswer(BaseModel):
+class PartsAnswer(AnswerSchema):
     """Question 1: what it is, and the ways of taking it apart."""
 
+    SCHEMA: ClassVar[str] = "parts/1"
     object: str
     decompositions: list[Decomposition]
 
@@ -71,9 +75,10 @@ class DecompositionRank(BaseModel):
     reason: str
 
 
-class RankingAnswer(BaseModel):
+class RankingAnswer(AnswerSchema):
     """The critic's order, best first."""
 
+    SCHEMA: ClassVar[str] = "ranking/1"
     ranking: list[DecompositionRank]
 
 
@@ -101,9 +106,10 @@ class PartAnswer(BaseModel):
     surface_share: UnitShare | None = None
 
 
-class MaterialsAnswer(BaseModel):
+class MaterialsAnswer(AnswerSchema):
     """Question 2: every part of one object."""
 
+    SCHEMA: ClassVar[str] = "materials/1"
     parts: list[PartAnswer]
 
 
@@ -117,9 +123,10 @@ class RealVolumeShare(BaseModel):
     reason: str
 
 
-class ThicknessAnswer(BaseModel):
+class ThicknessAnswer(AnswerSchema):
     """How far a scan of something thin is thicker than the real thing."""
 
+    SCHEMA: ClassVar[str] = "thickness/1"
     parts: list[RealVolumeShare]
 
 
@@ -143,9 +150,10 @@ class PartFractions(BaseModel):
     values: list[QuantityFraction]
 
 
-class FractionAnswer(BaseModel):
+class FractionAnswer(AnswerSchema):
     """Question 3, asked for places in ranges."""
 
+    SCHEMA: ClassVar[str] = "placement-fractions/1"
     parts: list[PartFractions]
 
 
@@ -169,9 +177,10 @@ class PartValues(BaseModel):
     values: list[QuantityValue]
 
 
-class ValueAnswer(BaseModel):
+class ValueAnswer(AnswerSchema):
     """Question 3, asked for values."""
 
+    SCHEMA: ClassVar[str] = "placement-values/1"
     parts: list[PartValues]
 
 
@@ -195,10 +204,11 @@ class PrintedStatement(BaseModel):
         return said | {"unit": listed} if factor == 1.0 else said
 
 
-class MassAnswer(BaseModel):
+class MassAnswer(AnswerSchema):
     """What is printed on an object, and what it weighs, judged without any library."""
 
-    printed: list[PrintedStatement] = []
+    SCHEMA: ClassVar[str] = "mass/1"
+    printed: list[PrintedStatement] = Field(default=[])
     low_kg: float = Field(gt=0, lt=1e9, allow_inf_nan=False)
     likely_kg: float = Field(gt=0, lt=1e9, allow_inf_nan=False)
     high_kg: float = Field(gt=0, lt=1e9, allow_inf_nan=False)
@@ -212,15 +222,17 @@ class ClassExtent(BaseModel):
     metres: float = Field(gt=0, lt=1000, allow_inf_nan=False)
 
 
-class ExtentsAnswer(BaseModel):
+class ExtentsAnswer(AnswerSchema):
     """Question 4: every class of things in the scene."""
 
+    SCHEMA: ClassVar[str] = "extents/1"
     classes: list[ClassExtent]
 
 
-class SizeAnswer(BaseModel):
+class SizeAnswer(AnswerSchema):
     """How large one class of things is along its longest side, in metres."""
 
+    SCHEMA: ClassVar[str] = "size/1"
     smallest: float = Field(gt=0, allow_inf_nan=False)
     usual: float = Field(gt=0, allow_inf_nan=False)
     largest: float = Field(gt=0, allow_inf_nan=False)
@@ -236,9 +248,10 @@ class ListedObject(BaseModel):
     """Length of its longest side in reality."""
 
 
-class ObjectsAnswer(BaseModel):
+class ObjectsAnswer(AnswerSchema):
     """Which things stand in a scene that was photographed."""
 
+    SCHEMA: ClassVar[str] = "things/1"
     things: list[ListedObject]
 
 
@@ -249,7 +262,8 @@ class PaintedRegion(BaseModel):
     thing: int | None
 
 
-class RegionsAnswer(BaseModel):
+class RegionsAnswer(AnswerSchema):
     """Which thing each painted region is."""
 
+    SCHEMA: ClassVar[str] = "regions/1"
     regions: list[PaintedRegion]

@@ -11,11 +11,11 @@ from threading import Lock
 
 import numpy as np
 from PIL import Image
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
-from corporeal.vlm import Answer, AnswerCheck, Question, Reply, no_complaints
+from corporeal.vlm import Answer, AnswerCheck, AnswerSchema, Question, Reply, no_complaints
 from corporeal.vlm.recordings import (
     ReplayClient,
     first_validation_problem,
@@ -72,7 +72,7 @@ class HumanClient:
         """
         page = self.pages / self._name(question, answer)
         found = _read_answer(page.with_suffix(".json"), answer, check)
-        if isinstance(found, BaseModel):
+        if isinstance(found, AnswerSchema):
             with self._one:
                 write_recording(self.folder, question, found, HUMAN_MODEL_NAME)
             return Reply(found, "recording", HUMAN_MODEL_NAME)
@@ -81,7 +81,7 @@ class HumanClient:
         _write_page(page, question, answer, found)
         raise PendingQuestionsError(f"{page.with_suffix('.md')} waits for an answer.")
 
-    def _name(self, question: Question, answer: type[BaseModel]) -> str:
+    def _name(self, question: Question, answer: type[AnswerSchema]) -> str:
         key = recording_digest(recording_key_row(question, answer))[:6]
         plain = re.sub(r"[^\w.-]+", "-", f"{question.scene}-{question.task}")
         number = question.turn.number
@@ -129,7 +129,7 @@ def _read_answer(path: Path, answer: type[Answer], check: AnswerCheck[Answer]) -
     return "\n".join(check(found)) or found
 
 
-def _write_page(page: Path, question: Question, answer: type[BaseModel], wrong: str) -> None:
+def _write_page(page: Path, question: Question, answer: type[AnswerSchema], wrong: str) -> None:
     schema = answer.model_json_schema()
     text = question.text + ANSWER_SHAPE_TEXT.format(
         shape=schema_example(schema, schema.get("$defs", {}))

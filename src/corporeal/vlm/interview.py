@@ -51,6 +51,7 @@ from corporeal.vlm.answer_schemas import (
     ValueAnswer,
 )
 from corporeal.vlm.interpret_answers import LookingSource, millimetres_text, strange_share_notes
+from corporeal.vlm.prompt_files import Prompt
 
 SHARES_INSTRUCTION = (
     "The parts share one model, so say for each what it takes up of the object as the pictures "
@@ -83,6 +84,13 @@ REVISION_INSTRUCTION = (
     "\n\nYou answered this before, and your values do not fit each other:\n\n$answer\n\n"
     "$problems\n\nAnswer again, for all parts. Keep a value only if it is meant so, and say why."
 )
+SENTENCES: Mapping[str, Mapping[str, str]] = {
+    "shares": {"shared": SHARES_INSTRUCTION, "own": NO_SHARES_INSTRUCTION},
+    "unseen": {"hollowed": UNSEEN_CLAUSE, "whole": ""},
+    "holes": {"hollowed": MODELLED_HOLES_CLAUSE, "whole": ""},
+    "how": {"fraction": FRACTION_INSTRUCTION, "value": VALUE_INSTRUCTION},
+}
+"""Fact → its value → what stands in the prompt for it; other facts stand there themselves."""
 
 TASKS_WITH_FIXED_TEXT = ("materials", "mass")
 """Questions whose text hangs on question 1 only, so that each of several answers is to the same."""
@@ -126,8 +134,8 @@ class Interview:
 
     model: VlmClient
     critic: VlmClient
-    prompts: Mapping[str, str]
-    """Task → wording, with $facts and {lists}."""
+    prompts: Mapping[str, Prompt]
+    """By task."""
     subject: InterviewSubject
     seen: str = ""
     """What question 1 found it to be; "": it was not asked."""
@@ -188,13 +196,13 @@ class Interview:
 
         """
         named = _part_list(parts)
-        hollowed = self.subject.drawn.hollowed
+        hollowed = "hollowed" if self.subject.drawn.hollowed else "whole"
         asked = self._question(
             "materials",
             parts=named,
-            unseen=UNSEEN_CLAUSE if hollowed else "",
-            holes=MODELLED_HOLES_CLAUSE if hollowed else "",
-            shares=SHARES_INSTRUCTION if shared else NO_SHARES_INSTRUCTION,
+            unseen=hollowed,
+            holes=hollowed,
+            shares="shared" if shared else "own",
         )
         asked = replace(asked, lists=lists)
         reply = self._ask(
@@ -264,13 +272,13 @@ class Interview:
             odd: Says what does not fit in an answer.
 
         """
-        reply = self._placement(offers, shape, "")
+        reply = self._placement(offers, shape, {})
         problems = odd(reply.answer) if reply else ()
         if reply and problems:
-            again = Template(REVISION_INSTRUCTION).substitute(
-                answer=json.dumps(reply.answer.model_dump()),
-                problems="\n".join(f"- {p}" for p in problems),
-            )
+            again = {
+                "answer": json.dumps(reply.answer.model_dump()),
+                "problems": "\n".join(f"- {p}" for p in problems),
+            }
             reply = self._placement(offers, shape, again) or reply
         return (reply.answer, reply.by) if reply else None
 
@@ -278,16 +286,18 @@ class Interview:
         self,
         offers: Mapping[str, PlacementOffer],
         shape: type[FractionAnswer] | type[ValueAnswer],
-        again: str,
+        again: Mapping[str, str],
     ) -> Reply[FractionAnswer | ValueAnswer] | None:
         asked = self._question(
             "placement",
             parts="\n".join(f"- {offer.facts}" for offer in offers.values()),
-            how=FRACTION_INSTRUCTION if shape is FractionAnswer else VALUE_INSTRUCTION,
+            how="fraction" if shape is FractionAnswer else "value",
         )
         asked = replace(
             asked,
-            prompt=asked.prompt + again,
+            prompt=asked.prompt
+            + (Template(REVISION_INSTRUCTION).substitute(again) if again else ""),
+            facts={**asked.facts, **again},
             lists={"ranges": _range_list(offers)},
         )
         wanted: dict[str, Collection[str]] = {part: list(o.ranges) for part, o in offers.items()}
@@ -340,15 +350,20 @@ class Interview:
             "name": about.name,
             "class_name": about.class_name,
             "sides": about.sides,
-            "seen": f"It was found to be: {self.seen}." if self.seen else "",
+            "seen": self.seen,
         }
-        prompt = Template(self.prompts[task]).substitute(common | facts).strip()
-        turn = (
-            replace(self.turn, alike=True)
-            if task in TASKS_WITH_FIXED_TEXT and self.turn.of > 1
-            else self.turn
+        prompt = self.prompts[task]
+        put = {name: (common | facts)[name] for name in prompt.names()}
+        return Question(
+            task,
+            Template(prompt.text).substitute({n: _in_words(n, put[n]) for n in put}).strip(),
+            about.scene,
+            about.views,
+            about.pictures,
+            turn=replace(self.turn, alike=task in TASKS_WITH_FIXED_TEXT and self.turn.of > 1),
+            prompt_version=prompt.version,
+            facts=put,
         )
-        return Question(task, prompt, about.scene, about.views, about.pictures, turn=turn)
 
     def _ask(
         self, whom: VlmClient, question: Question, shape: type[Answer], check: AnswerCheck[Answer]
@@ -366,6 +381,13 @@ class Interview:
             return None
         self.transcript.append(_transcript_row(question) | _answered(reply))
         return reply
+
+
+def _in_words(name: str, fact: str) -> str:
+    """Return what stands in a prompt for a fact."""
+    if name == "seen":
+        return f"It was found to be: {fact}." if fact else ""
+    return SENTENCES[name][fact] if name in SENTENCES else fact
 
 
 def _part_list(parts: Mapping[str, str]) -> str:

@@ -27,6 +27,7 @@ from corporeal.recognition.typical_extents import (
 from corporeal.vlm import VlmClient, connect_vlm
 from corporeal.vlm.interpret_answers import sum_usage
 from corporeal.vlm.interview import Interview, InterviewSubject
+from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.real_sizes import ANSWER_SOURCE_TEXT, EXTENT_TABLE_SOURCE
 
 COMMAND_LINE_SOURCE = "the command line"
@@ -130,9 +131,7 @@ class PhotoInterview:
     def _interview(
         self, model: VlmClient, task: str, pictures: Sequence[np.ndarray], count: int
     ) -> Interview:
-        prompt = (
-            files("corporeal.vlm").joinpath("prompts", f"{task}.md").read_text(encoding="utf-8")
-        )
+        prompt = read_prompt(files("corporeal.vlm").joinpath("prompts", f"{task}.md"))
         views = f"{count} of its photographs"
         subject = InterviewSubject(
             scene=self.scene,

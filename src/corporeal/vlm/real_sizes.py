@@ -17,6 +17,7 @@ from corporeal.vlm import VlmClient, connect_vlm
 from corporeal.vlm.human_client import is_not_pending, refuse_pending
 from corporeal.vlm.interpret_answers import extent_text, sum_usage
 from corporeal.vlm.interview import Interview, InterviewSubject
+from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.thread_map import thread_map
 
 UNKNOWN_EXTENT_M = 0.3
@@ -144,7 +145,7 @@ def estimate_real_extent(
 
 
 def _interview(model: VlmClient, class_name: str) -> Interview:
-    prompt = files("corporeal.vlm").joinpath("prompts", "sizes.md").read_text(encoding="utf-8")
+    prompt = read_prompt(files("corporeal.vlm").joinpath("prompts", "sizes.md"))
     subject = InterviewSubject(class_name, class_name, class_name, "")
     return Interview(model, model, {"sizes": prompt}, subject)
 

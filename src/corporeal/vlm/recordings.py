@@ -1,22 +1,33 @@
 """Answers recorded earlier: free, offline, repeatable.
 
-A recording is one JSON file: task, scene, prompt, schema, views, model, lists, answer. It is found
-by what was asked about what, not by pixels, by model, or by how long the library's lists were; so
-neither a better renderer nor a new material makes it stale.
+A recording is one JSON file: task, scene, version of the prompt and facts put into it, schema,
+views, model, lists, prompt, answer. It is found by what was asked about what, not by pixels, by
+model, by words of the prompt, or by how long the library's lists were; so neither a better renderer
+nor a new material nor a clearer sentence makes it stale.
 """
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.vlm import Answer, AnswerCheck, Question, Reply, VlmClient, no_complaints
+from corporeal.vlm import (
+    Answer,
+    AnswerCheck,
+    AnswerSchema,
+    Question,
+    Reply,
+    VlmClient,
+    no_complaints,
+)
 
-RECORDING_KEY_FIELDS = ("task", "scene", "prompt", "schema", "views")
+RECORDING_KEY_FIELDS = ("task", "scene", "prompt_version", "facts", "schema", "views")
 """What must be equal for a recording to answer a question, most telling last to differ."""
 ANSWER_NUMBER_KEY = "answer_number"
 """Which of several answers to a question it is; absent: the first, as in recordings of one."""
@@ -51,11 +62,11 @@ class ReplayClient:
             raise UserError(self._why_not(recording_key_row(question, answer)))
         return Reply(_validated(row, answer, check), "recording", str(row.get("model", "")))
 
-    def holds(self, question: Question, answer: type[BaseModel]) -> bool:
+    def holds(self, question: Question, answer: type[AnswerSchema]) -> bool:
         """Tell whether the question was answered."""
         return self._row(recording_key_row(question, answer)) is not None
 
-    def _row(self, wanted: dict[str, str]) -> dict | None:
+    def _row(self, wanted: dict[str, Any]) -> dict | None:
         return next(
             (
                 r
@@ -65,11 +76,11 @@ class ReplayClient:
             None,
         )
 
-    def _alike(self, wanted: dict[str, str]) -> list[dict]:
+    def _alike(self, wanted: dict[str, Any]) -> list[dict]:
         """Return the recorded answers to a question, whichever of several they are."""
         return [r for r in self.rows if all(r[f] == wanted[f] for f in RECORDING_KEY_FIELDS)]
 
-    def _why_not(self, wanted: dict[str, str]) -> str:
+    def _why_not(self, wanted: dict[str, Any]) -> str:
         about = f"{wanted['task']!r} about {wanted['scene']!r}"
         if not self.rows:
             return f"No recording in {self.folder}: nothing answers {about}."
@@ -82,18 +93,15 @@ class ReplayClient:
             self.rows, key=lambda row: [row[f] == wanted[f] for f in RECORDING_KEY_FIELDS]
         )
         differs = next(f for f in RECORDING_KEY_FIELDS if nearest[f] != wanted[f])
-        if differs in ("prompt", "schema"):
+        how = f"differs in {_difference(differs, nearest[differs], wanted[differs])}"
+        if differs in ("prompt_version", "schema"):
             return (
                 f"The answers in {self.folder} are to another wording of the questions "
-                f"({nearest['file']} differs in {differs!r}: recorded "
-                f"{_quote_difference(nearest[differs], wanted[differs])}, asked "
-                f"{_quote_difference(wanted[differs], nearest[differs])}): record them again, or use "
-                "--vlm metadata."
+                f"({nearest['file']} {how}): record them again, or use --vlm metadata."
             )
         return (
             f"No recording in {self.folder} answers {about}. The nearest, {nearest['file']}, "
-            f"differs in {differs!r}: recorded {_quote_difference(nearest[differs], wanted[differs])}, asked "
-            f"{_quote_difference(wanted[differs], nearest[differs])}. Record it again, or use --vlm metadata."
+            f"{how}. Record it again, or use --vlm metadata."
         )
 
 
@@ -114,41 +122,35 @@ class RecordingClient:
         return reply
 
 
-def write_recording(folder: Path, question: Question, answer: BaseModel, model: str) -> Path:
+def write_recording(folder: Path, question: Question, answer: AnswerSchema, model: str) -> Path:
     """Keep an answer where ``ReplayClient`` finds it; the file appears whole or not at all."""
     row = recording_key_row(question, type(answer))
     key = recording_digest(row)[:16]
-    row = row | {"model": model, "lists": dict(question.lists), "answer": answer.model_dump()}
+    row |= {"model": model, "lists": dict(question.lists), "prompt": question.prompt}
+    row |= {"answer": answer.model_dump()}
     path = folder / f"{question.task}-{key}.json"
     store.write_json(path, row)
     return path
 
 
-def recording_key_row(question: Question, answer: type[BaseModel]) -> dict[str, str]:
+def recording_key_row(question: Question, answer: type[AnswerSchema]) -> dict[str, Any]:
     """Name a question by all that its answer depends on."""
     number = question.turn.number
     return {
         "task": question.task,
         "scene": question.scene,
-        "prompt": question.prompt,
-        "schema": schema_digest(answer),
+        "prompt_version": question.prompt_version or question.prompt,
+        "facts": dict(question.facts),
+        "schema": answer.SCHEMA,
         "views": question.views,
         **({ANSWER_NUMBER_KEY: str(number)} if number > 1 else {}),
     }
 
 
-def recording_digest(row: dict[str, str]) -> str:
+def recording_digest(row: Mapping[str, Any]) -> str:
     """Return the name of what was asked, in hexadecimal digits."""
-    words = [row[f] for f in RECORDING_KEY_FIELDS] + (
-        [row[ANSWER_NUMBER_KEY]] if ANSWER_NUMBER_KEY in row else []
-    )
-    return hashlib.sha256("\0".join(words).encode()).hexdigest()
-
-
-def schema_digest(answer: type[BaseModel]) -> str:
-    """Name the shape of an answer."""
-    schema = json.dumps(answer.model_json_schema(), sort_keys=True)
-    return hashlib.sha256(schema.encode()).hexdigest()[:16]
+    named = {f: row[f] for f in (*RECORDING_KEY_FIELDS, ANSWER_NUMBER_KEY) if f in row}
+    return hashlib.sha256(json.dumps(named, sort_keys=True).encode()).hexdigest()
 
 
 def _read_recording(path: Path) -> dict:
@@ -185,6 +187,14 @@ def first_validation_problem(error: ValidationError) -> str:
     """Say where an answer first leaves its shape, and how."""
     first = error.errors()[0]
     return f"{'.'.join(str(x) for x in first['loc'])}: {first['msg']}"
+
+
+def _difference(name: str, recorded: Any, wanted: Any) -> str:
+    """Name what differs, of facts the first one, and quote both."""
+    if isinstance(recorded, Mapping):
+        names = [n for n in (*wanted, *recorded) if recorded.get(n) != wanted.get(n)]
+        name, recorded, wanted = names[0], recorded.get(names[0], ""), wanted.get(names[0], "")
+    return f"{name!r}: recorded {_quote_difference(recorded, wanted)}, asked {_quote_difference(wanted, recorded)}"
 
 
 def _quote_difference(text: str, other: str) -> str:

@@ -4,11 +4,12 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from corporeal.core.deserialize import from_plain
+from corporeal.vlm import AnswerSchema
 
 QuestionAnswer = Literal["yes", "no", "unclear", "na"]
 MAX_DESCRIPTION_CHARACTERS = 1000
@@ -73,9 +74,10 @@ def _answers() -> type[VideoAnswers]:
     return create_model("Answers", __base__=VideoAnswers, **fields)
 
 
-class Verdict(BaseModel):
+class Verdict(AnswerSchema):
     """What is said of one film after one look."""
 
+    SCHEMA: ClassVar[str] = "verdict/1"
     happens: str = Field(min_length=1, max_length=MAX_DESCRIPTION_CHARACTERS)
     answers: _answers()  # type: ignore[valid-type]
     whole: int = Field(ge=MIN_MARK, le=MAX_MARK)

@@ -1,7 +1,8 @@
 """The question about one film after one look, and what asking it costs.
 
 It is named by a digest of the motion that it shows: an answer to another motion is never found, and
-nothing in it says which condition the film is of.
+nothing in it says which condition the film is of. The version in ``film.md`` covers the questions
+of ``questions.toml``, too.
 """
 
 import hashlib
@@ -20,6 +21,7 @@ from corporeal.lab.evaluation.judge.judge_pictures import (
 from corporeal.lab.evaluation.judge.subquestions import question_catalogue
 from corporeal.lab.evaluation.judge.video_motion import VideoMotion
 from corporeal.vlm import OnDemandPictures, Question
+from corporeal.vlm.prompt_files import Prompt, read_prompt
 from corporeal.vlm.token_prices import price_usd
 
 DYNAMICS_TASK = "dynamics"
@@ -60,12 +62,18 @@ def video_question(film: VideoMotion, staging: Staging, told: str, look: int) ->
 
     """
     name = f"film-{motion_digest(film, staging)}"
+    places = question_order(name, look)
     return Question(
         task=DYNAMICS_TASK,
-        prompt=prompt_text(told, question_order(name, look)),
+        prompt=prompt_text(told, places),
         scene=name,
         views=pictures_description(look),
         pictures=OnDemandPictures(lambda: judge_pictures(film, staging, look)),
+        prompt_version=_template().version,
+        facts={
+            "told": told,
+            "questions": " ".join(question_catalogue().question[k].id for k in places),
+        },
     )
 
 
@@ -81,7 +89,7 @@ def prompt_text(told: str, places: list[int]) -> str:
     asked = [question_catalogue().question[k] for k in places]
     text = (
         _template()
-        .replace("{count}", str(PICTURES_PER_LOOK))
+        .text.replace("{count}", str(PICTURES_PER_LOOK))
         .replace("{dated}", str(DATED_PICTURES))
     )
     text = text.replace("{close}", str(CLOSE_UP_PICTURES)).replace("{facts}", told)
@@ -89,8 +97,8 @@ def prompt_text(told: str, places: list[int]) -> str:
 
 
 @cache
-def _template() -> str:
-    return files("corporeal.lab.evaluation.judge").joinpath("film.md").read_text(encoding="utf-8")
+def _template() -> Prompt:
+    return read_prompt(files("corporeal.lab.evaluation.judge").joinpath("film.md"))
 
 
 @dataclass(frozen=True)
