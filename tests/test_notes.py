@@ -1,10 +1,8 @@
 """A sentence keeps the kind that it was given where something was noticed."""
 
 import copy
-import json
 import pickle
 
-import numpy as np
 import pytest
 
 from corporeal.core import store
@@ -47,16 +45,6 @@ def test_what_a_verb_keeps_has_the_kinds(tmp_path):
     large = extent_warning("duck_0", "duck", 100.0)
     store.save(tmp_path / "data.npz", Inventory((), warnings=(large,)))
     assert store.load(tmp_path / "data.npz").warnings[0].size_of == "duck_0"
-
-
-def test_what_was_kept_before_there_were_kinds_is_a_doubt(tmp_path):
-    row = {"list": [{"value": "a.jpg was left out."}], "tuple": True}
-    none = {"list": [], "tuple": True}
-    tree = {"type": "Inventory", "fields": {"objects": none, "warnings": row}}
-    np.savez(
-        tmp_path / "data.npz", **{store.TREE_ARRAY: np.frombuffer(json.dumps(tree).encode(), "u1")}
-    )
-    assert note_kinds(store.load(tmp_path / "data.npz").warnings) == (NoteKind.DOUBT,)
 
 
 def test_kinds_beside_plain_sentences_are_put_to_them_again():

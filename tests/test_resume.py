@@ -139,24 +139,6 @@ def test_three_kills_at_random_moments_change_nothing(tmp_path):
     assert_same(tmp_path / "whole", broken)
 
 
-def test_a_run_of_the_engine_that_was_called_warp_is_opened_and_not_done_again(tmp_path):
-    scene, folder, said = a_scene(tmp_path / "two.glb", duration=0.05), tmp_path / "run", []
-    quiet = lambda verb: lambda fraction, words: said.append(words)  # noqa: E731
-    run_pipeline.run([scene], folder, Settings(), quiet, until="simulate")
-    filled, simulated = (folder / run_pipeline.STAGE_FOLDERS[verb] for verb in ("fill", "simulate"))
-    former = {"engine": "warp", "contact": "multi"}
-    key = store.result_key("simulate", former, [store.read_json(filled / store.META_FILE)["key"]])
-    store.finish_result(simulated, key, former, 1.0)
-    declared = store.read_json(folder / run_pipeline.RUN_FILE)
-    declared["settings"]["simulate"] = former
-    store.write_json(folder / run_pipeline.RUN_FILE, declared)
-    asked = run_pipeline.read_run_request(folder)
-    assert asked.settings.simulate.engine == "cpu"
-    said.clear()
-    run_pipeline.run(asked.inputs, folder, asked.settings, quiet, until="simulate")
-    assert not said, "what is done is not done again"
-
-
 def test_a_run_is_let_go_of_when_it_ends(tmp_path):
     for _ in range(2):
         with store.lock_folder(tmp_path), pytest.raises(UserError, match="works in"):

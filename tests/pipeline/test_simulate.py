@@ -346,8 +346,3 @@ def test_an_object_is_rigid_only_when_all_its_parts_are(tmp_path, monkeypatch):
     particles = replace(particles, treatments=(treated(kind="rigid"), treated()))
     problem = problem_of(monkeypatch, tmp_path, (scene, particles, field))
     assert [b.rigid for b in problem.bodies] == [True, False]
-
-
-def test_the_former_name_of_the_processors_engine_still_works_and_says_so(caplog):
-    assert SimulateConfig(engine="warp") == SimulateConfig(engine="cpu")
-    assert caplog.messages == ["The engine 'warp' is called 'cpu' now."]

@@ -1,8 +1,8 @@
 """Plain data, as JSON knows it, made into frozen dataclasses by their annotations.
 
 The inverse of ``store.plain``: what was written to a file is read by the names of fields, not by
-strings. Keys that no field has are ignored, and a field with a default may be absent, so that files
-of older and newer versions open.
+strings. Keys that no field has are ignored, so that a reader declares only what it needs, and a
+field with a default may be absent, as in tables that are written by hand.
 """
 
 from collections.abc import Mapping

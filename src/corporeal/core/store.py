@@ -20,14 +20,14 @@ from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from functools import cache
 from pathlib import Path
-from typing import IO, Any, get_type_hints
+from typing import IO, Any
 
 import numpy as np
 
-from corporeal.core import types
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Note, NoteKind
+from corporeal.core.types.stored_kinds import KIND_OF, STORED_KINDS
 from corporeal.core.version import __version__
 
 META_FILE = "meta.json"
@@ -36,11 +36,6 @@ TREE_ARRAY = "tree"
 LOCK_FILE = ".lock"
 CACHE_VARIABLE = "CORPOREAL_CACHE"
 """Environment variable that names the folder of what is kept outside of runs."""
-STORABLE_TYPES: dict[str, Any] = {
-    name: kind
-    for name, kind in vars(types).items()
-    if isinstance(kind, type) and kind.__module__.startswith(f"{types.__name__}.")
-}
 
 
 class DiskError(UserError):
@@ -236,9 +231,25 @@ def _to_plain_leaf(value: Any) -> Any:
 
 # ---------------------------------------------------------------- anything that flows ↔ npz
 
+UNREADABLE = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    EOFError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
+"""What loading a damaged file, or one with other fields, may raise."""
+
 
 def save(path: Path, value: Any) -> None:
-    """Save any value made of the types in ``types``, containers, arrays and numbers."""
+    """Save a value made of the types in ``STORED_KINDS``, containers, arrays and numbers.
+
+    Raises:
+        TypeError: A dataclass or an enumeration in it has no kind.
+
+    """
     arrays: dict[str, Any] = {}
     tree = json.dumps(_encode(value, arrays), allow_nan=True)
     with disk_errors(path):
@@ -262,7 +273,7 @@ def load(path: Path) -> Any:
         with np.load(path, allow_pickle=False) as file:
             tree = json.loads(bytes(file[TREE_ARRAY]).decode())
             return _decode(tree, file)
-    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise BadFileError(
             path, f"cannot be read ({error}).", "Delete the folder it is in and run again."
         ) from error
@@ -275,16 +286,23 @@ def _encode(value: Any, arrays: dict[str, Any]) -> Any:
         return {"array": name}
     if is_dataclass(value) and not isinstance(value, type):
         content = {f.name: _encode(getattr(value, f.name), arrays) for f in fields(value)}
-        return {"type": type(value).__name__, "fields": content}
+        return {"type": _kind(value), "fields": content}
     if isinstance(value, tuple | list):
         return {"list": [_encode(v, arrays) for v in value], "tuple": isinstance(value, tuple)}
     if isinstance(value, dict):
         return {"dict": [[k, _encode(v, arrays)] for k, v in value.items()]}
     if isinstance(value, Enum):
-        return {"type": type(value).__name__, "member": value.name}
+        return {"type": _kind(value), "member": value.name}
     if isinstance(value, Note):
         return {"note": str(value), "kind": value.kind.name, "size_of": value.size_of}
     return {"path": str(value)} if isinstance(value, Path) else {"value": _plain_number(value)}
+
+
+def _kind(value: Any) -> str:
+    kind = KIND_OF.get(type(value))
+    if kind is None:
+        raise TypeError(f"{type(value).__name__} has no kind in STORED_KINDS, so it is not stored")
+    return kind
 
 
 def _plain_number(value: Any) -> Any:
@@ -305,56 +323,18 @@ def _decode(tree: dict, arrays: Any) -> Any:
         return Path(tree["path"])
     if "note" in tree:
         return Note(tree["note"], NoteKind[tree["kind"]], tree["size_of"])
-    kind = STORABLE_TYPES[tree["type"]]
+    stored: Any = STORED_KINDS[tree["type"]]
     if "member" in tree:
-        return kind[tree["member"]]
-    return _build_dataclass(kind, {k: _decode(v, arrays) for k, v in tree["fields"].items()})
-
-
-def _build_dataclass(kind: type, given: dict[str, Any]) -> Any:
-    """Make a dataclass; where an older version kept a dictionary, make what it is now.
-
-    What a type no longer has is left out.
-    """
-    hints = get_type_hints(kind)
-    given = {name: value for name, value in given.items() if name in hints}
-    now = {
-        name: from_plain(hints[name], value)
-        for name, value in given.items()
-        if isinstance(value, dict) and is_dataclass(hints.get(name))
-    }
-    return kind(**given | now)
+        return stored[tree["member"]]
+    return stored(**{k: _decode(v, arrays) for k, v in tree["fields"].items()})
 
 
 # ---------------------------------------------------------------- stage folders
 
 
-ADDED_LATER = {"later": True}
-"""Metadata of a setting that was added when results were already kept under names."""
-
-
-def settings_for_key(config: Any) -> Any:
-    """Return settings as results are named by them.
-
-    What was added ``ADDED_LATER`` is left out at its default: results from before keep their names.
-    """
-    if is_dataclass(config) and not isinstance(config, type):
-        told = [(f, getattr(config, f.name)) for f in fields(config)]
-        return {
-            f.name: settings_for_key(value)
-            for f, value in told
-            if "later" not in f.metadata or value != f.default
-        }
-    if isinstance(config, Mapping):
-        return {str(k): settings_for_key(v) for k, v in config.items()}
-    if isinstance(config, list | tuple):
-        return [settings_for_key(v) for v in config]
-    return to_plain(config)
-
-
 def result_key(stage: str, config: Any, inputs: list[str]) -> str:
     """Name a result by all it depends on: the stage, its configuration, what came before."""
-    text = json.dumps([__version__, stage, settings_for_key(config), inputs], sort_keys=True)
+    text = json.dumps([__version__, stage, to_plain(config), inputs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
@@ -397,7 +377,7 @@ class ResultMeta:
     version: str = ""
     """Of this package."""
     source: str = ""
-    """Names the state of the package's code that made it; empty: older than this entry."""
+    """Names the state of the package's code that made it."""
 
 
 def read_meta(folder: Path) -> ResultMeta:

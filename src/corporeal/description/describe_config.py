@@ -1,10 +1,9 @@
 """Who is asked what is in a scene, and how."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-from corporeal.core import store
 from corporeal.core.errors import check_range
 from corporeal.core.setting_types import ReadsPath, WritesPath
 
@@ -38,7 +37,7 @@ class DescribeConfig:
     direct: bool = True
     """Also ask a model, without the library, what is printed on each object and what it weighs.
     This reweights the ways it may be, and sets no value."""
-    answers: int = field(default=1, metadata=store.ADDED_LATER)
+    answers: int = 1
     """Number of answers to each question about materials, values and mass (self-consistency). What
     an object may weigh is pooled over them, each with the same weight; parts are asked for once."""
     parallel: int = 4

@@ -37,7 +37,6 @@ from corporeal.io.scene_toml import read_scene_file, write_scene_file
 from corporeal.pipeline.results import RUN_FILES, StageResults
 from corporeal.pipeline.settings.ground_config import GroundConfig
 from corporeal.pipeline.settings.settings import Settings
-from corporeal.pipeline.settings.simulate_config import SimulateConfig, settings_for_key
 from corporeal.recognition.readable_names import safe_name
 
 Progress = Callable[[float, str], None]
@@ -321,9 +320,8 @@ class _Run:
     def _do(self, verb: str) -> None:
         config = getattr(self.settings, verb, None)
         before = [self.key] if self.key else [store.path_digest(p) for p in self._files()]
-        named = settings_for_key(config) if isinstance(config, SimulateConfig) else config
         self.key = store.result_key(
-            verb, named, before + digests_of_named_files(config) + self._borrowed(verb)
+            verb, config, before + digests_of_named_files(config) + self._borrowed(verb)
         )
         folder = self.folder / STAGE_FOLDERS[verb]
         step = getattr(self, f"_{verb}")

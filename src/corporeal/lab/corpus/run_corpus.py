@@ -16,7 +16,6 @@ from corporeal.jobs.job_manifest import ManifestRow
 from corporeal.lab.corpus.corpus_plan import CorpusPlan, PlannedScene, read_plan
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
-from corporeal.pipeline.settings.simulate_config import settings_for_key
 from corporeal.showcase.showcase_scenes import view_direction
 
 SCENES_FOLDER, RUNS_FOLDER = "scenes", "runs"
@@ -92,12 +91,11 @@ def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[s
     path = folder / SCENES_FOLDER / scene.name
     made = store.read_meta(path).key
     asked = replace(settings, describe=replace(settings.describe, record=None))
-    named = {**store.settings_for_key(asked), "simulate": settings_for_key(settings.simulate)}
     return Job(
         name=scene.name,
         function=run_scene,
         folder=folder / RUNS_FOLDER / scene.name,
-        key=store.result_key("corpus run", named, [made, *read]),
+        key=store.result_key("corpus run", asked, [made, *read]),
         arguments={"scene": (path / SCENE_TOML_FILE).resolve(), "settings": settings},
         resumable=True,
     )

@@ -1,9 +1,8 @@
 """How files become a scene: what a person may ask."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
-from corporeal.core import store
 from corporeal.core.errors import check_range
 from corporeal.io.length_units import LengthUnit
 
@@ -20,9 +19,9 @@ class AssembleConfig:
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
     """Raise each object above what it stands on by this many times its own size."""
-    lift: tuple[str, ...] = field(default=(), metadata=store.ADDED_LATER)
+    lift: tuple[str, ...] = ()
     """Raise an object above where it stands, such as "duck=0.5" [m]."""
-    velocity: tuple[str, ...] = field(default=(), metadata=store.ADDED_LATER)
+    velocity: tuple[str, ...] = ()
     """An object's initial velocity, such as "duck=1,0,-2" [m/s]."""
     extent: tuple[str, ...] = ()
     """Largest real extent of an object, such as "duck=0.1" [m]."""

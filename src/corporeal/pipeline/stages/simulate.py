@@ -21,7 +21,7 @@ from corporeal.core.version import __version__
 from corporeal.discretization.build_model import ModelMapping, build_model, standing_objects
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import ENGINES, Engine, Problem
-from corporeal.pipeline.settings.simulate_config import SimulateConfig, settings_for_key, validate
+from corporeal.pipeline.settings.simulate_config import SimulateConfig, validate
 from corporeal.simulation.audit import audit
 from corporeal.simulation.audit_file import write_audit
 from corporeal.simulation.checkpoint import Checkpoints, fingerprint
@@ -89,7 +89,7 @@ def simulate(
     lying = bodies_to_relax(scene, particles, posed)
     if lying:
         posed = replace(posed, problem=replace(posed.problem, gravity_ramp=0.0))
-    name = fingerprint(__version__, posed.problem, settings_for_key(config), times, lying)
+    name = fingerprint(__version__, posed.problem, store.to_plain(config), times, lying)
     with store.disk_errors(folder):
         kept, slept = Checkpoints(folder, name), Checkpoints(folder / "settling", name)
         relax = partial(relax_to_equilibrium, scene, posed, lying, build, slept, progress)

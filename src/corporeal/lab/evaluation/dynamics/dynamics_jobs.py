@@ -15,7 +15,6 @@ from corporeal.lab.evaluation.dynamics.dynamics_folders import (
 from corporeal.lab.evaluation.dynamics.run_measures import measure_run, write_run_measures
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
-from corporeal.pipeline.settings.simulate_config import settings_for_key
 
 ORPHAN_WAIT_S = 60.0
 """Longest wait for the process of an earlier call that was killed to be gone [s]."""
@@ -63,12 +62,11 @@ def _job(scene: EvaluatedScene, folder: Path, settings: Settings) -> Job:
     configs = [getattr(settings, f.name) for f in fields(Settings)]
     read = [name for config in configs for name in run_pipeline.digests_of_named_files(config)]
     asked = replace(settings, describe=replace(settings.describe, record=None))
-    named = {**store.settings_for_key(asked), "simulate": settings_for_key(settings.simulate)}
     return Job(
         name=f"{scene.name}.{folder.name}",
         function=run_and_measure,
         folder=folder,
-        key=store.result_key("dynamics", named, [store.path_digest(scene.path), *read]),
+        key=store.result_key("dynamics", asked, [store.path_digest(scene.path), *read]),
         arguments={"scene": scene.path.resolve(), "settings": settings},
         resumable=True,
     )
