@@ -6,13 +6,15 @@ from typing import Any, Literal
 
 from corporeal.core import registry, store
 from corporeal.core.errors import UserError
+from corporeal.mpm.engines import DEFAULT_ENGINE, engine_class, require_of_class
+from corporeal.mpm.problem import BodySplittingEngine, InteractiveEngine
 
 
 @dataclass(frozen=True)
 class SimulateConfig:
     """Solver settings; none of them changes material numbers."""
 
-    engine: Literal["cpu", "cuda", "reference", "warp"] = "cpu"
+    engine: Literal["cpu", "cuda", "reference", "warp"] = DEFAULT_ENGINE
     """cpu: the fast engine; cuda: the same on a CUDA card; reference: NumPy in double precision,
     slow, which the others are tested against; warp: the former name of cpu."""
     contact: Literal["multi", "single"] = "multi"
@@ -40,11 +42,11 @@ def settings_for_key(config: SimulateConfig) -> dict[str, Any]:
 
 def validate(config: SimulateConfig) -> None:
     """Raise UserError where there is no engine as asked for, whatever the scene."""
-    if config.breaking and (config.engine, config.contact) != ("cpu", "multi"):
-        raise UserError(
-            "--breaking works with the engine cpu and with contact multi alone. Leave out "
-            "--engine and --contact."
-        )
+    if config.breaking:
+        for capability in (InteractiveEngine, BodySplittingEngine):
+            require_of_class(engine_class(config.engine), capability)
+        if config.contact != "multi":
+            raise UserError("--breaking works with contact multi alone. Leave out --contact.")
     if config.engine == "cuda":
         registry.load_backend(
             "engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:require_device"}
