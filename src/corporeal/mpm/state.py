@@ -370,6 +370,34 @@ class State:
         found["branch_volume"] = np.where(fresh[:, None], 0.0, self.branch_volume)
         return replace(self, **found).follow_rigid(matter)
 
+    def continuing(
+        self,
+        before: tuple[ParticleConstants, "State"],
+        matter: ParticleConstants,
+        whole: Collection[int],
+    ) -> "State":
+        """Return this state with whole bodies, and the time, as they were in another problem.
+
+        Args:
+            before: The other problem's matter and state, in which these bodies have their numbers.
+            matter: Of this one.
+            whole: Bodies that are the same in both.
+
+        """
+        then, there = before
+        mine, body = self._of(matter, whole)
+        theirs, their_body = there._of(then, whole)
+        found = {"time": there.time}
+        for name in vars(self).keys() - found.keys():
+            here, chosen, taken = np.array(getattr(self, name)), mine, theirs
+            if name in ("centre", "speed", "spin_momentum", "rotation"):
+                chosen, taken = body, their_body
+            elif name in ("branch_strain", "branch_volume"):
+                chosen, taken = mine[matter.relaxing], theirs[then.relaxing]
+            here[chosen] = getattr(there, name)[taken]
+            found[name] = here
+        return replace(self, **found)
+
     def _of(
         self, matter: ParticleConstants, bodies: Collection[int]
     ) -> tuple[np.ndarray, np.ndarray]:

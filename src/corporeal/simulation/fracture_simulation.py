@@ -15,9 +15,9 @@ from corporeal.core.types import FractureEvent, Surface
 from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import Snapshot
-from corporeal.mpm.split_body import BodySplit, ParentMap, can_split, split_problem
+from corporeal.mpm.engines import require
+from corporeal.mpm.problem import BodySplittingEngine, Engine, InteractiveEngine, Snapshot, Split
+from corporeal.mpm.split_body import can_split
 from corporeal.simulation.fracture_prediction import (
     BrittleImpact,
     encloses_cavity,
@@ -39,9 +39,8 @@ class FracturedRun:
     """A thing that has just broken."""
 
     stage: FractureState
-    engine: CpuEngine
+    engine: Engine
     breaks: tuple[FractureEvent, ...]
-    heirs: ParentMap
 
 
 def next_breaking_impact(
@@ -79,7 +78,7 @@ def next_breaking_impact(
 
 
 def fracture_body(
-    stage: FractureState, engine: CpuEngine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
+    stage: FractureState, engine: Engine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
 ) -> FracturedRun | None:
     """Make pieces of what a blow is about to strike; None: it cannot be cut, and stays whole.
 
@@ -88,6 +87,9 @@ def fracture_body(
         engine: At an instant before the blow; goes on to just before it.
         blow: Which.
         breaks: What broke before.
+
+    Raises:
+        UserError: The engine cannot break bodies.
 
     """
     owner = stage.posed.object_of_body
@@ -106,10 +108,8 @@ def fracture_body(
     _take_energy(engine, stage, blow)
     one = _break(blow, pieces)
     split = _split(stage, engine, body, one)
-    heirs, problem = ParentMap.of(engine.problem, split), split_problem(engine.problem, split)
-    after = CpuEngine(problem, engine.threads)
-    after.inherit(engine.save(), heirs)
-    return FracturedRun(stage.with_pieces(one, split, problem, now), after, (*breaks, one), heirs)
+    after = require(engine, BodySplittingEngine).with_split_body(split)
+    return FracturedRun(stage.with_pieces(one, split, after.problem, now), after, (*breaks, one))
 
 
 # ---------------------------------------------------------------- the pieces
@@ -166,7 +166,7 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
     )
 
 
-def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -> None:
+def _take_energy(engine: Engine, stage: FractureState, blow: BrittleImpact) -> None:
     """Slow the blow down by what the wall bears until it breaks; a body it strikes is pushed back.
 
     J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
@@ -179,10 +179,10 @@ def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -
         if number is not None and stage.scene.objects[number].path is None:
             body = int(np.flatnonzero(stage.posed.object_of_body == number)[0])
             a, b, c = (sign * impulse).tolist()
-            engine.apply_impulse(body, (x, y, z), (a, b, c))
+            require(engine, InteractiveEngine).apply_impulse(body, (x, y, z), (a, b, c))
 
 
-def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEvent) -> BodySplit:
+def _split(stage: FractureState, engine: Engine, body: int, one: FractureEvent) -> Split:
     """Say where the pieces are and how they move."""
     now, mine = engine.snapshot(), stage.rows(body)
     start = stage.particles.position[stage.particles.object == one.object].astype(float)
@@ -194,4 +194,4 @@ def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEven
     for mesh, count in zip(meshes, np.ceil(PIECE_CONTACT_POINTS * area / area.sum()), strict=True):
         spread = np.concatenate([mesh.vertices, sample_surface(mesh, int(count), rng)[0]])
         points.append((spread - start.mean(axis=0)) @ turn.T + place)
-    return BodySplit(body, one.piece, now.position[mine], now.velocity[mine], tuple(points))
+    return Split(body, one.piece, now.position[mine], now.velocity[mine], tuple(points))

@@ -7,8 +7,7 @@ from jaxtyping import Float
 
 from corporeal.core.types import FractureEvent, MaterialField, Particles, Scene
 from corporeal.discretization.build_model import ModelMapping
-from corporeal.mpm.problem import Problem, Snapshot
-from corporeal.mpm.split_body import BodySplit
+from corporeal.mpm.problem import Problem, Snapshot, Split
 from corporeal.scene.fractured_scene import (
     fractured_field,
     fractured_particles,
@@ -43,7 +42,7 @@ class FractureState:
         return slice(first, first + counts[body])
 
     def with_pieces(
-        self, one: FractureEvent, split: BodySplit, problem: Problem, now: Snapshot
+        self, one: FractureEvent, split: Split, problem: Problem, now: Snapshot
     ) -> "FractureState":
         """Return the stage with the pieces of a body as objects.
 

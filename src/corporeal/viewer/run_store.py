@@ -11,6 +11,7 @@ from corporeal.core.audit_data import RunAudit
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
 from corporeal.discretization.discretization_plan import DetailLevel
+from corporeal.mpm.engines import DEFAULT_ENGINE
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import RUN_FILE, STAGE_FOLDERS, read_run, read_run_request
 from corporeal.pipeline.stages.ground import DEFAULT_CONFIG, GroundConfig
@@ -48,6 +49,8 @@ class LiveInput:
     """With which it was filled."""
     ground: GroundConfig = DEFAULT_CONFIG
     """From which its materials came."""
+    engine: str = DEFAULT_ENGINE
+    """Which simulates it."""
 
 
 class RunStore:
@@ -107,7 +110,8 @@ class RunStore:
 
         """
         settings = read_run_request(self.path(name)).settings
-        return LiveInput(self.open(name).made, settings.fill.detail, settings.ground)
+        made, engine = self.open(name).made, settings.simulate.engine
+        return LiveInput(made, settings.fill.detail, settings.ground, engine)
 
     def asked(self, name: str) -> dict[str, Any]:
         """Say how a run was asked to begin: detail, drop; lift and velocity of every object."""

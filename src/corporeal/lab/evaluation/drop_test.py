@@ -6,8 +6,9 @@ import numpy as np
 
 from corporeal.core.types import GRAVITY_M_S2, Scene
 from corporeal.lab.evaluation.rebound_data import MeasuredRebound
+from corporeal.mpm.engines import build_engine
 from corporeal.mpm.problem import Diagnostics, Engine
-from corporeal.pipeline.in_memory import build_engine, pose_problem, prepare_scene
+from corporeal.pipeline.in_memory import pose_problem, prepare_scene
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.scene.scene_building import ball, box, build_scene
 

@@ -47,12 +47,15 @@ STEP_STATE_ARRAYS = (
 class CudaEngine(EngineInteraction):
     """Steps one problem on a CUDA card."""
 
-    def __init__(self, problem: Problem, device: str = "cuda") -> None:
+    name = "cuda"
+
+    def __init__(self, problem: Problem, device: str = "cuda", threads: int | None = None) -> None:
         """Lay out memory.
 
         Args:
             problem: What to simulate.
             device: A Warp device: "cuda", "cuda:1", …; "cpu" for tests.
+            threads: As every engine takes them; the host uses one.
 
         Raises:
             UserError: There is no such card, or the problem asks for what only other engines do.
