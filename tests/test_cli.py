@@ -94,7 +94,7 @@ def test_the_package_runs_as_a_module():
 
 
 def test_an_unknown_verb_shows_the_menu(typed):
-    refused(typed("simulat"), "Unknown verb", "simulate")
+    refused(typed("simulat"), "Unknown command", "simulate")
 
 
 def test_a_missing_file_is_named(typed):

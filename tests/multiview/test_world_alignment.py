@@ -117,7 +117,7 @@ def test_a_file_with_y_up_that_should_have_z_up_is_noticed(rng):
         z_up=True,
     )
     assert off(found, made)[0] < 0.1
-    assert any("90° from it. The cameras were believed" in w for w in found.warnings)
+    assert any("90° from it. The cameras were used" in w for w in found.warnings)
 
 
 def test_cameras_that_were_held_upright_do_not_count(rng):

@@ -363,7 +363,7 @@ def test_a_model_that_contradicts_what_the_file_states_is_believed_and_told_once
     assert inventory.warnings == (
         "duck_0: the file states a wall 2 mm thick for body, the model said a wall 0.4 mm thick; "
         "the file states soft_PVC, a wall 2 mm thick for beak, the model said ABS, solid. "
-        "The latter was believed; --annotations decides.",
+        "The latter was used; --annotations decides.",
     )
     block = ("block_0", [("block", plain(), {"substance": "wood", "shell_thickness_m": 0.0})])
     oracle = Oracle(parts=whole("block"), materials=made_of(part("block", "wood", "hollow")))

@@ -107,7 +107,7 @@ def test_a_model_that_differs_from_the_table_is_believed_and_told():
     assert sizes.usual["couch"].usual == 0.5
     (warning,) = sizes.warnings
     assert ", 50 cm is usual for objects like this: couch; the table" in warning
-    assert "knows 1 m to 4 m. The former was believed." in warning
+    assert "knows 1 m to 4 m. The former was used." in warning
 
 
 # ---------------------------------------------------------------- what is no answer

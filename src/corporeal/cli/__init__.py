@@ -1,4 +1,4 @@
-"""Command line: every verb."""
+"""Command line: every stage."""
 
 import os
 import sys
@@ -56,11 +56,11 @@ class RunFolder:
 
 
 def command_run() -> None:
-    """Run all verbs on a scene: from files to a film and a report.
+    """Run all stages on a scene: from files to a video and a report.
 
     SCENE is a model (GLB, glTF, OBJ, PLY, STL, OFF, 3MF, DAE, USD), several of them (each one
     object), or a scene.toml; or a folder of photographs, with poses (transforms.json, COLMAP,
-    3 x 4 matrices) or without, a film, or a trained Gaussian splat.
+    3 x 4 matrices) or without, a video, or a trained Gaussian splat.
     Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
     Results that are up to date are reused.
     """
@@ -112,7 +112,7 @@ def command_demo() -> None:
 
 
 def command_status() -> None:
-    """Show which verbs of a run are finished, and the time that each took."""
+    """Show which stages of a run are finished, and the time that each took."""
     from corporeal.pipeline.run_pipeline import stage_states
 
     @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def _redo_command(verb: str) -> Callable[[], None]:
                     {"__annotations__": {"run": Folder, "config": type(config)}, "config": config},
                 )
             )
-        words = f"Redo `{verb}` of a run with other settings, and all verbs after it."
+        words = f"Redo `{verb}` of a run with other settings, and all stages after it."
         asked = parse(shape, verb, words, first=FIRST_OPTIONS.get(verb, ()))
         before = read_run_request(asked.run)
         settings = before.settings
@@ -274,7 +274,7 @@ FIRST_OPTIONS = {
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
     "film": ("quality", "width", "height", "speed", "view", "colour-by"),
 }
-"""Options of a verb that come first in its help; of few options all do."""
+"""Options of a stage that come first in its help; of few options all do."""
 REDO_COMMANDS = (
     "reconstruct",
     "assemble",
@@ -290,7 +290,7 @@ COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
 COMMANDS |= {"assemble": command_assemble, "simulate": command_simulate}
 
 
-# ---------------------------------------------------------------- how a verb is done
+# ---------------------------------------------------------------- how a stage is done
 
 
 def _folder(where: RunFolder, inputs: list[Path]) -> Path:
@@ -312,7 +312,7 @@ def _run_stages(
     until: str = "report",
     again: bool = False,
 ) -> None:
-    """Do every verb up to ``until``, that one ``again`` even where its settings are the same."""
+    """Do every stage up to ``until``, that one ``again`` even where its settings are the same."""
     from corporeal.cli.validate_settings import validate_settings
     from corporeal.pipeline.run_pipeline import delete_simulation, invalidate_stage, run
 
@@ -343,14 +343,14 @@ def _usage() -> str:
 
 
 def main() -> None:
-    """Do the verb a person typed; their mistake prints one line and exits with code 2."""
+    """Do the stage a person typed; their mistake prints one line and exits with code 2."""
     verb = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if verb in ("--help", "-h", "help"):
         print(_usage())
     elif verb == "--version":
         print(__version__)
     elif verb not in COMMANDS:
-        sys.exit(_report_error(f"Unknown verb {verb!r}. Choose one of: {', '.join(COMMANDS)}."))
+        sys.exit(_report_error(f"Unknown command {verb!r}. Choose one of: {', '.join(COMMANDS)}."))
     else:
         sys.exit(_run_command(COMMANDS[verb]))
 

@@ -30,7 +30,7 @@ class WorkerOptions:
     """Of a running Ray cluster, "auto" for the one of this machine; by default one is started
     here and ended again. The corpus must lie where every machine sees it."""
     gpus: float = 0.0
-    """Share of a graphics card that each scene takes on Ray."""
+    """Share of a GPU that each scene takes on Ray."""
 
 
 def command_corpus() -> None:
@@ -88,7 +88,7 @@ def _assemble() -> None:
 
 
 def _run() -> None:
-    """Run every scene of a corpus to its film and report, several at a time.
+    """Run every scene of a corpus to its video and report, several at a time.
 
         corporeal corpus run corpus/ --detail draft --workers 4
 

@@ -17,7 +17,7 @@ LIBRARY_USES = {
     "embreex": "films and pictures",
     "igl": "filling of meshes",
     "DracoPy": "Draco files",
-    "pycolmap": "photographs without poses, and films",
+    "pycolmap": "photographs without poses, and videos",
     "pxr": "meshes in USD",
     "lxml": "meshes in 3MF and DAE",
     "collada": "meshes in DAE",
@@ -61,7 +61,7 @@ def _machine() -> list[CheckResult]:
 
 
 def _cores(used: int, all_of_them: int) -> str:
-    """Say how many cores are used, and of how many where that is fewer than there are."""
+    """Return how many cores are used, and of how many where that is fewer than there are."""
     said = f"{used} core{'s' * (used != 1)}"
     return said if used >= all_of_them else f"{said} of the {all_of_them} that the machine has"
 
@@ -73,7 +73,7 @@ def _engines() -> list[CheckResult]:
         cards = [_gpu(device) for device in wp.get_cuda_devices()]
     except Exception as error:  # whatever is broken in a native library belongs in the table
         return [CheckResult("cpu engine", False, str(error), "Reinstall: pip install warp-lang.")]
-    gpu = ", ".join(cards) or "no CUDA card: simulations run on the processor"
+    gpu = ", ".join(cards) or "no CUDA GPU: simulations run on the processor"
     use = "Simulate on it with --engine cuda." if cards else "Not needed."
     return [
         CheckResult("cpu engine", True, f"Warp {version('warp-lang')}, on the processor"),
@@ -104,8 +104,8 @@ def _encoder() -> list[CheckResult]:
 
         path = imageio_ffmpeg.get_ffmpeg_version()
     except Exception as error:  # as above
-        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
-    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for films")]
+        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")]
+    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for videos")]
 
 
 def _keys() -> list[CheckResult]:

@@ -1,4 +1,4 @@
-"""The order of a verb's options in its help: what most people need first, all others under "more".
+"""The order of a stage's options in its help: what most people need first, all others under "more".
 
 Settings are nested dataclasses, each with a heading of its own. Here their fields are dealt out to
 flat dataclasses, one for each heading of the help, and what was typed is put together again.

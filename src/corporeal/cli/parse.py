@@ -20,7 +20,7 @@ def parse(
         kind: A dataclass.
         verb: What was typed after the program's name ("run", "assets list").
         description: For the help.
-        words: How many words of the command line the verb takes up.
+        words: How many words of the command line the stage takes up.
         first: Options that come first in the help, six at most; all others stand under "more".
 
     """

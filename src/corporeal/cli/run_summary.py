@@ -23,7 +23,7 @@ MAX_PART_ROWS = 12
 MAX_SENTENCES_PER_SECTION = 5
 """Sentences of a section that are printed whole."""
 MAX_LISTED_IMPACTS = 3
-"""Blows that may break something and are printed."""
+"""Impacts that may break something and are printed."""
 TABLE_HEADS = ("object", "part", "material", "mass", "simulated as")
 
 
@@ -40,7 +40,7 @@ def show_summary(folder: Path) -> None:
 
 
 def _breakage_sentences(found: Sequence[PredictedBreakage]) -> None:
-    """Say what the film shows whole although it would break, and how to see it break."""
+    """Describe what the video shows whole although it would break, and how to see it break."""
     doubted = [b for b in found if b.word != "holds" and not b.pieces]
     for blow in doubted[:MAX_LISTED_IMPACTS]:
         _say("hint", breakage_message(blow))

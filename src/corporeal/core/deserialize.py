@@ -2,7 +2,7 @@
 
 The inverse of ``store.plain``: what was written to a file is read by the names of fields, not by
 strings. Keys that no field has are ignored, so that a reader declares only what it needs, and a
-field with a default may be absent, as in tables that are written by hand.
+field with a default may be absent, as in tables that are written manually.
 """
 
 from collections.abc import Mapping

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 Progress = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 
 
 def subprogress(progress: Progress, begin: float, end: float, what: str = "") -> Progress:

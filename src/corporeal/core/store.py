@@ -351,7 +351,7 @@ def path_digest(path: Path) -> str:
 
 
 def cache_folder(kind: str) -> Path:
-    """Return where things of a kind are kept for all runs: as ``CACHE_VARIABLE`` says, or the system's."""
+    """Return where objects of a kind are kept for all runs: as ``CACHE_VARIABLE`` says, or the system's."""
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen).expanduser() / kind

@@ -99,7 +99,7 @@ def parts_from_file(
 
 
 def open_ware_notes(objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
-    """Say of which objects from pictures the name decided that they are no solids."""
+    """State which objects from pictures the name decided that they are no solids."""
     made = [
         (o.name, p) for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN_WARE_MARK
     ]
@@ -112,7 +112,7 @@ def open_ware_notes(objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
 
 
 def _wall_text(part: PartDescription) -> str:
-    """Say how thick the wall of open ware is taken to be, and why."""
+    """Return how thick the wall of open ware is taken to be, and why."""
     if part.thickness is None or not part.wall_usual:
         return "as thick as such walls usually are"
     why = f" ({part.wall_why})" if part.wall_why else ""

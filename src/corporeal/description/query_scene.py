@@ -127,7 +127,7 @@ class SceneQuery:
         return Inventory(tuple(objects), rows, sum_usage(rows), (*warnings, *doubts))
 
     def _contradicted(self, number: int, words: ObjectDescription) -> str:
-        """Say where a model was believed before what the file states of an object outright."""
+        """Return where a model was used before what the file states of an object outright."""
         believed, clauses = {w.name: w for w in words.parts}, []
         for k, entry in enumerate(self.identity.catalogue):
             if entry.object == number:
@@ -142,7 +142,7 @@ class SceneQuery:
         if not against_file:
             return ""
         return Note(
-            f"{words.name}: {against_file}. The latter was believed; --annotations decides.",
+            f"{words.name}: {against_file}. The latter was used; --annotations decides.",
             NoteKind.ASSUMED,
         )
 

@@ -61,7 +61,7 @@ def _ask_unless_pending(ask: Callable, waiting: list[PendingQuestionsError]):
 
 
 def _is_complete(rows: Sequence[Mapping]) -> bool:
-    """Tell whether every question was answered, if only one of the times that it was put."""
+    """Return whether every question was answered, if only one of the times that it was put."""
     answered = {row["task"] for row in rows if row["answer"] is not None}
     return all(row["task"] in answered for row in rows)
 

@@ -2,8 +2,8 @@
 
 What a displacement is forced on has its shape at any stiffness, and only the force is as wrong as
 its stiffness. So a part that the step budget softens stays deformable, and the factor is said. What
-would be softened out of all proportion is hard: in life it would stop, or break, what presses it,
-which prescribed motion cannot do. It is rigid, at the cost of a rigid one, and that is said.
+would be softened out of all proportion is hard: in reality it would stop, or break, what presses
+it, which prescribed motion cannot do. It is rigid, at the cost of a rigid one, and that is said.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ def too_stiff_to_compress(
     unslowed: Sequence[Discretization],
     slowed: Sequence[Discretization],
 ) -> dict[int, str]:
-    """Say which part that is deformable only since it is pressed is too stiff for that, and why.
+    """Return which part that is deformable only since it is pressed is too stiff for that, and why.
 
     Only the stiffest: without it, the step budget may leave the others as they are.
 
@@ -54,7 +54,7 @@ def too_stiff_to_compress(
 
 
 def _only_soft_by_compression(verdict: RigidityVerdict) -> bool:
-    """Tell whether a part would be rigid if nothing pressed it."""
+    """Return whether a part would be rigid if nothing pressed it."""
     return not verdict.rigid and verdict.pressed >= MAX_INVISIBLE_STRAIN > max(
         verdict.weight, verdict.impact
     )
@@ -87,7 +87,8 @@ def warn_of_wrong_compression(
             )
         elif share < MIN_RIGHT_FORCE_STIFFNESS_RATIO:
             told.append(
-                f"{name} is pressed by what moves as told and simulated {1 / share:.2g} times "
+                f"{name} is pressed by what follows a prescribed path and simulated "
+                f"{1 / share:.2g} times "
                 "softer than it is: the force that it presses back with is about so much too "
                 "small. A finer detail has a larger step budget."
             )

@@ -37,7 +37,7 @@ THICKNESS_PERCENTILES = (10, 25, 50)
 
 @dataclass(frozen=True)
 class ThinScan:
-    """A scan of something thin: how coarse it is, and how thick it draws the thing."""
+    """A scan of something thin: how coarse it is, and how thick it draws the object."""
 
     edge: float
     """Median edge [m]."""
@@ -92,7 +92,7 @@ def mean_drawn_thickness(surfaces: Sequence[TriangleSurface], scale: float = 1.0
 
 
 def is_drawn_as_lump(surfaces: Sequence[TriangleSurface], wall: float, scale: float = 1.0) -> bool:
-    """Tell whether a vessel is drawn as a lump: far thicker than its wall, and with no room.
+    """Return whether a vessel is drawn as a lump: far thicker than its wall, and with no room.
 
     Args:
         surfaces: All of the object's, upright.

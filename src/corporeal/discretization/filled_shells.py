@@ -89,7 +89,7 @@ def judge_filled_shell(
     motion: ExpectedMotion,
     judge: Callable[[PartGeometry, ExpectedMotion], RigidityVerdict],
 ) -> RigidityVerdict:
-    """Say whether wall and contents move as one rigid body, and why."""
+    """Return whether wall and contents move as one rigid body, and why."""
     structure, inner = part.structure, part.structure.contents
     assert inner is not None
     if structure.inflated:

@@ -101,7 +101,7 @@ def weigh_bulk_foliage(
         anatomy: The plant.
         member: The part.
         field: What it is made of.
-        tissue: What leaves are made of, as thick as in life.
+        tissue: What leaves are made of, as thick as in reality.
         scale: Scene size over real size.
 
     """

@@ -1,4 +1,4 @@
-"""How deep a blow dents a ball that strikes a rigid plane, by what resists it."""
+"""How deep an impact dents a ball that strikes a rigid plane, by what resists it."""
 
 from math import pi, sqrt
 

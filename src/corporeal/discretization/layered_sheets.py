@@ -1,4 +1,4 @@
-"""Which bodies are sheets that a blow presses across their layers, and which are balls to them."""
+"""Which bodies are sheets that an impact presses across their layers, and which are balls to them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -79,13 +79,13 @@ def layered_restitution_law(
     speed: float,
     packed: float,
 ) -> RestitutionLaw | None:
-    """Say how a ball rebounds from a sheet of layers that it strikes; None: they are none.
+    """Return how a ball rebounds from a sheet of layers that it strikes; None: they are none.
 
     Args:
         field: What parts are made of.
         shapes: By their numbers.
         pair: Numbers of two parts.
-        speed: Of their blow [m/s].
+        speed: Of their impact [m/s].
         packed: Restitution of both without their layers [-].
 
     """

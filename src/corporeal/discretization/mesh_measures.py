@@ -62,7 +62,9 @@ class MeasuredPart:
     whole: QueryMesh | None = None
     """All that encloses something, of the object."""
     drawn: Mesh | None = None
-    """The surface of loose matter that fills what holds it (``bed``); None: ``body`` is drawn."""
+    """The surface of granular material that fills what holds it (``bed``); None: ``body`` is
+    drawn.
+    """
     holder: int = -1
     """The part that it fills; -1: none."""
     measured: float = 0.0

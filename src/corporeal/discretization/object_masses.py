@@ -75,7 +75,7 @@ def scale_to_stated_masses(
 def warn_of_implausible_masses(
     scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
 ) -> list[str]:
-    """Say which objects are too heavy or too light for the room that they take.
+    """Return which objects are too heavy or too light for the room that they take.
 
     Args:
         scene: The objects, with what they are.
@@ -98,7 +98,7 @@ def warn_of_implausible_masses(
 def warn_of_masses_not_as_named(
     scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
 ) -> list[str]:
-    """Say which objects do not weigh what their names say ("dumbbell_5kg").
+    """Return which objects do not weigh what their names say ("dumbbell_5kg").
 
     Args:
         scene: The objects, with what they are called.
@@ -119,7 +119,7 @@ def warn_of_masses_not_as_named(
 
 
 def _real_lengths(sides: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
-    """Return lengths in the scene as they are in life [m]."""
+    """Return lengths in the scene as they are in reality [m]."""
     a, b, c = sides
     return a / scale, b / scale, c / scale
 
@@ -130,7 +130,7 @@ def warn_of_thick_walls(
     makes: Mapping[int, PartModel],
     field: MaterialField,
 ) -> list[str]:
-    """Say which walls weigh too much, because nobody but the mesh said how thick they are.
+    """Return which walls weigh too much, because nobody but the mesh said how thick they are.
 
     Artists draw walls as thick as looks well: a bin of polypropylene had 9 mm. What comes in sheets
     and is a block, because nobody said that it covers something, is said, too.
@@ -153,7 +153,7 @@ def warn_of_thick_walls(
 def _thick_wall_text(
     obj: SceneObject, made: PartModel, words: PartDescription, material: Material
 ) -> str:
-    """Say that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
+    """State that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
     ground = material.grounds.get("shell_thickness")
     if ground is None or words.answered_by not in UNSEEN_MATERIAL_SOURCES:
         return ""
@@ -176,7 +176,7 @@ def _thick_wall_text(
 def _thick_block_text(
     obj: SceneObject, made: PartModel, words: PartDescription, thickest: float
 ) -> str:
-    """Say that what comes in sheets is a block; "": it may be some sheets on one another."""
+    """State that what comes in sheets is a block; "": it may be some sheets on one another."""
     through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
     if through <= MAX_PLAUSIBLE_SHEET_LAYERS * thickest:
         return ""

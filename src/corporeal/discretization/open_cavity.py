@@ -19,7 +19,7 @@ def is_below_rim(
 ) -> Bool[np.ndarray, " N"]:
     """Whether a level liquid could reach each point without running over the rim.
 
-    That is outside the matter with faces below and, but for one crack, all around.
+    That is outside the material with faces below and, but for one crack, all around.
 
     Args:
         matter: What no liquid is in; None: only sheets.

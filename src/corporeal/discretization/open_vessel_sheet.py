@@ -76,7 +76,7 @@ def find_vessel_outside(shape: QueryMesh, part: Mesh, rng: np.random.Generator) 
 def _openness(
     shape: QueryMesh, points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-    """Say how much of the open places see below their own height, and in all, of half a sphere."""
+    """Return how much of the open places see below their own height, and in all, of half a sphere."""
     start = points + 1e-5 * shape.mesh.extent * normals
     below, seen = np.zeros(len(points)), np.zeros(len(points))
     for direction in sphere_directions(LOOK_DIRECTIONS_COUNT):
@@ -111,7 +111,7 @@ def _normal_evenness(
 def _is_beside_mouth(
     points: Float[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places lie outside of a mouth at the top, in plan; none if none is wide enough.
+    """Return which places lie outside of a mouth at the top, in plan; none if none is wide enough.
 
     What is wider at its foot than at its top is a cover: its top is no mouth.
     """

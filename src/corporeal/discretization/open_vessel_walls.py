@@ -23,7 +23,7 @@ from corporeal.recognition.parts_by_name import name_words as written
 
 @dataclass(frozen=True)
 class NamedObject:
-    """What a thing is called, and how large it is."""
+    """What an object is called, and how large it is."""
 
     names: Sequence[tuple[str, ...]]
     """Words of each."""
@@ -46,7 +46,7 @@ def with_usual_vessel_wall(words: PartDescription, called: NamedObject) -> PartD
 
     Args:
         words: Of a part.
-        called: The thing.
+        called: The object.
 
     """
     if words.thickness is not None and not words.wall_usual:
@@ -65,7 +65,7 @@ def usual_vessel_wall(material: str | None, called: NamedObject) -> OpenVesselWa
 
     Args:
         material: What it is of.
-        called: The thing.
+        called: The object.
 
     """
     if material is None:
@@ -116,7 +116,7 @@ def sheet_if_drawn_full(
 
 
 def _is_no_single_vessel(name: TokenisedName) -> bool:
-    """Tell whether a name is not that of one piece of ware that is open by what it is."""
+    """Return whether a name is not that of one piece of ware that is open by what it is."""
     tokens = name.words
     return (
         not names_open_vessel(tokens)

@@ -22,7 +22,7 @@ from corporeal.mpm.physics.time_step_limits import bounded_poisson, p_wave_speed
 
 
 def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdict:
-    """Say whether a part would yield or visibly flex.
+    """Return whether a part would yield or visibly flex.
 
     ε = max(v/c, ρ a L/E, tip shift of a cantilever / L, what prescribed motion presses it by) and
     v_y = σ_y/(ρ c); rigid when ε is below half a percent and v below v_y. A thin wall is judged by

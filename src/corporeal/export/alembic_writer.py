@@ -1,4 +1,4 @@
-"""A scene as Alembic: the vertices of every surface at every frame, for film and effects tools.
+"""A scene as Alembic: the vertices of every surface at every frame, for video and effects tools.
 
 Alembic says nothing of axes or sides; what everybody does is +Y up and faces clockwise seen from
 outside. Written with alembic3d, an unofficial build of PyAlembic under a name of its own.

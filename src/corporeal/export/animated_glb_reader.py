@@ -72,7 +72,7 @@ class AnimatedGlb:
 
 
 def read_animated_glb(path: Path) -> AnimatedGlb:
-    """Open a film.
+    """Open a video.
 
     Raises:
         BadFileError: It cannot be read.

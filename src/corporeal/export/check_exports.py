@@ -165,7 +165,7 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
 
 
 def check_glb(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Open the film as a viewer does, and pose it at every frame."""
+    """Open the video as a viewer does, and pose it at every frame."""
     motion, film = asked.motion, read_animated_glb(folder / "film.glb")
     if not motion.moves:
         return ReaderFindings()
@@ -216,7 +216,7 @@ def check_splats(folder: Path, asked: ExportRequest) -> ReaderFindings:
 
 
 def check_without_reader(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Say that there is no reader to ask."""
+    """State that there is no reader to ask."""
     return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is no package.",))
 
 

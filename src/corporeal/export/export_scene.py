@@ -37,7 +37,7 @@ ExportProgress = Callable[[float, str], None]
 
 
 def ignore_progress(fraction: float, words: str) -> None:
-    """Tell nobody about progress."""
+    """Ignore progress."""
 
 
 def export_scene(
@@ -57,7 +57,7 @@ def export_scene(
         out: Where the targets' folders and ``export.json`` go; None: SOURCE/export of a run or a
             corpus, NAME-export of a scene called NAME.
         config: The instant, what can deform, tolerances.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Returns:
         What was written, also kept in ``export.json``; of a corpus, of its data set.

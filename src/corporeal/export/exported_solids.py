@@ -23,7 +23,7 @@ class PartMaterial:
     object: int
     """Index into ``PhysicalScene.solids``."""
     material: Material
-    """As in life."""
+    """As in reality."""
     treatment: Discretization
     """As simulated."""
     provenance: dict[str, Any]
@@ -97,7 +97,7 @@ class ExportedSolid:
     surface_numbers: tuple[int, ...]
     """Of these surfaces in the scene."""
     pieces: tuple[ConvexCollider, ...] = ()
-    """Convex pieces of a rigid solid, which meet other things."""
+    """Convex pieces of a rigid solid, which meet other objects."""
     hull: ConvexCollider | None = None
     """Convex hull of a rigid solid, which meets floor and walls."""
     grains: MaterialPoints | None = None

@@ -14,7 +14,7 @@ def identifiers(titles: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     becomes ``thing``.
 
     Args:
-        titles: As people call things.
+        titles: As people call objects.
         taken: Identifiers that stand for something else.
 
     """

@@ -67,7 +67,7 @@ def material_points_prim(solid: ExportedSolid) -> UsdPrim:
 
 
 def tetrahedra_prim(solid: ExportedSolid, scene: PhysicalScene) -> UsdPrim:
-    """Return the same matter as a volume mesh."""
+    """Return the same material as a volume mesh."""
     mesh = tetrahedra_of(solid, scene.cell)
     prim = UsdPrim("TetMesh", "tetrahedra")
     prim.set("float3[]", "extent", usda_vectors(_box(mesh.points, 0.0)))

@@ -68,7 +68,8 @@ def _not_written(asked: ExportRequest, corners: int) -> list[str]:
         )
     if corners > PHYSX_GPU_MAX_CORNERS:
         sentences.append(
-            f"A convex collider has {corners} corners; PhysX on a card takes {PHYSX_GPU_MAX_CORNERS}: "
+            f"A convex collider has {corners} corners; PhysX on a GPU takes "
+            f"{PHYSX_GPU_MAX_CORNERS}: "
             f"--hull-vertices {PHYSX_GPU_MAX_CORNERS}."
         )
     return sentences

@@ -40,7 +40,7 @@ class UniformField:
     value: Mapping[str, float]
     """Field of ``types.Material`` → value, SI."""
     keeps_laws: bool
-    """Whether parts keep their laws and builds; else all is solid fixed-corotated matter."""
+    """Whether parts keep their laws and builds; else all is solid fixed-corotated material."""
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ class Executor:
     hire: WorkerPoolFactory
     """Opens the workers."""
     progress: ProgressCallback
-    """Told the fraction done."""
+    """Called with the fraction done."""
     say: EventCallback
     """Told what happens."""
 

@@ -18,7 +18,7 @@ from typing import Any, Literal, Protocol
 from corporeal.core import store
 
 ProgressCallback = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 PARTIAL_FOLDER_SUFFIX = ".part"
 
 

@@ -111,7 +111,7 @@ class LocalWorkerPool:
 
 
 def exit_reason(code: int) -> str:
-    """Say how a process ended that gave no reason itself."""
+    """Return how a process ended that gave no reason itself."""
     if code >= 0:
         return f"Its process ended with code {code} without a word."
     try:
@@ -153,7 +153,7 @@ def local_executor(
         folder: The corpus's; what the processes print goes to ``logs`` in it.
         slots: Scenes at the same time; 0: one per core and ``threads``.
         threads: Of each scene.
-        progress: Told the fraction done.
+        progress: Called with the fraction done.
         say: Told each event in a sentence.
 
     """

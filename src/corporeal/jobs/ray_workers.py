@@ -100,7 +100,7 @@ def ray_worker_pool(slots: int, threads: int, gpus: float, address: str) -> Iter
     Args:
         slots: How many jobs at the same time.
         threads: Processors of each.
-        gpus: Share of a graphics card that each takes.
+        gpus: Share of a GPU that each takes.
         address: Of a running cluster; empty: start one here, and end it again.
 
     Raises:

@@ -45,7 +45,7 @@ def part_materials(library_name: str = "default") -> list[str]:
 
 
 def content_materials(library_name: str = "default") -> list[str]:
-    """Names of what an object may be filled with: liquids, loose matter and soft stuffing."""
+    """Names of what an object may be filled with: liquids, granular material and soft stuffing."""
     return [e.name for e in library(library_name).values() if e.group in CONTENT_GROUPS]
 
 

@@ -43,7 +43,7 @@ MATERIAL_GROUPS = (
 )
 MATERIAL_GROUPS += ("food", "liquid", "bulk")
 LOSS_CHECKED_GROUPS = ("soft", "fibrous", "polymer", "elastomer", "foam", "food")
-"""Groups whose blows are lost in the bulk: loss and restitution tell of the same."""
+"""Groups whose impacts are lost in the bulk: loss and restitution tell of the same."""
 RESERVED_KEYS = ("extends", "sources")
 """Keys at the top of a user's library that are no materials."""
 RANGE_KEYS = ("low", "typical", "high", "source", "unusual", "note")
@@ -280,7 +280,7 @@ def _check_needs(found: _ProblemFinder, name: str, law: Law | None, fields: set[
 
 
 def _check_cell(found: _ProblemFinder, at: _NumberPlace, cell: Any, known: set[str]) -> bool:
-    """Tell what is wrong with the form of a cell; return whether its numbers can be read."""
+    """Return what is wrong with the form of a cell; return whether its numbers can be read."""
     form = "Write { low = 1, typical = 2, high = 3, source = 'key' }."
     if not isinstance(cell, dict):
         found.tell(at.table, at.key, f"is {cell!r}, not a range.", form)

@@ -64,7 +64,7 @@ def describe_material(name: str, library_name: str = "default") -> str:
 
 
 def _uses(entry: MaterialEntry) -> list[str]:
-    """Say how use or treatment narrows the ranges, as a model is offered them."""
+    """Return how use or treatment narrows the ranges, as a model is offered them."""
     rows = []
     for use in range_modifiers(entry.name):
         bands = [
@@ -141,7 +141,7 @@ def materials_json(
 
 
 def _mass_json(mixture: MassPosterior) -> dict:
-    """Say what an object may weigh, by each of several answers too where several were given."""
+    """Describe what an object may weigh, by each of several answers too where several were given."""
     row = asdict(mixture)
     return row if mixture.answers else {n: value for n, value in row.items() if n != "answers"}
 

@@ -153,7 +153,7 @@ def library_markdown() -> str:
 
 
 def _needs() -> str:
-    """Say what some laws cannot do without."""
+    """Describe what some laws cannot do without."""
     asked = {
         law.name.lower(): CONSTITUTIVE_LAWS[law].needs
         for law in Law
@@ -166,7 +166,7 @@ def _needs() -> str:
 
 
 def _counts() -> str:
-    """Say how well founded the numbers are."""
+    """Return how well founded the numbers are."""
     counts = {"read": 0, "recalled": 0, "ours": 0}
     for entry in library().values():
         for field in ("young", "poisson", "density", "yield_stress"):
@@ -209,7 +209,7 @@ def _cells(entry: MaterialEntry, fields: Sequence[str]) -> list[str]:
 
 
 def _notes() -> list[str]:
-    """Collect what else takes the energy of a blow, and of which materials."""
+    """Collect what else takes the energy of an impact, and of which materials."""
     names_of: dict[str, list[str]] = {}
     for entry in library().values():
         if "restitution" in entry.notes:

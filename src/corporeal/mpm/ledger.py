@@ -96,7 +96,7 @@ class EngineLedger:
             else:
                 self.pair_impulse[a, c] += size[mine].sum()
                 self.pair_impulse[c, a] = self.pair_impulse[a, c]
-            if not np.any(size[mine] > 0.0):  # a wall that only drags on a liquid is no blow
+            if not np.any(size[mine] > 0.0):  # a wall that only drags on a liquid is no impact
                 continue
             if np.isnan(self.first_contact[a, c]):
                 place = np.average(point[mine], axis=0, weights=size[mine])

@@ -133,7 +133,7 @@ class MaterialTable:
         return np.isin(self.law, laws.PLASTIC_LAWS)
 
     def numbers(self, row: Int[np.ndarray, " P"], dt: float) -> YieldParameters:
-        """Give what return maps read of the material of some particles, by their rows.
+        """Return what return maps read of the material of some particles, by their rows.
 
         Args:
             row: Of each particle.

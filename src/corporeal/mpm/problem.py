@@ -29,7 +29,7 @@ class WettedSurface:
     point: Float[np.ndarray, "N 3"]
     """[m]"""
     normal: Float[np.ndarray, "N 3"]
-    """Unit, out of the matter."""
+    """Unit, out of the material."""
 
 
 NO_WIND_FACES = WindFaces(np.zeros((0, 3)), np.zeros(0, np.int64))
@@ -168,9 +168,10 @@ class Problem:
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
     blows: Float[np.ndarray, "BW BW 5"] | None = None
-    """How e of every pair changes with the speed of a blow: at which it is ``restitution``
+    """How e of every pair changes with the speed of an impact: at which it is ``restitution``
     [m/s], slope [s/m], exponent [-], least and most: see ``physics.backing.bounce_at``. None: it is
-    the same at all speeds."""
+    the same at all speeds.
+    """
 
     @property
     def never_touch(self) -> tuple[tuple[int, int], ...]:

@@ -1,4 +1,4 @@
-"""Warp, started without its word on stderr that there is no graphics card."""
+"""Warp, started without its word on stderr that there is no GPU."""
 
 import os
 

@@ -41,7 +41,7 @@ class ParentMap:
 
     @classmethod
     def of(cls, problem: Problem, split: BodySplit) -> "ParentMap":
-        """Say who comes of whom."""
+        """Return who comes of whom."""
         body, more = problem.bodies[split.body], split.count - 1
         mass = np.bincount(split.piece, body.volume * body.density, split.count)
         share = np.ones(len(problem.bodies) + more)

@@ -20,7 +20,8 @@ MIN_EMPTYING_VIEWS = 2
 """Views whose lines must pass through a cell for it to be empty."""
 SAME_FACE_DISTANCE_CELLS = 8.0
 """Points that are nearer together [cells], and neighbours in a picture, are taken to be on one
-face: what is before it is empty, too. Things that stand on a face show points of their own."""
+face: what is before it is empty, too. Objects that stand on a face show points of their own.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class LinesOfSight:
         side: float,
         shape: tuple[int, ...],
     ) -> Bool[np.ndarray, "X Y Z"]:
-        """Tell which cubic cells lines of several views pass through, or next to.
+        """Return which cubic cells lines of several views pass through, or next to.
 
         Args:
             cameras: Of the views.

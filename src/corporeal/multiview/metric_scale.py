@@ -187,7 +187,7 @@ def stated_metric_scale(
 
 
 def implausible_scene_extent(extent: float) -> str | None:
-    """Say that a whole scene is too large or too small to be one that people stand objects in.
+    """State that a whole scene is too large or too small to be one that people stand objects in.
 
     Args:
         extent: Of the whole [m].

@@ -324,7 +324,7 @@ def _with_other_lens(
 
 
 def _masks_doubt(masks: np.ndarray, cameras: tuple[Camera, ...]) -> str | None:
-    """Say where masks do not belong to pictures that agree with their poses."""
+    """Return where masks do not belong to pictures that agree with their poses."""
     share = silhouette_coherence(masks, cameras)
     if share >= INCOHERENT_HULL_FRACTION:
         return None

@@ -57,7 +57,7 @@ def is_outside_silhouettes(
     beside: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
     looking: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places are outside, by how many views look there and see them beside masks."""
+    """Return which places are outside, by how many views look there and see them beside masks."""
     return (beside >= MIN_OUTSIDE_VIEWS) & (beside >= MIN_OUTSIDE_VIEWS_FRACTION * looking)
 
 

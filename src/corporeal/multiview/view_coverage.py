@@ -16,11 +16,13 @@ UNSEEN_HALF_GAP_DEG = 180.0
 """Such an angle from which on a flat face that looks to its middle is in no photograph [deg]."""
 
 MIN_COVERED_ANGLE_DEG = 90.0
-"""Angle of the circle around a thing, below which outlines leave its depth open [deg]: between two
-tangent cones that are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is."""
+"""Angle of the circle around an object, below which outlines leave its depth open [deg]: between
+two tangent cones that are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is.
+"""
 STEEP_VIEW_ELEVATION_DEG = 45.0
-"""Height of a camera over the floor's horizon from which on a thing that stands there seems no
-deeper than it is by its height [deg]."""
+"""Height of a camera over the floor's horizon from which on an object that stands there seems no
+deeper than it is by its height [deg].
+"""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def unseen_side_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
 
 
 def unseen_half_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
-    """Say that half of the circle around it was not photographed, if so.
+    """State that half of the circle around it was not photographed, if so.
 
     Args:
         cameras: Of the photographs.
@@ -78,7 +80,7 @@ def widest_unseen_angle(cameras: Sequence[Camera]) -> float:
 
 
 def depth_doubt_text(cameras: Sequence[Camera]) -> str | None:
-    """Say in a clause that photographs leave open how deep things are; None: they do not.
+    """Return in a clause that photographs leave open how deep objects are; None: they do not.
 
     Args:
         cameras: Of the photographs.

@@ -18,7 +18,7 @@ from corporeal.multiview.up_direction import UpDirection, estimate_up_direction
 from corporeal.multiview.viewed_region import ViewedRegion, find_viewed_region
 
 MIN_STRONG_CONFIDENCE = 0.6
-"""From here on a direction is believed unless something stronger speaks."""
+"""From here on a direction is accepted unless something stronger speaks."""
 MAX_FLOOR_TILTS_RAD = {True: np.radians(12), False: np.radians(35)}
 """How far a floor's normal may be from an up that is strong, or not."""
 FILE_UP_CONFLICT_RAD = np.radians(20)
@@ -34,7 +34,7 @@ MAX_POINT_DISTANCE_RADII = 2.0
 UNDERSIDE_PERCENTILE = 0.5
 """Percentile of heights that is the underside of objects, where no point is astray."""
 UNUSUAL_AXIS_EXTRA_ROLL_RAD = np.radians(10)
-"""How much farther objects may roll from the usual axis than from another to be believed there."""
+"""How much farther objects may roll from the usual axis than from another to be accepted there."""
 MAX_STANDING_ROLL_RAD = np.radians(12)
 """Objects that roll less were, and their frame was a little tilted."""
 MIN_UP_CONFIDENCE = 0.3
@@ -193,7 +193,7 @@ def _up_from_resting(told: _UpEvidence, points: np.ndarray) -> _UpEvidence:
 
 
 def _unknown_up_note(more: str) -> Note:
-    """Say that nobody said what is up, and more of it."""
+    """State that nobody said what is up, and more of it."""
     return Note(UNKNOWN_UP_NOTE + more, NoteKind.ASSUMED)
 
 
@@ -213,7 +213,7 @@ def _up_by_file(seen: UpDirection | None) -> _UpEvidence:
         return said
     words = (
         f"Such files have +z up, but the cameras, which agree with each other, were held level "
-        f"about a direction {np.degrees(angle):.0f}° from it. The cameras were believed."
+        f"about a direction {np.degrees(angle):.0f}° from it. The cameras were used."
     )
     reason = f"Up is what the cameras agree on (to {_degrees_text(seen.error)})."
     return _UpEvidence(
@@ -289,7 +289,7 @@ def _world_alignment(
         ]
         height, by = float(np.percentile(heights, UNDERSIDE_PERCENTILE)), "objects"
         reason = "No floor was found: it is put below the lowest points."
-        warnings.append(f"{reason} Things that float above it will fall.")
+        warnings.append(f"{reason} Objects that float above it will fall.")
     else:
         height, by, reason = (
             float(centre[2]),

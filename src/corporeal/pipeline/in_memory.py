@@ -1,6 +1,6 @@
 """A scene in memory: load it, prepare it, pose it for an engine, or play it; no run's folder.
 
-``pipeline.run`` does the same verbs in a folder and keeps what each one made.
+``pipeline.run`` does the same stages in a folder and keeps what each one made.
 """
 
 import shutil
@@ -32,7 +32,7 @@ DEFAULT_ENGINE = SimulateConfig().engine
 
 
 def no_progress(fraction: float, words: str) -> None:
-    """Tell nobody about progress."""
+    """Ignore progress."""
 
 
 def load_scene(
@@ -70,12 +70,12 @@ def prepare_scene(
 ) -> PreparedScene:
     """Find the parts of a scene, give them materials, and fill them with material points.
 
-    The verbs describe, segment, ground and fill, in this order.
+    The stages describe, segment, ground and fill, in this order.
 
     Args:
         scene: From ``load_scene`` or ``build_scene``.
-        settings: Of the four verbs.
-        progress: Told the fraction done and what is being done.
+        settings: Of the four stages.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: A setting makes no sense, or the scene cannot be filled.
@@ -111,7 +111,7 @@ def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE) -> Engine:
     """Return an engine at time 0 of a problem.
 
     Args:
-        problem: From ``pose_problem``, or built by hand.
+        problem: From ``pose_problem``, or built manually.
         engine: A name from ``corporeal.ENGINES``.
 
     Raises:
@@ -132,9 +132,9 @@ def simulate_scene(
 
     Args:
         scene: As built or loaded, or prepared already.
-        settings: Of the verbs from describe to simulate.
+        settings: Of the stages from describe to simulate.
         folder: Where the frames go; None: a temporary folder that goes with the result.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: A setting makes no sense, or the scene cannot be filled.

@@ -59,10 +59,11 @@ MAX_DRAWS_PER_OBJECT = 200
 OPEN_MESH_VOLUME_LOG_STD = 0.3
 """Standard deviation of the logarithm of the volume of what is not closed [-]."""
 MODELLED_SHAPE_VOLUME_LOG_STD = 0.12
-"""Standard deviation of the logarithm of what a modelled shape encloses, over what things of its
-name do [-], of a part that only its name describes: the distance that half of 18 solid things of
+"""Standard deviation of the logarithm of what a modelled shape encloses, over what objects of its
+name do [-], of a part that only its name describes: the distance that half of 18 solid objects of
 published mass and known material exceed, in deviations, beside what their densities have (decision
-110)."""
+110).
+"""
 NAME_ONLY_SOURCES = ("metadata", "unknown")
 """Who tells of a part that nobody looked at."""
 NESTED_SHARE_FIELDS = ("volume_share", "surface_share", "inside", "inner_share", "missing")
@@ -72,7 +73,7 @@ FITTED_DRAW_REASON = "This draw from the range fits the estimate of the object's
 
 @dataclass(frozen=True)
 class WeighedInventory:
-    """What is believed of a scene once its masses have been weighed."""
+    """What is accepted of a scene once its masses have been weighed."""
 
     inventory: Inventory
     """With the way that each part is taken to be."""
@@ -106,7 +107,7 @@ class MassSampler:
         ]
         self.owner = [p.object for p in parts.catalogue]
         self.doubts = [volume_log_std(m) for m in self.members]
-        # What is called by no word for a thing differs from no others of its name.
+        # What is called by no word for an object differs from no others of its name.
         called = [bool(head_terms(name_tokens(o.class_name))) for o in scene.objects]
         self.forms = [shape_log_std(m) if called[self.owner[m.part]] else 0.0 for m in self.members]
         self.volume = sum(m.volume for m in self.members)
@@ -203,9 +204,9 @@ def volume_log_std(member: MeasuredPart) -> float:
 
 
 def shape_log_std(member: MeasuredPart) -> float:
-    """Return how far a modelled shape is from the thing's: deviation of its logarithm [-].
+    """Return how far a modelled shape is from the object's: deviation of its logarithm [-].
 
-    A scan's shape is the thing's; what its edges leave open is its ``volume_log_std``.
+    A scan's shape is the object's; what its edges leave open is its ``volume_log_std``.
     """
     return 0.0 if scan_edge_length(member.body) > 0 else MODELLED_SHAPE_VOLUME_LOG_STD
 
@@ -376,7 +377,7 @@ class _ObjectSamples:
         )
 
     def _answers(self) -> tuple[AnsweredMass, ...]:
-        """Say what each of several answers comes to by itself; its draws are every N-th."""
+        """Describe what each of several answers comes to by itself; its draws are every N-th."""
         found, count = [], len(self.words.answers)
         for k, answer in enumerate(self.words.answers):
             masses = self.masses[k::count]
@@ -468,7 +469,7 @@ def _fix_draw(
 
 
 def hypothesis_label(words: ObjectDescription, drawn: ObjectDescription) -> str:
-    """Say in words which of its ways each part in doubt was drawn in."""
+    """Describe in words which of its ways each part in doubt was drawn in."""
     in_doubt = [
         f"{p.name}: {q.material}, {q.structure}{f' of {q.contents}' if q.contents else ''}"
         for p, q in zip(leaf_parts(words.parts), leaf_parts(drawn.parts), strict=True)

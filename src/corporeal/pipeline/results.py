@@ -1,4 +1,4 @@
-"""What the verbs of a run made, one typed field a verb."""
+"""What the stages of a run made, one typed field a stage."""
 
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -26,15 +26,15 @@ RUN_FILES = (
     "close-up.png",
     *("ensemble.json", "ensemble.png"),
 )
-"""All that may lie in a run's folder beside the folders of its verbs."""
+"""All that may lie in a run's folder beside the folders of its stages."""
 
 
 @dataclass(frozen=True)
 class StageResults:
-    """What each verb made; None: it has not been done, or need not be.
+    """What each stage made; None: it has not been done, or need not be.
 
-    The fields carry the names of the verbs. Read the properties, which carry the names of objects:
-    they raise LookupError where a verb has not been done.
+    The fields carry the names of the stages. Read the properties, which carry the names of objects:
+    they raise LookupError where a stage has not been done.
     """
 
     reconstruct: Reconstruction | None = None
@@ -48,7 +48,7 @@ class StageResults:
     report: None = None
 
     def having(self, verb: str, made: Any) -> "StageResults":
-        """Return the results with what one more verb made."""
+        """Return the results with what one more stage made."""
         return replace(self, **{verb: made})
 
     @property
@@ -102,7 +102,7 @@ class StageResults:
 
     @property
     def movie(self) -> Video:
-        """From film."""
+        """From video."""
         return _made(self.film, "film")
 
     @property

@@ -1,4 +1,4 @@
-"""What a run leaves in its folder for people and programs: film, report, tables, figures."""
+"""What a run leaves in its folder for people and programs: video, report, tables, figures."""
 
 import resource
 import shutil
@@ -40,7 +40,7 @@ class RunCost:
     settings: Mapping[str, str]
     """What the report says of them."""
     seconds: dict[str, float]
-    """Verb → what it took [s]; the report's own are added before they are written down."""
+    """Stage → what it took [s]; the report's own are added before they are written down."""
     divided: bool = False
     """Whether it was asked for which nodes of a file are objects."""
 
@@ -57,17 +57,17 @@ def write_run_files(
 
     Args:
         folder: The run's.
-        made: What each verb made.
+        made: What each stage made.
         audit: The simulation's.
         spent: What was asked for, and what it took.
-        progress: Told the fraction done and what is being done.
-        more: Figures that verbs drew, by caption.
+        progress: Called with the fraction done and a description.
+        more: Figures that stages drew, by caption.
 
     """
     started = time.perf_counter()
     # Figures.
     figures = {
-        "The film as a row of frames": folder / "strip.png",
+        "The video as a row of frames": folder / "strip.png",
         **_close_up(made.movie, folder / "close-up.png"),
         "Materials, laws and values of every part": folder / "fields.png",
         **(more or {}),
@@ -102,7 +102,7 @@ def write_run_files(
 
 
 def _close_up(movie: Video, path: Path) -> dict[str, Path]:
-    """Copy the film's close-up beside the other files, where it has one."""
+    """Copy the video's close-up beside the other files, where it has one."""
     drawn = movie.path.parent / CLOSE_UP_FILE
     if not drawn.exists():
         return {}
@@ -149,7 +149,7 @@ def run_audit(
 
 
 def _warnings(made: StageResults, audit: Audit) -> tuple[str, ...]:
-    """Return what every verb warns of, in the order of the verbs.
+    """Return what every stage warns of, in the order of the stages.
 
     What was noticed of photographs comes last: it is most, and the terminal shows the first.
     """
@@ -167,7 +167,7 @@ def _warnings(made: StageResults, audit: Audit) -> tuple[str, ...]:
 
 
 def sort_warnings(found: Reconstruction | None, warnings: Iterable[str]) -> tuple[str, ...]:
-    """Return each warning once, before all others where shapes are not to be believed."""
+    """Return each warning once, before all others where shapes are unreliable."""
     doubted = () if found is None else found.doubts
     return tuple(dict.fromkeys((*doubted, *warnings)))
 

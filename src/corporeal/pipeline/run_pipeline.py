@@ -1,10 +1,11 @@
 """The order of the verbs: the only file that knows it.
 
-A run is a folder. Each verb leaves its result in a numbered folder inside, named by a key that
+A run is a folder. Each stage leaves its result in a numbered folder inside, named by a key that
 covers everything it depends on: what is fresh is read back, what is stale is done again, what was
 interrupted goes on. ``run.json`` says how far the run came.
 
-What does a verb is imported when it is done: a run that is read back, or not begun, waits for none.
+What does a stage is imported when it is done: a run that is read back, or not begun, waits for
+none.
 """
 
 import shutil
@@ -40,9 +41,9 @@ from corporeal.pipeline.settings.settings import Settings
 from corporeal.recognition.readable_names import safe_name
 
 Progress = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 ProgressOfStage = Callable[[str], Progress]
-"""Given a verb, returns whom to tell about its progress."""
+"""Returns the progress callback of a stage."""
 
 STAGE_FOLDERS = {
     "reconstruct": "0-reconstruct",
@@ -64,7 +65,7 @@ DEFAULT_SETTINGS = Settings()
 
 
 def no_progress_of_stage(verb: str) -> Progress:
-    """Tell nobody about progress."""
+    """Ignore progress."""
     return lambda fraction, words: None
 
 
@@ -75,14 +76,14 @@ def run(
     tell: ProgressOfStage = no_progress_of_stage,
     until: str = "report",
 ) -> Path:
-    """Do every verb up to ``until``; return the run's folder.
+    """Do every stage up to ``until``; return the run's folder.
 
     Args:
         inputs: What a person typed: scene files, a folder of photographs, or a splat.
         folder: The run's folder; made when absent.
-        settings: Configuration of every verb.
-        tell: Whom to tell about progress.
-        until: The last verb to do.
+        settings: Configuration of every stage.
+        tell: Progress callback of each stage.
+        until: The last stage to do.
 
     Raises:
         UserError: An input cannot be used, the disk is full, another process works in the folder,
@@ -96,21 +97,21 @@ def run(
 
 @dataclass(frozen=True)
 class OpenRun:
-    """A run whose verbs are done."""
+    """A run whose stages are done."""
 
     made: StageResults
     key: str
-    """Of the last verb's result: names all that it depends on."""
+    """Of the last stage's result: names all that it depends on."""
 
 
 @contextmanager
 def open_run(
     inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage, until: str
 ) -> Iterator[OpenRun]:
-    """Do every verb up to ``until`` and keep the run's folder from others meanwhile.
+    """Do every stage up to ``until`` and keep the run's folder from others meanwhile.
 
     Yields:
-        What each verb made, under which key.
+        What each stage made, under which key.
 
     """
     with store.lock_folder(folder), store.disk_errors(folder):
@@ -144,7 +145,7 @@ def read_run_request(folder: Path) -> RunRequest:
 
 
 def read_run(folder: Path) -> StageResults:
-    """Read what the finished verbs of a run made; nothing is done, and nothing in it changes.
+    """Read what the finished stages of a run made; nothing is done, and nothing in it changes.
 
     Raises:
         UserError: The folder is not a run.
@@ -166,7 +167,7 @@ def _read_stage_result(verb: str, folder: Path) -> Any:
     if verb == "report":
         return None
     found = store.load(folder / store.DATA_FILE)
-    # A run may have been moved, or is named from elsewhere: its film lies beside what says so.
+    # A run may have been moved, or is named from elsewhere: its video lies beside what says so.
     return replace(found, path=folder / found.path.name) if verb == "film" else found
 
 
@@ -178,7 +179,7 @@ def digests_of_named_files(config: Any) -> list[str]:
 
 @dataclass(frozen=True)
 class StageState:
-    """How far a run came with one verb."""
+    """How far a run came with one stage."""
 
     verb: str
     state: Literal["finished", "unfinished", "not yet"]
@@ -187,7 +188,7 @@ class StageState:
 
 
 def stage_states(folder: Path) -> list[StageState]:
-    """Return the state of every verb of a run, in their order.
+    """Return the state of every stage of a run, in their order.
 
     Raises:
         UserError: The folder is not a run.
@@ -216,7 +217,7 @@ def stages_for(inputs: list[Path]) -> tuple[str, ...]:
 
 
 def invalidate_stage(folder: Path, verb: str) -> None:
-    """Declare one verb's result stale, so that it is done again even with the same settings."""
+    """Declare one stage's result stale, so that it is done again even with the same settings."""
     with store.lock_folder(folder):
         (folder / STAGE_FOLDERS[verb] / store.META_FILE).unlink(missing_ok=True)
 
@@ -283,7 +284,7 @@ def write_cached_showcase(name: str, folder: Path) -> Path:
 
 
 class _Run:
-    """One pass over the verbs; holds what earlier verbs made for later ones."""
+    """One pass over the stages; holds what earlier stages made for later ones."""
 
     def __init__(
         self, inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage
@@ -294,13 +295,13 @@ class _Run:
         self.made = StageResults()
 
     def through(self, until: str) -> None:
-        """Do all verbs up to ``until`` and say in ``run.json`` how it went."""
+        """Do all stages up to ``until`` and say in ``run.json`` how it went."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self._declare("running")
         try:
             todo = stages_for(self.inputs)
             if until not in todo:
-                raise UserError("A model needs no reconstruction: run the other verbs.")
+                raise UserError("A model needs no reconstruction: run the other stages.")
             for verb in todo[: todo.index(until) + 1]:
                 self._do(verb)
         except KeyboardInterrupt:
@@ -337,7 +338,7 @@ class _Run:
         store.finish_result(folder, self.key, config, self.seconds[verb])
 
     def _borrowed(self, verb: str) -> list[str]:
-        """Name what a verb takes from another verb's settings."""
+        """Name what a stage takes from another stage's settings."""
         if verb == "reconstruct":
             from corporeal.io.photos.mask_files import edited_masks
 
@@ -378,7 +379,7 @@ class _Run:
         store.save(folder / store.DATA_FILE, value)
         return value
 
-    # ------------------------------------------------------------ the verbs
+    # ------------------------------------------------------------ the stages
 
     def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
         from corporeal.io.splat.splat_ply import write_splat_ply

@@ -1,4 +1,4 @@
-"""Ways that things are made which are there for their mass, where their name states it."""
+"""Ways that objects are made which are there for their mass, where their name states it."""
 
 import tomllib
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ EXTRAS_STATING_CONSTRUCTION = (SUBSTANCE_KEY, STATED_MATTER_KEY, "shell_thicknes
 
 @dataclass(frozen=True)
 class ConstructionHypotheses:
-    """Of one part that is a whole thing."""
+    """Of one part that is a whole object."""
 
     mass: float
     """That its name states [kg]."""
@@ -38,7 +38,7 @@ class ConstructionHypotheses:
 def construction_hypotheses(
     scene: Scene, number: int, described: ObjectDescription
 ) -> ConstructionHypotheses | None:
-    """Return the ways that a thing may be made, among which the mass in its name chooses.
+    """Return the ways that an object may be made, among which the mass in its name chooses.
 
     None: its name states no mass, it is not there for its mass, or somebody said how it is made.
     """
@@ -70,7 +70,7 @@ def best_mass_fit(masses: Sequence[float], said: float) -> int:
     Where none does, the first, as it was recognised.
 
     Args:
-        masses: Of the thing, made in each way [kg].
+        masses: Of the object, made in each way [kg].
         said: That its name states [kg].
 
     """

@@ -39,7 +39,7 @@ class NamedContents:
     """What a name says of what is in a vessel."""
 
     share: float | None
-    """Of the room behind the wall [-]; None: it says only of what."""
+    """Of the cavity inside the wall [-]; None: it says only of what."""
     contents: str | None
     """A name from the library; None: it does not say of what, or nobody knows that word."""
     vessel: WordPhrase
@@ -154,7 +154,7 @@ def apply_named_contents(
 
 
 def unused_contents_notes(scene: Scene, objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
-    """Say of which objects it was not used how full their names say they are."""
+    """State which objects it was not used how full their names say they are."""
     said = [(o, contents_from_name(thing)) for o, thing in zip(objects, scene.objects, strict=True)]
     return tuple(
         Note(
@@ -185,7 +185,7 @@ def _unused_reason(thing: ObjectDescription, said: NamedContents) -> str:
 
 
 def _is_accounted_for(thing: ObjectDescription, said: NamedContents) -> bool:
-    """Tell whether something is in it, a part of it is that, or a person decided."""
+    """Return whether something is in it, a part of it is that, or a person decided."""
     if said.share and said.share == MAX_FILL_FRACTION and not said.vessel:
         return True  # "full" by itself says little of what is no vessel
     inside = _phrases("contents", said.contents) if said.contents else frozenset()

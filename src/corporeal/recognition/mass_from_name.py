@@ -16,7 +16,7 @@ NETWORK_GENERATIONS = ("2g", "3g", "4g", "5g", "6g")
 
 
 def mass_from_name(*names: str) -> float | None:
-    """Return the mass [kg] that a thing's names state; None: none, or several different ones."""
+    """Return the mass [kg] that an object's names state; None: none, or several different ones."""
     found = {mass for name in names for mass in _of_name(name)}
     return found.pop() if len(found) == 1 else None
 
@@ -42,7 +42,7 @@ def _mass_of_match(name: str, match: re.Match[str]) -> float | None:
 
 
 def _has_table_word(name: str, table: str) -> bool:
-    """Tell whether words of a table stand in a name, whole."""
+    """Return whether words of a table stand in a name, whole."""
     return any(re.search(rf"\b{w}s?\b", name) for w in _table()[table])
 
 
@@ -64,7 +64,7 @@ def _table() -> dict:
 
 
 def mass_from_name_warning(name: str, mass: float, *names: str) -> str | None:
-    """Return a sentence for the user where a thing does not weigh what its names state.
+    """Return a sentence for the user where an object does not weigh what its names state.
 
     Args:
         name: Of the object, for the sentence.

@@ -47,7 +47,7 @@ UNPAINTED_METALS = frozenset(
 )
 """Metals that are seldom painted: beside what is usually of them, a metal's name is no colour."""
 STUFFING_MATERIALS = frozenset(("seat_foam", "memory_foam", "fibre_fill"))
-"""What upholstered things are of, behind their covers."""
+"""What upholstered objects are of, behind their covers."""
 COVER_MATERIALS = frozenset("leather synthetic_leather cotton synthetic_textile felt".split())
 """What comes in sheets, and covers what is upholstered: a leather sofa is no block of leather."""
 MACHINERY_CONTENTS = "machinery"
@@ -105,7 +105,7 @@ class FileEvidence:
 
     @property
     def _heard(self) -> set[tuple[str, ...]]:
-        """Names of the object that are believed: a "rubber_ball" of steel_ball.ply is no steel."""
+        """Names of the object that are accepted: a "rubber_ball" of steel_ball.ply is no steel."""
         thing, heard = self.thing, set()
         by_file = thing.class_name == everyday_words(thing.stem)
         first = [thing.name, thing.class_name] if by_file else [thing.class_name, thing.name]
@@ -247,7 +247,7 @@ def substance_hint(surface: Surface, finish: Finish) -> str:
 
 
 def recognise_part(evidence: FileEvidence) -> PartDescription:
-    """Say what a part is made of, how sure, and why; unknown is a normal answer."""
+    """Describe what a part is made of, how sure, and why; unknown is a normal answer."""
     for ask in (_by_own_names, _by_object_names, _by_colour, _by_surface_values):
         answer = ask(evidence)
         if answer is not None:
@@ -433,8 +433,9 @@ def _strongest_terms(
 def _terms_in_context(name: TokenisedName) -> list[LexiconTerm]:
     """Find what stands in a name; a substance right beside an object is that of such an object.
 
-    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no thing's matter: a
-    snow shoe, a snow globe. A general word means what such things are of: a plastic duck is of PVC.
+    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no object's material:
+    a snow shoe, a snow globe. A general word means what such objects are of: a plastic duck is of
+    PVC.
     """
     standing = head_terms(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
@@ -462,7 +463,7 @@ def _is_loose_material(term: LexiconTerm) -> bool:
 
 
 def _is_purpose(term: LexiconTerm, name: TokenisedName, things: Sequence[LexiconTerm]) -> bool:
-    """Tell whether what lies loose stands beside a thing that is for it, and not made of it."""
+    """Return whether what lies loose stands beside an object that is for it, and not made of it."""
     return _is_loose_material(term) and any(
         t.phrase[-1] not in NOUNS_SHAPED_OF_LOOSE | NOUNS_WHOLLY_OF_MATERIAL
         or not (name.says(term.phrase + t.phrase) or name.says(t.phrase + term.phrase))

@@ -80,7 +80,7 @@ def identify_parts(scene: Scene, hint: GroupHint = lambda surface, finish: "") -
     """Tell the parts of every object apart.
 
     A node whose extras state a substance is a part. Other surfaces of an object form one part when
-    they wear the same finish, unless ``hint`` (what the names say of the matter) differs.
+    they wear the same finish, unless ``hint`` (what the names say of the material) differs.
     """
     looks = [_finish_key(finish) for finish in scene.finishes]
     members = _object_surfaces(scene)

@@ -65,7 +65,7 @@ def numbered_names(classes: Sequence[str], titles: Sequence[str] = ()) -> list[s
     """Return a node name ``<class>_<k>`` for each class.
 
     Args:
-        classes: What each thing is, in words.
+        classes: What each object is, in words.
         titles: What each is called in its file. Where all of a class end in numbers of their own
             ("block_10", "block_11"), these are kept: a scene file that names them means them.
             Otherwise k counts from 0.

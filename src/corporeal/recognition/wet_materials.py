@@ -19,7 +19,7 @@ def wet_material_values(
     cells store: it falls dead where a dry one bounces.
 
     Args:
-        names: Of the thing and of its part.
+        names: Of the object and of its part.
         material: What it is made of.
         dry: Density of that [kg/m³].
 

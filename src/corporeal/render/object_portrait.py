@@ -47,7 +47,7 @@ class PortraitOptions:
 
     @property
     def words(self) -> str:
-        """Say in words how the pictures are taken."""
+        """Describe in words how the pictures are taken."""
         return f"{self.count} of {DIRECTION_COUNT} views, {self.size} px, seed {self.seed}"
 
 

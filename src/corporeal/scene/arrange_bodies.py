@@ -153,7 +153,7 @@ def _stance_with_yaw(stance: StandingStance, rng: np.random.Generator) -> np.nda
 def _broadside(body: SettlingBody, stance: StandingStance, rng: np.random.Generator) -> np.ndarray:
     """With its narrowest width along x, turned about by chance: like a domino.
 
-    Flat sides then face each other, a blow goes through the middle, and what is tall topples on.
+    Flat sides then face each other, an impact goes through the middle, and what is tall topples on.
     """
     rotation = _rotation_to_down(stance.down)
     outline = (body.hull.vertices @ rotation.T)[:, :2]

@@ -97,7 +97,7 @@ def drop_in_blender(
 def _blender_job(
     bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: BlenderConfig
 ) -> dict[str, Any]:
-    """Say what falls, about its centres of mass and in Blender's units."""
+    """Describe what falls, about its centres of mass and in Blender's units."""
     scale = BLENDER_SCENE_SIZE / scene_unit_of(bodies)
     lightest = min(b.mass for b in bodies)
     entries = []

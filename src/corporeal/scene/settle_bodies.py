@@ -108,7 +108,7 @@ def _drop_bodies(
 def _why_lost(
     bodies: Sequence[SettlingBody], start: Sequence[BodyPose], dropped: DroppedBodies
 ) -> str:
-    """Say why bodies are not worth examining; "": they are."""
+    """Return why bodies are not worth examining; "": they are."""
     if not dropped.quiet:
         return f"something still moved after {dropped.seconds:.0f} s"
     far = MAX_STRAY_UNITS * scene_unit_of(bodies)

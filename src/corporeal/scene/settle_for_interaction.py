@@ -115,6 +115,6 @@ def _fitting_kinds(
 def _why_impossible(kind: InteractionKind) -> str:
     reasons = {
         "wind": f"no wind of up to {MAX_WIND_SPEED_M_S:g} m/s moves anything",
-        "chain": "no blow reaches the last of the row",
+        "chain": "no impact reaches the last of the row",
     }
     return reasons.get(kind, f"no room for a {kind}")

@@ -39,7 +39,7 @@ def wind_threshold(body: SettlingBody, pose: BodyPose, heading: Float[np.ndarray
     leans on something, its centre of mass not above its foot, can only slide.
 
     Args:
-        body: What; its matter says how rough it is.
+        body: What; its material says how rough it is.
         pose: How it stands.
         heading: Where the wind goes, along the floor, unit.
 

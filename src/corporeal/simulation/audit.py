@@ -196,7 +196,7 @@ def energy_balance(
 
 
 def object_gaining_energy(ledger: Ledger, scene: Scene, cell: float) -> EnergyGain | None:
-    """Say which object gained energy from nowhere, if any did beyond what is allowed."""
+    """Return which object gained energy from nowhere, if any did beyond what is allowed."""
     balance, scale = energy_balance(ledger, scene, cell)
     names = [thing.name for thing in scene.objects]
     return energy_gain(ledger, names, balance, ALLOWED_BREACHES["mechanical_growth"] * scale)

@@ -1,7 +1,7 @@
-"""What would break: every brittle rigid part at its first blow from each other body.
+"""What would break: every brittle rigid part at its first impact from each other body.
 
 The simulation keeps such parts whole, unless it is told to break them (``breaking``). Here the
-energy of the blow is compared with what half of such parts bear (``fracture``). Blows after the
+energy of the impact is compared with what half of such parts bear (``fracture``). Impacts after the
 first of a pair are not looked at: a vase that falls over where it stood, and what bounces, are
 judged by their first touch.
 """
@@ -42,7 +42,7 @@ FREE_FLIGHT_FRAMES = 1.5
 
 @dataclass(frozen=True)
 class _ImpactMotion:
-    """How an object moves and resists as a blow comes."""
+    """How an object moves and resists as an impact comes."""
 
     velocity: Float[np.ndarray, "3"]
     """Where it is struck [m/s]."""
@@ -60,7 +60,7 @@ class _ImpactMotion:
 
 @dataclass(frozen=True)
 class BrittleImpact:
-    """The first blow of another body, or of a plane, on a brittle part."""
+    """The first impact of another body, or of a plane, on a brittle part."""
 
     object: int
     part: int
@@ -79,7 +79,7 @@ FIXED_MOTION = _ImpactMotion(np.zeros(3), 0.0, np.zeros((3, 3)), np.zeros(3))
 def predict_breakage(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> tuple[PredictedBreakage, ...]:
-    """Judge every brittle rigid part by the hardest of its first blows; of what broke, by that.
+    """Judge every brittle rigid part by the hardest of its first impacts; of what broke, by that.
 
     Args:
         scene: What was simulated.
@@ -98,7 +98,7 @@ def predict_breakage(
 
 
 def fracture_event_of(one: FractureEvent, scene: Scene, field: MaterialField) -> PredictedBreakage:
-    """Say what broke."""
+    """Describe what broke."""
     return PredictedBreakage(
         object=scene.objects[one.object].name,
         part=field.words[one.part].name,
@@ -128,7 +128,7 @@ def first_impacts(
 
 
 def _brittle(particles: Particles, field: MaterialField) -> np.ndarray:
-    """Which parts are rigid and of brittle matter."""
+    """Which parts are rigid and of brittle material."""
     return np.array(
         [
             t.kind == "rigid" and m.strength_local is not None
@@ -138,7 +138,7 @@ def _brittle(particles: Particles, field: MaterialField) -> np.ndarray:
 
 
 class _FirstImpacts:
-    """The first blows of a run."""
+    """The first impacts of a run."""
 
     def __init__(
         self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
@@ -240,7 +240,7 @@ class _FirstImpacts:
         return rotation_vector(left @ right) / float(self.ledger.time[k] - self.ledger.time[k - 1])
 
     def _normal(self, a: int, c: int, k: int) -> Float[np.ndarray, "3"]:
-        """Direction of a blow: a plane's normal, else that of the momentum it gave."""
+        """Direction of an impact: a plane's normal, else that of the momentum it gave."""
         objects = len(self.scene.objects)
         if c >= objects:
             normals = [(0.0, 0.0, 1.0), *(wall.normal for wall in self.scene.walls)]

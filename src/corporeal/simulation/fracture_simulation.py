@@ -1,8 +1,8 @@
 """Breaking, simulated: what is struck with ten times the energy that it bears becomes pieces.
 
 The run is taken back to just before the two touch, what the wall bears until it breaks is taken
-from the blow, and the thing becomes rigid pieces that move on as it did (decision 39). The momentum
-of the pieces is that of the whole.
+from the impact, and the object becomes rigid pieces that move on as it did (decision 39). The
+momentum of the pieces is that of the whole.
 """
 
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ PIECE_CONTACT_POINTS = 1200
 
 @dataclass(frozen=True)
 class FracturedRun:
-    """A thing that has just broken."""
+    """An object that has just broken."""
 
     stage: FractureState
     engine: CpuEngine
@@ -52,7 +52,7 @@ def next_breaking_impact(
     number: int,
     since: float,
 ) -> BrittleImpact | None:
-    """Return the first blow since a time [s] under which something breaks; None: there is none.
+    """Return the first impact since a time [s] under which something breaks; None: there is none.
 
     Args:
         stage: What is simulated.
@@ -81,11 +81,11 @@ def next_breaking_impact(
 def fracture_body(
     stage: FractureState, engine: CpuEngine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
 ) -> FracturedRun | None:
-    """Make pieces of what a blow is about to strike; None: it cannot be cut, and stays whole.
+    """Make pieces of what an impact is about to strike; None: it cannot be cut, and stays whole.
 
     Args:
         stage: What is simulated.
-        engine: At an instant before the blow; goes on to just before it.
+        engine: At an instant before the impact; goes on to just before it.
         blow: Which.
         breaks: What broke before.
 
@@ -117,7 +117,7 @@ def fracture_body(
 
 @dataclass(frozen=True)
 class _CutPieces:
-    """Pieces of a thing, where it was at the start."""
+    """Pieces of an object, where it was at the start."""
 
     of_particle: np.ndarray
     surfaces: tuple[Surface, ...]
@@ -126,7 +126,7 @@ class _CutPieces:
 def _pieces(
     stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot
 ) -> _CutPieces | None:
-    """Cut a thing into cells around the blow; None: its surface is not closed."""
+    """Cut an object into cells around the impact; None: its surface is not closed."""
     scene, particles = stage.scene, stage.particles
     own = [s for s in scene.surfaces if s.object == blow.object]
     if len({s.finish for s in own}) != 1:
@@ -167,7 +167,7 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
 
 
 def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -> None:
-    """Slow the blow down by what the wall bears until it breaks; a body it strikes is pushed back.
+    """Slow the impact down by what the wall bears until it breaks; a body it strikes is pushed back.
 
     J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
     """
@@ -183,7 +183,7 @@ def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -
 
 
 def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEvent) -> BodySplit:
-    """Say where the pieces are and how they move."""
+    """Return where the pieces are and how they move."""
     now, mine = engine.snapshot(), stage.rows(body)
     start = stage.particles.position[stage.particles.object == one.object].astype(float)
     turn, place = now.motion[mine][0], now.position[mine].mean(axis=0)

@@ -1,4 +1,4 @@
-"""What is simulated at an instant of a run in which things break."""
+"""What is simulated at an instant of a run in which objects break."""
 
 from dataclasses import dataclass
 

@@ -14,7 +14,7 @@ def ledger_row(
 ) -> Ledger:
     """Everything the audit needs of one instant.
 
-    The bodies of one object, its soft matter and the frames bonded to it, are added up.
+    The bodies of one object, its soft material and the frames bonded to it, are added up.
     """
     # What is known of each body: what the engine measured, speeds, depths in planes.
     ends = np.cumsum([len(b.position) for b in problem.bodies])[:-1]
@@ -96,7 +96,7 @@ def rotate_with_body(
 
 
 def object_of_body(problem: Problem) -> np.ndarray:
-    """Say which object each body is of (B,): bodies held together or kept apart are of one."""
+    """Return which object each body is of (B,): bodies held together or kept apart are of one."""
     first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.apart)}
     group: list[int] = []
     for b in range(len(problem.bodies)):

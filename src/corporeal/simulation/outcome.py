@@ -37,7 +37,7 @@ known no better. What rests on something is within 0.45, what stands beside it f
 def measure_outcome(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> Outcome:
-    """Say what was seen.
+    """Describe what was seen.
 
     Args:
         scene: What was simulated.
@@ -119,7 +119,7 @@ class ObjectParticles:
 
 
 def object_row(body: int, names: list[str], bodies: ObjectParticles) -> ObjectOutcome:
-    """Say what happened to one object."""
+    """Describe what happened to one object."""
     ledger, cell, start = bodies.ledger, bodies.cell, bodies.start[body]
     mark, rim = residual_mark(body, bodies)
     centre = ledger.centre[:, body]
@@ -177,7 +177,7 @@ def level_reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
 def vertical_extent(
     points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float
 ) -> float:
-    """Extent of most matter along z [m]: of the points, and half a row above and below them.
+    """Extent of most material along z [m]: of the points, and half a row above and below them.
 
     A row is half a cell high at the start. What is squeezed flat has rows as much lower: a puddle
     that was a column would else be taken for half a cell higher than it is.
@@ -280,7 +280,7 @@ def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
 
 
 def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str, PairOutcome]:
-    """Say what happened between every two objects, and between each object and the floor."""
+    """Describe what happened between every two objects, and between each object and the floor."""
     ledger, time = trajectory.ledger, trajectory.time
     rows = {}
     for a, c in combinations(range(len(names) + 1), 2):

@@ -1,4 +1,4 @@
-"""Frames and ledger before a thing broke, with its pieces as objects that move as one."""
+"""Frames and ledger before an object broke, with its pieces as objects that move as one."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -68,7 +68,7 @@ def _ledger_shares(row: Ledger, frame: Frame, before: FractureState, one: Fractu
 def _piece_motions(
     row: Ledger, frame: Frame, before: FractureState, one: FractureEvent
 ) -> list["_PieceMotion"]:
-    """Say how each piece moves as long as the thing is whole."""
+    """Return how each piece moves as long as the object is whole."""
     particles, k = before.particles, one.object
     mine = np.flatnonzero(particles.object == k)
     weight, volume = particles.mass[mine], particles.volume[mine]

@@ -49,7 +49,7 @@ def run_hints(
 
 
 def _energy_loss_hint(share: float | None, parts: Sequence[PartAudit]) -> Iterator[str]:
-    """Say that coarse cells took energy that what is soft would have given back."""
+    """State that coarse cells took energy that what is soft would have given back."""
     soft = dict.fromkeys(p.object for p in parts if p.object and _springs_back(p))
     if share is not None and share > REPORTED_LOSS_FRACTION and soft:
         yield (
@@ -60,7 +60,7 @@ def _energy_loss_hint(share: float | None, parts: Sequence[PartAudit]) -> Iterat
 
 
 def _springs_back(part: PartAudit) -> bool:
-    """Tell whether a part gives back what strains it: liquids and grains keep nothing to give."""
+    """Return whether a part gives back what strains it: liquids and grains keep nothing to give."""
     return part.treatment != "rigid" and part.law not in FLOWING_LAWS
 
 
@@ -77,7 +77,7 @@ def _one_object_hint(scene: Scene) -> Iterator[str]:
 
 
 def _motionless_hint(scene: Scene, happened: Outcome) -> Iterator[str]:
-    """Say that nothing moves, or that a push or a wind does not move what it acts on."""
+    """State that nothing moves, or that a push or a wind does not move what it acts on."""
     held = [o for o in scene.objects if _is_still(happened.objects.get(o.name))]
     pushed = [o.name for o in held if o.push is not None]
     blown = [o.name for o in held if o.wind is not None]

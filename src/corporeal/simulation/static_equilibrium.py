@@ -4,7 +4,7 @@ Poses at rest come from rigid bodies: what is soft was never asked. Here it sink
 weight, and with it what lies on it. Motion is taken out by kinetic damping (Cundall 1976; Barnes
 1999, "Form finding and analysis of tension structures by dynamic relaxation"): whenever the kinetic
 energy of an object passes a maximum it lies near its balance, and is stopped there. There is no
-coefficient to choose, and what falls over falls as fast as in life. In the end nothing is damped
+coefficient to choose, and what falls over falls as fast as in reality. In the end nothing is damped
 for a while; only what stays by itself has found its balance.
 """
 
@@ -61,7 +61,7 @@ def settling_problem(problem: Problem, hung: set[int]) -> Problem:
     which alone carries what has lain for long.
 
     Args:
-        problem: Of the film.
+        problem: Of the video.
         hung: Bodies that nothing carries: gravity does not pull them.
 
     """

@@ -1,6 +1,6 @@
 """The mark in sand, mud, snow or paste: how deep its free surface fell, and how high a rim rose.
 
-What holds together is dented where its matter went (``residual_shape.dent``). Grains and pastes
+What holds together is dented where its material went (``residual_shape.dent``). Grains and pastes
 part: a splash takes a few of them far from where they lay, which says nothing of the hollow that
 is seen. Its depth is that of the surface, in columns along z of a width of ``COLUMN_WIDTH_DX``
 cells.

@@ -46,7 +46,7 @@ class FrameLayout:
 
     @classmethod
     def of(cls, posed: ModelMapping) -> "FrameLayout":
-        """Say which particle belongs to which object of a problem."""
+        """Return which particle belongs to which object of a problem."""
         bodies, place = posed.problem.bodies, np.empty_like(posed.order)
         place[posed.order] = np.arange(len(posed.order))
         owner = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
@@ -182,7 +182,7 @@ def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
 class FrameSequence(Sequence[Frame]):
     """The frames of one trajectory, read from disk when asked for; the first ones only once.
 
-    Audit, film and report each read most of them. What is beyond ``FRAME_CACHE_BYTES`` is read
+    Audit, video and report each read most of them. What is beyond ``FRAME_CACHE_BYTES`` is read
     again.
     """
 

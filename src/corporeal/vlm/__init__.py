@@ -168,7 +168,7 @@ class VlmClient(Protocol):
 
 
 def choose_critic(spec: str, asked: str) -> str:
-    """Say who ranks partitions of an object: who is ``asked`` to, a cheaper one, or the same.
+    """Return who ranks partitions of an object: who is ``asked`` to, a cheaper one, or the same.
 
     Args:
         spec: Who answers, as a person types it.

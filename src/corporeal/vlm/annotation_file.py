@@ -44,7 +44,7 @@ class PartAnnotation:
     inflation: float | None = None
     """Gauge pressure of the air sealed behind the wall [Pa]."""
     solidity: float | None = None
-    """Of what is packed: share of its shape that is matter, above 0 and up to 1."""
+    """Of what is packed: share of its shape that is material, above 0 and up to 1."""
     values: dict[str, float] = field(default_factory=dict)
     """Spelt as in the library, unit in the key: ``{"young_MPa": 5}``."""
 

@@ -132,7 +132,7 @@ class ApiClient(ABC):
         """Make the client's model with this key."""
 
     def _where(self) -> str:
-        """Say which server is asked."""
+        """Return which server is asked."""
         return self.address.url or self.provider
 
     def _variable(self) -> str:
@@ -254,7 +254,7 @@ class ApiClient(ABC):
         return asked.output
 
     def _form(self, turn: AnswerNumber) -> RequestForm:
-        """Say how a question is put, as far as the server is known to take it."""
+        """Return how a question is put, as far as the server is known to take it."""
         sampled = self._sampled and turn.of > 1
         count = turn.of - turn.number + 1 if sampled and turn.alike and self._several else 1
         return RequestForm(self.mode, sampled, count)
@@ -333,7 +333,7 @@ class ApiClient(ABC):
 
 
 def _validation_failure_text(error: Exception) -> str:
-    """Say what did not fit in the last of several tries to answer; "": it failed otherwise."""
+    """Describe what did not fit in the last of several tries to answer; "": it failed otherwise."""
     last = error.__cause__
     if not isinstance(last, ToolRetryError):
         return ""

@@ -1,4 +1,4 @@
-"""Answer by hand: every question becomes a page with its picture, and waits for its answer.
+"""Answer manually: every question becomes a page with its picture, and waits for its answer.
 
 For who has a chat window and no key, or wants to look for themselves. Answered questions are kept
 as recordings in the same folder, so ``--vlm replay:FOLDER`` needs nobody any more.
@@ -112,7 +112,7 @@ def refuse_pending(results: list, spec: str) -> list:
 
 
 def is_not_pending(error: Exception) -> bool:
-    """Tell whether an error is more than a question that waits."""
+    """Return whether an error is more than a question that waits."""
     return not isinstance(error, PendingQuestionsError)
 
 

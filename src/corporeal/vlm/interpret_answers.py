@@ -212,7 +212,7 @@ def contradiction_with_file(
     """Say in a clause where a model contradicts what the file states; "" where it does not.
 
     Args:
-        words: What is believed of a part.
+        words: What is accepted of a part.
         material: What the file states it is made of.
         wall: How thick the file states its wall is [m]; 0: stated solid; None: unknown.
         put: How thick the model put its wall [m].
@@ -261,7 +261,7 @@ def apply_placements(
 
 
 def parts_filling_scan(words: Sequence[PartDescription]) -> list[PartDescription]:
-    """Parts whose matter fills what a scan draws, at its surface, in some way they may be."""
+    """Parts whose material fills what a scan draws, at its surface, in some way they may be."""
     return [
         leaf
         for leaf in leaf_parts(words)
@@ -302,7 +302,7 @@ def box_sides_text(lengths: Sequence[float]) -> str:
 
 
 def strange_share_notes(answer: ThicknessAnswer, doubt: float) -> list[str]:
-    """Say which parts are said to be far from what a scan draws, for how fine it is.
+    """Return which parts are said to be far from what a scan draws, for how fine it is.
 
     Args:
         answer: Of how much of what it draws is real.
@@ -318,7 +318,7 @@ def strange_share_notes(answer: ThicknessAnswer, doubt: float) -> list[str]:
                 Note(
                     f"{part.part} is said to take up {part.likely:.0%} of what its scan draws, "
                     f"which is fine enough for {exp(-doubt / 2):.0%} ± {doubt:.0%}. The former was "
-                    "believed; --annotations decides.",
+                    "accepted; --annotations decides.",
                     NoteKind.ASSUMED,
                 )
             )

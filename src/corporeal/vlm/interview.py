@@ -224,7 +224,7 @@ class Interview:
         """Ask how much of what a scan draws of something thin is real; None: no answer.
 
         Args:
-            parts: Those whose matter fills what is drawn.
+            parts: Those whose material fills what is drawn.
             thin: How coarse the scan is, and how thick it draws the object.
 
         """
@@ -396,7 +396,7 @@ def _part_list(parts: Mapping[str, str]) -> str:
 
 
 def _look_text(part: SeenPart) -> str:
-    """Say how a part looks, and where it cannot be seen."""
+    """Return how a part looks, and where it cannot be seen."""
     where = {"yes": "", "hidden": "; hidden", "missing": "; the model lacks it"}
     return f"{part.look}{where[part.seen]}"
 
@@ -410,7 +410,7 @@ def _range_list(offers: Mapping[str, PlacementOffer]) -> str:
 
 
 def _answer_number_text(turn: AnswerNumber) -> str:
-    """Say which of several answers is meant; "" where one only is wanted."""
+    """Return which of several answers is meant; "" where one only is wanted."""
     return f"{turn.number} of {turn.of} " if turn.of > 1 else ""
 
 

@@ -13,8 +13,9 @@ from corporeal.discretization.part_model import NORMAL_90_PERCENT_WIDTH_SIGMAS
 from corporeal.vlm.interpret_answers import leaf_parts
 
 MIN_JUDGED_MASS_LOG_STD = 0.25
-"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on things that
-no data set publishes are off by a fifth (ALDE .20)."""
+"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on objects
+that no data set publishes are off by a fifth (ALDE .20).
+"""
 PACKAGING_MASS_RATIO = 1.12
 """Usual mass of packaged goods over their printed net weight [-]."""
 PRINTED_MASS_LOG_STD = 0.12
@@ -52,7 +53,7 @@ def evidence_masses(evidence: MassEvidence | None) -> list[tuple[float, float]]:
 
 
 def mass_contradiction(words: ObjectDescription, masses: Float[np.ndarray, " N"]) -> str:
-    """Say where evidence is far from every draw, and what would reconcile them; "": nowhere."""
+    """Return where evidence is far from every draw, and what would reconcile them; "": nowhere."""
     clauses = []
     for centre, width in evidence_masses(words.evidence):
         away = np.log(masses / centre) / width
@@ -82,7 +83,7 @@ def _reconciliation_text(words: ObjectDescription, masses: np.ndarray, estimate:
         wanted = f"a wall of {main.name} {ratio:.2g} times as thick"
     elif ratio < 1:
         share = (main.solidity or 1.0) * ratio
-        wanted = f"{main.name} hollow, or {share:.0%} of its shape matter"
+        wanted = f"{main.name} hollow, or {share:.0%} of its shape material"
     else:
         wanted = f"a material of {main.name} {ratio:.2g} times as dense"
     return f"To reconcile them it would take {wanted}, or {size}."

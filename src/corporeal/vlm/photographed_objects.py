@@ -160,7 +160,7 @@ def object_of_usual_size(class_name: str) -> SeenObject:
 
 
 def telling_words(source: str) -> str:
-    """Return the words of a folder's name, or a film's, that can be of what the pictures show.
+    """Return the words of a folder's name, or a video's, that can be of what the pictures show.
 
     Not those for what they are or were taken with: "photos" are no paper, and "Camera" no camera.
     """
@@ -172,7 +172,7 @@ def telling_words(source: str) -> str:
 
 
 def object_from_name(source: str) -> SeenObject | None:
-    """Return what the name of a folder or a film says is in it, as large as it usually is.
+    """Return what the name of a folder or a video says is in it, as large as it usually is.
 
     None: it says nothing that has a usual size.
     """
@@ -183,7 +183,7 @@ def object_from_name(source: str) -> SeenObject | None:
 
 
 def named_object_note(source: str, seen: SeenObject, name: str) -> str:
-    """Say what was taken from the name of the pictures, and how to say it better.
+    """Describe what was taken from the name of the pictures, and how to say it better.
 
     Args:
         source: What the pictures are called.
@@ -204,7 +204,7 @@ def named_object_note(source: str, seen: SeenObject, name: str) -> str:
 
 
 def class_extent_note(objects: Sequence[SeenObject], names: Sequence[str]) -> str:
-    """Say that nobody stated a size, what was taken for it, and how to say it better.
+    """State that nobody stated a size, what was taken for it, and how to say it better.
 
     Args:
         objects: What there is, as far as it is known.

@@ -113,7 +113,7 @@ def find_class_sizes(
 def estimate_real_extent(
     name: str, class_name: str, extent: float, metric: bool, sizes: ClassSizes
 ) -> RealExtent:
-    """Say how large the real object is of which a file holds a model.
+    """Return how large the real object is of which a file holds a model.
 
     A file in metres counts; the usual size of its class can only cast doubt on it. Otherwise the
     usual size of its class counts, and where nobody knows that, a neutral stand-in.
@@ -189,7 +189,7 @@ def _size_source_text(size: ClassSize) -> str:
 
 
 def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> str:
-    """Say where a model's size is beyond the table's; "" where it is not."""
+    """Return where a model's size is beyond the table's; "" where it is not."""
     if (
         known is None
         or known.low / TYPICAL_EXTENT_MARGIN_RATIO
@@ -198,14 +198,16 @@ def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> st
     ):
         return ""
     return (
-        f"According to {_size_source_text(answered)}, {extent_text(answered.usual)} is usual for objects like "
-        f"this: {answered.class_name}; {EXTENT_TABLE_SOURCE} knows {extent_text(known.low)} to {extent_text(known.high)}. "
-        "The former was believed."
+        f"According to {_size_source_text(answered)}, {extent_text(answered.usual)} is usual for "
+        "objects like "
+        f"this: {answered.class_name}; {EXTENT_TABLE_SOURCE} knows {extent_text(known.low)} to "
+        f"{extent_text(known.high)}. "
+        "The former was used."
     )
 
 
 def _class_disagreement_text(name: str, extent: float, known: ClassSize | None) -> str:
-    """Say where a file's own size is beyond its class's; "" where it is not."""
+    """Return where a file's own size is beyond its class's; "" where it is not."""
     if (
         known is None
         or known.low / TYPICAL_EXTENT_MARGIN_RATIO
@@ -214,7 +216,9 @@ def _class_disagreement_text(name: str, extent: float, known: ClassSize | None) 
     ):
         return ""
     return (
-        f"{name} is {extent_text(extent)} large in its file, which is in metres; {_size_source_text(known)} knows "
-        f"such objects ({known.class_name}) from {extent_text(known.low)} to {extent_text(known.high)}. The "
-        "file was believed."
+        f"{name} is {extent_text(extent)} large in its file, which is in metres; "
+        f"{_size_source_text(known)} knows "
+        f"such objects ({known.class_name}) from {extent_text(known.low)} to "
+        f"{extent_text(known.high)}. The "
+        "file was used."
     )

@@ -63,7 +63,7 @@ class ReplayClient:
         return Reply(_validated(row, answer, check), "recording", str(row.get("model", "")))
 
     def holds(self, question: Question, answer: type[AnswerSchema]) -> bool:
-        """Tell whether the question was answered."""
+        """Return whether the question was answered."""
         return self._row(recording_key_row(question, answer)) is not None
 
     def _row(self, wanted: dict[str, Any]) -> dict | None:
@@ -184,7 +184,7 @@ def _validated(row: dict, answer: type[Answer], check: AnswerCheck[Answer]) -> A
 
 
 def first_validation_problem(error: ValidationError) -> str:
-    """Say where an answer first leaves its shape, and how."""
+    """Return where an answer first leaves its shape, and how."""
     first = error.errors()[0]
     return f"{'.'.join(str(x) for x in first['loc'])}: {first['msg']}"
 

@@ -215,7 +215,7 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([lost / "a.jpg"])
     (tmp_path / "films").mkdir()
     (tmp_path / "films" / "a.MOV").touch()
-    with pytest.raises(UserError, match=r"holds 1 films and no model\. Name the film itself: .*a"):
+    with pytest.raises(UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"):
         assemble([tmp_path / "films"])
 
 

@@ -506,7 +506,7 @@ def test_a_film_that_was_held_upright_is_turned(tmp_path, caplog):
 
 @pytest.mark.parametrize("kind", ["ten frames", "still", "noise", "empty", "text", "long"])
 def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monkeypatch):
-    path, said = tmp_path / "a.mp4", "cannot be read as a film"
+    path, said = tmp_path / "a.mp4", "cannot be read as a video"
     if kind == "ten frames":
         said = "holds 10 frames; at least 20"
         film(path, 10)

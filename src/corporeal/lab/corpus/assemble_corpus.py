@@ -100,7 +100,7 @@ def _wind_test(pool: AssetPool, composing: ComposeConfig) -> WindTest:
 
 
 def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]:
-    """Say what is to be done for every scene of a plan.
+    """Describe what is to be done for every scene of a plan.
 
     Raises:
         UserError: The pool no longer has an asset of the plan.
@@ -121,7 +121,7 @@ def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]
 
 
 def planned_compose_config(scene: PlannedScene, composing: ComposeConfig) -> ComposeConfig:
-    """Say how one scene of a plan is composed."""
+    """Return how one scene of a plan is composed."""
     return replace(
         composing,
         assets=scene.assets,

@@ -125,7 +125,7 @@ class SceneRecord:
     """What was measured; None: it was not run."""
     parts: tuple[PartRecord, ...] = ()
     picture: Path | None = None
-    """The film as a row of frames; of a scene that was not run, a view of it at rest."""
+    """The video as a row of frames; of a scene that was not run, a view of it at rest."""
     settings: Settings | None = None
 
     @property
@@ -274,7 +274,7 @@ COPIED_AUDIT_FIELDS = (
 def _did_interaction_happen(
     kind: InteractionKind, happened: Outcome, landed: int, sent: Sequence[str]
 ) -> bool:
-    """Tell whether what the interaction promises happened.
+    """Return whether what the interaction promises happened.
 
     fall: something came down on the floor or on another. fall-onto, collision: two objects met.
     chain: what was struck struck a third. wind: something moved or gave way by a millimetre.

@@ -206,7 +206,7 @@ def _values(
     return [max(getattr(n, name), LOG_AXIS_MIN) if log else getattr(n, name) for n in mine]
 
 
-# ---------------------------------------------------------------- matter and cost
+# ---------------------------------------------------------------- material and cost
 
 
 def _materials(axes: Axes, corpus: CorpusResults) -> None:

@@ -46,7 +46,7 @@ def draw_objects(found: Sequence[ObjectsResult], path: Path) -> None:
 
 
 def _match_numbers(truth: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Give what was found the number of what it fits best; what fits nothing comes after."""
+    """Return what was found the number of what it fits best; what fits nothing comes after."""
     count, known = int(found.max()) + 1, int(truth.max()) + 1
     number = optimal_assignment(iou_matrix(truth, found, known, count).T)
     left = number < 0

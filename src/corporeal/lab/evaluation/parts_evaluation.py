@@ -163,7 +163,7 @@ def evaluate_parts(
         folder: Models, one object each; None: four of the showcase.
         names: What parts are called; those not in it are called as the file does.
         how: How they are pictured and taken apart, and who looks.
-        progress: Told the share done.
+        progress: Called with the fraction done.
 
     Raises:
         UserError: There is no model of several parts, or an encoder cannot be had.

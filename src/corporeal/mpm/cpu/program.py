@@ -233,7 +233,7 @@ class CpuProgram:
         return self.hands
 
     def divide(self, first: list[int], chores: int) -> None:
-        """Say where each colour's chores begin, and how many there are."""
+        """Return where each colour's chores begin, and how many there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
             if phase.count in ("bare", "colour", "looks", "reaches"):
                 row[1] = first[phase.which]

@@ -169,7 +169,7 @@ def surface_begins(
 
 
 def sees_thin_place(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, " E"]:
-    """Tell which nodes see a place where a rigid body is thin.
+    """Return which nodes see a place where a rigid body is thin.
 
     Args:
         places: Surface points behind which it is thin [m].
@@ -182,7 +182,7 @@ def sees_thin_place(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarr
 
 
 def touching_offset(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> Vectors:
-    """Say how far from a node two rigid bodies touch that meet there [m].
+    """Return how far from a node two rigid bodies touch that meet there [m].
 
     A node is felt up to 1½ cells beyond a body's edge, where nothing can be pushed at. So the
     place is the one nearest to the node, along the plane of contact, that lies in both bodies,
@@ -269,7 +269,7 @@ class WettedFaces(NamedTuple):
 
 
 def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: float) -> WettedFaces:
-    """Say where a rigid body's surface lies for the liquid at each node.
+    """Return where a rigid body's surface lies for the liquid at each node.
 
     The surface point nearest to the liquid's own place decides which face of a thin wall it is; it
     and its neighbours that look alike are averaged, w = (1 - u)² with u from 0 at the nearest to 1

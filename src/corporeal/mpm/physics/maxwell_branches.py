@@ -141,7 +141,7 @@ def complex_modulus(
 
 
 def branch_decay(dt: float, time: Float[np.ndarray, " *N"]) -> tuple[np.ndarray, np.ndarray]:
-    """Give what is left of old strain, and of strain made evenly during the step [-].
+    """Return what is left of old strain, and of strain made evenly during the step [-].
 
     Exact for a constant rate of strain. With T far below dt the second is T/dt: the branch is then
     a viscosity G T, without the time step that an explicit viscosity asks for.

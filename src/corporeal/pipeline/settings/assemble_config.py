@@ -13,8 +13,9 @@ class AssembleConfig:
 
     objects: Literal["auto", "one", "nodes"] = "auto"
     """What counts as one object within a file: the nodes that state a class, else the pieces that
-    touch no other or are named as things of their own (auto); the whole file (one); every branch
-    below the root (nodes)."""
+    touch no other or are named as objects of their own (auto); the whole file (one); every branch
+    below the root (nodes).
+    """
     stack: bool = False
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
@@ -32,7 +33,7 @@ class AssembleConfig:
     duration: float | None = None
     """Simulated time [s]; by default from the scene file, else long enough for the falls."""
     fps: int | None = None
-    """Frames per second of the film; by default from the scene file, else 30."""
+    """Frames per second of the video; by default from the scene file, else 30."""
 
 
 def validate(config: AssembleConfig) -> None:

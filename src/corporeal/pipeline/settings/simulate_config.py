@@ -12,14 +12,16 @@ class SimulateConfig:
     """Solver settings; none of them changes material numbers."""
 
     engine: Literal["cpu", "cuda", "reference"] = "cpu"
-    """cpu: the fast engine; cuda: the same on a CUDA card; reference: NumPy in double precision,
-    slow, which the others are tested against."""
+    """cpu: the fast engine; cuda: the same on a CUDA GPU; reference: NumPy in double precision,
+    slow, which the others are tested against.
+    """
     contact: Literal["multi", "single"] = "multi"
     """multi: one velocity field per object, with friction between them; single: one field for all,
     a control in which touching objects stick together."""
     breaking: bool = False
-    """Brittle things that are struck with ten times the energy that they bear break into pieces;
-    else they stay whole, and it is said what would break."""
+    """Brittle objects that are struck with ten times the energy that they bear break into pieces;
+    else they stay whole, and it is said what would break.
+    """
 
 
 def validate(config: SimulateConfig) -> None:

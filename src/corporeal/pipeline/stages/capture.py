@@ -82,7 +82,7 @@ def render_views(
         scene: At rest.
         aims: Of the cameras, which take the place of ``views`` and ``size`` of the configuration.
         config: Quality and threads.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
     stage = RayScene(

@@ -119,7 +119,7 @@ def compose(
         pool: What there is.
         folder: Where the scene goes.
         config: What goes into it.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         weigh: Says how the mass of an object lies; None: as in a solid of one material.
 
     Raises:
@@ -152,7 +152,7 @@ def compose(
 
 
 def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: Weigh) -> bool:
-    """Tell whether any of the objects of a scene could be moved by a wind, standing alone.
+    """Return whether any of the objects of a scene could be moved by a wind, standing alone.
 
     Args:
         assets: What the scene is of.

@@ -40,7 +40,7 @@ def describe(
         scene: What was assembled.
         config: Whom to ask.
         library: The library whose names and ranges a model is offered.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         from_pictures: Which objects are, by number: one surface each. An annotation may name the
             pieces of one, and how thick the surface draws a wall tells nothing, whoever says that
             there is one. Models beside them show their walls.

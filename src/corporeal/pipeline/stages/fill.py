@@ -85,7 +85,7 @@ def fill(
 ) -> Particles:
     """Turn meshes into material points, choosing resolution and treatment on the way.
 
-    A wall is as thick as in life times the scale of its object.
+    A wall is as thick as in reality times the scale of its object.
 
     Args:
         scene: What is filled.
@@ -309,7 +309,7 @@ def fill_sentences(
 
 
 def real_size_sentence(make: PartModel, scale: float) -> str:
-    """Say what a part weighs at its real size, and how thick its wall is; "" where it has it."""
+    """Describe what a part weighs at its real size, and how thick its wall is; "" where it has it."""
     if not is_not_life_size(scale):
         return ""
     wall = make.thickness or make.sheet

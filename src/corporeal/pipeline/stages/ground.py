@@ -228,7 +228,7 @@ def _piece(words: PartDescription, config: GroundConfig) -> PartComponent:
 
 
 def _scan_thickening_words(words: PartDescription) -> str:
-    """Say how much of what its scan draws is real, where somebody said."""
+    """Return how much of what its scan draws is real, where somebody said."""
     said = words.swelling
     return f" It takes up {said.likely:.0%} of what its scan draws: {said.reason}" if said else ""
 
@@ -240,7 +240,8 @@ def _structure(material: Material, words: PartDescription, config: GroundConfig)
     if words.structure == "packed":
         share = words.solidity or 1.0
         reason = (
-            f"{STRUCTURE_SOURCE_WORDS[words.built_by]} that it is packed: {share:.0%} of its shape is matter."
+            f"{STRUCTURE_SOURCE_WORDS[words.built_by]} that it is packed: {share:.0%} of its shape "
+            "is material."
             f"{_scan_thickening_words(words)}"
         )
         return Structure("solid", None, reason, solidity=share)
@@ -272,7 +273,7 @@ def _structure(material: Material, words: PartDescription, config: GroundConfig)
 def _structure_of_part(
     material: Material, words: PartDescription, config: GroundConfig, scene: Scene, number: int
 ) -> Structure:
-    """Say how a part of one object is built, and what air is sealed in it."""
+    """Return how a part of one object is built, and what air is sealed in it."""
     bare = _structure(material, words, config)
     if words.inflation is None:
         return bare
@@ -349,7 +350,7 @@ class _WallThickness:
 
 def _wall_thickness(material: Material, words: PartDescription) -> _WallThickness:
     if words.thickness:
-        whose = "usual of such things" if words.wall_usual else "stated"
+        whose = "usual of such objects" if words.wall_usual else "stated"
         if words.wall_usual and words.wall_why:
             whose += f": {words.wall_why}"
         return _WallThickness(

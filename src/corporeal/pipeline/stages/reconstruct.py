@@ -1,7 +1,7 @@
 """Reconstruct: from posed photographs, or a trained splat, to objects with closed surfaces.
 
 What comes out is a scene of objects like any other, which ``assemble`` reads as a GLB; and the
-Gaussians themselves, for the film and for telling parts apart.
+Gaussians themselves, for the video and for telling parts apart.
 """
 
 from collections.abc import Sequence
@@ -96,7 +96,7 @@ BACKING_SURFELS_STATEMENT = (
     "were laid along the closed surface, below what was learned: they show where that is thin, "
     "and what no photograph shows."
 )
-"""Said of the film, and of gaussians.ply."""
+"""Said of the video, and of gaussians.ply."""
 PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS, PROGRESS_AFTER_OBJECTS = 0.6, 0.66, 0.7
 """Share of the work that is done after each step. Surfaces took 27 to 38 % of it at preset normal
 (docs/inputs.md)."""
@@ -123,12 +123,12 @@ def reconstruct(
     """Find the objects of a scene in photographs, or in a splat.
 
     Args:
-        source: A folder of photographs, a film, or a splat.
+        source: A folder of photographs, a video, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
         viewer: Who is asked what the pictures show, where ``config.things`` does not say it.
         folder: Where an interrupted training, and maps of learned features, are kept.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: The input cannot be used, holds nothing that could be an object, or an option
@@ -207,7 +207,7 @@ class _NamedObjects:
 
     @property
     def statements(self) -> list[str]:
-        """Say how large they are, where no warning does."""
+        """Return how large they are, where no warning does."""
         return [self.scale.reason] * (self.scale.source != "nobody")
 
 
@@ -221,7 +221,7 @@ def _name_objects(
     """Name objects, and decide how large they are; a lone one may be called as its folder.
 
     Args:
-        source: The folder of photographs, the film or the splat.
+        source: The folder of photographs, the video or the splat.
         found: Objects, in order of size.
         objects: What each is, as far as anybody said.
         config: What was asked for.
@@ -256,7 +256,7 @@ def _align_upright(
         source: Named in errors.
         taken: What was learned.
         config: How.
-        folder: Where masks lie that are not believed, and a figure of others is drawn.
+        folder: Where masks lie that are rejected, and a figure of others is drawn.
 
     Raises:
         UserError: These are the room.
@@ -280,7 +280,7 @@ def _align_upright(
 
 
 def _not_worth_error(source: Path, why: str, lie: str, taken: GaussianScene) -> UserError:
-    """Make an error of why things are not worth simulating, with what was noticed before."""
+    """Make an error of why objects are not worth simulating, with what was noticed before."""
     noticed = dict.fromkeys((*taken.doubts, *taken.warnings))
     return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), noticed)
 
@@ -288,7 +288,7 @@ def _not_worth_error(source: Path, why: str, lie: str, taken: GaussianScene) -> 
 def _reason_not_worth(
     found: FoundObjects, photographers: Sequence[Camera], masked: bool, count: int | None
 ) -> str | None:
-    """Say why what was found is not worth simulating, if it is not.
+    """Return why what was found is not worth simulating, if it is not.
 
     Args:
         found: Objects.
@@ -310,7 +310,7 @@ def _reason_not_worth(
 
 @dataclass(frozen=True)
 class _VideoGaussians:
-    """What films show of objects and of what is about them."""
+    """What videos show of objects and of what is about them."""
 
     gaussians: Gaussians
     owner: Int[np.ndarray, " N"]

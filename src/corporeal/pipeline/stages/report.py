@@ -1,6 +1,6 @@
 """Report: one self-contained page that shows what was assumed, what happened, and how sure it is.
 
-The page holds its film and figures, so that it can be mailed. Every number carries the measured
+The page holds its video and figures, so that it can be mailed. Every number carries the measured
 range it was chosen from and where that range was read.
 """
 
@@ -189,7 +189,7 @@ def _origin_list(story: ReportContent) -> str:
 
 
 def _answer_source_words(questions: ModelUsage, answers: int) -> str:
-    """Say who chose the materials from pictures, and how often, where more often than once."""
+    """Return who chose the materials from pictures, and how often, where more often than once."""
     times = f", asked for {answers} answers each" if answers else ""
     return f"Materials were recognised in pictures by {escape_html(_answerers(questions))}{times}."
 
@@ -222,13 +222,13 @@ def _window(force: Push | Wind) -> str:
 
 
 def _caption(found: Sequence[PredictedBreakage]) -> str:
-    """Say below the film what it shows whole although it may not stay so."""
+    """Say below the video what it shows whole although it may not stay so."""
     doubted = [b for b in found if b.word != "holds"]
     return "".join(f"<p>{escape_html(breakage_message(b))}</p>" for b in doubted)
 
 
 def _impact_words(story: ReportContent, k: int) -> str:
-    """Say what the hardest blow does to a brittle part; "" of all others."""
+    """Describe what the hardest impact does to a brittle part; "" of all others."""
     owner = story.scene.objects[story.parts.catalogue[k].object].name
     mine = (owner, story.field.words[k].name)
     broken = [b for b in story.audit.breakage if (b.object, b.part) == mine]
@@ -294,15 +294,15 @@ def _part_row(story: ReportContent, k: int) -> str:
 
 
 def structure_words(structure: Structure) -> str:
-    """Say how a part is built, and what is in it."""
+    """Return how a part is built, and what is in it."""
     if structure.contents is None:
-        packed = f"packed, {structure.solidity:.0%} of it matter"
+        packed = f"packed, {structure.solidity:.0%} of it material"
         return packed if structure.solidity < 1 else structure.kind
     return f"{structure.kind} with {structure.contents.name}"
 
 
 def stiffness_words(treatment: Discretization, *, liquid: bool = False) -> str:
-    """Say which Young's modulus was simulated, and how far it is from the real one.
+    """Return which Young's modulus was simulated, and how far it is from the real one.
 
     A liquid has none: its pressure is that of its volume, with a speed of sound of our own.
     """
@@ -455,7 +455,7 @@ def _settings(audit: RunAudit) -> str:
 
 
 def usage_words(questions: ModelUsage) -> str:
-    """Say what the questions to models took."""
+    """Describe what the questions to models took."""
     if not questions.questions:
         return ""
     who, number = escape_html(_answerers(questions)), questions.questions

@@ -101,9 +101,9 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 
 
 def _undivided_objects_warning(objects: Sequence[ObjectDescription]) -> list[str]:
-    """Say which objects have unknown pieces: a chair from pictures may be all foam.
+    """Return which objects have unknown pieces: a chair from pictures may be all foam.
 
-    Where nothing is known of the matter, ``ground`` says so, and how to say it.
+    Where nothing is known of the material, ``ground`` says so, and how to say it.
     """
     names = [
         obj.name

@@ -1,6 +1,6 @@
 """Simulate: step the scene through time, keep every frame as it comes, and audit the whole.
 
-Frames are written one by one and nothing holds a film in memory. A checkpoint lies beside them:
+Frames are written one by one and nothing holds a video in memory. A checkpoint lies beside them:
 whatever stops a simulation, the same call goes on from there exactly as if nothing had happened.
 A scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
 """
@@ -75,7 +75,7 @@ def simulate(
         field: What every part is made of.
         config: Engine and contact.
         folder: Where the frames go.
-        progress: Told the fraction done and what is going on.
+        progress: Called with the fraction done and a description.
 
     Raises:
         SimulationError: The state became impossible; the frames so far are kept.
@@ -210,7 +210,7 @@ class SimulationRun:
         """Step to the end, writing every frame as it comes.
 
         Args:
-            progress: Told the fraction done and what is going on.
+            progress: Called with the fraction done and a description.
             lying: Bodies that are brought to static equilibrium before time 0.
             relax: Returns the state in it.
 

@@ -1,8 +1,8 @@
 """Film: the scene itself moves, carried by its particles, and a camera watches.
 
 What is seen are textured surfaces, or the Gaussians that were learned from pictures: those move and
-stretch with the matter (F Σ F^T), stand before the usual floor, and the surfaces that were made of
-them are only seen by their shadows on it.
+stretch with the material (F Σ F^T), stand before the usual floor, and the surfaces that were made
+of them are only seen by their shadows on it.
 
 The camera stands where it sees the whole motion; light and camera do not move; the dice of the
 ray caster are fixed per pixel, so that nothing flickers.
@@ -72,7 +72,7 @@ CLOSE_UP_TIMES_S = (-0.03, 0.0, 0.02, 0.05, 0.12, 0.4)
 MAX_FRAMES_FOR_CAMERA = 60
 """Frames that the camera's place is chosen by, at most."""
 OCCLUSION_CHECK_FRACTIONS = (0.0, 0.35, 0.7, 1.0)
-"""Instants at which it is seen what hides, as shares of the film."""
+"""Instants at which it is seen what hides, as shares of the video."""
 STRAY_PARTICLES_PERCENT = 0.4
 """Percent of an object's particles, at either end, that need not be in the picture."""
 CORE_MASS_FRACTION = 0.5
@@ -101,8 +101,8 @@ def render_video(
         played: What is to be seen: surfaces, or Gaussians where the scene was made of them, bound
             to material points at the start; those of no object stand still.
         config: Size, quality, view.
-        folder: Where the film goes.
-        progress: Told the fraction done and what is going on.
+        folder: Where the video goes.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: There is nothing to show, Gaussians are asked for and there are none, the disk
@@ -135,7 +135,7 @@ def render_video(
 
 @dataclass(frozen=True)
 class _VideoSetup:
-    """A film ready to be taken."""
+    """A video ready to be taken."""
 
     troupe: "_AnimatedScene"
     reel: MotionBounds
@@ -168,7 +168,7 @@ def _video_setup(played: SimulationResult, config: VideoConfig) -> _VideoSetup:
 def frame_scenes(
     played: SimulationResult, config: VideoConfig, frames: Int[np.ndarray, " N"]
 ) -> Iterator[tuple[RayScene, CameraAim]]:
-    """Return the surfaces that a film shows in some frames, each with its camera."""
+    """Return the surfaces that a video shows in some frames, each with its camera."""
     staged = _video_setup(played, config)
     at = staged.camera.at
     for scenery in _frame_scenes(staged.troupe, played.trajectory, frames.astype(float), at):
@@ -218,7 +218,7 @@ def _close_up(
 def write_caption(
     picture: np.ndarray, time: float, config: VideoConfig, about: float | None
 ) -> np.ndarray:
-    """Write the time [s] into a picture, and that the film is slow there."""
+    """Write the time [s] into a picture, and that the video is slow there."""
     if not config.caption:
         return picture
     slower = config.slow / config.speed if is_slow(time, about) else 1.0 / config.speed

@@ -19,7 +19,7 @@ class MethodResult:
     against: RunDifference | None
     """From the reference; None: there is none to trust."""
     error: str = ""
-    """Why it failed, or cannot be believed."""
+    """Why it failed, or cannot be accepted."""
 
     @property
     def met(self) -> int:

@@ -30,7 +30,7 @@ class ObjectMeasures:
     path: tuple[Vector, ...]
     """One place per instant [m]."""
     young: float
-    """Of its materials, the mean of their logarithms by mass [Pa]: as they are in life."""
+    """Of its materials, the mean of their logarithms by mass [Pa]: as they are in reality."""
     restitution: float
     """Of its heaviest part's material [-]."""
     groups: tuple[str, ...]

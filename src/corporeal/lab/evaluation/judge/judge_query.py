@@ -1,4 +1,4 @@
-"""Ask a judge about films: the price first, every film in a conversation of its own."""
+"""Ask a judge about videos: the price first, every video in a conversation of its own."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -40,13 +40,13 @@ def query_judge(
     progress: Progress = lambda fraction, words: None,
     judge: VlmClient | None = None,
 ) -> JudgeVerdicts:
-    """Ask about all films, each in a conversation of its own, in an order that tells nothing.
+    """Ask about all videos, each in a conversation of its own, in an order that tells nothing.
 
     Args:
         films: From ``gather_films``.
         config: Who judges.
         say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         judge: Who answers, instead of ``config.judge``.
 
     Raises:
@@ -61,7 +61,7 @@ def query_judge(
     results = thread_map(
         [lambda a=a: asking.ask(a.question, Verdict) for a in jobs],
         MAX_PARALLEL_QUESTIONS,
-        lambda count: progress(count / max(len(jobs), 1), f"{count} of {len(jobs)} films"),
+        lambda count: progress(count / max(len(jobs), 1), f"{count} of {len(jobs)} videos"),
         lambda error: not isinstance(error, PendingQuestionsError | UnansweredError),
     )
     refuse_pending(results, config.judge)
@@ -108,8 +108,8 @@ def _somebody(model: VlmClient | None) -> VlmClient:
 
 
 def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
-    """Say what asking takes."""
-    words = f"{reckoned.films} films to judge, about {reckoned.tokens:,} tokens"
+    """Describe what asking takes."""
+    words = f"{reckoned.films} videos to judge, about {reckoned.tokens:,} tokens"
     if not is_paid(config.judge):
         return f"{words}; {config.judge.partition(':')[0]} costs nothing."
     if reckoned.dollars is None:

@@ -36,7 +36,7 @@ def judge_runs(
         out: Holds ``SCENE/METHOD``, each a run.
         config: Who judges, how often.
         say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: There are no such runs, nobody judges, or it costs more than was agreed to.
