@@ -85,7 +85,7 @@ def _show(folder: Path) -> None:
         f"meshes {1e3 * certificate.penetration_m:.2g} mm; {_attempts(certificate.attempts)}, "
         f"{certificate.seconds:.1f} s."
     )
-    print(f"Go on with: corporeal run {quote(str(folder / 'scene.toml'))}")
+    print(f"Next: corporeal run {quote(str(folder / 'scene.toml'))}")
 
 
 def _attempts(count: int) -> str:
