@@ -1,6 +1,6 @@
-"""A scene in memory: load it, prepare it, pose it for an engine, or play it; no run's folder.
+"""In-memory pipeline: load, prepare and simulate a scene without a run's folder.
 
-``pipeline.run`` does the same stages in a folder and keeps what each one made.
+``pipeline.run`` runs the same stages in a folder and stores their results.
 """
 
 import shutil
@@ -42,14 +42,14 @@ def load_scene(
 
     Args:
         path: The file or the folder.
-        config: What counts as one object, sizes, duration.
+        config: Grouping into objects, sizes, duration.
         up: Which axis of a mesh points up; auto: as its file states, or as its kind usually has it.
 
     Returns:
         The scene in metres, +Z up, nothing below the floor at z = 0.
 
     Raises:
-        UserError: There is no such file, or it cannot be used; photographs and splats hold no
+        UserError: The file does not exist or cannot be used; photographs and splats hold no
             objects before they are reconstructed.
 
     """
@@ -60,7 +60,7 @@ def load_scene(
     if kind != "model":
         raise UserError(
             f"{path} holds a {'splat' if kind == 'splat' else 'set of photographs'}, which must be "
-            "reconstructed first: corporeal.run([path], folder) does everything."
+            "reconstructed first: use corporeal.run([path], folder)."
         )
     return assemble([path], config, chosen_up_axis(up))
 
@@ -78,7 +78,7 @@ def prepare_scene(
         progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: A setting makes no sense, or the scene cannot be filled.
+        UserError: A setting is invalid, or the scene cannot be filled.
 
     """
     progress(0.0, "recognising")
@@ -94,14 +94,13 @@ def prepare_scene(
 
 
 def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS) -> Problem:
-    """Return what an engine solves: bodies in the order of the scene's objects, and the floor.
+    """Return the problem for an engine: bodies in the order of the scene's objects, and the floor.
 
-    An object that is partly rigid gives a soft body and then each rigid frame.
+    A partly rigid object gives a soft body, followed by its rigid frames.
 
     Args:
         prepared: The scene.
         settings: ``settings.simulate.contact`` is used.
-
     """
     contact = settings.simulate.contact
     return build_model(prepared.scene, prepared.particles, prepared.field, contact).problem
@@ -115,7 +114,7 @@ def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE) -> Engine:
         engine: A name from ``corporeal.ENGINES``.
 
     Raises:
-        UnknownChoiceError: There is no such engine.
+        UnknownChoiceError: The engine is unknown.
         UserError: The engine does not work on this machine, or cannot solve the problem.
 
     """
@@ -133,12 +132,12 @@ def simulate_scene(
     Args:
         scene: As built or loaded, or prepared already.
         settings: Of the stages from describe to simulate.
-        folder: Where the frames go; None: a temporary folder that goes with the result.
+        folder: Folder of the frames; None: a temporary folder that is deleted with the result.
         progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: A setting makes no sense, or the scene cannot be filled.
-        SimulationError: The state became impossible.
+        UserError: A setting is invalid, or the scene cannot be filled.
+        SimulationError: The simulation diverged.
 
     """
     ready = scene if isinstance(scene, PreparedScene) else prepare_scene(scene, settings, progress)

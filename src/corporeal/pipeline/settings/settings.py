@@ -1,4 +1,4 @@
-"""What a person may ask of a whole run."""
+"""Settings of a run."""
 
 from dataclasses import dataclass, field
 
