@@ -1,4 +1,4 @@
-"""What can be wrong with a model's answer: names and bounds, checked against what was asked."""
+"""Validation of a model's answers: names and bounds, checked against the question."""
 
 from collections.abc import Collection, Mapping, Sequence
 from math import isclose
@@ -179,7 +179,7 @@ def _nesting_problems(answer: MaterialsAnswer) -> list[str]:
 
 
 def weakness_notes(answer: MaterialsAnswer) -> list[str]:
-    """Describe what was mended in an answer, or makes it weak, in clauses."""
+    """Describe corrections and weaknesses of an answer, in clauses."""
     found = []
     for part in answer.parts:
         total = sum(way.probability for way in part.ways)
@@ -241,7 +241,7 @@ def _printed_weight(fact: PrintedStatement) -> float | None:
 
 
 def _too_dense(mass: float | None, box: float, advice: str) -> str:
-    """State that nothing of a mass [kg] fits a box [m³], or is so light; "": it may be."""
+    """Describe why a mass [kg] is implausible for a box [m³]; "": plausible."""
     low, high = BOX_DENSITY_RANGE_KG_M3
     mean = mass / box if mass is not None and box > 0 else low
     if low <= mean <= high:

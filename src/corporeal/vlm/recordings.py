@@ -1,4 +1,4 @@
-"""Answers recorded earlier: free, offline, repeatable.
+"""Recorded answers: free, offline, repeatable.
 
 A recording is one JSON file: task, scene, version of the prompt and facts put into it, schema,
 views, model, lists, prompt, answer. It is found by what was asked about what, not by pixels, by
@@ -42,8 +42,8 @@ class ReplayClient:
         self.folder = Path(folder)
         if not folder or not self.folder.is_dir():
             raise UserError(
-                f"No folder of recordings at {folder!r}. Say --vlm replay:FOLDER, or --vlm "
-                "metadata to go without."
+                f"No folder of recordings at {folder!r}. Use --vlm replay:FOLDER, or --vlm "
+                "metadata."
             )
         self.rows = [_read_recording(path) for path in sorted(self.folder.glob("*.json"))]
 
