@@ -1,4 +1,4 @@
-"""Breaking, simulated: what is struck with ten times the energy that it bears becomes pieces.
+"""Simulated fracture: objects struck with ten times the energy they withstand become fragments.
 
 The run is taken back to just before the two touch, what the wall bears until it breaks is taken
 from the impact, and the object becomes rigid pieces that move on as it did (decision 39). The
@@ -36,7 +36,7 @@ PIECE_CONTACT_POINTS = 1200
 
 @dataclass(frozen=True)
 class FracturedRun:
-    """An object that has just broken."""
+    """A run with one more fractured object."""
 
     stage: FractureState
     engine: CpuEngine
@@ -52,11 +52,11 @@ def next_breaking_impact(
     number: int,
     since: float,
 ) -> BrittleImpact | None:
-    """Return the first impact since a time [s] under which something breaks; None: there is none.
+    """Return the first fracturing impact since a time [s], if any.
 
     Args:
         stage: What is simulated.
-        breaks: What has broken, which breaks no more.
+        breaks: Earlier fractures; fragments don't break again.
         whole: Objects that cannot be cut.
         folder: Where the frames are.
         number: Of the last one.
@@ -81,13 +81,13 @@ def next_breaking_impact(
 def fracture_body(
     stage: FractureState, engine: CpuEngine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
 ) -> FracturedRun | None:
-    """Make pieces of what an impact is about to strike; None: it cannot be cut, and stays whole.
+    """Replace the struck object by fragments just before the impact; None: it cannot be cut.
 
     Args:
         stage: What is simulated.
         engine: At an instant before the impact; goes on to just before it.
-        blow: Which.
-        breaks: What broke before.
+        blow: The impact.
+        breaks: Earlier fractures.
 
     """
     owner = stage.posed.object_of_body
@@ -126,7 +126,7 @@ class _CutPieces:
 def _pieces(
     stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot
 ) -> _CutPieces | None:
-    """Cut an object into cells around the impact; None: its surface is not closed."""
+    """Cut an object into Voronoi cells around the impact; None: its surface is not closed."""
     scene, particles = stage.scene, stage.particles
     own = [s for s in scene.surfaces if s.object == blow.object]
     if len({s.finish for s in own}) != 1:
@@ -167,7 +167,7 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
 
 
 def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -> None:
-    """Slow the impact down by what the wall bears until it breaks; a body it strikes is pushed back.
+    """Subtract the fracture energy from the impact; the struck body recoils.
 
     J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
     """
@@ -183,7 +183,7 @@ def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -
 
 
 def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEvent) -> BodySplit:
-    """Return where the pieces are and how they move."""
+    """Return positions and motions of the fragments."""
     now, mine = engine.snapshot(), stage.rows(body)
     start = stage.particles.position[stage.particles.object == one.object].astype(float)
     turn, place = now.motion[mine][0], now.position[mine].mean(axis=0)

@@ -1,4 +1,4 @@
-"""What an impact does to brittle material: the peak force of its energy, and the tension under it.
+"""Brittle fracture under impact: peak force from the energy, and tensile stress under it.
 
 An impact's energy goes into a dent where the two touch (Hertz) and into bending the wall:
 E = F²/2k + ⅖ F^(5/3)/k_h^(2/3). Under the force a wall is in tension as under a load on a small
@@ -33,12 +33,12 @@ BrittleForm = Literal["closed", "tube", "plate", "lump"]
 """Of a wall that goes all around, an open vessel or bottle, a flat sheet, and what has no wall."""
 BreakageWord = Literal["holds", "may break", "would break"]
 CERTAIN_BREAK_ENERGY_RATIO = 10.0
-"""Times the energy that half of such parts bear, from which there is no doubt [-]."""
+"""Ratio to the energy that breaks half of such parts, from which breakage is certain [-]."""
 
 
 @dataclass(frozen=True)
 class ElasticSolid:
-    """How an isotropic solid gives."""
+    """Elastic constants of an isotropic solid."""
 
     young: float
     """E [Pa]."""
@@ -141,7 +141,7 @@ def _root(missing: Callable[[float], float]) -> float:
 
 
 def breakage_word(ratio: float) -> BreakageWord:
-    """Say in a word what an impact of so many times E₅₀ does."""
+    """Return the word for the outcome of an impact of so many times E₅₀."""
     if ratio < 1.0:
         return "holds"
     return "may break" if ratio <= CERTAIN_BREAK_ENERGY_RATIO else "would break"
