@@ -48,7 +48,7 @@ def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
     made = describe(bowl, from_pictures=[0])
     said = words(made)[("bowl_0", "bowl")]
     assert (said.structure, said.built_by, said.wall_unseen) == ("sheet", "metadata", True)
-    assert "By its name it is taken for open ware" in made.warnings[0]
+    assert "By its name it is open ware" in made.warnings[0]
     drawn = describe(bowl)
     assert words(drawn)[("bowl_0", "bowl")].structure is None and not drawn.warnings
     assert not describe(scene(THING), from_pictures=[0]).warnings

@@ -1,4 +1,4 @@
-"""Pose the problem: turn a scene filled with particles into what an engine is given."""
+"""Build the simulation problem from a scene filled with particles."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -392,7 +392,7 @@ def starts_settled(scene: Scene, particles: Particles) -> bool:
     Then gravity grows over a tenth of a second: switched on at once it would set off vibrations
     in which bodies hop by less than a grid cell.
     """
-    # What follows a path moves when it says.
+    # prescribed paths set the time of motion
     moving = np.abs(particles.velocity).max(initial=0.0) > 0.0
     if moving or any(o.push or o.wind for o in scene.objects):
         return False

@@ -1,4 +1,4 @@
-"""The cavity inside a wall: how much goes in, and where contents lie that do not fill it."""
+"""Cavities: volume inside a wall, and level of contents that fill a part of it."""
 
 from dataclasses import dataclass
 
@@ -34,7 +34,7 @@ class Cavity:
 
 
 def is_vessel(member: MeasuredPart) -> bool:
-    """Whether the room lies between the faces of the mesh instead of behind all of them.
+    """Whether the cavity lies between the faces of the mesh instead of behind all of them.
 
     A bowl too wide to be told from a body by what is blocked around its hollow is told by how much
     goes into that.

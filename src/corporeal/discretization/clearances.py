@@ -1,4 +1,4 @@
-"""How far objects can move towards each other, along a direction, before they touch."""
+"""Clearances between objects along a direction."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Which parts that prescribed motion presses are too stiff to be simulated so, and what is said.
+"""Limits on the stiffness of parts that prescribed motion compresses, with warnings.
 
 What a displacement is forced on has its shape at any stiffness, and only the force is as wrong as
 its stiffness. So a part that the step budget softens stays deformable, and the factor is said. What
@@ -48,8 +48,7 @@ def too_stiff_to_compress(
         return {}
     k = max(hard, key=lambda number: hard[number])
     return {
-        k: f"prescribed motion presses it by about {parts[k].pressed:.2g} of its thickness, and it "
-        "is too stiff to be simulated so"
+        k: f"prescribed motion presses it by about {parts[k].pressed:.2g} of its thickness, and it is too stiff for that"
     }
 
 
@@ -81,15 +80,14 @@ def warn_of_wrong_compression(
         share = treatment.young / true.young if true.young > 0.0 else 1.0
         if treatment.kind == "rigid":
             told.append(
-                f"{name} is pressed by about {part.pressed:.2g} of its thickness by what moves as "
-                "told, and is rigid, so no force on what presses it can be right. Let the path end "
-                "where it touches, or say a softer material."
+                f"{name} is pressed by about {part.pressed:.2g} of its thickness by prescribed "
+                "motion, and is rigid, so the contact force cannot be right. End the path at the "
+                "contact, or choose a softer material."
             )
         elif share < MIN_RIGHT_FORCE_STIFFNESS_RATIO:
             told.append(
-                f"{name} is pressed by what follows a prescribed path and simulated "
-                f"{1 / share:.2g} times "
-                "softer than it is: the force that it presses back with is about so much too "
-                "small. A finer detail has a larger step budget."
+                f"{name} is compressed by prescribed motion and simulated {1 / share:.2g} times "
+                "softer than it is: its reaction force is too small by about that factor. A finer "
+                "detail has a larger step budget."
             )
     return list(dict.fromkeys(told))

@@ -1,4 +1,4 @@
-"""How each part enters the simulation: rigid, deformable or shell, and with which numbers.
+"""Discretization of each part: rigid, deformable or shell, with its parameters.
 
 One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
 is rigid, by itself or as the frame of softer parts; everything else keeps its true stiffness; thin

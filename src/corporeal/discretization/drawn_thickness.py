@@ -1,4 +1,4 @@
-"""What a mesh draws of an object: holes, and how thick; who is asked about it has to know."""
+"""Thickness and holes of an object as drawn by its mesh, for questions to a model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class DrawnShape:
 
 
 NO_DRAWN_SHAPE = DrawnShape()
-"""Of what nobody measured, or what is not closed."""
+"""Of parts that were not measured or are not closed."""
 
 
 def measure_drawn_shape(surfaces: Sequence[TriangleSurface], scale: float = 1.0) -> DrawnShape:

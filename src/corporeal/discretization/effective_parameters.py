@@ -1,4 +1,4 @@
-"""The treatment of one part: rigid, deformable or shell, with which numbers and why."""
+"""Simulated parameters of one part: rigid, deformable or shell, with reasons."""
 
 from dataclasses import dataclass
 from math import hypot, inf, sqrt
@@ -195,7 +195,7 @@ def treatment_reason(verdict: RigidityVerdict, role: PartRole) -> str:
     """Say in one sentence why a part is treated as it is."""
     return {
         "rigid": f"Rigid, because {verdict.reason}.",
-        "frame": f"A rigid frame that holds what is soft around it, because {verdict.reason}.",
+        "frame": f"A rigid frame that holds the soft parts around it, because {verdict.reason}.",
         "trinket": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
@@ -257,9 +257,8 @@ def partner_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
     if not names or not is_dented_as_hertz(part) or CONSTITUTIVE_LAWS[part.material.law].loose:
         return ""
     return (
-        f" What meets it is rigid here ({', '.join(names)}) and would give way beside it in "
-        "reality: "
-        "its loss factor is that of both, of each by its share of the compliance."
+        f" What meets it is rigid here ({', '.join(names)}) but deforms in reality: the loss "
+        "factor is that of both, weighted by compliance."
     )
 
 

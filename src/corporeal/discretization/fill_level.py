@@ -1,4 +1,4 @@
-"""The shape of what lies loose in a vessel: its hollow up to the level of what is in it."""
+"""Shape of loose contents: the hollow of a vessel up to the fill level."""
 
 from dataclasses import dataclass
 

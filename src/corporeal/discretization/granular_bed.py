@@ -1,8 +1,7 @@
-"""What lies below the drawn surface of granular material: it fills what holds it down to the wall.
+"""Granular beds: material below a drawn surface, down to the walls of its container.
 
-Whoever models a plant or a cup of coffee draws the top of what is in it, and pictures show no
-more. Grains and liquids do not lie over air, so that all between that surface and the inside of
-what holds it is theirs.
+Models and pictures show only the top surface of contents. Grains and liquids do not rest on air, so
+they fill the space between that surface and the container.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Objects whose granular material fills what holds it, although only its surface is drawn."""
+"""Granular beds of objects of which only the surface is drawn."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -121,6 +121,6 @@ def warn_of_loose_sheets(
     return tuple(
         f"{scene.objects[parts.catalogue[m.part].object].name}: {parts.catalogue[m.part].name} of "
         f"{field.materials[m.part].name} is drawn as an open sheet, and nothing of the same object "
-        "holds it: how deep it is, and so its mass, is a guess. Model its body, or what it lies in."
+        "holds it: its depth and mass are a guess. Model its volume or its container."
         for m in found
     )

@@ -1,4 +1,4 @@
-"""At which frequency a mat loses: that of the impacts that it takes.
+"""Frequency of damping of soft mats, set by the impacts on them.
 
 Branches keep a loss factor over one decade (``mpm.physics.branches``). A ball that strikes touches
 for two to three half periods of its own slowest vibration, which lie in it. A mat is struck in one

@@ -1,4 +1,4 @@
-"""Restitution of rigid parts at the speeds of their impacts."""
+"""Restitution of rigid parts at their impact speeds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

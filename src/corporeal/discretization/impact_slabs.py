@@ -1,4 +1,4 @@
-"""Slabs and sheets on the floor that would be dented much too deeply.
+"""Slabs and sheets on the floor that would be indented much too deeply.
 
 A ball that is dented more than twice as deep as in reality is rigid instead (``step_budget``). So
 is a slab that lies on the floor and is softened by the step budget, and a flat sheet that the grid

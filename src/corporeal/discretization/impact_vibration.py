@@ -1,12 +1,13 @@
-"""A ball that is struck hard vibrates: what that takes of an impact, its material has not to lose.
+"""Energy lost to vibration in hard impacts of balls, subtracted from the material's loss.
 
-Loss factors and rebounds are one thing by hereditary Hertz contact (``materials.rebound``), which
-holds where an impact is slow against the waves in the ball. An impact of ρ v²/E = 0.1 dents it by
-two thirds of its radius and leaves it vibrating, and it comes back as if its loss factor were
+Loss factor and restitution are equivalent in hereditary Hertz contact (``materials.rebound``),
+which holds where an impact is slow against the waves in the ball. An impact of ρ v²/E = 0.1 dents
+it by two thirds of its radius and leaves it vibrating, and it comes back as if its loss factor were
 larger by 0.09. A solid ball does that in reality, too, and there is nothing to mend where it is as
 stiff here. It is too much
 
-- where the step budget has softened it: what it loses here beyond what it does in reality is taken off
+- where the step budget has softened it: what it loses here beyond what it does in reality is taken
+off
   its loss factor;
 - where it stands for a wall with air behind it, whose loss factor was made from its rebound, or is
   that of the wall: the solid rings instead of them.
@@ -106,6 +107,5 @@ def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Disc
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, made.impact_speed, cell),
-        why=f"{made.why} It is struck so hard that vibrations of its own take what a loss factor "
-        f"of {taken:.2g} would, beyond those of the real thing: its material loses so much less.",
+        why=f"{made.why} Its simulated vibrations in a hard impact dissipate as much as a loss factor of {taken:.2g}, beyond those of the real object: its loss factor is reduced by that.",
     )

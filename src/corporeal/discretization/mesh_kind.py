@@ -1,4 +1,4 @@
-"""What a mesh models: bodies, walls with both faces or open sheets; and which faces are outer."""
+"""Classification of meshes: bodies, walls with both faces or open sheets; outer faces."""
 
 from dataclasses import dataclass
 from enum import IntEnum

@@ -1,4 +1,4 @@
-"""One object taken apart: which triangles enclose which part, how large everything is."""
+"""Measures of one object's mesh: the triangles, volumes and areas of its parts."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace

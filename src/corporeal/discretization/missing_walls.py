@@ -1,8 +1,8 @@
-"""Walls below soft material that lies on them, where one surface is drawn of both.
+"""Missing walls below soft material, where one surface is drawn of both.
 
-Pictures show no border inside a thing: of a couch's base they show sides and underside, of its seat
-the top. What is soft bridges no hollow, so that the base has a top below its seat. What is stiff
-does, as a slab on a cabinet and the cork of a jar.
+Pictures show no border inside an object: of a couch's base they show sides and underside, of its
+seat the top. What is soft bridges no hollow, so that the base has a top below its seat. What is
+stiff does, as a slab on a cabinet and the cork of a jar.
 """
 
 from collections.abc import Mapping, Sequence
@@ -230,4 +230,4 @@ def describe_missing_wall(member: MeasuredPart) -> str:
     if member.lid is None:
         return ""
     area = float(member.lid.areas.sum())
-    return f": closed, though not shown, below what is soft and lies on it ({area:.2g} m²)"
+    return f": closed below the soft part on it, though not drawn ({area:.2g} m²)"

@@ -1,4 +1,4 @@
-"""All points of one object, part by part, from a recipe for each part."""
+"""Material points of one object, part by part."""
 
 from dataclasses import dataclass
 

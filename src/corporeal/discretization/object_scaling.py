@@ -1,4 +1,4 @@
-"""How large objects stand in a scene together, and what that makes of their walls.
+"""Relative scaling of objects in a scene, walls included.
 
 A duck beside a couch is a dot. A power law between 0 (all of one size) and 1 (true relative sizes)
 brings objects nearer to each other and keeps their order. An object that is not life-size is the
@@ -84,11 +84,11 @@ def parse_extent(text: str, only: str = "") -> tuple[str, float]:
     """Return name and metres of "duck=0.1", or of "0.1" where there is only one object.
 
     Args:
-        text: What a person typed after --extent.
+        text: Value of --extent.
         only: Name of the only object there is; "": there are several.
 
     Raises:
-        UserError: It says something else.
+        UserError: The format is invalid.
 
     """
     name, _, number = text.rpartition("=")

@@ -1,4 +1,4 @@
-"""What a level liquid could fill of an open shape, up to its rim."""
+"""Volume of open cavities up to the rim."""
 
 from collections.abc import Sequence
 

@@ -1,7 +1,6 @@
-"""How large the sheet is that open ware is formed from, whatever lies in its hollow.
+"""Area of the sheet that open ware is formed from, independent of its hollow.
 
-Pictures show the outside of a bowl well, and its plain inside hardly: between the two a surface
-from pictures holds anything from a wall to a lump with a roof over the rim. So only its outside is
+Reconstructions show the outside of a bowl well, and its plain inside hardly, so only the outside is
 measured.
 """
 
@@ -66,7 +65,7 @@ def find_vessel_outside(shape: QueryMesh, part: Mesh, rng: np.random.Generator) 
     normals = part.normals[triangle]
     below, seen = _openness(shape, points, normals)
     counts = np.minimum(1.0, 2.0 * below)
-    # Half of what there is below, so that the outer side of a mouth is told from its inner one.
+    # half of the depth below, to separate the outer and the inner side of a mouth
     beside = below > 0.25 * (1.0 - normals[:, 2])
     counts[beside & _is_beside_mouth(points, seen > 0.1)] = 1.0
     reach = NORMAL_AVERAGING_RADIUS_FRACTION * float(np.sort(np.ptp(points, axis=0))[1])

@@ -1,4 +1,4 @@
-"""What is rigid loses nothing on what is soft, so that what is soft loses for both.
+"""Damping of contact pairs: the deformable side takes the loss of the rigid side, too.
 
 One force presses both sides of a contact and their dents add up, so that each stores energy in
 proportion to its compliance (1 - ν²)/E, and loses of that what its own loss factor says. A rigid

@@ -1,6 +1,6 @@
-"""What the treatment policy needs to know of a part: its shape, its material, what will happen to it.
+"""Inputs of the discretization policy for one part: shape, material, expected loads.
 
-A part's wall may be simulated thicker than it is; here is what that does to its numbers.
+Includes the effective parameters of thickened walls.
 """
 
 from dataclasses import dataclass, replace
@@ -149,7 +149,7 @@ def is_subgrid_part(part: PartGeometry, cell: float) -> bool:
 
 
 def part_width(part: PartGeometry) -> float:
-    """How wide the part is across [m]: its shortest side, or less where it is bent or branched.
+    """Width of the part [m]: its shortest side, or less where it is bent or branched.
 
     6 V/A is the side of the cube (the diameter of the sphere) with the part's volume per area; it
     says nothing when the mesh models the wall itself, inside and outside.

@@ -1,4 +1,4 @@
-"""How a part is made: solid, wall or sheet, how thick, how heavy, and where its material lies."""
+"""Construction of a part: solid, wall or sheet, with thickness, mass and filling."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.object_filling import FillRecipe
 
 GUESSED_SHEET_THICKNESS_FRACTION = 0.01
-"""Thickness of an open sheet, of its middle extent, where nobody states it."""
+"""Default thickness of an open sheet, relative to its middle extent."""
 THICKNESS_FROM_MESH = "as its mesh shows"
 THICKNESS_FROM_NAME = "as objects of its name usually have"
 THICKNESS_FROM_JUDGE = {
@@ -58,11 +58,11 @@ class VolumeLeeway:
     """
 
     larger: float = 1.0
-    """Factor of the volume that the surface encloses, where nobody said how swollen it is [-]."""
+    """Default factor of the volume enclosed by the surface of a scan [-]."""
     about: float = 1.0
-    """The same about what somebody said: without its mean [-]."""
+    """The same for a stated ratio: without its mean [-]."""
     deviate: float = 0.0
-    """By how many of its widths what somebody said is off."""
+    """Deviation of the stated ratio in its standard deviations."""
 
     def of(self, words: PartDescription) -> float:
         """Return the factor of what is described [-], whose likely share counts already."""
@@ -75,7 +75,7 @@ NO_VOLUME_LEEWAY = VolumeLeeway()
 
 
 def swelling_log_sigma(said: ScanThickening) -> float:
-    """Return the standard deviation of the logarithm of a share that somebody judged [-]."""
+    """Return the standard deviation of the logarithm of a judged share [-]."""
     return max(log(said.high / said.low) / NORMAL_90_PERCENT_WIDTH_SIGMAS, MIN_EYE_LOG_SIGMA)
 
 
@@ -135,7 +135,7 @@ class PartModel:
     whose: str = ""
     """Where its wall's thickness comes from, in a clause."""
     outside: bool = False
-    """Whether its wall is taken to lie along its outside, as nobody saw how deep it is inside."""
+    """Whether its wall is assumed along its outside, since its inside was not seen."""
     leaves: float = 0.0
     """Of a crown in bulk: area of one side of its leaves [m²], by which it is weighed; else 0."""
 
@@ -429,14 +429,14 @@ def _is_open_sheet(words: PartDescription) -> bool:
 def choose_wall_thickness(
     structure: Structure, words: PartDescription, shown: float, usual: float, guess: float
 ) -> tuple[float, str]:
-    """Return a wall's thickness [m], and its source: the first that knows.
+    """Return a wall's thickness [m], and the first source that has it.
 
     Args:
         structure: How it is built.
         words: Its description.
         shown: What its mesh draws [m]; 0: nothing.
-        usual: Of such walls [m]; 0: not known.
-        guess: What is taken where nobody knows [m].
+        usual: Usual thickness [m]; 0: unknown.
+        guess: Default [m].
 
     """
     if words.thickness:
@@ -447,11 +447,11 @@ def choose_wall_thickness(
         return structure.thickness, THICKNESS_FROM_JUDGE[by]
     if shown:
         return shown, THICKNESS_FROM_MESH
-    return (usual, "as such walls usually are") if usual else (guess, "as is guessed from its size")
+    return (usual, "as such walls usually are") if usual else (guess, "as guessed from its size")
 
 
 def thickness_judge(words: PartDescription) -> str:
-    """Return who stated the thickness having seen the object; "" for nobody."""
+    """Return the source that stated the thickness after seeing the object, or ""."""
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")
@@ -520,7 +520,7 @@ def describe_fill(
     springs = "leaves on springs" if treatment.kind == "foliage" else ""
     if made.leaves:
         shown = f"about {made.leaves:.2g} m² of leaves {made.sheet * 1e3:.3g} mm thick"
-        return f"{springs or 'a crown'}, {shown}: its surface does not show one from another"
+        return f"{springs or 'a crown'}, {shown}: its surface does not resolve single leaves"
     if springs:
         return springs
     if made.held:
@@ -532,7 +532,7 @@ def describe_fill(
         return f"solid, {member.volume * 1e6:.4g} cm³ by winding number{open_too}"
     wall = describe_wall(made)
     if not made.modelled and is_porous_shell(member, cell):
-        return f"{wall}, filled through because it is narrow, with the wall's mass{open_too}"
+        return f"{wall}, filled as a solid because it is narrow, with the wall's mass{open_too}"
     if treatment.kind == "shell" and treatment.thickness and treatment.thickness > made.thickness:
         return f"{wall}, simulated {treatment.thickness * 1e3:.3g} mm thick{open_too}"
     return f"{wall}{open_too}"

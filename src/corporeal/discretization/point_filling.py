@@ -1,4 +1,4 @@
-"""Material points for bodies, walls and sheets: where they lie and how much each stands for."""
+"""Sampling of material points in bodies, walls and sheets, with their volumes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Every point's share of its part's mass, and no point of one object among another's."""
+"""Masses of material points, and removal of overlaps between objects."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,12 +1,12 @@
-"""What prescribed motion presses: how hard, before anything is simulated.
+"""Compression by prescribed motion, estimated before the simulation.
 
-What follows a prescribed path forces a displacement on what lies in its way and cannot go away:
-between a path and the floor, a wall or another path. Along the direction in which those two come
-closer to each other, all free objects between them are pushed together as rigid bodies, one up to
-the next, as far as they go: the least sum of gaps from one to the other is how far they may come.
-What they come farther, s, is taken up by what lies in between as by springs in series: it bears p =
-s / Σ (L_k/E_k), and strains by p/E, so that a block of steel under a ball of rubber stays what it
-is. What can go away (a block before a pusher) is pressed by nothing.
+A prescribed path forces a displacement on objects that cannot give way: between a path and the
+floor, a wall or another path. Along the direction in which those two come closer to each other, all
+free objects between them are pushed together as rigid bodies, one up to the next, as far as they
+go: the least sum of gaps from one to the other is how far they may come. What they come farther, s,
+is taken up by what lies in between as by springs in series: it bears p = s / Σ (L_k/E_k), and
+strains by p/E, so that a block of steel under a ball of rubber stays what it is. What can go away
+(a block before a pusher) is pressed by nothing.
 
 Objects are pushed together from where they start, and are not turned: what is first brought
 elsewhere, or tips off its support, is judged as if it had stayed.

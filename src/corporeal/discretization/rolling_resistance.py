@@ -1,4 +1,4 @@
-"""How far the force on what rolls lies ahead of its middle: c of every pair [m], from their loss.
+"""Rolling resistance: offset c of the contact force of every pair [m], from their loss factors.
 
 What rolls presses in before it and is pushed back behind it by less, by what its material and the
 other one lose. The moment of that is c N, with c = 3/16 α a under a ball and 2/(3π) α a under a

@@ -1,7 +1,7 @@
-"""Where the steps that a scene may take do not suffice: waves are slowed, in their order.
+"""Step budget: reduction of wave speeds if the allowed number of time steps does not suffice.
 
-First the bulk of what is nearly incompressible gives way, which hardly shows; then Young's modulus.
-What would then be dented or squashed much more than in reality is rigid instead.
+First the bulk modulus of nearly incompressible materials is reduced, which is hardly visible; then
+Young's modulus. Parts that would then be deformed much more than in reality become rigid.
 
 Also the published rule, a cap that does not keep the order: a control only.
 """
@@ -51,7 +51,7 @@ def slow_subgrid_parts(
     for part, treatment, trinket in zip(parts, treatments, small, strict=True):
         if not trinket:
             fastest[part.object] = max(fastest[part.object], treatment.wave_speed)
-    because = "Too small for the grid to show its own stiffness, it is slowed to what it sits on"
+    because = "Too small for the grid to resolve its stiffness, it is softened to its surroundings"
     return [
         slow_waves(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
         for p, t, trinket in zip(parts, treatments, small, strict=True)
@@ -103,7 +103,7 @@ def fit_step_budget(
     # A part whose bulk gave way runs at the limit, but for rounding.
     if fastest <= limit * (1 + 1e-9):
         return BudgetedTreatments(treatments)
-    because = "The step budget slows its waves"
+    because = "The step budget reduces its wave speed"
     bends = [(t.young, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
     knee, power = fit_young_compression(bends, limit)
     fitted = [
@@ -120,7 +120,7 @@ def fit_step_budget(
     )
     warning = (
         f"{changed} of {len(fitted)} parts {softer}, to stay within {steps:,.0f} steps per second; "
-        "what is stiffer stays stiffer. A finer --detail has a larger budget."
+        "the order of stiffness is kept. A finer --detail has a larger budget."
     )
     return BudgetedTreatments(fitted, (warning,))
 

@@ -1,7 +1,6 @@
-"""Open ware from pictures as the vessel that it is: material along its outside, as thick as its wall.
+"""Open ware from pictures as a shell along its outside, with the thickness of its wall.
 
-What pictures did not see of a hollow is drawn as a lump, or as a roof over the rim. Such ware would
-hold nothing, and what falls into it would lie on its mouth.
+Unseen hollows are reconstructed as a lump or as a roof over the rim; such ware would hold nothing.
 """
 
 from collections.abc import Sequence

@@ -101,7 +101,7 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 
 
 def _undivided_objects_warning(objects: Sequence[ObjectDescription]) -> list[str]:
-    """Return which objects have unknown pieces: a chair from pictures may be all foam.
+    """Return a warning of objects whose pieces are unknown.
 
     Unknown materials are reported by ``ground``.
     """
