@@ -34,7 +34,7 @@ PLANTED = {
     ),
     "incompressible": (
         ("high = 0.3,", "high = 0.5,"),
-        "poisson: reaches 0.5: at 0.5 no volume can change at all.",
+        "poisson: reaches 0.5: 0.5 is incompressible.",
     ),
     "no source": ((', source = "my-bench" }\npoisson', " }\npoisson"), "young_GPa: has no source."),
     "empty source": (
@@ -67,15 +67,15 @@ PLANTED = {
     "no yield stress": (("yield_MPa", "note = 'x' #"), "no yield stress (von_mises reads it)."),
     "never read": (("von_mises", "hencky"), "hencky never reads yield stress."),
     "no law": (('law = "von_mises"', ""), "has no law. Add law = one of: corotated"),
-    "strange law": (("von_mises", "hooke"), "law: 'hooke' is no law."),
+    "strange law": (("von_mises", "hooke"), "law: 'hooke' is not a constitutive law."),
     "no group": (('group = "metal"', ""), "has no group, so its numbers cannot be compared"),
-    "strange group": (('"metal"', '"metals"'), "group: 'metals' is no group."),
+    "strange group": (('"metal"', '"metals"'), "group: 'metals' is not a group."),
     "not a range": (("{ low = 0.28, typical = 0.29, high = 0.3,", "0.3 #"), "is 0.3, not a range."),
     "a word for a number": (("low = 0.28", 'low = "0.28"'), "poisson: 'low' is missing or no nu"),
-    "not a number": (("low = 0.28", "low = nan"), "poisson: 'low' is missing or no number."),
+    "not a number": (("low = 0.28", "low = nan"), "poisson: 'low' is missing or not a number."),
     "strange entry": (("low = 0.28", "min = 0.1, low = 0.28"), "an unknown entry 'min'."),
     "strange base": (("\n[sources", "extends = 'mine'\n[sources"), "extends: 'mine' is no library"),
-    "no citation": (('cite = "Our', 'site = "Our'), "says nothing that could be looked up."),
+    "no citation": (('cite = "Our', 'site = "Our'), "has no citation."),
     "two of one name": (
         ("[lamp_steel]", "[other]\nlaw = 'hencky'\naliases = ['Lamp_Steel']\n[lamp_steel]"),
         "'lamp_steel' also names other.",

@@ -1,4 +1,4 @@
-"""What happens between two surfaces: measured pairs first, then a stated rule."""
+"""Friction and restitution of pairs of materials: measured pairs first, then combination rules."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -66,7 +66,7 @@ class Restitution:
     value: float
     """[-]"""
     measured: MeasuredRange | None
-    """Of the pair; None: nobody measured it, and ``value`` is the rule's."""
+    """Range of the pair; None: not measured, and ``value`` is the rule's."""
 
 
 VITREOUS_MATERIALS = frozenset(("glass", "ceramic", "porcelain"))

@@ -1,4 +1,4 @@
-"""What a sheet of layers gives back when it is pressed across them.
+"""Restitution of layered sheets under flat crush.
 
 Corrugated board is stiff in its plane and weak across its flutes, which fold at a pressure that
 hardly changes until they lie flat (flat crush). An impact that presses harder than that is work

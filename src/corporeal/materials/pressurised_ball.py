@@ -172,12 +172,12 @@ def inflated_ball_material(ball: InflatedBall) -> Material:
     light, skin = equivalent_solid(ball, 0.0), ball.skin
     density = AIR_DENSITY * (1.0 + ball.gauge / ATMOSPHERIC_PRESSURE_PA)
     bounces = restitution_of_loss(light.loss)
-    why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa press side by side"
+    why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa act in parallel"
     values = {
         "young": _ground(0.5 * light.young, light.young, 1.5 * light.young, why),
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "as of a ball full of air"),
         "density": _ground(density, density, density, "air at this pressure"),
-        "restitution": _ground(0.0, bounces, 1.0, "what the wall loses of what it stores"),
+        "restitution": _ground(0.0, bounces, 1.0, "the wall's share of the loss"),
         "loss": _ground(
             0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"
         ),

@@ -1,7 +1,7 @@
-"""Consistent sets of values drawn from the measured ranges: what is not known, as samples.
+"""Sampling of consistent material values from the measured ranges.
 
 A value is drawn from a triangle on its range's own scale, whose peak is the chosen value. It spans
-the whole range where nobody chose, half of the way to either end where a model did, and nothing
+the whole range if none was chosen, half of the way to either end where a model did, and nothing
 where a person stated it. Within one material the stiffer grade is also the stronger, and in porous
 and granular material the denser; what is of one material in one object is of one grade.
 """
@@ -77,7 +77,7 @@ def triangular_quantile(quantile: float, low: float, peak: float, high: float) -
 
 
 def draw_hypotheses(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
-    """Draw for every part one of the ways it may be, as a whole, by their probabilities.
+    """Sample a hypothesis for every part by their probabilities.
 
     Ways that share a reading of the object ("imitation") are drawn together. What nobody recognised
     may be of any of the library's materials. Where several answers were given, one of them is drawn

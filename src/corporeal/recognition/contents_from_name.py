@@ -1,4 +1,4 @@
-"""What a name says of a vessel's contents: how full it is, and of what."""
+"""Contents of vessels from names: fill level and material."""
 
 import re
 from collections.abc import Collection, Iterator, Sequence
@@ -41,7 +41,7 @@ class NamedContents:
     share: float | None
     """Of the cavity inside the wall [-]; None: it says only of what."""
     contents: str | None
-    """A name from the library; None: it does not say of what, or nobody knows that word."""
+    """Material of the library; None: not named or unknown."""
     vessel: WordPhrase
     """The vessel's name; (): none is known."""
     drinks: bool
@@ -94,7 +94,7 @@ def _is_level(said: Sequence[str], k: int, n: int) -> bool:
 
 
 def _find_contents(said: Sequence[str], vessel: WordPhrase, end: int, levelled: bool) -> str | None:
-    """Return what is in a vessel: "bottle of milk", and where its level is told "milk bottle"."""
+    """Return a vessel's contents: "bottle of milk", and with a fill level "milk bottle"."""
     if not vessel:
         return None
     known = {p: name for name in contents_table()["contents"] for p in _phrases("contents", name)}
@@ -148,7 +148,7 @@ def apply_named_contents(
         else GOODS_FILL_FRACTION
     )
     fill = usual if said.share is None else said.share
-    taken = "" if said.contents or found.contents else f", of what is not said: of {inner}"
+    taken = "" if said.contents or found.contents else f", contents not named: {inner}"
     reason = f"{found.reason} By its name it is {fill:.0%} full of {inner}{taken}."
     return replace(found, structure="filled", contents=inner, fill=fill, reason=reason)
 
@@ -175,13 +175,13 @@ def _contents_text(said: NamedContents) -> str:
 
 def _unused_reason(thing: ObjectDescription, said: NamedContents) -> str:
     if not said.vessel:
-        return "it names no vessel that is known"
+        return "it names no known vessel"
     if len(thing.parts) > 1:
-        return "which of its parts holds it is not known"
+        return "the part that holds it is unknown"
     if not (said.contents or said.drinks):
-        return "it does not say of what"
+        return "its contents are not named"
     material = next((p.material for p in thing.parts if p.material), "it")
-    return f"{material} has no wall that is known"
+    return f"no wall thickness of {material} is known"
 
 
 def _is_accounted_for(thing: ObjectDescription, said: NamedContents) -> bool:

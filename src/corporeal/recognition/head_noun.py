@@ -1,4 +1,4 @@
-"""Which word of a name is the thing: read as English has it, whatever order the file has."""
+"""Head nouns of names, by English word order."""
 
 import tomllib
 from collections.abc import Collection, Sequence
@@ -81,7 +81,7 @@ def _names_object(words: Sequence[str], known: KnownWords, phrases: PhraseSet) -
 
 
 def _is_followed_by_substance(word: str, behind: Sequence[str], known: KnownWords) -> bool:
-    """Return whether a preposition is followed by what something is made of, and by no object."""
+    """Return whether a preposition is followed by a substance, and by no object."""
     return (word,) in _phrases("made") and behind[0] in known.first and len(behind) == 1
 
 

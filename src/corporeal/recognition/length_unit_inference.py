@@ -1,4 +1,4 @@
-"""What the lengths of mesh files that state no unit are in, judged by how large such objects are."""
+"""Inference of the length unit of mesh files from usual sizes of objects."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ PRINT_UNIT_ORDER = ("millimetres", "metres", "centimetres", "inches")
 """In which order they are likely in files that are made for printing."""
 IMPLAUSIBLE_SIZE_RATIO = 10.0
 """No mesh is so many times smaller or larger than the smallest or largest of such objects."""
-UNIT_ADVICE = "--unit or --extent says otherwise."
+UNIT_ADVICE = "Override with --unit or --extent."
 MAX_NAMED_FILES = 3
 """Files that are named in one sentence."""
 
@@ -114,8 +114,9 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
     if not unit:
         return [
             Note(
-                f"{row.file.name} states no unit: it was made as large as "
-                f"{with_article(row.usual, 'usually is', 'usually are')}, {length_text(row.extent)}. {UNIT_ADVICE}",
+                f"{row.file.name} states no unit: it was scaled to the size that "
+                f"{with_article(row.usual, 'usually is', 'usually are')}, "
+                f"{length_text(row.extent)}. {UNIT_ADVICE}",
                 NoteKind.ASSUMED,
             )
             for row in rows
@@ -125,7 +126,7 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
         size = length_text(rows[0].extent)
         return [
             Note(
-                f"{names[0]} states no unit: it was taken to be in {unit}{also}, so that it is "
+                f"{names[0]} states no unit: it was read in {unit}{also}, so that it is "
                 f"{size} large. {UNIT_ADVICE}",
                 NoteKind.ASSUMED,
             )
@@ -136,8 +137,8 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
     sizes = [row.extent for row in rows]
     return [
         Note(
-            f"{', '.join(first)} and {last} state no unit: they were taken to be in {unit}{also}, "
-            f"so that they are {length_text(min(sizes))} to {length_text(max(sizes))} large. {UNIT_ADVICE}",
+            f"{', '.join(first)} and {last} state no unit: they were read in {unit}{also}, so that "
+            f"they are {length_text(min(sizes))} to {length_text(max(sizes))} large. {UNIT_ADVICE}",
             NoteKind.ASSUMED,
         )
     ]

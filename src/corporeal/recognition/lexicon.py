@@ -1,4 +1,4 @@
-"""The lexicon: what words, and plain colours, tell about material."""
+"""Lexicon of materials: words and plain colours."""
 
 import colorsys
 import tomllib
@@ -24,7 +24,7 @@ from corporeal.recognition.translation import OF_PREPOSITIONS, translate_words
 from corporeal.recognition.typical_extents import sized_classes
 
 LOOSE_MATERIALS = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
-"""What no container is made of: a compost bin has some in it."""
+"""Materials of contents, never of containers: a compost bin."""
 NOUNS_SHAPED_OF_LOOSE = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
 """Things that are made of it: a snow shoe is not."""
 NOUNS_WHOLLY_OF_MATERIAL = frozenset(("block", "ring", "bag"))
@@ -379,14 +379,14 @@ def formed_materials() -> frozenset[str]:
 
 
 def names_unknown_object(tokens: tuple[str, ...]) -> bool:
-    """Return whether a name has a word for an object, of whose material no table knows anything."""
+    """Return whether a name has a word for an object without a known material."""
     standing = head_terms(tokens)
     known = {w for term in standing for w in term.phrase} | _describing_words() | OF_PREPOSITIONS
     return all(t.kind == "substance" for t in standing) and any(w not in known for w in tokens)
 
 
 def substance_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
-    """Return the words of a name that say what the object is made of."""
+    """Return the words of a name that name the object's material."""
     return [t for t in head_terms(tokens) if t.kind == "substance"]
 
 
@@ -396,7 +396,7 @@ def names_solid_object(tokens: tuple[str, ...]) -> bool:
 
 
 def is_hollow_in_material(thing: LexiconTerm, material: str) -> bool:
-    """Return whether an object has its wall where it is of a material that somebody names."""
+    """Return whether an object is hollow in a named material."""
     if not (thing.moulded or thing.blown) or material in mouldable_materials():
         return True
     return thing.moulded and material in fired_materials()

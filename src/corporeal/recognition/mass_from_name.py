@@ -1,4 +1,4 @@
-"""A mass that a name states: "dumbbell_5kg", "10lb bowling ball"; volumes and sizes are none."""
+"""Masses stated in names: "dumbbell_5kg", "10lb bowling ball"."""
 
 import re
 import tomllib
@@ -80,8 +80,8 @@ def mass_from_name_warning(name: str, mass: float, *names: str) -> str | None:
     ):
         return None
     return Note(
-        f"{name}: its name says {said:.3g} kg, and it weighs {mass:.3g} kg. Check how large it is "
-        "(--extent), what it is made of and whether it is hollow or filled (--annotations); or the "
+        f"{name}: its name says {said:.3g} kg, and it weighs {mass:.3g} kg. Check its size "
+        "(--extent), its material and whether it is hollow or filled (--annotations); or the "
         "name means something else.",
         NoteKind.ASSUMED,
     )

@@ -1,4 +1,4 @@
-"""What all objects of a name have: the air in a ball, the rebound that its rules ask for."""
+"""Priors by name: pressure of balls, and restitution by the rules of their sport."""
 
 from collections.abc import Callable
 

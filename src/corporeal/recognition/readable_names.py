@@ -1,4 +1,4 @@
-"""Everyday words out of file, node and mesh names."""
+"""Everyday words from file, node and mesh names."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ FILLER_WORDS = frozenset(
 def everyday_words(name: str) -> str:
     """Return the words of a name that say what an object is: "soda can coke"; may be empty.
 
-    Of any alphabet: what no table of ours knows still tells objects apart for its reader.
+    Words of any alphabet are kept.
     """
     name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)

@@ -1,4 +1,4 @@
-"""Names in other languages, as far as they name everyday objects and what these are made of."""
+"""Translation of names of everyday objects and materials to English."""
 
 import tomllib
 import unicodedata

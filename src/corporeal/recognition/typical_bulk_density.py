@@ -1,4 +1,4 @@
-"""How heavy everyday objects are for the room that they take, to notice what cannot be."""
+"""Typical bulk density of everyday objects, for plausibility checks."""
 
 import tomllib
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ def typical_bulk_density(class_name: str, longest: float) -> TypicalBulkDensity 
     """Return the entry of the name's last known noun, the one with the most words that fit.
 
     Args:
-        class_name: What somebody calls an object.
+        class_name: Class of the object.
         longest: Its longest side [m].
 
     """
@@ -106,7 +106,7 @@ def mass_warning(
     )
 
 
-MASS_ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."
+MASS_ADVICE = "Check its size (--extent), its material and whether it is hollow."
 
 
 def _mass_text(name: str, mass: float, found: float, measure: BulkMeasure) -> str:

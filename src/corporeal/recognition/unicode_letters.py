@@ -1,4 +1,4 @@
-"""Letters of every alphabet, as they stand in names that people give to objects."""
+"""Letters of every alphabet, for tokenizing names."""
 
 import unicodedata
 from itertools import groupby

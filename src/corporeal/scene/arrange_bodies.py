@@ -1,4 +1,4 @@
-"""Where bodies start: near each other, upright where they can stand, and nowhere touching.
+"""Initial arrangement of bodies: close, upright where possible, without contact.
 
 A body comes from outside along a straight line and stops short of what is there. By conservative
 advancement (Mirtich 1996) it moves, again and again, as far as it is away from everything: no

@@ -1,4 +1,4 @@
-"""How fast to send the first of a row, so that the impact reaches the last.
+"""Initial speed of a chain of collisions, so that the impact reaches the last object.
 
 Backwards along the row: what slides a way d arrives with v² = v₀² - 2 μ g d, and goes on together
 with what it strikes, M v/(M + m): impacts without a bounce. Where heavy objects come first that

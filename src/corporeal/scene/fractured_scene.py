@@ -1,4 +1,4 @@
-"""A scene in which the pieces of what broke are objects."""
+"""Scenes with fragments as objects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

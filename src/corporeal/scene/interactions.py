@@ -1,4 +1,4 @@
-"""What happens in a settled scene: who falls, is thrown, is pushed along, or stands in the wind.
+"""Interactions of a settled scene: drop, throw, slide, wind.
 
 The settled poses are certified at rest; an interaction changes the start of as few objects as it
 can. Heights and speeds are drawn within ranges that scale with the scene, so that a scene of twice

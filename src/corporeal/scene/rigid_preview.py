@@ -1,7 +1,7 @@
-"""Play the start of an interaction with rigid bodies, to see who will meet whom, and when.
+"""Rigid-body preview of an interaction, to find contacts and their times.
 
 The engine's contacts are soft and take the bounce out of impacts, so that less momentum is passed
-on than in reality: what arrives here arrives.
+on than in reality: so it is a lower bound.
 """
 
 # The engine's names come from compiled modules without stubs.

@@ -1,4 +1,4 @@
-"""Arrange, settle, certify; again from another seed where it failed."""
+"""Arranging, settling and certifying of bodies, with retries."""
 
 import time
 from collections.abc import Sequence

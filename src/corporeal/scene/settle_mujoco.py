@@ -1,4 +1,4 @@
-"""Let bodies fall and come to rest in MuJoCo.
+"""Settling of bodies in MuJoCo.
 
 The floor meets the exact convex hull of each mesh; bodies meet each other with their convex
 pieces, every two bodies with the friction that is certain to hold them. All is computed for a scene

@@ -1,4 +1,4 @@
-"""Objects at rest, and what stands in whose way; boxes stand for them."""
+"""Objects at rest, approximated by boxes, and obstacles between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

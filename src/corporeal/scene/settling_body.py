@@ -1,4 +1,4 @@
-"""What is settled: bodies with their convex pieces, and where they are."""
+"""Bodies for settling, with their convex pieces and poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

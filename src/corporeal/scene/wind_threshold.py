@@ -1,4 +1,4 @@
-"""The slowest wind in which an object at rest begins to slide or to fall over."""
+"""Threshold wind speed at which an object at rest slides or topples."""
 
 from dataclasses import dataclass
 from math import inf, sqrt
