@@ -1,4 +1,4 @@
-"""What is found in a finished simulation, as data: what happened, and whether to trust it.
+"""Data of the audit of a finished simulation: outcome and violations.
 
 Computed in ``trajectory.outcome`` and ``trajectory.audit``, kept as ``audit.json`` (``trajectory.
 audit_file``), whose keys are the names of the fields below. All quantities are SI; a name ends in

@@ -1,4 +1,4 @@
-"""How far work has come, told of a part of it as of the whole."""
+"""Nested progress callbacks."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What a person sees while stages work: bars with the time left or lines of a log, and tables."""
+"""Terminal output: progress bars, log lines and tables."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence

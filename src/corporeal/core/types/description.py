@@ -1,4 +1,4 @@
-"""What a scene is, in words: objects, their parts, and the ways that these may be."""
+"""Descriptions of scenes: objects, parts and hypotheses."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal

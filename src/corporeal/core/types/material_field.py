@@ -1,4 +1,4 @@
-"""What a scene is made of: materials, walls, masses."""
+"""Materials, structures and masses of a scene."""
 
 from dataclasses import dataclass, field
 from enum import Enum

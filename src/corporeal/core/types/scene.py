@@ -1,4 +1,4 @@
-"""What comes in: scenes, pictures and Gaussians."""
+"""Inputs: scenes, pictures and Gaussians."""
 
 from dataclasses import dataclass, field
 from typing import Literal

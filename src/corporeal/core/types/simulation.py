@@ -1,4 +1,4 @@
-"""What is simulated, and what comes of it."""
+"""Particles, treatments, trajectories and videos."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
