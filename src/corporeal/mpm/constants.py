@@ -1,9 +1,8 @@
-"""Every number of the method, once.
+"""Numerical constants of the method.
 
-NumPy code imports them, kernels on GPUs take them as they compile, and C++ text finds them in
-``namespace mpm``: ``cpp_constants`` writes it. What is chosen here is chosen for all engines.
-Numbers of one constitutive law stand with the law, coefficients of a formula in the formula. A cell
-is dx long.
+NumPy code imports them, GPU kernels compile them in, and C++ code finds them in ``namespace mpm``:
+``cpp_constants`` writes it. They apply to all engines. Numbers of one constitutive law stand with
+the law, coefficients of a formula in the formula. A cell is dx long.
 """
 
 from collections.abc import Mapping
@@ -130,12 +129,14 @@ FACET_REPLACES_NODES_DX = 2.0
 [cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes
 misjudge, as they take it for a plane within the 3 cells that each sees …"""
 FACET_NORMAL_COSINE = 0.95
-"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN_BODY_DX``
-normals of nodes lean, since mass lies around them on both sides: there ``CURVED_NORMAL_COSINE``
-counts."""
+"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is
+``THIN_BODY_DX`` normals of nodes lean, since mass lies around them on both sides: there
+``CURVED_NORMAL_COSINE`` counts.
+"""
 OPPOSED_FACES_COSINE = 0.5
-"""Where normals of nodes lean farther than ``FACET_NORMAL_COSINE`` from all faces, around edges of both
-bodies, they are of two that look at one another so nearly and lean no farther than that [-]."""
+"""Where normals of nodes lean farther than ``FACET_NORMAL_COSINE`` from all faces, around edges of
+both bodies, they are of two that look at one another so nearly and lean no farther than that [-].
+"""
 FACE_SCATTER_DX = 0.03
 """What a node sees aside of a face is no edge, but the scatter of particles [cells]."""
 VALLEY_ITERATIONS = 6

@@ -1,4 +1,4 @@
-"""What is done to an engine's bodies from outside, between two advances.
+"""External interaction with bodies between two advances.
 
 An engine says how it changes velocities, takes grips and places bodies. What is the same in all of
 them is here: what an impact does, what takes hold of what, what a start from another engine's state

@@ -1,4 +1,4 @@
-"""What a run has done so far: impulses, work, losses and contacts, for the reference engine."""
+"""Ledger of impulses, work, losses and contacts of the reference engine."""
 
 from dataclasses import dataclass, fields
 

@@ -1,4 +1,4 @@
-"""What an engine is given and what it gives back: the contract that every engine keeps."""
+"""Interface of engines: the problem, and the results."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field

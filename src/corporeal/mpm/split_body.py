@@ -1,4 +1,4 @@
-"""A rigid body becomes several: mass, momentum and the books are shared out, nothing is added."""
+"""Splitting of a rigid body; mass, momentum and ledgers are conserved."""
 
 from dataclasses import dataclass, replace
 

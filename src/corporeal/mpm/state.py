@@ -1,4 +1,4 @@
-"""All particles of a problem in one list: what never changes of them, and what does."""
+"""Particles of a problem: constant properties and state."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace

@@ -1,4 +1,4 @@
-"""Memory that the native contact piece works in, and the parameters it takes from the problem."""
+"""Memory of the native contact solver, and its parameters."""
 
 import numpy as np
 

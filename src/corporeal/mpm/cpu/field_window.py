@@ -243,7 +243,9 @@ def _shifted_places(place: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """Shift fixed-point places, which float32 channels hold."""
     fixed = np.ascontiguousarray(place).view(np.int32).astype(np.int64) + shift
     if (np.abs(fixed) >= 2**31).any():
-        raise SimulationError("What joins is too far from all else for one grid. Drop it nearer.")
+        raise SimulationError(
+            "The added body is too far from the others for one grid. Add it nearer."
+        )
     return fixed.astype(np.int32).view(np.float32)
 
 

@@ -1,7 +1,7 @@
-"""Memory that Python and the native loops share: channels, columns, codes and structs.
+"""Memory layout shared by Python and native loops: channels, columns, codes and structs.
 
-``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no number and
-no struct of this layout is written in ``loops``.
+``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no
+number and no struct of this layout is written in ``loops``.
 """
 
 from corporeal.mpm.constants import BRANCHES

@@ -1,4 +1,4 @@
-"""What the native piece of the springs reads: records of tethers, joints and grips."""
+"""Records of tethers, joints and grips for native code."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How fields look where they meet, on the device: surfaces, normals, gaps.
+"""Contact geometry on the device: surfaces, normals, gaps.
 
 Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and relative to the node.
 """

@@ -1,4 +1,4 @@
-"""The engine for CUDA GPUs: all steps of a frame in one graph, no word to the host inside.
+"""The engine for CUDA GPUs: all steps of a frame in one graph, without host synchronisation.
 
 The same method as ``reference``, in plain Warp: particles in float32 with their places relative
 to the grid, rigid bodies and impulses in double precision. ``device="cpu"`` runs the very same

@@ -1,4 +1,4 @@
-"""What the kernels of the device engine share: numbers, and structs of what each step works on.
+"""Constants and structs shared by the kernels of the device engine.
 
 Plain Warp, so that the same kernels run on a CUDA GPU and on the processor. Every kernel loops
 over its items with a stride: it is launched with as many threads as the device keeps busy, and

@@ -1,4 +1,4 @@
-"""The clock of the device engine: how long the next step is, and what it begins with."""
+"""Time step control of the device engine."""
 
 from corporeal.mpm import constants
 from corporeal.mpm.cuda import block_arena

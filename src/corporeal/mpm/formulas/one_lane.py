@@ -1,4 +1,4 @@
-"""The formulas at one lane, as functions that Warp kernels call: for GPUs, and to test them alone.
+"""Scalar versions of the formulas for Warp kernels, on GPUs and in tests.
 
 Every function is a call into the headers beside this file and holds no formula of its own.
 """

@@ -1,4 +1,4 @@
-"""Constitutive laws, one a file, and the menu: whoever has to choose by a law asks here.
+"""Constitutive laws, one per file, and their dispatch.
 
 A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``.
 The functions below answer for particles of different laws at once.

@@ -1,4 +1,4 @@
-"""Stacks of deformation gradients F: what every law makes of them before it speaks of stress.
+"""Kinematics of stacks of deformation gradients F.
 
 Letters: F = R S = U Σ Vᵀ, J = det F, b = F Fᵀ, ε = ln Σ.
 """

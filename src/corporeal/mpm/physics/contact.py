@@ -1,4 +1,4 @@
-"""Contact between fields on grid nodes: where a face lies, and which way it looks.
+"""Contact between fields on grid nodes: positions and normals of faces.
 
 A pair of fields (a, c) meets at a node; n points from a to c. Every field shows itself there by
 its mean offset X̄ from the node and by its outward volume gradient g. Walls are half spaces. What
@@ -244,9 +244,9 @@ def gap_of_liquid(
 
     Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
     face alone would let the first layer of a liquid be squeezed along it. So nodes up to
-    ``LIQUID_WALL_REACH_DX`` above are in contact too, where the liquid fills the half space up to the face
-    as far as the node can tell: by its mean place, and by how ``full`` the node is, its mass over
-    that of a full cell. A sheet or a drop would hover at such a node otherwise.
+    ``LIQUID_WALL_REACH_DX`` above are in contact too, where the liquid fills the half space up to
+    the face as far as the node can tell: by its mean place, and by how ``full`` the node is, its
+    mass over that of a full cell. A sheet or a drop would hover at such a node otherwise.
     """
     h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
     deep = gap_to_plane(mean, height, normal, cell)

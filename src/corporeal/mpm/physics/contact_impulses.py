@@ -1,4 +1,4 @@
-"""Contact between fields on grid nodes: the impulses that it transmits, and what they take.
+"""Contact between fields on grid nodes: impulses and dissipation.
 
 Rigid bodies' impacts come first, in rounds of sweeps; then all contacts, with Coulomb friction.
 """

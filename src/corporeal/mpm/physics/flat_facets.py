@@ -1,4 +1,4 @@
-"""Flat faces of a rigid body, on which what is round rolls: each is a plane with an end."""
+"""Flat facets of a rigid body, on which round bodies roll."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Rigid inclusions: the stiff part of a mixed object moves with the soft material that it holds.
+"""Rigid inclusions: stiff parts that move with the soft material around them.
 
 The frame keeps its six degrees of freedom and scatters mass only. Nodes of the soft field inside it
 are its own: before contact, frame and lumped nodes become one rigid body with their momentum and

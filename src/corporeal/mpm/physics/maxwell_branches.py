@@ -1,4 +1,4 @@
-"""Viscoelasticity: two Maxwell branches beside the elastic law, so that loss is there at impact.
+"""Viscoelasticity: two Maxwell branches in parallel with the elastic law.
 
 A branch is a spring that forgets. Its strain is a conformation tensor less the identity,
 E = b - 1 (an Oldroyd-B branch: Ram et al. 2015, "A material point method for viscoelastic fluids,

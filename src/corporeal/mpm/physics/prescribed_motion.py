@@ -1,4 +1,4 @@
-"""Prescribed motion: a rigid body that follows a given path, whatever it meets.
+"""Prescribed motion of rigid bodies along paths.
 
 In contact it is as heavy as a wall, with the velocity that takes it, in this step, to where its
 path says. Whatever that takes is booked: its momentum and energy change by what contacts give it

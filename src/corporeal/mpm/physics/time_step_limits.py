@@ -1,4 +1,4 @@
-"""How fast waves run, how large a step that allows, and how far the step budget reaches."""
+"""Wave speeds, stable time steps, and the step budget."""
 
 from collections.abc import Sequence
 from math import inf, log, sqrt

@@ -1,4 +1,4 @@
-"""Which fields meet where in one step, and what comes of it: the reference engine's contact.
+"""Contact of the reference engine: detection and solution in one step.
 
 Order: list the nodes; look at the surfaces there; choose normals; measure gaps; solve all
 impulses together, rigid bodies and walls included.
