@@ -1,4 +1,4 @@
-"""Assemble the scenes of a corpus: each planned scene is made in a process of its own.
+"""Assembly of the scenes of a corpus, each in its own process.
 
 A scene's folder below ``<corpus>/scenes`` appears whole or not at all, under an id that covers the
 settings, the seed and the bytes of its assets.

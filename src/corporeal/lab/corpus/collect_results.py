@@ -1,4 +1,4 @@
-"""Read what a corpus left on the disk: one record per scene, and one per simulated part."""
+"""Results of a corpus: one record per scene, and one per simulated part."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -314,5 +314,5 @@ def _group(scene: str, material: str, source: str) -> str:
     except UserError as error:
         raise UserError(
             f"Scene {scene} was run with the materials of {source}, and the classes of these "
-            f"cannot be read: {error} Bring the library back, or ask from where the corpus was run."
+            f"cannot be read: {error} Restore the library, or run this where the corpus was run."
         ) from error

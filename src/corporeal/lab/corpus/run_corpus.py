@@ -1,4 +1,4 @@
-"""Run every assembled scene of a corpus through the pipeline, each in a process of its own.
+"""Runs of all assembled scenes of a corpus, each in its own process.
 
 ``<corpus>/scenes/<scene>/scene.toml`` becomes ``<corpus>/runs/<scene>/``, a run like any other. A
 scene that is interrupted goes on from its checkpoint.
@@ -62,7 +62,7 @@ def run_corpus(
     there = [s for s in planned if (folder / SCENES_FOLDER / s.name / store.META_FILE).exists()]
     if not there:
         raise UserError(
-            f"No scene of {folder} is assembled. Do it with: corporeal corpus assemble {folder}."
+            f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}."
         )
     if len(there) < len(planned):
         hands.say(

@@ -1,4 +1,4 @@
-"""Drop one real object in the simulation, as ``life.toml`` says, and watch it rebound."""
+"""Simulated drop tests of the objects in ``life.toml``."""
 
 from dataclasses import dataclass, replace
 

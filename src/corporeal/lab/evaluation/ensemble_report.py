@@ -1,4 +1,4 @@
-"""The spread of an ensemble as a table for the terminal, and as a figure."""
+"""Spread of an ensemble as a table and a figure."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Scenes as points: what they look like, whose each point is, and whose it was taken for."""
+"""Figure of object segmentation: colours, ground truth and prediction of points."""
 
 from collections.abc import Sequence
 from pathlib import Path

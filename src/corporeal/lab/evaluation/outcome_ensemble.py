@@ -1,4 +1,4 @@
-"""How far the outcome is known: one run simulated again with other values from the ranges.
+"""Uncertainty of the outcome by an ensemble of sampled material values.
 
 Every member is drawn as a whole (materials/value_sampling.py), filled anew and simulated; its
 frames are dropped once its outcome is known. A member that is done is not done again, and one that

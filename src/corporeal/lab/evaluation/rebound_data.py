@@ -1,4 +1,4 @@
-"""How high real objects rebound, as published: ``life.toml``, read."""
+"""Published rebounds of real objects, from ``life.toml``."""
 
 import tomllib
 from collections.abc import Iterator, Sequence

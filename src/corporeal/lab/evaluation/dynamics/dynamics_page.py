@@ -1,4 +1,4 @@
-"""The page of an evaluation of dynamics, and the same for the documentation."""
+"""Report and documentation page of an evaluation of dynamics."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -100,7 +100,7 @@ def borrowed_numbers(found: DynamicsSummary) -> list[str]:
     said = [
         f"{row.method}: {note}" for row in found.rows if row.numbers for note in row.numbers.notes
     ]
-    return list(dict.fromkeys(said)) or ["Nothing: no method brought numbers of its own."]
+    return list(dict.fromkeys(said)) or ["Nothing: no method has its own material values."]
 
 
 def _html(table: ResultTable) -> str:

@@ -1,4 +1,4 @@
-"""Sum an evaluation of dynamics up: per scene and method, per material class and law, ranks, life.
+"""Summary of an evaluation of dynamics: per scene and method, per material class and law, ranks, rebounds.
 
 Everything is read from what finished runs left on the disk.
 """

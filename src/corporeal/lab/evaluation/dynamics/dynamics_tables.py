@@ -1,4 +1,4 @@
-"""An evaluation of dynamics as tables: per scene, per group, ranks and life."""
+"""Tables of an evaluation of dynamics: per scene, per group, ranks and rebounds."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Who comes first in a scene, and in which columns ours does not."""
+"""Ranking of methods in a scene."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

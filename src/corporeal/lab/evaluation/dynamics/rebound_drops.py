@@ -1,4 +1,4 @@
-"""Methods against life: every published rebound is dropped once by each, as a job of its own."""
+"""Drop tests of all methods against published rebounds, as jobs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -91,7 +91,7 @@ def read_drops(out: Path, method: Method) -> list[MethodDrop]:
         try:
             one = from_plain(DropResult, store.read_json(folder / DROP_FILE))
         except (ValueError, TypeError, AttributeError) as error:
-            what = f"is no drop that this version can read ({error})."
+            what = f"is not a drop of this version ({error})."
             raise BadFileError(folder / DROP_FILE, what, f"Remove {folder}.") from error
         found.append(MethodDrop(row, one.restitution))
     return found

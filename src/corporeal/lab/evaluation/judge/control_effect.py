@@ -1,4 +1,4 @@
-"""Whether a video differs from the reference by more than our own error: else nobody can tell it."""
+"""Test whether a control differs from the reference by more than the simulation's error."""
 
 from dataclasses import dataclass
 

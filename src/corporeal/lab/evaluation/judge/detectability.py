@@ -1,4 +1,4 @@
-"""What a judge can tell: every question against every control, with intervals.
+"""Detection rates of a judge: every question against every control, with intervals.
 
 A question tells a control where it raises an alarm on the control more often than on the reference
 of the same scene, beyond chance. Of a law of physics a judge is trusted only through questions

@@ -1,4 +1,4 @@
-"""The page of a judged evaluation: first what the judge cannot tell, at the end every video."""
+"""Report of a judged evaluation: detection rates first, then all videos."""
 
 import io
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""What a judge is shown of a video in one look."""
+"""Pictures of a video for one look of a judge."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""Ask a judge about videos: the price first, every video in a conversation of its own."""
+"""Questions to a judge about videos, each in a separate conversation, after a cost estimate."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -101,9 +101,7 @@ def connect_judge(config: JudgeConfig) -> VlmClient | None:
 
 def _somebody(model: VlmClient | None) -> VlmClient:
     if model is None:
-        raise UserError(
-            "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."
-        )
+        raise UserError("No judge. Choose one: --judge openai:MODEL, ask:FOLDER or replay:FOLDER.")
     return model
 
 
@@ -128,6 +126,6 @@ def _agreed(reckoned: JudgingCost, config: JudgeConfig) -> None:
         return
     if reckoned.dollars is None or reckoned.dollars > CONFIRM_ABOVE_USD:
         raise UserError(
-            f"{price_words(reckoned, config)} Add --yes to ask all the same, or judge fewer: "
+            f"{price_words(reckoned, config)} Add --yes to confirm, or judge fewer: "
             "--looks 1 --control-scenes 3."
         )

@@ -1,4 +1,4 @@
-"""Judge the runs that lie in the folder of an evaluation: OUT/SCENE/METHOD."""
+"""Judgement of the runs in the folder of an evaluation: OUT/SCENE/METHOD."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
