@@ -1,4 +1,4 @@
-"""Open exported files with real readers and measure what they hold.
+"""Checks of exported files with independent readers.
 
 A reader that is not installed is named, and nothing is measured then.
 """
@@ -158,7 +158,7 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
     if not soft:
         return ()
     names = ", ".join(soft)
-    return (f"Drift is measured without {names}, which can deform: what lies on it falls.",)
+    return (f"Drift is measured without {names}, which can deform: objects on it fall.",)
 
 
 # ---------------------------------------------------------------- motion and data
@@ -217,7 +217,7 @@ def check_splats(folder: Path, asked: ExportRequest) -> ReaderFindings:
 
 def check_without_reader(folder: Path, asked: ExportRequest) -> ReaderFindings:
     """State that there is no reader to ask."""
-    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is no package.",))
+    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is not a package.",))
 
 
 TARGET_CHECKS: dict[

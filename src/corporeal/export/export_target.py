@@ -1,4 +1,4 @@
-"""What a writer is asked for, what it returns, and the menu of writers."""
+"""Interface and registry of writers."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a writer of any format is given: every object ready to leave, and what acts between them.
+"""Format-independent input of writers: solids and their interactions.
 
 The frame of a ``ExportedSolid`` has its origin in the centre of mass at the exported instant and
 the axes of the world, so that no writer has an offset or a rotation to get wrong.

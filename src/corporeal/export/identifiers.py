@@ -1,4 +1,4 @@
-"""Names that every format and file system takes, one for each name in any alphabet."""
+"""Portable identifiers of names."""
 
 import re
 import unicodedata

@@ -267,5 +267,5 @@ def _not_written(asked: ExportRequest) -> list[str]:
                 f"Poisson's ratio of {matter.name} is {MAX_FLEX_POISSON_RATIO} in MuJoCo, not {ratio}."
             )
     if scene.settled:
-        sentences.append("Nothing bounces: in MuJoCo what lies at rest would creep.")
+        sentences.append("No restitution: in MuJoCo resting objects would creep.")
     return sentences

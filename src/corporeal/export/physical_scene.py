@@ -1,4 +1,4 @@
-"""From what the stages of a run made to solids at one instant."""
+"""Conversion of the results of a run to solids at one instant."""
 
 from dataclasses import replace
 from functools import partial

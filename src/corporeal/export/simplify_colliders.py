@@ -1,4 +1,4 @@
-"""Convex colliders of few corners, for engines that take no more."""
+"""Simplification of convex colliders."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What can deform in USD: material points for MPM, and tetrahedra for finite elements.
+"""Deformable bodies in USD: material points for MPM, and tetrahedra for finite elements.
 
 Schemas: Newton's ``newton-usd-schemas`` (points, per-part subsets with MPM materials); the AOUSD
 proposal for deformables under both names that readers look for, ``physics:`` (Newton) and

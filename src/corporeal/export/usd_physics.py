@@ -1,4 +1,4 @@
-"""The layer ``physics.usda``: what simulates, over the shapes of another layer; made to be read.
+"""The layer ``physics.usda``: physics as overrides of the geometry layer.
 
 Schemas: UsdPhysics. Readers take one friction a surface: ours, which belong to pairs, are fitted
 (``friction.py``). The floor meets convex hulls and objects meet one another with their convex

@@ -63,8 +63,8 @@ def _not_written(asked: ExportRequest, corners: int) -> list[str]:
         sentences.append(f"{', '.join(soft)} can deform and is not simulated.")
     elif soft:
         sentences.append(
-            f"{', '.join(soft)} can deform: Newton reads it; PhysX on the processor and MuJoCo do "
-            "not, and what lies on it falls through."
+            f"{', '.join(soft)} can deform: Newton reads it; PhysX on the CPU and MuJoCo do not, "
+            "and objects on it fall through."
         )
     if corners > PHYSX_GPU_MAX_CORNERS:
         sentences.append(
