@@ -41,7 +41,7 @@ PLANTED = {
         ('source = "my-bench" }\npoisson', 'source = "" }\npoisson'),
         "young_GPa: has no source. Say who measured it",
     ),
-    "hearsay": (('"elastic-tables"', '"hearsay"'), "cites 'hearsay', which nothing explains."),
+    "hearsay": (('"elastic-tables"', '"hearsay"'), "cites 'hearsay', which is not defined."),
     "GPa for MPa": (("yield_MPa", "yield_GPa"), "In MPa it would fit: check the unit."),
     "MPa for GPa": (("young_GPa", "young_MPa"), "In GPa it would fit: check the unit."),
     "grams for kilograms": (

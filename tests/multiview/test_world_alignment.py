@@ -159,7 +159,7 @@ def test_without_cameras_what_is_usual_is_corrected_by_a_floor(rng):
     angle, floor = off(found, tilted)
     assert angle < 0.5
     assert abs(floor) < 0.004
-    assert "look at the result" in found.warnings[0]
+    assert "check the result" in found.warnings[0]
 
 
 def stool(rng):

@@ -104,7 +104,9 @@ def _encoder() -> list[CheckResult]:
 
         path = imageio_ffmpeg.get_ffmpeg_version()
     except Exception as error:  # as above
-        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")]
+        return [
+            CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")
+        ]
     return [CheckResult("ffmpeg", True, f"{path}, a separate program, for videos")]
 
 

@@ -65,6 +65,4 @@ def command_masks() -> None:
         )
     print(*made.said, *filter(None, [made.beside]), sep="\n")
     photographs, masks = quote(str(asked.photographs)), quote(str(out))
-    print(
-        f"Check {out / MASK_FOLDERS[0]}. Next: corporeal run {photographs} --masks {masks}"
-    )
+    print(f"Check {out / MASK_FOLDERS[0]}. Next: corporeal run {photographs} --masks {masks}")

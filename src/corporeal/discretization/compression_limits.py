@@ -48,7 +48,8 @@ def too_stiff_to_compress(
         return {}
     k = max(hard, key=lambda number: hard[number])
     return {
-        k: f"prescribed motion presses it by about {parts[k].pressed:.2g} of its thickness, and it is too stiff for that"
+        k: f"prescribed motion presses it by about {parts[k].pressed:.2g} of its thickness, "
+        "and it is too stiff for that"
     }
 
 

@@ -107,5 +107,7 @@ def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Disc
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, made.impact_speed, cell),
-        why=f"{made.why} Its simulated vibrations in a hard impact dissipate as much as a loss factor of {taken:.2g}, beyond those of the real object: its loss factor is reduced by that.",
+        why=f"{made.why} Its simulated vibrations in a hard impact dissipate as much as a loss "
+        f"factor of {taken:.2g}, beyond those of the real object: its loss factor is reduced by "
+        "that.",
     )

@@ -134,8 +134,9 @@ def describe_scales(objects: Sequence[SceneObject]) -> str:
 def describe_mass(mass: float, scale: float) -> str:
     """Write a mass in the scene [kg], and in brackets that of the real object where it differs."""
     return (
-        f"{mass:.3g} ({mass / scale**3:.3g} in "
-        f"reality)" if is_not_life_size(scale) else f"{mass:.3g}"
+        f"{mass:.3g} ({mass / scale**3:.3g} in reality)"
+        if is_not_life_size(scale)
+        else f"{mass:.3g}"
     )
 
 

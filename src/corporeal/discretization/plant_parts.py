@@ -14,9 +14,7 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 MIN_FOLIAGE_LEAVES = 20
 """A part of fewer separate leaves is no crown."""
-POTTED_SOIL_REASON = (
-    "a rigid pot holds it, and its compliance is in the spring at the plant's root"
-)
+POTTED_SOIL_REASON = "a rigid pot holds it, and its compliance is in the spring at the plant's root"
 FOLIAGE_REASON = "A crown of leaves without stress of its own, each on a damped spring to the wood"
 
 

@@ -1,4 +1,4 @@
-"""Points spread evenly and without a lattice: jittered starts, dart throwing, repulsion."""
+"""Blue-noise sampling: jittered starts, dart throwing, repulsion."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""The objects of a scene as bodies in space: their boxes, moved, resized, looked at for overlap."""
+"""Boxes, transforms and overlaps of the objects of a scene."""
 
 from collections.abc import Sequence
 from dataclasses import replace

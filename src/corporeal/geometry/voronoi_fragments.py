@@ -1,4 +1,4 @@
-"""Pieces of a closed surface: Voronoi cells of points that lie closer together near an impact."""
+"""Voronoi fragments of a closed surface, smaller near an impact."""
 
 from collections.abc import Sequence
 from dataclasses import replace

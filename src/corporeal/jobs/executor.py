@@ -1,4 +1,4 @@
-"""Carry jobs out: workers are kept busy, and no failure stops the others."""
+"""Execution of jobs on workers; failures don't stop other jobs."""
 
 from collections import deque
 from collections.abc import Callable, Sequence

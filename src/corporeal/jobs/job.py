@@ -1,4 +1,4 @@
-"""A job: one scene's worth of work, done in a process of its own, here or on another machine.
+"""A job: work on one scene in its own process, here or on another machine.
 
 A job's folder is finished when it holds ``meta.json`` with the job's key, written last. A job that
 can be resumed works in its folder; any other works beside it and the finished folder is put in

@@ -1,4 +1,4 @@
-"""What became of every scene: ``manifest.json``, and ``corpus.log`` with a line for each event.
+"""State of all jobs: ``manifest.json``, and ``corpus.log`` with events.
 
 The manifest says nothing that the folders do not: which results are finished is read from them, so
 that a process killed between the two loses nothing.

@@ -1,6 +1,6 @@
 """Jobs on this machine: one process each, started afresh, so that no scene inherits memory.
 
-A process that is killed takes nobody with it, and a killed parent leaves none behind.
+A killed process does not affect others, and a killed parent leaves no processes behind.
 """
 
 import json
@@ -94,7 +94,7 @@ class LocalWorkerPool:
         with suppress(BrokenPipeError):
             process.stdin.close()
         died = JobEvent(
-            job, "died", words=f"{exit_reason(code)} Its words are in {LOG_FOLDER}/{name}.log."
+            job, "died", words=f"{exit_reason(code)} Its log is in {LOG_FOLDER}/{name}.log."
         )
         return self.last.pop(name, died)
 
@@ -113,7 +113,7 @@ class LocalWorkerPool:
 def exit_reason(code: int) -> str:
     """Return how a process ended that gave no reason itself."""
     if code >= 0:
-        return f"Its process ended with code {code} without a word."
+        return f"Its process ended with code {code} without output."
     try:
         name = signal.Signals(-code).name
     except ValueError:

@@ -83,9 +83,7 @@ def lint_library(
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        return [
-            LibraryProblem(0, "", "", f"This is not TOML: {error}.", "Fix the syntax first.")
-        ]
+        return [LibraryProblem(0, "", "", f"This is not TOML: {error}.", "Fix the syntax first.")]
     found = _ProblemFinder(_line_of_key(text))
     _check_top(found, tables, bases)
     own = tables.get("sources", {})
@@ -210,7 +208,12 @@ def _law(found: _ProblemFinder, name: str, row: dict) -> Law | None:
     if "law" not in row:
         found.tell(name, "", "has no law.", f"Add law = one of: {_list(laws)}.")
     elif row["law"] not in laws:
-        found.tell(name, "law", f"{row['law']!r} is not a constitutive law.", f"Write one of: {_list(laws)}.")
+        found.tell(
+            name,
+            "law",
+            f"{row['law']!r} is not a constitutive law.",
+            f"Write one of: {_list(laws)}.",
+        )
     else:
         return Law[row["law"].upper()]
     return None
@@ -306,7 +309,7 @@ def _check_source(found: _ProblemFinder, at: _NumberPlace, source: Any, known: s
     for key in source.split("+"):
         if key not in known:
             advice = f"Add [sources.{key}] with cite = '...', or use an existing key."
-            found.tell(at.table, at.key, f"cites {key!r}, which nothing explains.", advice)
+            found.tell(at.table, at.key, f"cites {key!r}, which is not defined.", advice)
 
 
 def _check_sizes(found: _ProblemFinder, row: _MaterialRow, fields: dict[str, _RangeCell]) -> None:

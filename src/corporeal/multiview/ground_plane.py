@@ -1,4 +1,4 @@
-"""The plane that objects stand on, found among points of which half may be anywhere.
+"""Robust estimation of the ground plane from points.
 
 RANSAC (Fischler & Bolles 1981) with the truncated loss of MSAC (Torr & Zisserman 2000), refined by
 reweighted least squares. Points below a plane speak against it: nothing is under a floor.

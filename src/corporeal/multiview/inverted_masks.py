@@ -1,7 +1,7 @@
-"""Masks that are black where they should be white.
+"""Detection of inverted masks.
 
 Programs differ in what white means. Inverted masks contradict neither the pictures nor one another:
-together they show the room, from all sides, without the object.
+together they show the surroundings without the object.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Lenses that bend straight lines, and pictures straightened.
+"""Lens distortion, and undistortion of pictures.
 
 Brown's model as OpenCV and COLMAP have it: at x, y = the direction over its depth, r² = x² + y²,
 

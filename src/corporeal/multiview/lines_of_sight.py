@@ -1,4 +1,4 @@
-"""Lines of sight from cameras to points that they saw: what lies on the way is empty.
+"""Free space along lines of sight from cameras to observed points.
 
 Structure from motion says of each of its points which pictures show it. Labatut, Pons and Keriven,
 "Efficient multi-view reconstruction of large-scale scenes using interest points, Delaunay

@@ -1,4 +1,4 @@
-"""Whether silhouettes can be those of one object: the coherence of their visual hull.
+"""Silhouette coherence of the visual hull.
 
 Under the right poses the part of space that all silhouettes allow fills each of them. After
 Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration under circular motion"

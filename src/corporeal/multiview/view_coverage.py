@@ -1,4 +1,4 @@
-"""From which side of what cameras look at there is no photograph."""
+"""Coverage of the views, and gaps around the object."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -49,8 +49,8 @@ def unseen_side_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
     if not MIN_UNSEEN_GAP_DEG <= gap.angle < UNSEEN_HALF_GAP_DEG:
         return None
     return Note(
-        f"Between {gap.ends} lie {gap.angle:.0f}° from which nobody looked: what "
-        "faces there is made up. Photograph that side next time.",
+        f"Between {gap.ends} lie {gap.angle:.0f}° without photographs: surfaces facing there are "
+        "invented. Photograph that side next time.",
         NoteKind.GRAVE,
     )
 
@@ -68,7 +68,7 @@ def unseen_half_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
         return None
     return Note(
         f"Its shape is known from one side only: between {gap.ends} lie {gap.angle:.0f}° of the "
-        "circle around it, from which nobody looked, and all that faces there is made up. "
+        "circle around it, without photographs, and all surfaces facing there are invented. "
         "Photograph it from there, too.",
         NoteKind.GRAVE,
     )
@@ -94,7 +94,7 @@ def depth_doubt_text(cameras: Sequence[Camera]) -> str | None:
         return None
     return (
         f"all photographs were taken from {seen:.0f}° of the circle around it, and none from "
-        "steeply above, so that nothing says how deep it is"
+        "steeply above, so that its depth is unknown"
     )
 
 

@@ -1,4 +1,4 @@
-"""What a set of cameras looks at."""
+"""Region viewed by a set of cameras."""
 
 from dataclasses import dataclass
 

@@ -101,6 +101,7 @@ def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS)
     Args:
         prepared: The scene.
         settings: ``settings.simulate.contact`` is used.
+
     """
     contact = settings.simulate.contact
     return build_model(prepared.scene, prepared.particles, prepared.field, contact).problem

@@ -171,7 +171,9 @@ class MassSampler:
         field = sample_material_field(field, self.owner, rng, library, floor)
         away = [float(rng.normal(-d / 2, d)) if d else 0.0 for d in self.doubts]
         judged = rng.normal(size=len(away))  # the error of thickness is common to all parts
-        hands = rng.normal(size=len(self.scene.objects))  # the error of shape is common to all parts
+        hands = rng.normal(
+            size=len(self.scene.objects)
+        )  # the error of shape is common to all parts
         shaped = [
             float(f * hands[self.owner[m.part]])
             if field.words[m.part].answered_by in NAME_ONLY_SOURCES
@@ -224,7 +226,9 @@ def ground_with_mass_posterior(
     """
     if not inventory.transcript:  # only ranges are uncertain
         return ground(scene, parts, _with_named_mass(scene, parts, inventory, grounding), grounding)
-    ours = replace(grounding, field="")  # samples use the library's ranges, whoever chooses the values
+    ours = replace(
+        grounding, field=""
+    )  # samples use the library's ranges, whoever chooses the values
     believed = sample_masses(
         MassSampler(scale_to_life_size(scene), parts, ours, 0), inventory, SAMPLES_PER_SCENE
     )

@@ -389,7 +389,9 @@ class _Run:
         assert source is not None, "models need no reconstruction"
         config, extents = self.settings.reconstruct, self.settings.assemble.extent
         if self.settings.assemble.objects != "auto":
-            raise UserError("--objects is for models. Choose how objects are separated with --apart.")
+            raise UserError(
+                "--objects is for models. Choose how objects are separated with --apart."
+            )
         viewer = PhotoInterview(safe_name(scene_name(source)), asked.vlm, asked.record)
         result = reconstruct(source, config, extents, viewer, folder, progress)
         made, scene = result.found, result.scene

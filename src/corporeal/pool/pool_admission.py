@@ -1,4 +1,4 @@
-"""From verdicts to members: classes, credits and units; no shape twice, no name twice."""
+"""Admission of models to a pool: classes, credits, units, duplicates."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

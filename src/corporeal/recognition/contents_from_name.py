@@ -154,13 +154,13 @@ def apply_named_contents(
 
 
 def unused_contents_notes(scene: Scene, objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
-    """State which objects it was not used how full their names say they are."""
+    """Return notes on fill levels in names that were not used."""
     said = [(o, contents_from_name(thing)) for o, thing in zip(objects, scene.objects, strict=True)]
     return tuple(
         Note(
-            f"{o.name}: its name says how full it is ({_contents_text(filling)}), and that was not used"
-            f": {_unused_reason(o, filling)}. Say it with --annotations: structure filled, contents and "
-            "fill.",
+            f"{o.name}: the fill level in its name ({_contents_text(filling)}) was not used: "
+            f"{_unused_reason(o, filling)}. State it with --annotations: structure filled, contents "
+            "and fill.",
             NoteKind.ASSUMED,
         )
         for o, filling in said

@@ -1,4 +1,4 @@
-"""Figures as papers show them: the scene coloured by what it is made of, and a video as a strip."""
+"""Figures: the scene coloured by materials, and a video as a strip of frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

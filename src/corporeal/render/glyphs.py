@@ -1,4 +1,4 @@
-"""What the font of our figures can write."""
+"""Glyphs of the font of figures."""
 
 from functools import cache
 

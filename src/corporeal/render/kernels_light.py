@@ -1,4 +1,4 @@
-"""Light at the hits: where to ask for it, sharing it among neighbours, and what the eye gets.
+"""Light at ray hits: sampling, sharing among neighbours, and shading.
 
 Neighbours share what their rays found, so that a pixel gathers dozens of directions: the samples
 of each 4 × 4 tile look along different directions, then a filter over tiles shares them (after

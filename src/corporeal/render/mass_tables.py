@@ -1,4 +1,4 @@
-"""What objects may weigh, as tables of a page: in all ways, and by each of several answers."""
+"""HTML tables of mass posteriors: over hypotheses, and by answer."""
 
 from collections.abc import Sequence
 

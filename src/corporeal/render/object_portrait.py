@@ -1,4 +1,4 @@
-"""Pictures of one object for somebody who is to recognise it and say what it is made of."""
+"""Pictures of one object for recognition of its materials."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

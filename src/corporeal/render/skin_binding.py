@@ -1,4 +1,4 @@
-"""Points follow the material: vertices and Gaussians are bound at the start to particles near them.
+"""Skinning: vertices and Gaussians are bound to nearby particles at the start.
 
 Weights depend on position and part only, so vertices doubled along a texture seam stay together,
 and a rigid object, whose particles all share one rotation, moves exactly.

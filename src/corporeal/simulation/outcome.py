@@ -98,7 +98,7 @@ class ObjectParticles:
                 self.last[b].append(now)
 
     def resting_frames(self) -> np.ndarray:
-        """Indices of up to ``REST_FRAMES`` frames in the last 0.3 s."""
+        """Return the indices of up to ``REST_FRAMES`` frames in the last 0.3 s."""
         late = np.flatnonzero(self.time >= self.time[-1] - REST_DURATION_S - 1e-9)
         return np.unique(np.linspace(late[0], late[-1], REST_FRAMES).astype(int))
 

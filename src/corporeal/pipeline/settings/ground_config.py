@@ -36,5 +36,7 @@ def validate(config: GroundConfig) -> None:
 
     library_entry(config.floor, config.library)
     if library_entry(config.neutral, config.library).group == "liquid":
-        raise UserError(f"--neutral {config.neutral} is a liquid and cannot be the material of a part.")
+        raise UserError(
+            f"--neutral {config.neutral} is a liquid and cannot be the material of a part."
+        )
     parse_field_specification(config.field)

@@ -53,4 +53,6 @@ def validate(config: VideoConfig) -> None:
     check_range("--slow", config.slow, 1.0, MAX_SLOW_MOTION_RATIO)
     if config.view is not None and not 0 < math.hypot(*config.view) < math.inf:
         given = " ".join(f"{x:g}" for x in config.view)
-        raise UserError(f"--view is {given}, which is not a direction. For example: --view 1 -1 0.5.")
+        raise UserError(
+            f"--view is {given}, which is not a direction. For example: --view 1 -1 0.5."
+        )

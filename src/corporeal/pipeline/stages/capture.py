@@ -85,9 +85,7 @@ def render_views(
         progress: Called with the fraction done and a description.
 
     """
-    stage = RayScene(
-        scene, StudioLight(front=VIEW_DIRECTION)
-    )  # shadows are the same in all views
+    stage = RayScene(scene, StudioLight(front=VIEW_DIRECTION))  # shadows are the same in all views
     shape = (len(aims), aims[0].height, aims[0].width)
     views = Views(
         rgb=np.empty((*shape, 3), np.uint8),

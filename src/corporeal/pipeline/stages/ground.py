@@ -250,9 +250,7 @@ def _structure(material: Material, words: PartDescription, config: GroundConfig)
         return Structure("solid", None, "How it is built is unknown: the shape decides.")
     if not (words.material or words.thickness or material.shell_thickness):
         reason = f"It is described as a {words.structure} of unknown material"
-        return Structure(
-            "solid", None, f"{reason}; {material.name} has none: the shape decides."
-        )
+        return Structure("solid", None, f"{reason}; {material.name} has none: the shape decides.")
     wall = _wall_thickness(material, words)
     thickness, reason = wall.thickness, wall.reason
     reason = f"{STRUCTURE_SOURCE_WORDS[words.built_by]} that it {WALL_KIND_WORDS[words.structure]}. {reason}"

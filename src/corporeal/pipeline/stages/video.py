@@ -266,7 +266,7 @@ def _mass_core(points: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]
 
 
 def _reach_ratio(points: np.ndarray, mass: np.ndarray) -> float:
-    """Initial extent of an object over the radius of most of its mass [-]."""
+    """Return the initial extent of an object over the radius of most of its mass [-]."""
     if len(points) == 0:
         return 1.0
     middle, core = _mass_core(points, mass)
