@@ -154,7 +154,7 @@ def test_a_stiff_part_of_a_mixed_object_is_its_rigid_frame():
     cushion = block(FOAM, 0.17, 0.6, 0.6)
     frame, foam = plan_discretization([FRAME, cushion], [FALL], "draft").treatments
     assert (frame.kind, foam.kind) == ("rigid", "deformable")
-    assert "frame that holds what is soft" in frame.why
+    assert "frame that holds the soft parts" in frame.why
     assert frame.young == frame.young_real
     alone = plan_discretization([FRAME], [FALL], "draft").treatments[0]
     assert "frame" not in alone.why

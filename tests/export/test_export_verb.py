@@ -113,7 +113,7 @@ def test_a_run_without_matter_is_told_how_to_go_on(command, run_folder, tmp_path
     code, said = command("export", run, "--to", "glb")
     assert code == 2
     # As a shell takes it, blanks and all.
-    assert said.err.strip().endswith(f"has no matter yet. Go on with: corporeal fill '{run}'")
+    assert said.err.strip().endswith(f"has no particles yet. Next: corporeal fill '{run}'")
 
 
 def test_a_scene_can_leave_before_it_was_simulated(tmp_path, monkeypatch):

@@ -398,7 +398,7 @@ def test_looks_are_one_to_three(looks):
 
 def test_nobody_to_judge_is_an_error():
     films = judge_scenes.JudgedVideos([], [], [], {}, [REFERENCE_METHOD])
-    with pytest.raises(UserError, match="Nobody judges"):
+    with pytest.raises(UserError, match="No judge"):
         query_judge(films, JudgeConfig(), lambda words: None)
 
 
@@ -427,14 +427,14 @@ def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_
         return query_judge(films, JudgeConfig(**config), said.append, judge=Asked({}))
 
     ask(3, judge="openai:gpt-5.4")
-    assert "3 films to judge" in said[0] and "US$ at list prices" in said[0]
+    assert "3 videos to judge" in said[0] and "US$ at list prices" in said[0]
     with pytest.raises(UserError, match="Add --yes"):
         ask(400, judge="openai:gpt-5.4")
     ask(400, judge="openai:gpt-5.4", yes=True)
     with pytest.raises(UserError, match="price of openai:new is not known"):
         ask(1, judge="openai:new")
     ask(400, judge="replay:folder")
-    assert "400 films to judge" in said[0] and said[0].endswith("replay costs nothing.")
+    assert "400 videos to judge" in said[0] and said[0].endswith("replay costs nothing.")
 
 
 # ---------------------------------------------------------------- simulated controls

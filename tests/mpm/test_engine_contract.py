@@ -17,7 +17,7 @@ from corporeal.mpm.engines import (
     require,
     require_of_class,
 )
-from corporeal.mpm.problem import ENGINES, Engine, InteractiveEngine, Split, VariableLoadEngine
+from corporeal.mpm.problem import ENGINES, Engine, InteractiveEngine, BodySplit, VariableLoadEngine
 
 WHOLE = ("cpu", "reference")
 """Engines with every capability."""
@@ -107,7 +107,7 @@ def test_pieces_of_a_split_body_move_on_as_the_whole_did(name):
     place = now.position[mine]
     piece = np.digitize(place[:, 0], [0.47, 0.53])
     surfaces = tuple(place[piece == k] for k in range(3))
-    after = engine.with_split_body(Split(BOARD, piece, place, now.velocity[mine], surfaces))
+    after = engine.with_split_body(BodySplit(BOARD, piece, place, now.velocity[mine], surfaces))
     there = after.measure()
     assert len(after.problem.bodies) == 4 and after.time == engine.time
     for name in ("mass", "momentum", "angular_momentum", "external_impulse"):

@@ -251,10 +251,10 @@ def test_a_camera_goes_by_where_most_of_a_thing_is_and_sees_all_of_what_keeps_it
 
 def test_what_is_no_film_is_said_in_one_line(tmp_path):
     path = tmp_path / "film.mp4"
-    with pytest.raises(UserError, match=r"film\.mp4: there is no such film\. Make it again\.$"):
+    with pytest.raises(UserError, match=r"film\.mp4: there is no such video\. Make it again\.$"):
         video_file.read_frames(path, [0])
     path.write_bytes(b"no film at all" * 100)
     for read in (video_file.count_frames, lambda p: video_file.read_frames(p, [0])):
-        with pytest.raises(UserError, match=r"cannot be read as a film \(.+\)\. Make it") as said:
+        with pytest.raises(UserError, match=r"cannot be read as a video \(.+\)\. Make it") as said:
             read(path)
         assert "\n" not in str(said.value)

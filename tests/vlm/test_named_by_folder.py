@@ -113,7 +113,7 @@ def test_sizes_of_what_nobody_named_can_be_stated():
 def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):
     (said,) = [w for w in made(tmp_path, "one", things=("banana",)).found.warnings if "large" in w]
     assert said == (
-        "Nobody said how large it is: made as large as a banana usually is, 19 cm. "
+        "How large it is was not stated: assumed as large as a banana usually is, 19 cm. "
         "State a size with --extent banana=METRES."
     )
     stated = made(tmp_path, "two", ("banana=0.2",), things=("banana",)).found.warnings

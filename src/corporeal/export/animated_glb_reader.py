@@ -1,4 +1,4 @@
-"""Pose an animated GLB at its keyframes, as a viewer does: nodes, then morph targets."""
+"""Reader of animated GLB, evaluated at keyframes: nodes, then morph targets."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -72,7 +72,7 @@ class AnimatedGlb:
 
 
 def read_animated_glb(path: Path) -> AnimatedGlb:
-    """Open a film.
+    """Open a video.
 
     Raises:
         BadFileError: It cannot be read.

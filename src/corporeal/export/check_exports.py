@@ -1,4 +1,4 @@
-"""Open exported files with real readers and measure what they hold.
+"""Checks of exported files with independent readers.
 
 A reader that is not installed is named, and nothing is measured then.
 """
@@ -158,14 +158,14 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
     if not soft:
         return ()
     names = ", ".join(soft)
-    return (f"Drift is measured without {names}, which can deform: what lies on it falls.",)
+    return (f"Drift is measured without {names}, which can deform: objects on it fall.",)
 
 
 # ---------------------------------------------------------------- motion and data
 
 
 def check_glb(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Open the film as a viewer does, and pose it at every frame."""
+    """Open the video as a viewer does, and pose it at every frame."""
     motion, film = asked.motion, read_animated_glb(folder / "film.glb")
     if not motion.moves:
         return ReaderFindings()
@@ -216,8 +216,8 @@ def check_splats(folder: Path, asked: ExportRequest) -> ReaderFindings:
 
 
 def check_without_reader(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Say that there is no reader to ask."""
-    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is no package.",))
+    """State that there is no reader to ask."""
+    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is not a package.",))
 
 
 TARGET_CHECKS: dict[

@@ -76,7 +76,7 @@ def load_model(
 def _read_by_suffix(path: Path, objects: ObjectGrouping, frame: MeshFrame) -> LoadedModel:
     if path.suffix.lower() in GLTF_SUFFIXES or not path.exists():
         if frame != FRAME_AS_STATED:
-            step = "Leave --up and --unit out; --extent gives things another size."
+            step = "Leave --up and --unit out; --extent gives objects another size."
             raise BadFileError(path, "glTF has +Y up and is in metres.", step)
         return gltf_reader.read_gltf_model(path, objects)
     if not is_mesh_file(path):

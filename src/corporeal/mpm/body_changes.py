@@ -11,7 +11,7 @@ import numpy as np
 
 from corporeal.mpm.add_bodies import AddedBodies, adopt_running_conditions
 from corporeal.mpm.engine_interaction import EngineInteraction
-from corporeal.mpm.problem import Problem, Split
+from corporeal.mpm.problem import Problem, BodySplit
 from corporeal.mpm.split_body import ParentMap, split_problem
 
 BodyChange = AddedBodies | ParentMap
@@ -29,7 +29,7 @@ class EngineBodyChanges(EngineInteraction):
         after._enter(change.before, np.zeros(3), float(added.sum()))
         return after
 
-    def with_split_body(self, split: Split) -> Self:
+    def with_split_body(self, split: BodySplit) -> Self:
         """Return an engine with a body in pieces: see ``problem.BodySplittingEngine``."""
         change = ParentMap.of(self.problem, split)
         return self._followed_by(split_problem(self.problem, split), change)

@@ -1,7 +1,7 @@
-"""What is done to an engine's bodies from outside, between two advances.
+"""External interaction with bodies between two advances.
 
 An engine says how it changes velocities, takes grips and places bodies. What is the same in all of
-them is here: what a blow does, what takes hold of what, what a start from another engine's state
+them is here: what an impact does, what takes hold of what, what a start from another engine's state
 takes over, and what is booked of it.
 """
 

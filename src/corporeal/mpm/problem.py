@@ -1,4 +1,4 @@
-"""What an engine is given and what it gives back: the contract that every engine keeps."""
+"""Interface of engines: the problem, and the results."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ class WettedSurface:
     point: Float[np.ndarray, "N 3"]
     """[m]"""
     normal: Float[np.ndarray, "N 3"]
-    """Unit, out of the matter."""
+    """Unit, out of the material."""
 
 
 NO_WIND_FACES = WindFaces(np.zeros((0, 3)), np.zeros(0, np.int64))
@@ -168,9 +168,10 @@ class Problem:
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
     blows: Float[np.ndarray, "BW BW 5"] | None = None
-    """How e of every pair changes with the speed of a blow: at which it is ``restitution``
+    """How e of every pair changes with the speed of an impact: at which it is ``restitution``
     [m/s], slope [s/m], exponent [-], least and most: see ``physics.backing.bounce_at``. None: it is
-    the same at all speeds."""
+    the same at all speeds.
+    """
 
     @property
     def never_touch(self) -> tuple[tuple[int, int], ...]:
@@ -272,7 +273,7 @@ class StepStatistics:
 
 
 @dataclass(frozen=True)
-class Split:
+class BodySplit:
     """Which body becomes several, and how."""
 
     body: int
@@ -453,7 +454,7 @@ class BodySplittingEngine(Protocol):
     When and into what is decided outside, from ``snapshot`` and the first contacts of ``measure``.
     """
 
-    def with_split_body(self, split: Split) -> Engine:
+    def with_split_body(self, split: BodySplit) -> Engine:
         """Return an engine that goes on from here with a body in pieces.
 
         Mass, momentum and the books are shared out among them (``splitting``). What held the body

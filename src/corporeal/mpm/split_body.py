@@ -1,4 +1,4 @@
-"""A rigid body becomes several: mass, momentum and the books are shared out, nothing is added."""
+"""Splitting of a rigid body; mass, momentum and ledgers are conserved."""
 
 from dataclasses import dataclass, replace
 
@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.types import CURVATURE_COLUMNS
-from corporeal.mpm.problem import Body, Problem, Split
+from corporeal.mpm.problem import Body, Problem, BodySplit
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class ParentMap:
 
     @classmethod
     def of(cls, problem: Problem, split: BodySplit) -> "ParentMap":
-        """Say who comes of whom."""
+        """Return who comes of whom."""
         body, more = problem.bodies[split.body], split.count - 1
         mass = np.bincount(split.piece, body.volume * body.density, split.count)
         share = np.ones(len(problem.bodies) + more)

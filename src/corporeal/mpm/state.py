@@ -1,4 +1,4 @@
-"""All particles of a problem in one list: what never changes of them, and what does."""
+"""Particles of a problem: constant properties and state."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
@@ -262,7 +262,7 @@ class State:
     motion: Float[np.ndarray, "P 3 3"]
     plastic: Float[np.ndarray, " P"]
     volume: Float[np.ndarray, " P"]
-    """v_c of granular matter."""
+    """v_c of granular material."""
     relief: Float[np.ndarray, " P"]
     """ln of the mean volume J̄ that a particle's pressure follows over its own J; see
     ``Matter.swells``."""
@@ -413,7 +413,7 @@ class State:
 def elastic_stress(matter: ParticleConstants, state: State) -> Float[np.ndarray, "P 3 3"]:
     """Kirchhoff stress τ of each particle's own strain [Pa]; none in rigid bodies.
 
-    Without what ``mean_pressure`` adds where matter is nearly incompressible.
+    Without what ``mean_pressure`` adds where material is nearly incompressible.
     """
     m, s = matter, state
     out = np.zeros_like(s.F)

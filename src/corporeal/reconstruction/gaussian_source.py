@@ -104,7 +104,7 @@ def gaussians_from_source(
         if folder is not None:
             (folder / MASKS_FIGURE_FILE).unlink(missing_ok=True)
             masks_figure(posed.folder, found.folder, folder / MASKS_FIGURE_FILE)
-        # What somebody corrected is to be believed.
+        # What somebody corrected is reliable.
         grown = found.grown and found.folder is not None and not edited_masks(found.folder)
         masked = MaskSource(found.folder, grown)
         taken = load_or_train_gaussians(posed.folder, training, kept, later, instances, masked)
@@ -129,7 +129,7 @@ class _MasksFound:
     grown: bool = False
     """Whether nobody, and no model, said what an object is."""
     doubted: Path | None = None
-    """Where masks are that are not to be believed."""
+    """Where masks are that are unreliable."""
     incomplete: str = ""
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
@@ -248,14 +248,14 @@ def _test_poses_by_masks(
 def _drop_doubted_pictures(
     posed: FoundPoses, grown: GrownMasks, doubted: Path, place: Path, progress: Progress
 ) -> tuple[FoundPoses, GrownMasks]:
-    """Leave out pictures that doubted masks speak against, if masks of the others are believed.
+    """Leave out pictures that doubted masks speak against, if masks of the others are accepted.
 
     Args:
         posed: Where pictures were taken from.
         grown: What is returned otherwise, with the poses.
         doubted: The masks, whose outlines contradict each other.
         place: Gets the other poses and masks.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
     other = replace(posed, folder=place / ALIKE_POSES_FOLDER)

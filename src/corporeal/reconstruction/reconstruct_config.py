@@ -48,7 +48,7 @@ class ReconstructConfig:
     training: Literal["preview", "draft", "normal"] = "normal"
     """Length of training on photographs: seconds, about one minute, or four, on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
-    """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
+    """Rasteriser for training: numba on the processor, or gsplat on a CUDA GPU."""
     semantic: EncoderSpec = "descriptor"
     """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
     needs no weights."""

@@ -1,4 +1,4 @@
-"""Figures as papers show them: the scene coloured by what it is made of, and a film as a strip."""
+"""Figures: the scene coloured by materials, and a video as a strip of frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -133,10 +133,10 @@ def panel_legend(
 
 
 def write_filmstrip(film: Video, path: Path, count: int = 6, width: int = 340) -> None:
-    """Set evenly chosen frames of a film in a row with thin white gaps, each with its time.
+    """Set evenly chosen frames of a video in a row with thin white gaps, each with its time.
 
     Raises:
-        UserError: The film cannot be read, or the file cannot be written.
+        UserError: The video cannot be read, or the file cannot be written.
 
     """
     last = max((len(film.times) or video_file.count_frames(film.path)) - 1, 0)

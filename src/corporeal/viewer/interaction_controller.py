@@ -14,10 +14,10 @@ from corporeal.viewer.commands import Command
 from corporeal.viewer.live_edit import MAX_DROP_HEIGHT_M, AddedObject, LiveEditor
 
 RECORDED_GRAB = "hold"
-"""What a record has in place of a page's "grab": its point is that of matter at the start [m]."""
+"""What a record has in place of a page's "grab": its point is that of material at the start [m]."""
 
 RECORDED_ADD = "join"
-"""What a record has in place of a page's "add": its point is where the thing begins."""
+"""What a record has in place of a page's "add": its point is where the object begins."""
 MIN_CLEARANCE_DX = 2.0
 """Between what is added and what is under it, at least [cells]: no contact is felt so far away."""
 
@@ -67,7 +67,7 @@ class InteractionController:
             posed: Which objects the bodies belong to.
             problem: Its own, or the control with one velocity field.
             threads: Of the engine.
-            growth: Gives the scene with things that are added; None: nothing can be.
+            growth: Gives the scene with objects that are added; None: nothing can be.
             engine: Its name.
 
         Raises:
@@ -205,13 +205,13 @@ class InteractionController:
             if len(known[body].faces.area):
                 engine.blow(body, order.to)
 
-    # ---------------------------------------------------------------- things that are added
+    # ---------------------------------------------------------------- objects that are added
 
     def top(self, order: Command) -> float:
-        """Return how high matter reaches under a thing that is to be added [m].
+        """Return how high material reaches under an object that is to be added [m].
 
         Args:
-            order: Which thing; it points at the middle.
+            order: Which object; it points at the middle.
 
         """
         low, high = self._growing.reach(order.thing, drop_height(order))
@@ -221,7 +221,7 @@ class InteractionController:
         return max(order.point[2], float(place[under, 2].max(initial=0.0)))
 
     def above(self, order: Command, top: float) -> Command:
-        """Say where a thing that is to be added begins, over what reaches up to ``top`` [m]."""
+        """Return where an object that is to be added begins, over what reaches up to ``top`` [m]."""
         room = max(drop_height(order), MIN_CLEARANCE_DX * self.engine.problem.cell)
         x, y, _ = order.point
         return replace(
@@ -269,7 +269,7 @@ class InteractionController:
 
 
 def drop_height(order: Command) -> float:
-    """Return how high above all that is under it a thing begins [m]."""
+    """Return how high above all that is under it an object begins [m]."""
     return min(max(order.to[2], 0.0), MAX_DROP_HEIGHT_M)
 
 

@@ -109,7 +109,7 @@ class SceneDisplay:
         self.moments = SnapshotFrames(grown.posed)
 
     def hello(self) -> dict:
-        """Say what pictures will hold, and how honest they are."""
+        """Describe what pictures will hold, and how honest they are."""
         return {
             "generation": self.generation,
             "honest": resolution_statement(self.prepared),
@@ -182,11 +182,11 @@ class LiveSimulation:
         )
 
     def hello(self) -> dict:
-        """Say what pictures will hold, how honest they are, and how heavy things are."""
+        """Describe what pictures will hold, how honest they are, and how heavy objects are."""
         return self.face.hello() | {"gravity": list(self.prepared.scene.gravity)}
 
     def ask(self, order: Command) -> None:
-        """Let an order be obeyed; a thing that is to be added is filled first, beside the rest."""
+        """Let an order be obeyed; an object that is to be added is filled first, beside the rest."""
         if order.do != "add":
             self.orders.append(order)
             return
@@ -308,7 +308,7 @@ class LiveSimulation:
                 self.twin.obey(done)
 
     def _add(self, order: Command) -> None:
-        """Drop a thing, into the control beside as well: over what is highest in either."""
+        """Drop an object, into the control beside as well: over what is highest in either."""
         every = [hands for hands in (self.hands, self.twin) if hands]
         self.message = ""
         begins = self.hands.above(order, max(hands.top(order) for hands in every))
@@ -398,7 +398,7 @@ class LiveSession:
         """Hold none yet.
 
         Args:
-            read: Gives by its name what a run's verbs made.
+            read: Gives by its name what a run's stages made.
             find: Gives by its name what may be dropped.
 
         """

@@ -1,7 +1,7 @@
 """A record of what was done to a live simulation, and the same once more, as finely as a draft.
 
 The record holds every order and the instant of every advance. What was taken hold of is told by
-where its matter was at the start, so that a scene filled more finely obeys it as well.
+where its material was at the start, so that a scene filled more finely obeys it as well.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -75,7 +75,7 @@ def write_replays(
 
     Args:
         place: Folder to write to.
-        progress: Told the fraction done and what is done.
+        progress: Called with the fraction done and what is done.
         run: That was touched.
         kept: File of the record.
         beside: Runs whose objects were dropped.
@@ -139,14 +139,14 @@ def replay_frames(
 ) -> Iterator[Frame]:
     """Do again what a record says; yield frames, its first and last instant among them.
 
-    All frames hold all that is there in the end: until it is dropped, a thing waits where it will
+    All frames hold all that is there in the end: until it is dropped, an object waits where it will
     begin, and a page hides it.
 
     Args:
         growth: The scene.
-        contact: As in life, or the control.
+        contact: As in reality, or the control.
         done: What to do.
-        tell: Told the fraction done.
+        tell: Called with the fraction done.
         engine: The name of the engine.
 
     """

@@ -198,7 +198,7 @@ def test_corrected_masks_are_kept_and_not_asked_for_again(photographs, tmp_path)
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(mask)
     again = learned_masks(photographs, tmp_path / "made", masker, ("duck", "can"))
     assert len(masker.asked) == 5
-    assert "1 of the masks were corrected by hand." in again.said
+    assert "1 of the masks were corrected manually." in again.said
     assert np.asarray(Image.open(mask)).min() == 255
     learned_masks(photographs, tmp_path / "made", masker, ("duck", "other"))
     assert len(masker.asked) == 10, "other words are another question"

@@ -215,7 +215,7 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([lost / "a.jpg"])
     (tmp_path / "films").mkdir()
     (tmp_path / "films" / "a.MOV").touch()
-    with pytest.raises(UserError, match=r"holds 1 films and no model\. Name the film itself: .*a"):
+    with pytest.raises(UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"):
         assemble([tmp_path / "films"])
 
 
@@ -236,7 +236,7 @@ def test_what_only_its_name_calls_a_picture_is_not_called_one(tmp_path, name, sa
 @pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
 def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
     saved(tmp_path, greys[:count], ".jpg", Image.fromarray)
-    with pytest.raises(BadFileError, match=f"photos: {said} too few to show a thing"):
+    with pytest.raises(BadFileError, match=f"photos: {said} too few to show an object"):
         gathered(tmp_path)
 
 

@@ -278,7 +278,7 @@ def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
     assert tried == ["plain", "thorough"], "both attempts once"
     shutil.copytree(taken[0], tmp_path / "other")
     (tmp_path / "other" / "photo_000.jpg").unlink()
-    with pytest.raises(BadFileError, match="Put the thing on something with a pattern"):
+    with pytest.raises(BadFileError, match="Put the object on something with a pattern"):
         find_poses(tmp_path / "other", tmp_path / "poses", silent)
     assert len(tried) == 4, "other pictures are looked at anew"
 
@@ -506,7 +506,7 @@ def test_a_film_that_was_held_upright_is_turned(tmp_path, caplog):
 
 @pytest.mark.parametrize("kind", ["ten frames", "still", "noise", "empty", "text", "long"])
 def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monkeypatch):
-    path, said = tmp_path / "a.mp4", "cannot be read as a film"
+    path, said = tmp_path / "a.mp4", "cannot be read as a video"
     if kind == "ten frames":
         said = "holds 10 frames; at least 20"
         film(path, 10)
@@ -537,7 +537,7 @@ def test_a_recording_of_a_screen_is_refused(tmp_path):
             made.add(shown)
     with pytest.raises(BadFileError, match="never moves: it is a recording of a screen") as error:
         write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", silent)
-    assert "\n" not in str(error.value) and "Do not turn the thing" in str(error.value)
+    assert "\n" not in str(error.value) and "Do not turn the object" in str(error.value)
 
 
 def test_what_stands_still_before_a_plain_wall_is_no_screen():

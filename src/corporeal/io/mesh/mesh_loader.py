@@ -73,7 +73,7 @@ def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = N
 
     Args:
         path: Its suffix says what it is; its companions must lie beside it.
-        objects: "one": the whole file is one object. "nodes": every named thing on the first level
+        objects: "one": the whole file is one object. "nodes": every named object on the first level
             that branches is one. "auto": the bodies that the file states (USD); without any, the
             whole file.
         up: Axis of the file that points up; None: the one it states, else its kind's usual one.

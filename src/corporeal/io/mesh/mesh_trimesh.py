@@ -199,7 +199,7 @@ def _names_in_obj(data: bytes, keyword: bytes) -> set[bytes]:
 
 
 def _object_and_material(node: str, mesh: trimesh.Trimesh) -> tuple[str, ...]:
-    """Return the names of an OBJ's thing and surface: trimesh joins them with the material's."""
+    """Return the names of an OBJ's object and surface: trimesh joins them with the material's."""
     material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")
     owner = node.removesuffix(f"_{material}")
     return (node,) if owner in ("", node) else (owner, node)

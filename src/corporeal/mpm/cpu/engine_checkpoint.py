@@ -1,4 +1,4 @@
-"""What a CPU engine keeps of itself by name, and takes back: fields, rigid bodies, clock, books."""
+"""Checkpoints of the CPU engine: fields, rigid bodies, clock, ledgers."""
 
 import re
 from collections.abc import Collection

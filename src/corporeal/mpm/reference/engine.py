@@ -1,4 +1,4 @@
-"""The reference engine: NumPy, double precision, one idea per function. Slow and to be trusted.
+"""The reference engine: NumPy in double precision, slow, for verification.
 
 Moving-least-squares MPM (Hu et al. 2018) with one field per body and explicit contact between
 fields. Every other engine is compared with this one.

@@ -1,4 +1,4 @@
-"""Which engine steps a scene: what a person may ask."""
+"""Settings of the stage simulate."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,21 +11,24 @@ from corporeal.mpm.problem import BodySplittingEngine, InteractiveEngine
 
 @dataclass(frozen=True)
 class SimulateConfig:
-    """Solver settings; none of them changes material numbers."""
+    """Solver settings; none of them changes material values."""
 
     engine: Literal["cpu", "cuda", "reference"] = DEFAULT_ENGINE
-    """cpu: the fast engine; cuda: the same on a CUDA card; reference: NumPy in double precision,
-    slow, which the others are tested against."""
+    """cpu: the fast engine; cuda: the same on a CUDA GPU; reference: NumPy in double precision,
+    slow, which the others are tested against.
+    """
     contact: Literal["multi", "single"] = "multi"
-    """multi: one velocity field per object, with friction between them; single: one field for all,
-    a control in which touching objects stick together."""
+    """multi: one velocity field per object, with friction between them; single: one shared
+    field, a control in which touching objects stick together.
+    """
     breaking: bool = False
-    """Brittle things that are struck with ten times the energy that they bear break into pieces;
-    else they stay whole, and it is said what would break."""
+    """Break brittle objects that are struck with ten times the energy they withstand; else a
+    warning says what would break.
+    """
 
 
 def validate(config: SimulateConfig) -> None:
-    """Raise UserError where there is no engine as asked for, whatever the scene."""
+    """Raise UserError where the engine cannot run."""
     if config.breaking:
         for capability in (InteractiveEngine, BodySplittingEngine):
             require_of_class(engine_class(config.engine), capability)

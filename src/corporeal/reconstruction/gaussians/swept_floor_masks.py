@@ -86,7 +86,7 @@ def masks_above_floor(
 def _connected_with_many(
     gaussians: Gaussians, which: np.ndarray, cell: float
 ) -> Bool[np.ndarray, " M"]:
-    """Tell which of the chosen Gaussians hang together with many others."""
+    """Return which of the chosen Gaussians hang together with many others."""
     turn = Rotation.from_quat(gaussians.rotation[which], scalar_first=True).as_matrix()
     axes = GAUSSIAN_EXTENT_SIGMAS * (turn * gaussians.scale[which, None]).transpose(0, 2, 1)
     ends = np.concatenate([axes, -axes], axis=1)

@@ -322,7 +322,7 @@ def _limits_and_haze(
 
 
 def _in_empty_space(theta: ParameterMatrix, schedule: TrainingSchedule) -> Bool[np.ndarray, " N"]:
-    """Tell which Gaussians are where lines of sight pass."""
+    """Return which Gaussians are where lines of sight pass."""
     if schedule.outlines is None:
         return np.zeros(len(theta), np.bool_)
     return schedule.outlines.emptied(theta[:, PARAM_MEAN:PARAM_ROTATION])

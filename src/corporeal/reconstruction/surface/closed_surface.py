@@ -84,7 +84,7 @@ COLOUR_NEIGHBOURS = 500
 COLOUR_FALLOFF_POWER = 4
 """Power of the distance by which one counts less."""
 TINY_EXTENT_FRACTION = 1e-9
-"""Shares of the thing's extent that can be divided by."""
+"""Shares of the object's extent that can be divided by."""
 WINDING_CHECK_PLACES = 4000
 """Places at which the winding number is compared."""
 MAX_SURFACE_MOVE_CELLS = 2.0

@@ -1,7 +1,7 @@
-"""What a judge can tell: every question against every control, with intervals.
+"""Detection rates of a judge: every question against every control, with intervals.
 
 A question tells a control where it raises an alarm on the control more often than on the reference
-of the same scene, beyond chance. Of a law of physics a judge is believed only through questions
+of the same scene, beyond chance. Of a law of physics a judge is trusted only through questions
 that tell a control they are meant for.
 """
 
@@ -24,14 +24,14 @@ INTERVAL_LEVEL = 0.90
 CHANCE_ACCURACY = 0.5
 """Accuracy of a coin [-]."""
 WHOLE_MARK = "whole"
-"""The mark for the whole film, beside the questions."""
+"""The mark for the whole video, beside the questions."""
 BOOTSTRAP_DRAWS = 2000
 """Of scenes, for the interval of a mean."""
 
 
 @dataclass(frozen=True)
 class VideoVerdict:
-    """What is said of one film: means over looks."""
+    """What is said of one video: means over looks."""
 
     scene: str
     condition: str
@@ -44,7 +44,7 @@ class VideoVerdict:
 
 
 def video_verdict(scene: str, condition: str, looks: Sequence[Verdict]) -> VideoVerdict:
-    """Take the mean of the looks at one film; "unclear" reports nothing."""
+    """Take the mean of the looks at one video; "unclear" reports nothing."""
     said = [look.said() for look in looks]
     alarm = {}
     for q in question_catalogue().question:
@@ -160,7 +160,7 @@ def trusted_questions(
 
 @dataclass(frozen=True)
 class MethodMark:
-    """How well one method does in a group of scenes, by questions that are believed."""
+    """How well one method does in a group of scenes, by questions that are trusted."""
 
     method: str
     group: str
@@ -175,13 +175,13 @@ class MethodMark:
 def method_mark(
     films: Sequence[VideoVerdict], method: str, group: str, questions: Sequence[str]
 ) -> MethodMark | None:
-    """Mark a method by some questions; None: none of them applies to any of its films.
+    """Mark a method by some questions; None: none of them applies to any of its videos.
 
     Args:
         films: Of the group's scenes.
         method: Name among the conditions.
         group: What the scenes or questions have in common.
-        questions: That are believed.
+        questions: That are trusted.
 
     """
     shares = []

@@ -1,4 +1,4 @@
-"""The page of a judged evaluation: first what the judge cannot tell, at the end every film."""
+"""Report of a judged evaluation: detection rates first, then all videos."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ from corporeal.render.html_page import data_url, escape_html, fill_page, html_fi
 
 Progress = Callable[[float, str], None]
 PICTURES_PER_VIDEO = 6
-"""Pictures of a film on the page."""
+"""Pictures of a video on the page."""
 JPEG_QUALITY = 80
 """Of their JPEG."""
 
@@ -28,13 +28,13 @@ def write_judge_page(
     path: Path,
     progress: Progress = lambda fraction, words: None,
 ) -> None:
-    """Write the page; ``PICTURES_PER_VIDEO`` pictures of every film's first look are rendered for it.
+    """Write the page; ``PICTURES_PER_VIDEO`` pictures of every video's first look are rendered for it.
 
     Args:
-        judged: What was said of which films.
+        judged: What was said of which videos.
         result: What follows.
         path: Of the page.
-        progress: Told the fraction done and which film is rendered.
+        progress: Called with the fraction done and which video is rendered.
 
     Raises:
         UserError: The file cannot be written.
@@ -65,7 +65,7 @@ def write_judge_page(
 
 
 def blind_spots_sentence(result: JudgeResult) -> str:
-    """Say in a sentence which laws of physics the judge cannot tell."""
+    """Return in a sentence which laws of physics the judge cannot tell."""
     none = [law for law, questions in result.believed.items() if not questions]
     if not none:
         return "Of each law of physics at least one question tells a control it is meant for."
@@ -79,7 +79,7 @@ def _summary(judged: JudgeVerdicts) -> str:
     by = ", ".join(judged.answered_by) or "nobody"
     scenes = len({v.scene for v in judged.verdicts})
     missing = f" {judged.unanswered} looks have no usable answer." if judged.unanswered else ""
-    return f"{len(judged.verdicts)} films of {scenes} scenes, answered by {by}.{missing}"
+    return f"{len(judged.verdicts)} videos of {scenes} scenes, answered by {by}.{missing}"
 
 
 def _table(table: ResultTable) -> str:

@@ -1,4 +1,4 @@
-"""What a judge is shown of a film in one look."""
+"""Pictures of a video for one look of a judge."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -47,7 +47,7 @@ class SequentialPictures(Sequence[np.ndarray]):
 def judge_pictures(
     film: VideoMotion, staging: Staging, look: int
 ) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
-    """Show a film: dated pictures, close-ups, and the diagram of its paths.
+    """Show a video: dated pictures, close-ups, and the diagram of its paths.
 
     Args:
         film: What moves.
@@ -79,6 +79,6 @@ def judge_pictures(
 
 
 def pictures_description(look: int) -> str:
-    """Say in words how the pictures of a look are taken; recordings compare this."""
+    """Describe in words how the pictures of a look are taken; recordings compare this."""
     size = f"{PICTURE_SIZE_PX[0]} x {PICTURE_SIZE_PX[1]}"
     return f"{DATED_PICTURES} dated pictures, {CLOSE_UP_PICTURES} close-ups, paths; {size}; turned {LOOK_TURNS_DEG[look]:+g}°"

@@ -1,4 +1,4 @@
-"""Ask a judge about films: the price first, every film in a conversation of its own."""
+"""Questions to a judge about videos, each in a separate conversation, after a cost estimate."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -40,13 +40,13 @@ def query_judge(
     progress: Progress = lambda fraction, words: None,
     judge: VlmClient | None = None,
 ) -> JudgeVerdicts:
-    """Ask about all films, each in a conversation of its own, in an order that tells nothing.
+    """Ask about all videos, each in a conversation of its own, in an order that tells nothing.
 
     Args:
         films: From ``gather_films``.
         config: Who judges.
         say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         judge: Who answers, instead of ``config.judge``.
 
     Raises:
@@ -61,7 +61,7 @@ def query_judge(
     results = thread_map(
         [lambda a=a: asking.ask(a.question, Verdict) for a in jobs],
         MAX_PARALLEL_QUESTIONS,
-        lambda count: progress(count / max(len(jobs), 1), f"{count} of {len(jobs)} films"),
+        lambda count: progress(count / max(len(jobs), 1), f"{count} of {len(jobs)} videos"),
         lambda error: not isinstance(error, PendingQuestionsError | UnansweredError),
     )
     refuse_pending(results, config.judge)
@@ -101,15 +101,13 @@ def connect_judge(config: JudgeConfig) -> VlmClient | None:
 
 def _somebody(model: VlmClient | None) -> VlmClient:
     if model is None:
-        raise UserError(
-            "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."
-        )
+        raise UserError("No judge. Choose one: --judge openai:MODEL, ask:FOLDER or replay:FOLDER.")
     return model
 
 
 def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
-    """Say what asking takes."""
-    words = f"{reckoned.films} films to judge, about {reckoned.tokens:,} tokens"
+    """Describe what asking takes."""
+    words = f"{reckoned.films} videos to judge, about {reckoned.tokens:,} tokens"
     if not is_paid(config.judge):
         return f"{words}; {config.judge.partition(':')[0]} costs nothing."
     if reckoned.dollars is None:
@@ -128,6 +126,6 @@ def _agreed(reckoned: JudgingCost, config: JudgeConfig) -> None:
         return
     if reckoned.dollars is None or reckoned.dollars > CONFIRM_ABOVE_USD:
         raise UserError(
-            f"{price_words(reckoned, config)} Add --yes to ask all the same, or judge fewer: "
+            f"{price_words(reckoned, config)} Add --yes to confirm, or judge fewer: "
             "--looks 1 --control-scenes 3."
         )

@@ -1,4 +1,4 @@
-"""All films of several scenes: references, controls and methods, ready to be asked about."""
+"""All videos of several scenes: references, controls and methods, ready to be asked about."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,12 +41,13 @@ class JudgeConfig:
     """Who judges, how often, and what it may cost."""
 
     judge: str = NO_MODEL
-    """Model that judges the films: as --vlm."""
+    """Model that judges the videos: as --vlm."""
     record: Path | None = None
     """Folder where its answers are recorded, for replay:FOLDER."""
     looks: int = 1
-    """Times that each film is judged, each from another side and with questions in another order:
-    1 to 3."""
+    """Times that each video is judged, each from another side and with questions in another order:
+    1 to 3.
+    """
     control_scenes: int = DEFAULT_CONTROL_SCENES
     """Scenes of which controls are judged."""
     yes: bool = False
@@ -66,7 +67,7 @@ class SceneRuns:
 
 @dataclass(frozen=True)
 class FailedVideo:
-    """A film that nobody judges, and why."""
+    """A video that nobody judges, and why."""
 
     scene: str
     condition: str
@@ -113,7 +114,7 @@ def check_judging(config: JudgeConfig) -> None:
     check_range("--control-scenes", config.control_scenes, 0, 10_000)
 
 
-# ---------------------------------------------------------------- films
+# ---------------------------------------------------------------- videos
 
 
 def gather_videos(
@@ -122,13 +123,13 @@ def gather_videos(
     config: JudgeConfig,
     progress: Progress = lambda fraction, words: None,
 ) -> JudgedVideos:
-    """Make all films: read runs back, simulate and edit controls.
+    """Make all videos: read runs back, simulate and edit controls.
 
     Args:
         scenes: With finished runs.
         out: Folder of the evaluation; runs of controls go to ``OUT/SCENE/control-NAME``.
         config: How many looks, and controls of how many scenes.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
     films = JudgedVideos([], [], [], {}, methods_of(scenes))
@@ -147,7 +148,7 @@ def methods_of(scenes: Sequence[SceneRuns]) -> list[str]:
 def _gather_scene(
     scene: SceneRuns, folder: Path, with_controls: bool, config: JudgeConfig, films: JudgedVideos
 ) -> None:
-    """Add the films of one scene; a reference that is not clean leaves it out."""
+    """Add the videos of one scene; a reference that is not clean leaves it out."""
     reference, why = _run(scene, REFERENCE_METHOD)
     if reference is None:
         films.failed.append(FailedVideo(scene.name, REFERENCE_METHOD, why))
@@ -174,7 +175,7 @@ def _gather_scene(
 
 
 def _methods(scene: SceneRuns, films: JudgedVideos) -> dict[str, VideoMotion]:
-    """Return the films of all methods but the reference; what cannot be judged is a row."""
+    """Return the videos of all methods but the reference; what cannot be judged is a row."""
     shown = {m: _read(scene, m, films) for m in scene.runs if m != REFERENCE_METHOD}
     return {m: film for m, film in shown.items() if film is not None}
 
@@ -191,7 +192,7 @@ def _read(scene: SceneRuns, method: str, films: JudgedVideos) -> VideoMotion | N
 def _controls(
     scene: SceneRuns, reference: SimulationResult, folder: Path, films: JudgedVideos
 ) -> dict[str, VideoMotion]:
-    """Return the films of all controls that have a place in the scene."""
+    """Return the videos of all controls that have a place in the scene."""
     found = {c: _control(c, scene, reference, folder, films) for c in CONTROL_NAMES}
     return {c: film for c, film in found.items() if film is not None}
 
@@ -215,7 +216,7 @@ def _run(scene: SceneRuns, method: str) -> tuple[SimulationResult | None, str]:
 
 
 def audit_breach(audit: Audit) -> str:
-    """Say what keeps a run from being judged as physics; "": nothing."""
+    """Describe what keeps a run from being judged as physics; "": nothing."""
     if audit.nan_count or audit.particles_out_of_domain:
         return "the simulation lost particles"
     if audit.mechanical_growth > ALLOWED_BREACHES["mechanical_growth"]:

@@ -1,7 +1,7 @@
-"""The question about one film after one look, and what asking it costs.
+"""The question about one video after one look, and what asking it costs.
 
 It is named by a digest of the motion that it shows: an answer to another motion is never found, and
-nothing in it says which condition the film is of. The version in ``film.md`` covers the questions
+nothing in it says which condition the video is of. The version in ``film.md`` covers the questions
 of ``questions.toml``, too.
 """
 
@@ -33,7 +33,7 @@ TOKENS_PER_CHARACTER, TOKENS_PER_PICTURE, TOKENS_PER_ANSWER = 0.25, 350, 400
 
 @dataclass(frozen=True)
 class VideoQuestion:
-    """A film, ready to be asked about."""
+    """A video, ready to be asked about."""
 
     scene: str
     condition: str
@@ -52,7 +52,7 @@ def motion_digest(film: VideoMotion, staging: Staging) -> str:
 
 
 def video_question(film: VideoMotion, staging: Staging, told: str, look: int) -> Question:
-    """Ask about one film.
+    """Ask about one video.
 
     Args:
         film: What is shown.
@@ -78,7 +78,7 @@ def video_question(film: VideoMotion, staging: Staging, told: str, look: int) ->
 
 
 def question_order(name: str, look: int) -> list[int]:
-    """Return the order of the questions: another for each film and look, and always the same."""
+    """Return the order of the questions: another for each video and look, and always the same."""
     seed = hashlib.sha256(f"{name} {look}".encode()).digest()[:8]
     dice = np.random.default_rng(int.from_bytes(seed, "big"))
     return dice.permutation(len(question_catalogue().question)).tolist()
@@ -106,14 +106,14 @@ class JudgingCost:
     """What asking takes, reckoned before anybody is asked."""
 
     films: int
-    """Films times looks."""
+    """Videos times looks."""
     tokens: int
     dollars: float | None
     """At list prices [US$]; None: the table of prices does not know the model."""
 
 
 def estimate_cost(asked: list[VideoQuestion], model: str) -> JudgingCost:
-    """Reckon what asking about films costs, answers that are kept already included."""
+    """Reckon what asking about videos costs, answers that are kept already included."""
     read = sum(
         round(TOKENS_PER_CHARACTER * len(a.question.text)) + TOKENS_PER_PICTURE * PICTURES_PER_LOOK
         for a in asked
