@@ -64,7 +64,7 @@ def colmap(folder, views, matrix):
     return folder
 
 
-def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
+def test_photographs_become_a_video_of_things_that_fall(typed, views, tmp_path):
     write_views(tmp_path / "photos", views)
     code, said = typed("run", "photos", "--things", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL)
     assert code == 0, said.err
@@ -72,7 +72,7 @@ def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
     report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())
     assert "Gaussians were learned from 20 photographs" in report
     assert "discs were laid along the closed surface" in report
-    assert (run / "film.mp4").stat().st_size > 1000
+    assert (run / "video.mp4").stat().st_size > 1000
     assert (run / "0-reconstruct" / "gaussians.ply").stat().st_size > 10_000
     moved = audit["outcome"]["objects"]
     assert list(moved) == list(NAMES)

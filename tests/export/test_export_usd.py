@@ -149,8 +149,8 @@ def test_one_of_two_ways_to_simulate_lives(usd, asked):
             assert not stage.GetPrimAtPath(f"/World/{solid.name}/{other}").IsActive()
 
 
-def test_the_film_moves_as_the_run_did(usd, asked):
-    stage = opened(usd, "film.usda")
+def test_the_video_moves_as_the_run_did(usd, asked):
+    stage = opened(usd, "video.usda")
     assert stage.GetTimeCodesPerSecond() == asked.scene.fps
     assert stage.GetEndTimeCode() == len(asked.motion.time) - 1
     shapes = asked.motion.shapes(asked.scene.solids)
@@ -165,8 +165,8 @@ def test_the_film_moves_as_the_run_did(usd, asked):
 
 
 def test_no_stage_has_both_physics_and_motion(usd):
-    film, sim = opened(usd, "film.usda"), opened(usd)
-    assert not any(p.HasAPI(UsdPhysics.RigidBodyAPI) for p in film.Traverse())
+    video, sim = opened(usd, "video.usda"), opened(usd)
+    assert not any(p.HasAPI(UsdPhysics.RigidBodyAPI) for p in video.Traverse())
     for prim in sim.Traverse():
         assert not any(a.GetNumTimeSamples() for a in prim.GetAttributes())
 

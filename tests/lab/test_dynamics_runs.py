@@ -55,7 +55,7 @@ def test_a_run_keeps_what_is_compared(tmp_path):
     assert numbers.outcome.pair("ball", "block").first_contact_s is not None
     assert not numbers.faults and numbers.steps > 10
     assert numbers.source == store.source_digest() != ""
-    assert run_pipeline.stage_states(folder)[-1].state == "not yet"  # the report, as of the film
+    assert run_pipeline.stage_states(folder)[-1].state == "not yet"  # the report, as of the video
 
 
 @pytest.mark.slow

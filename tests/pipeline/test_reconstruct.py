@@ -130,8 +130,8 @@ def test_gaussians_follow_their_objects_beside_others(made):
     np.testing.assert_allclose(shift[:, 2], found.object_of_gaussian == 1, atol=1e-5)
     results = StageResults(reconstruct=found, assemble=more)
     assert results.reconstruction is not None
-    assert results.filmed is None, "the ball has no Gaussians"
-    assert StageResults(reconstruct=found, assemble=scene).filmed is not None
+    assert results.rendered_reconstruction is None, "the ball has no Gaussians"
+    assert StageResults(reconstruct=found, assemble=scene).rendered_reconstruction is not None
 
 
 def test_the_report_is_told_how_it_came_about(made):

@@ -116,10 +116,10 @@ def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):
 
 def page(scene, made, folder):
     _, parts, field, particles = made
-    film = Video(folder / "film.mp4", 24, 64, 64)
-    film.path.write_bytes(b"")
+    video = Video(folder / "video.mp4", 24, 64, 64)
+    video.path.write_bytes(b"")
     story = ReportContent(
-        scene, parts, field, particles, film, run_audit(), {}, materials.cited_sources()
+        scene, parts, field, particles, video, run_audit(), {}, materials.cited_sources()
     )
     report(story, folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")

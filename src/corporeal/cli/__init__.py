@@ -56,12 +56,12 @@ class RunFolder:
 
 
 def command_run() -> None:
-    """Run all verbs on a scene: from files to a film and a report.
+    """Run all verbs on a scene: from files to a video and a report.
 
     SCENE is a model (GLB, glTF, OBJ, PLY, STL, OFF, 3MF, DAE, USD), several of them (each one
     object), or a scene.toml; or a folder of photographs, with poses (transforms.json, COLMAP,
-    3 x 4 matrices) or without, a film, or a trained Gaussian splat.
-    Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
+    3 x 4 matrices) or without, a video, or a trained Gaussian splat.
+    Results go to runs/<name>/: video.mp4, report.html, materials.json, audit.json and pictures.
     Results that are up to date are reused.
     """
     from corporeal.pipeline.settings.settings import Settings
@@ -106,8 +106,10 @@ def command_demo() -> None:
     with console.status("building the scene"):
         path = write_cached_showcase(asked.scene, folder / "input")
     settings = asked.settings
-    if settings.film.view is None:
-        settings = replace(settings, film=replace(settings.film, view=view_direction(asked.scene)))
+    if settings.video.view is None:
+        settings = replace(
+            settings, video=replace(settings.video, view=view_direction(asked.scene))
+        )
     _run_stages([path], folder, settings, where)
 
 
@@ -272,7 +274,7 @@ FIRST_OPTIONS = {
     "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
     "assemble": ("drop", "lift", "velocity", "extent", "stack", "duration"),
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
-    "film": ("quality", "width", "height", "speed", "view", "colour-by"),
+    "video": ("quality", "width", "height", "speed", "view", "colour-by"),
 }
 """Options of a verb that come first in its help; of few options all do."""
 REDO_COMMANDS = (
@@ -283,7 +285,7 @@ REDO_COMMANDS = (
     "ground",
     "fill",
     "simulate",
-    "film",
+    "video",
 )
 REDO_COMMANDS = (*REDO_COMMANDS, "report")
 COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
@@ -326,7 +328,7 @@ def _run_stages(
     if until == "report":
         show_summary(folder)
         print(folder / "report.html")
-        print(folder / "film.mp4")
+        print(folder / "video.mp4")
     else:
         print(f"{until} done. Go on with: corporeal report {quote(str(folder))}")
 

@@ -88,7 +88,7 @@ def _assemble() -> None:
 
 
 def _run() -> None:
-    """Run every scene of a corpus to its film and report, several at a time.
+    """Run every scene of a corpus to its video and report, several at a time.
 
         corporeal corpus run corpus/ --detail draft --workers 4
 

@@ -14,10 +14,10 @@ from corporeal.core.version import __version__
 
 API_KEY_VARIABLES = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
 LIBRARY_USES = {
-    "embreex": "films and pictures",
+    "embreex": "videos and pictures",
     "igl": "filling of meshes",
     "DracoPy": "Draco files",
-    "pycolmap": "photographs without poses, and films",
+    "pycolmap": "photographs without poses, and videos",
     "pxr": "meshes in USD",
     "lxml": "meshes in 3MF and DAE",
     "collada": "meshes in DAE",
@@ -104,8 +104,10 @@ def _encoder() -> list[CheckResult]:
 
         path = imageio_ffmpeg.get_ffmpeg_version()
     except Exception as error:  # as above
-        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
-    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for films")]
+        return [
+            CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")
+        ]
+    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for videos")]
 
 
 def _keys() -> list[CheckResult]:

@@ -209,8 +209,8 @@ def evaluate_dynamics() -> None:
 
     TARGET is "showcase" or a corpus whose scenes are assembled. Each run lies in OUT/SCENE/METHOD,
     is done in a process of its own, and is not done again; say the same again to go on. A run that
-    fails is a row. With --judge a vision-language model judges films of the runs, after proving
-    on control films what it can tell; corporeal evaluate judge OUT does the same later.
+    fails is a row. With --judge a vision-language model judges videos of the runs, after proving
+    on control videos what it can tell; corporeal evaluate judge OUT does the same later.
     """
     from corporeal.jobs.executor import Executor
     from corporeal.lab.evaluation.dynamics import dynamics_tables
@@ -236,10 +236,10 @@ def evaluate_dynamics() -> None:
         docs: Path | None = None
         """File for the measured rows as a page of documentation (Markdown)."""
         judge: str = NO_MODEL
-        """Model that also judges films of the runs, as --vlm: see evaluate judge. Its page and
+        """Model that also judges videos of the runs, as --vlm: see evaluate judge. Its page and
         answers lie in OUT as judge.html and judge.json; --record keeps the answers for replay."""
         looks: int = 1
-        """Times that the judge looks at each film, each from another side: 1 to 3."""
+        """Times that the judge looks at each video, each from another side: 1 to 3."""
         yes: bool = False
         """Ask a judge that costs more than 5 US$, or whose price is not known."""
         crew: WorkerOptions = field(default_factory=WorkerOptions)
@@ -285,7 +285,7 @@ def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
 
 
 def evaluate_judge() -> None:
-    """Let a vision-language model judge films of runs, after judging the model by control films.
+    """Let a vision-language model judge videos of runs, after judging the model by control videos.
 
     FOLDER holds SCENE/METHOD, each a run, as evaluate dynamics leaves them. Controls are the run
     "ours" with one known fault each. Of a law of physics the judge is believed only where its
@@ -299,7 +299,7 @@ def evaluate_judge() -> None:
         json: Path | None = None
         """File for answers, intervals and marks (JSON)."""
         page: Path | None = None
-        """File for a page with every film (HTML)."""
+        """File for a page with every video (HTML)."""
         how: JudgeConfig = field(default_factory=JudgeConfig)
 
     first = ("judge", "looks", "record", "yes", "json", "page")

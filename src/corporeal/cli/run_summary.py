@@ -40,7 +40,7 @@ def show_summary(folder: Path) -> None:
 
 
 def _breakage_sentences(found: Sequence[PredictedBreakage]) -> None:
-    """Say what the film shows whole although it would break, and how to see it break."""
+    """Say what the video shows whole although it would break, and how to see it break."""
     doubted = [b for b in found if b.word != "holds" and not b.pieces]
     for blow in doubted[:MAX_LISTED_IMPACTS]:
         _say("hint", breakage_message(blow))

@@ -315,7 +315,7 @@ class Audit:
     settling: SettlingOutcome | None
     """None: nothing was left to settle before time 0."""
     warnings: tuple[str, ...]
-    """What to read before trusting the film, in sentences."""
+    """What to read before trusting the video, in sentences."""
     kind_of_warning: tuple[NoteKind, ...] = field(default=(), kw_only=True)
     """One for each; none: a run from before they were kept."""
     breakage: tuple[PredictedBreakage, ...] = field(default=(), kw_only=True)

@@ -36,7 +36,7 @@ class ExportConfig:
     """How simulators get what can deform: material points (USD), tetrahedra (USD, MJCF), or not at
     all. MJCF knows no material points and takes tetrahedra for them."""
     tolerance: float = 1e-3
-    """Largest error of a vertex in the GLB film [m]."""
+    """Largest error of a vertex in the GLB video [m]."""
     friction_for: TargetEngine = "physx"
     """Whose rule makes one friction of two where a format has no pairs."""
     hull_vertices: int = 0

@@ -25,7 +25,7 @@ SAME_INSTANT_S = 1e-9
 
 @dataclass(frozen=True)
 class SolidPoses:
-    """Where a solid's frame is at every frame of the film; F frames."""
+    """Where a solid's frame is at every frame of the video; F frames."""
 
     position: Float[np.ndarray, "F 3"]
     """[m]"""

@@ -41,5 +41,5 @@ def _poured_sentence(scene: Scene, particles: Particles) -> Iterator[str]:
     for one in particles.contents:
         yield (
             f"{one.thing.name} lies loose in {scene.objects[one.vessel].name} and flows; formats "
-            "take it for a soft solid, and films carry the mesh of its start along."
+            "take it for a soft solid, and videos carry the mesh of its start along."
         )

@@ -1,4 +1,4 @@
-"""The layer ``motion.usda``: time samples only; one time code is one frame of the film."""
+"""The layer ``motion.usda``: time samples only; one time code is one frame of the video."""
 
 from functools import partial
 

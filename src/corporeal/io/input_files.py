@@ -143,7 +143,7 @@ def images_in_folder(folder: Path) -> list[Path]:
 
 
 def videos_in_folder(folder: Path) -> list[Path]:
-    """Return the films that lie in a folder, by name."""
+    """Return the videos that lie in a folder, by name."""
     return sorted(p for p in folder.iterdir() if _has_suffix(p, VIDEO_SUFFIXES))
 
 

@@ -52,7 +52,7 @@ STAGE_FOLDERS = {
     "ground": "6-ground",
     "fill": "7-fill",
     "simulate": "8-simulate",
-    "film": "9-film",
+    "video": "9-video",
     "report": "10-report",
 }
 STAGES = tuple(STAGE_FOLDERS)
@@ -166,8 +166,8 @@ def _read_stage_result(verb: str, folder: Path) -> Any:
     if verb == "report":
         return None
     found = store.load(folder / store.DATA_FILE)
-    # A run may have been moved, or is named from elsewhere: its film lies beside what says so.
-    return replace(found, path=folder / found.path.name) if verb == "film" else found
+    # A run may have been moved, or is named from elsewhere: its video lies beside what says so.
+    return replace(found, path=folder / found.path.name) if verb == "video" else found
 
 
 def digests_of_named_files(config: Any) -> list[str]:
@@ -461,11 +461,11 @@ class _Run:
         made, config = self.made, self.settings.simulate
         return simulate(made.scene, made.particles, made.field, config, folder, progress)
 
-    def _film(self, folder: Path, progress: Progress) -> Video:
+    def _video(self, folder: Path, progress: Progress) -> Video:
         from corporeal.pipeline.stages.video import render_video
 
         return self._keep(
-            folder, render_video(self.made.played, self.settings.film, folder, progress)
+            folder, render_video(self.made.played, self.settings.video, folder, progress)
         )
 
     def _report(self, folder: Path, progress: Progress) -> None:

@@ -1,4 +1,4 @@
-"""Where a film's camera stands: far enough to see everything, close to a contact, or alongside.
+"""Where a video's camera stands: far enough to see everything, close to a contact, or alongside.
 
 Boxes are those of objects over time, nan where an object is absent or went far away.
 """

@@ -1,4 +1,4 @@
-"""Whether a film's next picture would show what the last one shows."""
+"""Whether a video's next picture would show what the last one shows."""
 
 from collections.abc import Callable
 

@@ -34,7 +34,7 @@ def escape_html(text: object) -> str:
 
 
 def data_url_of_file(path: Path) -> str:
-    """Return a picture or film as an address that holds it."""
+    """Return a picture or video as an address that holds it."""
     return data_url(path.read_bytes(), MIME_TYPES[path.suffix])
 
 

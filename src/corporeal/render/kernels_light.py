@@ -3,7 +3,7 @@
 Neighbours share what their rays found, so that a pixel gathers dozens of directions: the samples
 of each 4 × 4 tile look along different directions, then a filter over tiles shares them (after
 Keller & Heidrich 2001, "Interleaved sampling"). Directions depend on the place in the picture
-only: a film does not flicker.
+only: a video does not flicker.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Rays from what a film's pixels met to sky and sun, and along what it mirrors."""
+"""Rays from what a video's pixels met to sky and sun, and along what it mirrors."""
 
 from dataclasses import dataclass
 

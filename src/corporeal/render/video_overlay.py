@@ -1,4 +1,4 @@
-"""What colours mean, and when it is, written into the corners of a film's pictures."""
+"""What colours mean, and when it is, written into the corners of a video's pictures."""
 
 from collections.abc import Sequence
 

@@ -2,7 +2,7 @@
 
 The settled poses are certified at rest; an interaction changes the start of as few objects as it
 can. Heights and speeds are drawn within ranges that scale with the scene, so that a scene of twice
-the size plays the same film more slowly (Froude scaling): a height is a share of an object's size,
+the size plays the same video more slowly (Froude scaling): a height is a share of an object's size,
 a speed a share of √(g L). What depends on masses and friction is found from them: how fast the
 first of a row must go for the blow to reach the last, and in which wind something moves.
 """
@@ -249,5 +249,5 @@ def _horizontal_vector(across: np.ndarray) -> Vector:
 
 
 def _watch_duration(until: float) -> float:
-    """Return how long to film [s] when the last impact that counts comes after ``until``."""
+    """Return the duration of the video [s] when the last impact that counts comes after ``until``."""
     return round(min(max(until + WATCH_AFTER_IMPACT_S, 1.0), 3.0), 2)

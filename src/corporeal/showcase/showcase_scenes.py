@@ -1,7 +1,7 @@
 """The ten showcase scenes: who stands where before the first step, and what is done to them.
 
 Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
-has there: the film begins when something is about to happen. Nothing numerical is in a scene.
+has there: the video begins when something is about to happen. Nothing numerical is in a scene.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Gaps, overlaps and crossings of objects, measured between their surfaces as a picture shows them.
 
 The ledger measures between particles, which know a surface to a fraction of a cell. Here the meshes
-of the scene follow the matter, as in the film, and are asked for distances themselves.
+of the scene follow the matter, as in the video, and are asked for distances themselves.
 """
 
 from collections.abc import Mapping, Sequence

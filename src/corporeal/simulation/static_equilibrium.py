@@ -61,7 +61,7 @@ def settling_problem(problem: Problem, hung: set[int]) -> Problem:
     which alone carries what has lain for long.
 
     Args:
-        problem: Of the film.
+        problem: Of the video.
         hung: Bodies that nothing carries: gravity does not pull them.
 
     """

@@ -182,7 +182,7 @@ def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
 class FrameSequence(Sequence[Frame]):
     """The frames of one trajectory, read from disk when asked for; the first ones only once.
 
-    Audit, film and report each read most of them. What is beyond ``FRAME_CACHE_BYTES`` is read
+    Audit, video and report each read most of them. What is beyond ``FRAME_CACHE_BYTES`` is read
     again.
     """
 

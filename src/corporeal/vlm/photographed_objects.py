@@ -160,7 +160,7 @@ def object_of_usual_size(class_name: str) -> SeenObject:
 
 
 def telling_words(source: str) -> str:
-    """Return the words of a folder's name, or a film's, that can be of what the pictures show.
+    """Return the words of a folder's name, or a video's, that can be of what the pictures show.
 
     Not those for what they are or were taken with: "photos" are no paper, and "Camera" no camera.
     """
@@ -172,7 +172,7 @@ def telling_words(source: str) -> str:
 
 
 def object_from_name(source: str) -> SeenObject | None:
-    """Return what the name of a folder or a film says is in it, as large as it usually is.
+    """Return what the name of a folder or a video says is in it, as large as it usually is.
 
     None: it says nothing that has a usual size.
     """

@@ -290,7 +290,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Video:
-    """A finished film."""
+    """A finished video."""
 
     path: Path
     fps: int

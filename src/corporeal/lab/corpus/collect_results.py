@@ -125,7 +125,7 @@ class SceneRecord:
     """What was measured; None: it was not run."""
     parts: tuple[PartRecord, ...] = ()
     picture: Path | None = None
-    """The film as a row of frames; of a scene that was not run, a view of it at rest."""
+    """The video as a row of frames; of a scene that was not run, a view of it at rest."""
     settings: Settings | None = None
 
     @property

@@ -48,7 +48,7 @@ COLUMN_NOTES = (
     "was struck struck a third, or the wind moved something.",
     "- **deepest overlap**: of an object with another or with the floor, in cells of the grid.",
     "- **energy gained**: kinetic and elastic, that no work accounts for, relative.",
-    "- **time**: of the process that finished the scene, film included; **memory**: its most.",
+    "- **time**: of the process that finished the scene, video included; **memory**: its most.",
 )
 
 

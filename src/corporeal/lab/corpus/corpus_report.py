@@ -31,7 +31,7 @@ from corporeal.simulation.audit_messages import ALLOWED_BREACHES
 
 REPORT_PAGE_FILE, REPORT_TABLE_FILE, REPORT_DATA_FILE = "report.html", "report.csv", "report.json"
 THUMBNAIL_WIDTH_PX = 840
-"""Width of a film's row of frames on the page [px]."""
+"""Width of a video's row of frames on the page [px]."""
 BREAKDOWN_COLUMNS = (
     "scenes",
     "objects",

@@ -32,7 +32,7 @@ class AssembleConfig:
     duration: float | None = None
     """Simulated time [s]; by default from the scene file, else long enough for the falls."""
     fps: int | None = None
-    """Frames per second of the film; by default from the scene file, else 30."""
+    """Frames per second of the video; by default from the scene file, else 30."""
 
 
 def validate(config: AssembleConfig) -> None:

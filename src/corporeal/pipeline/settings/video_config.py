@@ -1,4 +1,4 @@
-"""Camera, size and quality of a film: what a person may ask."""
+"""Camera, size and quality of a video: what a person may ask."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ MAX_SLOW_MOTION_RATIO = 100.0
 
 @dataclass(frozen=True)
 class VideoConfig:
-    """Camera, size and quality of the film."""
+    """Camera, size and quality of the video."""
 
     width: int = 1280
     """[px]"""
@@ -36,7 +36,7 @@ class VideoConfig:
     """wide: everything, all the time, but for what goes farther than 2.5 sizes of the scene; close:
     what is struck first, or moves most; follow: the camera goes along with what moves."""
     slow: float = 1.0
-    """How many times slower the film is about the first contact."""
+    """How many times slower the video is about the first contact."""
     caption: bool = True
     """Write the time into the picture."""
 

@@ -38,7 +38,7 @@ from corporeal.scene.initial_state import with_initial_state
 MIN_DURATION_S, MAX_DURATION_S = 1.0, 3.0
 """Bounds of the time that is watched when nobody says how long [s]."""
 DEFAULT_FPS = 30
-"""Frames per second of the film when nobody says."""
+"""Frames per second of the video when nobody says."""
 
 
 DEFAULT_CONFIG = AssembleConfig()
@@ -110,9 +110,9 @@ def _models_in(folder: Path) -> list[Path]:
             what += f" and {len(places) - 1} more folders"
             step = "Put the photographs of one thing into one folder, and name that."
         raise BadFileError(folder, f"{what}.", step)
-    if films := videos_in_folder(folder):
-        what = f"the folder holds {len(films)} films and no model."
-        raise BadFileError(folder, what, f"Name the film itself: {films[0]}.")
+    if videos := videos_in_folder(folder):
+        what = f"the folder holds {len(videos)} videos and no model."
+        raise BadFileError(folder, what, f"Name the video itself: {videos[0]}.")
     step = "Name a model, or a folder that holds some, or photographs with poses."
     raise BadFileError(
         folder, f"the folder holds no model ({READABLE_MODEL_FORMATS}) and no pictures.", step

@@ -60,7 +60,7 @@ CELLS_ALONG_LARGEST_OBJECT = 48
 CONVEX_PIECES_FOLDER = "pieces"
 """Folder of the pool that keeps convex pieces."""
 DURATION_AT_REST_S = 1.0
-"""How long to film a scene in which nothing happens [s]."""
+"""Duration of a scene in which nothing happens [s]."""
 
 
 @dataclass(frozen=True)

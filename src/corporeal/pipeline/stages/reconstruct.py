@@ -1,7 +1,7 @@
 """Reconstruct: from posed photographs, or a trained splat, to objects with closed surfaces.
 
 What comes out is a scene of objects like any other, which ``assemble`` reads as a GLB; and the
-Gaussians themselves, for the film and for telling parts apart.
+Gaussians themselves, for the video and for telling parts apart.
 """
 
 from collections.abc import Sequence
@@ -96,7 +96,7 @@ BACKING_SURFELS_STATEMENT = (
     "were laid along the closed surface, below what was learned: they show where that is thin, "
     "and what no photograph shows."
 )
-"""Said of the film, and of gaussians.ply."""
+"""Said of the video, and of gaussians.ply."""
 PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS, PROGRESS_AFTER_OBJECTS = 0.6, 0.66, 0.7
 """Share of the work that is done after each step. Surfaces took 27 to 38 % of it at preset normal
 (docs/inputs.md)."""
@@ -123,7 +123,7 @@ def reconstruct(
     """Find the objects of a scene in photographs, or in a splat.
 
     Args:
-        source: A folder of photographs, a film, or a splat.
+        source: A folder of photographs, a video, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
         viewer: Who is asked what the pictures show, where ``config.things`` does not say it.
@@ -221,7 +221,7 @@ def _name_objects(
     """Name objects, and decide how large they are; a lone one may be called as its folder.
 
     Args:
-        source: The folder of photographs, the film or the splat.
+        source: The folder of photographs, the video or the splat.
         found: Objects, in order of size.
         objects: What each is, as far as anybody said.
         config: What was asked for.
@@ -310,7 +310,7 @@ def _reason_not_worth(
 
 @dataclass(frozen=True)
 class _VideoGaussians:
-    """What films show of objects and of what is about them."""
+    """What videos show of objects and of what is about them."""
 
     gaussians: Gaussians
     owner: Int[np.ndarray, " N"]

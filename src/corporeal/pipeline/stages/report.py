@@ -1,6 +1,6 @@
 """Report: one self-contained page that shows what was assumed, what happened, and how sure it is.
 
-The page holds its film and figures, so that it can be mailed. Every number carries the measured
+The page holds its video and figures, so that it can be mailed. Every number carries the measured
 range it was chosen from and where that range was read.
 """
 
@@ -91,7 +91,7 @@ class ReportContent:
     parts: Parts
     field: MaterialField
     particles: Particles
-    film: Video
+    video: Video
     audit: RunAudit
     figures: Mapping[str, Path]
     """Caption → picture, in order."""
@@ -112,8 +112,8 @@ def report(story: ReportContent, path: Path) -> None:
         title=escape_html(story.scene.name),
         summary=_summary(story),
         view=story.view,
-        film=data_url_of_file(story.film.path),
-        width=story.film.width,
+        video=data_url_of_file(story.video.path),
+        width=story.video.width,
         caption=_caption(audit.breakage),
         figures="".join(
             html_figure(caption, data_url_of_file(file)) for caption, file in story.figures.items()
@@ -222,7 +222,7 @@ def _window(force: Push | Wind) -> str:
 
 
 def _caption(found: Sequence[PredictedBreakage]) -> str:
-    """Say below the film what it shows whole although it may not stay so."""
+    """Say below the video what it shows whole although it may not stay so."""
     doubted = [b for b in found if b.word != "holds"]
     return "".join(f"<p>{escape_html(breakage_message(b))}</p>" for b in doubted)
 

@@ -1,6 +1,6 @@
 """Simulate: step the scene through time, keep every frame as it comes, and audit the whole.
 
-Frames are written one by one and nothing holds a film in memory. A checkpoint lies beside them:
+Frames are written one by one and nothing holds a video in memory. A checkpoint lies beside them:
 whatever stops a simulation, the same call goes on from there exactly as if nothing had happened.
 A scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
 """

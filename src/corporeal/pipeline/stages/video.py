@@ -1,4 +1,4 @@
-"""Film: the scene itself moves, carried by its particles, and a camera watches.
+"""Video: the scene itself moves, carried by its particles, and a camera watches.
 
 What is seen are textured surfaces, or the Gaussians that were learned from pictures: those move and
 stretch with the matter (F Σ F^T), stand before the usual floor, and the surfaces that were made of
@@ -62,7 +62,7 @@ from corporeal.simulation.moving_gaussians import (
 )
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
-VIDEO_FILE = "film.mp4"
+VIDEO_FILE = "video.mp4"
 THUMBNAIL_FILE = "thumbnail.png"
 CLOSE_UP_FILE = "close-up.png"
 CLOSE_UP_SIZE_PX = (340, 256)
@@ -72,7 +72,7 @@ CLOSE_UP_TIMES_S = (-0.03, 0.0, 0.02, 0.05, 0.12, 0.4)
 MAX_FRAMES_FOR_CAMERA = 60
 """Frames that the camera's place is chosen by, at most."""
 OCCLUSION_CHECK_FRACTIONS = (0.0, 0.35, 0.7, 1.0)
-"""Instants at which it is seen what hides, as shares of the film."""
+"""Instants at which it is seen what hides, as shares of the video."""
 STRAY_PARTICLES_PERCENT = 0.4
 """Percent of an object's particles, at either end, that need not be in the picture."""
 CORE_MASS_FRACTION = 0.5
@@ -95,13 +95,13 @@ def render_video(
     folder: Path,
     progress: Progress = lambda fraction, words: None,
 ) -> Video:
-    """Write ``film.mp4`` and ``thumbnail.png``: what the scene looks like follows the particles.
+    """Write ``video.mp4`` and ``thumbnail.png``: what the scene looks like follows the particles.
 
     Args:
         played: What is to be seen: surfaces, or Gaussians where the scene was made of them, bound
             to material points at the start; those of no object stand still.
         config: Size, quality, view.
-        folder: Where the film goes.
+        folder: Where the video goes.
         progress: Told the fraction done and what is going on.
 
     Raises:
@@ -135,7 +135,7 @@ def render_video(
 
 @dataclass(frozen=True)
 class _VideoSetup:
-    """A film ready to be taken."""
+    """A video ready to be taken."""
 
     troupe: "_AnimatedScene"
     reel: MotionBounds
@@ -168,7 +168,7 @@ def _video_setup(played: SimulationResult, config: VideoConfig) -> _VideoSetup:
 def frame_scenes(
     played: SimulationResult, config: VideoConfig, frames: Int[np.ndarray, " N"]
 ) -> Iterator[tuple[RayScene, CameraAim]]:
-    """Return the surfaces that a film shows in some frames, each with its camera."""
+    """Return the surfaces that a video shows in some frames, each with its camera."""
     staged = _video_setup(played, config)
     at = staged.camera.at
     for scenery in _frame_scenes(staged.troupe, played.trajectory, frames.astype(float), at):
@@ -218,7 +218,7 @@ def _close_up(
 def write_caption(
     picture: np.ndarray, time: float, config: VideoConfig, about: float | None
 ) -> np.ndarray:
-    """Write the time [s] into a picture, and that the film is slow there."""
+    """Write the time [s] into a picture, and that the video is slow there."""
     if not config.caption:
         return picture
     slower = config.slow / config.speed if is_slow(time, about) else 1.0 / config.speed
@@ -385,8 +385,8 @@ def _gaussian_deformer(config: VideoConfig, played: SimulationResult) -> MovingG
         return None
     if found is None:
         raise UserError(
-            "This scene was made of surfaces and has no Gaussians to be filmed. "
-            "Film it with look 'surfaces', or run it from photographs or a splat."
+            "This scene was made of surfaces and has no Gaussians to render. "
+            "Render it with look 'surfaces', or run it from photographs or a splat."
         )
     return moving_gaussians(found, played.prepared)
 

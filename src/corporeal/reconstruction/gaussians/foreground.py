@@ -177,7 +177,7 @@ def gaussians_below_floor(
     """Tell which Gaussians of objects are below the floor.
 
     Where nobody looks from below, the visual hull goes on under it, as a cone that nothing denies.
-    The floor ends the surface there; in a film of a thing that is lifted the cone would show.
+    The floor ends the surface there; in a video of a thing that is lifted the cone would show.
 
     Args:
         gaussians: In the world's frame: +z up, the floor at z = 0.

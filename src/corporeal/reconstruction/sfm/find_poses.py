@@ -139,10 +139,10 @@ def _load_record(folder: Path) -> _PosesRecord:
 
 
 def find_poses(source: Path, folder: Path, progress: Progress) -> FoundPoses:
-    """Find the poses of photographs, or of frames of a film.
+    """Find the poses of photographs, or of frames of a video.
 
     Args:
-        source: A folder of photographs, or a film.
+        source: A folder of photographs, or a video.
         folder: Gets pictures and model. What is there of the same source is not done again.
         progress: Told the fraction done and what is being done.
 

@@ -60,7 +60,7 @@ OPAQUE_ALPHA_U8 = 255
 ALPHA_THRESHOLD_U8 = 127
 """Alpha above which it is rather seen than not."""
 MAX_ASPECT_RATIO = 2.4
-"""Longer side over the shorter, above which a picture is no camera's: films have 21 : 9. For one
+"""Longer side over the shorter, above which a picture is no camera's: videos have 21 : 9. For one
 of 1600 × 120 a lens was found that nobody has, and 24 good photographs were refused with it."""
 JPEG_QUALITY = 95
 """Of JPEG copies."""

@@ -1,4 +1,4 @@
-"""Whether what was found in pictures is worth simulating, or a film of the room."""
+"""Whether what was found in pictures is worth simulating, or a video of the room."""
 
 from collections.abc import Sequence
 

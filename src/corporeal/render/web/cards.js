@@ -104,7 +104,7 @@ const NUMBERS = {
 export function auditOf(header, openPart) {
   const audit = header.audit
   if (!audit) {
-    return el('p', {}, header.film ? 'The audit comes with the report, which this run does not have yet.'
+    return el('p', {}, header.video ? 'The audit comes with the report, which this run does not have yet.'
       : 'Nothing has been simulated yet: the audit says afterwards what energy, momentum and contacts did.')
   }
   const warnings = audit.warnings.map(w => el('li', {}, w.text, ' ',
