@@ -187,7 +187,7 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     registered = f"{row['registered']}/{pictures}" if "registered" in row else "–"
     good = "–"
     if "watertight" in row:
-        pieces = row["things"] == 1 and row["pieces"] == [1]
+        pieces = row["objects"] == 1 and row["pieces"] == [1]
         good = "yes" if row["watertight"] and pieces else f"{row['things']} things"
     return (
         row["set"],

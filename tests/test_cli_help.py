@@ -14,7 +14,7 @@ from corporeal import cli
 from corporeal.cli.help_layout import OPTIONS_BEFORE_MORE, lay_out, options_of
 from corporeal.pipeline.run_pipeline import Settings
 
-NEEDED = ("detail", "vlm", "annotations", "drop", "things", "out")
+NEEDED = ("detail", "vlm", "annotations", "drop", "object-names", "out")
 
 
 @dataclass(frozen=True)

@@ -82,7 +82,10 @@ def test_every_prompt_states_a_version_of_its_own():
     found = [
         files("corporeal.description").joinpath("prompts", f"{task}.md") for task in INTERVIEW_TASKS
     ]
-    found += [files("corporeal.vlm").joinpath("prompts", f"{t}.md") for t in ("sizes", "things", "regions")]
+    found += [
+        files("corporeal.vlm").joinpath("prompts", f"{t}.md")
+        for t in ("sizes", "things", "regions")
+    ]
     found += [files("corporeal.lab.evaluation.judge").joinpath("video.md")]
     prompts = [read_prompt(file) for file in found]
     assert len({prompt.version for prompt in prompts}) == len(prompts)

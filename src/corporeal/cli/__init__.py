@@ -72,7 +72,7 @@ def command_run() -> None:
         where: RunFolder = RunFolder()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    first = ("detail", "vlm", "annotations", "drop", "things", "out")
+    first = ("detail", "vlm", "annotations", "drop", "object-names", "out")
     asked = parse(Run, "run", command_run.__doc__, first=first)
     _run_stages(
         list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where
@@ -271,7 +271,7 @@ COMMANDS: dict[str, Callable[[], None]] = {
     "doctor": command_doctor,
 }
 FIRST_OPTIONS = {
-    "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
+    "reconstruct": ("object-names", "count", "up", "metres-per-unit", "training", "apart"),
     "assemble": ("drop", "lift", "velocity", "extent", "stack", "duration"),
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
     "video": ("quality", "width", "height", "speed", "view", "colour-by"),

@@ -341,7 +341,7 @@ class _Run:
         if verb == "reconstruct":
             from corporeal.io.photos.mask_files import edited_masks
 
-            asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
+            asked = [] if self.settings.reconstruct.object_names else [self.settings.describe.vlm]
             by_hand = sorted(edited_masks(self.folder / STAGE_FOLDERS[verb]).items())
             return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
         if verb == "assemble":

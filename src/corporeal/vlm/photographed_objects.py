@@ -198,7 +198,7 @@ def named_object_note(source: str, seen: SeenObject, name: str) -> str:
         more = f", and how large with --extent {name}=METRES"
     return Note(
         f"Nobody said what it is: by the name {source!r} it was called {seen.class_name}{size}. "
-        f"Say what it is with --things{more}.",
+        f"Say what it is with --object-names{more}.",
         NoteKind.ASSUMED,
     )
 
@@ -245,7 +245,9 @@ def check_stated_extents(
     for text in stated:
         name, _ = parse_extent(text, (known or [UNKNOWN_CLASS])[0])
         if name not in known and not name.startswith(UNKNOWN_CLASS):
-            step = f"Choose one of: {', '.join(known)}." if known else "Name it with --things."
+            step = (
+                f"Choose one of: {', '.join(known)}." if known else "Name it with --object-names."
+            )
             raise UserError(f"--extent: no object {name!r}. {step}")
 
 

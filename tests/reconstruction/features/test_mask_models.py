@@ -205,7 +205,7 @@ def test_corrected_masks_are_kept_and_not_asked_for_again(photographs, tmp_path)
 
 
 def test_words_are_asked_for(photographs, tmp_path):
-    with pytest.raises(UserError, match="--things"):
+    with pytest.raises(UserError, match="--object-names"):
         learned_masks(photographs, tmp_path / "made", Found(), ())
 
 

@@ -126,7 +126,7 @@ def reconstruct(
         source: A folder of photographs, a video, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
-        viewer: Who is asked what the pictures show, where ``config.things`` does not say it.
+        viewer: Who is asked what the pictures show, where ``config.object_names`` does not say it.
         folder: Where an interrupted training, and maps of learned features, are kept.
         progress: Told the fraction done and what is being done.
 
