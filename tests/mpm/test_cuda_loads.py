@@ -95,11 +95,11 @@ def test_blows_and_drags_reach_a_body_as_in_the_reference(rigid):
             if step == 2:
                 engine.apply_impulse(0, (0.05, 0.0, 0.31), (-0.1, 0.02, 0.0))
             if step == 4:
-                engine.pull(0, (0.0, 0.05, 0.3), (0.0, 0.2, 0.4), 300.0)
+                engine.attach_spring(0, (0.0, 0.05, 0.3), (0.0, 0.2, 0.4), 300.0)
             if step == 24:
-                engine.pull(0, None, (0.1, 0.2, 0.4), 100.0)
+                engine.attach_spring(0, None, (0.1, 0.2, 0.4), 100.0)
             if step == 32:
-                engine.pull(0, None, (0.0, 0.0, 0.0), 0.0)
+                engine.attach_spring(0, None, (0.0, 0.0, 0.0), 0.0)
             engine.step(1e-3)
     mine, theirs = ours.measure(), sure.measure()
     scale = np.abs(theirs.momentum).max()
@@ -109,4 +109,4 @@ def test_blows_and_drags_reach_a_body_as_in_the_reference(rigid):
     # At the mean velocity of a step no energy comes from nowhere; the transfer takes some of it.
     assert 0.995 * gained < mine.push_work < 1.15 * gained
     with pytest.raises(UserError, match="not held"):
-        ours.pull(0, None, (0.0, 0.0, 0.0), 5.0)
+        ours.attach_spring(0, None, (0.0, 0.0, 0.0), 5.0)

@@ -52,7 +52,7 @@ def test_each_rise_has_the_restitution_of_its_own_blow(patient_engine, law):
     speed, e = 1.2, 0.5
     stone = steel_ball((0.003, 0.002, RADIUS + 0.001), velocity=(0, 0, -speed))
     given = problem(stone, cell=CELL, restitution=e, planes=[floor()], gravity=DOWN)
-    run = patient_engine(replace(given, blows=np.tile(law, (2, 2, 1))))
+    run = patient_engine(replace(given, restitution_law=np.tile(law, (2, 2, 1))))
     before = run.measure()
     struck = np.sqrt(speed**2 + 2 * G * 0.001)
     for _ in range(3):

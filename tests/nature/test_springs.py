@@ -179,15 +179,15 @@ def test_what_is_pulled_hangs_below_the_hand_by_its_weight_over_the_spring(fast_
     body = ball((0, 0, 0), 0.06, CELL / 2, stuff=Stuff(young=2e5), rigid=rigid)
     weight = float(body.volume @ body.density) * 9.81
     run = fast_engine(problem(body, cell=CELL, gravity=FALL))
-    run.pull(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 500.0)
+    run.attach_spring(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 500.0)
     run.advance(0.7)
     sunk = run.measure().centre[0, 2]
     assert sunk == pytest.approx(-weight / 500.0, rel=0.02)
-    run.pull(0, None, (0.1, 0.0, 0.0), 500.0)
+    run.attach_spring(0, None, (0.1, 0.0, 0.0), 500.0)
     run.advance(1.4)
     measure = run.measure()
     assert measure.centre[0] == pytest.approx([0.1, 0.0, -weight / 500.0], abs=1.5e-3)
-    run.pull(0, None, (0.1, 0.0, 0.0), 0.0)
+    run.attach_spring(0, None, (0.1, 0.0, 0.0), 0.0)
     run.advance(1.5)
     assert run.measure().momentum[0, 2] == pytest.approx(-weight * 0.1, rel=0.05)
 
@@ -198,7 +198,7 @@ def test_hands_act_as_in_the_reference(rigid):
     fast, sure = CpuEngine(given, threads=1), ReferenceEngine(given)
     for run in (fast, sure):
         run.apply_impulse(0, (0.0, 0.05, 0.0), (0.1, 0.0, 0.1))
-        run.pull(0, (0.0, 0.0, 0.05), (0.1, 0.0, 0.2), 300.0)
+        run.attach_spring(0, (0.0, 0.0, 0.05), (0.1, 0.0, 0.2), 300.0)
     for _ in range(30):
         dt = min(fast.stable_step(), sure.stable_step())
         fast.step(dt)
@@ -216,6 +216,6 @@ def test_a_hand_that_grasps_nothing_is_told(fast_engine):
     with pytest.raises(UserError, match="not finite"):
         run.apply_impulse(0, (0.0, 0.0, np.nan), (1.0, 0.0, 0.0))
     with pytest.raises(UserError, match="not held yet"):
-        run.pull(0, None, (0.0, 0.0, 0.0), 10.0)
+        run.attach_spring(0, None, (0.0, 0.0, 0.0), 10.0)
     with pytest.raises(UserError, match="stiffness is -1"):
-        run.pull(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -1.0)
+        run.attach_spring(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -1.0)

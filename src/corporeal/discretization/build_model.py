@@ -83,7 +83,9 @@ def build_model(
         cell=particles.cell,
         friction=averaged(field.friction),
         restitution=averaged(bounces.restitution),
-        blows=np.stack([averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1),
+        restitution_law=np.stack(
+            [averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1
+        ),
         planes=(FLOOR, *(plane_of_wall(w) for w in scene.walls)),
         gravity=scene.gravity,
         gravity_ramp=GRAVITY_RAMP_S if starts_settled(scene, particles) else 0.0,

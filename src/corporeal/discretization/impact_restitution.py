@@ -13,7 +13,7 @@ from corporeal.materials import ImpactBody, RestitutionLaw
 from corporeal.materials.restitution_speed import NOMINAL_IMPACT_SPEED_M_S
 
 CONSTANT_RESTITUTION_LAW = (NOMINAL_IMPACT_SPEED_M_S, 0.0, 0.0, 0.0, 1.0)
-"""The law of what does not change: see ``Problem.blows``."""
+"""The law of what does not change: see ``Problem.restitution_law``."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class PairRestitutions:
     restitution: Float[np.ndarray, "K1 K1"]
     """At the speeds of their first blows [-]."""
     laws: Float[np.ndarray, "K1 K1 5"]
-    """How it changes with speed: see ``Problem.blows``."""
+    """How it changes with speed: see ``Problem.restitution_law``."""
 
 
 def restitutions_at_impact(

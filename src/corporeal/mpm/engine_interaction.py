@@ -33,7 +33,7 @@ class EngineInteraction(EngineReadout):
     """What is held from outside, by body."""
 
     def apply_impulse(self, body: int, point: Vector, impulse: Vector) -> None:
-        """Give a body an impulse [N s] at a point [m] at once: see ``problem.Interactive``."""
+        """Give a body an impulse [N s] at a point [m] at once: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, body, point, impulse)
         before, hold = self.measure().kinetic[body], self._hold(body, point)
         given, struck = np.array(impulse, np.float64), self._rigid_bodies().get(body)
@@ -45,24 +45,26 @@ class EngineInteraction(EngineReadout):
             self._add_velocity(body, hold.particle, hold.share[:, None] * given / mass[:, None])
         self._enter(body, given, float(self.measure().kinetic[body] - before))
 
-    def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
-        """Pull on a body by a spring until released: see ``problem.Interactive``."""
+    def attach_spring(
+        self, body: int, point: Vector | None, target: Vector, stiffness: float
+    ) -> None:
+        """Pull on a body by a spring until released: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, body, point, target)
         hold = None if point is None else self._hold(body, point)
         total = self._total(body)
         self.grips = updated_grips(self.grips, body, hold, np.array(target), stiffness, total)
         self._take_grips()
 
-    def weigh(self, gravity: Vector) -> None:
-        """Let gravity be another from now on [m/s²]: see ``problem.Interactive``."""
+    def set_gravity(self, gravity: Vector) -> None:
+        """Let gravity be another from now on [m/s²]: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, 0, gravity)
         before = float(np.sum(self.measure().potential))
         self.problem = replace(self.problem, gravity=gravity, gravity_ramp=0.0)
         self._take_loads()
         self._enter(0, np.zeros(3), float(np.sum(self.measure().potential)) - before)
 
-    def blow(self, body: int, wind: Vector) -> None:
-        """Let the air about a body move from now on [m/s]: see ``problem.Interactive``."""
+    def set_wind(self, body: int, wind: Vector) -> None:
+        """Let the air about a body move from now on [m/s]: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, body, wind)
         if self.problem.bodies[body].wind is None or not len(self.problem.bodies[body].faces.area):
             raise UserError(

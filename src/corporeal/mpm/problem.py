@@ -167,9 +167,9 @@ class Problem:
     rolling: Float[np.ndarray, "BW BW"] | None = None
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
-    blows: Float[np.ndarray, "BW BW 5"] | None = None
-    """How e of every pair changes with the speed of a blow: at which it is ``restitution``
-    [m/s], slope [s/m], exponent [-], least and most: see ``physics.backing.bounce_at``. None: it is
+    restitution_law: Float[np.ndarray, "BW BW 5"] | None = None
+    """How e of every pair changes with the speed of an impact: at which it is ``restitution``
+    [m/s], slope [s/m], exponent [-], least and most: see ``physics.impact_support.restitution_at_speed``. None: it is
     the same at all speeds."""
 
     @property
@@ -179,10 +179,10 @@ class Problem:
         return (*self.bonds, *self.apart, *combinations(prescribed, 2))
 
     @property
-    def blow_laws(self) -> Float[np.ndarray, "BW BW 5"]:
-        """``blows``, or that no restitution changes."""
-        if self.blows is not None:
-            return np.asarray(self.blows, float)
+    def restitution_law_of_pair(self) -> Float[np.ndarray, "BW BW 5"]:
+        """``restitution_law``, or that no restitution changes."""
+        if self.restitution_law is not None:
+            return np.asarray(self.restitution_law, float)
         return np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (*np.shape(self.restitution), 1))
 
     @property
@@ -339,7 +339,9 @@ class InteractiveEngine(Engine, Protocol):
         """
         ...
 
-    def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+    def attach_spring(
+        self, body: int, point: Vector | None, target: Vector, stiffness: float
+    ) -> None:
         """Pull on a body by a damped spring until released.
 
         Args:
@@ -354,7 +356,7 @@ class InteractiveEngine(Engine, Protocol):
         """
         ...
 
-    def weigh(self, gravity: Vector) -> None:
+    def set_gravity(self, gravity: Vector) -> None:
         """Let gravity be another from now on [m/s²]; what that adds to the potential is work.
 
         Raises:
@@ -363,7 +365,7 @@ class InteractiveEngine(Engine, Protocol):
         """
         ...
 
-    def blow(self, body: int, wind: Vector) -> None:
+    def set_wind(self, body: int, wind: Vector) -> None:
         """Let the air about a body move with a velocity from now on [m/s].
 
         Raises:

@@ -91,7 +91,9 @@ def split_problem(problem: Problem, split: BodySplit) -> Problem:
         bodies=(*bodies, *pieces[1:]),
         friction=problem.friction[np.ix_(rows, rows)],
         restitution=problem.restitution[np.ix_(rows, rows)],
-        blows=None if problem.blows is None else problem.blows[np.ix_(rows, rows)],
+        restitution_law=None
+        if problem.restitution_law is None
+        else problem.restitution_law[np.ix_(rows, rows)],
         rolling=None if problem.rolling is None else problem.rolling[np.ix_(rows, rows)],
     )
 

@@ -167,14 +167,14 @@ class ParticleConstants:
         return self.substances.wave_speed[self.kind]
 
     @cached_property
-    def forgetting(self) -> Float[np.ndarray, " P"]:
+    def flip_damping_rate(self) -> Float[np.ndarray, " P"]:
         """Rate at which what the grid cannot see is forgotten [1/s]: see ``MaterialTable``."""
-        return self.substances.forgetting[self.kind]
+        return self.substances.flip_damping_rate[self.kind]
 
     @cached_property
-    def swells(self) -> Bool[np.ndarray, " P"]:
+    def uses_mean_dilatation(self) -> Bool[np.ndarray, " P"]:
         """Whether pressure comes from a mean dilatation."""
-        return self.substances.swells[self.kind]
+        return self.substances.uses_mean_dilatation[self.kind]
 
     @cached_property
     def mean_bulk(self) -> Float[np.ndarray, " P"]:
@@ -263,9 +263,9 @@ class State:
     plastic: Float[np.ndarray, " P"]
     volume: Float[np.ndarray, " P"]
     """v_c of granular matter."""
-    relief: Float[np.ndarray, " P"]
+    log_volume_ratio: Float[np.ndarray, " P"]
     """ln of the mean volume J̄ that a particle's pressure follows over its own J; see
-    ``Matter.swells``."""
+    ``Matter.uses_mean_dilatation``."""
     branch_strain: Float[np.ndarray, "K 2 3 3"]
     """What Maxwell branches remember, of the particles that have any (``Matter.relaxing``) …"""
     branch_volume: Float[np.ndarray, "K 2"]
@@ -296,7 +296,7 @@ class State:
             motion=identity,
             plastic=np.zeros(count),
             volume=np.zeros(count),
-            relief=np.zeros(count),
+            log_volume_ratio=np.zeros(count),
             branch_strain=np.zeros((len(matter.relaxing), 2, 3, 3)),
             branch_volume=np.zeros((len(matter.relaxing), 2)),
             centre=matter.centre,
@@ -358,7 +358,10 @@ class State:
         Whatever they were strained by there was long ago: their branches have forgotten it.
         """
         mine, body = self._of(matter, bodies)
-        taken = {name: mine for name in ("position", "F", "motion", "plastic", "volume", "relief")}
+        taken = {
+            name: mine
+            for name in ("position", "F", "motion", "plastic", "volume", "log_volume_ratio")
+        }
         taken |= {name: body for name in ("centre", "rotation")}
         found = {}
         for name, chosen in taken.items():
@@ -410,27 +413,29 @@ def branch_energy(matter: ParticleConstants, memory: BranchMemory) -> Float[np.n
 
 def mean_pressure(matter: ParticleConstants, state: State) -> Float[np.ndarray, " P"]:
     """Kirchhoff pressure of the mean dilatation [Pa]; 0 where pressure is one's own."""
-    m, k, out = matter, matter.swells, np.zeros(len(state.F))
-    mean = np.maximum(mean_volume(state.F[k], state.relief[k]), MIN_VOLUME_RATIO)
+    m, k, out = matter, matter.uses_mean_dilatation, np.zeros(len(state.F))
+    mean = np.maximum(mean_volume(state.F[k], state.log_volume_ratio[k]), MIN_VOLUME_RATIO)
     out[k] = laws.mean_pressure(m.law[k], mean, m.mean_bulk[k])
     return out
 
 
 def mean_volume(
-    F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+    F: Float[np.ndarray, "P 3 3"], log_volume_ratio: Float[np.ndarray, " P"]
 ) -> Float[np.ndarray, " P"]:
-    """J̄ = J exp(relief) [-]."""
-    return determinant(F) * np.exp(relief)
+    """J̄ = J exp(log_volume_ratio) [-]."""
+    return determinant(F) * np.exp(log_volume_ratio)
 
 
 def strain_energy(
-    matter: ParticleConstants, F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+    matter: ParticleConstants,
+    F: Float[np.ndarray, "P 3 3"],
+    log_volume_ratio: Float[np.ndarray, " P"],
 ) -> Float[np.ndarray, " P"]:
-    """Elastic energy of each particle [J] at F and the relief of its mean dilatation."""
+    """Elastic energy of each particle [J] at F and the log_volume_ratio of its mean dilatation."""
     m, out = matter, np.zeros(len(F))
-    soft, k = ~m.rigid, m.swells
+    soft, k = ~m.rigid, m.uses_mean_dilatation
     out[soft] = laws.psi(m.law[soft], F[soft], m.mu[soft], m.own_lam[soft])
-    out[k] += laws.psi_mean(m.law[k], mean_volume(F[k], relief[k]), m.mean_bulk[k])
+    out[k] += laws.psi_mean(m.law[k], mean_volume(F[k], log_volume_ratio[k]), m.mean_bulk[k])
     return m.volume * out
 
 

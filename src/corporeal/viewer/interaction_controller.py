@@ -172,26 +172,26 @@ class InteractionController:
         mass = float(self.engine.measure().mass[spot.body])
         stiffness = mass * (2 * np.pi * order.firm) ** 2
         x, y, z = point.tolist()
-        self.engine.pull(spot.body, (x, y, z), order.to, stiffness)
+        self.engine.attach_spring(spot.body, (x, y, z), order.to, stiffness)
         self.held = SpringGrip(spot.body, stiffness, order.to)
 
     def _pull(self, order: Command) -> None:
         if self.held is not None:
-            self.engine.pull(self.held.body, None, order.to, self.held.stiffness)
+            self.engine.attach_spring(self.held.body, None, order.to, self.held.stiffness)
             self.held = SpringGrip(self.held.body, self.held.stiffness, order.to)
 
     def _drop(self, order: Command) -> None:
         if self.held is not None:
-            self.engine.pull(self.held.body, None, self.held.to, 0.0)
+            self.engine.attach_spring(self.held.body, None, self.held.to, 0.0)
             self.held = None
 
     def _gravity(self, order: Command) -> None:
-        self.engine.weigh(order.to)
+        self.engine.set_gravity(order.to)
 
     def _wind(self, order: Command) -> None:
         for body in self._bodies(order.object):
             if len(self.engine.problem.bodies[body].faces.area):
-                self.engine.blow(body, order.to)
+                self.engine.set_wind(body, order.to)
 
     # ---------------------------------------------------------------- things that are added
 

@@ -159,7 +159,7 @@ class ContactMemory:
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
-        self.blows = np.ascontiguousarray(problem.blow_laws)
+        self.restitution_law = np.ascontiguousarray(problem.restitution_law_of_pair)
         self.face = face_table()
         self.stage = np.zeros(1, layout.CONTACT_STAGE_RECORD.dtype)
         self.pair = np.zeros(self.friction.size * PAIR_COLUMNS)
@@ -170,7 +170,7 @@ class ContactMemory:
             plane=self.plane,
             friction=self.friction,
             restitution=self.restitution,
-            bounces=self.blows,
+            bounces=self.restitution_law,
             contact_memory=self.stage,
             face=self.face,
         )

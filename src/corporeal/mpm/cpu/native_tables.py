@@ -47,7 +47,7 @@ class FieldMaterials:
     """Columns: see ``layout``."""
     body: Int[np.ndarray, " M"]
     """Whose each row is."""
-    swells: bool
+    uses_mean_dilatation: bool
     """Whether pressure comes from the mean dilatation of clusters."""
     flows: bool
     """Whether any of it has a return map."""
@@ -63,7 +63,9 @@ class FieldMaterials:
         table = np.zeros((len(s.body), MATERIAL_COLUMNS), np.float32)
         none = np.zeros(len(s.body))
         numbers = (s.mu, s.lam, s.yield_stress, s.hardening, s.cone, s.apex, none, s.flow_index)
-        table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.forgetting, s.density, s.rigid])
+        table[:, :SHEAR] = np.column_stack(
+            [s.law, *numbers, s.flip_damping_rate, s.density, s.rigid]
+        )
         table[:, CONSISTENCY] = s.consistency
         table[:, STIFFENING] = s.stiffening**2
         branches = s.branches
@@ -73,7 +75,7 @@ class FieldMaterials:
             (BRANCH_TIME, branches.time),
         ):
             table[:, first : first + BRANCHES] = column
-        kinds = (bool(s.swells.all()), bool(s.flows.any()), bool(s.relaxes.any()))
+        kinds = (bool(s.uses_mean_dilatation.all()), bool(s.flows.any()), bool(s.relaxes.any()))
         pours = bool(np.isin(s.law, laws.LIQUID_LAWS).any() and not s.rigid.all())
         return cls(table, s.body, *kinds, pours)
 

@@ -236,7 +236,7 @@ class DeviceMemory:
             self.put(friction, wp.float64),
             self.put(restitution, wp.float64),
         )
-        c.blows = self.put(problem.blow_laws.reshape(-1, 5), wp.float64)
+        c.restitution_law = self.put(problem.restitution_law_of_pair.reshape(-1, 5), wp.float64)
         lengths = 0.0 * friction if problem.rolling is None else problem.rolling
         c.rolling = self.put(lengths, wp.float64)
         rows = np.zeros((friction.size, SUPPORT_ROW))

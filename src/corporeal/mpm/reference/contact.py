@@ -182,7 +182,7 @@ def _rebound(
         bodies=impact_support.ImpactBodies(
             np.concatenate([np.where(stiff[:bodies], light, -1.0), np.zeros(planes)]),
             np.asarray(problem.restitution, dtype=float),
-            problem.blow_laws,
+            problem.restitution_law_of_pair,
         ),
     )
 
