@@ -65,7 +65,7 @@ def moved(problem: Problem, time: float) -> tuple[float, float, float]:
 
 def unknown(problem: Problem) -> Problem:
     """Return the same problem, in which nobody knows what is round."""
-    bodies = (replace(b, rounding=np.zeros((0, CURVATURE_COLUMNS))) for b in problem.bodies)
+    bodies = (replace(b, curvature=np.zeros((0, CURVATURE_COLUMNS))) for b in problem.bodies)
     return replace(problem, bodies=tuple(bodies))
 
 

@@ -231,7 +231,7 @@ def rolled_share(engine, rounded, points=300, time=0.8):
     surface = ball_surface(start, RADIUS, points)
     rows = ball_rounding(start, RADIUS, surface) if rounded else np.zeros((0, CURVATURE_COLUMNS))
     given = problem(
-        steel_ball(start, surface=surface, rounding=rows),
+        steel_ball(start, surface=surface, curvature=rows),
         cell=CELL,
         friction=0.5,
         restitution=0.6,

@@ -262,7 +262,7 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
         law=column.pop("law").astype(np.int64),
         rigid=piece.rigid,
         surface=particles.surface[piece.surface].astype(float),
-        rounding=piece_curvature(particles, piece),
+        curvature=piece_curvature(particles, piece),
         wetted=piece_wetted_surface(particles, piece),
         push=obj.push,
         wind=obj.wind,
@@ -276,8 +276,8 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
 
 def piece_curvature(particles: Particles, piece: BodyPiece) -> Float[np.ndarray, "S2 Columns"]:
     """Give how its surface curves at a piece's surface points; none: it is not known."""
-    known = len(particles.rounding) == len(particles.surface)
-    return particles.rounding[piece.surface if known else []].astype(float)
+    known = len(particles.curvature) == len(particles.surface)
+    return particles.curvature[piece.surface if known else []].astype(float)
 
 
 def piece_wetted_surface(particles: Particles, piece: BodyPiece) -> WettedSurface | None:

@@ -102,10 +102,10 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
-    rounding: Float[np.ndarray, "S2 Columns"] = field(
+    curvature: Float[np.ndarray, "S2 Columns"] = field(
         default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
-    """How the surface curves at those points, see ``types.ROUNDING``; none: they are corners."""
+    """How the surface curves at those points, see ``types.CURVATURE_COLUMNS``; none: they are corners."""
     wetted: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None

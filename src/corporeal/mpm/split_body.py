@@ -108,7 +108,7 @@ def _piece_body(body: Body, split: BodySplit, k: int) -> Body:
         position=split.position[mine],
         velocity=split.velocity[mine],
         surface=split.surfaces[k],
-        rounding=np.zeros((0, CURVATURE_COLUMNS)),
+        curvature=np.zeros((0, CURVATURE_COLUMNS)),
         wetted=None,
         **{name: None if value is None else value[mine] for name, value in held.items()},
     )

@@ -21,8 +21,8 @@ from corporeal.mpm.problem import Body, Problem
 def surface_curvature(body: Body) -> Float[np.ndarray, "S 12"]:
     """How a body's surface curves at its points; zeros where it was not told."""
     rows = np.zeros((len(body.surface), CURVATURE_COLUMNS))
-    if len(body.rounding) == len(body.surface):
-        rows[:, : body.rounding.shape[1]] = body.rounding
+    if len(body.curvature) == len(body.surface):
+        rows[:, : body.curvature.shape[1]] = body.curvature
     return rows
 
 
@@ -47,8 +47,8 @@ class ParticleConstants:
     """Position at the start, from the body's centre [m]."""
     surface: tuple[Float[np.ndarray, "S 3"], ...]
     """Surface points of each body at the start, from its centre [m]."""
-    rounding: tuple[Float[np.ndarray, "S 12"], ...]
-    """How the surface curves there at the start: see ``types.ROUNDING``; zero where it does not."""
+    curvature: tuple[Float[np.ndarray, "S 12"], ...]
+    """How the surface curves there at the start: see ``types.CURVATURE_COLUMNS``; zero where it does not."""
 
     @classmethod
     def of(cls, problem: Problem) -> "ParticleConstants":
@@ -73,7 +73,7 @@ class ParticleConstants:
                 [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
             ),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
-            rounding=tuple(surface_curvature(b) for b in bodies),
+            curvature=tuple(surface_curvature(b) for b in bodies),
         )
 
     @cached_property
@@ -85,7 +85,7 @@ class ParticleConstants:
     @cached_property
     def facets(self) -> tuple[BodyFacets, ...]:
         """Flat faces of each body at the start, from its centre."""
-        both = zip(self.surface, self.rounding, strict=True)
+        both = zip(self.surface, self.curvature, strict=True)
         return tuple(facets_of(points, rows) for points, rows in both)
 
     @cached_property
@@ -96,7 +96,7 @@ class ParticleConstants:
     @cached_property
     def edged(self) -> tuple[bool, ...]:
         """Whether each body is known to have edges."""
-        return tuple(map(has_edges, self.rounding))
+        return tuple(map(has_edges, self.curvature))
 
     @cached_property
     def spacing(self) -> Float[np.ndarray, " B"]:
@@ -106,14 +106,14 @@ class ParticleConstants:
     def thinness(self, cell: float) -> tuple[int, ...]:
         """How thin each body is against a cell [m], were it rigid: see ``rigid.thinness``."""
         if cell not in self._thin:
-            both = zip(self.surface, self.rounding, strict=True)
+            both = zip(self.surface, self.curvature, strict=True)
             self._thin[cell] = tuple(rigid.thinness(p, rows[:, :3], cell) for p, rows in both)
         return self._thin[cell]
 
     def thin_places(self, cell: float) -> tuple[Bool[np.ndarray, " S"], ...]:
         """Surface points of each body where it is thin and not as a whole, were it rigid."""
         if cell not in self._places:
-            both = zip(self.surface, self.rounding, strict=True)
+            both = zip(self.surface, self.curvature, strict=True)
             self._places[cell] = tuple(rigid.thin_places(p, r[:, :3], cell) for p, r in both)
         return self._places[cell]
 

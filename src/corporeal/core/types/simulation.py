@@ -116,7 +116,7 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
-    rounding: Float[np.ndarray, "S2 Columns"] = field(
+    curvature: Float[np.ndarray, "S2 Columns"] = field(
         default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
     """How each of those points curves, see ``CURVATURE_COLUMNS``; none: as corners."""

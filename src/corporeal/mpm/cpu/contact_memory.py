@@ -63,13 +63,13 @@ def rigid_grid(
 
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
-    surface, rounding = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
-    facets = facets_of(surface, rounding)
+    surface, curvature = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
+    facets = facets_of(surface, curvature)
     points, clumps = _sort_into_cubes(points, 4.0 * cell)
     wetted, patches = _wetted_points(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
-    normals = rounding[:, :3]
+    normals = curvature[:, :3]
     thin = rigid.thinness(body.surface, normals, cell)
     spacing = rigid.surface_point_spacing(body.surface)
     # Many nodes ask where a body's surface begins: runs of points that are near each other.
@@ -88,7 +88,7 @@ def rigid_grid(
         "point": points,
         "clump": clumps,
         "surface": np.ascontiguousarray(surface),
-        "rounding": np.ascontiguousarray(rounding),
+        "curvature": np.ascontiguousarray(curvature),
         "facet": facets.row,
         "facet_point": np.ascontiguousarray(facets.point),
         "wetted": wetted,
@@ -105,12 +105,12 @@ def rigid_grid(
     record["pointed"] = len(surface) > 0 or body.path is not None
     record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
     record["wets"], record["facets"] = places.shape[1], len(facets.row)
-    record["rolls"] = bool((rounding[:, 6:8] > 0.0).any())
-    record["bends"] = bool(np.any(rounding[:, 10:] != 0.0))
+    record["rolls"] = bool((curvature[:, 6:8] > 0.0).any())
+    record["bends"] = bool(np.any(curvature[:, 10:] != 0.0))
     record["spacing"] = spacing
     record["thin"], record["slims"] = thin, len(slim)
     record["flat"] = is_bounded_by_facets(facets, body.surface)
-    record["edged"] = has_edges(rounding)
+    record["edged"] = has_edges(curvature)
     return arrays
 
 

@@ -200,7 +200,7 @@ FIELD_RECORD = NativeRecord(
     ("double *", "rigid"),  # rigid: its state
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
     ("double *", "facet facet_point"),  # rigid: [facets][FACET_ROW] flat faces; places on them
-    ("double *", "rounding"),  # rigid: [surfaces][ROUNDING], see types.ROUNDING
+    ("double *", "curvature"),  # rigid: [surfaces][CURVATURE_COLUMNS], see types.CURVATURE_COLUMNS
     ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast

@@ -140,9 +140,9 @@ class DeviceMemory:
         r.surfaces = sum(len(p) for p in points)
         r.surface_body = self.put(np.concatenate([np.zeros(0, int), *body]), wp.int32)
         r.surface = self.put(np.concatenate([np.zeros((0, 3)), *points]), wp.vec3d)
-        rows = [matter.rounding[b].reshape(-1) for b in stiff]
-        r.rounding = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
-        r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.rounding]), wp.int32)
+        rows = [matter.curvature[b].reshape(-1) for b in stiff]
+        r.curvature = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
+        r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.curvature]), wp.int32)
         count, thin, flat = np.zeros((3, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [matter.thinness(cell)[b] for b in stiff]

@@ -29,7 +29,7 @@ from corporeal.mpm.state import ParticleConstants, Velocities, branch_energy, st
 KNOWN_FIELDS = {
     Body: "name position velocity volume density law young poisson yield_stress hardening "
     "friction_angle cohesion loss vibration consistency flow_index "
-    "rigid surface rounding wetted push wind faces tether path pivot",
+    "rigid surface curvature wetted push wind faces tether path pivot",
     Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "
     "courant bonds joints apart rolling restitution_law",
 }

@@ -76,7 +76,7 @@ class ContactScene:
         And whether it is that point's at all, and not its neighbours'.
         """
         R = self.state.rotation[body]
-        rows = self.matter.rounding[body]
+        rows = self.matter.curvature[body]
         shift, own = support_point_shift(rows, np.tile(towards @ R, (len(rows), 1)))
         return self.surface(body) + shift @ R.T, own
 

@@ -159,6 +159,6 @@ class RoundOnCurved:
 
 def _turned_curvature(scene: ContactScene, body: int) -> Float[np.ndarray, "S 12"]:
     """How a body's surface curves at its points, in the world."""
-    rows, turn = scene.matter.rounding[body].copy(), scene.state.rotation[body]
+    rows, turn = scene.matter.curvature[body].copy(), scene.state.rotation[body]
     rows[:, :3], rows[:, 3:6] = rows[:, :3] @ turn.T, rows[:, 3:6] @ turn.T
     return rows
