@@ -157,7 +157,7 @@ def test_a_stiff_part_of_a_mixed_object_is_its_rigid_frame():
     assert "frame that holds what is soft" in frame.why
     assert frame.young == frame.young_real
     alone = plan_discretization([FRAME], [FALL], "draft").treatments[0]
-    assert "frame" not in alone.why
+    assert "inclusion" not in alone.why
 
 
 def test_only_the_soft_parts_of_a_framed_object_set_the_grid():

@@ -41,7 +41,7 @@ from corporeal.mpm.problem import (
 ZERO_VELOCITY = (0.0, 0.0, 0.0)
 GRAVITY_RAMP_S = 0.1
 """Time over which gravity grows where everything starts at rest in contact [s]."""
-SAME_FRAME_DISTANCE_CELLS = 1.5
+SAME_INCLUSION_DISTANCE_CELLS = 1.5
 """Rigid matter of one object nearer than this [cells] belongs to one frame."""
 
 
@@ -64,8 +64,8 @@ def build_model(
 ) -> ModelMapping:
     """Build the problem that an engine solves.
 
-    One body per object, in the scene's order; an object with rigid frames gives its soft body and
-    then each frame.
+    One body per object, in the scene's order; an object with rigid inclusions gives its soft body and
+    then each inclusion.
     """
     pieces = divide_into_pieces(particles, len(scene.objects))
     bodies = tuple(build_body(scene, particles, field, piece) for piece in pieces)
@@ -113,7 +113,7 @@ def build_model(
 
 @dataclass(frozen=True)
 class BodyPiece:
-    """What becomes one body: an object, or of a mixed object what is soft or one rigid frame."""
+    """What becomes one body: an object, or of a mixed object what is soft or one rigid inclusion."""
 
     object: int
     rigid: bool
@@ -128,7 +128,7 @@ class BodyPiece:
 
 
 def divide_into_pieces(particles: Particles, objects: int) -> list[BodyPiece]:
-    """Take mixed objects apart into what is soft and its rigid frames."""
+    """Take mixed objects apart into what is soft and its rigid inclusions."""
     stiff = np.array([t.kind == "rigid" for t in particles.treatments])[particles.part]
     pieces: list[BodyPiece] = []
     leafy = np.array([t.kind == "foliage" for t in particles.treatments])[particles.part]
@@ -141,32 +141,32 @@ def divide_into_pieces(particles: Particles, objects: int) -> list[BodyPiece]:
         if stiff[mine].all() or not stiff[mine].any():
             pieces.append(BodyPiece(k, bool(stiff[mine[0]]), mine, points))
             continue
-        soft, frame = len(pieces), mine[stiff[mine]]
+        soft, inclusion = len(pieces), mine[stiff[mine]]
         pieces.append(BodyPiece(k, False, mine[~stiff[mine]], points[:0]))
-        found = label_rigid_frames(
-            particles.position[frame],
+        found = label_rigid_inclusions(
+            particles.position[inclusion],
             particles.surface[points],
-            SAME_FRAME_DISTANCE_CELLS * particles.cell,
+            SAME_INCLUSION_DISTANCE_CELLS * particles.cell,
         )
         pieces += [
-            BodyPiece(k, True, frame[found.of_particle == c], points[found.of_point == c], soft)
+            BodyPiece(k, True, inclusion[found.of_particle == c], points[found.of_point == c], soft)
             for c in range(found.of_particle.max() + 1)
         ]
     return pieces
 
 
 @dataclass(frozen=True)
-class RigidFrameLabels:
-    """Which rigid frame what belongs to."""
+class RigidInclusionLabels:
+    """Which rigid inclusion what belongs to."""
 
     of_particle: Int[np.ndarray, " N"]
     of_point: Int[np.ndarray, " S"]
     """Of the surface."""
 
 
-def label_rigid_frames(
+def label_rigid_inclusions(
     position: Float[np.ndarray, "N 3"], surface: Float[np.ndarray, "S 3"], reach: float
-) -> RigidFrameLabels:
+) -> RigidInclusionLabels:
     """Say which frame each rigid particle and each surface point belongs to.
 
     Surfaces join too: a wire has few particles, far apart, on a coarse grid.
@@ -184,7 +184,7 @@ def label_rigid_frames(
     )
     known = np.isin(label[len(position) :], filled)
     owner[known] = np.searchsorted(filled, label[len(position) :][known])
-    return RigidFrameLabels(joined, owner)
+    return RigidInclusionLabels(joined, owner)
 
 
 def divide_plant(

@@ -38,9 +38,9 @@ from corporeal.mpm.physics.time_step_limits import (
     stable_step,
 )
 
-PartRole = Literal["soft", "rigid", "frame", "trinket", "crown"]
-"""A frame is a rigid inclusion: it holds the softer parts of its object. A trinket is too small to
-be one and goes with them. A crown is leaves on springs."""
+PartRole = Literal["soft", "rigid", "inclusion", "subgrid", "foliage"]
+"""An inclusion is rigid and holds the softer parts of its object. A subgrid part is too small to
+be one and goes with them. Foliage is leaves on springs."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,9 @@ def effective_parameters(
 ) -> Discretization:
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
     cell = resolved.cell
-    if role == "crown":
+    if role == "foliage":
         return foliage_parameters(part, verdict, motion)
-    soft = role in ("soft", "trinket")
+    soft = role in ("soft", "subgrid")
     part = part_as_contents(part, motion.impact_speed) if soft else part
     material, structure = part.material, part.structure
     thicker = choose_thickening(part, role, 2 * cell, motion.impact_speed)
@@ -195,8 +195,8 @@ def treatment_reason(verdict: RigidityVerdict, role: PartRole) -> str:
     """Say in one sentence why a part is treated as it is."""
     return {
         "rigid": f"Rigid, because {verdict.reason}.",
-        "frame": f"A rigid frame that holds what is soft around it, because {verdict.reason}.",
-        "trinket": "Deformable with the rest of its object; by itself it would be rigid.",
+        "inclusion": f"A rigid inclusion that holds what is soft around it, because {verdict.reason}.",
+        "subgrid": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
 

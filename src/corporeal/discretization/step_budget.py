@@ -48,13 +48,13 @@ def slow_subgrid_parts(
     """
     small = [is_subgrid_part(p, cell) for p in parts]
     fastest = dict.fromkeys((p.object for p in parts), 0.0)
-    for part, treatment, trinket in zip(parts, treatments, small, strict=True):
-        if not trinket:
+    for part, treatment, subgrid in zip(parts, treatments, small, strict=True):
+        if not subgrid:
             fastest[part.object] = max(fastest[part.object], treatment.wave_speed)
     because = "Too small for the grid to show its own stiffness, it is slowed to what it sits on"
     return [
-        slow_waves(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
-        for p, t, trinket in zip(parts, treatments, small, strict=True)
+        slow_waves(t, fastest[p.object], cell, because) if subgrid and fastest[p.object] > 0 else t
+        for p, t, subgrid in zip(parts, treatments, small, strict=True)
     ]
 
 

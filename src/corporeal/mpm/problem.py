@@ -158,7 +158,7 @@ class Problem:
     courant: float = COURANT
     """Largest fraction of a cell that a wave may cross in one step."""
     bonds: tuple[tuple[int, int], ...] = ()
-    """Rigid inclusions: (frame, soft), a rigid and a deformable body of one object. The frame holds
+    """Rigid inclusions: (inclusion, soft), a rigid and a deformable body of one object. The first holds
     what of the soft body lies inside it, and the two are never in contact."""
     joints: tuple[Joint, ...] = ()
     """Between rigid bodies."""

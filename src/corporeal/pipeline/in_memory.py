@@ -96,7 +96,7 @@ def prepare_scene(
 def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS) -> Problem:
     """Return what an engine solves: bodies in the order of the scene's objects, and the floor.
 
-    An object that is partly rigid gives a soft body and then each rigid frame.
+    An object that is partly rigid gives a soft body and then each rigid inclusion.
 
     Args:
         prepared: The scene.

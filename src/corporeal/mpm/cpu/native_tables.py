@@ -35,7 +35,7 @@ from corporeal.mpm.cpu.layout import (
 )
 from corporeal.mpm.material_table import MaterialTable
 from corporeal.mpm.physics import rigid
-from corporeal.mpm.physics.inclusions import frame_and_soft_density, frame_particles_near
+from corporeal.mpm.physics.inclusions import inclusion_and_soft_density, inclusion_particles_near
 from corporeal.mpm.problem import Body, Problem
 
 
@@ -156,8 +156,11 @@ def bond_records(problem: Problem) -> tuple[np.ndarray, list[np.ndarray]]:
     rows, points = np.zeros(len(pairs), BOND_RECORD.dtype), []
     for row, (f, s) in zip(rows, pairs, strict=True):
         frame, soft = problem.bodies[f], problem.bodies[s]
-        stiff, held = frame_and_soft_density(frame, soft, problem.cell)
-        mass, chosen = frame.volume * frame.density, frame_particles_near(frame, soft, problem.cell)
+        stiff, held = inclusion_and_soft_density(frame, soft, problem.cell)
+        mass, chosen = (
+            frame.volume * frame.density,
+            inclusion_particles_near(frame, soft, problem.cell),
+        )
         place = frame.position - mass @ frame.position / mass.sum()
         points.append(np.column_stack([place, mass / stiff])[chosen])
         row["point"], row["points"] = points[-1].ctypes.data, len(points[-1])
