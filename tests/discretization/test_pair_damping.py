@@ -76,8 +76,8 @@ def test_all_else_keeps_the_very_loss_of_its_material(parts, motions, floor):
 def mat(young=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
     return Discretization(
         kind=kind,
-        young_real=young,
-        young=young,
+        young_pa=young,
+        simulated_young_pa=young,
         poisson=0.5,
         density=1000.0,
         yield_stress=None,

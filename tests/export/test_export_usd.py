@@ -105,7 +105,7 @@ def test_soft_matter_keeps_mass_modulus_and_parts(usd, asked):
             material = f"/World/Matter/part_{part}"
             for dialect in ("physics", "omniphysics", "newton:mpm"):
                 young = attribute(stage, material, f"{dialect}:youngsModulus")
-                assert young == pytest.approx(treatment.young, rel=1e-6)
+                assert young == pytest.approx(treatment.simulated_young_pa, rel=1e-6)
             subset = UsdGeom.Subset(stage.GetPrimAtPath(f"{path}/part_{part}"))
             chosen = np.array(subset.GetIndicesAttr().Get())
             np.testing.assert_array_equal(chosen, np.flatnonzero(solid.grains.part == part))
@@ -181,7 +181,7 @@ def test_every_value_says_its_range_and_source(usd, asked):
             assert tuple(told["range"]) == (ground.range.low, ground.range.high)
             assert told["chosen_by"] == ground.chosen_by
             assert told["source"] and told["reason"] == ground.reason
-        assert said["simulated"]["young"] == matter.treatment.young
+        assert said["simulated"]["simulated_young_pa"] == matter.treatment.simulated_young_pa
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def compare_with_newton(said, asked):
     counts = {}
     for solid in soft(asked):
         for part in solid.parts:
-            young = asked.scene.matter[part].treatment.young
+            young = asked.scene.matter[part].treatment.simulated_young_pa
             counts[young] = counts.get(young, 0) + int((solid.grains.part == part).sum())
     wanted = sorted(counts.items())
     assert [c for _, c in said["young"]] == [c for _, c in wanted]
@@ -247,7 +247,7 @@ def test_the_loader_of_gns_opens_ours(written, asked):
     said = json.loads(out)
     assert said["samples"] == len(asked.motion.time) - length
     compare_windows(said, asked, len(asked.motion.time) - 1)
-    young = sorted({m.treatment.young for m in asked.scene.matter})
+    young = sorted({m.treatment.simulated_young_pa for m in asked.scene.matter})
     np.testing.assert_allclose(said["young"], young, rtol=1e-6)
 
 

@@ -156,9 +156,9 @@ class PartAudit:
     """rigid, deformable, shell or foliage."""
     structure: str
     """solid, shell or filled."""
-    E: float
+    young_pa: float
     """Young's modulus of the material [Pa]."""
-    E_sim: float
+    simulated_young_pa: float
     """As simulated [Pa]."""
     nu: float
     """Poisson's ratio [-]."""

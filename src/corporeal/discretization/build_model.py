@@ -313,10 +313,10 @@ def constitutive_numbers(
     The hardening modulus is a stiffness and follows E; cohesion is a strength and follows
     √(E_sim/E), as the yield stress does.
     """
-    softer, leafy = treatment.young / treatment.young_real, treatment.kind == "foliage"
+    softer, leafy = treatment.simulated_young_pa / treatment.young_pa, treatment.kind == "foliage"
     return {
         "law": float(Law.COROTATED.value if leafy else material.law.value),
-        "young": treatment.young,
+        "young": treatment.simulated_young_pa,
         "poisson": treatment.poisson,
         "yield_stress": treatment.yield_stress or 0.0,
         "hardening": material.hardening * softer,
@@ -331,7 +331,7 @@ def constitutive_numbers(
 
 def slowest_vibration_rad_s(treatment: Discretization, extent: float) -> float:
     """ω₀ = π √(μ/ρ)/L [rad/s]: the fundamental of a free bar of the object's length in shear."""
-    shear = treatment.young / (2 * (1 + treatment.poisson))
+    shear = treatment.simulated_young_pa / (2 * (1 + treatment.poisson))
     return pi * sqrt(shear / treatment.density) / extent
 
 

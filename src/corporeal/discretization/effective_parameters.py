@@ -105,11 +105,11 @@ def effective_parameters(
     # What the grid does not dissipate by itself, and the waves that limit the step.
     shell = structure.kind == "shell" and structure.thickness is not None
     loss = remaining_loss_factor(part, motion, resolved.across) if soft else 0.0
-    wave = wave_speed(young * thicker.young, poisson, density, loss) if soft else 0.0
+    wave = wave_speed(young * thicker.young_factor, poisson, density, loss) if soft else 0.0
     return Discretization(
         kind=("shell" if shell else "deformable") if soft else "rigid",
-        young_real=real,
-        young=young * thicker.young if soft else material.young,
+        young_pa=real,
+        simulated_young_pa=young * thicker.young_factor if soft else material.young,
         poisson=poisson,
         density=density,
         yield_stress=strong * thicker.strength if soft and strong is not None else strong,
@@ -140,7 +140,7 @@ class ThickeningFactors:
     """Thickness of its wall over the simulated one [-]; 1: as it is."""
     rod: float
     """Diameter of a rod over the simulated one [-]; 1: as it is."""
-    young: float
+    young_factor: float
     """Factor on E [-]."""
     strength: float
     """Factor on the yield stress [-]."""
@@ -177,8 +177,8 @@ def foliage_parameters(
     """Give foliage no stress of its own."""
     return Discretization(
         kind="foliage",
-        young_real=part.material.young,
-        young=0.0,
+        young_pa=part.material.young,
+        simulated_young_pa=0.0,
         poisson=0.0,
         density=part.material.density,
         yield_stress=None,

@@ -87,10 +87,10 @@ def _excess_vibration_loss(
     part: PartGeometry, true: Discretization, made: Discretization, speed: float
 ) -> float:
     """Loss factor [-] that vibrations take beyond those of life."""
-    here = vibration_loss(made.density, speed, made.young)
+    here = vibration_loss(made.density, speed, made.simulated_young_pa)
     if part.structure.inflated:
         return here
-    return here - vibration_loss(true.density, speed, true.young)
+    return here - vibration_loss(true.density, speed, true.simulated_young_pa)
 
 
 def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Discretization:
@@ -99,7 +99,7 @@ def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Disc
     if taken < MIN_NOTABLE_LOSS_FACTOR:
         return made
     loss = made.loss - taken
-    wave = wave_speed(made.young, made.poisson, made.density, loss)
+    wave = wave_speed(made.simulated_young_pa, made.poisson, made.density, loss)
     return replace(
         made,
         loss=loss,

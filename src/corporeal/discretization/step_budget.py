@@ -102,17 +102,24 @@ def fit_step_budget(
     if fastest <= limit * (1 + 1e-9):
         return BudgetedTreatments(treatments)
     because = "The step budget slows its waves"
-    bends = [(t.young, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
+    bends = [(t.simulated_young_pa, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
     knee, power = fit_young_compression(bends, limit)
     fitted = [
         slow_waves(
-            t, t.wave_speed * sqrt(compress_young(t.young, knee, power) / t.young), cell, because
+            t,
+            t.wave_speed
+            * sqrt(compress_young(t.simulated_young_pa, knee, power) / t.simulated_young_pa),
+            cell,
+            because,
         )
         if t.wave_speed > 0
         else t
         for t in treatments
     ]
-    changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
+    changed = sum(
+        a.simulated_young_pa != b.simulated_young_pa
+        for a, b in zip(treatments, fitted, strict=True)
+    )
     softer = (
         "is simulated softer than it is" if changed == 1 else "are simulated softer than they are"
     )
@@ -139,7 +146,7 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         return treatment
 
     def at(poisson: float) -> Discretization:
-        wave = wave_speed(treatment.young, poisson, treatment.density, treatment.loss)
+        wave = wave_speed(treatment.simulated_young_pa, poisson, treatment.density, treatment.loss)
         step = stable_step(wave, treatment.impact_speed, cell)
         return replace(treatment, poisson=poisson, wave_speed=wave, step=step)
 
@@ -256,14 +263,14 @@ def _ball_dents(
         return _BallDents(
             *(
                 hertz_dent_of_ball(young, true.poisson, true.density, true.impact_speed)
-                for young in (true.young, soft.young)
+                for young in (true.simulated_young_pa, soft.simulated_young_pa)
             )
         )
     if soft.kind != "shell" or not part.structure.sealed or not soft.thickness:
         return None
     speed, radius, made = true.impact_speed, 0.5 * part.size[0], part.material
     real = (made.young, made.poisson, made.density, part.structure.thickness or soft.thickness)
-    slow = (soft.young, soft.poisson, soft.density, soft.thickness)
+    slow = (soft.simulated_young_pa, soft.poisson, soft.density, soft.thickness)
     return _BallDents(*(dent_of_hollow_ball(*wall, radius, speed) for wall in (real, slow)))
 
 
@@ -292,8 +299,10 @@ def _sags_too_far(
     numbers.
     """
     pull = motion.driven if part.burden else motion.acceleration
-    squashed = soft.density * pull * part.size[2] / soft.young
-    sags = min(1.0, max(squashed, verdict.weight * true.young / soft.young))
+    squashed = soft.density * pull * part.size[2] / soft.simulated_young_pa
+    sags = min(
+        1.0, max(squashed, verdict.weight * true.simulated_young_pa / soft.simulated_young_pa)
+    )
     return sags - min(1.0, verdict.weight) > max(verdict.weight, MAX_INVISIBLE_STRAIN)
 
 
@@ -344,7 +353,7 @@ def slow_waves(
     strong = treatment.yield_stress
     return replace(
         treatment,
-        young=treatment.young * factor**2,
+        simulated_young_pa=treatment.simulated_young_pa * factor**2,
         yield_stress=None if strong is None else strong * factor,
         wave_speed=speed,
         step=stable_step(speed, treatment.impact_speed, cell),
@@ -361,7 +370,7 @@ def cap_stiffness(part: PartGeometry, treatment: Discretization, cell: float) ->
     strong = material.yield_stress
     return replace(
         treatment,
-        young=young,
+        simulated_young_pa=young,
         poisson=poisson,
         yield_stress=None if strong is None else strong * young / material.young,
         wave_speed=wave,

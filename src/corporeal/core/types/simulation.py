@@ -18,10 +18,10 @@ class Discretization:
     """How one part enters the simulation: real numbers, simulated numbers, and why they differ."""
 
     kind: Literal["rigid", "deformable", "shell", "foliage"]
-    young_real: float
-    """[Pa]"""
-    young: float
-    """Simulated Young's modulus [Pa]."""
+    young_pa: float
+    """Young's modulus of the material [Pa]."""
+    simulated_young_pa: float
+    """The same as simulated [Pa]."""
     poisson: float
     density: float
     """Simulated density [kg/m³]."""

@@ -310,9 +310,9 @@ def stiffness_words(treatment: Discretization, *, liquid: bool = False) -> str:
         return "rigid"
     if liquid:
         return f"liquid, its sound slowed to {treatment.wave_speed:.2g} m/s"
-    ratio = treatment.young / treatment.young_real
+    ratio = treatment.simulated_young_pa / treatment.young_pa
     factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
-    return f"{si_text(treatment.young, 'Pa')} ({factor})"
+    return f"{si_text(treatment.simulated_young_pa, 'Pa')} ({factor})"
 
 
 def _grounds(story: ReportContent, k: int) -> str:
