@@ -34,7 +34,7 @@ def part_audit(**what):
         "treatment": "deformable", "structure": "solid", "young_pa": 1e6, "simulated_young_pa": 1e6, "nu": 0.45,
         "density": 1e3, "density_sim": 1e3, "yield_stress": None, "yield_stress_sim": None,
         "thickness_m": None, "contents": None, "fill": None, "thickness_sim_m": None,
-        "mass_kg": 1.0, "real_mass_kg": 1.0, "why": "",
+        "mass_kg": 1.0, "real_mass_kg": 1.0, "reason": "",
     }  # fmt: skip
     return PartAudit(**said | what)
 

@@ -85,7 +85,7 @@ def test_what_cannot_go_away_is_strained_by_the_way_over_its_length(name):
     first, *others = treated(*things).treatments
     assert (first.kind, {t.kind for t in others}) == ("deformable", {"rigid"})
     assert first.strain == pytest.approx(strain, rel=0.03)
-    assert "prescribed motion presses it" in first.why
+    assert "prescribed motion presses it" in first.reason
 
 
 BESIDE = co.box("steel", (0.02, SIDE, SIDE), at=(-0.05, 0, 0.03), name="pusher")

@@ -154,10 +154,10 @@ def test_a_stiff_part_of_a_mixed_object_is_its_rigid_frame():
     cushion = block(FOAM, 0.17, 0.6, 0.6)
     frame, foam = plan_discretization([FRAME, cushion], [FALL], "draft").treatments
     assert (frame.kind, foam.kind) == ("rigid", "deformable")
-    assert "frame that holds what is soft" in frame.why
+    assert "inclusion that holds what is soft" in frame.reason
     assert frame.simulated_young_pa == frame.young_pa
     alone = plan_discretization([FRAME], [FALL], "draft").treatments[0]
-    assert "inclusion" not in alone.why
+    assert "inclusion" not in alone.reason
 
 
 def test_only_the_soft_parts_of_a_framed_object_set_the_grid():
@@ -191,7 +191,7 @@ def test_cloth_is_not_pulled_to_pieces_and_stays_limp():
     assert made.thickness > 4 * 0.004
     assert made.simulated_young_pa * made.thickness == pytest.approx(5e3 * 0.004)
     assert made.density * made.thickness == pytest.approx(30.0 * 0.004)
-    assert "stiffness in its plane" in made.why
+    assert "stiffness in its plane" in made.reason
     hangs = 1.5 * made.density * 9.81 * 0.6**3 / (made.simulated_young_pa * made.thickness**2)
     assert hangs > 1
 
@@ -240,7 +240,7 @@ def test_what_the_step_budget_would_let_sag_is_rigid_where_that_is_nearer_to_lif
     (draft,) = plan_discretization([pole], [calm], "draft").treatments
     assert not judge_rigidity(pole, calm).rigid
     assert draft.kind == "rigid"
-    assert "step budget" in draft.why
+    assert "step budget" in draft.reason
     flabby = cylinder(replace(WOOD, young=12e6), 0.15, 5.0)
     assert plan_discretization([flabby], [calm], "draft").treatments[0].kind == "deformable"
     for thing in (BALL, DUCK, CAN, block(SAND, 0.33, 2, 2), block(RUBBER, 0.004, 0.01, 0.6)):
@@ -354,7 +354,7 @@ def test_a_tab_too_small_to_see_does_not_set_the_step_of_the_scene():
     can, small = plan_discretization([CAN, tab], [FALL], "draft").treatments
     assert small.wave_speed <= can.wave_speed
     assert small.yield_stress / (small.density * small.wave_speed) == pytest.approx(2.4, abs=0.1)
-    assert "too small" in small.why.lower()
+    assert "too small" in small.reason.lower()
 
 
 def test_a_slender_leg_is_no_trinket_but_a_tack_is():
@@ -364,7 +364,7 @@ def test_a_slender_leg_is_no_trinket_but_a_tack_is():
     assert wood.kind == "rigid"
     assert steel.kind == "deformable"
     assert steel.wave_speed == pytest.approx(foam.wave_speed)
-    assert "by itself it would be rigid" in steel.why
+    assert "by itself it would be rigid" in steel.reason
 
 
 def test_a_heavy_foot_of_a_few_cells_holds_what_is_around_it():
@@ -397,7 +397,7 @@ def test_a_long_part_that_is_no_known_rod_says_what_it_was_taken_for():
     tube = cylinder(STEEL, 0.03, 1.2, shell(1.2e-3))
     board = block(WOOD, 0.02, 0.6, 0.9)
     said = [
-        plan_discretization([p], [FALL], "draft").treatments[0].why
+        plan_discretization([p], [FALL], "draft").treatments[0].reason
         for p in (strip, tripod, rod, tube, board)
     ]
     assert ["solid bar" in why for why in said] == [True, True, False, False, False]
@@ -408,7 +408,7 @@ def test_a_long_part_that_bends_and_is_not_thickened_says_so():
     strip = replace(block(RUBBER, 0.004, 0.01, 0.6), object=1)
     bent = plan_discretization([sphere(RUBBER, 0.2), strip], [FALL] * 2, "draft").treatments[1]
     assert bent.kind == "deformable"
-    assert "rough estimate" in bent.why
+    assert "rough estimate" in bent.reason
 
 
 def test_a_shell_that_rounds_to_no_width_is_judged_like_any_other():
@@ -427,7 +427,7 @@ def test_the_bulk_gives_way_before_the_shape_does():
     assert draft.kind == "deformable"
     assert draft.poisson == pytest.approx(MIN_REDUCED_POISSON_RATIO)
     assert draft.simulated_young_pa > 0.2 * RUBBER.young
-    assert "Poisson" in draft.why
+    assert "Poisson" in draft.reason
     (fine,) = plan_discretization([ball], [fast], "fine").treatments
     assert fine.poisson > 0.48
     assert fine.simulated_young_pa == RUBBER.young
@@ -446,7 +446,7 @@ def test_what_would_be_dented_twice_as_much_as_in_life_rebounds_rigidly():
     hard = replace(RUBBER, young=30e6)
     (treatment,) = plan_discretization([sphere(hard, 0.06)], [fast], "draft").treatments
     assert treatment.kind == "rigid"
-    assert "restitution" in treatment.why
+    assert "restitution" in treatment.reason
     (fine,) = plan_discretization([sphere(hard, 0.06)], [fast], "fine").treatments
     assert fine.kind == "deformable"
     # Sheets and rods bend, and hollow things give way as a whole.
@@ -464,7 +464,7 @@ def test_what_would_be_marked_twice_as_deeply_as_in_life_is_rigid():
     fast = ExpectedMotion(impact_speed=4.43, acceleration=9.81)
     (ball,) = plan_discretization([sphere(LEAD, 0.02)], [fast], "draft").treatments
     assert ball.kind == "rigid"
-    assert "0.073 of its radius" in ball.why
+    assert "0.073 of its radius" in ball.reason
     putty = replace(LEAD, young=3.2e6, density=1750.0, yield_stress=1e5)
     (soft,) = plan_discretization([sphere(putty, 0.04)], [fast], "draft").treatments
     assert soft.kind == "deformable"

@@ -38,7 +38,7 @@ BEFORE = {
         "treatment": "rigid", "structure": "filled", "young_pa": 2e11, "simulated_young_pa": 2e11, "nu": 0.3,
         "density": 7850.0, "density_sim": 7850.0, "yield_stress": 3e8, "yield_stress_sim": 3e8,
         "thickness_m": 0.0002, "contents": "soup", "fill": 0.9, "thickness_sim_m": None,
-        "mass_kg": 0.4, "real_mass_kg": 0.4, "why": "Rigid.",
+        "mass_kg": 0.4, "real_mass_kg": 0.4, "reason": "Rigid.",
     }],
     "settling": {"seconds": 0.5, "found": True, "objects": [
         {"name": "can_0", "moved_m": [0.0, 0.0, -0.01], "moved_dx": 1.0, "farthest_m": 0.02}]},

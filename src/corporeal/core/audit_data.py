@@ -182,7 +182,7 @@ class PartAudit:
     """Estimated, at the scene's scale [kg]."""
     real_mass_kg: float | None
     """Of the real object [kg]."""
-    why: str
+    reason: str
     """Why it is simulated so."""
 
 

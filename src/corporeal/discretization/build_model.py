@@ -92,8 +92,8 @@ def build_model(
         contact=contact,
         bonds=tuple((k, p.soft) for k, p in enumerate(pieces) if p.soft >= 0),
         joints=plant_joints(particles, pieces),
-        apart=never_touching_pieces(pieces),
-        rolling=rolling_resistance_lengths(
+        excluded_pairs=never_touching_pieces(pieces),
+        rolling_resistance=rolling_resistance_lengths(
             bodies,
             [field.materials[int(share.argmax())] for share in weights],
             field.floor,
@@ -263,7 +263,7 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
         rigid=piece.rigid,
         surface=particles.surface[piece.surface].astype(float),
         curvature=piece_curvature(particles, piece),
-        wetted=piece_wetted_surface(particles, piece),
+        wetted_surface=piece_wetted_surface(particles, piece),
         push=obj.push,
         wind=obj.wind,
         faces=exposed_piece_faces(particles, mine) if obj.wind is not None else NO_WIND_FACES,
@@ -286,7 +286,7 @@ def piece_wetted_surface(particles: Particles, piece: BodyPiece) -> WettedSurfac
     if not piece.rigid or not own.any():
         return None
     return WettedSurface(
-        particles.wetted[own].astype(float), particles.wetted_normal[own].astype(float)
+        particles.wetted_point[own].astype(float), particles.wetted_normal[own].astype(float)
     )
 
 

@@ -119,7 +119,7 @@ def effective_parameters(
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
-        why="".join(
+        reason="".join(
             (
                 treatment_reason(verdict, role),
                 wall_reason(part, thicker.wall, motion.impact_speed) if soft else "",
@@ -187,7 +187,7 @@ def foliage_parameters(
         impact_speed=motion.impact_speed,
         wave_speed=0.0,
         step=inf,
-        why=f"{FOLIAGE_REASON}, because {verdict.reason} and the wood stays rigid.",
+        reason=f"{FOLIAGE_REASON}, because {verdict.reason} and the wood stays rigid.",
     )
 
 

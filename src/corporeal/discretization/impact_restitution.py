@@ -64,7 +64,7 @@ def restitutions_at_impact(
             law = layered_restitution_law(field, shapes or {}, (i, j), speed, law.value) or law
             table[i, j] = table[j, i] = law.value
             laws[i, j] = laws[j, i] = law.speed, law.slope, law.exponent, law.least, law.most
-    for k in (k for k, treatment in enumerate(treatments) if treatment.laid):
+    for k in (k for k, treatment in enumerate(treatments) if treatment.is_floor_covering):
         table[k, :-1] = table[:-1, k] = table[-1, :-1]
         laws[k, :-1] = laws[:-1, k] = laws[-1, :-1]
     return PairRestitutions(table, laws)

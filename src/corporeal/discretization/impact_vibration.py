@@ -105,6 +105,6 @@ def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Disc
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, made.impact_speed, cell),
-        why=f"{made.why} It is struck so hard that vibrations of its own take what a loss factor "
+        reason=f"{made.reason} It is struck so hard that vibrations of its own take what a loss factor "
         f"of {taken:.2g} would, beyond those of the real thing: its matter loses so much less.",
     )

@@ -159,7 +159,7 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         lower = float(brentq(excess, MIN_REDUCED_POISSON_RATIO, treatment.poisson))  # pyright: ignore[reportArgumentType]
     return replace(
         at(lower),
-        why=f"{treatment.why} The step budget lowers its Poisson's ratio from "
+        reason=f"{treatment.reason} The step budget lowers its Poisson's ratio from "
         f"{treatment.poisson:.3g} to {lower:.3g}.",
     )
 
@@ -357,7 +357,7 @@ def slow_waves(
         yield_stress=None if strong is None else strong * factor,
         wave_speed=speed,
         step=stable_step(speed, treatment.impact_speed, cell),
-        why=f"{treatment.why} {because}: {1 / factor:.3g} times.",
+        reason=f"{treatment.reason} {because}: {1 / factor:.3g} times.",
     )
 
 
@@ -375,5 +375,5 @@ def cap_stiffness(part: PartGeometry, treatment: Discretization, cell: float) ->
         yield_stress=None if strong is None else strong * young / material.young,
         wave_speed=wave,
         step=stable_step(wave, treatment.impact_speed, cell),
-        why="Deformable with the published cap on Young's modulus.",
+        reason="Deformable with the published cap on Young's modulus.",
     )

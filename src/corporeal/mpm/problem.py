@@ -106,7 +106,7 @@ class Body:
         default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
     """How the surface curves at those points, see ``types.CURVATURE_COLUMNS``; none: they are corners."""
-    wetted: WettedSurface | None = None
+    wetted_surface: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None
     wind: Wind | None = None
@@ -162,9 +162,9 @@ class Problem:
     what of the soft body lies inside it, and the two are never in contact."""
     joints: tuple[Joint, ...] = ()
     """Between rigid bodies."""
-    apart: tuple[tuple[int, int], ...] = ()
+    excluded_pairs: tuple[tuple[int, int], ...] = ()
     """Bodies of one object that are never in contact with each other."""
-    rolling: Float[np.ndarray, "BW BW"] | None = None
+    rolling_resistance: Float[np.ndarray, "BW BW"] | None = None
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
     restitution_law: Float[np.ndarray, "BW BW 5"] | None = None
@@ -173,10 +173,10 @@ class Problem:
     the same at all speeds."""
 
     @property
-    def never_touch(self) -> tuple[tuple[int, int], ...]:
+    def all_excluded_pairs(self) -> tuple[tuple[int, int], ...]:
         """Pairs without contact: what is bonded or apart, and two prescribed motions."""
         prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
-        return (*self.bonds, *self.apart, *combinations(prescribed, 2))
+        return (*self.bonds, *self.excluded_pairs, *combinations(prescribed, 2))
 
     @property
     def restitution_law_of_pair(self) -> Float[np.ndarray, "BW BW 5"]:
@@ -186,9 +186,13 @@ class Problem:
         return np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (*np.shape(self.restitution), 1))
 
     @property
-    def brakes(self) -> bool:
+    def has_rolling_resistance(self) -> bool:
         """Whether anything brakes what rolls."""
-        return self.contact == "multi" and self.rolling is not None and bool(self.rolling.any())
+        return (
+            self.contact == "multi"
+            and self.rolling_resistance is not None
+            and bool(self.rolling_resistance.any())
+        )
 
 
 @dataclass(frozen=True)

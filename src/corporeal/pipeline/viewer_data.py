@@ -105,7 +105,7 @@ def part_cards(prepared: PreparedScene) -> list[dict]:
     heavy = particles.mass_real, part_scales(scene, parts)
     listed = materials.materials_json(prepared.field, parts, *heavy)["parts"]
     for k, (card, treatment) in enumerate(zip(listed, particles.treatments, strict=True)):
-        numbers = ("kind", "simulated_young_pa", "young_pa", "density", "why")
+        numbers = ("kind", "simulated_young_pa", "young_pa", "density", "reason")
         card["simulated"] = {name: getattr(treatment, name) for name in numbers}
         card["fill"] = particles.fills[k] if k < len(particles.fills) else ""
     return listed

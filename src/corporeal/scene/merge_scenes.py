@@ -43,7 +43,7 @@ def shift_filled_scene(filled: FilledScene, shift: Float[np.ndarray, "3"]) -> Fi
         particles,
         position=particles.position + shift,
         surface=particles.surface + shift,
-        wetted=particles.wetted + shift,
+        wetted_point=particles.wetted_point + shift,
         roots=tuple(_shifted_root(root, shift) for root in particles.roots),
     )
     return FilledScene(SceneWithMaterials(scene, whole.parts, whole.field), moved)

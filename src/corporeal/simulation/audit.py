@@ -260,5 +260,5 @@ def part_row(
         thickness_sim_m=treatment.thickness,
         mass_kg=mass,
         real_mass_kg=None if owner is None else mass / owner.scale**3,
-        why=treatment.why,
+        reason=treatment.reason,
     )

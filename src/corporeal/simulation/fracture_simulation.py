@@ -160,7 +160,7 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
         ratio=said.ratio,
         by=said.by,
         speed=said.speed,
-        blow=said.energy,
+        impact_energy=said.energy,
         piece=pieces.of_particle,
         surfaces=pieces.surfaces,
     )

@@ -37,12 +37,12 @@ class Discretization:
     """Simulated longitudinal wave speed [m/s]; 0 when rigid."""
     step: float
     """Largest stable time step of this part [s]; inf when rigid."""
-    why: str
+    reason: str
     loss: float = 0.0
     """Simulated loss factor [-]: its material's, less what the grid takes of a blow by itself."""
     vibration: float = 0.0
     """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
-    laid: bool = False
+    is_floor_covering: bool = False
     """Whether it is a rigid sheet that lies on the floor, thinner than half a cell: what strikes it
     strikes the floor."""
 
@@ -133,7 +133,7 @@ class Particles:
     """Of plants that stand in soil."""
     contents: tuple[VesselContents, ...] = ()
     """What moves in vessels: objects and parts after all that the scene has."""
-    wetted: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    wetted_point: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Where liquids touch rigid objects, inside of what is hollow too [m]."""
     wetted_normal: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Unit, out of the matter there."""
@@ -264,8 +264,8 @@ class FractureEvent:
     """The other body, or the floor."""
     speed: float
     """Along the blow [m/s]."""
-    blow: float
-    """Energy of the blow [J]."""
+    impact_energy: float
+    """Energy of the impact [J]."""
     piece: Int[np.ndarray, " P"]
     """Which piece each of its particles belongs to."""
     surfaces: tuple[Surface, ...]

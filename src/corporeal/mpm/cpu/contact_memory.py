@@ -119,9 +119,9 @@ def _wetted_points(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndar
 
     Patches are two cells wide: a liquid looks no farther.
     """
-    if body.wetted is None:
+    if body.wetted_surface is None:
         return np.zeros((0, 6)), np.zeros((0, 6))
-    rows = np.concatenate([body.wetted.point - centre, body.wetted.normal], axis=1)
+    rows = np.concatenate([body.wetted_surface.point - centre, body.wetted_surface.normal], axis=1)
     return _sort_into_cubes(rows, WETTED_REACH_DX * cell)
 
 
@@ -174,8 +174,8 @@ class ContactMemory:
             contact_memory=self.stage,
             face=self.face,
         )
-        if problem.brakes:
-            self.rolling = np.array(problem.rolling, float)
+        if problem.has_rolling_resistance:
+            self.rolling = np.array(problem.rolling_resistance, float)
             write_pointers(world, rolling=self.rolling)
         write_pointers(world, **{name: getattr(ledger, name) for name in LEDGER_ARRAYS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
@@ -277,7 +277,7 @@ def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     friction = np.array(problem.friction, float)
     restitution = np.array(problem.restitution, float)
     if problem.contact == "multi":
-        for frame, soft in problem.never_touch:
+        for frame, soft in problem.all_excluded_pairs:
             friction[frame, soft] = friction[soft, frame] = BONDED_FRICTION
         return friction, restitution
     bodies, walls = len(problem.bodies), len(problem.planes)

@@ -182,7 +182,7 @@ class DeviceMemory:
     ) -> None:
         rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)
         for b in np.flatnonzero(stiff):
-            wetted = problem.bodies[b].wetted
+            wetted = problem.bodies[b].wetted_surface
             if wetted is not None:
                 both = np.stack([wetted.point - matter.centre[b], wetted.normal], axis=1)
                 rows.append(both.reshape(-1, 3))
@@ -237,14 +237,16 @@ class DeviceMemory:
             self.put(restitution, wp.float64),
         )
         c.restitution_law = self.put(problem.restitution_law_of_pair.reshape(-1, 5), wp.float64)
-        lengths = 0.0 * friction if problem.rolling is None else problem.rolling
+        lengths = (
+            0.0 * friction if problem.rolling_resistance is None else problem.rolling_resistance
+        )
         c.rolling = self.put(lengths, wp.float64)
         rows = np.zeros((friction.size, SUPPORT_ROW))
         rows[:, SUPPORT_LEAST_GAP] = VAST_DOUBLE
         c.rounds = self.put(rows, wp.float64)
         c.lightness = self.zeros(len(friction), wp.float64)
         apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
-        for a, b in problem.never_touch:
+        for a, b in problem.all_excluded_pairs:
             apart[a, b] = apart[b, a] = 1
         c.apart = self.put(apart, wp.int32)
 

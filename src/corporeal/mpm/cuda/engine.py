@@ -29,9 +29,9 @@ from corporeal.mpm.state import ParticleConstants, Velocities, branch_energy, st
 KNOWN_FIELDS = {
     Body: "name position velocity volume density law young poisson yield_stress hardening "
     "friction_angle cohesion loss vibration consistency flow_index "
-    "rigid surface curvature wetted push wind faces tether path pivot",
+    "rigid surface curvature wetted_surface push wind faces tether path pivot",
     Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "
-    "courant bonds joints apart rolling restitution_law",
+    "courant bonds joints excluded_pairs rolling_resistance restitution_law",
 }
 """What this engine knows of a problem; anything else must be at its default."""
 INITIAL_CONTACT_ROOM = 4096

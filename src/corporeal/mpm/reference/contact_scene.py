@@ -82,7 +82,7 @@ class ContactScene:
 
     def wetted(self, body: int) -> WettedSurface | None:
         """Where liquids touch a rigid body now; None: as everything else does."""
-        given = self.problem.bodies[body].wetted
+        given = self.problem.bodies[body].wetted_surface
         if given is None or not self.is_rigid(body):
             return None
         R = self.state.rotation[body].T

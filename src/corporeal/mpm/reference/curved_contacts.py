@@ -25,7 +25,7 @@ def list_curved_contacts(scene: ContactScene) -> list[PossibleContacts]:
     to its middle. Where both are round, points of the first body count.
     """
     bodies = scene.problem.bodies
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
     found = []
     for round_one, other in permutations(filter(scene.is_rigid, range(len(bodies))), 2):
         pair = min(round_one, other), max(round_one, other)

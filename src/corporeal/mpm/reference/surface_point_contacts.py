@@ -49,7 +49,7 @@ def list_facet_contacts(scene: ContactScene) -> list[PossibleContacts]:
     Each face is a plane that ends: exact, where nodes of the grid would be a road with bumps.
     """
     bodies = scene.problem.bodies
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
     found = []
     for round_one, flat_one in permutations(filter(scene.is_rigid, range(len(bodies))), 2):
         pair = min(round_one, flat_one), max(round_one, flat_one)

@@ -328,7 +328,7 @@ def _grounds(story: ReportContent, k: int) -> str:
         f"{escape_html(story.scene.objects[part.object].name)}: {escape_html(material.name)}</summary>"
         f"<p>{escape_html(words.reason)} (margin {words.margin:.2f}; {SOURCE_WORDS[words.answered_by]})"
         f"{alternative_words(words)}<br>{escape_html(structure.reason)} {escape_html(fill)}<br>"
-        f"{escape_html(story.particles.treatments[k].why)}{_impact_words(story, k)}</p>{tables}</details>"
+        f"{escape_html(story.particles.treatments[k].reason)}{_impact_words(story, k)}</p>{tables}</details>"
     )
 
 

@@ -55,10 +55,10 @@ function built(structure) {
 }
 
 function simulated(s) {
-  if (s.kind === 'rigid') return [el('b', {}, 'Simulated as a rigid body. '), s.why]
+  if (s.kind === 'rigid') return [el('b', {}, 'Simulated as a rigid body. '), s.reason]
   const ratio = s.simulated_young_pa / s.young_pa, same = Math.abs(ratio - 1) < 1e-3
   return [`E real `, el('b', {}, si(s.young_pa, 'Pa')), ', simulated ', el('b', {}, si(s.simulated_young_pa, 'Pa')),
-    same ? ' (as measured). ' : ` (${+ratio.toPrecision(2)} ×). `, s.why]
+    same ? ' (as measured). ' : ` (${+ratio.toPrecision(2)} ×). `, s.reason]
 }
 
 function valueRow(name, {value, range, unit, place, scale, chosen_by, reason, source}) {
