@@ -33,9 +33,9 @@ def problems():
 def test_who_was_there_goes_on_as_if_nothing_had_happened(problems, contact):
     few, more = (replace(p, contact=contact) for p in problems)
     engine = CpuEngine(few, 1)
-    engine.weigh((0.3, 0.0, -5.0))
+    engine.set_gravity((0.3, 0.0, -5.0))
     engine.apply_impulse(FOAM, (0.0, 0.03, 2.0), (0.005, 0.0, 0.0))
-    engine.pull(STONE, (0.5, 0.0, 2.0), (0.5, 0.0, 2.5), 40.0)
+    engine.attach_spring(STONE, (0.5, 0.0, 2.0), (0.5, 0.0, 2.5), 40.0)
     engine.advance(0.01)
     after = engine.with_added_bodies(more)
     old = engine.snapshot()

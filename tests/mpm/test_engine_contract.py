@@ -17,7 +17,7 @@ from corporeal.mpm.engines import (
     require,
     require_of_class,
 )
-from corporeal.mpm.problem import ENGINES, Engine, InteractiveEngine, BodySplit, VariableLoadEngine
+from corporeal.mpm.problem import ENGINES, BodySplit, Engine, InteractiveEngine, VariableLoadEngine
 
 WHOLE = ("cpu", "reference")
 """Engines with every capability."""
@@ -74,8 +74,8 @@ def test_added_bodies_change_nothing_for_the_others_and_are_booked(name, contact
     few = replace(falling(), contact=contact)
     more = problem(*few.bodies, body(ball(HIGH - ASIDE)), contact=contact)
     engine = build_engine(few, name, threads=1)
-    engine.weigh((0.3, 0.0, -5.0))
-    engine.pull(BOARD, (0.5, 0.0, 1.0), (0.5, 0.0, 1.5), 40.0)
+    engine.set_gravity((0.3, 0.0, -5.0))
+    engine.attach_spring(BOARD, (0.5, 0.0, 1.0), (0.5, 0.0, 1.5), 40.0)
     engine.advance(0.004)
     before, held = engine.measure(), engine.snapshot().position
     after = engine.with_added_bodies(more)
@@ -99,8 +99,8 @@ def test_added_bodies_change_nothing_for_the_others_and_are_booked(name, contact
 @pytest.mark.parametrize("name", WHOLE)
 def test_pieces_of_a_split_body_move_on_as_the_whole_did(name):
     engine = build_engine(falling(), name, threads=1)
-    engine.pull(SOFT, (0.0, 0.0, 1.0), (0.0, 0.0, 1.1), 10.0)
-    engine.pull(BOARD, (0.5, 0.0, 1.0), (0.5, 0.0, 1.1), 10.0)
+    engine.attach_spring(SOFT, (0.0, 0.0, 1.0), (0.0, 0.0, 1.1), 10.0)
+    engine.attach_spring(BOARD, (0.5, 0.0, 1.0), (0.5, 0.0, 1.1), 10.0)
     engine.advance(0.01)
     before, now = engine.measure(), engine.snapshot()
     mine = slice(len(engine.problem.bodies[SOFT].position), None)
@@ -136,7 +136,7 @@ def test_what_follows_a_path_is_booked_by_the_gravity_that_is(name):
     rise = Keyframes((0.0, 0.1), ((0.0, 0.0, 1.0), (0.0, 0.0, 1.1)), ((0.0,) * 3,) * 2)
     lifted = replace(board(HIGH, size=SIZE), path=rise, pivot=(0.0, 0.0, 1.0))
     engine = build_engine(problem(lifted), name, threads=1)
-    engine.weigh((0.0, 0.0, -2.0))
+    engine.set_gravity((0.0, 0.0, -2.0))
     before = engine.measure()
     engine.advance(0.05)
     after = engine.measure()

@@ -198,7 +198,7 @@ def test_the_audit_names_every_field_and_finds_the_hole_in_the_floor(tmp_path):
                  "particles_out_of_domain", "momentum_residual", "energy_growth",
                  "max_penetration_m", "max_penetration_dx", "parts"):  # fmt: skip
         assert name in audit
-    for name in ("name", "object", "material", "law", "treatment", "structure", "E", "E_sim",
+    for name in ("name", "object", "material", "law", "treatment", "structure", "young_pa", "simulated_young_pa",
                  "nu", "density", "yield_stress", "mass_kg"):  # fmt: skip
         assert name in audit["parts"][0]
     assert audit["momentum_residual"] < 1e-12

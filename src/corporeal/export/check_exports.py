@@ -65,7 +65,7 @@ def check_usd(folder: Path, asked: ExportRequest) -> ReaderFindings:
     context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     complaints: list[str] = []
     stages = sorted(folder.glob("*.usda"))
-    for path in (p for p in stages if p.stem in ("sim", "film")):
+    for path in (p for p in stages if p.stem in ("sim", "video")):
         errors = context.Validate(Usd.Stage.Open(str(path)))
         complaints += [f"{path.name}: {e.GetErrorAsString()}" for e in errors]
     stage = Usd.Stage.Open(str(folder / "sim.usda"))
@@ -166,13 +166,13 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
 
 def check_glb(folder: Path, asked: ExportRequest) -> ReaderFindings:
     """Open the video as a viewer does, and pose it at every frame."""
-    motion, film = asked.motion, read_animated_glb(folder / "film.glb")
+    motion, video = asked.motion, read_animated_glb(folder / "video.glb")
     if not motion.moves:
         return ReaderFindings()
     shapes = motion.shapes(asked.scene.solids)
     numbers = [n for s in asked.scene.solids for n in s.surface_numbers]
     wanted = np.concatenate([shapes.of(n)[0] for n in numbers], axis=1)
-    off = [np.linalg.norm(film.vertices(k) - wanted[k], axis=1).max() for k in range(len(wanted))]
+    off = [np.linalg.norm(video.vertices(k) - wanted[k], axis=1).max() for k in range(len(wanted))]
     return ReaderFindings({"vertex_off_m": float(max(off))})
 
 
@@ -194,7 +194,7 @@ def check_alembic(folder: Path, asked: ExportRequest) -> ReaderFindings:
     """Open the archive and compare every surface at the last frame."""
     from alembic3d import Abc, AbcGeom
 
-    top = Abc.IArchive(str(folder / "film.abc")).getTop()
+    top = Abc.IArchive(str(folder / "video.abc")).getTop()
     shapes = asked.motion.shapes(asked.scene.solids)
     last, off = len(asked.motion.time) - 1, [0.0]
     for solid in asked.scene.solids:

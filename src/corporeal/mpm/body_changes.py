@@ -11,7 +11,7 @@ import numpy as np
 
 from corporeal.mpm.add_bodies import AddedBodies, adopt_running_conditions
 from corporeal.mpm.engine_interaction import EngineInteraction
-from corporeal.mpm.problem import Problem, BodySplit
+from corporeal.mpm.problem import BodySplit, Problem
 from corporeal.mpm.split_body import ParentMap, split_problem
 
 BodyChange = AddedBodies | ParentMap

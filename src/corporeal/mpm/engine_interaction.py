@@ -34,7 +34,7 @@ class EngineInteraction(EngineReadout):
     """What is held from outside, by body."""
 
     def apply_impulse(self, body: int, point: Vector, impulse: Vector) -> None:
-        """Give a body an impulse [N s] at a point [m] at once: see ``problem.Interactive``."""
+        """Give a body an impulse [N s] at a point [m] at once: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, body, point, impulse)
         before, hold = self.measure().kinetic[body], self._hold(body, point)
         given, struck = np.array(impulse, np.float64), self._rigid_bodies().get(body)
@@ -46,8 +46,10 @@ class EngineInteraction(EngineReadout):
             self._add_velocity(body, hold.particle, hold.share[:, None] * given / mass[:, None])
         self._enter(body, given, float(self.measure().kinetic[body] - before))
 
-    def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
-        """Pull on a body by a spring until released: see ``problem.Interactive``."""
+    def attach_spring(
+        self, body: int, point: Vector | None, target: Vector, stiffness: float
+    ) -> None:
+        """Pull on a body by a spring until released: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, body, point, target)
         hold = None if point is None else self._hold(body, point)
         total = self._total(body)
@@ -57,7 +59,7 @@ class EngineInteraction(EngineReadout):
     def grip_point(
         self, body: int, position: Float[np.ndarray, "P 3"]
     ) -> Float[np.ndarray, "3"] | None:
-        """Where a body is held now [m], or None: see ``problem.Interactive``."""
+        """Where a body is held now [m], or None: see ``problem.InteractiveEngine``."""
         if body not in self.grips:
             return None
         hold, state = self.grips[body].hold, self._rigid_bodies().get(body)
@@ -129,7 +131,7 @@ class EngineInteraction(EngineReadout):
 class EngineLoadChanges(EngineInteraction):
     """Gravity and winds of an engine that change while it runs."""
 
-    def weigh(self, gravity: Vector) -> None:
+    def set_gravity(self, gravity: Vector) -> None:
         """Let gravity be another from now on [m/s²]: see ``problem.VariableLoadEngine``."""
         require_finite(gravity)
         before = float(np.sum(self.measure().potential))
@@ -137,7 +139,7 @@ class EngineLoadChanges(EngineInteraction):
         self._take_loads()
         self._enter(0, np.zeros(3), float(np.sum(self.measure().potential)) - before)
 
-    def blow(self, body: int, wind: Vector) -> None:
+    def set_wind(self, body: int, wind: Vector) -> None:
         """Let the air about a body move from now on [m/s]: see ``problem.VariableLoadEngine``."""
         check_grip(self.problem, body, wind)
         if self.problem.bodies[body].wind is None or not len(self.problem.bodies[body].faces.area):

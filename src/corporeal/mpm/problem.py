@@ -102,11 +102,11 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
-    rounding: Float[np.ndarray, "S2 Columns"] = field(
+    curvature: Float[np.ndarray, "S2 Columns"] = field(
         default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
-    """How the surface curves at those points, see ``types.ROUNDING``; none: they are corners."""
-    wetted: WettedSurface | None = None
+    """How the surface curves at those points, see ``types.CURVATURE_COLUMNS``; none: they are corners."""
+    wetted_surface: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None
     wind: Wind | None = None
@@ -158,38 +158,42 @@ class Problem:
     courant: float = COURANT
     """Largest fraction of a cell that a wave may cross in one step."""
     bonds: tuple[tuple[int, int], ...] = ()
-    """Rigid inclusions: (frame, soft), a rigid and a deformable body of one object. The frame holds
+    """Rigid inclusions: (inclusion, soft), a rigid and a deformable body of one object. The first holds
     what of the soft body lies inside it, and the two are never in contact."""
     joints: tuple[Joint, ...] = ()
     """Between rigid bodies."""
-    apart: tuple[tuple[int, int], ...] = ()
+    excluded_pairs: tuple[tuple[int, int], ...] = ()
     """Bodies of one object that are never in contact with each other."""
-    rolling: Float[np.ndarray, "BW BW"] | None = None
+    rolling_resistance: Float[np.ndarray, "BW BW"] | None = None
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
-    blows: Float[np.ndarray, "BW BW 5"] | None = None
+    restitution_law: Float[np.ndarray, "BW BW 5"] | None = None
     """How e of every pair changes with the speed of an impact: at which it is ``restitution``
-    [m/s], slope [s/m], exponent [-], least and most: see ``physics.backing.bounce_at``. None: it is
+    [m/s], slope [s/m], exponent [-], least and most: see ``physics.impact_support.restitution_at_speed``. None: it is
     the same at all speeds.
     """
 
     @property
-    def never_touch(self) -> tuple[tuple[int, int], ...]:
+    def all_excluded_pairs(self) -> tuple[tuple[int, int], ...]:
         """Pairs without contact: what is bonded or apart, and two prescribed motions."""
         prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
-        return (*self.bonds, *self.apart, *combinations(prescribed, 2))
+        return (*self.bonds, *self.excluded_pairs, *combinations(prescribed, 2))
 
     @property
-    def blow_laws(self) -> Float[np.ndarray, "BW BW 5"]:
-        """``blows``, or that no restitution changes."""
-        if self.blows is not None:
-            return np.asarray(self.blows, float)
+    def restitution_law_of_pair(self) -> Float[np.ndarray, "BW BW 5"]:
+        """``restitution_law``, or that no restitution changes."""
+        if self.restitution_law is not None:
+            return np.asarray(self.restitution_law, float)
         return np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (*np.shape(self.restitution), 1))
 
     @property
-    def brakes(self) -> bool:
+    def has_rolling_resistance(self) -> bool:
         """Whether anything brakes what rolls."""
-        return self.contact == "multi" and self.rolling is not None and bool(self.rolling.any())
+        return (
+            self.contact == "multi"
+            and self.rolling_resistance is not None
+            and bool(self.rolling_resistance.any())
+        )
 
 
 @dataclass(frozen=True)
@@ -378,7 +382,9 @@ class InteractiveEngine(Protocol):
         """
         ...
 
-    def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+    def attach_spring(
+        self, body: int, point: Vector | None, target: Vector, stiffness: float
+    ) -> None:
         """Pull on a body by a damped spring until released.
 
         Args:
@@ -410,7 +416,7 @@ class InteractiveEngine(Protocol):
 class VariableLoadEngine(Protocol):
     """An engine whose gravity and winds can be changed between two advances."""
 
-    def weigh(self, gravity: Vector) -> None:
+    def set_gravity(self, gravity: Vector) -> None:
         """Let gravity be another from now on [m/s²]; what that adds to the potential is work.
 
         Raises:
@@ -419,7 +425,7 @@ class VariableLoadEngine(Protocol):
         """
         ...
 
-    def blow(self, body: int, wind: Vector) -> None:
+    def set_wind(self, body: int, wind: Vector) -> None:
         """Let the air about a body move with a velocity from now on [m/s].
 
         Raises:

@@ -53,7 +53,7 @@ STAGE_FOLDERS = {
     "ground": "6-ground",
     "fill": "7-fill",
     "simulate": "8-simulate",
-    "film": "9-film",
+    "video": "9-video",
     "report": "10-report",
 }
 STAGES = tuple(STAGE_FOLDERS)
@@ -168,7 +168,7 @@ def _read_stage_result(verb: str, folder: Path) -> Any:
         return None
     found = store.load(folder / store.DATA_FILE)
     # paths in the results may be stale: the run may have been moved
-    return replace(found, path=folder / found.path.name) if verb == "film" else found
+    return replace(found, path=folder / found.path.name) if verb == "video" else found
 
 
 def digests_of_named_files(config: Any) -> list[str]:
@@ -341,7 +341,7 @@ class _Run:
         if verb == "reconstruct":
             from corporeal.io.photos.mask_files import edited_masks
 
-            asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
+            asked = [] if self.settings.reconstruct.object_names else [self.settings.describe.vlm]
             by_hand = sorted(edited_masks(self.folder / STAGE_FOLDERS[verb]).items())
             return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
         if verb == "assemble":
@@ -463,11 +463,11 @@ class _Run:
         made, config = self.made, self.settings.simulate
         return simulate(made.scene, made.particles, made.field, config, folder, progress)
 
-    def _film(self, folder: Path, progress: Progress) -> Video:
+    def _video(self, folder: Path, progress: Progress) -> Video:
         from corporeal.pipeline.stages.video import render_video
 
         return self._keep(
-            folder, render_video(self.made.played, self.settings.film, folder, progress)
+            folder, render_video(self.made.played, self.settings.video, folder, progress)
         )
 
     def _report(self, folder: Path, progress: Progress) -> None:

@@ -132,23 +132,23 @@ def panel_legend(
     return PanelLegend((title, *made.lines), made.swatches)
 
 
-def write_filmstrip(film: Video, path: Path, count: int = 6, width: int = 340) -> None:
+def write_filmstrip(video: Video, path: Path, count: int = 6, width: int = 340) -> None:
     """Set evenly chosen frames of a video in a row with thin white gaps, each with its time.
 
     Raises:
         UserError: The video cannot be read, or the file cannot be written.
 
     """
-    last = max((len(film.times) or video_file.count_frames(film.path)) - 1, 0)
+    last = max((len(video.times) or video_file.count_frames(video.path)) - 1, 0)
     numbers = [int(k) for k in np.unique(np.linspace(0, last, count).round())]
-    pictures = video_file.read_frames(film.path, numbers)
+    pictures = video_file.read_frames(video.path, numbers)
     if not pictures:
-        raise UserError(f"{film.path}: has no frames. Make it again.")
-    small = (width, round(width * film.height / film.width))
+        raise UserError(f"{video.path}: has no frames. Make it again.")
+    small = (width, round(width * video.height / video.width))
     shown = [
         np.asarray(Image.fromarray(p).resize(small, Image.Resampling.LANCZOS)) for p in pictures
     ]
-    times = [film.times[k] if film.times else k / film.fps for k in numbers]
+    times = [video.times[k] if video.times else k / video.fps for k in numbers]
     write_image_row(shown, [f"{t:.2f} s" for t in times], path)
 
 

@@ -16,7 +16,13 @@ from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
 from corporeal.mpm.engines import require
-from corporeal.mpm.problem import BodySplittingEngine, Engine, InteractiveEngine, Snapshot, BodySplit
+from corporeal.mpm.problem import (
+    BodySplit,
+    BodySplittingEngine,
+    Engine,
+    InteractiveEngine,
+    Snapshot,
+)
 from corporeal.mpm.split_body import can_split
 from corporeal.simulation.fracture_prediction import (
     BrittleImpact,
@@ -160,7 +166,7 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
         ratio=said.ratio,
         by=said.by,
         speed=said.speed,
-        blow=said.energy,
+        impact_energy=said.energy,
         piece=pieces.of_particle,
         surfaces=pieces.surfaces,
     )

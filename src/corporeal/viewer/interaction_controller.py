@@ -181,29 +181,31 @@ class InteractionController:
         mass = float(self.engine.measure().mass[spot.body])
         stiffness = mass * (2 * np.pi * order.firm) ** 2
         x, y, z = point.tolist()
-        require(self.engine, InteractiveEngine).pull(spot.body, (x, y, z), order.to, stiffness)
+        require(self.engine, InteractiveEngine).attach_spring(
+            spot.body, (x, y, z), order.to, stiffness
+        )
         self.held = SpringGrip(spot.body, stiffness, order.to)
 
     def _pull(self, order: Command) -> None:
         if self.held is not None:
             held, engine = self.held, require(self.engine, InteractiveEngine)
-            engine.pull(held.body, None, order.to, held.stiffness)
+            engine.attach_spring(held.body, None, order.to, held.stiffness)
             self.held = SpringGrip(self.held.body, self.held.stiffness, order.to)
 
     def _drop(self, order: Command) -> None:
         if self.held is not None:
             engine = require(self.engine, InteractiveEngine)
-            engine.pull(self.held.body, None, self.held.to, 0.0)
+            engine.attach_spring(self.held.body, None, self.held.to, 0.0)
             self.held = None
 
     def _gravity(self, order: Command) -> None:
-        require(self.engine, VariableLoadEngine).weigh(order.to)
+        require(self.engine, VariableLoadEngine).set_gravity(order.to)
 
     def _wind(self, order: Command) -> None:
         engine, known = require(self.engine, VariableLoadEngine), self.engine.problem.bodies
         for body in self._bodies(order.object):
             if len(known[body].faces.area):
-                engine.blow(body, order.to)
+                engine.set_wind(body, order.to)
 
     # ---------------------------------------------------------------- objects that are added
 

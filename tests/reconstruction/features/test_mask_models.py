@@ -111,8 +111,8 @@ def test_sam3_finds_what_words_name(sam3, monkeypatch):
 
 
 @needs_models()
-def test_checkpoints_for_films_hold_the_same_model(sam2, tmp_path):
-    place = shutil.copytree(sam2, tmp_path / "film")
+def test_checkpoints_for_videos_hold_the_same_model(sam2, tmp_path):
+    place = shutil.copytree(sam2, tmp_path / "video")
     config = json.loads((place / "config.json").read_text()) | {"model_type": "sam2_video"}
     (place / "config.json").write_text(json.dumps(config))
     made = connect_mask_model(f"sam2:{place}").instances(photograph(), (), (24.0, 18.0))[0]
@@ -205,7 +205,7 @@ def test_corrected_masks_are_kept_and_not_asked_for_again(photographs, tmp_path)
 
 
 def test_words_are_asked_for(photographs, tmp_path):
-    with pytest.raises(UserError, match="--things"):
+    with pytest.raises(UserError, match="--object-names"):
         learned_masks(photographs, tmp_path / "made", Found(), ())
 
 

@@ -86,7 +86,7 @@ def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
         float(max(after, 0.0) / speed),
         met[1] - met[0],
         treatment.kind,
-        treatment.young / treatment.young_real if not rigid else 1.0,
+        treatment.simulated_young_pa / treatment.young_pa if not rigid else 1.0,
         0.0 if rigid else unbooked_energy(first, last) / float(0.5 * first.mass[0] * speed**2),
         engine.steps.count,
     )

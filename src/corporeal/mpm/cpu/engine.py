@@ -139,7 +139,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
             if b not in separate
         ]
         self.contact = ContactMemory(self.world, problem, self.ledger)
-        self.blows = WindRecords(
+        self.winds = WindRecords(
             problem, self.first, self.ledger.external_impulse, self.rigid, self.points
         )
         self.springs = SpringRecords(problem, self.first, self.ledger.external_impulse, self.rigid)
@@ -235,13 +235,13 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
             chore=self.task.chore,
             list=self.node_task,
             report=self.report,
-            blow=self.blows.record,
+            blow=self.winds.record,
             bond=self.bond,
         )
         self._connect_bonds()
         self.springs.connect(world)
-        world["blows"] = len(self.blows.record)
-        world["blown"] = len(self.field) if len(self.blows.record) else 0
+        world["blows"] = len(self.winds.record)
+        world["blown"] = len(self.field) if len(self.winds.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
         world["tasks"], world["nodes"] = len(self.task.row), len(self.node_task)
         world["colour"], world["chores"] = self.task.colours, len(self.task.chore)
@@ -269,7 +269,10 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
         record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
-        record["swells"], record["pours"] = self.material[f].swells, self.material[f].pours
+        record["uses_mean_dilatation"], record["pours"] = (
+            self.material[f].uses_mean_dilatation,
+            self.material[f].pours,
+        )
         record["full"] = full_cell_mass(self.problem.bodies[f], self.problem.cell)
         record["flows_by"] = wall_stress.flow_curve(self.problem.bodies[f], self.problem.cell)
         # One lane of a node says how high mass lies over a floor.
@@ -336,7 +339,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         total = self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]].sum(axis=0)
         self.ledger.plastic_loss += total[0]
         self.ledger.viscous_loss += total[1] + self.springs.take_loss()
-        self.ledger.push_work += total[2] + self.blows.take_work() + self.springs.take_work()
+        self.ledger.push_work += total[2] + self.winds.take_work() + self.springs.take_work()
         self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]] = 0.0
 
     def _sort(self, fields: set[int]) -> None:
@@ -462,7 +465,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         self.book()
         self.clock["gravity"], self.clock["ramp"] = self.problem.gravity, self.problem.gravity_ramp
         self.clock["fall"] = self._longest_fall()
-        self.blows.blow(self.problem)
+        self.winds.set_wind(self.problem)
 
     def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         for f, window in self.window.items():

@@ -151,7 +151,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         soft = ~m.rigid
         if soft.any():
             law, F = m.law[soft], self.state.F[soft]
-            mean = mean_volume(F, self.state.relief[soft])
+            mean = mean_volume(F, self.state.log_volume_ratio[soft])
             modulus = laws.wave_modulus(law, F, m.mu[soft], m.own_lam[soft])
             modulus += laws.mean_modulus(law, mean, m.mean_bulk[soft])
             wave = np.sqrt(modulus / m.density[soft])
@@ -235,7 +235,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
 
         """
         m, state = self.matter, self.state
-        forget = np.minimum(1.0, m.forgetting * dt)
+        forget = np.minimum(1.0, m.flip_damping_rate * dt)
         keep = 1.0 - forget
         both = np.hstack([new, old])
         v, v_old = np.split(grid.gather(both), 2, axis=1)
@@ -244,7 +244,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         step = np.eye(3) + dt * gradient
         k, branches = m.relaxing, m.branches
         memory = advance_branches(state.memory, dt * gradient[k], branches.time, dt)
-        grown = np.where(m.swells, dt * np.trace(gradient, axis1=1, axis2=2), 0.0)
+        grown = np.where(m.uses_mean_dilatation, dt * np.trace(gradient, axis1=1, axis2=2), 0.0)
         after = replace(
             state,
             position=state.position + dt * v,
@@ -252,7 +252,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
             affine=gradient + keep[:, None, None] * lost_c,
             F=step @ state.F,
             motion=step @ state.motion,
-            relief=state.relief + groups.mean(grown) - grown,
+            log_volume_ratio=state.log_volume_ratio + groups.mean(grown) - grown,
             branch_strain=memory.strain,
             branch_volume=memory.volume,
         )
@@ -371,7 +371,9 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
 
     def _sums(self) -> BodySums:
         m, s = self.matter, self.state
-        energy = ParticleEnergy(strain_energy(m, s.F, s.relief), branch_energy(m, s.memory))
+        energy = ParticleEnergy(
+            strain_energy(m, s.F, s.log_volume_ratio), branch_energy(m, s.memory)
+        )
         return BodySums.of(m, self._particles(), s.affine, energy, self.problem.cell)
 
     def _rigid_bodies(self) -> dict[int, rigid.RigidBody]:

@@ -110,9 +110,9 @@ def _models_in(folder: Path) -> list[Path]:
             what += f" and {len(places) - 1} more folders"
             step = "Put the photographs of one object into one folder, and name that."
         raise BadFileError(folder, f"{what}.", step)
-    if films := videos_in_folder(folder):
-        what = f"the folder holds {len(films)} videos and no model."
-        raise BadFileError(folder, what, f"Name the video itself: {films[0]}.")
+    if videos := videos_in_folder(folder):
+        what = f"the folder holds {len(videos)} videos and no model."
+        raise BadFileError(folder, what, f"Name the video itself: {videos[0]}.")
     step = "Name a model, a folder of models, or photographs with poses."
     raise BadFileError(
         folder, f"the folder holds no model ({READABLE_MODEL_FORMATS}) and no pictures.", step

@@ -126,7 +126,7 @@ def reconstruct(
         source: A folder of photographs, a video, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
-        viewer: Model that names the objects if ``config.things`` does not.
+        viewer: Model that names the objects if ``config.object_names`` does not.
         folder: Folder of checkpoints and feature maps.
         progress: Called with the fraction done and a description.
 

@@ -450,7 +450,9 @@ def _training_statements(trained: TrainedGaussians, photographs: int) -> tuple[s
 
 
 def _agreement_words(quality: HeldOutQuality) -> str:
-    shown = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on objects"
+    shown = (
+        "" if quality.psnr_on_objects is None else f", {quality.psnr_on_objects:.1f} dB on objects"
+    )
     return (
         f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
         f"from to {quality.psnr:.1f} dB{shown}."

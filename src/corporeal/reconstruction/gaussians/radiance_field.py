@@ -127,7 +127,7 @@ class TrainedField:
         return (
             made,
             f"Pictures of it agree with {count} others that it was not learned from to "
-            f"{q.psnr:.1f} dB, {q.psnr_things:.1f} dB on objects.",
+            f"{q.psnr:.1f} dB, {q.psnr_on_objects:.1f} dB on objects.",
         )
 
 

@@ -230,8 +230,8 @@ def _trial_gain(schedule: TrainingSchedule, progress: Progress) -> float:
     inside, hull_alone = (train_gaussians(views, masks, lines, c).quality for c in tries)
     if inside is None or hull_alone is None:
         return np.nan  # too few views to tell
-    assert inside.psnr_things is not None and hull_alone.psnr_things is not None
-    return inside.psnr_things - hull_alone.psnr_things
+    assert inside.psnr_on_objects is not None and hull_alone.psnr_on_objects is not None
+    return inside.psnr_on_objects - hull_alone.psnr_on_objects
 
 
 def _learn(
