@@ -62,7 +62,7 @@ def test_a_shadow_is_none_of_the_thing_that_stands_on_a_floor_of_its_colour(scen
 def test_what_is_lost_in_the_floors_layer_goes_on_as_above_it(scene, monkeypatch):
     whole, kind = scene
     for module in (foreground, swept_floor_masks):
-        monkeypatch.setattr(module, "THICK", 0.05)
+        monkeypatch.setattr(module, "FLOOR_LAYER_RADII", 0.05)
     _, true = pictured(gaussian_subset(whole, kind == POST), CAMERAS)
     found = masks_above_floor(whole, CAMERAS, floor=True, threads=1)
     low, least = ([np.flatnonzero(m.any(axis=1))[-1] for m in masks] for masks in (found, true))

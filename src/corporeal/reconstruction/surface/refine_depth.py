@@ -26,14 +26,22 @@ from corporeal.reconstruction.gaussians.hull_stereo import (
 )
 from corporeal.reconstruction.gaussians.kernels_space_carving import relax_unknown_cells
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
+from corporeal.reconstruction.gaussians.visual_hull import (
+    DEFAULT_HULL,
+    HullConfig,
+    carve_tight_hull,
+)
 
 DEPTH_FILL_ITERATIONS = 200
 """Of laying a face between known depths."""
 
 
 def refine_depth(
-    rendering: DepthRendering, views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool
+    rendering: DepthRendering,
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    pool: ThreadPool,
+    config: HullConfig = DEFAULT_HULL,
 ) -> DepthRendering:
     """Return the same, as deep as photographs see and Gaussians let most light through.
 
@@ -42,10 +50,11 @@ def refine_depth(
         views: Photographs of what is rendered, by the same cameras in any frame of the same unit.
         masks: Their pixels on objects.
         pool: Threads.
+        config: How the visual hull is carved.
 
     """
     try:
-        hull = carve_tight_hull(views, masks, pool)
+        hull = carve_tight_hull(views, masks, pool, config)
     except UserError:  # masks agree nowhere: Gaussians are all there is
         return rendering
     looks = HullStereoImages(views, masks)
