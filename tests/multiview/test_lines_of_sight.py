@@ -6,8 +6,8 @@ import pytest
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.reconstruction.gaussians import carved_volume
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import HullConfig
 
 HALF, WALL, HEIGHT = 1.0, 0.25, 1.2
 """A box without a lid: half its width, its walls and bottom, its height [m]."""

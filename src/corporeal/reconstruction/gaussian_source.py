@@ -83,7 +83,12 @@ def gaussians_from_source(
         BadFileError: Where pictures were taken from, or what they are of, cannot be told.
 
     """
-    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
+    training = TrainConfig(
+        config.training,
+        seed=config.training_seed,
+        rasteriser=config.rasteriser,
+        hull=config.resolution.hull,
+    )
     kept = None if folder is None else folder / "training.npz"
     instances = config.apart == "masks"
     if input_kind([source]) == "splat":

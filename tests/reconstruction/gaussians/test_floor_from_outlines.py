@@ -12,7 +12,7 @@ from corporeal.reconstruction.gaussians.floor_from_outlines import (
     _foot_height,
     floor_height_from_outlines,
 )
-from corporeal.reconstruction.gaussians.visual_hull import HullConfig
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 
 CAMERAS = around(30, (96, 80), focal=100.0, centre=(0, 0, 0.3))[:16]
 LOW, HIGH = np.array([-0.3, -0.2, 0.0]), np.array([0.3, 0.2, 0.6])

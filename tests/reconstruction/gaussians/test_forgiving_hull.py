@@ -7,8 +7,9 @@ from splat_scenes import around
 from test_visual_hull import masks_of
 
 from corporeal.core.types import Views
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import DEFAULT_HULL, HullConfig, carve_hull
+from corporeal.reconstruction.gaussians.visual_hull import carve_hull
 
 CENTRES = np.array([[0, 0, 0], [0.5, 0.1, 0.2], [-0.4, 0.3, -0.2], [0.1, -0.45, 0.3]])
 RADII = np.array([0.35, 0.2, 0.25, 0.2])

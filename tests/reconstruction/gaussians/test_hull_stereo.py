@@ -6,9 +6,10 @@ import trimesh
 
 from corporeal.core.types import Camera, Views
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.hull_stereo import hull_cells_seen_past
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import HullConfig, carve_tight_hull
+from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
 from corporeal.reconstruction.surface.refine_depth import fill_plain_depth, refine_depth
 
 HALF, WALL, HEIGHT, SIZE = 1.0, 0.25, 1.2, 96

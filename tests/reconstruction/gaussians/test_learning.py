@@ -36,6 +36,7 @@ from corporeal.reconstruction.gaussians.gaussian_parameters import (
     parameters_of_gaussians,
 )
 from corporeal.reconstruction.gaussians.heldout_quality import heldout_quality, psnr, ssim
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.image_loss import TargetImage, image_loss, target_image
 from corporeal.reconstruction.gaussians.kernels_plane_sweep import count_support
 from corporeal.reconstruction.gaussians.kernels_training import SSIM_WINDOW, adam_rows
@@ -46,7 +47,7 @@ from corporeal.reconstruction.gaussians.plane_sweep import (
 )
 from corporeal.reconstruction.gaussians.rasteriser_numba import draw, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import HullConfig, camera_rows
+from corporeal.reconstruction.gaussians.visual_hull import camera_rows
 
 RNG = np.random.default_rng
 

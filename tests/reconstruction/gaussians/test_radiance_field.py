@@ -10,6 +10,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Views
 from corporeal.reconstruction.gaussians import kernels_radiance, radiance_field
 from corporeal.reconstruction.gaussians.feature_distillation import distil_features
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.radiance_field import (
     RadianceFieldConfig,
     field_arrays,
@@ -19,7 +20,6 @@ from corporeal.reconstruction.gaussians.radiance_field import (
     render_field,
     train_field,
 )
-from corporeal.reconstruction.gaussians.visual_hull import HullConfig
 
 SIDE = 24
 """Of pictures [px]."""

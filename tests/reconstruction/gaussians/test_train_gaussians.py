@@ -13,6 +13,7 @@ from corporeal.reconstruction.gaussians import carved_volume, scale_limits
 from corporeal.reconstruction.gaussians import train_gaussians as module
 from corporeal.reconstruction.gaussians.depth_rendering import render_depth
 from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, points_on_hull
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.plane_sweep import PlaneSweepConfig
 from corporeal.reconstruction.gaussians.scale_limits import equal_scale_limits
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
@@ -22,7 +23,6 @@ from corporeal.reconstruction.gaussians.training_schedule import (
     TrainConfig,
     shrink_picture,
 )
-from corporeal.reconstruction.gaussians.visual_hull import HullConfig
 from glb_maker import CUBE, CUBE_TRIANGLES
 
 COARSE = TrainConfig(

@@ -8,6 +8,7 @@ from splat_scenes import around
 
 from corporeal.core.types import Views
 from corporeal.reconstruction.gaussians import visual_hull
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 CAMERAS = around(5, (64, 64), focal=80.0)
@@ -46,7 +47,7 @@ def pieces(seed, config):
 
 def test_of_five_views_things_are_left_and_hardly_a_phantom():
     seeds = range(8)
-    coarse = visual_hull.HullConfig(grid_cells=100_000)
+    coarse = HullConfig(grid_cells=100_000)
     found = [pieces(seed, coarse) for seed in seeds]
     all_pieces = [pieces(seed, replace(coarse, phantom_max_views=0)) for seed in seeds]
     things = [[k for k in one if k >= 0] for one in all_pieces]
@@ -56,7 +57,7 @@ def test_of_five_views_things_are_left_and_hardly_a_phantom():
 
 
 def test_what_many_views_see_is_left_though_others_would_fill_its_masks():
-    most = visual_hull.DEFAULT_HULL.phantom_max_views
+    most = DEFAULT_HULL.phantom_max_views
     masks = np.ones((most + 1, 64, 64), bool)
     cameras = around(len(masks), (64, 64), focal=80.0)
     cells = np.stack(np.meshgrid(*3 * [np.linspace(-0.2, 0.2, 9)], indexing="ij"), axis=-1)

@@ -7,14 +7,10 @@ from jaxtyping import Bool
 
 from corporeal.core.types import Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.hull_stereo import hull_cells_seen_past
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import (
-    DEFAULT_HULL,
-    CarvedVolume,
-    HullConfig,
-    carve_tight_hull,
-)
+from corporeal.reconstruction.gaussians.visual_hull import CarvedVolume, carve_tight_hull
 
 
 def carve_volume(

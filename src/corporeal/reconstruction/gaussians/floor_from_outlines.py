@@ -14,10 +14,9 @@ from scipy.ndimage import gaussian_filter1d, shift
 
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import (
-    DEFAULT_HULL,
-    HullConfig,
     VisualHull,
     camera_rows,
     carve_tight_hull,

@@ -7,7 +7,7 @@ and colour are interpolated between the nodes of a grid, before they are made po
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +21,7 @@ from corporeal.core.types import Camera, Views
 from corporeal.geometry.grid_interpolation import trilinear_weights
 from corporeal.reconstruction.gaussians import kernels_radiance, training_checkpoint
 from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality, psnr, ssim
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.rasteriser_numba import RenderedPicture
 from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
@@ -30,11 +31,7 @@ from corporeal.reconstruction.gaussians.training_schedule import (
     check_training_views,
     shrink_picture,
 )
-from corporeal.reconstruction.gaussians.visual_hull import (
-    DEFAULT_HULL,
-    HullConfig,
-    carve_tight_hull,
-)
+from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
 
 Progress = Callable[[float, str], None]
 
@@ -65,6 +62,8 @@ class FieldPreset:
     steps: int
     longest: int
     """Larger pictures are shrunk by a whole number until no side is longer [px]."""
+    rays_per_step: int = 8192
+    """Rays that a step learns from [1]."""
 
 
 FIELD_PRESETS = {
@@ -87,8 +86,8 @@ class RadianceFieldConfig:
     """Of everything that is left to chance."""
     threads: int | None = None
     """None: one per processor. Changes no result."""
-    rays_per_step: int = 8192
-    """Rays that a step learns from [1]."""
+    rays_per_step: int | None = None
+    """Rays that a step learns from [1]; None: as the preset says."""
     hull: HullConfig = DEFAULT_HULL
     """How the visual hull is carved, whose cells are the field's."""
 
@@ -322,21 +321,25 @@ def train_field(
     begun = time.monotonic()
     check_training_views(views, masks)
     preset = FIELD_PRESETS[config.preset]
-    steps = config.steps or preset.steps
+    preset = replace(
+        preset,
+        steps=config.steps or preset.steps,
+        rays_per_step=config.rays_per_step or preset.rays_per_step,
+    )
     count, every = len(views.cameras), config.held_out
     held = tuple(range(every // 2, count, every)) if every and count > every else ()
     chosen = [k for k in range(count) if k not in held]
     cameras = tuple(views.cameras[k] for k in chosen)
     work = Views(views.rgb[chosen], cameras), masks[chosen]
     poses = [(c.K.tolist(), c.world_from_camera.tolist()) for c in cameras]
-    how = preset, steps, config.seed, config.rays_per_step, config.hull
+    how = preset, config.seed, config.hull
     name = training_checkpoint.fingerprint(*work[0].rgb, work[1], poses, *how)
     state = training_checkpoint.load_checkpoint(checkpoint, name) if checkpoint is not None else {}
     with ThreadPool(config.threads) as pool:
         made = _field_from_state(state) if state else _haze_in_hull(*work, pool, config.hull)
         if not state:
-            data = _TrainingData(made, *work, preset.longest, config)
-            _optimise_field(data, steps, pool, progress)
+            data = _TrainingData(made, *work, preset, config.seed)
+            _optimise_field(data, pool, progress)
     if checkpoint is not None and not state:
         training_checkpoint.save_checkpoint(checkpoint, name, _checkpoint_state(made))
     out = _field_quality(made, views, masks, held) if held else None
@@ -374,14 +377,14 @@ class _TrainingData:
         made: RadianceField,
         views: Views,
         masks: Masks,
-        longest: int,
-        config: RadianceFieldConfig,
+        preset: FieldPreset,
+        seed: int,
     ) -> None:
-        factor = -(-max(views.rgb.shape[1:3]) // longest)
+        factor = -(-max(views.rgb.shape[1:3]) // preset.longest)
         full = masks[..., None] * np.uint8(255)
         rgb = np.stack([shrink_picture(picture, factor) for picture in views.rgb])
         cover = np.stack([shrink_picture(mask, factor)[..., 0] for mask in full])
-        self.field, self.seed, self.rays_per_step = made, config.seed, config.rays_per_step
+        self.field, self.preset, self.seed = made, preset, seed
         self.width = rgb.shape[2]
         self.pictures = rgb.reshape(len(rgb), -1, 3)
         self.masks = cover.reshape(len(rgb), -1)
@@ -391,12 +394,13 @@ class _TrainingData:
         self.rays = np.argwhere(near.reshape(len(rgb), -1) > 0).astype(np.int32)
 
 
-def _optimise_field(data: _TrainingData, steps: int, pool: ThreadPool, progress: Progress) -> None:
+def _optimise_field(data: _TrainingData, pool: ThreadPool, progress: Progress) -> None:
     """Change a field's numbers until it looks like the pictures."""
     values, grid = data.field.values, field_arrays(data.field)
     gradients = np.zeros((GRADIENT_SHARES, *values.shape), np.float32)
     moments = np.zeros((2, *values.shape), np.float32)
-    shown, count = (data.width, data.cameras, data.pictures, data.masks, grid), data.rays_per_step
+    shown = data.width, data.cameras, data.pictures, data.masks, grid
+    steps, count = data.preset.steps, data.preset.rays_per_step
     for step in range(steps):
         rng = np.random.default_rng([data.seed, 3, step])
         rays = data.rays[rng.integers(0, len(data.rays), count)]

@@ -13,11 +13,12 @@ from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians import training_checkpoint
 from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, free_depths
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.kernels_project import PinholeCamera
 from corporeal.reconstruction.gaussians.plane_sweep import DEFAULT_SWEEP, PlaneSweepConfig
 from corporeal.reconstruction.gaussians.rasteriser_numba import pinhole_of_camera
 from corporeal.reconstruction.gaussians.view_depths import ViewDepths
-from corporeal.reconstruction.gaussians.visual_hull import DEFAULT_HULL, CarvedVolume, HullConfig
+from corporeal.reconstruction.gaussians.visual_hull import CarvedVolume
 
 Masks = Bool[np.ndarray, "V H W"]
 

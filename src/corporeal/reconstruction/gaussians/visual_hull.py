@@ -17,6 +17,7 @@ from corporeal.multiview.silhouette_coherence import (
     shrink_mask,
 )
 from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.kernels_training import count_mask_votes
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
@@ -28,24 +29,6 @@ MANY_VIEWS = 8
 """Views from which on some may err more: of fewer, each is needed."""
 NEEDED_PIXELS_FRACTION = 0.2
 """Share of the pixels of a piece of the hull that only it must fill for it to stand there."""
-
-
-@dataclass(frozen=True)
-class HullConfig:
-    """How the visual hull is carved from masks."""
-
-    grid_cells: int = 2_000_000
-    """Cells of the grid that it is carved from [1]."""
-    min_mask_fill_fraction: float = 0.996
-    """Fraction of its mask that a silhouette of the hull fills where masks agree, in the median
-    view [1]. Outlines that err by 10 of 640 pixels leave .992, exact ones and those that err by 4
-    leave nothing. 0: masks are taken at their word."""
-    phantom_max_views: int = 7
-    """Where no more views look, silhouettes may cross by chance where there is nothing [1]. 0: all
-    pieces are kept."""
-
-
-DEFAULT_HULL = HullConfig()
 
 
 @dataclass(frozen=True)

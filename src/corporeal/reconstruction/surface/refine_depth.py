@@ -19,6 +19,7 @@ from scipy.ndimage import distance_transform_edt
 from corporeal.core.errors import UserError
 from corporeal.core.types import Views
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.hull_stereo import (
     DEPTH_ERROR_CELLS,
     MIN_CONFIRMING_VIEWS,
@@ -26,11 +27,7 @@ from corporeal.reconstruction.gaussians.hull_stereo import (
 )
 from corporeal.reconstruction.gaussians.kernels_space_carving import relax_unknown_cells
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import (
-    DEFAULT_HULL,
-    HullConfig,
-    carve_tight_hull,
-)
+from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
 
 DEPTH_FILL_ITERATIONS = 200
 """Of laying a face between known depths."""
