@@ -19,10 +19,6 @@ from corporeal.core.errors import BadFileError
 from corporeal.simulation.trajectory_files import frame_path, read_arrays, write_arrays
 
 CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE = "checkpoint.npz", "checkpoint-before.npz"
-MIN_INTERVAL_S = 10.0
-"""Least seconds of computing between two checkpoints."""
-MAX_WRITE_TIME_FRACTION = 0.05
-"""Largest share of the time that may be spent on writing them."""
 STATE_PREFIX = "engine."
 
 log = logging.getLogger(__name__)
@@ -38,24 +34,40 @@ class CheckpointState:
     """As the engine saved it; empty where nothing is done."""
 
 
+@dataclass(frozen=True)
+class CheckpointConfig:
+    """How often checkpoints are written."""
+
+    min_interval_s: float = 10.0
+    """Least time of computing between two of them [s]."""
+    max_write_time_fraction: float = 0.05
+    """Largest fraction of the time that may be spent on writing them [1]."""
+
+
+DEFAULT_CHECKPOINTS = CheckpointConfig()
+
+
 class Checkpoints:
     """The last two states of one simulation in one folder."""
 
-    def __init__(self, folder: Path, name: str) -> None:
+    def __init__(
+        self, folder: Path, name: str, config: CheckpointConfig = DEFAULT_CHECKPOINTS
+    ) -> None:
         """Look after the checkpoints in a folder.
 
         Args:
             folder: Where they are, beside the frames.
             name: What is simulated; a checkpoint with another name is never used.
+            config: How often they are written.
 
         """
-        self.folder, self.name = folder, name
+        self.folder, self.name, self.config = folder, name, config
         self.written, self.seconds = time.monotonic(), 0.0
 
     @property
     def due(self) -> bool:
         """Whether enough was computed since the last one to write another."""
-        pause = max(MIN_INTERVAL_S, self.seconds / MAX_WRITE_TIME_FRACTION)
+        pause = max(self.config.min_interval_s, self.seconds / self.config.max_write_time_fraction)
         return time.monotonic() - self.written >= pause
 
     def keep(self, saved: dict[str, np.ndarray], done: int) -> None:

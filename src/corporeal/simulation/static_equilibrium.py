@@ -105,15 +105,16 @@ class DynamicRelaxation:
         self.energy[:] = 0.0
         self.anchor, self.since, self.count, self.watching = self.start.copy(), 0.0, 0, False
 
-    def run(self, pause: SaveCallback) -> StaticEquilibrium:
-        """Go on until everything has found its balance, or for ``MAX_RELAXATION_S``.
+    def run(self, pause: SaveCallback, max_seconds: float = MAX_RELAXATION_S) -> StaticEquilibrium:
+        """Go on until everything has found its balance, or time is up.
 
         Args:
             pause: Told the time [s] now and then, when the state is good to go on from.
+            max_seconds: Gives up after so long [s].
 
         """
         found = False
-        while not found and self.engine.time < MAX_RELAXATION_S:
+        while not found and self.engine.time < max_seconds:
             if self.count % CHECKS_BETWEEN_SAVE_POINTS == 0:
                 pause(self.engine.time)
             self.count += 1
