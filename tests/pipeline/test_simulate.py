@@ -3,6 +3,7 @@
 import errno
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -228,10 +229,12 @@ def test_an_interrupted_simulation_goes_on_as_if_nothing_had_happened(tmp_path, 
         np.testing.assert_array_equal(a.position, b.position)
 
 
+OFTEN = checkpoint.CheckpointConfig(min_interval_s=0.0, max_write_time_fraction=np.inf)
+
+
 def test_a_killed_simulation_goes_on_from_its_last_checkpoint(tmp_path, monkeypatch):
     asked = scene_of()
-    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
-    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
+    monkeypatch.setattr(stage, "Checkpoints", partial(checkpoint.Checkpoints, config=OFTEN))
 
     class KilledError(BaseException):
         pass

@@ -110,17 +110,17 @@ def _close_up(video: Video, path: Path) -> dict[str, Path]:
     return {"The first contact from close by": path}
 
 
-def _view(made: StageResults, audit: RunAudit) -> str:
+def _view(made: StageResults, audit: RunAudit, max_bytes: int = MAX_VIEW_BYTES) -> str:
     """Return the 3D view for the report, decimated in time to fit its size."""
     cast = bind_scene(made.prepared)
     recording = record_trajectory(cast, made.trajectory)
     for step in FRAME_STRIDES:
         taken = viewer_recording(made.prepared, cast, audit.outcome, recording.every(step), audit)
         view = inline_view(taken)
-        if len(view) <= MAX_VIEW_BYTES:
+        if len(view) <= max_bytes:
             return view
     return (
-        f'<p class="lead">The 3D view of this run is larger than {MAX_VIEW_BYTES / 1e6:.0f} MB and is '
+        f'<p class="lead">The 3D view of this run is larger than {max_bytes / 1e6:.0f} MB and is '
         "left out. Open it with: corporeal view RUN</p>"
     )
 

@@ -86,7 +86,12 @@ def gaussians_from_source(
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="corporeal-") as name:
             return gaussians_from_source(source, config, Path(name), progress)
-    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
+    training = TrainConfig(
+        config.training,
+        seed=config.training_seed,
+        rasteriser=config.rasteriser,
+        hull=config.resolution.hull,
+    )
     kept = folder / "training.npz"
     instances = config.apart == "masks"
     if input_kind([source]) == "splat":

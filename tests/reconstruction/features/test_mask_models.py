@@ -97,17 +97,17 @@ def test_sam2_is_asked_at_the_place_that_was_meant(sam2, monkeypatch):
 
 
 @needs_models()
-def test_sam3_finds_what_words_name(sam3, monkeypatch):
-    from corporeal.reconstruction.features import sam3 as module
+def test_sam3_finds_what_words_name(sam3):
+    from corporeal.reconstruction.features.sam3 import Sam3
 
-    monkeypatch.setattr(module, "MIN_SCORE", 0.0)
-    masker = connect_mask_model(f"sam3:{sam3}")
+    assert isinstance(connect_mask_model(f"sam3:{sam3}"), Sam3)
+    masker = Sam3(sam3, min_score=0.0)
     found = masker.instances(photograph(), ("duck", "can"), (0.0, 0.0))
     assert {one.word for one in found} == {"duck", "can"} and len(found) == 10
     assert all(one.mask.shape == (HIGH, WIDE) for one in found)
     assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
-    monkeypatch.setattr(module, "MIN_SCORE", 1.1)
-    assert not masker.instances(photograph(), ("duck",), (0.0, 0.0)), "none is that sure"
+    strict = Sam3(sam3, min_score=1.1)
+    assert not strict.instances(photograph(), ("duck",), (0.0, 0.0)), "none is that sure"
 
 
 @needs_models()

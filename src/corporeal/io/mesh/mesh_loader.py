@@ -68,7 +68,12 @@ class MeshFile:
     """Whether the file itself says what its objects are."""
 
 
-def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = None) -> MeshFile:
+def load_mesh(
+    path: Path,
+    objects: ObjectGrouping = "one",
+    up: UpAxis | None = None,
+    max_seconds: float = MAX_MESH_READ_S,
+) -> MeshFile:
     """Read one file.
 
     Args:
@@ -77,6 +82,7 @@ def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = N
             that branches is one. "auto": the bodies that the file states (USD); without any, the
             whole file.
         up: Axis of the file that points up; None: the one it states, else its kind's usual one.
+        max_seconds: Reading it may take so long [s].
 
     Raises:
         BadFileError: The file cannot be used.
@@ -85,7 +91,7 @@ def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = N
     path = Path(path)
     read_file_bytes(path)  # refuses what is absent, empty, or too large to be read
     with tempfile.TemporaryDirectory(prefix="corporeal-") as folder:
-        _run_reader_process(path, Path(folder), [])
+        _run_reader_process(path, Path(folder), [], max_seconds)
         raw = read_raw_mesh(Path(folder) / RAW_MESH_FILE)
     _check_numbers(path, raw)
     taken, of_up = (up, ()) if up else _assumed_up_axis(path, raw)
@@ -117,7 +123,9 @@ def mesh_companions(path: Path) -> list[Path]:
 # ---------------------------------------------------------------- the child
 
 
-def _run_reader_process(path: Path, folder: Path, words: Sequence[str]) -> None:
+def _run_reader_process(
+    path: Path, folder: Path, words: Sequence[str], max_seconds: float = MAX_MESH_READ_S
+) -> None:
     """Let a child process read a file into a folder.
 
     Raises:
@@ -134,11 +142,11 @@ def _run_reader_process(path: Path, folder: Path, words: Sequence[str]) -> None:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             env=os.environ | threads,
-            timeout=MAX_MESH_READ_S,
+            timeout=max_seconds,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        what = f"is not read within {MAX_MESH_READ_S} s."
+        what = f"is not read within {max_seconds} s."
         raise BadFileError(path, what, "Simplify the model, or export it as .glb.") from None
     if (folder / REFUSAL_FILE).exists():
         raise BadFileError(path, store.read_json(folder / REFUSAL_FILE))

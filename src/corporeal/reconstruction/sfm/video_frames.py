@@ -59,20 +59,23 @@ class VideoInfo:
         return min(self.rate, MAX_DECODED_FRAMES / max(self.seconds, 1e-3))
 
 
-def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
+def write_video_frames(
+    path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S
+) -> list[str]:
     """Write the chosen frames of a video as PNG; return what is to be said of them.
 
     Args:
         path: The video.
         folder: Where frames go, named by their number.
         progress: Called with the fraction done and a description.
+        max_seconds: Longer films are refused [s].
 
     Raises:
         BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it
             is a recording of a screen.
 
     """
-    video = _open_video(path)
+    video = _open_video(path, max_seconds)
     change, sharp = [0.0], []
     before, standstill = None, StaticPixels()
     expected = max(video.looked * video.seconds, 1.0)
@@ -135,7 +138,7 @@ def choose_frames(
     return chosen
 
 
-def _open_video(path: Path) -> VideoInfo:
+def _open_video(path: Path, max_seconds: float) -> VideoInfo:
     # It warns that a turned video is not as wide as its frames are stored: so it should be.
     logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
     reading = imageio_ffmpeg.read_frames(str(path))
@@ -149,8 +152,8 @@ def _open_video(path: Path) -> VideoInfo:
     finally:
         with contextlib.suppress(Exception):
             reading.close()
-    if video.seconds > MAX_VIDEO_S:
-        what = f"is {video.seconds / 60:.0f} minutes long; at most {MAX_VIDEO_S / 60:.0f} are looked at."
+    if video.seconds > max_seconds:
+        what = f"is {video.seconds / 60:.0f} minutes long; at most {max_seconds / 60:.0f} are looked at."
         raise BadFileError(path, what, "Cut out the part that goes around the object.")
     return video
 
