@@ -27,7 +27,7 @@ def command_assets() -> None:
 def _index() -> None:
     """Judge every model below the folders, and keep the good ones in a pool.
 
-    A model is a .glb, .gltf or .obj file. Its class is what a table says (--csv, or a manifest.csv
+    A model is a glTF or a mesh file. Its class is what a table says (--csv, or a manifest.csv
     in the folder or above it), else the folder it lies in, else its own name in everyday words.
     Each file gets in or gets a reason. What was judged before is not judged again.
     """
