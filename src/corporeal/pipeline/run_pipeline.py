@@ -33,8 +33,15 @@ from corporeal.core.types import (
 )
 from corporeal.geometry.gaussian_transforms import chosen_up_axis
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.io.input_files import input_kind, list_input_files, photographed_input, scene_name
-from corporeal.io.scene_toml import read_scene_file, write_scene_file
+from corporeal.io.input_files import (
+    input_kind,
+    is_scene_file,
+    list_input_files,
+    photographed_input,
+    read_scene,
+    scene_name,
+)
+from corporeal.io.scene_toml import write_scene_file
 from corporeal.pipeline.results import RUN_FILES, StageResults
 from corporeal.pipeline.settings.ground_config import GroundConfig
 from corporeal.pipeline.settings.settings import Settings
@@ -412,7 +419,7 @@ class _Run:
             ]
             config = replace(config, extent=())  # they determine the scale of the reconstruction
             scene = assemble(inputs, config)
-            if self.inputs[0].suffix.lower() == ".toml":
+            if is_scene_file(self.inputs[0]):
                 scene = replace(scene, name=scene_title(self.inputs[0]))
             return self._keep(folder, scene)
         return self._keep(
@@ -489,9 +496,9 @@ class _Run:
 def _reconstructed_model(asked: Path, folder: Path) -> Path:
     """Return the model that was reconstructed, with all that a scene file says beside it."""
     model = next(folder.glob("*.glb"))
-    if asked.suffix.lower() != ".toml":
+    if not is_scene_file(asked):
         return model
-    write_scene_file(folder / "scene.toml", replace(read_scene_file(asked), file=model))
+    write_scene_file(folder / "scene.toml", replace(read_scene(asked), file=model))
     return folder / "scene.toml"
 
 
