@@ -214,7 +214,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     [
         ({"count": 0}, (), "--count is 0"),
         ({"semantic": "bert"}, (), "Unknown picture encoder 'bert'"),
-        ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
+        ({"count": 3, "things": ("crate",)}, (), "--count is 3, but --things names 1 objects"),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
         ({"floor_at": float("nan")}, (), "--floor-at is nan"),
         ({"training_seed": -1}, (), "--training-seed is -1"),

@@ -25,7 +25,7 @@ def test_what_is_too_large_has_half_the_pictures_and_then_none(made, monkeypatch
     assert 0 < len(thin) < whole and "<script" in thin
     monkeypatch.setattr(run_files, "MAX_VIEW_BYTES", 1000)
     said = view(made)
-    assert "would take more than" in said and "corporeal view RUN" in said
+    assert "is larger than" in said and "corporeal view RUN" in said
 
 
 def test_a_view_of_two_balls_with_three_js_takes_less_than_two_and_a_half_megabytes(made):

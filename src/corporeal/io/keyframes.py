@@ -1,4 +1,4 @@
-"""Prescribed motion as people write it: rows of time, place and, if it turns, orientation.
+"""Keyframes of prescribed motion: rows of time, position and optionally orientation.
 
 A row is ``t, x, y, z`` [s, m]; with three more numbers a rotation vector since the first row
 [degrees] (for a turn about one axis: the angle about it, as many times around as wanted), with four
@@ -41,7 +41,7 @@ def keyframes_from_rows(
     """Return where a path begins [m], and how it goes on from there.
 
     Args:
-        rows: What somebody wrote.
+        rows: Rows of the file.
         fail: Told what is wrong and what to do.
 
     """

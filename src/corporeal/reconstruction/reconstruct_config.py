@@ -1,4 +1,4 @@
-"""How photographs or a splat are made objects, and which settings cannot be right."""
+"""Settings of the stage reconstruct, with validation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,8 +87,8 @@ def validate_reconstruct(
     check_range("--floor-at", config.floor_at, -MAX_COORDINATE_UNITS, MAX_COORDINATE_UNITS)
     if config.count and config.things and config.count != len(config.things):
         raise UserError(
-            f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
-            "--count out, or name all of them."
+            f"--count is {config.count}, but --things names {len(config.things)} objects. Omit "
+            "--count, or name all of them."
         )
     if config.things or not asked:
         check_stated_extents(

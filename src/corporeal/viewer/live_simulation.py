@@ -1,4 +1,4 @@
-"""A simulation that runs while pages watch and touch it: of pictures, the newest only."""
+"""Live simulation with interaction; pages get the newest frame only."""
 
 import threading
 import time

@@ -1,4 +1,4 @@
-"""The runs that a server shows, and what of them has been read."""
+"""Runs shown by the server, with cached results."""
 
 from collections import OrderedDict
 from dataclasses import dataclass

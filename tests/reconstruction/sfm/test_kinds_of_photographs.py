@@ -215,7 +215,9 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([lost / "a.jpg"])
     (tmp_path / "films").mkdir()
     (tmp_path / "films" / "a.MOV").touch()
-    with pytest.raises(UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"):
+    with pytest.raises(
+        UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"
+    ):
         assemble([tmp_path / "films"])
 
 
@@ -271,7 +273,7 @@ def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
     names = tuple(f"{k}.jpg" for k in range(COUNT))
     cropped = PreparedImages(names, tuple((64, 40 + k) for k in range(COUNT)), ())
     whole = PreparedImages(names, ((64, 48),) * COUNT, ())
-    assert "as the camera took them" in _refusal(["why"], cropped, ()).what_to_do
+    assert "original photographs" in _refusal(["why"], cropped, ()).what_to_do
     assert "newspaper" in _refusal(["why"], whole, ()).what_to_do
 
 

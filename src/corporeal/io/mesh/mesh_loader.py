@@ -1,4 +1,4 @@
-"""Read OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene: +Z up.
+"""Loading of OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene, +Z up.
 
 The libraries that read them run in a child process with limits of time and memory; what it hands
 over is checked as any file's. Facts of each kind, docs/inputs.md, "Meshes".
@@ -218,14 +218,14 @@ def _check_numbers(path: Path, raw: RawMesh) -> None:
 
 
 def _assumed_up_axis(path: Path, raw: RawMesh) -> tuple[UpAxis, tuple[str, ...]]:
-    """Return what is taken for up where nobody says it, and what there is to say of that."""
+    """Return the assumed up axis if none is stated, with notes."""
     kind = path.suffix.lower()
     if kind not in SUFFIXES_WITHOUT_UP_AXIS:
         return raw.up, ()
     if kind == ".obj" and comment_says_z_up(_text(path, COMMENT_HEAD_CHARACTERS)):
         return "+z", (
             Note(
-                f"{path.name}: +z is up, as a comment in it says; --up y takes another.",
+                f"{path.name}: +z is up, as its comment states; override with --up.",
                 NoteKind.ASSUMED,
             ),
         )
@@ -239,7 +239,7 @@ def _assumed_up_axis(path: Path, raw: RawMesh) -> tuple[UpAxis, tuple[str, ...]]
     axis, why = likelier
     said = f"{path.name} does not state what is up. {raw.up} was taken, as is usual in {kind}, "
     return raw.up, (
-        Note(f"{said}{why}. If it lies on its side, say --up {axis[1]}.", NoteKind.ASSUMED),
+        Note(f"{said}{why}. If it lies on its side, use --up {axis[1]}.", NoteKind.ASSUMED),
     )
 
 

@@ -1,4 +1,4 @@
-"""Mesh files beside glTF: their suffixes, and what is taken for granted where they are silent."""
+"""Suffixes of mesh files besides glTF, and their default axes and units."""
 
 from pathlib import Path
 from typing import Literal

@@ -76,7 +76,7 @@ class _ObjMaterials(_CompanionResolver):
 
 
 def read_obj(path: Path) -> RawMesh:
-    """Read a Wavefront OBJ with its materials; nobody says its unit, +y is up.
+    """Read a Wavefront OBJ with its materials; unit unknown, +y up.
 
     Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
     but one of the two.
@@ -91,21 +91,21 @@ def read_obj(path: Path) -> RawMesh:
 
 
 def read_ply(path: Path) -> RawMesh:
-    """Read a PLY with faces; nobody says its unit, +z is up."""
+    """Read a PLY with faces; unit unknown, +z up."""
     data, lost = triangulate_mixed_faces(path, read_file_bytes(path))
     scene = _load_with_trimesh(path, "ply", data)
     return RawMesh(*_finished_meshes(scene, lambda *_: (path.stem,)), up="+z", lost=lost)
 
 
 def read_stl(path: Path) -> RawMesh:
-    """Read an STL, in text or in bytes; nobody says its unit, +z is up."""
+    """Read an STL, in text or in bytes; unit unknown, +z up."""
     return RawMesh(
         *_finished_meshes(_load_with_trimesh(path, "stl"), lambda *_: (path.stem,)), up="+z"
     )
 
 
 def read_off(path: Path) -> RawMesh:
-    """Read an OFF; nobody says its unit, +z is up."""
+    """Read an OFF; unit unknown, +z up."""
     return RawMesh(
         *_finished_meshes(_load_with_trimesh(path, "off"), lambda *_: (path.stem,)), up="+z"
     )

@@ -1,4 +1,4 @@
-"""Where weights are: in a folder, or on the Hugging Face hub and in its copy on this disk."""
+"""Weights of models: in a folder, or from the Hugging Face hub and its cache."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Pictures as if all had been taken with one exposure and one white balance.
+"""Equalisation of exposure and white balance.
 
 A phone chooses both anew for every picture, so that a brown floor has as many browns as there
 are pictures, and what is told by colours borders on all of them. What the floor's places look like

@@ -1,4 +1,4 @@
-"""Pixels that show the floor for certain: other views see the same pattern at that place of it.
+"""Certain floor pixels by consistency of their texture over views.
 
 Where an object stands its contact shadow may have the colours of the object, and an outline that is
 found by colour spreads over the floor. But a pattern on the floor is one plane's: taken to that

@@ -1,4 +1,4 @@
-"""How well pixels fit what the floor shows at their place, whatever its colours are elsewhere.
+"""Likelihood of pixels under the floor's texture at their place.
 
 An object on a newspaper is as white and black as this, so that colours alone do not tell them
 apart. But the floor is one plane: taken to it, all views see one print there, but for light. A

@@ -1,4 +1,4 @@
-"""What has the colours of objects, but is in no silhouette of the hull that masks carved.
+"""Pixels with the colours of objects outside the silhouettes of the hull.
 
 Masks agree with their hull because they are kept to it. What it lost is seen beside it: pieces so
 flat that they pass for a pattern on the floor, or what pictures of other places would not carve.

@@ -1,4 +1,4 @@
-"""Cells of space that objects may fill, carved by masks, and the silhouettes of what is left."""
+"""Voxels carved by masks, and their silhouettes."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""Find where photographs were taken from, in up to three attempts, or say why that cannot be."""
+"""Pose estimation of photographs in up to three attempts."""
 
 import shutil
 from dataclasses import dataclass, replace

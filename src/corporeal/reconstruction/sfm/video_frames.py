@@ -1,4 +1,4 @@
-"""Frames of a video that are sharp and differ from one another.
+"""Selection of sharp, distinct frames of a video.
 
 ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen.
 It turns pictures as the video's own matrix says.
@@ -41,12 +41,12 @@ CHANGE_NOISE_U8 = 0.05
 """Mean difference of neighbouring thumbnails, of 255, that is noise."""
 MAX_STATIC_FRACTION = 0.25
 """Share of what has contrast that never moves, from which on a video shows no way around an object."""
-VIDEO_HINT = "Film the object slowly, all around and from above, for 20 to 60 s."
+VIDEO_HINT = "Record the object slowly, all around and from above, for 20 to 60 s."
 
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a video states."""
+    """Metadata of a video."""
 
     path: Path
     seconds: float
