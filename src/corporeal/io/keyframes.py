@@ -93,7 +93,7 @@ def read_keyframe_file(file: Path, fail: FailCallback) -> tuple[Vector, Keyframe
 
 
 def _numbers(file: Path, number: int, line: list[str]) -> Iterator[list[object]]:
-    """Give the numbers of one line; none for a heading."""
+    """Return the numbers of one line; none for a heading."""
     try:
         yield [float(cell) for cell in line]
     except ValueError:

@@ -275,7 +275,7 @@ def _drop_doubted_pictures(
 def _refuse_doubted_poses(
     source: Path, posed: FoundPoses, force: bool, step: str = STAND_STILL_HINT
 ) -> FoundPoses:
-    """Refuse poses in which neighbours share too little, or say so in a warning.
+    """Reject poses in which neighbours share too little, or say so in a warning.
 
     Args:
         source: The photographs.

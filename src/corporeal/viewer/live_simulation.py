@@ -230,7 +230,7 @@ class LiveSimulation:
     # ---------------------------------------------------------------- two threads
 
     def _run(self) -> None:
-        """Obey and step; what there is to see is handed over, and nobody waited for."""
+        """Obey and step; frames are handed over without waiting."""
         self._hand_over()
         while not self.closed:
             begun, worked = time.perf_counter(), time.thread_time()

@@ -162,7 +162,7 @@ def _row(name: str, run: Path) -> dict[str, Any]:
 
 
 def _input_name(path: Path) -> str:
-    """Return what to call an input; names of uploads are ours and tell nobody anything."""
+    """Return what to call an input; names of uploads are generated."""
     return UPLOADED_NAME if INBOX_FOLDER in path.parts else path.name
 
 

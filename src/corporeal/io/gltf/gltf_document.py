@@ -37,7 +37,7 @@ class GltfEntry:
     pointer: str
 
     def fail(self, what: str, next_step: str = GLTF_EXPORT_ADVICE) -> NoReturn:
-        """Refuse the file because of this entry."""
+        """Reject the file because of this entry."""
         where = f"at {self.pointer}: " if self.pointer else ""
         raise BadFileError(self.document.path, where + what, next_step)
 

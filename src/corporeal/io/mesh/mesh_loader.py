@@ -191,7 +191,7 @@ def _text(path: Path, most: int = MAX_COMPANION_TEXT_BYTES) -> str:
 
 
 def _check_numbers(path: Path, raw: RawMesh) -> None:
-    """Refuse numbers that cannot be.
+    """Reject numbers that cannot be.
 
     Raises:
         BadFileError: There are some, or there are no triangles.

@@ -85,7 +85,7 @@ def split_projection(
 
 
 def check_focal(path: Path, K: Float[np.ndarray, "3 3"], width: int, height: int) -> None:
-    """Refuse a K that cannot be this picture's, as of matrices [R | t] without one.
+    """Reject a K that cannot be this picture's, as of matrices [R | t] without one.
 
     Raises:
         BadFileError: The focal length or the principal point is absurd.

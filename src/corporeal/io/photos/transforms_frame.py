@@ -49,7 +49,7 @@ class TransformsFrame:
     value: dict[str, Any]
 
     def fail(self, what: str, next_step: str) -> NoReturn:
-        """Refuse the file because of this frame."""
+        """Reject the file because of this frame."""
         raise BadFileError(self.path, f"{self.where}{what}", next_step)
 
     def number(self, key: str, default: float | None = None, zero: bool = False) -> float:

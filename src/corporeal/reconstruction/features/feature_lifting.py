@@ -88,7 +88,7 @@ def lift_features(
 
 
 def known_features(mean: Float32[np.ndarray, "N D"]) -> LiftedFeatures:
-    """Return features that came onto points otherwise; where they are 0 nobody knows them."""
+    """Return features that came onto points otherwise; where they are 0 they are unknown."""
     return LiftedFeatures(mean, np.any(mean, axis=1).astype(np.int64))
 
 

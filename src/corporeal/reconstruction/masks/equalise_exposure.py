@@ -29,7 +29,7 @@ def equalise_exposure(
 
     Args:
         views: The pictures.
-        floor: The plane that objects stand on; None: nobody knows it.
+        floor: The plane that objects stand on; None: unknown.
         around: The ball that all look at.
         longest: Longer side of the pictures that exposures are read from [px].
 

@@ -66,7 +66,7 @@ def floor_fit(
 
     Args:
         views: The pictures.
-        floor: The plane that objects stand on; None: nobody knows it, nor anything of a pixel.
+        floor: The plane that objects stand on; None: unknown, nor anything of a pixel.
         around: The ball that all look at.
         sure: Pixels that show the floor for certain, by its pattern.
 

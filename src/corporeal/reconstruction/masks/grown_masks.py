@@ -241,7 +241,7 @@ def _is_sound(grown: RegionGrowingResult) -> bool:
 
 
 def _is_better(one: RegionGrowingResult, other: RegionGrowingResult) -> bool:
-    """Return whether colours are told apart better, and masks agree better with their hull."""
+    """Return whether colours are separated better, and masks agree better with their hull."""
     return one.alike < other.alike and one.coherence > other.coherence
 
 

@@ -35,7 +35,7 @@ def residual_fraction(
 def pixels_before_floor(
     cameras: tuple[Camera, ...], floor: GroundPlane | None, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell behind which pixels the floor under the ball lies; none where nobody knows the floor.
+    """Tell behind which pixels the floor under the ball lies; none where the floor is unknown.
 
     Walls, and what stands before them, may have any colour.
     """

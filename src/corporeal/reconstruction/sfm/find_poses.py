@@ -308,7 +308,7 @@ def _refusal(
     others: int = 0,
     tried: tuple[SfmRun, ...] = (),
 ) -> _PosesRecord:
-    """Refuse, and say which pictures are blurred, if that may be why."""
+    """Reject, and say which pictures are blurred, if that may be why."""
     total = len(gathered.names)
     if smeared:
         why = [*why, f"{len(smeared)} of {total} pictures are blurred ({some_names(smeared)})"]

@@ -212,7 +212,7 @@ def _cropping_note(sizes: Sequence[tuple[int, int]]) -> list[str]:
 
 
 def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], twins: int) -> None:
-    """Refuse what shows too little; that some show the same as others says nothing against these.
+    """Reject what shows too little; that some show the same as others says nothing against these.
 
     Args:
         source: The folder.

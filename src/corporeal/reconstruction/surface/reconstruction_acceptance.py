@@ -128,7 +128,7 @@ def colour_rejection_reason(
 
     Args:
         masks: Which pixels show what was taken for objects, by where it is.
-        coloured: The same, by its colours, which are unreliable alone; None: nobody knows.
+        coloured: The same, by its colours, which are unreliable alone; None: unknown.
 
     """
     if coloured is None or not coloured.any():
