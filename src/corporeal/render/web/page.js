@@ -4,7 +4,7 @@ import * as THREE from './three.min.js'
 import { Stage, graphics, squareOf } from './stage.js'
 import { auditOf, card, differences, el, key, si, spoken, table } from './cards.js'
 
-const VIEW = [.8, -.62, .36] // three-quarter view, as the film's
+const VIEW = [.8, -.62, .36] // three-quarter view, as the video's
 const ANGLE = 30 // vertical field of view [deg]
 const CLICK = 4 // a pointer that moves less is a click [px]
 const PAUSE = .4 // at the end of a recording, before it starts again [s]
@@ -110,7 +110,7 @@ export class Viewer {
     const two = this.takes.length > 1 ? differences(...this.takes.map(t => t.header)) : []
     return el('div', {}, film ? null : this.options.unmoved?.() ?? el('p', {class: 'note'}, 'This has not been simulated yet: it stands as it will begin.'),
       el('label', {class: 'line'}, 'colour by', this.by), splats ? [el('label', {class: 'line'}, 'as in the pictures', this.soft), el('p', {class: 'hint'},
-        `${many} in place of the surfaces. They move and turn with the objects; only the film stretches them, too.`)] : null,
+        `${many} in place of the surfaces. They move and turn with the objects; only the video stretches them, too.`)] : null,
       el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
       el('p', {class: 'hint'}, `Squares on the floor are ${si(squareOf(Math.max(...this.stages.map(s => s.size))), 'm')} wide.`), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])
