@@ -223,7 +223,7 @@ def _name_objects(
     Args:
         source: The folder of photographs, the video or the splat.
         found: Objects, in order of size.
-        objects: What each is, as far as anybody said.
+        objects: What each is, if stated.
         config: What was asked for.
         extents: Real largest extents, such as "duck=0.1" [m].
 
