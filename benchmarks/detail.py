@@ -5,7 +5,7 @@
 Each experiment has the grid and the stiffness that the policy gives it. Balls of 10 cm fall on the
 floor at 2 m/s; a column of sand, twice as wide as high, collapses; rollers as wide as the
 showcase's duck hit mud as deep as the heap of scene 1, between smooth walls two cells apart.
-``--docs`` writes docs/detail.md.
+``--docs`` writes docs/reference/resolution-benchmark.md.
 """
 
 import argparse
@@ -42,7 +42,7 @@ from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry
 from corporeal.materials import find_material
 from corporeal.simulation.surface_mark import surface_mark
 
-PAGE = Path(__file__).parents[1] / "docs" / "detail.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "resolution-benchmark.md"
 G = 9.81
 FOAM = Material("foam", Law.NEO_HOOKEAN, 2.5e5, 0.35, 30.0)
 GEL = Material("gel", Law.NEO_HOOKEAN, 1e5, 0.45, 1000.0)
@@ -200,7 +200,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--docs", action="store_true", help="write docs/detail.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument("--workers", type=int, default=min(4, usable_cores()), help="side by side")
     asked = parser.parse_args()
     text = lines(table(asked.workers))

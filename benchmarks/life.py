@@ -4,9 +4,9 @@
 
 Every thing goes through the verbs as a scene of a person would: names or materials, walls, the air
 in balls, one word of detail; nothing else can be set. ``--quick`` drops each once, at draft;
-``--docs`` writes docs/life.md. Every drop is written to FILE as it ends; ``--resume`` goes on from
-what is there, which holds as long as the code is the same. Ranges and sources:
-src/corporeal/lab/evaluation/life.toml.
+``--docs`` writes docs/reference/restitution-validation.md. Every drop is written to FILE as it
+ends; ``--resume`` goes on from what is there, which holds as long as the code is the same. Ranges
+and sources: src/corporeal/lab/evaluation/life.toml.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from corporeal.lab.evaluation.rebound_data import (
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.recognition.lexicon import head_terms, name_tokens
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[1] / "docs" / "reference"
 DETAILS, SEEDS = ("draft", "normal"), (0, 1, 2)
 LEEWAY = 0.03
 """How far from the published range still counts as inside [-]."""
@@ -192,12 +192,12 @@ def blind(found: Sequence[Result]) -> str:
     return (
         f"{len(rows)} of the things were written down before they were tried ({names}): {AT_FIRST} "
         f"were in their range ± {LEEWAY} at draft at the first try, before anything was changed; "
-        f"{inside} are now (decisions [54](decisions/0054-heights-fall-through-air.md), "
-        "[65](decisions/0065-what-rules-say-of-balls.md), "
-        "[72](decisions/0072-what-rolls-is-braked-by-loss.md), "
-        "[77](decisions/0077-restitution-at-the-speed-of-a-blow.md), "
-        "[85](decisions/0085-what-is-soft-loses-for-what-is-rigid.md) and "
-        "[96](decisions/0096-mats-are-pressed-as-layers.md))."
+        f"{inside} are now (decisions [54](../decisions/0054-heights-fall-through-air.md), "
+        "[65](../decisions/0065-what-rules-say-of-balls.md), "
+        "[72](../decisions/0072-what-rolls-is-braked-by-loss.md), "
+        "[77](../decisions/0077-restitution-at-the-speed-of-a-blow.md), "
+        "[85](../decisions/0085-what-is-soft-loses-for-what-is-rigid.md) and "
+        "[96](../decisions/0096-mats-are-pressed-as-layers.md))."
     )
 
 
@@ -228,7 +228,7 @@ def contradicted(found: Sequence[Result]) -> Iterator[str]:
             f"These measured the same and contradict each other: {names}. No value is within "
             f"{LEEWAY} of all; {0.5 * (low + high):.3f} would be off by {0.5 * (low - high):.3f}. "
             "They are counted as all others are "
-            "([decision 109](decisions/0109-rows-that-contradict-and-thin-ends.md))."
+            "([decision 109](../decisions/0109-rows-that-contradict-and-thin-ends.md))."
         )
 
 
@@ -282,7 +282,7 @@ def asked_for() -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="write every drop to this file")
     parser.add_argument("--resume", action="store_true", help="keep the drops that it holds")
     parser.add_argument("--row", nargs="+", metavar="NAME", help="only these things")
-    parser.add_argument("--docs", action="store_true", help="write docs/life.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument(
         "--workers", type=int, default=min(4, usable_cores()), help="drops side by side"
     )
@@ -316,7 +316,7 @@ def main() -> None:
     met = verdicts(found, wrong)
     show(found, met)
     if asked.docs:
-        (DOCS / "life.md").write_text(page(found, met), encoding="utf-8")
+        (DOCS / "restitution-validation.md").write_text(page(found, met), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ MODELS are folders of models, or a pool that ``corporeal assets index`` made of 
 composed from them by ``corporeal assemble``, by name. Points are spread over what 24 pictures show;
 with ``--gaussians`` the means of Gaussians that are learned from the pictures are told apart, too
 (minutes each). What lies in ``--out`` already is not composed, learned or judged again. ``--docs``
-writes docs/objects.md and its figure.
+writes docs/reference/object-separation-benchmark.md and its figure.
 """
 
 import argparse
@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument("models", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("runs/objects"))
     parser.add_argument("--gaussians", action="store_true", help="learn Gaussians of the pairs")
-    parser.add_argument("--docs", action="store_true", help="write docs/objects.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     composed(asked.models, asked.out)
     shown = segmented(asked.out, list(PAIRS) + list(STACKS), gaussians=False)
@@ -182,7 +182,7 @@ def main() -> None:
         words = PAGE
         for name, text in (tables | {"times": "; ".join(costs)}).items():
             words = words.replace(f"{{{name}}}", text)
-        (DOCS / "objects.md").write_text(words, encoding="utf-8")
+        (DOCS / "reference" / "object-separation-benchmark.md").write_text(words, encoding="utf-8")
 
 
 PAGE = """# Separating objects that touch
@@ -208,7 +208,7 @@ methods:
    a million cells, and points at different connected pieces of the rest are separate. Pieces are
    taken wider by half of a cell's diagonal, so that carving loses no thin leg, or half a pixel, if
    that is more: narrower gaps are none
-   ([decision 146](decisions/0146-apart-is-what-cameras-see-between.md)).
+   ([decision 146](../decisions/0146-apart-is-what-cameras-see-between.md)).
 2. **Features** are normalised and reduced to their first 64 principal components.
 3. **Superpoints**, about 2000: k-means over position, features and normal in which a point can only
    join clusters seeded near it (SLIC).
@@ -239,7 +239,8 @@ result.
 Written by `python benchmarks/objects.py objects/ ycb/ --gaussians --docs`. Pairs are composed
 from public models with `corporeal assemble`; objects side by side are pushed until they touch.
 Points lie on the surface seen in 24 pictures of 256², colours come from the pictures, and features
-are the [descriptor](features.md), which needs no weights. Numbers are the mean IoU of objects after
+are the [descriptor](../explanation/image-features-on-points.md), which needs no weights.
+Numbers are the mean IoU of objects after
 Hungarian matching. "Ours" is given the number of objects; "not counted" estimates it (in brackets).
 Masks are exact, numbered anew in each view. `corporeal evaluate objects SCENES` does the same for
 any settled scenes. All is of 27 November 2026; points on surfaces give the figures of the evening
@@ -247,7 +248,7 @@ before.
 
 {surface}
 
-![Points of the pairs: colours, true instances, found instances](images/objects.png)
+![Points of the pairs: colours, true instances, found instances](../images/objects.png)
 
 Stacks of thin objects, which warn:
 

@@ -55,9 +55,9 @@ HEADS = (
     "held out, thing [dB]", "up off", "size off", "IoU, worst", "one closed piece", "minutes",
     "why not",
 )  # fmt: skip
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[1] / "docs" / "reference"
 TITLES = {"real": "Real photographs", "made": "Made photographs"}
-"""Of the pages, each ``docs/KIND-photographs.md``."""
+"""Of the pages, each at `page_of` its kind."""
 MADE = (
     "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
 )
@@ -212,6 +212,12 @@ def with_more(note: str, more: str) -> str:
     return f"{note.removesuffix('.')}. {more}" if note and more else note or more
 
 
+def page_of(kind: str) -> Path:
+    """Return the page of real or of made photographs."""
+    name = {"real": "real", "made": "rendered"}[kind]
+    return DOCS / f"{name}-photographs-benchmark.md"
+
+
 def write_docs(
     rows: list[dict[str, Any]],
     table: list[tuple[str, ...]],
@@ -237,7 +243,7 @@ def write_docs(
         if row["case"] in ALONE:
             warnings = " ".join(row.get("warnings", [])) or row.get("why", "Nothing.")
             lines += [f"- *{row['set']}* at {row['training']}: {warnings}"]
-    (DOCS / f"{kind}-photographs.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    page_of(kind).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def sets_in(folder: Path, only: Sequence[str], refuse: Callable[[str], NoReturn]) -> list[Path]:

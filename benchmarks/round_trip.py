@@ -71,21 +71,21 @@ FOUND = (
     "- Photographs were taken and learned from once, on 26 November 2026, by code that learns as "
     "today's does. All that follows is of the code of 27 November in five "
     "rows, and masses and motion of *tree-and-ball-in-sand*; its surfaces, and all of "
-    "*lamp-on-couch*, are of the day before, after [119](decisions/"
+    "*lamp-on-couch*, are of the day before, after [119](../decisions/"
     "0119-what-is-soft-bridges-no-hollow.md): not done again for want of time. The rule of "
-    "[125](decisions/0125-what-masks-need-is-not-taken-away.md) gives nothing back to the sand; to "
-    "the lamp, on coarse cells, .9 %. The day before the rows said -9.6, +3.7, -1.7, -.5, +4.8, "
+    "[125](../decisions/0125-what-masks-need-is-not-taken-away.md) gives nothing back to the sand; "
+    "to the lamp, on coarse cells, .9 %. The day before the rows said -9.6, +3.7, -1.7, -.5, +4.8, "
     "-8.6 and -5.5 %. Worse is now the plant, by .4 points (41 g: its surface has 37 cm² less), "
     "and the duck on mud ends farther off, by less than its spread (.6 to .9 %); nearer are the "
     "ball of steel, duck and can, and the ends of vase, ball, can and tree. Before "
-    "[97](decisions/0097-surfaces-where-photographs-agree.md) the same photographs gave -10.2, "
+    "[97](../decisions/0097-surfaces-where-photographs-agree.md) the same photographs gave -10.2, "
     "+6.5, -14.7, -4.6, +15.2, -26.7 and -11.5 %, before "
-    "[101](decisions/0101-what-no-camera-looks-into-is-not-empty.md) -9.0, +3.6, -16.3, -.8, +5.8, "
-    "-25.9 and -11.7 %; rows of 22 November, of older code, said -.2, +6.4, -15.1, -.4, +7.0, "
-    "-13.6 and +2.7 %.",
+    "[101](../decisions/0101-what-no-camera-looks-into-is-not-empty.md) -9.0, +3.6, -16.3, -.8, "
+    "+5.8, -25.9 and -11.7 %; rows of 22 November, of older code, said -.2, +6.4, -15.1, -.4, "
+    "+7.0, -13.6 and +2.7 %.",
     "- Balls of rubber and mud keep their mass within a percent or so; the steel ball, a mirror, "
     "lacks 3.6 %, and lacked 11 % before "
-    "[125](decisions/0125-what-masks-need-is-not-taken-away.md). The duck that is to weigh 74 g "
+    "[125](../decisions/0125-what-masks-need-is-not-taken-away.md). The duck that is to weigh 74 g "
     "weighs 80, its beak being solid and large; the can a quarter too little: its tab is not "
     "described, and its wall is what is left.",
     "- Where objects fly, bounce or topple, small differences grow. End positions of the model's "
@@ -99,21 +99,22 @@ FOUND = (
     "the cushions are in no picture, and the border between plywood and foam shows in no colour; "
     "only the description gives it, by height. Its textureless seat is reconstructed only "
     "because some Gaussians begin inside the visual hull ([decision "
-    "15](decisions/0015-a-small-training-tells-where-to-begin.md)). Its plywood is weighed by the "
-    "area of its faces. Its underside and sides are there (2.3 of 2.08 m²); its top, 1.18 m² under "
-    "the seat, which no picture shows, is there since foam bridges no hollow ([119](decisions/"
-    "0119-what-is-soft-bridges-no-hollow.md)): 36.2 of 35.2 kg, 27.2 before. That is nearer than "
+    "15](../decisions/0015-a-small-training-tells-where-to-begin.md)). Its plywood is weighed by "
+    "the area of its faces. Its underside and sides are there (2.3 of 2.08 m²); its top, 1.18 m² "
+    "under the seat, which no picture shows, is there since foam bridges no hollow ([119]("
+    "../decisions/0119-what-is-soft-bridges-no-hollow.md)): 36.2 of 35.2 kg, 27.2 before. That is nearer than "
     "its parts are: the low end of the arms counts as plywood's, too, which has 23.8 of 19.7 kg "
     "(14.9 before), while the foam lacks 2.5 kg.",
     "- The lamp lacks 14 %: its foot, reconstructed with a dent, is too light, and its shade, "
     "uneven inside and merged with bulb and wires, too heavy.",
     "- The heap of sand had seven litres of caverns behind faces of faint Gaussians, which "
-    "[101](decisions/0101-what-no-camera-looks-into-is-not-empty.md) closes: on the floor of "
+    "[101](../decisions/0101-what-no-camera-looks-into-is-not-empty.md) closes: on the floor of "
     "then its surface enclosed 91.6 of 95.6 litres instead of 84.5; it encloses 90.5 now. Its rim "
     "is 2 cm too low, 3 litres, because Gaussians there lie below the face, where the sand is "
     "plain and no picture says otherwise "
-    "([125](decisions/0125-what-masks-need-is-not-taken-away.md)); a pit is left beside the trunk.",
-    "- The plant's soil fills the pot below its surface since [107](decisions/"
+    "([125](../decisions/0125-what-masks-need-is-not-taken-away.md)); a pit is left beside "
+    "the trunk.",
+    "- The plant's soil fills the pot below its surface since [107](../decisions/"
     "0107-soil-does-not-lie-over-air.md): 6.5 of 6.8 litres, where each place inside went with the "
     "nearest face and 4.4 litres behind the pot's wall were air (-26.7 %). Of the .9 kg that it "
     "lacks .5 are the pot's, .2 the trunk's, .2 soil. The model has become heavier since "
@@ -132,7 +133,7 @@ HEADS = (
     "own spread",
     "quality [dB]",
 )
-DOCS = Path(__file__).parents[1] / "docs" / "round-trip.md"
+DOCS = Path(__file__).parents[1] / "docs" / "reference" / "reconstruction-round-trip.md"
 
 
 def settings(detail: Detail, seed: int = 0) -> Settings:
@@ -408,7 +409,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("runs/round-trip"))
     parser.add_argument("--detail", default="draft")
     parser.add_argument("--training", default="normal")
-    parser.add_argument("--docs", action="store_true", help="write docs/round-trip.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     rows = []
     for source in asked.scenes:

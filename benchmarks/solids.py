@@ -8,7 +8,7 @@ pictures. Gaussians are learned from pictures and masks of things (kept in ``--o
 by the nearest model, so that only the making of solids is judged. Scenes behind ``--clad`` are not
 learned: flat Gaussians lie on the models' own surfaces, as a perfect training would put them.
 Inside is where the generalised winding number says so, of the solid and of the model. Time is the
-processor's, divided by two. ``--docs`` writes docs/solids.md.
+processor's, divided by two. ``--docs`` writes docs/reference/surface-reconstruction-benchmark.md.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface, build_closed_surfaces
 
-PAGE = Path(__file__).parents[1] / "docs" / "solids.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "surface-reconstruction-benchmark.md"
 CORES = 2
 PLACES = 400_000
 """At which inside and outside are compared."""
@@ -152,7 +152,7 @@ def main() -> None:
     parser.add_argument("--clad", nargs="*", type=Path, default=[])
     parser.add_argument("--preset", default="draft", choices=["draft", "normal"])
     parser.add_argument("--out", type=Path, default=Path("runs/solids"))
-    parser.add_argument("--docs", action="store_true", help="write docs/solids.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     rows = [*TABLE]
     jobs = [(f, asked.preset) for f in asked.scenes] + [(f, None) for f in asked.clad]

@@ -10,7 +10,7 @@ it takes on two cores of this machine, however busy it is, were all work shared 
 the clock stand beside it. Deep, near: share of the pixels on things where what is seen lies farther
 behind or before the model than 2 % of the radius of what the cameras look at. What lies in
 ``--out`` already is not learned again. ``--docs`` writes
-docs/splats.md.
+docs/reference/gaussian-training-benchmark.md.
 """
 
 import argparse
@@ -41,7 +41,7 @@ from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESETS, TrainConfig
 
-PAGE = Path(__file__).parents[1] / "docs" / "splats.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "gaussian-training-benchmark.md"
 CORES = 2
 OFF = 0.02
 """What is seen is deep or near from here on, in radii of what the cameras look at."""
@@ -164,7 +164,7 @@ def main() -> None:
         "--presets", nargs="+", default=list(TRAINING_PRESETS), choices=list(TRAINING_PRESETS)
     )
     parser.add_argument("--sources", nargs="+", default=["masks"], choices=["masks", "pictures"])
-    parser.add_argument("--docs", action="store_true", help="write docs/splats.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     raster, rows = kept(asked.out, "raster", drawn), []
     for preset in asked.presets:

@@ -1,4 +1,4 @@
-"""docs/benchmarks.md and its figures, made from what was measured."""
+"""docs/reference/substep-benchmark.md and its figures, made from what was measured."""
 
 import os
 import platform
@@ -107,7 +107,7 @@ def machine() -> str:
 
 
 def write(results: list[Result], where: str, command: str, docs: Path) -> None:
-    """Write docs/benchmarks.md and its figures."""
+    """Write docs/reference/substep-benchmark.md and its figures."""
     images = docs / "images"
     images.mkdir(parents=True, exist_ok=True)
     figures = {
@@ -121,7 +121,7 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
         draw(axes, results)
         figure.savefig(images / f"benchmarks-{name}.png", dpi=110)
         plt.close(figure)
-        shown.append(f"![{words}](images/benchmarks-{name}.png)\n")
+        shown.append(f"![{words}](../images/benchmarks-{name}.png)\n")
     text = PAGE.format(
         machine=where,
         load=os.getloadavg()[0],
@@ -131,7 +131,8 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
         upkeep=_upkeep(results),
         rows=_table(HEAD, [result.cells() for result in results]),
     )
-    (docs / "benchmarks.md").write_text(text, encoding="utf-8")
+    (docs / "reference").mkdir(exist_ok=True)
+    (docs / "reference" / "substep-benchmark.md").write_text(text, encoding="utf-8")
 
 
 PAGE = """# What a substep costs

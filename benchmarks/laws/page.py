@@ -1,4 +1,4 @@
-"""Write docs/validation.md and its plots from what the cases found."""
+"""Write docs/reference/solver-validation.md and its plots from what the cases found."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -121,7 +121,7 @@ def write(
     for plot, errors in plots:
         name = f"validation-{plot.case}.png"
         draw(plot, errors, images / name)
-        pictures += [f"![Error over cells: {plot.title}](images/{name})", "", plot.words, ""]
+        pictures += [f"![Error over cells: {plot.title}](../images/{name})", "", plot.words, ""]
     met, total = tally
     text = [
         "# Validation",
@@ -151,4 +151,4 @@ def write(
         *settings(found),
         "",
     ]
-    (docs / "validation.md").write_text("\n".join(text))
+    (docs / "reference" / "solver-validation.md").write_text("\n".join(text))

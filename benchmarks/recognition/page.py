@@ -58,12 +58,13 @@ and the fourth 59 %, 1 %. The word "cheese" was taken out again when it was seen
 fourth. When carpet became a material of its own, the carpet of the third set, listed as cotton
 whose other name it had been, may be either: with the list as it was, 66 % right, 6 % wrong, and
 margins order .68 over all sets. Before word order was put right and words of public lists came in
-([decision 74](decisions/0074-the-thing-of-a-name-in-any-order.md)) the third set gave 67 % right,
-5 % wrong and the fourth 60 %, 1 %; the label of a champagne bottle, glass now, is among the wrong.
+([decision 74](../decisions/0074-the-thing-of-a-name-in-any-order.md)) the third set gave 67 %
+right, 5 % wrong and the fourth 60 %, 1 %; the label of a champagne bottle, glass now, is
+among the wrong.
 With the classes that a vocabulary of others lacked (BEHAVIOR-1K,
-[decision 120](decisions/0120-names-by-others.md)) the fourth rose from 69 % to what it is; a word
-of these, chocolate, was seen to be wrong in it twice and counts only by itself since. Of 77 names
-of that vocabulary that were held back 52 are known now (43 before), none of them wrongly.
+[decision 120](../decisions/0120-names-by-others.md)) the fourth rose from 69 % to what it is; a
+word of these, chocolate, was seen to be wrong in it twice and counts only by itself since. Of 77
+names of that vocabulary that were held back 52 are known now (43 before), none of them wrongly.
 
 ## Masses by name
 
@@ -71,13 +72,14 @@ of that vocabulary that were held back 52 are known now (43 before), none of the
 materials, implausible masses (beyond 2.5 times those in life), warnings and false alarms. Its
 lists were written with what the things may be made of and weigh before any was tried; most masses
 are common knowledge or reckoned from sides, walls and densities. Every change of a rule, before and
-after: [decision 68](decisions/0068-every-known-name-is-checked.md). Of 166 names 114 were right, 9
-wrong, 43 unknown at first sight, 5 known ones implausible without a word, 7 falsely doubted; of 60
-listed after these had been mended 36, 5, 19, 5 and 3 at first sight. Of 180 more, as they stand in
-data sets, shops and eight other languages, 121 were right, 9 wrong, 50 unknown, 9 implausible
-without a word and 5 falsely doubted at first sight; 60 of them are only scored, and of these
-41, 1, 18, 3 and 1 now (39, 1, 20, 3 and 1 before the other 120 were mended). So expect of names
-that nobody tried that two in three are known, and a twentieth of all implausible without a warning.
+after: [decision 68](../decisions/0068-every-known-name-is-checked.md). Of 166 names 114 were
+right, 9 wrong, 43 unknown at first sight, 5 known ones implausible without a word, 7 falsely
+doubted; of 60 listed after these had been mended 36, 5, 19, 5 and 3 at first sight. Of 180 more,
+as they stand in data sets, shops and eight other languages, 121 were right, 9 wrong, 50 unknown, 9
+implausible without a word and 5 falsely doubted at first sight; 60 of them are only scored, and of
+these 41, 1, 18, 3 and 1 now (39, 1, 20, 3 and 1 before the other 120 were mended). So expect of
+names that nobody tried that two in three are known, and a twentieth of all implausible without a
+warning.
 
 On 26 November fifteen more were written down (`names_states.toml`) and tried: 10 right, 4 wrong, 1
 unknown, 1 implausible without a word. Two rules of language came of these and of what is missed of

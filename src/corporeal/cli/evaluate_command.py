@@ -74,7 +74,9 @@ def evaluate_mass() -> None:
 
     first = ("truth", "vlm", "anonymous", "split", "json", "figure")
     asked = parse(Mass, "evaluate mass", evaluate_mass.__doc__, words=2, first=first)
-    objects = measured_masses.objects_to_weigh(_folder(asked.folder, "mass"), asked.truth, asked.split)
+    objects = measured_masses.objects_to_weigh(
+        _folder(asked.folder, "mass"), asked.truth, asked.split
+    )
     with progress_bars() as tell:
         done = tell("evaluate")
         found = mass_evaluation.predict_masses(
