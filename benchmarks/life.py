@@ -223,7 +223,7 @@ def contradicted(found: Sequence[Result]) -> Iterator[str]:
             f"These measured the same and contradict each other: {names}. No value is within "
             f"{LEEWAY} of all; {0.5 * (low + high):.3f} would be off by {0.5 * (low - high):.3f}. "
             "They are counted as all others are "
-            "([decision 109](../decisions/0109-rows-that-contradict-and-thin-ends.md))."
+            "([contact decision](../decisions/contact-rigid-faces.md))."
         )
 
 

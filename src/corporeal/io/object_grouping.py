@@ -1,7 +1,7 @@
 """Grouping of a file's pieces into objects.
 
 Pieces that touch are one object, as the legs and the seat of a chair are, unless their names say
-that each is an object by itself, as a cup and its saucer are. Why so: decision 62.
+that each is an object by itself, as a cup and its saucer are. Why so: decision objects-counting.
 """
 
 import re

@@ -363,7 +363,7 @@ def normal_cache_steps(travel: float) -> int:
     """For how many steps what is widest is kept, where something moves so far in a step [cells].
 
     Candidates themselves follow their fields in every step, and contacts that are new are looked
-    at at once: what may be out of date is only which of three is taken (decision 52).
+    at at once: what may be out of date is only which of three is taken (decision contact-normal-cache).
     """
     count = NORMAL_CACHE_STEPS
     while count > 1 and count * travel > NORMAL_CACHE_TRAVEL_DX:

@@ -6,7 +6,7 @@ from corporeal.reconstruction.masks.region_growing import SETTLED_AGREEMENT, Reg
 MAX_COLOUR_OVERLAP = 0.2
 """Overlap of the colours of objects and of what is around them, of evened pictures, above which the
 outline is unreliable. It parts little: right masks have up to .23, .42 on a print before
-the floor is asked, wrong ones .02 to .64 (decision 139).
+the floor is asked, wrong ones .02 to .64 (decision masks-acceptance).
 """
 MIN_HULL_AGREEMENT = 0.7
 """Masks and the silhouettes of their hull must agree by so much; those of the last two rounds by
