@@ -72,7 +72,7 @@ def load_mesh(
     path: Path,
     objects: ObjectGrouping = "one",
     up: UpAxis | None = None,
-    max_seconds: float = MAX_MESH_READ_S,
+    max_seconds: int = MAX_MESH_READ_S,
 ) -> MeshFile:
     """Read one file.
 
@@ -124,7 +124,7 @@ def mesh_companions(path: Path) -> list[Path]:
 
 
 def _run_reader_process(
-    path: Path, folder: Path, words: Sequence[str], max_seconds: float = MAX_MESH_READ_S
+    path: Path, folder: Path, words: Sequence[str], max_seconds: int = MAX_MESH_READ_S
 ) -> None:
     """Let a child process read a file into a folder.
 
