@@ -256,9 +256,9 @@ TAIL = (
     "with boards of 16 mm and pixels of 8 mm, came out a quarter too heavy on cells of 12 mm and "
     "a seventh too heavy on cells of 7 mm.",
     "",
-    "## Films",
+    "## Videos",
     "",
-    "`corporeal film` draws a scene that was made of Gaussians from them: each is bound at the "
+    "`corporeal video` draws a scene that was made of Gaussians from them: each is bound at the "
     "start to the nearest particles of its own object, with the same skinning weights as mesh "
     "vertices. Its covariance becomes F Σ F^T, and its spherical harmonics turn with the "
     "rotation of F. Gaussians of floor and background stand still. Behind them are the usual "

@@ -66,15 +66,17 @@ def colmap(folder, views, matrix):
     return folder
 
 
-def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
+def test_photographs_become_a_video_of_things_that_fall(typed, views, tmp_path):
     write_views(tmp_path / "photos", views)
-    code, said = typed("run", "photos", "--things", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL)
+    code, said = typed(
+        "run", "photos", "--object-names", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL
+    )
     assert code == 0, said.err
     run = tmp_path / "runs" / "photos"
     report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())
     assert "Gaussians were learned from 20 photographs" in report
     assert "discs were laid along the closed surface" in report
-    assert (run / "film.mp4").stat().st_size > 1000
+    assert (run / "video.mp4").stat().st_size > 1000
     assert (run / "0-reconstruct" / "gaussians.ply").stat().st_size > 10_000
     moved = audit["outcome"]["objects"]
     assert list(moved) == list(NAMES)
@@ -84,14 +86,14 @@ def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
     assert "reconstruct" in said.out
     code, said = typed("reconstruct", run, "--count", "1")
     assert code == 2
-    assert "--things names 2" in said.err
+    assert "--object-names names 2" in said.err
 
 
 def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
     turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
     moved = similarity_matrix(turn, 3.7, (5.0, -2.0, 1.0))
     colmap(tmp_path / "scan", views, moved)
-    words = ("--things", *NAMES, "--extent", "crate=0.3", *BRIEF)
+    words = ("--object-names", *NAMES, "--extent", "crate=0.3", *BRIEF)
     code, said = typed("run", "scan", *words, *SMALL)
     assert code == 0, said.err
     found = store.load(tmp_path / "runs/scan/0-reconstruct/data.npz")
@@ -118,7 +120,7 @@ def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch)
         return step(training, *rest)
 
     monkeypatch.setattr(train_gaussians, "_step", stopping)
-    words = ("run", "photos", "--things", *NAMES, *BRIEF, *SMALL)
+    words = ("run", "photos", "--object-names", *NAMES, *BRIEF, *SMALL)
     for _ in range(2):
         code, _ = typed(*words)
         assert code == 130

@@ -44,7 +44,7 @@ def splat(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(splat):
-    config = replace(COARSE, things=("crate", "blue pillar"))
+    config = replace(COARSE, object_names=("crate", "blue pillar"))
     return reconstruct(splat, config, ("crate=0.4",))
 
 
@@ -123,8 +123,8 @@ def test_gaussians_follow_their_objects_beside_others(made):
     np.testing.assert_allclose(shift[:, 2], found.object_of_gaussian == 1, atol=1e-5)
     results = StageResults(reconstruct=found, assemble=more)
     assert results.reconstruction is not None
-    assert results.filmed is None, "the ball has no Gaussians"
-    assert StageResults(reconstruct=found, assemble=scene).filmed is not None
+    assert results.rendered_reconstruction is None, "the ball has no Gaussians"
+    assert StageResults(reconstruct=found, assemble=scene).rendered_reconstruction is not None
 
 
 def test_the_report_is_told_how_it_came_about(made):
@@ -186,7 +186,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     monkeypatch.setattr(point_features, "connect_encoder", lambda spec, folder: Colours())
     small = radiance_field.FieldPreset(100, 160, 2048)
     monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", small)
-    config = replace(COARSE, things=("a", "b"), training="draft", lifting=lifting)
+    config = replace(COARSE, object_names=("a", "b"), training="draft", lifting=lifting)
     with pytest.raises(Enough) as caught:
         reconstruct(splat, config)
     (cloud,) = caught.value.args
@@ -206,13 +206,21 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     [
         ({"count": 0}, (), "--count is 0"),
         ({"semantic": "bert"}, (), "Unknown picture encoder 'bert'"),
-        ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
+        (
+            {"count": 3, "object_names": ("crate",)},
+            (),
+            "--count is 3, but --object-names names 1 objects",
+        ),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
         ({"floor_at": float("nan")}, (), "--floor-at is nan"),
         ({"training_seed": -1}, (), "--training-seed is -1"),
         ({"apart": "masks"}, (), "is a splat, which has no instance masks"),
-        ({"things": ("crate", "pillar")}, ("box=1",), "no object 'box'. Choose one of: crate, pil"),
-        ({}, ("box=1",), "no object 'box'. Name it with --things"),
+        (
+            {"object_names": ("crate", "pillar")},
+            ("box=1",),
+            "no object 'box'. Choose one of: crate, pil",
+        ),
+        ({}, ("box=1",), "no object 'box'. Name it with --object-names"),
         (
             {"known_distance": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)},
             (),

@@ -224,7 +224,7 @@ def test_what_is_lossy_sinks_as_far_as_what_is_not(tmp_path):
     assert sunk[0.6] == pytest.approx(sunk[0.0], rel=0.05)
 
 
-def test_equilibrium_is_sought_without_loss_and_the_film_has_it():
+def test_equilibrium_is_sought_without_loss_and_the_video_has_it():
     scene, particles, field = scene_of((0.0,), (replace(FOAM, loss=0.6),))
     problem = build_model(scene, particles, field).problem
     lost = []

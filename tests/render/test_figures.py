@@ -150,8 +150,8 @@ def test_numbers_are_written_as_people_read_them():
     assert si_prefix_text(0.37, "") == "0.37"
 
 
-def test_a_strip_shows_the_film_from_first_to_last_frame(tmp_path):
-    path = tmp_path / "film.mp4"
+def test_a_strip_shows_the_video_from_first_to_last_frame(tmp_path):
+    path = tmp_path / "video.mp4"
     with video_file.open_video(path, 10, (64, 48)) as reel:
         for k in range(11):
             reel.add(np.full((48, 64, 3), 20 * k, np.uint8))
@@ -163,13 +163,13 @@ def test_a_strip_shows_the_film_from_first_to_last_frame(tmp_path):
     assert (picture[24, 64:70] == 255).all(), "a white gap"
 
 
-def test_a_short_film_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_path):
-    path = tmp_path / "film.mp4"
+def test_a_short_video_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_path):
+    path = tmp_path / "video.mp4"
     with video_file.open_video(path, 10, (64, 48)) as reel:
         reel.add(np.zeros((48, 64, 3), np.uint8))
     write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png", width=64)
     assert Image.open(tmp_path / "strip.png").size[0] == 64
-    path.write_bytes(b"not a film")
+    path.write_bytes(b"not a video")
     with pytest.raises(UserError, match="Make it again"):
         write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png")
 

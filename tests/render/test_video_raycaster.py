@@ -37,12 +37,12 @@ def stage(name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_film_shows_what_an_even_cast_shows(name):
+def test_a_video_shows_what_an_even_cast_shows(name):
     """The measure is a picture of 3 × 3 samples; the even cast of the same word is as far off."""
     exact = render_image(stage(name), front(), "fine", 1).astype(float)
     even = render_image(stage(name), front(), "draft", 1).astype(float)
-    film = VideoRaycaster().picture(stage(name), front(), "draft", 1).astype(float)
-    off, usual = (np.sqrt(((x - exact) ** 2).mean()) for x in (film, even))
+    video = VideoRaycaster().picture(stage(name), front(), "draft", 1).astype(float)
+    off, usual = (np.sqrt(((x - exact) ** 2).mean()) for x in (video, even))
     assert off <= 1.1 * usual + 0.1
 
 

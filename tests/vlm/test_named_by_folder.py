@@ -62,7 +62,7 @@ def test_a_lone_thing_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
     (said,) = [w for w in found.warnings if "banana" in w]
     assert "19 cm" in said
     assert "--extent banana=METRES" in said
-    assert "--things" in said
+    assert "--object-names" in said
     assert not any("0.5 m" in w for w in found.warnings)
 
 
@@ -76,7 +76,7 @@ def test_a_size_that_somebody_states_is_the_size_whatever_the_name_says(tmp_path
 
 
 def test_what_somebody_names_is_not_called_as_the_folder(tmp_path):
-    came = made(tmp_path, "banana", things=("crate",))
+    came = made(tmp_path, "banana", object_names=("crate",))
     assert [o.name for o in came.scene.objects] == ["crate"]
     assert not any("banana" in w for w in came.found.warnings)
 
@@ -106,10 +106,12 @@ def test_sizes_of_what_nobody_named_can_be_stated():
 
 
 def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):
-    (said,) = [w for w in made(tmp_path, "one", things=("banana",)).found.warnings if "large" in w]
+    (said,) = [
+        w for w in made(tmp_path, "one", object_names=("banana",)).found.warnings if "large" in w
+    ]
     assert said == (
-        "Nobody said how large it is: made as large as a banana usually is, 19 cm. "
+        "How large it is was not stated: assumed as large as a banana usually is, 19 cm. "
         "State a size with --extent banana=METRES."
     )
-    stated = made(tmp_path, "two", ("banana=0.2",), things=("banana",)).found.warnings
+    stated = made(tmp_path, "two", ("banana=0.2",), object_names=("banana",)).found.warnings
     assert not any("how large" in w for w in stated)

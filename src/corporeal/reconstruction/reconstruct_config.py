@@ -1,4 +1,4 @@
-"""How photographs or a splat are made objects, and which settings cannot be right."""
+"""Settings of the stage reconstruct, with validation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,10 +55,10 @@ DEFAULT_RESOLUTION = ReconstructionResolution()
 class ReconstructConfig:
     """Reconstruction from photographs or a splat; of a model only ``up`` is used."""
 
-    things: tuple[str, ...] = ()
+    object_names: tuple[str, ...] = ()
     """Names of the objects, the largest first, such as "armchair" "soda can"."""
     count: int | None = None
-    """Number of objects; by default as many as --things names, else it is estimated."""
+    """Number of objects; by default as many as --object-names names, else it is estimated."""
     apart: SegmentationRule = "auto"
     """What objects are segmented by; auto: instance masks where there are any, else appearance
     features and concavity (look)."""
@@ -80,7 +80,7 @@ class ReconstructConfig:
     training: Literal["preview", "draft", "normal"] = "normal"
     """Length of training on photographs: seconds, about one minute, or four, on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
-    """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
+    """Rasteriser for training: numba on the processor, or gsplat on a CUDA GPU."""
     semantic: EncoderSpec = "descriptor"
     """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
     needs no weights."""
@@ -119,14 +119,14 @@ def validate_reconstruct(
     check_range("--count", config.count, 1, 1000)
     check_range("--training-seed", config.training_seed, 0, 2**63)
     check_range("--floor-at", config.floor_at, -MAX_COORDINATE_UNITS, MAX_COORDINATE_UNITS)
-    if config.count and config.things and config.count != len(config.things):
+    if config.count and config.object_names and config.count != len(config.object_names):
         raise UserError(
-            f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
-            "--count out, or name all of them."
+            f"--count is {config.count}, but --object-names names {len(config.object_names)} objects. Omit "
+            "--count, or name all of them."
         )
-    if config.things or not asked:
+    if config.object_names or not asked:
         check_stated_extents(
-            extents, [object_of_usual_size(name) for name in config.things], source
+            extents, [object_of_usual_size(name) for name in config.object_names], source
         )
     for spec in (config.semantic, config.structural):
         connect_encoder(spec)  # who is to look must be there before anything is learned
@@ -144,8 +144,8 @@ def _check_masks(config: ReconstructConfig) -> None:
                 f"There is no folder {config.masks} for --masks. Name a folder of masks, or "
                 f"{', '.join(f'{kind}:FOLDER' for kind in MASKERS)}."
             )
-    elif connect_mask_model(config.masks).needs_words and not config.things:
-        raise UserError("These masks are found by words: name the objects with --things.")
+    elif connect_mask_model(config.masks).needs_words and not config.object_names:
+        raise UserError("These masks are found by words: name the objects with --object-names.")
 
 
 def metric_scale(config: ReconstructConfig) -> MetricScale | None:

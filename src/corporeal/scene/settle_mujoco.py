@@ -1,4 +1,4 @@
-"""Let bodies fall and come to rest in MuJoCo.
+"""Settling of bodies in MuJoCo.
 
 The floor meets the exact convex hull of each mesh; bodies meet each other with their convex
 pieces, every two bodies with the friction that is certain to hold them. All is computed for a scene
@@ -159,7 +159,7 @@ class MujocoScene:
             full = True
         if full:
             raise UserError(
-                f"Things touch in more places ({self.data.ncon}) than MuJoCo has room for. Take "
+                f"Objects touch in more places ({self.data.ncon}) than MuJoCo has room for. Take "
                 "fewer or simpler objects, or another arrangement."
             )
 
@@ -325,7 +325,7 @@ def _add_contact_pairs(
 def _give_inertia(
     node: "mujoco.MjsBody", inertial: MassProperties, unit: float, lightest: float
 ) -> None:
-    """Say how a body's mass lies, in units of length and of the lightest mass."""
+    """Return how a body's mass lies, in units of length and of the lightest mass."""
     tensor = inertial.inertia / (lightest * unit**2)
     # The engine refuses what is thinner than any body can be.
     tensor = tensor + ADDED_INERTIA_FRACTION * np.trace(tensor) * np.eye(3)

@@ -1,4 +1,4 @@
-"""Checkpoints: what a simulation that was cut off goes on from, exactly as if nothing had happened.
+"""Checkpoints, from which an interrupted simulation resumes bit for bit.
 
 ``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the
 problem it belongs to; ``checkpoint-before.npz`` is the one before it, for when the last cannot be
@@ -19,6 +19,10 @@ from corporeal.core.errors import BadFileError
 from corporeal.simulation.trajectory_files import frame_path, read_arrays, write_arrays
 
 CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE = "checkpoint.npz", "checkpoint-before.npz"
+MIN_INTERVAL_S = 10.0
+"""Minimum computing time between two checkpoints [s]."""
+MAX_WRITE_TIME_FRACTION = 0.05
+"""Maximum share of the time spent on writing them."""
 STATE_PREFIX = "engine."
 
 log = logging.getLogger(__name__)
@@ -26,12 +30,12 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class CheckpointState:
-    """What a checkpoint holds."""
+    """Content of a checkpoint."""
 
     done: int = 0
     """Frames before it."""
     state: dict[str, np.ndarray] = field(default_factory=dict)
-    """As the engine saved it; empty where nothing is done."""
+    """State of the engine; empty at the start."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +57,11 @@ class Checkpoints:
     def __init__(
         self, folder: Path, name: str, config: CheckpointConfig = DEFAULT_CHECKPOINTS
     ) -> None:
-        """Look after the checkpoints in a folder.
+        """Manage the checkpoints in a folder.
 
         Args:
             folder: Where they are, beside the frames.
-            name: What is simulated; a checkpoint with another name is never used.
+            name: Fingerprint of the problem; checkpoints with another one are ignored.
             config: How often they are written.
 
         """
@@ -66,7 +70,7 @@ class Checkpoints:
 
     @property
     def due(self) -> bool:
-        """Whether enough was computed since the last one to write another."""
+        """Whether the next checkpoint is due."""
         pause = max(self.config.min_interval_s, self.seconds / self.config.max_write_time_fraction)
         return time.monotonic() - self.written >= pause
 
@@ -84,7 +88,7 @@ class Checkpoints:
         self.seconds = self.written - start
 
     def newest(self) -> CheckpointState:
-        """Return the newest usable checkpoint; one of nothing where there is none."""
+        """Return the newest usable checkpoint; an empty one if there is none."""
         for path in (self.folder / CHECKPOINT_FILE, self.folder / PREVIOUS_CHECKPOINT_FILE):
             if not path.exists():
                 continue
@@ -120,7 +124,7 @@ class Checkpoints:
 
 
 def fingerprint(*objects: Any) -> str:
-    """Name anything made of dataclasses, containers, arrays and numbers by its content."""
+    """Return a digest of dataclasses, containers, arrays and numbers."""
     total = hashlib.sha256()
     for obj in objects:
         _feed(total, obj)

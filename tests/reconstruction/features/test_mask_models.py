@@ -111,8 +111,8 @@ def test_sam3_finds_what_words_name(sam3):
 
 
 @needs_models()
-def test_checkpoints_for_films_hold_the_same_model(sam2, tmp_path):
-    place = shutil.copytree(sam2, tmp_path / "film")
+def test_checkpoints_for_videos_hold_the_same_model(sam2, tmp_path):
+    place = shutil.copytree(sam2, tmp_path / "video")
     config = json.loads((place / "config.json").read_text()) | {"model_type": "sam2_video"}
     (place / "config.json").write_text(json.dumps(config))
     made = connect_mask_model(f"sam2:{place}").instances(photograph(), (), (24.0, 18.0))[0]
@@ -147,7 +147,7 @@ def test_a_folder_that_is_not_there_is_named_and_nothing_is_fetched(monkeypatch)
         "corporeal.reconstruction.features.mask_models.find_spec", lambda package: True
     )
     for spec in ("sam2:", "sam3:nowhere", "birefnet:facebook/sam2"):
-        with pytest.raises(UserError, match="none are fetched"):
+        with pytest.raises(UserError, match="none are downloaded"):
             connect_mask_model(spec)
     with pytest.raises(UnknownChoiceError, match="sam3"):
         split_model_spec("sam9:folder")
@@ -198,14 +198,14 @@ def test_corrected_masks_are_kept_and_not_asked_for_again(photographs, tmp_path)
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(mask)
     again = learned_masks(photographs, tmp_path / "made", masker, ("duck", "can"))
     assert len(masker.asked) == 5
-    assert "1 of the masks were corrected by hand." in again.said
+    assert "1 of the masks were corrected manually." in again.said
     assert np.asarray(Image.open(mask)).min() == 255
     learned_masks(photographs, tmp_path / "made", masker, ("duck", "other"))
     assert len(masker.asked) == 10, "other words are another question"
 
 
 def test_words_are_asked_for(photographs, tmp_path):
-    with pytest.raises(UserError, match="--things"):
+    with pytest.raises(UserError, match="--object-names"):
         learned_masks(photographs, tmp_path / "made", Found(), ())
 
 

@@ -316,5 +316,5 @@ def test_the_quality_of_the_truth_is_that_of_rounding():
     truth, cameras = blobs(), around(6)
     views, masks = pictured(truth, cameras, (0.5, 0.5, 0.5))
     same = heldout_quality(truth, views, range(6), background=(0.5, 0.5, 0.5))
-    assert same.psnr > 55 and same.ssim > 0.999 and same.psnr_things is None
-    assert heldout_quality(truth, views, [1, 3], masks, (0.5, 0.5, 0.5)).psnr_things > 50
+    assert same.psnr > 55 and same.ssim > 0.999 and same.psnr_on_objects is None
+    assert heldout_quality(truth, views, [1, 3], masks, (0.5, 0.5, 0.5)).psnr_on_objects > 50

@@ -43,7 +43,7 @@ def test_things_are_learned_from_pictures_and_masks(scene):
     told = []
     out = train_gaussians(views, masks, config=SMALL, progress=lambda f, w: told.append((f, w)))
     assert out.quality.views == (4, 12)
-    assert out.quality.psnr > 24 and out.quality.psnr_things > 22
+    assert out.quality.psnr > 24 and out.quality.psnr_on_objects > 22
     fractions = [f for f, _ in told]
     assert len(told) == 160 and fractions == sorted(fractions) and fractions[-1] == 1
     assert "dB" in told[80][1] and "s left" in told[80][1]
@@ -82,12 +82,12 @@ def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
     """
     views, masks = plain(BENCH)
     on_it = replace(FINE, begin="hull")
-    opened = train_gaussians(views, masks, config=on_it).quality.psnr_things
+    opened = train_gaussians(views, masks, config=on_it).quality.psnr_on_objects
     monkeypatch.setattr(
         carved_volume, "hull_cells_seen_past", lambda v, m, closed, p: closed.inside & False
     )
-    made = train_gaussians(views, masks, config=FINE).quality.psnr_things
-    control = train_gaussians(views, masks, config=on_it).quality.psnr_things
+    made = train_gaussians(views, masks, config=FINE).quality.psnr_on_objects
+    control = train_gaussians(views, masks, config=on_it).quality.psnr_on_objects
     assert made > control + 2 and made > 25
     assert opened > control + 2 and opened > 25
 
@@ -127,7 +127,7 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
 def test_a_scene_without_masks_starts_from_a_sweep(scene):
     views, _ = scene
     out = train_gaussians(views, config=SMALL)
-    assert out.quality.psnr > 20 and out.quality.psnr_things is None
+    assert out.quality.psnr > 20 and out.quality.psnr_on_objects is None
 
 
 def test_given_points_are_where_it_starts(scene):

@@ -35,6 +35,18 @@ SOG_CONVERT_ADVICE = "Save it again as SOG version 2, or as PLY."
 FileLoader = Callable[[str], bytes]
 
 
+def read_sog(path: Path, data: memoryview) -> Gaussians:
+    """Return the Gaussians of a bundle, or of a ``meta.json`` with its pictures, unchecked.
+
+    Raises:
+        BadFileError: It is broken, of another version, or lacks a file.
+
+    """
+    if data[:4] == ZIP_SIGNATURE:
+        return read_sog_zip(path, data)
+    return _SogReader(path, lambda name: read_beside(path.parent, name, MAX_SOG_FILE_BYTES)).read()
+
+
 def read_sog_zip(
     path: Path, data: memoryview, max_file_bytes: int = MAX_SOG_FILE_BYTES
 ) -> Gaussians:
@@ -68,16 +80,6 @@ def read_sog_zip(
 
     with archive:
         return _SogReader(path, source).read()
-
-
-def read_sog_folder(path: Path) -> Gaussians:
-    """Return the Gaussians of a ``meta.json`` with its pictures beside it, unchecked.
-
-    Raises:
-        BadFileError: It is broken, of another version, or lacks a file.
-
-    """
-    return _SogReader(path, lambda name: read_beside(path.parent, name, MAX_SOG_FILE_BYTES)).read()
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""SAM 3 (Carion et al. 2025): all objects that a word names. Under the SAM License."""
+"""SAM 3 (Carion et al. 2025): segmentation of all objects named by a text. Under the SAM License."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -17,7 +17,7 @@ from corporeal.reconstruction.features.model_weights import picture_statistics, 
 from corporeal.reconstruction.features.vit_pictures import enlarge_logits, prepare_picture
 
 SAM3_KINDS = ("sam3", "sam3_video")
-"""What its checkpoints call themselves: those for films hold the same detector."""
+"""What its checkpoints call themselves: those for videos hold the same detector."""
 MIN_SCORE = 0.3
 """Score from which on an answer counts, as its authors have it."""
 

@@ -1,4 +1,4 @@
-"""Masks of objects on a floor, where none are given, from Gaussians of whole photographs.
+"""Masks of objects on a floor from Gaussians of whole photographs.
 
 Where objects are decides, not how they look: what lies in the floor's plane is floor, whatever its
 colour. So shadows are none of the objects, and objects of the floor's own colour are.
@@ -95,7 +95,7 @@ def masks_above_floor(
 def _connected_with_many(
     gaussians: Gaussians, which: np.ndarray, cell: float
 ) -> Bool[np.ndarray, " M"]:
-    """Tell which of the chosen Gaussians hang together with many others."""
+    """Return which of the chosen Gaussians hang together with many others."""
     turn = Rotation.from_quat(gaussians.rotation[which], scalar_first=True).as_matrix()
     axes = GAUSSIAN_EXTENT_SIGMAS * (turn * gaussians.scale[which, None]).transpose(0, 2, 1)
     ends = np.concatenate([axes, -axes], axis=1)

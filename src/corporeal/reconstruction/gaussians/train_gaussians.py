@@ -1,4 +1,4 @@
-"""Gaussians from posed pictures.
+"""Training of Gaussians on posed pictures.
 
 Adam on the loss of ``image_loss``, one view a step, before random backgrounds: where there are
 masks, nothing beside the objects is drawn, and without, no place is left empty. The first steps
@@ -224,8 +224,8 @@ def _trial_gain(schedule: TrainingSchedule, progress: Progress) -> float:
     inside, hull_alone = (train_gaussians(views, masks, lines, c).quality for c in tries)
     if inside is None or hull_alone is None:
         return np.nan  # too few views to tell
-    assert inside.psnr_things is not None and hull_alone.psnr_things is not None
-    return inside.psnr_things - hull_alone.psnr_things
+    assert inside.psnr_on_objects is not None and hull_alone.psnr_on_objects is not None
+    return inside.psnr_on_objects - hull_alone.psnr_on_objects
 
 
 def _learn(
@@ -317,7 +317,7 @@ def _limits_and_haze(
 
 
 def _in_empty_space(theta: ParameterMatrix, schedule: TrainingSchedule) -> Bool[np.ndarray, " N"]:
-    """Tell which Gaussians are where lines of sight pass."""
+    """Return which Gaussians are where lines of sight pass."""
     if schedule.outlines is None:
         return np.zeros(len(theta), np.bool_)
     return schedule.outlines.emptied(theta[:, PARAM_MEAN:PARAM_ROTATION])

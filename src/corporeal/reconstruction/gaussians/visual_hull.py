@@ -54,7 +54,7 @@ class CarvedVolume:
     """Which of its cells lines of sight pass through."""
 
     def emptied(self, places: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Tell which places are where lines of sight say that nothing is."""
+        """Return which places are where lines of sight say that nothing is."""
         if not self.empty.any():
             return np.zeros(len(places), np.bool_)
         cell = np.round((places - self.hull.cells[0, 0, 0]) / self.hull.side)

@@ -1,7 +1,7 @@
-"""Pieces of what stands in space that cameras see to be empty.
+"""Separation of pieces by observed free space.
 
 Means of Gaussians are poor witnesses of gaps: a plain face or neck has few, far apart. Cameras see
-that it is there, and see through between things that are apart. So space is carved by what they
+that it is there, and see through between objects that are apart. So space is carved by what they
 see, as for closed surfaces, and what lies about the same connected piece of the rest goes together.
 
 A piece is taken as wide as the grid can lose a line, so that thin legs and necks, of which carving
