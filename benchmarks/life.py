@@ -43,7 +43,7 @@ INSIDE = 0.85
 """Least share of rows inside."""
 AT_FIRST = 20
 """So many of the blind rows were in their range ± ``LEEWAY`` when they were tried first, at draft
-(decisions 54, 65, 72, 77, 85 and 96)."""
+."""
 UNBOOKED = 0.08
 """Most that may be lost unbooked at draft, over the energy of the blow [-]."""
 
