@@ -1,8 +1,8 @@
 """Meshes of all kinds beside glTF: one shape in each, and files that mean no good."""
 
 import io
+import os
 import struct
-import time
 import zipfile
 
 import numpy as np
@@ -14,8 +14,6 @@ from corporeal.core.errors import BadFileError
 from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.io import registry
 from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
-from corporeal.io.input_files import list_companions
-from corporeal.io.mesh import mesh_loader
 from corporeal.io.mesh.mesh_loader import load_mesh
 from corporeal.io.mesh.raw_mesh import MAX_PIECES
 from corporeal.io.ply_container import kind_of_ply
@@ -378,8 +376,13 @@ def test_a_layer_from_elsewhere_is_refused_before_it_is_opened(tmp_path):
             load_mesh(tmp_path / "own" / "a.usda")
 
 
+def processor_seconds():
+    """Of this process and of its children that have ended: a busy machine counts for nothing."""
+    return sum(os.times()[:4])
+
+
 @pytest.mark.slow
-def test_instances_of_instances_end_at_the_deadline(tmp_path, monkeypatch):
+def test_instances_of_instances_end_at_the_deadline(tmp_path):
     pytest.importorskip("pxr")
     lines = ['#usda 1.0\nclass "c0" {\ndef Mesh "m" {\npoint3f[] points = [(0, 0, 0)]\n}\n}\n']
     for level in range(1, 9):
@@ -389,11 +392,10 @@ def test_instances_of_instances_end_at_the_deadline(tmp_path, monkeypatch):
         )
         lines.append(f'class "c{level}" {{\n{inner}\n}}\n')
     (tmp_path / "a.usda").write_text("".join(lines) + 'def "a" (references = </c8>) {}\n')
-    monkeypatch.setattr(mesh_loader, "MAX_MESH_READ_S", 12)
-    start = time.monotonic()
+    start = processor_seconds()
     with pytest.raises(BadFileError, match="is not read within 12 s"):
-        load_mesh(tmp_path / "a.usda")
-    assert time.monotonic() - start < 20
+        load_mesh(tmp_path / "a.usda", max_seconds=12)
+    assert processor_seconds() - start < 20
 
 
 # ---------------------------------------------------------------- what is broken
@@ -501,10 +503,10 @@ def test_a_hostile_file_ends_in_one_sentence(tmp_path, name):
         pytest.importorskip(package)
     make, said = HOSTILE[name]
     path.write_bytes(make())
-    start = time.monotonic()
+    start = processor_seconds()
     with pytest.raises(BadFileError, match=said) as error:
         load_mesh(path)
-    assert time.monotonic() - start < 30
+    assert processor_seconds() - start < 30
     assert name in str(error.value) and "\n" not in str(error.value)
     assert len(str(error.value)) < len(str(path)) + 250
 

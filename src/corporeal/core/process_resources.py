@@ -1,4 +1,4 @@
-"""What this process may use of the machine that it runs on."""
+"""Resources available to this process."""
 
 import atexit
 import ctypes
@@ -11,7 +11,7 @@ CPU_QUOTA_FILE = Path("/sys/fs/cgroup/cpu.max")
 """Where a container's share of the processor stands, as "microseconds per-period" (Linux)."""
 UNLIMITED_CORES = 1 << 16
 KEPT_FREED_BYTES = 1 << 26
-"""Memory that was freed and stays with the process [bytes]: some pictures of a film."""
+"""Memory that was freed and stays with the process [bytes]: some pictures of a video."""
 GC_THRESHOLD_OBJECTS = 50_000
 """Objects made, less those that ended, after which unused cycles of them are looked for."""
 TRIM_THRESHOLD, MMAP_THRESHOLD, ARENA_MAX = -1, -3, -8

@@ -1,4 +1,4 @@
-"""Choose a backend by name. Each room keeps its own menu; nothing is imported until chosen."""
+"""Lazy registries of backends, chosen by name."""
 
 from collections.abc import Mapping
 from importlib import import_module

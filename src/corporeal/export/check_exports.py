@@ -1,4 +1,4 @@
-"""Open exported files with real readers and measure what they hold.
+"""Checks of exported files with independent readers.
 
 A reader that is not installed is named, and nothing is measured then.
 """
@@ -64,7 +64,7 @@ def check_usd(folder: Path, asked: ExportRequest) -> ReaderFindings:
     context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     complaints: list[str] = []
     stages = sorted(folder.glob("*.usda"))
-    for path in (p for p in stages if p.stem in ("sim", "film")):
+    for path in (p for p in stages if p.stem in ("sim", "video")):
         errors = context.Validate(Usd.Stage.Open(str(path)))
         complaints += [f"{path.name}: {e.GetErrorAsString()}" for e in errors]
     stage = Usd.Stage.Open(str(folder / "sim.usda"))
@@ -157,21 +157,21 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
     if not soft:
         return ()
     names = ", ".join(soft)
-    return (f"Drift is measured without {names}, which can deform: what lies on it falls.",)
+    return (f"Drift is measured without {names}, which can deform: objects on it fall.",)
 
 
 # ---------------------------------------------------------------- motion and data
 
 
 def check_glb(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Open the film as a viewer does, and pose it at every frame."""
-    motion, film = asked.motion, read_animated_glb(folder / "film.glb")
+    """Open the video as a viewer does, and pose it at every frame."""
+    motion, video = asked.motion, read_animated_glb(folder / "video.glb")
     if not motion.moves:
         return ReaderFindings()
     shapes = motion.shapes(asked.scene.solids)
     numbers = [n for s in asked.scene.solids for n in s.surface_numbers]
     wanted = np.concatenate([shapes.of(n)[0] for n in numbers], axis=1)
-    off = [np.linalg.norm(film.vertices(k) - wanted[k], axis=1).max() for k in range(len(wanted))]
+    off = [np.linalg.norm(video.vertices(k) - wanted[k], axis=1).max() for k in range(len(wanted))]
     return ReaderFindings({"vertex_off_m": float(max(off))})
 
 
@@ -193,7 +193,7 @@ def check_alembic(folder: Path, asked: ExportRequest) -> ReaderFindings:
     """Open the archive and compare every surface at the last frame."""
     from alembic3d import Abc, AbcGeom
 
-    top = Abc.IArchive(str(folder / "film.abc")).getTop()
+    top = Abc.IArchive(str(folder / "video.abc")).getTop()
     shapes = asked.motion.shapes(asked.scene.solids)
     last, off = len(asked.motion.time) - 1, [0.0]
     for solid in asked.scene.solids:
@@ -215,5 +215,5 @@ def check_splats(folder: Path, asked: ExportRequest) -> ReaderFindings:
 
 
 def check_without_reader(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Say that there is no reader to ask."""
-    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is no package.",))
+    """State that there is no reader to ask."""
+    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is not a package.",))

@@ -1,4 +1,4 @@
-"""A corpus that was run, for other tools: one data set to learn from, all else scene by scene."""
+"""Export of a corpus: one data set for learning, other targets scene by scene."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -36,7 +36,7 @@ def finished_runs(corpus: Path) -> list[Path]:
     folders = sorted(p.parent for p in (corpus / RUNS_FOLDER).glob(f"*/{RUN_FILE}"))
     found = [f for f in folders if (f / STAGE_FOLDERS["simulate"] / store.META_FILE).exists()]
     if not found:
-        raise UserError(f"{corpus} has no finished run. Go on with: corporeal corpus run {corpus}")
+        raise UserError(f"{corpus} has no finished run. Next: corporeal corpus run {corpus}")
     return found
 
 

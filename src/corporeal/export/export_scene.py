@@ -1,4 +1,4 @@
-"""Export: a run, or a scene before any simulation, into the formats of other tools.
+"""Export of a run, or of a scene before simulation, to other formats.
 
 Every target has a folder of its own that appears whole or not at all; the run is only read.
 """
@@ -38,7 +38,7 @@ ExportProgress = Callable[[float, str], None]
 
 
 def ignore_progress(fraction: float, words: str) -> None:
-    """Tell nobody about progress."""
+    """Ignore progress."""
 
 
 def export_scene(
@@ -58,7 +58,7 @@ def export_scene(
         out: Where the targets' folders and ``export.json`` go; None: SOURCE/export of a run or a
             corpus, NAME-export of a scene called NAME.
         config: The instant, what can deform, tolerances.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Returns:
         What was written, also kept in ``export.json``; of a corpus, of its data set.
@@ -128,7 +128,7 @@ def _export_request(
         return _request_of_scene(prepare_scene(load_scene(path)), config), str(path)
     made = read_run(path)
     if made.fill is None:
-        raise UserError(f"{path} has no matter yet. Go on with: corporeal fill {quote(str(path))}")
+        raise UserError(f"{path} has no particles yet. Next: corporeal fill {quote(str(path))}")
     if made.simulate is None:
         return _request_of_scene(made.prepared, config), str(path)
     return _request_of_run(made.played, config), str(path)

@@ -1,4 +1,4 @@
-"""What a writer is asked for, what it returns, and the menu of writers."""
+"""Interface and registry of writers."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -55,12 +55,13 @@ class ExportConfig:
     """How simulators get what can deform: material points (USD), tetrahedra (USD, MJCF), or not at
     all. MJCF knows no material points and takes tetrahedra for them."""
     tolerance: float = 1e-3
-    """Largest error of a vertex in the GLB film [m]."""
+    """Largest error of a vertex in the GLB video [m]."""
     friction_for: TargetEngine = "physx"
     """Whose rule makes one friction of two where a format has no pairs."""
     hull_vertices: int = 0
-    """Largest number of corners of a convex collider in USD, 64 for PhysX on a card: hulls of more
-    are enclosed in coarser ones. 0: hulls stay as they are, so that what is settled stays put."""
+    """Largest number of corners of a convex collider in USD, 64 for PhysX on a GPU: hulls of more
+    are enclosed in coarser ones. 0: hulls stay as they are, so that what is settled stays put.
+    """
     check: bool = False
     """Open the files again with real readers and measure what they hold."""
 

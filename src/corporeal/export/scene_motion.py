@@ -1,4 +1,4 @@
-"""How a scene moved, and where everything is at the instant that is exported."""
+"""Motion of a scene, and its pose at the exported instant."""
 
 import os
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ SAME_INSTANT_S = 1e-9
 
 @dataclass(frozen=True)
 class SolidPoses:
-    """Where a solid's frame is at every frame of the film; F frames."""
+    """Where a solid's frame is at every frame of the video; F frames."""
 
     position: Float[np.ndarray, "F 3"]
     """[m]"""

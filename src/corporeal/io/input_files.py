@@ -25,7 +25,7 @@ InputKind = Literal["model", "photographs", "splat"]
 
 
 def input_kind(inputs: Sequence[Path]) -> InputKind:
-    """Say what the inputs are, by their names; what is nothing else is taken for a model.
+    """Describe what the inputs are, by their names; what is nothing else is taken for a model.
 
     Raises:
         UserError: Photographs or a splat are named beside something else.
@@ -162,7 +162,7 @@ def images_in_folder(folder: Path) -> list[Path]:
 
 
 def videos_in_folder(folder: Path) -> list[Path]:
-    """Return the films that lie in a folder, by name."""
+    """Return the videos that lie in a folder, by name."""
     return sorted(p for p in folder.iterdir() if _has_suffix(p, VIDEO_SUFFIXES))
 
 
@@ -181,7 +181,7 @@ def photos_in_folder(folder: Path) -> list[Path]:
 
 
 def unread_images_note(photographs: Sequence[Path]) -> list[str]:
-    """Say which pictures of a kind that is not read lie beside photographs, if they are no copies.
+    """Return which pictures of a kind that is not read lie beside photographs, if they are no copies.
 
     Args:
         photographs: Of one folder; what has the name of one but for its suffix is its raw picture.
@@ -226,7 +226,7 @@ def _is_excluded_folder(name: str) -> bool:
 
 
 def unused_nested_images_note(folder: Path, photographs: Sequence[Path]) -> list[str]:
-    """Say which pictures lie in folders below photographs and are not used, if they are no copies.
+    """Return which pictures lie in folders below photographs and are not used, if they are no copies.
 
     Args:
         folder: Of the photographs.
@@ -245,7 +245,7 @@ def unused_nested_images_note(folder: Path, photographs: Sequence[Path]) -> list
     return [
         Note(
             f"{count} in folders below and {left} left out, such as {where}: what shows the same "
-            "thing belongs beside the others.",
+            "object belongs beside the others.",
             NoteKind.LEFT_OUT,
         )
     ]

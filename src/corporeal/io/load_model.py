@@ -81,7 +81,7 @@ def _read_by_suffix(path: Path, objects: ObjectGrouping, frame: MeshFrame) -> Lo
         raise _not_read_error(path)
     if reader.kind == "model":
         if frame != FRAME_AS_STATED:
-            step = "Leave --up and --unit out; --extent gives things another size."
+            step = "Leave --up and --unit out; --extent gives objects another size."
             raise BadFileError(path, f"the axes and the unit of {reader.name} are fixed.", step)
         return load_function(reader.read)(path, objects)
     mesh = load_mesh(path, objects, frame.up)

@@ -1,4 +1,4 @@
-"""Where candidates come from: plain folders, or collections with a layout of their own."""
+"""Sources of candidates: plain folders and known collections."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

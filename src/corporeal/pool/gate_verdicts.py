@@ -1,4 +1,4 @@
-"""What the gate says of a file's content: whatever the file is called and whoever owns it."""
+"""Verdicts of the quality gate on the content of files."""
 
 import hashlib
 import json

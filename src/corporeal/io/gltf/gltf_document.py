@@ -42,7 +42,7 @@ class GltfEntry:
         raise BadFileError(self.document.path, where + what, next_step)
 
     def has(self, key: str) -> bool:
-        """Tell whether the file says anything under the key."""
+        """Return whether the file says anything under the key."""
         return key in self.value
 
     def whole(self, key: str, default: int | None = None, most: int = 2**32) -> int:

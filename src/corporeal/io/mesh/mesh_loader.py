@@ -52,15 +52,21 @@ class MeshFile:
     """Whether the file itself says what its objects are."""
 
 
-def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = None) -> MeshFile:
+def load_mesh(
+    path: Path,
+    objects: ObjectGrouping = "one",
+    up: UpAxis | None = None,
+    max_seconds: float = MAX_MESH_READ_S,
+) -> MeshFile:
     """Read one file.
 
     Args:
         path: Its suffix says what it is; its companions must lie beside it.
-        objects: "one": the whole file is one object. "nodes": every named thing on the first level
+        objects: "one": the whole file is one object. "nodes": every named object on the first level
             that branches is one. "auto": the bodies that the file states (USD); without any, the
             whole file.
         up: Axis of the file that points up; None: the one it states, else its kind's usual one.
+        max_seconds: Reading it may take so long [s].
 
     Raises:
         BadFileError: The file cannot be used.
@@ -72,7 +78,7 @@ def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = N
     if reader is None:
         raise BadFileError(path, "is no mesh that is read.", MESH_EXPORT_ADVICE)
     with tempfile.TemporaryDirectory(prefix="corporeal-") as folder:
-        _run_reader_process(path, Path(folder), reader, reader.read)
+        _run_reader_process(path, Path(folder), reader, reader.read, max_seconds)
         raw = read_raw_mesh(Path(folder) / RAW_MESH_FILE)
     _check_numbers(path, raw)
     taken, of_up = (up, ()) if up else _assumed_up_axis(path, raw, reader.usual_up)
@@ -106,7 +112,9 @@ def companions_in_child(path: Path, reader: Reader) -> list[Path]:
 # ---------------------------------------------------------------- the child
 
 
-def _run_reader_process(path: Path, folder: Path, reader: Reader, function: str) -> None:
+def _run_reader_process(
+    path: Path, folder: Path, reader: Reader, function: str, max_seconds: float = MAX_MESH_READ_S
+) -> None:
     """Let a child process call a function of a reader, and write what it returns into a folder.
 
     Raises:
@@ -124,11 +132,11 @@ def _run_reader_process(path: Path, folder: Path, reader: Reader, function: str)
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             env=os.environ | threads,
-            timeout=MAX_MESH_READ_S,
+            timeout=max_seconds,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        what = f"is not read within {MAX_MESH_READ_S} s."
+        what = f"is not read within {max_seconds} s."
         raise BadFileError(path, what, "Simplify the model, or export it as .glb.") from None
     if (folder / REFUSAL_FILE).exists():
         raise BadFileError(path, store.read_json(folder / REFUSAL_FILE))

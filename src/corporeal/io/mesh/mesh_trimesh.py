@@ -202,7 +202,7 @@ def _comment_says_z_up(text: str) -> bool:
 
 
 def _object_and_material(node: str, mesh: trimesh.Trimesh) -> tuple[str, ...]:
-    """Return the names of an OBJ's thing and surface: trimesh joins them with the material's."""
+    """Return the names of an OBJ's object and surface: trimesh joins them with the material's."""
     material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")
     owner = node.removesuffix(f"_{material}")
     return (node,) if owner in ("", node) else (owner, node)

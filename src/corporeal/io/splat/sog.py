@@ -47,8 +47,12 @@ def read_sog(path: Path, data: memoryview) -> Gaussians:
     return _SogReader(path, lambda name: read_beside(path.parent, name, MAX_SOG_FILE_BYTES)).read()
 
 
-def read_sog_zip(path: Path, data: memoryview) -> Gaussians:
+def read_sog_zip(
+    path: Path, data: memoryview, max_file_bytes: int = MAX_SOG_FILE_BYTES
+) -> Gaussians:
     """Return the Gaussians of a bundle as it says them, unchecked.
+
+    max_file_bytes: of one picture or of the JSON; larger ones are refused.
 
     Raises:
         BadFileError: It is broken, of another version, or lacks a file.
@@ -63,10 +67,10 @@ def read_sog_zip(path: Path, data: memoryview) -> Gaussians:
 
     def source(name: str) -> bytes:
         try:
-            if archive.getinfo(name).file_size > MAX_SOG_FILE_BYTES:
+            if archive.getinfo(name).file_size > max_file_bytes:
                 raise ValueError("it is too large")
             with archive.open(name) as stream:
-                return stream.read(MAX_SOG_FILE_BYTES)
+                return stream.read(max_file_bytes)
         except KeyError:
             raise ValueError("it is not in the archive") from None
         except (zipfile.BadZipFile, OSError, EOFError, RuntimeError) as p:

@@ -16,7 +16,7 @@ from corporeal.reconstruction.features.model_weights import picture_statistics, 
 from corporeal.reconstruction.features.vit_pictures import enlarge_logits, prepare_picture
 
 SAM2_KINDS = ("sam2", "sam2_video")
-"""What its checkpoints call themselves: those for films hold the same model."""
+"""What its checkpoints call themselves: those for videos hold the same model."""
 
 
 class Sam2:

@@ -88,7 +88,7 @@ class GaussianScene:
     masks: Bool[np.ndarray, "V H W"] | None = None
     """Which pixels are on objects; None: unknown."""
     coloured: Bool[np.ndarray, "V H W"] | None = None
-    """Which pixels have the colours of objects, where that is not to be believed alone."""
+    """Which pixels have the colours of objects, where that is unreliable alone."""
     z_up: bool = False
     """The file's kind says so, and that its unit is the metre."""
     usual: Vector | None = None
@@ -100,7 +100,7 @@ class GaussianScene:
     seen: Float[np.ndarray, "N 3"] | None = None
     """Sparse points on all that the photographs show, the floor too; None: the file has none."""
     doubts: tuple[str, ...] = ()
-    """Where shapes are not to be believed, in sentences."""
+    """Where shapes are unreliable, in sentences."""
     quality: HeldOutQuality | None = None
     """How well pictures of the Gaussians agree with photographs held back; None: none was."""
     statements: tuple[str, ...] = ()
@@ -280,7 +280,7 @@ class _TrainingInput:
             return trained, masks, ()
         kept = None if self.checkpoint is None else self.checkpoint.with_stem(RETRAINING_CHECKPOINT)
         later = subprogress(
-            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the thing"
+            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the object"
         )
         left = masks & ~odd
         share = np.count_nonzero(odd) / np.count_nonzero(masks)
@@ -401,7 +401,7 @@ def pose_warnings(
 
 
 def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str, ...]:
-    """Say where what was learned is not what photographs show, or where none was left to tell."""
+    """Return where what was learned is not what photographs show, or where none was left to tell."""
     if trained.quality is None:
         return (
             Note(
@@ -450,7 +450,9 @@ def _training_statements(trained: TrainedGaussians, photographs: int) -> tuple[s
 
 
 def _agreement_words(quality: HeldOutQuality) -> str:
-    shown = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on objects"
+    shown = (
+        "" if quality.psnr_on_objects is None else f", {quality.psnr_on_objects:.1f} dB on objects"
+    )
     return (
         f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
         f"from to {quality.psnr:.1f} dB{shown}."
