@@ -56,7 +56,7 @@ def load_mesh(
     path: Path,
     objects: ObjectGrouping = "one",
     up: UpAxis | None = None,
-    max_seconds: float = MAX_MESH_READ_S,
+    max_seconds: int = MAX_MESH_READ_S,
 ) -> MeshFile:
     """Read one file.
 
@@ -113,7 +113,7 @@ def companions_in_child(path: Path, reader: Reader) -> list[Path]:
 
 
 def _run_reader_process(
-    path: Path, folder: Path, reader: Reader, function: str, max_seconds: float = MAX_MESH_READ_S
+    path: Path, folder: Path, reader: Reader, function: str, max_seconds: int = MAX_MESH_READ_S
 ) -> None:
     """Let a child process call a function of a reader, and write what it returns into a folder.
 
