@@ -2,8 +2,8 @@
 
     python benchmarks/answer_rules.py FOLDER --truth masses.csv --recordings SET ...
 
-The two rules of decision 86 beside the product's, over the same draws of ``--answers 3``, and what
-decision 92 asks of rule B. ``--each`` prints the interval of each thing first. Objects are models
+The two rules of decision mass-pooled-answers beside the product's, over the same draws of ``--answers 3``, and what
+decision mass-pooled-answers asks of rule B. ``--each`` prints the interval of each thing first. Objects are models
 of one object each, pictured without names, as in ``evaluate mass``.
 """
 
@@ -136,7 +136,7 @@ def against(found: Sequence[tuple[float, float, float]], truths: Sequence[float]
 
 
 def verdict(plain: Scored, few: Scored) -> dict[str, bool]:
-    """Tell which conditions of decision 92 rule B meets; all four must hold."""
+    """Tell which conditions of decision mass-pooled-answers rule B meets; all four must hold."""
     gain = plain.score - few.score
     most = int(np.argmax(gain))
     away = [abs(float(s.inside.mean()) - AIM) for s in (plain, few)]

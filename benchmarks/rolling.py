@@ -1,4 +1,4 @@
-"""How far what is drawn round rolls, and where it stops: tables of decisions 58, 64 and 72.
+"""How far what is drawn round rolls, and where it stops.
 
     python benchmarks/rolling.py [--only slopes | bowls | floors]
 

@@ -2,7 +2,7 @@
 
     python benchmarks/shared_errors.py FOLDER --truth masses.csv --recordings SET ... [--answers 3]
 
-The rules of decision 114 over the same draws; none but the product's is in use. Objects are models
+The rules of decision mass-pooled-answers over the same draws; none but the product's is in use. Objects are models
 of one object each, pictured without names, as in ``evaluate mass``.
 """
 

@@ -22,7 +22,7 @@ def test_the_second_list_shares_nothing_with_the_first_and_was_read():
 
 
 def test_the_second_lists_open_half_comes_near_too(tmp_path):
-    """Before decision 110 its ALDE was 1.05: blocks of titanium and brass, and unknown words."""
+    """Before decision mass-by-name its ALDE was 1.05: blocks of titanium and brass, and unknown words."""
     off = []
     for row in (r for r in FRESH if r["half"] == "open"):
         seen = weigh(shape(row["shape"]), tmp_path / f"{row['name']}.glb")
@@ -43,7 +43,7 @@ def test_every_shape_is_closed():
 
 
 def test_the_open_half_weighs_what_is_published(tmp_path):
-    """Before decision 104 its ALDE was .38, and five were off by more than 2.5."""
+    """Before decision mass-by-name its ALDE was .38, and five were off by more than 2.5."""
     off = []
     for row in OPEN:
         seen = weigh(shape(row["shape"]), tmp_path / f"{row['name']}.glb")

@@ -27,13 +27,13 @@ PACKAGES = [
 ]
 """Layers of the package, lowest first; packages of one layer do not import each other."""
 SOLVER = [
-    {"constants", "records"},
-    {"problem", "ledger", "laws", "warp_start"},
+    {"constants", "native_records"},
+    {"problem", "ledger", "laws", "quiet_warp"},
     {"physics"},
-    {"formulas", "substance"},
+    {"formulas", "material_table"},
     {"state"},
-    {"measure"},
-    {"engines", "interaction", "joining", "splitting"},
+    {"diagnostics"},
+    {"engines", "engine_interaction", "add_bodies", "split_body"},
     {"body_changes"},
     {"reference", "cpu", "cuda"},
 ]

@@ -158,7 +158,7 @@ def test_the_numbers_are_found():
     homes = names(TEXTS)
     assert homes["WALL_REACH"] == homes["SWEEPS"] == [HOME]
     assert homes["XI"] == ["cpu/layout.py"]
-    assert homes["PATIENCE"] == ["cpu/loops/conduct.cpp"]
+    assert homes["PATIENCE"] == ["cpu/loops/step_loop.cpp"]
     assert len(homes) > 150
 
 
@@ -169,12 +169,12 @@ def test_the_numbers_are_found():
         ("reference/contact.py", "FIRST_BIAS, WALL_REACH = 0.1, 0.5"),
         ("cuda/contact.py", "WALL_REACH = wp.constant(0.51)"),
         ("cuda/contact.py", "WALL_REACH = wp.constant(D(0.51))"),
-        ("cpu/loops/pace.cpp", "constexpr double WALL_REACH = 0.51;"),
-        ("cpu/loops/pace.cpp", "const double A = 1, WALL_REACH = .51;"),
+        ("cpu/loops/timestep.cpp", "constexpr double WALL_REACH = 0.51;"),
+        ("cpu/loops/timestep.cpp", "const double A = 1, WALL_REACH = .51;"),
         ("formulas/contact.h", "static const float WALL_REACH = 0.51f;"),
         ("formulas/contact.h", "#define WALL_REACH 0.51f"),
-        ("cpu/loops/pace.cpp", "enum { NONE, SWEEPS = 10 };"),
-        ("cpu/loops/pace.cpp", "const int XI = 0;"),
+        ("cpu/loops/timestep.cpp", "enum { NONE, SWEEPS = 10 };"),
+        ("cpu/loops/timestep.cpp", "const int XI = 0;"),
         ("formulas/laws.h", "constexpr int SWEEPS = 10;"),
     ],
 )
@@ -188,7 +188,7 @@ def test_a_planted_second_name_is_found(path, line):
     [
         ("physics/rigid.py", "NEAR_A_WALL = 0.5"),
         ("cuda/contact.py", "NEAR = wp.constant(D(0.5))"),
-        ("cpu/loops/pace.cpp", "constexpr double NEAR = 0.5, FAR = 2;"),
+        ("cpu/loops/timestep.cpp", "constexpr double NEAR = 0.5, FAR = 2;"),
     ],
 )
 def test_a_planted_fraction_with_a_name_of_its_own_is_found(path, line):
@@ -200,8 +200,8 @@ def test_a_planted_fraction_with_a_name_of_its_own_is_found(path, line):
     ("path", "line", "value"),
     [
         ("physics/rigid.py", "def near(h): return h < 0.51", 0.51),
-        ("cpu/loops/pace.cpp", "if (h > 0.51f * dx) return;", 0.51),
-        ("cpu/loops/pace.cpp", "double fine = 2e-3 * dx;", 2e-3),
+        ("cpu/loops/timestep.cpp", "if (h > 0.51f * dx) return;", 0.51),
+        ("cpu/loops/timestep.cpp", "double fine = 2e-3 * dx;", 2e-3),
         ("formulas/loads.h", "double most = 1e+30f;", 1e30),
     ],
 )

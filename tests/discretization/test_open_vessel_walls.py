@@ -35,7 +35,7 @@ def made_of(mesh, path, **how):
 
 @pytest.mark.parametrize("from_pictures", [True, False])
 def test_one_piece_of_each_kind_weighs_what_is_published(tmp_path, from_pictures):
-    """Before decision 127 their mean logarithm was .56 from pictures, and 1.29 as full meshes."""
+    """Before decision mass-open-ware their mean logarithm was .56 from pictures, and 1.29 as full meshes."""
     off = []
     for row in ONE_OF_EACH:
         path = tmp_path / f"{row['name']}.glb"

@@ -1,7 +1,7 @@
 """Twelve further things on the scales, each of three answers pooled, written blind.
 
 What shows least of how it is built was made for this batch; two of its masses are missed, and why
-is in decision 92.
+is in decision mass-pooled-answers.
 """
 
 from pathlib import Path

@@ -74,7 +74,7 @@ def test_on_a_single_grid_the_vase_sticks_to_the_ball(story, tmp_path):
 
 
 def test_two_balls_at_normal_gain_no_energy(tmp_path):
-    """Nearly incompressible rubber once gained 47 times its energy in flight: decision 23."""
+    """Nearly incompressible rubber once gained 47 times its energy in flight: decision laws-mean-dilatation."""
     settings = Settings(fill=FillConfig(detail="normal"))
     seen = tell("steel-and-rubber", tmp_path, settings)
     assert seen.audit.mechanical_growth < 1e-3

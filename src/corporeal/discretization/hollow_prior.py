@@ -18,7 +18,7 @@ from corporeal.recognition.metadata_recognition import FileEvidence
 MAX_SOLID_THICKNESS_RATIO = 5.0
 """A mean thickness over the greatest measured wall of its substance, from which an object is drawn
 as it looks from outside [-]: of objects of which a name tells the substance alone, solid ones reach
-3 (beams, a gun barrel), and those that turned out hollow begin at 9 (decision 110).
+3 (beams, a gun barrel), and those that turned out hollow begin at 9 (decision mass-by-name).
 """
 
 

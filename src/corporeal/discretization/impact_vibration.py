@@ -25,7 +25,7 @@ from corporeal.mpm.physics.time_step_limits import stable_step
 
 VIBRATION_LOSS_COEFFICIENT = 0.87
 """Loss factor that vibrations take of an impact, over ρ v²/E [-]: measured on balls of 8 to 20
-cells, ρ v²/E of 0.001 to 0.1, ν of 0.2 and 0.41, loss factors from 0.05 to 0.4 (decision 103).
+cells, ρ v²/E of 0.001 to 0.1, ν of 0.2 and 0.41, loss factors from 0.05 to 0.4 (decision discretize-rigid-parts).
 """
 MAX_IMPACT_NUMBER = 0.1
 """ρ v²/E up to which it was measured [-]; what is struck harder counts as struck so."""

@@ -1,4 +1,4 @@
-"""Movable contents of vessels, as objects of their own (decision 34)."""
+"""Movable contents of vessels, as objects of their own (decision liquids-walls-and-vessels)."""
 
 from collections.abc import Sequence
 from dataclasses import replace

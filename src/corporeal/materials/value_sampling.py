@@ -61,7 +61,7 @@ MAX_MOUTH_INFLATION_PA = 10_000.0
 NAMED_WALL_LOG_STD = 0.45
 """Standard deviation of the logarithm of a wall that is only usual of objects of that name: half
 the interquartile range of what 62 named objects weigh in reality over what they weighed with such
-walls, in deviations (.46); the median distance of 11 of published mass gives .43 (decision 104).
+walls, in deviations (.46); the median distance of 11 of published mass gives .43 (decision mass-by-name).
 """
 MAX_INNER_VOLUME_FRACTION = 0.99
 """Of what encloses them, all that lies inside takes up at most [-]."""
@@ -79,8 +79,8 @@ def triangular_quantile(quantile: float, low: float, peak: float, high: float) -
 def draw_hypotheses(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
     """Sample a hypothesis for every part by their probabilities.
 
-    Ways that share a reading of the object ("imitation") are drawn together. What nobody recognised
-    may be of any of the library's materials. Where several answers were given, one of them is drawn
+    Ways that share a reading of the object ("imitation") are drawn together. Unrecognised parts may
+    be of any of the library's materials. Where several answers were given, one of them is drawn
     first, since its ways and its values fit each other.
     """
     return replace(

@@ -68,10 +68,10 @@ RANK_CUTOFF = 1e-12
 FLIP_DAMPING_FRACTION = 0.1
 """κ [-]: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
 GRANULAR_DAMPING_FRACTION = 0.5
-"""How often granular material forgets while it falls half a cell, in √(dx/g) [-] (decision 6)."""
+"""How often granular material forgets while it falls half a cell, in √(dx/g) [-] (decision laws-sand)."""
 LOCAL_BULK_RATIO = 4.0
 """λ/μ [-], at ν = 0.4: of nearly incompressible material what λ exceeds it by acts on the mean
-dilatation of a cluster of particles, not on each one's own volume (decision 23).
+dilatation of a cluster of particles, not on each one's own volume (decision laws-mean-dilatation).
 """
 BULK_ROUNDING_FRACTION = 1e-6
 """Share by which λ must exceed that for material to be so at all: ν of 0.4 in single precision is
@@ -186,7 +186,7 @@ of another wall."""
 POINT_RUN_WIDTH_RATIO = 6.0
 """Width of a run of them that is passed over together, over their spacing [-]: some forty."""
 NORMAL_CACHE_STEPS = 8
-"""Which candidate normal is widest is looked at anew in every so manieth step (decision 52) …"""
+"""Which candidate normal is widest is looked at anew in every so manieth step (decision contact-normal-cache) …"""
 NORMAL_CACHE_TRAVEL_DX = 0.5
 """… or two, four or eight times as often, where something moves farther meanwhile [cells]."""
 FACE_TABLE_INTERVALS = 4096
@@ -214,7 +214,7 @@ SWEEP_STRIDE_FRACTION = 0.6180339887498949
 in which they lie next to one another the first would carry more, and what rests would tilt."""
 SUPPORT_FREQUENCY_RATIO2 = 3.0
 """A body between what strikes it and what it rests on is squeezed at once where the square of its
-own frequency between the two is more than this times that of the impact [-] (decision 89) …
+own frequency between the two is more than this times that of the impact [-] (decision restitution-soft-and-layered) …
 """
 SUPPORT_NORMAL_COSINE = 0.5
 """… and what it rests on lies behind it: least cosine of the normal with the impact's [-] …"""
@@ -222,7 +222,7 @@ SUPPORT_MASS_RATIO = 0.9
 """… and is no lighter than this share of it [-]."""
 LAYER_STIFFNESS_FACTOR = 1.5707963267948966
 """Stiffness E π a²/h of a layer under a disc over that of a half-space, 2 E* a, by a/h: π/2 [-]
-(decision 96)."""
+(decision restitution-soft-and-layered)."""
 SUPPORTED_IMPACT_SWEEPS = 1000
 """Gauss–Seidel sweeps of such a round: what is heavy presses on what is light."""
 SIMULTANEOUS_SWEEPS = 30
@@ -255,7 +255,7 @@ MIN_LOSS_FACTOR = 0.02
 """A smaller loss factor takes less than the grid does, and gets no branches [-]."""
 GRID_LOSS_FACTOR = 3.2
 """Loss factor of contact and transfers themselves in an impact, times the square of the number of
-cells across what is struck [-]; measured on balls of 8 to 12 cells (decision 26).
+cells across what is struck [-]; measured on balls of 8 to 12 cells (decision discretize-effective-stiffness).
 """
 MIN_CELLS_FOR_GRID_LOSS = 8.0
 """Where there are fewer cells across, it is taken as with so many [-]."""
@@ -279,7 +279,7 @@ STICKING_FRICTION = 0.5
 are not held: a layer that sticks could not thin [-]."""
 WALL_LAYER_DX = 1.0 / 3.0
 """Thickness of the layer through which a wall drags on a liquid that sticks to it [cells], where
-its stress is shared among nodes by their splines' weights on the wall (decision 55)."""
+its stress is shared among nodes by their splines' weights on the wall (decision liquids-walls-and-vessels)."""
 LIQUID_TOUCH_DX = 0.15
 """It does so where the liquid's face is nearer than this by its mean place [cells]."""
 WETTED_REACH_DX = 2.0
@@ -352,7 +352,7 @@ OVERLAP_DEPTH_PARTICLES = 8
 OUT_OF_BLOCK_FRACTION = 0.1
 """Share of a field's particles outside of their blocks from which it is sorted with others [-]."""
 POLL_INTERVAL_S = 0.2
-"""Computing time after which Python looks whether somebody wants to stop [s]."""
+"""Computing time after which Python checks for interrupts [s]."""
 
 
 def constants_by_name() -> dict[str, int | float]:
@@ -372,5 +372,5 @@ def cpp_definitions(given: Mapping[str, int | float]) -> str:
 
 
 def cpp_type(value: int | float) -> str:
-    """Give the C++ type of a number."""
+    """Return the C++ type of a number."""
     return "int" if isinstance(value, int) else "double"

@@ -1,7 +1,7 @@
 """Simulated fracture: objects struck with ten times the energy they withstand become fragments.
 
 The run is taken back to just before the two touch, what the wall bears until it breaks is taken
-from the impact, and the object becomes rigid pieces that move on as it did (decision 39). The
+from the impact, and the object becomes rigid pieces that move on as it did (decision fracture-pieces). The
 momentum of the pieces is that of the whole.
 """
 

@@ -26,7 +26,7 @@ def cone_slope(friction_angle: Number) -> Number:
 
     There √J₂ = p sin φ (Davis 1968), and ‖s‖ = √(2 J₂) ≤ 3 α p. Through triaxial compression
     instead, as in Klar et al. 2016, a slope of φ = 30° would be as strong as one of 44°, and sand
-    pushed aside, in extension, stronger still (decision 6).
+    pushed aside, in extension, stronger still (decision laws-sand).
     """
     return np.sqrt(2.0) / 3.0 * np.sin(np.maximum(friction_angle, MIN_FRICTION_ANGLE_RAD))
 

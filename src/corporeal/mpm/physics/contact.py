@@ -135,7 +135,7 @@ def gap_to_wall(mean: Vectors, height: Scalars, normal: Vectors, cell: float) ->
 
 
 def gap_to_plane(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:
-    """Give the same at nodes however high above the wall [m]."""
+    """Return the same at nodes however high above the wall [m]."""
     h = height / cell
     xi = np.sum(mean * normal, axis=1) / cell
     return (-half_space_mean(-h) - xi - touching_distance(h)) * cell
@@ -363,7 +363,7 @@ def normal_cache_steps(travel: float) -> int:
     """For how many steps what is widest is kept, where something moves so far in a step [cells].
 
     Candidates themselves follow their fields in every step, and contacts that are new are looked
-    at at once: what may be out of date is only which of three is taken (decision 52).
+    at at once: what may be out of date is only which of three is taken (decision contact-normal-cache).
     """
     count = NORMAL_CACHE_STEPS
     while count > 1 and count * travel > NORMAL_CACHE_TRAVEL_DX:

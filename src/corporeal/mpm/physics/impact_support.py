@@ -2,7 +2,7 @@
 
 A body between what strikes it and what it rests on is squeezed at once where it is light, or where
 the contact behind is the wider one: its own vibration between the two contacts is then much quicker
-than the impact, so that both contacts are springs in series (decision 89).
+than the impact, so that both contacts are springs in series (decision restitution-soft-and-layered).
 """
 
 from dataclasses import dataclass
@@ -77,7 +77,7 @@ def restitution_at_speed(restitution: float, law: Float[np.ndarray, "5"], speed:
     """Restitution at the speed of an impact [-]: twin of ``Impact::bounce`` in contact.h.
 
     e = e_r (v/v_r)^(-q) - s (v - v_r), within bounds: q = 1/4 where a metal yields, a slope s where
-    a rubber ball was rated at two speeds (decision 77).
+    a rubber ball was rated at two speeds (decision restitution-speed).
 
     Args:
         restitution: e_r: at the law's speed [-].

@@ -68,7 +68,7 @@ def flip_damping_rate(
 
     κ c/dx: what rings, rings away within some passages of its waves. What flows like sand does not
     ring, and the stiffness of a grain must not tell how far a heap runs out: ½ √(g/dx) for it
-    (decision 6).
+    (decision laws-sand).
 
     Args:
         wave: Wave speed c [m/s].

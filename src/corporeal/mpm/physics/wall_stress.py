@@ -5,7 +5,7 @@ A node sees the wall through its spline. The layer between the wall and what the
 liquid's own flow curve, τ = τ_y + K (u/d)ⁿ (Herschel and Bulkley), and acts on the area of the wall
 that is the node's. So a wall takes as much momentum as the liquid's stress carries to it, and
 nothing more where steps are short: nodes that are held would take what transfers bring to them
-in every step (decision 55).
+in every step (decision liquids-walls-and-vessels).
 """
 
 from typing import NamedTuple
@@ -39,7 +39,7 @@ class FlowCurve(NamedTuple):
 
 
 def flow_curve(body: Body, cell: float) -> FlowCurve:
-    """Give the flow curve of a body's liquid, of several the most viscous; zeros of what is none.
+    """Return the flow curve of a body's liquid, of several the most viscous; zeros of what is none.
 
     Args:
         body: The liquid.

@@ -87,7 +87,7 @@ struct Simd : mpm::Lanes<f8> {
   }
 };
 // Means over the particles of each 2 x 2 x 2 cells of a block, weighted by volume: of the dilatation of
-// nearly incompressible matter and, as the adjoint, of its pressure (decision 23).
+// nearly incompressible matter and, as the adjoint, of its pressure (decision laws-mean-dilatation).
 struct ClusterMean {
   float sum[64], volume[64];
   ClusterMean() {
