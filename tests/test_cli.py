@@ -94,7 +94,7 @@ def test_the_package_runs_as_a_module():
 
 
 def test_an_unknown_verb_shows_the_menu(typed):
-    refused(typed("simulat"), "Unknown verb", "simulate")
+    refused(typed("simulat"), "Unknown command", "simulate")
 
 
 def test_a_missing_file_is_named(typed):
@@ -151,7 +151,7 @@ def test_an_unknown_material_in_an_annotation_shows_the_menu(typed, tmp_path):
     [
         (("--speed", "nan"), "--speed is nan"),
         (("--width", "100000"), "100000 × 720"),
-        (("--view", "0", "0", "0"), "no direction"),
+        (("--view", "0", "0", "0"), "not a direction"),
         (("--seed", "-1"), "--seed is -1"),
         (("--position-weight", "nan"), "--position-weight is nan"),
         (("--extent", "box"), "NAME=METRES"),

@@ -41,7 +41,7 @@ def verbs_of(command):
         code, said = command(verb, "--help")
         assert code == 0, said.err
         words = re.findall(rf"^  corporeal {verb} (\w+)", said.out, re.MULTILINE)
-        listed = "WORD --help tells more" in said.out
+        listed = "WORD --help shows its options" in said.out
         if listed:
             yield from (((verb, word), command(verb, word, "--help")[1].out) for word in words)
         else:

@@ -1,6 +1,7 @@
 """The whole way from photographs: written as other programs do, run, killed, gone on with."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.transforms_json import write_views
 from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
+from corporeal.reconstruction import gaussian_source
 from corporeal.reconstruction.gaussians import train_gaussians, training_schedule
 from corporeal.render import figures
 
@@ -107,7 +109,8 @@ def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
 def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch):
     """What comes of it to the last bit: see tests/reconstruct/gaussians/test_train.py."""
     write_views(tmp_path / "photos", views)
-    monkeypatch.setattr(train_gaussians, "CHECKPOINT_INTERVAL_S", 0.0)
+    often = partial(training_schedule.TrainConfig, checkpoint_interval_s=0.0)
+    monkeypatch.setattr(gaussian_source, "TrainConfig", often)
     steps, step = [], train_gaussians._step
 
     def stopping(training, *rest):

@@ -43,7 +43,7 @@ def test_a_ball_that_steps_have_softened_loses_no_more_than_a_stiff_one():
     beyond -= vibration_loss(softened.density, speed, softened.young_pa)
     assert beyond > 0.01
     assert softened.loss == pytest.approx(0.15 - 3.2 / 64 - beyond, abs=1e-3)
-    assert "vibrations of its own" in softened.reason
+    assert "simulated vibrations" in softened.reason
     assert simulate_drop(row("bouncy ball"), DRAFT).restitution == pytest.approx(
         restitution_of_loss(0.15), abs=0.015
     )

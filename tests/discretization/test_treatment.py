@@ -154,7 +154,7 @@ def test_a_stiff_part_of_a_mixed_object_is_its_rigid_frame():
     cushion = block(FOAM, 0.17, 0.6, 0.6)
     frame, foam = plan_discretization([FRAME, cushion], [FALL], "draft").treatments
     assert (frame.kind, foam.kind) == ("rigid", "deformable")
-    assert "inclusion that holds what is soft" in frame.reason
+    assert "inclusion that holds the soft parts" in frame.reason
     assert frame.simulated_young_pa == frame.young_pa
     alone = plan_discretization([FRAME], [FALL], "draft").treatments[0]
     assert "inclusion" not in alone.reason

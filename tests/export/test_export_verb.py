@@ -10,6 +10,7 @@ import pytest
 
 import corporeal as co
 from corporeal.core import store
+from corporeal.core.registry import load_function
 from corporeal.export import export_scene as verb
 from corporeal.export.export_record import read_record
 from corporeal.export.export_target import EXPORT_WRITERS
@@ -113,7 +114,7 @@ def test_a_run_without_matter_is_told_how_to_go_on(command, run_folder, tmp_path
     code, said = command("export", run, "--to", "glb")
     assert code == 2
     # As a shell takes it, blanks and all.
-    assert said.err.strip().endswith(f"has no matter yet. Go on with: corporeal fill '{run}'")
+    assert said.err.strip().endswith(f"has no particles yet. Next: corporeal fill '{run}'")
 
 
 def test_a_scene_can_leave_before_it_was_simulated(tmp_path, monkeypatch):
@@ -232,11 +233,9 @@ def test_earlier_targets_stay_in_the_record(run_folder, tmp_path):
 
 
 def test_the_menu_has_a_writer_for_every_target():
-    from importlib import import_module
-
-    for place in EXPORT_WRITERS.values():
-        module, _, name = place.partition(":")
-        assert callable(getattr(import_module(module), name))
+    for row in EXPORT_WRITERS.values():
+        for place in filter(None, (row.write, row.check, row.write_dataset)):
+            assert callable(load_function(place))
 
 
 # ---------------------------------------------------------------- many scenes

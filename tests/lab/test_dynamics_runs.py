@@ -27,7 +27,7 @@ from pathlib import Path
 from corporeal.lab.evaluation.dynamics.dynamics_jobs import run_and_measure
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.simulation import checkpoint
-checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
+checkpoint.MIN_INTERVAL_S, checkpoint.MAX_WRITE_TIME_FRACTION = 0.05, 1.0
 run_and_measure(Path(sys.argv[2]), lambda f, w: None, Path(sys.argv[1]), Settings())
 """
 PATIENCE = 600.0

@@ -398,7 +398,7 @@ def test_looks_are_one_to_three(looks):
 
 def test_nobody_to_judge_is_an_error():
     videos = judge_scenes.JudgedVideos([], [], [], {}, [REFERENCE_METHOD])
-    with pytest.raises(UserError, match="Nobody judges"):
+    with pytest.raises(UserError, match="No judge"):
         query_judge(videos, JudgeConfig(), lambda words: None)
 
 

@@ -9,7 +9,6 @@ import corporeal as co
 from corporeal.core.errors import UserError
 from corporeal.core.types import Wind
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.engine_interaction import EngineInteraction
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 ENGINES = (CpuEngine, ReferenceEngine)
@@ -84,5 +83,3 @@ def test_what_cannot_be_is_refused_in_a_sentence(problem):
     scene = co.build_scene(co.ball("granite", radius=0.05, at=(0, 0, 1.0)))
     with pytest.raises(UserError, match="without faces"):
         CpuEngine(co.pose_problem(co.prepare_scene(scene))).set_wind(0, (1.0, 0.0, 0.0))
-    with pytest.raises(UserError, match="Use the engine cpu"):
-        EngineInteraction._take_loads(engine)

@@ -166,7 +166,7 @@ def test_a_shell_too_narrow_to_be_hollow_is_filled_with_its_walls_mass():
     particles = fill(*scene)
     mass = particles.mass[particles.part == 1].sum()
     assert mass == pytest.approx(1100 * (0.02**2 * 0.4 - 0.018**2 * 0.398), rel=1e-3)
-    assert "filled through" in particles.fills[1]
+    assert "filled as a solid" in particles.fills[1]
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_who_must_give_masks_hears_where_doubted_ones_lie(tmp_path, monkeypatch,
 def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
     assert describe_masks_in(None) == describe_masks_in(tmp_path) == ""
     (tmp_path / "doubted" / "masks").mkdir(parents=True)
-    assert f"not believed, lie in {tmp_path / 'doubted' / 'masks'}" in describe_masks_in(tmp_path)
+    assert f"rejected, lie in {tmp_path / 'doubted' / 'masks'}" in describe_masks_in(tmp_path)
     (tmp_path / "masks").mkdir()
     assert f"colours lie in {tmp_path / 'masks'}" in describe_masks_in(tmp_path), (
         "those that were used"

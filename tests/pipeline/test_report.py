@@ -181,7 +181,7 @@ def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
 
 def test_a_long_reason_that_all_values_share_is_said_once(page):
     told = page(PartDescription("", None))
-    reason = "Nobody knows what this part is made of"
+    reason = "The material of this part is unknown"
     assert told.count(f"Reason where none is stated: {reason}") == 1
     assert told.count(reason) == 1
     usual = page(PartDescription("", "steel", answered_by="metadata"))

@@ -87,7 +87,7 @@ def test_both_masses_stand_side_by_side(life, large, tmp_path):
     real = life[3].mass_real[0]
     told = page(scale_scene(a_can("a recorded answer"), 5.0), large, tmp_path)
     assert f">{describe_mass(125 * real, 5.0)}<" in told
-    assert f"{125 * real:.3g} ({real:.3g} in life)" == describe_mass(125 * real, 5.0)
+    assert f"{125 * real:.3g} ({real:.3g} in reality)" == describe_mass(125 * real, 5.0)
     assert (
         "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with "
         "their object"
@@ -97,7 +97,7 @@ def test_both_masses_stand_side_by_side(life, large, tmp_path):
     )
     assert "<td>wall thickness</td>" not in told, "the wall is as stated, not as its material says"
     assert "life-size" not in page(a_can(), life, tmp_path)
-    assert "in life" not in page(a_can(), life, tmp_path).lower()
+    assert "in reality" not in page(a_can(), life, tmp_path).lower()
 
 
 def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):

@@ -5,7 +5,7 @@ from test_embree import RED, ball, front, scene, sheet
 
 from corporeal.core.types import Finish, Surface
 from corporeal.geometry.srgb import linear_to_srgb
-from corporeal.render import embree, shadow_culling, video_raycaster
+from corporeal.render import embree, shadow_culling
 from corporeal.render.camera_placement import CameraAim
 from corporeal.render.embree import RaySampling, RenderJob, identify_triangles, render_image
 from corporeal.render.kernels_floor import TILE_CAST, TILE_PX
@@ -63,21 +63,20 @@ def test_a_picture_hangs_neither_on_threads_nor_on_the_one_before():
     assert np.array_equal(after, VideoRaycaster().picture(stage("a red ball"), front(), "draft", 1))
 
 
-def test_the_empty_studio_hangs_on_no_band(monkeypatch):
+def test_the_empty_studio_hangs_on_no_band():
     near = front()
     tall = CameraAim(
         near.eye, near.target, 30.0, 64, 240
     )  # so that rows beside one another are alike
 
-    def cast() -> tuple[np.ndarray, ...]:
-        caster = VideoRaycaster()
+    def cast(*band: int) -> tuple[np.ndarray, ...]:
+        caster = VideoRaycaster(*band)
         picture = caster.picture(stage("a red ball"), tall, "draft", 1)
         assert caster._empty is not None
         return picture, caster._empty.mirrored, caster._empty.glances, caster._empty.wall
 
     whole = cast()
-    monkeypatch.setattr(video_raycaster, "EMPTY_BAND_TILES", 2)
-    assert all(np.array_equal(a, b) for a, b in zip(cast(), whole, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(cast(2), whole, strict=True))
 
 
 def test_a_camera_that_moves_sees_another_floor():

@@ -120,7 +120,7 @@ def test_what_takes_too_long_is_ended_with_all_that_it_started(fake, tmp_path):
     fake(f"hang {tmp_path / 'child'}")
     begun = time.perf_counter()
     assert "no rest within 0.7 s" in refusal(BlenderConfig(patience=0.7))
-    assert time.perf_counter() - begun < 50, "it would have gone on for a minute"
+    assert time.perf_counter() - begun < 300, "it would have gone on for ten minutes"
     child = int((tmp_path / "child").read_text())
     for _ in range(100):
         if not alive(child):
@@ -163,7 +163,7 @@ def said(*bodies, seconds=1.0, quiet=True):
 )
 def test_a_result_that_makes_no_sense_is_refused(fake, text, words):
     fake(f"say {text}")
-    with pytest.raises(BlenderError, match=f"its result makes no sense: .*{words}"):
+    with pytest.raises(BlenderError, match=f"its result is invalid: .*{words}"):
         drop_in_blender([box(0.4, 0.3, 0.2)], [BodyPose((0.0, 0.0, 1.0))])
 
 

@@ -1,4 +1,4 @@
-"""What can go wrong for a user. Each error says what happened, where, and what to do next."""
+"""Errors for users. Each message says what happened, where, and what to do next."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager

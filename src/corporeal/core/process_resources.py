@@ -1,4 +1,4 @@
-"""What this process may use of the machine that it runs on."""
+"""Resources available to this process."""
 
 import atexit
 import ctypes

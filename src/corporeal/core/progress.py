@@ -1,9 +1,9 @@
-"""How far work has come, told of a part of it as of the whole."""
+"""Nested progress callbacks."""
 
 from collections.abc import Callable
 
 Progress = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 
 
 def subprogress(progress: Progress, begin: float, end: float, what: str = "") -> Progress:

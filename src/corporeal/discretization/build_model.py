@@ -1,4 +1,4 @@
-"""Pose the problem: turn a scene filled with particles into what an engine is given."""
+"""Build the simulation problem from a scene filled with particles."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -42,7 +42,7 @@ ZERO_VELOCITY = (0.0, 0.0, 0.0)
 GRAVITY_RAMP_S = 0.1
 """Time over which gravity grows where everything starts at rest in contact [s]."""
 SAME_INCLUSION_DISTANCE_CELLS = 1.5
-"""Rigid matter of one object nearer than this [cells] belongs to one frame."""
+"""Rigid material of one object nearer than this [cells] belongs to one frame."""
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class RigidInclusionLabels:
 def label_rigid_inclusions(
     position: Float[np.ndarray, "N 3"], surface: Float[np.ndarray, "S 3"], reach: float
 ) -> RigidInclusionLabels:
-    """Say which frame each rigid particle and each surface point belongs to.
+    """Return which frame each rigid particle and each surface point belongs to.
 
     Surfaces join too: a wire has few particles, far apart, on a coarse grid.
 
@@ -275,13 +275,13 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
 
 
 def piece_curvature(particles: Particles, piece: BodyPiece) -> Float[np.ndarray, "S2 Columns"]:
-    """Give how its surface curves at a piece's surface points; none: it is not known."""
+    """Return how its surface curves at a piece's surface points; none: it is not known."""
     known = len(particles.curvature) == len(particles.surface)
     return particles.curvature[piece.surface if known else []].astype(float)
 
 
 def piece_wetted_surface(particles: Particles, piece: BodyPiece) -> WettedSurface | None:
-    """Give where liquids touch an object that is rigid all through; None: there are none."""
+    """Return where liquids touch an object that is rigid all through; None: there are none."""
     own = particles.object_of_wetted == piece.object
     if not piece.rigid or not own.any():
         return None
@@ -394,7 +394,7 @@ def starts_settled(scene: Scene, particles: Particles) -> bool:
     Then gravity grows over a tenth of a second: switched on at once it would set off vibrations
     in which bodies hop by less than a grid cell.
     """
-    # What follows a path moves when it says.
+    # prescribed paths set the time of motion
     moving = np.abs(particles.velocity).max(initial=0.0) > 0.0
     if moving or any(o.push or o.wind for o in scene.objects):
         return False

@@ -1,4 +1,4 @@
-"""Points on the outside of a rigid object, through which it touches planes exactly."""
+"""Contact points on the outside of rigid objects, for exact contact with planes."""
 
 import numpy as np
 from jaxtyping import Float

@@ -1,10 +1,10 @@
-"""How each part enters the simulation: rigid, deformable or shell, and with which numbers.
+"""Discretization of each part: rigid, deformable or shell, with its parameters.
 
 One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
 is rigid, by itself or as the inclusion of softer parts; everything else keeps its true stiffness; thin
 walls are thickened with the stiffness that counts and the areal mass kept; only a step budget may
-compress wave speeds, in their order. What would sag far more than in life, as soft as thick walls
-and the step budget make it, is rigid after all.
+compress wave speeds, in their order. What would sag far more than in reality, as soft as thick
+walls and the step budget make it, is rigid after all.
 """
 
 from collections.abc import Sequence
@@ -79,7 +79,7 @@ class QualityPreset:
     """Grid spacing of a scene that runs, for what joins it [m]; None: it is chosen."""
 
     def steps(self, particles: float, pressed: bool = False) -> float:
-        """Say how many steps per simulated second a scene of so many particles may take.
+        """Return how many steps per simulated second a scene of so many particles may take.
 
         Where prescribed motion presses something soft, its stiffness is the force that is asked
         for: then only the work counts, where it is counted.
@@ -201,7 +201,7 @@ def _plan_with_verdicts(
 
 
 def choose_role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float) -> PartRole:
-    """Say how a part takes part in its object.
+    """Return how a part takes part in its object.
 
     Args:
         part: Which.

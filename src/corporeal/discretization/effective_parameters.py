@@ -1,4 +1,4 @@
-"""The treatment of one part: rigid, deformable or shell, with which numbers and why."""
+"""Simulated parameters of one part: rigid, deformable or shell, with reasons."""
 
 from dataclasses import dataclass
 from math import hypot, inf, sqrt
@@ -54,11 +54,11 @@ class GridResolution:
 
 
 def remaining_loss_factor(part: PartGeometry, motion: ExpectedMotion, across: float) -> float:
-    """Loss factor that is left to the matter of what is struck, beside the grid's own share [-].
+    """Loss factor that is left to the material of what is struck, beside the grid's own share [-].
 
-    Contact at nodes and transfers take a share of a blow themselves. It counts on what the material
-    has to take, so that both together are what was measured. A solid loses for what is rigid and
-    meets it, too; a wall is dented so much more easily that it does not matter.
+    Contact at nodes and transfers take a share of an impact themselves. It counts on what the
+    material has to take, so that both together are what was measured. A solid loses for what is
+    rigid and meets it, too; a wall is dented so much more easily that it does not matter.
 
     Args:
         part: What is struck, as its contents where those are simulated.
@@ -76,7 +76,7 @@ def remaining_loss_factor(part: PartGeometry, motion: ExpectedMotion, across: fl
 
 
 def is_dented_as_hertz(part: PartGeometry) -> bool:
-    """Tell whether a blow dents a part as Hertz has it: no wall but a flat one."""
+    """Return whether an impact dents a part as Hertz has it: no wall but a flat one."""
     return part.structure.kind == "solid" or is_flat_wall(part)
 
 
@@ -195,14 +195,14 @@ def treatment_reason(verdict: RigidityVerdict, role: PartRole) -> str:
     """Say in one sentence why a part is treated as it is."""
     return {
         "rigid": f"Rigid, because {verdict.reason}.",
-        "inclusion": f"A rigid inclusion that holds what is soft around it, because {verdict.reason}.",
+        "inclusion": f"A rigid inclusion that holds the soft parts around it, because {verdict.reason}.",
         "subgrid": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
 
 
 def scale_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
-    """Say where the real object, struck as fast, would be judged otherwise; "" where it would not.
+    """Return where the real object, struck as fast, would be judged otherwise; "" where it would not.
 
     Stiffness against stress waves does not depend on size; against its own weight it does.
     """
@@ -218,18 +218,18 @@ def scale_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
 
 
 def rod_reason(ratio: float) -> str:
-    """Say what a thickened rod keeps."""
+    """Describe what a thickened rod keeps."""
     if ratio >= 1:
         return ""
     return (
         f" It is simulated {1 / ratio:.3g} times as thick, with its bending stiffness (up to 10 % "
         "less where it runs askew to the grid), its strength in bending and its mass kept; "
-        "stretched it is softer than in life."
+        "stretched it is softer than in reality."
     )
 
 
 def bar_reason(part: PartGeometry, simulated: float) -> str:
-    """Say what was assumed of a long thin part that is no known rod or tube; "" of all others.
+    """Describe what was assumed of a long thin part that is no known rod or tube; "" of all others.
 
     Args:
         part: Which.
@@ -250,20 +250,20 @@ def bar_reason(part: PartGeometry, simulated: float) -> str:
 
 
 def partner_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
-    """Say what else a part loses for; "" where it is nothing."""
+    """Describe what else a part loses for; "" where it is nothing."""
     names = sorted(
         {p.material.name for p in motion.partners if takes_part_in_impact(part.material, p)}
     )
     if not names or not is_dented_as_hertz(part) or CONSTITUTIVE_LAWS[part.material.law].loose:
         return ""
     return (
-        f" What meets it is rigid here ({', '.join(names)}) and would give way beside it in life: "
-        "its loss factor is that of both, of each by its share of the compliance."
+        f" What meets it is rigid here ({', '.join(names)}) but deforms in reality: the loss "
+        "factor is that of both, weighted by compliance."
     )
 
 
 def wall_reason(part: PartGeometry, ratio: float, speed: float) -> str:
-    """Say what a thickened wall keeps."""
+    """Describe what a thickened wall keeps."""
     if ratio >= 1:
         return ""
     factors = wall_factors(part, ratio, speed)
@@ -275,5 +275,5 @@ def wall_reason(part: PartGeometry, ratio: float, speed: float) -> str:
         lost = "in its plane it is softer"
     return (
         f" Its wall is simulated {1 / ratio:.3g} times as thick, with {kept} and its mass kept; "
-        f"{lost} than in life."
+        f"{lost} than in reality."
     )

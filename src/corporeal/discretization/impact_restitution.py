@@ -1,4 +1,4 @@
-"""Restitution of rigid parts at the speeds of their blows."""
+"""Restitution of rigid parts at their impact speeds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ class PairRestitutions:
     """Restitution of all pairs of K parts and the floor."""
 
     restitution: Float[np.ndarray, "K1 K1"]
-    """At the speeds of their first blows [-]."""
+    """At the speeds of their first impacts [-]."""
     laws: Float[np.ndarray, "K1 K1 5"]
     """How it changes with speed: see ``Problem.restitution_law``."""
 
@@ -31,10 +31,10 @@ def restitutions_at_impact(
     treatments: Sequence[Discretization],
     shapes: Mapping[int, PartProportions] | None = None,
 ) -> PairRestitutions:
-    """Carry the restitution of all pairs of parts and the floor to the speeds of their blows.
+    """Carry the restitution of all pairs of parts and the floor to the speeds of their impacts.
 
     The ratio to what the same pair has at ``NOMINAL_IMPACT_SPEED_M_S`` is applied, so that what
-    was drawn from a measured range stays drawn, and so do the laws by which later, slower blows
+    was drawn from a measured range stays drawn, and so do the laws by which later, slower impacts
     lose less. What strikes a sheet that is laid on the floor rebounds as from the floor.
 
     Args:
@@ -73,7 +73,7 @@ def restitutions_at_impact(
 def _restitution_of_pair(
     one: ImpactBody, other: ImpactBody, speed: float, drawn: float
 ) -> RestitutionLaw:
-    """Carry the restitution that two bodies have at ``NOMINAL_IMPACT_SPEED_M_S`` to the speed of their blow."""
+    """Carry the restitution that two bodies have at ``NOMINAL_IMPACT_SPEED_M_S`` to the speed of their impact."""
     nominal = materials.pair_restitution(one, other, NOMINAL_IMPACT_SPEED_M_S).value
     law = materials.pair_restitution_law(one, other, speed)
     ratio, value = 1.0, drawn

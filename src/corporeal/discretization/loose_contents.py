@@ -1,4 +1,4 @@
-"""Vessels with something loose in them: what it becomes, and where liquids touch what is rigid."""
+"""Vessels with loose contents, and wetted surfaces."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Plants: which parts are a crown of leaves, and what of the rest does not visibly bend.
+"""Plants: crowns of leaves, and parts that do not visibly bend.
 
 With true wood a plant hardly flexes: what sways is its root ball in soft potting soil and its
 leaves on their stalks. So where everything but the leaves stays rigid, the crown is a body of its
@@ -14,9 +14,7 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 MIN_FOLIAGE_LEAVES = 20
 """A part of fewer separate leaves is no crown."""
-POTTED_SOIL_REASON = (
-    "a rigid pot holds it, and what it gives way is in the spring at the plant's root"
-)
+POTTED_SOIL_REASON = "a rigid pot holds it, and its compliance is in the spring at the plant's root"
 FOLIAGE_REASON = "A crown of leaves without stress of its own, each on a damped spring to the wood"
 
 

@@ -1,12 +1,12 @@
-"""What prescribed motion presses: how hard, before anything is simulated.
+"""Compression by prescribed motion, estimated before the simulation.
 
-What moves as told forces a displacement on what lies in its way and cannot go away: between a path
-and the floor, a wall or another path. Along the direction in which those two come closer to each
-other, all free objects between them are pushed together as rigid bodies, one up to the next, as far
-as they go: the least sum of gaps from one to the other is how far they may come. What they come
-farther, s, is taken up by what lies in between as by springs in series: it bears
-p = s / Σ (L_k/E_k), and strains by p/E, so that a block of steel under a ball of rubber stays what
-it is. What can go away (a block before a pusher) is pressed by nothing.
+A prescribed path forces a displacement on objects that cannot give way: between a path and the
+floor, a wall or another path. Along the direction in which those two come closer to each other, all
+free objects between them are pushed together as rigid bodies, one up to the next, as far as they
+go: the least sum of gaps from one to the other is how far they may come. What they come farther, s,
+is taken up by what lies in between as by springs in series: it bears p = s / Σ (L_k/E_k), and
+strains by p/E, so that a block of steel under a ball of rubber stays what it is. What can go away
+(a block before a pusher) is pressed by nothing.
 
 Objects are pushed together from where they start, and are not turned: what is first brought
 elsewhere, or tips off its support, is judged as if it had stayed.
@@ -51,7 +51,7 @@ class CompressionPlane:
     """Of the plane from the origin [m]."""
 
     def gap(self, thing: PlacedObject) -> Clearance:
-        """Measure how far a thing can go towards it."""
+        """Measure how far an object can go towards it."""
         heights = thing.out(thing.thing.corners) @ self.normal - self.offset
         return Clearance(float(heights.min()), np.zeros(3))
 
@@ -94,7 +94,7 @@ def compression_pressures(
 
 
 def look_times(scene: Scene) -> Float[np.ndarray, " T"]:
-    """When to look [s]: evenly as long as anything moves as told, and at all rows of paths."""
+    """When to look [s]: evenly as long as anything follows a prescribed path, and at all rows of paths."""
     rows = np.concatenate([obj.path.time for obj in scene.objects if obj.path is not None])
     last = min(scene.duration, float(rows.max()))
     even = np.linspace(0.0, last, LOOK_TIMES_COUNT)
@@ -291,7 +291,7 @@ class StackedGaps:
     """L/E of each [m/Pa]."""
 
     def room(self, low: Float[np.ndarray, " F"], high: Float[np.ndarray, " F"]) -> CompressionGap:
-        """Give what is left, for each object, from one side through it to the other.
+        """Return what is left, for each object, from one side through it to the other.
 
         Args:
             low: Gaps from the lower side [m].
@@ -309,7 +309,7 @@ class StackedGaps:
 
 
 def comes_closer(presser: PresserPath, normal: Float[np.ndarray, "3"]) -> bool:
-    """Tell whether any point of a body comes closer to a plane than it was."""
+    """Return whether any point of a body comes closer to a plane than it was."""
     corners = presser[0].thing.corners
     few = corners[:: max(1, len(corners) // 50)]
     heights = np.array([p.out(few) @ normal for p in presser])

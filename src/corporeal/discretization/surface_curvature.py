@@ -1,4 +1,4 @@
-"""How a surface curves at points on it, where its triangles stand for something round.
+"""Curvature of surfaces at points where triangles approximate a round shape.
 
 A ball of triangles rolls on corners, and loses speed at each as a wheel without a rim does (McGeer
 1990, "Passive dynamic walking"): a fifth in a second. So every point gets the radii of curvature

@@ -1,4 +1,4 @@
-"""Pose an animated GLB at its keyframes, as a viewer does: nodes, then morph targets."""
+"""Reader of animated GLB, evaluated at keyframes: nodes, then morph targets."""
 
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""A scene as one animated GLB: rigid things move as nodes, soft ones by a few morph targets.
+"""A scene as one animated GLB: rigid objects move as nodes, soft ones by a few morph targets.
 
 Morph targets are modes of the shapes (``geometry/shape_modes.py``), kept as normalised 16 and 8 bit
 integers (KHR_mesh_quantization): a video takes a sixth of what keyframes of all vertices would.

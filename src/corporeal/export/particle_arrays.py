@@ -1,4 +1,4 @@
-"""A run as arrays of particles, numbered as data sets for learning do.
+"""A run as arrays of particles with the type numbers of learning data sets.
 
 Kinds are those of DeepMind's data sets (Sanchez-Gonzalez et al. 2020): 0 rigid, 6 sand, 7 goop; 8
 is ours, for metal. 3 is an obstacle to both loaders, and never used.

@@ -1,4 +1,4 @@
-"""Material points over time for learning: HDF5 as LagrangeBench has it, NPZ as geoelements/gns.
+"""Particle trajectories for learning: HDF5 of LagrangeBench, NPZ of geoelements/gns.
 
 Both loaders take positions and the kind of each particle. HDF5 has beside them what no other data
 set does: mass, volume, moduli, law, object, part, deformation gradients, and where every number

@@ -1,4 +1,4 @@
-"""How a scene moved, and where everything is at the instant that is exported."""
+"""Motion of a scene, and its pose at the exported instant."""
 
 import os
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What can deform in USD: material points for MPM, and tetrahedra for finite elements.
+"""Deformable bodies in USD: material points for MPM, and tetrahedra for finite elements.
 
 Schemas: Newton's ``newton-usd-schemas`` (points, per-part subsets with MPM materials); the AOUSD
 proposal for deformables under both names that readers look for, ``physics:`` (Newton) and
@@ -67,7 +67,7 @@ def material_points_prim(solid: ExportedSolid) -> UsdPrim:
 
 
 def tetrahedra_prim(solid: ExportedSolid, scene: PhysicalScene) -> UsdPrim:
-    """Return the same matter as a volume mesh."""
+    """Return the same material as a volume mesh."""
     mesh = tetrahedra_of(solid, scene.cell)
     prim = UsdPrim("TetMesh", "tetrahedra")
     prim.set("float3[]", "extent", usda_vectors(_box(mesh.points, 0.0)))

@@ -63,12 +63,13 @@ def _not_written(asked: ExportRequest, corners: int) -> list[str]:
         sentences.append(f"{', '.join(soft)} can deform and is not simulated.")
     elif soft:
         sentences.append(
-            f"{', '.join(soft)} can deform: Newton reads it; PhysX on the processor and MuJoCo do "
-            "not, and what lies on it falls through."
+            f"{', '.join(soft)} can deform: Newton reads it; PhysX on the CPU and MuJoCo do not, "
+            "and objects on it fall through."
         )
     if corners > PHYSX_GPU_MAX_CORNERS:
         sentences.append(
-            f"A convex collider has {corners} corners; PhysX on a card takes {PHYSX_GPU_MAX_CORNERS}: "
+            f"A convex collider has {corners} corners; PhysX on a GPU takes "
+            f"{PHYSX_GPU_MAX_CORNERS}: "
             f"--hull-vertices {PHYSX_GPU_MAX_CORNERS}."
         )
     return sentences

@@ -1,4 +1,4 @@
-"""Questions about points near a mesh: inside or outside, how far, what can be seen."""
+"""Queries of points near a mesh: inside, distance, visibility."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Where rays meet a mesh: Embree finds the triangle, in single precision; places are worked out.
+"""Ray casting with Embree; hits are refined in double precision.
 
 What Embree finds is met again in double precision, in the plane of its triangle. The mesh is blown
 up to a diagonal of 100 first, so that its size in metres does not matter. The rules are those of

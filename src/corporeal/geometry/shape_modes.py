@@ -1,4 +1,4 @@
-"""A moving surface as few fixed shapes that are added up with weights that change."""
+"""Low-rank modes of a moving surface."""
 
 from dataclasses import dataclass
 

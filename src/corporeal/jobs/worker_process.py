@@ -84,7 +84,7 @@ def attempt_job(packed: PackedJob, progress: ProgressCallback) -> str | None:
         return "Out of memory. Use fewer --workers, or --detail draft."
     except Exception as error:
         traceback.print_exc()
-        return f"A mistake of ours ({type(error).__name__}: {error})."
+        return f"Internal error ({type(error).__name__}: {error})."
     return None
 
 

@@ -133,7 +133,7 @@ def placed_wall_thickness(words: PartDescription, library_name: str = "default")
 def placement_contradictions(
     words: PartDescription, placements: Mapping[str, RangePlacement], library_name: str = "default"
 ) -> dict[str, str]:
-    """Say which of a part's values do not fit each other: field → why, in a clause.
+    """Return which of a part's values do not fit each other: field → why, in a clause.
 
     Only what somebody placed or stated can be put right: what was not asked of a way, as the
     stiffness of all but the likeliest, contradicts nothing.

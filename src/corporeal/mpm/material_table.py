@@ -1,4 +1,4 @@
-"""Substances: the one table of what bodies are made of, which every engine reads.
+"""Table of substances, shared by all engines.
 
 What a problem says of each particle (E, ν, σ_y, φ, c …) becomes here, once, the numbers that laws
 and loops read (μ, λ, the cone, the FLIP damping rate …). Particles carry the number of a row.
@@ -133,7 +133,7 @@ class MaterialTable:
         return np.isin(self.law, laws.PLASTIC_LAWS)
 
     def numbers(self, row: Int[np.ndarray, " P"], dt: float) -> YieldParameters:
-        """Give what return maps read of the material of some particles, by their rows.
+        """Return what return maps read of the material of some particles, by their rows.
 
         Args:
             row: Of each particle.
@@ -211,8 +211,7 @@ def _refuse_unknown(body: Body) -> None:
     if unknown:
         menu = ", ".join(f"{law.value} ({law.name.lower()})" for law in Law)
         raise SimulationError(
-            f"{body.name!r} follows a law of number {unknown[0]}, which there is not. Give one of: "
-            f"{menu}."
+            f"{body.name!r} has the unknown law {unknown[0]}. Give one of: {menu}."
         )
 
 

@@ -1,4 +1,4 @@
-"""What an engine is given and what it gives back: the contract that every engine keeps."""
+"""Interface of engines: the problem, and the results."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ class WettedSurface:
     point: Float[np.ndarray, "N 3"]
     """[m]"""
     normal: Float[np.ndarray, "N 3"]
-    """Unit, out of the matter."""
+    """Unit, out of the material."""
 
 
 NO_WIND_FACES = WindFaces(np.zeros((0, 3)), np.zeros(0, np.int64))
@@ -170,7 +170,8 @@ class Problem:
     restitution_law: Float[np.ndarray, "BW BW 5"] | None = None
     """How e of every pair changes with the speed of an impact: at which it is ``restitution``
     [m/s], slope [s/m], exponent [-], least and most: see ``physics.impact_support.restitution_at_speed``. None: it is
-    the same at all speeds."""
+    the same at all speeds.
+    """
 
     @property
     def all_excluded_pairs(self) -> tuple[tuple[int, int], ...]:
@@ -275,10 +276,40 @@ class StepStatistics:
     """[s]"""
 
 
+@dataclass(frozen=True)
+class BodySplit:
+    """Which body becomes several, and how."""
+
+    body: int
+    """Its first piece keeps its number, the others come after all bodies there are."""
+    piece: Int[np.ndarray, " P"]
+    """Which piece each of its particles belongs to."""
+    position: Float[np.ndarray, "P 3"]
+    """Of its particles now [m]."""
+    velocity: Float[np.ndarray, "P 3"]
+    """[m/s]"""
+    surfaces: tuple[Float[np.ndarray, "_ 3"], ...]
+    """Points on the surface of each piece, now [m]."""
+
+    @property
+    def count(self) -> int:
+        """Number of pieces."""
+        return len(self.surfaces)
+
+
 @runtime_checkable
 class Engine(Protocol):
-    """A solver of one problem."""
+    """What every solver of one problem does.
 
+    Its class is called with the problem and with ``threads``, how many threads it may use on the
+    CPU (None: as it likes), and stands in ``ENGINES``. What only some engines can do follows as
+    protocols of methods alone; ``engines.require`` asks for them.
+    """
+
+    name: str
+    """Its key in ``ENGINES``."""
+    problem: Problem
+    """What it solves now."""
     steps: StepStatistics
 
     @property
@@ -294,6 +325,14 @@ class Engine(Protocol):
                 body, when, and what to do. The state is that of the last good check.
 
         """
+        ...
+
+    def stable_step(self) -> float:
+        """Largest stable step now [s]."""
+        ...
+
+    def step(self, dt: float) -> None:
+        """Take one step of dt [s]."""
         ...
 
     def snapshot(self) -> Snapshot:
@@ -326,7 +365,7 @@ class Engine(Protocol):
 
 
 @runtime_checkable
-class InteractiveEngine(Engine, Protocol):
+class InteractiveEngine(Protocol):
     """An engine whose bodies can be touched from outside between two advances.
 
     A touch reaches the particles within two cells of a point, less with the distance; of a rigid
@@ -360,11 +399,28 @@ class InteractiveEngine(Engine, Protocol):
         """
         ...
 
+    def grip_point(
+        self, body: int, position: Float[np.ndarray, "P 3"]
+    ) -> Float[np.ndarray, "3"] | None:
+        """Where a body is held now [m]; None: it is not held.
+
+        Args:
+            body: Which.
+            position: Of all particles, as ``snapshot`` gives it now [m].
+
+        """
+        ...
+
+
+@runtime_checkable
+class VariableLoadEngine(Protocol):
+    """An engine whose gravity and winds can be changed between two advances."""
+
     def set_gravity(self, gravity: Vector) -> None:
         """Let gravity be another from now on [m/s²]; what that adds to the potential is work.
 
         Raises:
-            UserError: It is not finite, or the engine cannot change it.
+            UserError: It is not finite.
 
         """
         ...
@@ -373,9 +429,42 @@ class InteractiveEngine(Engine, Protocol):
         """Let the air about a body move with a velocity from now on [m/s].
 
         Raises:
-            UserError: There is no such body, it was given no faces for the wind, the velocity is
-                not finite, or the engine cannot change it.
+            UserError: There is no such body, it was given no faces for the wind, or the velocity
+                is not finite.
 
+        """
+        ...
+
+
+@runtime_checkable
+class BodyAddingEngine(Protocol):
+    """An engine whose problem can get more bodies between two advances."""
+
+    def with_added_bodies(self, problem: Problem) -> Engine:
+        """Return an engine that goes on from here with more bodies; nothing changes for the others.
+
+        Gravity, winds and what is held stay as they are. The potential energy of the new bodies is
+        booked as work from outside.
+
+        Args:
+            problem: With the new bodies, as they start, after all others.
+
+        """
+        ...
+
+
+@runtime_checkable
+class BodySplittingEngine(Protocol):
+    """An engine whose rigid bodies can break into rigid pieces between two advances.
+
+    When and into what is decided outside, from ``snapshot`` and the first contacts of ``measure``.
+    """
+
+    def with_split_body(self, split: BodySplit) -> Engine:
+        """Return an engine that goes on from here with a body in pieces.
+
+        Mass, momentum and the books are shared out among them (``splitting``). What held the body
+        lets go.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""A rigid body becomes several: mass, momentum and the books are shared out, nothing is added."""
+"""Splitting of a rigid body; mass, momentum and ledgers are conserved."""
 
 from dataclasses import dataclass, replace
 
@@ -6,28 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.types import CURVATURE_COLUMNS
-from corporeal.mpm.problem import Body, Problem
-
-
-@dataclass(frozen=True)
-class BodySplit:
-    """Which body, and how."""
-
-    body: int
-    """Its first piece keeps its number, the others come after all bodies there are."""
-    piece: Int[np.ndarray, " P"]
-    """Which piece each of its particles belongs to."""
-    position: Float[np.ndarray, "P 3"]
-    """Of its particles now [m]."""
-    velocity: Float[np.ndarray, "P 3"]
-    """[m/s]"""
-    surfaces: tuple[Float[np.ndarray, "_ 3"], ...]
-    """Points on the surface of each piece, now [m]."""
-
-    @property
-    def count(self) -> int:
-        """Number of pieces."""
-        return len(self.surfaces)
+from corporeal.mpm.problem import Body, BodySplit, Problem
 
 
 @dataclass(frozen=True)
@@ -41,7 +20,7 @@ class ParentMap:
 
     @classmethod
     def of(cls, problem: Problem, split: BodySplit) -> "ParentMap":
-        """Say who comes of whom."""
+        """Return who comes of whom."""
         body, more = problem.bodies[split.body], split.count - 1
         mass = np.bincount(split.piece, body.volume * body.density, split.count)
         share = np.ones(len(problem.bodies) + more)

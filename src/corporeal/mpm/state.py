@@ -1,4 +1,4 @@
-"""All particles of a problem in one list: what never changes of them, and what does."""
+"""Particles of a problem: constant properties and state."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
@@ -262,7 +262,7 @@ class State:
     motion: Float[np.ndarray, "P 3 3"]
     plastic: Float[np.ndarray, " P"]
     volume: Float[np.ndarray, " P"]
-    """v_c of granular matter."""
+    """v_c of granular material."""
     log_volume_ratio: Float[np.ndarray, " P"]
     """ln of the mean volume J̄ that a particle's pressure follows over its own J; see
     ``Matter.uses_mean_dilatation``."""
@@ -373,6 +373,34 @@ class State:
         found["branch_volume"] = np.where(fresh[:, None], 0.0, self.branch_volume)
         return replace(self, **found).follow_rigid(matter)
 
+    def continuing(
+        self,
+        before: tuple[ParticleConstants, "State"],
+        matter: ParticleConstants,
+        whole: Collection[int],
+    ) -> "State":
+        """Return this state with whole bodies, and the time, as they were in another problem.
+
+        Args:
+            before: The other problem's matter and state, in which these bodies have their numbers.
+            matter: Of this one.
+            whole: Bodies that are the same in both.
+
+        """
+        then, there = before
+        mine, body = self._of(matter, whole)
+        theirs, their_body = there._of(then, whole)
+        found = {"time": there.time}
+        for name in vars(self).keys() - found.keys():
+            here, chosen, taken = np.array(getattr(self, name)), mine, theirs
+            if name in ("centre", "speed", "spin_momentum", "rotation"):
+                chosen, taken = body, their_body
+            elif name in ("branch_strain", "branch_volume"):
+                chosen, taken = mine[matter.relaxing], theirs[then.relaxing]
+            here[chosen] = getattr(there, name)[taken]
+            found[name] = here
+        return replace(self, **found)
+
     def _of(
         self, matter: ParticleConstants, bodies: Collection[int]
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -388,7 +416,7 @@ class State:
 def elastic_stress(matter: ParticleConstants, state: State) -> Float[np.ndarray, "P 3 3"]:
     """Kirchhoff stress τ of each particle's own strain [Pa]; none in rigid bodies.
 
-    Without what ``mean_pressure`` adds where matter is nearly incompressible.
+    Without what ``mean_pressure`` adds where material is nearly incompressible.
     """
     m, s = matter, state
     out = np.zeros_like(s.F)

@@ -51,9 +51,10 @@ GIVEN_MASK_BOUNDS = OutlierBounds(0.75, 0.95)
 wrong ones 0.7 and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
 """
 GROWN_MASK_BOUNDS = OutlierBounds(0.85, 0.8)
-"""Of grown masks that are believed, which vary more: of 17 sets of one thing every right view is
-filled by 0.91 and more; views that show another thing on the same floor by 0.68 and less, at
-overlaps of 0.8 and less."""
+"""Of grown masks that are accepted, which vary more: of 17 sets of one object every right view is
+filled by 0.91 and more; views that show another object on the same floor by 0.68 and less, at
+overlaps of 0.8 and less.
+"""
 
 
 def outlier_views(

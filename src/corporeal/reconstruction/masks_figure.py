@@ -1,4 +1,4 @@
-"""Masks over some of the photographs: whether the thing is what somebody meant is seen at once."""
+"""Masks over some of the photographs: whether the object is what somebody meant is seen at once."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,8 +1,8 @@
-"""Masks by a model that finds objects in one picture, and whether they are of one thing at all.
+"""Masks by a model that finds objects in one picture, and whether they are of one object at all.
 
 A model sees one picture at a time and may take something else for the object in each. What it
 found is asked what grown masks are asked: whether pictures hold it, and whether its outlines are
-those of one thing. Nobody asks that of what a person drew.
+those of one object. Nobody asks that of what a person drew.
 """
 
 from pathlib import Path
@@ -34,19 +34,19 @@ CORRECT_MASKS_HINT = (
 def masks_from_model(
     config: ReconstructConfig, source: Path, place: Path, progress: Progress
 ) -> tuple[Path, tuple[str, ...], tuple[str, ...]]:
-    """Ask a model for masks, and ask of them whether they are of one thing.
+    """Ask a model for masks, and ask of them whether they are of one object.
 
     Args:
         config: Names model and words.
         source: A folder of photographs with poses.
         place: Gets the masks.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Returns:
         A folder that holds them, how they came about, and what is to be doubted.
 
     Raises:
-        UserError: There is no such model, or what it found is no thing.
+        UserError: There is no such model, or what it found is no object.
 
     """
     masker = connect_mask_model(config.masks)
@@ -76,7 +76,7 @@ def masks_from_model(
 def several_objects_reason(
     masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]
 ) -> tuple[str | None, float]:
-    """Say in a clause why masks are not of one thing; None: they may be.
+    """Return in a clause why masks are not of one object; None: they may be.
 
     Returns:
         The clause, and which share of a mask the hull of all fills.

@@ -6,17 +6,49 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from corporeal.core.errors import UserError, check_range
-from corporeal.core.setting_types import ReadsPath
+from corporeal.core.setting_types import NoOption, ReadsPath
 from corporeal.geometry.gaussian_transforms import MAX_COORDINATE_UNITS, UpAxisChoice
 from corporeal.multiview.metric_scale import MeasuredDistance, MetricScale, stated_metric_scale
 from corporeal.reconstruction.features import ENCODER_REGISTRY as ENCODERS
 from corporeal.reconstruction.features import connect_encoder
 from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
 from corporeal.reconstruction.features.mask_models import connect_mask_model, split_model_spec
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
+from corporeal.reconstruction.surface.surface_config import (
+    DEFAULT_CLOSED_SURFACE,
+    ClosedSurfaceConfig,
+)
 
 MASKS_AUTO, MASKS_NONE = "auto", "none"
 EncoderSpec = Annotated[str, ReadsPath(prefixes=tuple(ENCODERS))]
+
+
+@dataclass(frozen=True)
+class ReconstructionResolution:
+    """How finely a reconstruction looks and carves."""
+
+    rendered_views: int = 48
+    """Pictures of a splat that comes without cameras [1]."""
+    rendered_size_px: tuple[int, int] = (384, 384)
+    """Width and height of these [px]."""
+    hull_grid_cells: int = DEFAULT_HULL.grid_cells
+    """Cells of the grid that visual hulls are carved from [1]."""
+    object_grid_cells: int = DEFAULT_CLOSED_SURFACE.object_grid_cells
+    """Cells of the grid about each object that its surface is carved from, about [1]."""
+
+    @property
+    def hull(self) -> HullConfig:
+        """How visual hulls are carved."""
+        return HullConfig(grid_cells=self.hull_grid_cells)
+
+    @property
+    def surface(self) -> ClosedSurfaceConfig:
+        """How finely closed surfaces are carved."""
+        return ClosedSurfaceConfig(object_grid_cells=self.object_grid_cells, hull=self.hull)
+
+
+DEFAULT_RESOLUTION = ReconstructionResolution()
 
 
 @dataclass(frozen=True)
@@ -48,7 +80,7 @@ class ReconstructConfig:
     training: Literal["preview", "draft", "normal"] = "normal"
     """Length of training on photographs: seconds, about one minute, or four, on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
-    """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
+    """Rasteriser for training: numba on the processor, or gsplat on a CUDA GPU."""
     semantic: EncoderSpec = "descriptor"
     """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
     needs no weights."""
@@ -61,6 +93,8 @@ class ReconstructConfig:
     """Continue where objects are as large as the room, or photographs are reproduced badly."""
     training_seed: int = 0
     """Seed of all random numbers."""
+    resolution: Annotated[ReconstructionResolution, NoOption()] = DEFAULT_RESOLUTION
+    """Sizes of pictures and grids."""
 
 
 DEFAULT_RECONSTRUCT = ReconstructConfig()

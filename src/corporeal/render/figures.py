@@ -1,4 +1,4 @@
-"""Figures as papers show them: the scene coloured by what it is made of, and a video as a strip."""
+"""Figures: the scene coloured by materials, and a video as a strip of frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,15 +83,23 @@ class NumericPanel:
     log: bool = False
 
 
-def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) -> None:
+def fields_figure(
+    scene: Scene,
+    parts: Parts,
+    field: MaterialField,
+    path: Path,
+    picture_px: tuple[int, int] = PANEL_SIZE_PX,
+) -> None:
     """Draw six panels: material, law, stiffness, Poisson's ratio, density and object.
+
+    picture_px: width and height of what is rendered for each panel; it is scaled to the panel.
 
     Raises:
         UserError: The file cannot be written.
 
     """
     stage = RayScene(scene)
-    camera = fit_camera(_boxes(scene), PANEL_SIZE_PX, fill=0.93)
+    camera = fit_camera(_boxes(scene), picture_px, fill=0.93)
     seen, _ = identify_triangles(stage, camera)
     share = _visible_pixels(seen, parts)
     sheet = Image.new("RGB", SHEET_SIZE_PX, "white")

@@ -1,4 +1,4 @@
-"""Pages of HTML that hold all they show: one look, templates, and pictures inside the text."""
+"""Self-contained HTML pages: style, templates and embedded pictures."""
 
 import base64
 import html

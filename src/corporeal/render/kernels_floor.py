@@ -1,4 +1,4 @@
-"""The floor of a video's pictures: which of it objects darken, and how, where they do so softly.
+"""Shading of the floor: tiles in hard and soft shadow.
 
 Tiles of 8 × 8 pixels are told apart. Near objects and in their shadow pixels ask for light
 themselves; farther away objects only hide a little of the sky, which is asked at the corners of

@@ -1,4 +1,4 @@
-"""A scene before rays: what they hit, what stops them, and the light of the studio around it."""
+"""A scene for ray casting: hits, occlusion, and studio lighting."""
 
 from collections.abc import Sequence
 from copy import copy

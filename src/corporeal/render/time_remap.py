@@ -1,4 +1,4 @@
-"""Which instant every picture of a video shows: in real time, or slower about one instant."""
+"""Time remapping: real time, or slow motion about one instant."""
 
 import numpy as np
 from jaxtyping import Float

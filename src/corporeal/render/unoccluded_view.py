@@ -1,4 +1,4 @@
-"""From where a video shows what happens: rays from the camera to every object, against surfaces.
+"""View directions without occlusion, tested by rays to every object.
 
 Boxes cannot tell a bowl from a block. Where the usual direction leaves an object behind or inside
 of another one for most of the time, others are tried, also from higher up.

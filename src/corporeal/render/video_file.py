@@ -49,7 +49,7 @@ class VideoWriter:
             raise self.failure()
 
     def failure(self) -> UserError:
-        """Say what went wrong, in the encoder's words."""
+        """Describe what went wrong, in the encoder's words."""
         self.program.kill()
         self.program.wait()
         self.log.seek(0)
@@ -76,7 +76,8 @@ def check_size(width: int, height: int) -> None:
         or max(width, height) > MAX_SIDE_PX
     ):
         raise UserError(
-            f"A video cannot be {width} × {height} pixels. Both must be even, from {MIN_SIDE_PX} to "
+            f"A video cannot be {width} × {height} pixels. Both must be even, from {MIN_SIDE_PX} "
+            "to "
             f"{MAX_SIDE_PX}."
         )
 
@@ -151,7 +152,7 @@ def _credit_options(credit: str) -> list[str]:
 
 
 def _unreadable(path: Path, error: Exception) -> UserError:
-    """Say that a video cannot be read, by the last line of all that the program says."""
+    """State that a video cannot be read, by the last line of all that the program says."""
     if not path.exists():
         return UserError(f"{path}: there is no such video. Make it again.")
     last = (str(error).strip().splitlines() or ["it is empty"])[-1].strip(" .)")

@@ -1,4 +1,4 @@
-"""The viewer's page: its scripts, as files for a server, or all in one text for a report."""
+"""The viewer's page, as files for a server or inlined for a report."""
 
 import json
 import zlib

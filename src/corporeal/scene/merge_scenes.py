@@ -1,4 +1,4 @@
-"""Two filled scenes as one: the objects of the second after those of the first."""
+"""Merging of two filled scenes."""
 
 from dataclasses import replace
 
@@ -84,7 +84,7 @@ def _merged_parts(a: SceneWithMaterials, b: SceneWithMaterials) -> Parts:
 def _merged_field(
     a: MaterialField, b: MaterialField, friction: np.ndarray, restitution: np.ndarray
 ) -> MaterialField:
-    """Pairs that were there before keep what they had: somebody may have stated it."""
+    """Existing pairs keep their coefficients, which may be annotated."""
     friction, restitution = friction.copy(), restitution.copy()
     old = [*range(len(a.materials)), len(friction) - 1]
     friction[np.ix_(old, old)], restitution[np.ix_(old, old)] = a.friction, a.restitution

@@ -103,9 +103,9 @@ def duck_on_can() -> ShowcaseComposition:
     (2/3) P δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with
     k ≈ 2.3 E h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J,
     50 N) it only bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with
-    75 N, which in life leaves a dent of a millimetre or two. The simulated dent is far deeper:
+    75 N, which in reality leaves a dent of a millimetre or two. The simulated dent is far deeper:
     a wall that the grid must thicken is softer in its plane. Its place and that it stays are
-    to be believed, its depth is not.
+    reliable, its depth is not.
     """
     can = PlacedModel("soda_can", (-0.0575, 0, 0.0331), (0, 90, 0))
     duck = PlacedModel("rubber_duck", (-0.005, 0.0, 0.24), (0, 0, -15), (0.0, 0.0, -6.0))
@@ -196,7 +196,7 @@ def water_knocked_over() -> ShowcaseComposition:
     """Knock a glass of water over with a wooden ball that strikes it just under its rim.
 
     The ball, 46 g at 4 m/s, brings 0.18 kg m/s; the glass with 170 g of water weighs 0.38 kg. About
-    the edge of its foot the blow gives 0.18 × 0.085 = 16 g m²/s; to tip over it has to lift its
+    the edge of its foot the impact gives 0.18 × 0.085 = 16 g m²/s; to tip over it has to lift its
     centre from 4.5 cm over the floor to 5.5 cm from that edge, √(2 I m g 0.01) = 10 g m²/s with
     I ≈ 1.5 g m². A glass that lies on its side holds what is below its lower rim: at three fifths
     full hardly anything.

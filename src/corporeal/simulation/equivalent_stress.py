@@ -1,4 +1,4 @@
-"""Von Mises stress of every particle: what colours in the viewer show."""
+"""Von Mises stress of every particle."""
 
 import numpy as np
 from jaxtyping import Float
@@ -25,7 +25,7 @@ class VonMises:
     """Von Mises stress of every particle of a problem, in its order."""
 
     def __init__(self, problem: Problem) -> None:
-        """Look up what every particle is made of."""
+        """Look up the constitutive laws of the particles."""
         substances, row = MaterialTable.of(problem)
         self.soft = np.flatnonzero(~substances.rigid[row])
         mine = row[self.soft]

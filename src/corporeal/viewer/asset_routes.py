@@ -1,4 +1,4 @@
-"""What a page is told of things that it can drop, and of a live scene that has grown by them."""
+"""What a page is told of objects that it can drop, and of a live scene that has grown by them."""
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request

@@ -21,7 +21,7 @@ MAX_COMMAND_BYTES = 4096
 """Of one order [bytes]."""
 MAX_COMMANDS_PER_SECOND = 200
 MAX_NAME_CHARACTERS = 300
-"""Of a thing [letters]."""
+"""Of an object [letters]."""
 COMMAND_KINDS = (
     "grab",
     "pull",
@@ -47,10 +47,12 @@ class Command:
     object: int = 0
     point: Vector = (0.0, 0.0, 0.0)
     """Where an object is taken; what is pointed at, or in a record the middle of the underside of
-    a thing that is added [m]."""
+    an object that is added [m].
+    """
     to: Vector = (0.0, 0.0, 0.0)
     """Where it is pulled [m]; gravity [m/s²]; wind [m/s]; in its last place, how high above all
-    that is under it a thing that is added begins [m]."""
+    that is under it an object that is added begins [m].
+    """
     firm: float = 4.0
     """Natural frequency on the hand's spring [Hz]."""
     single: bool = False
@@ -100,7 +102,7 @@ def _number(value: Any) -> float:
 
 def _name(value: Any) -> str:
     if not isinstance(value, str) or len(value) > MAX_NAME_CHARACTERS:
-        raise UserError("The thing of an order is no name.")
+        raise UserError("The object of an order is no name.")
     return value
 
 

@@ -23,7 +23,7 @@ DEFAULT_SETTINGS = Settings()
 
 @dataclass(frozen=True)
 class AssetKey:
-    """What a thing is called: ``corporeal/mug``, or ``RUN/OBJECT``."""
+    """What an object is called: ``corporeal/mug``, or ``RUN/OBJECT``."""
 
     place: str
     name: str
@@ -55,7 +55,7 @@ class LiveAssets:
         return {"models": [{"thing": name} for name in ours], "runs": runs}
 
     def find(self, text: str) -> SceneWithMaterials:
-        """Return a scene of one thing alone, at rest, and what it is made of.
+        """Return a scene of one object alone, at rest, and what it is made of.
 
         Raises:
             UserError: There is none of this name.

@@ -51,7 +51,7 @@ def prepare_changed_run(
 
     Args:
         run: The other one's folder; not changed.
-        made: What its verbs made.
+        made: What its stages made.
         asked: ``parts``: number of a part → ``material`` and ``values`` (field → SI); ``detail``;
             ``drop`` in sizes of the object; ``objects``: number of an object → ``lift`` [m] and
             ``velocity`` [m/s].

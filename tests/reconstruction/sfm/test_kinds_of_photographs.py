@@ -238,7 +238,7 @@ def test_what_only_its_name_calls_a_picture_is_not_called_one(tmp_path, name, sa
 @pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
 def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
     saved(tmp_path, greys[:count], ".jpg", Image.fromarray)
-    with pytest.raises(BadFileError, match=f"photos: {said} too few to show a thing"):
+    with pytest.raises(BadFileError, match=f"photos: {said} too few to show an object"):
         gathered(tmp_path)
 
 

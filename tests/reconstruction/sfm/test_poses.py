@@ -20,7 +20,6 @@ from corporeal.reconstruction import gaussian_source as reconstructing
 from corporeal.reconstruction.masks.grown_masks import GrownMasks
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.reconstruction.sfm import find_poses as posing
-from corporeal.reconstruction.sfm import video_frames
 from corporeal.reconstruction.sfm.find_poses import (
     CAMERAS_FIGURE_FILE,
     describe_moved_object,
@@ -278,7 +277,7 @@ def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
     assert tried == ["plain", "thorough"], "both attempts once"
     shutil.copytree(taken[0], tmp_path / "other")
     (tmp_path / "other" / "photo_000.jpg").unlink()
-    with pytest.raises(BadFileError, match="Put the thing on something with a pattern"):
+    with pytest.raises(BadFileError, match="Put the object on something with a pattern"):
         find_poses(tmp_path / "other", tmp_path / "poses", silent)
     assert len(tried) == 4, "other pictures are looked at anew"
 
@@ -505,8 +504,8 @@ def test_a_video_that_was_held_upright_is_turned(tmp_path, caplog):
 
 
 @pytest.mark.parametrize("kind", ["ten frames", "still", "noise", "empty", "text", "long"])
-def test_videos_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monkeypatch):
-    path, said = tmp_path / "a.mp4", "cannot be read as a video"
+def test_videos_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind):
+    path, said, longest = tmp_path / "a.mp4", "cannot be read as a video", 600.0
     if kind == "ten frames":
         said = "holds 10 frames; at least 20"
         video(path, 10)
@@ -516,13 +515,12 @@ def test_videos_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, mon
             for _ in range(40):
                 made.add(np.full((240, 320, 3), 90, np.uint8))
     elif kind == "long":
-        said = "is 0 minutes long; at most"
-        monkeypatch.setattr(video_frames, "MAX_VIDEO_S", 0.5)
+        said, longest = "is 0 minutes long; at most", 0.5
         video(path, 30)
     else:
         path.write_bytes({"noise": bytes(range(256)) * 50, "empty": b"", "text": b"video"}[kind])
     with pytest.raises(BadFileError, match=said) as error:
-        write_video_frames(path, tmp_path / "frames", silent)
+        write_video_frames(path, tmp_path / "frames", silent, longest)
     assert "\n" not in str(error.value)
 
 
@@ -537,7 +535,7 @@ def test_a_recording_of_a_screen_is_refused(tmp_path):
             made.add(shown)
     with pytest.raises(BadFileError, match="never moves: it is a recording of a screen") as error:
         write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", silent)
-    assert "\n" not in str(error.value) and "Do not turn the thing" in str(error.value)
+    assert "\n" not in str(error.value) and "Do not turn the object" in str(error.value)
 
 
 def test_what_stands_still_before_a_plain_wall_is_no_screen():

@@ -1,4 +1,4 @@
-"""What a scene is, in words: objects, their parts, and the ways that these may be."""
+"""Descriptions of scenes: objects, parts and hypotheses."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -66,9 +66,9 @@ class Hypothesis:
     """In [0, 1]; those of a part add up to 1 at most."""
     contents: str | None = None
     fill: float | None = None
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     solidity: float | None = None
-    """Of what is packed: share of its outer shape that is matter, in [0, 1]."""
+    """Of what is packed: share of its outer shape that is material, in [0, 1]."""
     reading: str = ""
     """What the whole object is then ("imitation"): ways of one reading are drawn together."""
     reason: str = ""
@@ -109,7 +109,7 @@ AnswerSource = Literal["annotation", "recording", "model", "metadata", "unknown"
 class ScanThickening:
     """How much of what a scan draws of a part the real part takes up: scans thicken what is thin.
 
-    Shares of volume [-]: 1 where the model is as thick as the real thing.
+    Shares of volume [-]: 1 where the model is as thick as the real object.
     """
 
     low: float
@@ -143,9 +143,9 @@ class PartDescription:
     contents: str | None = None
     """A name from the library: what is behind the wall of what is filled."""
     fill: float | None = None
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     solidity: float | None = None
-    """Of what is packed: share of its outer shape that is matter, in [0, 1]."""
+    """Of what is packed: share of its outer shape that is material, in [0, 1]."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """All ways it may be, the one above among them, likeliest first; empty: only the one above."""
     placements: dict[str, RangePlacement] = field(default_factory=dict)
@@ -176,7 +176,7 @@ class PartDescription:
     """Whether its surface need not show the inner face of its wall, as pictures do not where that
     is plain: how thick the surface draws it tells nothing."""
     wall_usual: bool = False
-    """Whether ``thickness`` is that of most things of its name: nobody stated it of this one."""
+    """Whether ``thickness`` is that of most objects of its name: nobody stated it of this one."""
     wall_why: str = ""
     """Where such a usual thickness is from; "": its table does not say."""
 

@@ -1,4 +1,4 @@
-"""What a scene is made of: materials, walls, masses."""
+"""Materials, structures and masses of a scene."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -51,7 +51,7 @@ class Material:
     restitution: float = 0.5
     """Normal restitution where rigid meets rigid [-]."""
     loss: float = 0.0
-    """Loss factor at a blow: tan δ of the bulk at an impact's frequencies and strains [-]."""
+    """Loss factor at an impact: tan δ of the bulk at an impact's frequencies and strains [-]."""
     shell_thickness: float | None = None
     """How thin such objects are usually made [m]; None: solid as a rule."""
     viscosity: float | None = None
@@ -85,7 +85,7 @@ class Structure:
     contents: Material | None = None
     """What is behind the wall of what is filled; None: air."""
     fill: float = 0.0
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     loose: bool = False
     """Whether the contents lie at the bottom, as liquids and grains do; else they are all over."""
     inflated: bool = False
@@ -97,7 +97,7 @@ class Structure:
     rebound: float | None = None
     """Restitution that rules ask of an inflated ball of its name [-]; None: none is known."""
     solidity: float = 1.0
-    """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
+    """Share of a solid's shape that is material, the rest being air between its pieces; 1: all."""
     holds: str = ""
     """What moves by itself behind the wall of a shell, as an object of its own; "": nothing."""
     sealed: bool = False

@@ -1,4 +1,4 @@
-"""What comes in: scenes, pictures and Gaussians."""
+"""Inputs: scenes, pictures and Gaussians."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -296,4 +296,4 @@ class Reconstruction:
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
     doubts: tuple[str, ...] = ()
-    """Those of the warnings that say where shapes are not to be believed."""
+    """Those of the warnings that say where shapes are unreliable."""

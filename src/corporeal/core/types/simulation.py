@@ -1,4 +1,4 @@
-"""What is simulated, and what comes of it."""
+"""Particles, treatments, trajectories and videos."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -39,7 +39,9 @@ class Discretization:
     """Largest stable time step of this part [s]; inf when rigid."""
     reason: str
     loss: float = 0.0
-    """Simulated loss factor [-]: its material's, less what the grid takes of a blow by itself."""
+    """Simulated loss factor [-]: its material's, less what the grid takes of an impact by
+    itself.
+    """
     vibration: float = 0.0
     """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
     is_floor_covering: bool = False
@@ -136,7 +138,7 @@ class Particles:
     wetted_point: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Where liquids touch rigid objects, inside of what is hollow too [m]."""
     wetted_normal: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
-    """Unit, out of the matter there."""
+    """Unit, out of the material there."""
     object_of_wetted: Int[np.ndarray, " W"] = field(
         default_factory=lambda: np.zeros(0, dtype=np.int64)
     )
@@ -259,11 +261,11 @@ class FractureEvent:
     energy: float
     """Taken from the motion [J]: what it bears until it breaks."""
     ratio: float
-    """Energy of the blow over that [-]."""
+    """Energy of the impact over that [-]."""
     by: str
     """The other body, or the floor."""
     speed: float
-    """Along the blow [m/s]."""
+    """Along the impact [m/s]."""
     impact_energy: float
     """Energy of the impact [J]."""
     piece: Int[np.ndarray, " P"]

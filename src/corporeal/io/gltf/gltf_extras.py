@@ -15,7 +15,7 @@ MIN_SCALE_RATIO = 1e-6
 
 
 def is_own_file(document: GltfDocument) -> bool:
-    """Tell whether the extras mean what our writer means by them."""
+    """Return whether the extras mean what our writer means by them."""
     asset = document.root.child("asset")
     return asset is not None and asset.text("generator") == GLB_GENERATOR
 

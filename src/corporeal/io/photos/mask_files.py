@@ -43,7 +43,7 @@ class MaskRecord:
     beside: str = ""
     """What stands beside what they show, in sentences; empty: nothing is known of it."""
     contradict: bool = False
-    """Whether they are not believed because their outlines contradict each other."""
+    """Whether they are rejected because their outlines contradict each other."""
 
 
 def mask_file_names(shots: Sequence[PosedPhotoFile]) -> list[str]:

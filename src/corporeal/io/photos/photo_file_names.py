@@ -3,7 +3,7 @@
 READABLE_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 """Pictures that are read."""
 HEIC_SUFFIXES = (".heic", ".heif")
-"""Photographs that telephones take; they are not read, but known for what they are."""
+"""Photographs that phones take; they are not read, but known for what they are."""
 UNREAD_IMAGE_SUFFIXES = (
     ".tif",
     ".tiff",

@@ -195,7 +195,7 @@ def list_posed_photos(path: Path) -> PhotoListing:
 
 
 def has_masks(shots: list[PosedPhotoFile]) -> bool:
-    """Tell whether there are masks, instances or an alpha channel, by names and headers."""
+    """Return whether there are masks, instances or an alpha channel, by names and headers."""
     return any(s.mask or s.instances or _has_alpha(s.picture) for s in shots)
 
 
@@ -226,7 +226,7 @@ def _with_masks_from(folder: Path, shots: list[PosedPhotoFile]) -> list[PosedPho
         for shot in shots
     ]
     if not any(shot.mask or shot.instances for shot in made):
-        step = "Masks are PNG pictures with the names of the photographs, white where things are."
+        step = "Masks are PNG pictures with the names of the photographs, white where objects are."
         raise BadFileError(folder, "holds no mask with the name of a photograph.", step)
     return made
 
@@ -304,7 +304,7 @@ def _companion_names(picture: Path) -> tuple[str, ...]:
 
 
 def unused_masks_note(folder: Path, pictures: Sequence[Path]) -> list[str]:
-    """Say that a folder has masks whose names fit none of its photographs, if it has such."""
+    """State that a folder has masks whose names fit none of its photographs, if it has such."""
     for place in (folder / name for name in MASK_FOLDERS):
         held = [p for p in sorted(place.rglob("*")) if p.suffix.lower() in READABLE_IMAGE_SUFFIXES]
         if (

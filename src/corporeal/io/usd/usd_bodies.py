@@ -1,6 +1,6 @@
 """The physics of a USD stage: of our own exports all that they carry, of others UsdPhysics'.
 
-Meshes are read elsewhere (``mesh_usd.py``); here is what things weigh, how they move and what they
+Meshes are read elsewhere (``mesh_usd.py``); here is what objects weigh, how they move and what they
 are made of, each value with who stated it.
 """
 

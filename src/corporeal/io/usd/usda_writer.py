@@ -35,7 +35,7 @@ class UsdSampleStream:
 
 @dataclass
 class UsdPrim:
-    """One prim: its type, what it says of itself, and what is below it."""
+    """One prim: its type, what it states, and what is below it."""
 
     kind: str
     """Schema ("Mesh"); "": an over that adds to a prim of another layer."""
@@ -206,12 +206,12 @@ def usda_strings(values: Iterable[str]) -> str:
 
 
 def usda_display_name(words: str) -> str:
-    """Say how people call a prim, in any alphabet."""
+    """Return how people call a prim, in any alphabet."""
     return f"displayName = {usda_string(words)}"
 
 
 def usda_inactive() -> str:
-    """Say that a prim is not there."""
+    """State that a prim is not there."""
     return "active = false"
 
 

@@ -1,4 +1,4 @@
-"""The report of a corpus: one page that holds all it shows, and its numbers as CSV and JSON."""
+"""Report of a corpus: a self-contained page, with data as CSV and JSON."""
 
 import csv
 import io

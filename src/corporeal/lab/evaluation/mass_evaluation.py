@@ -1,4 +1,4 @@
-"""Mass: how well what was recognised predicts what the scales said.
+"""Evaluation of predicted masses against measured ones.
 
 The ladder of what is known, each step in the same run: the scan's volume as water; everything
 solid and usual; how objects are built and filled, with usual values; values placed in their

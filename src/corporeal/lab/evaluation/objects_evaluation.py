@@ -139,7 +139,7 @@ def evaluate_objects(
     Args:
         folder: Of scenes as ``corporeal assemble`` writes them, or one such scene.
         config: How they are pictured.
-        progress: Told the share done.
+        progress: Called with the fraction done.
 
     Raises:
         UserError: There is no scene of several objects.

@@ -1,4 +1,4 @@
-"""Memory that the native contact piece works in, and the parameters it takes from the problem."""
+"""Memory of the native contact solver, and its parameters."""
 
 import numpy as np
 
@@ -115,7 +115,7 @@ def rigid_grid(
 
 
 def _wetted_points(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Give points that liquids touch and their normals, in the body's frame, and patches of them.
+    """Return points that liquids touch and their normals, in the body's frame, and patches of them.
 
     Patches are two cells wide: a liquid looks no farther.
     """

@@ -5,12 +5,13 @@ particles, nodes and contacts are the native pieces of ``cpu.program``, launched
 """
 
 from collections.abc import Collection
+from typing import Self
 
 import numpy as np
 
 from corporeal.core.errors import SimulationError
 from corporeal.core.process_resources import usable_cores
-from corporeal.mpm.add_bodies import AddedBodies, adopt_running_conditions
+from corporeal.mpm.body_changes import BodyChange, EngineBodyChanges
 from corporeal.mpm.constants import (
     FREE_FALL_STEP_FRACTION,
     MAX_DISTANCE_FROM_ORIGIN_DX,
@@ -24,12 +25,7 @@ from corporeal.mpm.constants import (
 from corporeal.mpm.cpu import native_tables, task_lists
 from corporeal.mpm.cpu import step_clock as pacing
 from corporeal.mpm.cpu.contact_memory import ContactMemory, rigid_grid, write_pointers
-from corporeal.mpm.cpu.engine_checkpoint import (
-    EngineCheckpoint,
-    SavedArrays,
-    extend_state,
-    inherit_state,
-)
+from corporeal.mpm.cpu.engine_checkpoint import EngineCheckpoint, SavedArrays, continued
 from corporeal.mpm.cpu.field_window import NATIVE_ARRAYS, FieldWindow, window_too_wide_error
 from corporeal.mpm.cpu.layout import (
     BODY_SUMS,
@@ -58,7 +54,7 @@ from corporeal.mpm.cpu.shared_field import CarriedRigidBody
 from corporeal.mpm.cpu.spring_records import SpringRecords
 from corporeal.mpm.cpu.wind_records import WindRecords
 from corporeal.mpm.diagnostics import BodySums
-from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.material_table import MaterialTable
 from corporeal.mpm.physics import prescribed_motion, wall_stress
@@ -67,14 +63,15 @@ from corporeal.mpm.physics.rigid import RigidBody
 from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, StepStatistics
-from corporeal.mpm.split_body import ParentMap
 from corporeal.mpm.state import Velocities
 
 DEFAULT_THREADS = 4
 
 
-class CpuEngine(EngineInteraction):
+class CpuEngine(EngineBodyChanges, EngineLoadChanges):
     """Steps one problem on the CPU."""
+
+    name = "cpu"
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
         """Lay out memory.
@@ -398,36 +395,6 @@ class CpuEngine(EngineInteraction):
         self.lost[:] = False
         self.connect()
 
-    def inherit(self, saved: SavedArrays, heirs: ParentMap) -> None:
-        """Go on from the ``save`` of an engine of whose bodies one is several here.
-
-        The pieces are where the problem says; all else is as it was, and so are the books.
-        """
-        self.restore(inherit_state(self.save(), saved, heirs))
-
-    def joined_by(self, problem: Problem) -> "CpuEngine":
-        """Return an engine that goes on from here with more bodies.
-
-        Forces of contacts are looked for anew in the first step. What is held stays held. The
-        potential energy of those that join is booked as work from outside.
-
-        Args:
-            problem: With those that join after all others, which are as at the start.
-
-        """
-        who = AddedBodies(len(self.problem.bodies), len(problem.bodies))
-        after = CpuEngine(adopt_running_conditions(problem, self.problem), self.threads)
-        saved, shared = self.save(), after.problem.contact == "single"
-        after.restore(extend_state(after.save(), saved, who, shared))
-        if shared:
-            after.window[0].continue_as(self.window[0], after.material[0])
-            after.connect()
-        after.grips = dict(self.grips)
-        after._take_grips()
-        added = after.measure().potential[who.before :]
-        after._enter(who.before, np.zeros(3), float(added.sum()))
-        return after
-
     # ------------------------------------------------------------ accessors of what is common
 
     def _particles(self) -> Snapshot:
@@ -521,3 +488,12 @@ class CpuEngine(EngineInteraction):
             # What it was strained by there was long ago: branches have forgotten it.
             self.window[f].relax(self.material[f])
         self.connect()
+
+    def _successor(self, problem: Problem, change: BodyChange) -> Self:
+        after = type(self)(problem, self.threads)
+        saved, shared = self.save(), problem.contact == "single"
+        after.restore(continued(after.save(), saved, change, shared))
+        if shared:
+            after.window[0].continue_as(self.window[0], after.material[0])
+            after.connect()
+        return after

@@ -42,8 +42,9 @@ class FieldWindow:
     part: np.ndarray
     """Channels of all particles, (batches, CHANNELS, 8)."""
     history: np.ndarray
-    """What matter that flows or is nearly incompressible remembers besides, (batches, HISTORY, 8);
-    empty without any."""
+    """What material that flows or is nearly incompressible remembers besides, (batches, HISTORY,
+    8); empty without any.
+    """
     branch: np.ndarray
     """What Maxwell branches remember, (batches, MEMORY, 8); empty without any."""
     block: np.ndarray
@@ -66,7 +67,7 @@ class FieldWindow:
     """Size of the table."""
     fits: bool
     relieves: bool
-    """Whether the history, where there is any, is that of nearly incompressible matter."""
+    """Whether the history, where there is any, is that of nearly incompressible material."""
 
     def __init__(
         self, place: np.ndarray, rows: np.ndarray, material: FieldMaterials, sorter: ParticleSorter
@@ -181,7 +182,7 @@ class FieldWindow:
         return self._rows(self.part[:, first : first + width])
 
     def past(self, first: int, width: int) -> np.ndarray:
-        """Copy some channels of what matter that flows remembers; 0 where nothing flows."""
+        """Copy some channels of what material that flows remembers; 0 where nothing flows."""
         if not len(self.history):
             return np.zeros((self.count, width), np.float32)
         return self._rows(self.history[:, first : first + width])
@@ -242,12 +243,14 @@ def _shifted_places(place: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """Shift fixed-point places, which float32 channels hold."""
     fixed = np.ascontiguousarray(place).view(np.int32).astype(np.int64) + shift
     if (np.abs(fixed) >= 2**31).any():
-        raise SimulationError("What joins is too far from all else for one grid. Drop it nearer.")
+        raise SimulationError(
+            "The added body is too far from the others for one grid. Add it nearer."
+        )
     return fixed.astype(np.int32).view(np.float32)
 
 
 def window_too_wide_error(problem: Problem, bodies: list[int], time: float) -> str:
-    """Say that some bodies no longer fit into one window."""
+    """State that some bodies no longer fit into one window."""
     names = " and ".join(repr(problem.bodies[b].name) for b in bodies)
     return (
         f"At t = {time:.4g} s {names} no longer fits into one grid: it spans more than 500 cells. "

@@ -1,7 +1,7 @@
-"""Memory that Python and the native loops share: channels, columns, codes and structs.
+"""Memory layout shared by Python and native loops: channels, columns, codes and structs.
 
-``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no number and
-no struct of this layout is written in ``loops``.
+``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no
+number and no struct of this layout is written in ``loops``.
 """
 
 from corporeal.mpm.constants import BRANCHES
@@ -19,12 +19,14 @@ per cell: dx times the usual), F - 1 (9), stress (6), mass, volume, material and
 CHANNELS = 34
 """Channels of a particle."""
 EP, VC, TM = 0, 1, 2
-"""First channels of what matter that flows remembers besides: plastic strain, volume correction,
-whole motion - 1 (9)."""
+"""First channels of what material that flows remembers besides: plastic strain, volume correction,
+whole motion - 1 (9).
+"""
 LOG_VOLUME_RATIO, PRESSURE, OWN_DILATATION, CLUSTER, WAVE_BOUND = 1, 2, 3, 4, 5
-"""The same of nearly incompressible matter: ln of the mean volume over its own and the Kirchhoff
+"""The same of nearly incompressible material: ln of the mean volume over its own and the Kirchhoff
 pressure of the mean [Pa]; within a step, its own dilatation, its cluster and the wave bound so far.
-Its plastic strain, in the channel before, stays 0."""
+Its plastic strain, in the channel before, stays 0.
+"""
 HISTORY_CHANNELS = 11
 """Channels of that."""
 BRANCH_STRAIN, BRANCH_DILATATION = 0, 6

@@ -1,4 +1,4 @@
-"""What the native pieces read of bodies: rows of particles, materials and rigid states."""
+"""Tables of bodies for native code: particles, materials and rigid states."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Native reading of particles: spread into arrays, or added up by body."""
+"""Native reading of particles into arrays, or sums by body."""
 
 from itertools import pairwise
 

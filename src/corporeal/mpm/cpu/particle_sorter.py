@@ -1,4 +1,4 @@
-"""The native sort of one field's particles, and the memory it works in."""
+"""Native sort of one field's particles, with its memory."""
 
 from itertools import pairwise
 from typing import Protocol

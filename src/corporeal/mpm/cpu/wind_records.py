@@ -1,4 +1,4 @@
-"""What the native piece of the loads reads: one record for every body in the wind."""
+"""Records of bodies in wind for native code."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How fields look where they meet, on the device: surfaces, normals, gaps.
+"""Contact geometry on the device: surfaces, normals, gaps.
 
 Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and relative to the node.
 """
@@ -390,7 +390,7 @@ def gap_of(
 
 @wp.func
 def mean_of(c: DeviceContacts, g: BlockGrid, s: StepGlobals, entry: int):
-    """Mean offset of a field's matter from a node [cells]."""
+    """Mean offset of a field's material from a node [cells]."""
     return wp.vec3d(c.mean[entry] / (g.node[c.slot[entry]][0] * s.cell))
 
 

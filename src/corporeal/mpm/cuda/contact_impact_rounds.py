@@ -113,7 +113,7 @@ def closing_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int):
 
 @wp.kernel
 def find_struck_pairs(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
-    """Find the rigid pairs that are hit as things move now."""
+    """Find the rigid pairs that are hit as objects move now."""
     for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
         if has_restitution(c, r, s, t):
             un = closing_of(c, r, s, t)
@@ -192,7 +192,7 @@ def begin_round(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, lanes: 
 
 @wp.kernel
 def set_targets(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
-    """Say which contacts take part in a round, and what speed each may keep."""
+    """Return which contacts take part in a round, and what speed each may keep."""
     dt = s.clock[CLOCK_DT]
     for k in range(wp.tid(), s.flag[FLAG_MEETS], stride):
         if c.stiff[k] == 1:

@@ -1,4 +1,4 @@
-"""Memory of the device engine: what a problem puts into the structs of ``layout``."""
+"""Memory of the device engine: initialization of the structs of ``layout``."""
 
 from typing import Any
 

@@ -1,8 +1,8 @@
-"""The engine for CUDA cards: all steps of a frame in one graph, no word to the host inside.
+"""The engine for CUDA GPUs: all steps of a frame in one graph, without host synchronisation.
 
 The same method as ``reference``, in plain Warp: particles in float32 with their places relative
 to the grid, rigid bodies and impulses in double precision. ``device="cpu"`` runs the very same
-graph on the processor, one thread, which is how it is tested where there is no card.
+graph on the processor, one thread, which is how it is tested where there is no GPU.
 """
 
 from collections.abc import Collection
@@ -47,17 +47,20 @@ STEP_STATE_ARRAYS = (
 
 
 class CudaEngine(EngineInteraction):
-    """Steps one problem on a CUDA card."""
+    """Steps one problem on a CUDA GPU."""
 
-    def __init__(self, problem: Problem, device: str = "cuda") -> None:
+    name = "cuda"
+
+    def __init__(self, problem: Problem, device: str = "cuda", threads: int | None = None) -> None:
         """Lay out memory.
 
         Args:
             problem: What to simulate.
             device: A Warp device: "cuda", "cuda:1", …; "cpu" for tests.
+            threads: As every engine takes them; the host uses one.
 
         Raises:
-            UserError: There is no such card, or the problem asks for what only other engines do.
+            UserError: There is no such GPU, or the problem asks for what only other engines do.
 
         """
         self.device = require_device(device)
@@ -113,7 +116,7 @@ class CudaEngine(EngineInteraction):
         }
 
     def _start(self) -> None:
-        """Say how fast things are at the start, and find their blocks."""
+        """Return how fast objects are at the start, and find their blocks."""
         m = self.matter
         soft = self._rows("number")
         speed = wave = 0.0
@@ -416,7 +419,7 @@ def require_device(device: str) -> str:
     chosen = cards[0] if device == "cuda" and cards else device
     if chosen not in known:
         raise UserError(
-            f"The engine 'cuda' needs a CUDA card, and Warp finds no {device!r} here "
+            f"The engine 'cuda' needs a CUDA GPU, and Warp finds no {device!r} here "
             f"(found: {', '.join(known)}). Install NVIDIA's driver (CUDA 12.4 or later), or "
             "simulate on the processor: --engine cpu."
         )

@@ -1,4 +1,4 @@
-"""Grid to particles on the device: they move, strain and answer.
+"""Grid-to-particle transfer on the device.
 
 Same step as ``reference.ReferenceEngine.step``; see there for the formulas.
 """

@@ -1,4 +1,4 @@
-"""Structs of rigid bodies, of what acts on bodies, and of what frames hold: see ``layout``."""
+"""Structs of rigid bodies, loads and inclusions: see ``layout``."""
 
 from corporeal.mpm.quiet_warp import wp
 

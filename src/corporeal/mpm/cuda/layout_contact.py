@@ -79,7 +79,7 @@ class DeviceContacts:
     friction: wp.array2d(dtype=wp.float64)
     restitution: wp.array2d(dtype=wp.float64)
     restitution_law: wp.array2d(dtype=wp.float64)
-    """How it changes with the speed of a blow: 5 numbers a pair."""
+    """How it changes with the speed of an impact: 5 numbers a pair."""
     rolling: wp.array2d(dtype=wp.float64)
     """c [m]; where nothing brakes what rolls nobody looks."""
     face: wp.array(dtype=wp.float32)

@@ -1,4 +1,4 @@
-"""Memory of what acts on single particles, and of rigid inclusions; goes with ``memory``."""
+"""Memory of loads on particles and of rigid inclusions."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Mean dilatation of nearly incompressible matter on the device.
+"""Mean dilatation of nearly incompressible material on the device.
 
 Means are taken over the particles of 2³ cells of a field, as ``reference.mean_dilatation`` has it.
 """

@@ -1,4 +1,4 @@
-"""Memory of particles: all that is kept of them in one array of 32-bit words, (channels, lanes).
+"""Memory of particles: one array of 32-bit words, (channels, lanes).
 
 Channels lie one after the other, each over all particles, so that neighbouring threads read
 neighbouring words, and sorting is one kernel that knows no names. The host works with rows.

@@ -84,7 +84,7 @@ class CudaProgram:
         wp.capture_launch(self.graph)
 
     def hold(self, held: bool) -> None:
-        """Say whether anything is held from outside."""
+        """Return whether anything is held from outside."""
         if held != self.held:
             self.held = held
             self.forget()

@@ -1,4 +1,4 @@
-"""Constitutive laws, one a file, and the menu: whoever has to choose by a law asks here.
+"""Constitutive laws, one per file, and their dispatch.
 
 A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``.
 The functions below answer for particles of different laws at once.
@@ -77,7 +77,7 @@ def wave_modulus(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Sca
 def flow(
     law: LawNumbers, F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
 ) -> ReturnMapResult:
-    """Bring granular and plastic matter back to what it can bear.
+    """Bring granular and plastic material back to what it can bear.
 
     Args:
         law: ``types.Law`` values.
@@ -97,7 +97,7 @@ def flow(
 
 
 def is_stiff_in_bulk(law: LawNumbers, mu: Scalars, lam: Scalars) -> Bool[np.ndarray, " P"]:
-    """Whether matter is elastic and its ν above 0.4: splines lock unless pressure is a mean.
+    """Whether material is elastic and its ν above 0.4: splines lock unless pressure is a mean.
 
     Where ν is 0.4 to within rounding it is not above.
     """
@@ -117,7 +117,7 @@ def psi_mean(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
 
 
 def mean_modulus(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
-    """Give what a mean volume J̄ adds to the bound on ρ₀ c² [Pa]."""
+    """Return what a mean volume J̄ adds to the bound on ρ₀ c² [Pa]."""
     return bulk * _volumetric_by_law("modulus", law, J)
 
 

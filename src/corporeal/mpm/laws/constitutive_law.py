@@ -1,4 +1,4 @@
-"""What a constitutive law says of itself: the contract of the files beside this one.
+"""Interface of constitutive laws.
 
 ``psi`` is the stored energy per rest volume Ψ [J/m³], ``pk1`` the first Piola–Kirchhoff stress
 P = ∂Ψ/∂F [Pa], ``tau`` the Kirchhoff stress τ = P Fᵀ [Pa]; all take stacks of deformation gradients

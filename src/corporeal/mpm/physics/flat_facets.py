@@ -1,4 +1,4 @@
-"""Flat faces of a rigid body, on which what is round rolls: each is a plane with an end."""
+"""Flat facets of a rigid body, on which round bodies roll."""
 
 from typing import NamedTuple
 
@@ -71,12 +71,12 @@ def facets_of(
 
 
 def is_bounded_by_facets(facets: BodyFacets, surface: Float[np.ndarray, "S 3"]) -> bool:
-    """Tell whether a body is bounded by flat faces: most of its surface points lie on some."""
+    """Return whether a body is bounded by flat faces: most of its surface points lie on some."""
     return len(facets.point) > MIN_FLAT_SURFACE_FRACTION * len(surface)
 
 
 def has_edges(rows: Float[np.ndarray, "S W"]) -> bool:
-    """Tell whether a body has any: whether it is known not to be round all over.
+    """Return whether a body has any: whether it is known not to be round all over.
 
     Args:
         rows: How its surface curves at its points, ``types.CURVATURE_COLUMNS``; without normals where that

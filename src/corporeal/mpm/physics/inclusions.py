@@ -1,4 +1,4 @@
-"""Rigid inclusions: the stiff part of a mixed object moves with the soft matter that it holds.
+"""Rigid inclusions: stiff parts that move with the soft material around them.
 
 The frame keeps its six degrees of freedom and scatters mass only. Nodes of the soft field inside it
 are its own: before contact, frame and lumped nodes become one rigid body with their momentum and
@@ -15,10 +15,10 @@ from corporeal.mpm.problem import Body
 
 
 def inclusion_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
-    """Mean densities [kg/m³] of a frame and of the soft matter around it; masses give volumes.
+    """Mean densities [kg/m³] of a frame and of the soft material around it; masses give volumes.
 
     On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin
-    as in life it would hold nothing.
+    as in reality it would hold nothing.
     """
     far = KDTree(frame.position).query(soft.position, distance_upper_bound=FRAME_LAYER_DX * cell)[0]
     near = np.isfinite(far)

@@ -1,4 +1,4 @@
-"""Where a rigid body's rounded surface points touch a plane: twin of ``Round`` in surfaces.h."""
+"""Contact of a rigid body's rounded surface points with planes: twin of ``Round`` in surfaces.h."""
 
 import numpy as np
 from jaxtyping import Bool, Float

@@ -1,4 +1,4 @@
-"""Which fields meet where in one step, and what comes of it: the reference engine's contact.
+"""Contact of the reference engine: detection and solution in one step.
 
 Order: list the nodes; look at the surfaces there; choose normals; measure gaps; solve all
 impulses together, rigid bodies and walls included.
@@ -111,7 +111,7 @@ def resolve_contacts(
 def _touches_prescribed_body(
     scene: ContactScene, pair: Int[np.ndarray, "E 2"]
 ) -> Bool[np.ndarray, " E"]:
-    """Tell which contacts are of a rigid body with one that moves as told."""
+    """Return which contacts are of a rigid body with one that follows a prescribed path."""
     bodies, walls = scene.problem.bodies, len(scene.problem.planes)
     rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
     told = np.array([body.path is not None for body in bodies] + [False] * walls)
@@ -259,7 +259,7 @@ class NodeSamples:
     """How fields look from some slots. M links, each one particle seen from one slot."""
 
     mean: Float[np.ndarray, "A 3"]
-    """X̄: mean offset of the field's matter from the node [m]; 0 where nobody looks."""
+    """X̄: mean offset of the field's material from the node [m]; 0 where nobody looks."""
     outward: Float[np.ndarray, "A 3"]
     """g = Σ J V₀ ∇N [m²]."""
     slot: Int[np.ndarray, " M"]

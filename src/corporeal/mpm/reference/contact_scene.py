@@ -1,4 +1,4 @@
-"""What contact works on in one step: the reference engine's bodies, nodes and rules of contact."""
+"""Input of the reference engine's contact: bodies, nodes and contact parameters."""
 
 from dataclasses import dataclass
 from typing import Protocol

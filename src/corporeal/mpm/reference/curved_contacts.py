@@ -1,4 +1,4 @@
-"""Contacts of what is round with curved faces of other rigid bodies: a marble in a bowl."""
+"""Contacts of round bodies with curved faces of other rigid bodies: a marble in a bowl."""
 
 from dataclasses import dataclass
 from itertools import permutations

@@ -1,4 +1,4 @@
-"""The reference engine: NumPy, double precision, one idea per function. Slow and to be trusted.
+"""The reference engine: NumPy in double precision, slow, for verification.
 
 Moving-least-squares MPM (Hu et al. 2018) with one field per body and explicit contact between
 fields. Every other engine is compared with this one.
@@ -6,12 +6,14 @@ fields. Every other engine is compared with this one.
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.errors import SimulationError
 from corporeal.mpm import laws
+from corporeal.mpm.body_changes import BodyChange, EngineBodyChanges
 from corporeal.mpm.constants import (
     FREE_FALL_STEP_FRACTION,
     MAX_DISTANCE_FROM_ORIGIN_DX,
@@ -23,7 +25,7 @@ from corporeal.mpm.constants import (
     TINY_DOUBLE,
 )
 from corporeal.mpm.diagnostics import BodySums, ParticleEnergy
-from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics import contact, rigid
 from corporeal.mpm.physics.grid_spline import Stencil, stencil
@@ -53,10 +55,19 @@ from corporeal.mpm.state import (
 )
 
 
-class ReferenceEngine(EngineInteraction):
+class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
     """Steps one problem with NumPy in double precision."""
 
-    def __init__(self, problem: Problem) -> None:
+    name = "reference"
+
+    def __init__(self, problem: Problem, threads: int | None = None) -> None:
+        """Put all particles into one list.
+
+        Args:
+            problem: What to simulate.
+            threads: As every engine takes them; one is used.
+
+        """
         self.problem = problem
         self.steps = StepStatistics()
         self.matter = ParticleConstants.of(problem)
@@ -402,7 +413,7 @@ class ReferenceEngine(EngineInteraction):
         """Do nothing: a step reads ``grips``."""
 
     def _take_loads(self) -> None:
-        """Do nothing: a step reads ``problem``."""
+        self.guides = PrescribedBodies(self.problem)  # a step reads the rest from ``problem``
 
     def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         self.state = self.state.moving(motion, self.matter, bodies)
@@ -411,6 +422,13 @@ class ReferenceEngine(EngineInteraction):
         there = State(**_of("state.", saved))
         self.state = self.state.placed_as(there, self.matter, bodies)
         self.kept = NormalCache.none()
+
+    def _successor(self, problem: Problem, change: BodyChange) -> Self:
+        after, here = type(self)(problem), (self.matter, self.state)
+        after.state = after.state.continuing(here, after.matter, change.whole)
+        after.ledger = EngineLedger(**change.inherited(self.ledger.as_arrays()))
+        after.steps = replace(self.steps)
+        return after
 
 
 def _of(kind: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

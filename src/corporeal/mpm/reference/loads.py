@@ -1,4 +1,4 @@
-"""What acts on single particles: the reference engine's loads.
+"""Loads on particles in the reference engine.
 
 A load gives impulses to particles; the particles of a body that bends hand them to the grid, a
 rigid body adds them up.

@@ -1,4 +1,4 @@
-"""Mean dilatation of nearly incompressible matter (decision 23).
+"""Mean dilatation of nearly incompressible material (decision 23).
 
 Taken from every particle's own J, pressure would lock: eight constraints in a cell that has three
 nodes' worth of freedom make a block of ν = 0.49 up to a sixth too stiff.

@@ -35,7 +35,7 @@ def brake_rolling(
     Args:
         problem: Says by how much: ``rolling``.
         movers: After contact.
-        contacts: Where things touch.
+        contacts: Where objects touch.
         pair: Two bodies, or a body and B + plane, for each contact.
         impulse: What each transmits [N s].
         rounds: At which of them something round may roll.

@@ -113,7 +113,7 @@ def drop_replaced_nodes(
 def in_valley(
     normal: Float[np.ndarray, "E 3"], faces: Float[np.ndarray, "F 3"], near: Bool[np.ndarray, "E F"]
 ) -> Bool[np.ndarray, " E"]:
-    """Tell which normals on nodes are sums of those of faces near them, as far as they are known.
+    """Return which normals on nodes are sums of those of faces near them, as far as they are known.
 
     What is round and touches two faces of a body touches nothing between them, but nodes there see
     both, and look halfway. The face that a normal looks at most is taken off it, again and again.

@@ -63,7 +63,7 @@ def learned_masks(
             model are kept, and what somebody corrected in them.
         masker: The model.
         words: What is looked for.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: The photographs or the weights cannot be used, words are missing, or most
@@ -76,7 +76,7 @@ def learned_masks(
     record = read_mask_record(folder)
     if record is not None and record.made_by == made_by:
         count = len(edited_masks(folder))
-        more = [f"{count} of the masks were corrected by hand."] * bool(count)
+        more = [f"{count} of the masks were corrected manually."] * bool(count)
         return LearnedMasks(folder, (*record.said, *more))
     for name in (MASK_FOLDERS[0], INSTANCE_FOLDERS[0]):
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -30,7 +30,7 @@ class ModelWeights:
 
     @property
     def name(self) -> str:
-        """Say which weights very exactly, wherever they are."""
+        """Return which weights very exactly, wherever they are."""
         return f"{self.kind}@{self.revision}"
 
     @property

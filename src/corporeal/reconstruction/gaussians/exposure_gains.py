@@ -59,5 +59,5 @@ def update_gain(gains: ExposureGains, k: int, found: Float[np.ndarray, "3"]) -> 
 
 
 def exposures_differ(gains: ExposureGains) -> bool:
-    """Tell whether photographs differ in exposure or white balance."""
+    """Return whether photographs differ in exposure or white balance."""
     return bool(np.log(gains).std(axis=0).max() > EXPOSURE_SPREAD_LOG)

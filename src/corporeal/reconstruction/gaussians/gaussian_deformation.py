@@ -1,4 +1,4 @@
-"""Gaussians that move with matter: what the video of a deformed scene is drawn from."""
+"""Gaussians that move with material: what the video of a deformed scene is drawn from."""
 
 from dataclasses import replace
 

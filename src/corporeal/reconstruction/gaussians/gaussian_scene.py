@@ -10,10 +10,11 @@ from jaxtyping import Bool, Float, UInt8
 from corporeal.core.errors import UserError
 from corporeal.core.progress import Progress, subprogress
 from corporeal.core.types import Camera, Gaussians, Note, NoteKind, Vector, Views
-from corporeal.geometry.gaussian_transforms import UpAxisChoice
+from corporeal.geometry.gaussian_transforms import UpAxis, UpAxisChoice
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.io.input_files import input_kind
 from corporeal.io.photos.posed_photos import NO_INSTANCES_MESSAGE, PosedPhotos, read_posed_photos
+from corporeal.io.registry import reader_of
 from corporeal.io.splat.load_splat import load_splat
 from corporeal.multiview.feature_matching import FEATURE_IMAGE_SIDE_PX
 from corporeal.multiview.inverted_masks import are_masks_inverted
@@ -73,8 +74,6 @@ learned from again, so that 1.2 trainings are to be expected."""
 OVERVIEW_PICTURES = 4
 """Pictures that somebody is shown of the whole scene."""
 UP_BY_AXIS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-UP_BY_SUFFIX: dict[str, Vector] = {".spz": (0.0, 1.0, 0.0)}
-"""What is up in files of a kind as a rule; in others it is -y."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class GaussianScene:
     masks: Bool[np.ndarray, "V H W"] | None = None
     """Which pixels are on objects; None: unknown."""
     coloured: Bool[np.ndarray, "V H W"] | None = None
-    """Which pixels have the colours of objects, where that is not to be believed alone."""
+    """Which pixels have the colours of objects, where that is unreliable alone."""
     z_up: bool = False
     """The file's kind says so, and that its unit is the metre."""
     usual: Vector | None = None
@@ -101,7 +100,7 @@ class GaussianScene:
     seen: Float[np.ndarray, "N 3"] | None = None
     """Sparse points on all that the photographs show, the floor too; None: the file has none."""
     doubts: tuple[str, ...] = ()
-    """Where shapes are not to be believed, in sentences."""
+    """Where shapes are unreliable, in sentences."""
     quality: HeldOutQuality | None = None
     """How well pictures of the Gaussians agree with photographs held back; None: none was."""
     statements: tuple[str, ...] = ()
@@ -222,7 +221,8 @@ def load_or_train_gaussians(
 
 def _load_splat(source: Path) -> GaussianScene:
     given = load_splat(source)
-    usual = UP_BY_SUFFIX.get(source.suffix.lower(), (0.0, -1.0, 0.0))
+    reader = reader_of(source, "splat")
+    usual = _stated_up(reader.usual_up if reader else "-y")
     read = (f"{given.count:,} Gaussians were read from {source.name}.",)
     return GaussianScene(given, usual=usual, statements=read, warnings=given.warnings)
 
@@ -280,7 +280,7 @@ class _TrainingInput:
             return trained, masks, ()
         kept = None if self.checkpoint is None else self.checkpoint.with_stem(RETRAINING_CHECKPOINT)
         later = subprogress(
-            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the thing"
+            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the object"
         )
         left = masks & ~odd
         share = np.count_nonzero(odd) / np.count_nonzero(masks)
@@ -401,7 +401,7 @@ def pose_warnings(
 
 
 def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str, ...]:
-    """Say where what was learned is not what photographs show, or where none was left to tell."""
+    """Return where what was learned is not what photographs show, or where none was left to tell."""
     if trained.quality is None:
         return (
             Note(
@@ -422,7 +422,7 @@ def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str
     )
 
 
-def _stated_up(up: UpAxisChoice) -> Vector | None:
+def _stated_up(up: UpAxisChoice | UpAxis) -> Vector | None:
     if up == "auto":
         return None
     sign = -1.0 if up[0] == "-" else 1.0

@@ -30,7 +30,8 @@ MAX_STEREO_DEPTHS = 40_000
 """Depths that are looked for in all views together, about."""
 MIN_STEREO_PATCH_DEVIATION, MIN_STEREO_CORRELATION, MIN_STEREO_CORRELATION_GAIN = 0.01, 0.7, 0.1
 """Least deviation of a patch [0–1]; least correlation of what is the same; by how much that must
-exceed the correlation at the hull's front for something deeper to be believed."""
+exceed the correlation at the hull's front for something deeper to be accepted.
+"""
 STEREO_DEPTH_TOLERANCE = 0.015
 """Relative difference of depths that agree."""
 DEPTH_ERROR_CELLS = 2.0
@@ -43,7 +44,7 @@ without such a vote."""
 def hull_cells_seen_past(
     views: Views, masks: Bool[np.ndarray, "V H W"], hull: VisualHull, pool: ThreadPool
 ) -> Bool[np.ndarray, "X Y Z"]:
-    """Tell which cells of a hull more views see past than see something in.
+    """Return which cells of a hull more views see past than see something in.
 
     Args:
         views: Posed pictures.
@@ -138,7 +139,7 @@ class HullStereoImages:
         return known
 
     def plain(self, k: int) -> Bool[np.ndarray, "h w"]:
-        """Tell where a view's patches are too plain for their depth to be looked for."""
+        """Return where a view's patches are too plain for their depth to be looked for."""
         side, channels = 2 * PATCH_RADIUS_PX + 1, np.moveaxis(self.pictures[k], -1, 0)
         variance = np.zeros(channels.shape[1:])
         for one in channels:

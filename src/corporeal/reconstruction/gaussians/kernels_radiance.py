@@ -212,7 +212,7 @@ def render_pixels(first, last, camera, width, grid, out):
 
 @numba.njit(**JIT_OPTIONS)
 def light_sources(pixels, camera, width, grid, least, count, place, weight):
-    """Say where the light of some pixels comes from, and how much, where it is not less than least.
+    """Return where the light of some pixels comes from, and how much, where it is not less than least.
 
     count (R,): entries per pixel; place (R, M, 3), in cubes, and weight (R, M): the first M.
     """

@@ -133,7 +133,7 @@ def _beyond_explained(
 
 
 def _has_other_hue(off: Float[np.ndarray, "3"]) -> bool:
-    """Tell whether a difference is not one of light alone."""
+    """Return whether a difference is not one of light alone."""
     return bool(
         np.square(off - off.mean()).sum() > MIN_HUE_DIFFERENCE_FRACTION * np.square(off).sum()
     )

@@ -1,6 +1,6 @@
 """Pictures as if all had been taken with one exposure and one white balance.
 
-A telephone chooses both anew for every picture, so that a brown floor has as many browns as there
+A phone chooses both anew for every picture, so that a brown floor has as many browns as there
 are pictures, and what is told by colours borders on all of them. What the floor's places look like
 in each picture says by how much they differ.
 """

@@ -46,7 +46,7 @@ GAIN_ITERATIONS = 3
 def shaded_floor(
     views: Views, floor: GroundPlane | None, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show the floor's own colour, or a shade of it, on the floor.
+    """Return which pixels show the floor's own colour, or a shade of it, on the floor.
 
     None where nobody knows the floor, or where it is grey.
 

@@ -82,7 +82,7 @@ def pixels_on_agreed_floor(
     agreeing: Callable[[int, Int[np.ndarray, " P"]], Bool[np.ndarray, "P n n"]],
     wide: bool = False,
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show a place of the floor about which enough views agree.
+    """Return which pixels show a place of the floor about which enough views agree.
 
     Args:
         cameras: All of one size.

@@ -16,7 +16,7 @@ MIN_LIGHT_SAMPLES = 50
 LIGHT_ITERATIONS, REWEIGHTING_ITERATIONS = 3, 4
 """Of finding print and light in turn, and of weighing anew within one."""
 ROBUST_SCALE_LOG = 0.15
-"""Difference of logarithms at which a cell counts a quarter: things stand before some."""
+"""Difference of logarithms at which a cell counts a quarter: objects stand before some."""
 EVEN_LIGHT_WEIGHT = 0.02
 """Weight of light that is even, for each cell's of what is seen."""
 

@@ -69,7 +69,7 @@ class StandingRegions:
         return self.cells & (apart >= MIN_BESIDE_VIEWS_FRACTION * looking)
 
     def free(self, piece: Bool[np.ndarray, " M"]) -> bool:
-        """Tell whether a piece of the hull rises above the floor, and is no wall."""
+        """Return whether a piece of the hull rises above the floor, and is no wall."""
         return not self.room.wall(piece) and bool(
             self.room.height[piece].max() > MIN_TOP_HEIGHT_RADII
         )
@@ -138,7 +138,7 @@ def _floor_below_masks(
 def _contradicting_pixels(
     views: Views, floor: GroundPlane, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show something else than the median of all views has there on the floor."""
+    """Return which pixels show something else than the median of all views has there on the floor."""
     ground = floor_grid(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
     seen = equalise_floor_colour(

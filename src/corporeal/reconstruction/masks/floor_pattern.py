@@ -33,7 +33,7 @@ MIN_PATTERN_CORRELATION = 0.8
 def shows_floor_pattern(
     views: Views, floor: GroundPlane | None, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show a pattern that lies on the floor; none where nobody knows the floor.
+    """Return which pixels show a pattern that lies on the floor; none where nobody knows the floor.
 
     Args:
         views: The pictures; a patch is PATCH of their pixels wide.

@@ -54,7 +54,7 @@ def merge_attachments(
         views: The pictures.
         seeds: Where the given masks began.
         grown: What came of them.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         flat: As in ``grow_masks``.
 
     """

@@ -266,7 +266,7 @@ def _count_warnings(
 
 
 def _doubt_warnings(found: SurfacePatches, instance: np.ndarray, cuts: list[GraphCut]) -> list[str]:
-    """Say where another answer is nearly as good, and where objects are too thin to be sure of."""
+    """Return where another answer is nearly as good, and where objects are too thin to be sure of."""
     doubts = []
     if any(made.other < DOUBTFUL_SCORE_RATIO * made.score for made in cuts):
         doubts.append(

@@ -3,7 +3,7 @@
 An edge that is smeared by s rises over a distance that grows with s: smoothed by σ its steepest
 slope is proportional to 1 / √(σ² + s²). Two smoothings tell s whatever the contrast (Elder and
 Zucker, "Local scale control for edge detection and blur estimation", PAMI 1998). Noise has no
-edges of that size, and what is out of focus behind the thing does not count: the sharpest does.
+edges of that size, and what is out of focus behind the object does not count: the sharpest does.
 """
 
 from collections.abc import Sequence

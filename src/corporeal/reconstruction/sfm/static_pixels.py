@@ -1,7 +1,7 @@
 """How much of what a video shows never moves: a screen's frame, or all around a turntable.
 
-Where a camera moves about a thing, whatever has contrast moves in its pictures. What does not would
-be taken for the world that stands still, and all cameras put at one place.
+Where a camera moves about an object, whatever has contrast moves in its pictures. What does not
+would be taken for the world that stands still, and all cameras put at one place.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Frames of a video that are sharp and differ from one another.
 
-ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen. It
-turns pictures as the video's own matrix says.
+ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen.
+It turns pictures as the video's own matrix says.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ Progress = Callable[[float, str], None]
 CHOSEN_FRAMES = 60
 """Stretches of equal change; each gives one frame."""
 MIN_FRAMES = 20
-"""Frames from which a thing is seen from all sides."""
+"""Frames from which an object is seen from all sides."""
 MIN_SHARPNESS_RATIO = 0.3
 """Sharpness, over the median of the frames around, below which a frame is smeared."""
 SHARPNESS_WINDOW_FRAMES = 15
@@ -40,13 +40,13 @@ SHARPNESS_PICTURE_PX, CHANGE_THUMBNAIL_PX = 480, (32, 24)
 CHANGE_NOISE_U8 = 0.05
 """Mean difference of neighbouring thumbnails, of 255, that is noise."""
 MAX_STATIC_FRACTION = 0.25
-"""Share of what has contrast that never moves, from which on a video shows no way around a thing."""
+"""Share of what has contrast that never moves, from which on a video shows no way around an object."""
 VIDEO_HINT = "Record the object slowly, all around and from above, for 20 to 60 s."
 
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a video says of itself."""
+    """What a video states."""
 
     path: Path
     seconds: float
@@ -59,20 +59,23 @@ class VideoInfo:
         return min(self.rate, MAX_DECODED_FRAMES / max(self.seconds, 1e-3))
 
 
-def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
+def write_video_frames(
+    path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S
+) -> list[str]:
     """Write the chosen frames of a video as PNG; return what is to be said of them.
 
     Args:
         path: The video.
         folder: Where frames go, named by their number.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
+        max_seconds: Longer films are refused [s].
 
     Raises:
         BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it
             is a recording of a screen.
 
     """
-    video = _open_video(path)
+    video = _open_video(path, max_seconds)
     change, sharp = [0.0], []
     before, standstill = None, StaticPixels()
     expected = max(video.looked * video.seconds, 1.0)
@@ -98,7 +101,7 @@ def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str
     if standstill.share > MAX_STATIC_FRACTION:
         what = f"{standstill.share:.0%} of what has contrast in it never moves: it is a recording"
         what += " of a screen, or the camera stood still."
-        raise BadFileError(path, what, f"{VIDEO_HINT} Do not turn the thing instead.")
+        raise BadFileError(path, what, f"{VIDEO_HINT} Do not turn the object instead.")
     progress(0.7, "writing frames")
     _write_chosen(video, chosen, folder)
     if is_screen_recording(sorted(folder.glob("frame_*.png"))):
@@ -135,7 +138,7 @@ def choose_frames(
     return chosen
 
 
-def _open_video(path: Path) -> VideoInfo:
+def _open_video(path: Path, max_seconds: float) -> VideoInfo:
     # It warns that a turned video is not as wide as its frames are stored: so it should be.
     logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
     reading = imageio_ffmpeg.read_frames(str(path))
@@ -149,9 +152,9 @@ def _open_video(path: Path) -> VideoInfo:
     finally:
         with contextlib.suppress(Exception):
             reading.close()
-    if video.seconds > MAX_VIDEO_S:
-        what = f"is {video.seconds / 60:.0f} minutes long; at most {MAX_VIDEO_S / 60:.0f} are looked at."
-        raise BadFileError(path, what, "Cut out the part that goes around the thing.")
+    if video.seconds > max_seconds:
+        what = f"is {video.seconds / 60:.0f} minutes long; at most {max_seconds / 60:.0f} are looked at."
+        raise BadFileError(path, what, "Cut out the part that goes around the object.")
     return video
 
 

@@ -2,7 +2,7 @@
 
 Its points are the same in every two of them, also in two that show nothing else in common. From
 them all pictures would be of one place, taken from one viewpoint. What a camera that stands shows
-is at the same place, too, but all over the pictures; and where somebody walks around a thing, no
+is at the same place, too, but all over the pictures; and where somebody walks around an object, no
 place of the picture holds still from all sides.
 """
 

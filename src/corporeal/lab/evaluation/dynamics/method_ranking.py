@@ -1,4 +1,4 @@
-"""Who comes first in a scene, and in which columns ours does not."""
+"""Ranking of methods in a scene."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class MethodResult:
     against: RunDifference | None
     """From the reference; None: there is none to trust."""
     error: str = ""
-    """Why it failed, or cannot be believed."""
+    """Why it failed, or cannot be accepted."""
 
     @property
     def met(self) -> int:

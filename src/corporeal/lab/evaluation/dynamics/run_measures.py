@@ -1,4 +1,4 @@
-"""What is compared of one run, kept as JSON beside it: paths, what happened, the audit."""
+"""Measures of one run for comparison, stored as JSON: paths, outcome, audit."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +30,7 @@ class ObjectMeasures:
     path: tuple[Vector, ...]
     """One place per instant [m]."""
     young_pa: float
-    """Of its materials, the mean of their logarithms by mass [Pa]: as they are in life."""
+    """Of its materials, the mean of their logarithms by mass [Pa]: as they are in reality."""
     restitution: float
     """Of its heaviest part's material [-]."""
     groups: tuple[str, ...]
@@ -149,5 +149,5 @@ def read_run_measures(folder: Path) -> RunMeasures:
     try:
         return from_plain(RunMeasures, store.read_json(path))
     except (ValueError, TypeError, AttributeError) as error:
-        what = f"is not what this version keeps of a run ({error})."
+        what = f"is not a file of this version ({error})."
         raise BadFileError(path, what, f"Remove {folder}; it is then run again.") from error

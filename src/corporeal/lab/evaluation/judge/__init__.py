@@ -1,4 +1,4 @@
-"""A vision-language model judges videos of simulations, and is itself judged by videos with faults.
+"""Judgement of simulated videos by a vision-language model, validated on videos with known faults.
 
 A video is how one scene moves under one condition. The reference is our own run; a control is the
 reference with one known fault; a method is another way to simulate the same scene. What the judge

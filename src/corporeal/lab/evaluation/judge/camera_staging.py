@@ -1,4 +1,4 @@
-"""When and from where a scene is looked at: the same for all of its videos, from the reference."""
+"""Instants and cameras of a scene's videos, chosen from the reference."""
 
 from dataclasses import dataclass
 from functools import cached_property

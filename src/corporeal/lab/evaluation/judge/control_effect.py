@@ -1,4 +1,4 @@
-"""Whether a video differs from the reference by more than our own error: else nobody can tell it."""
+"""Test whether a control differs from the reference by more than the simulation's error."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ class MotionDifference:
     path: float
     """Root mean square distance of the centres."""
     shape: float
-    """Largest change of a principal width (standard deviation of its matter)."""
+    """Largest change of a principal width (standard deviation of its material)."""
 
     @property
     def limit(self) -> "MotionDifference":
@@ -75,7 +75,7 @@ def compare_motions(
 def principal_widths(
     video: VideoMotion, times: Float[np.ndarray, " T"]
 ) -> Float[np.ndarray, "T B 3"]:
-    """Return standard deviations of every object's matter along its principal axes [m]."""
+    """Return standard deviations of every object's material along its principal axes [m]."""
     mass = video.prepared.particles.mass
     rows = []
     for time in times.tolist():

@@ -1,7 +1,7 @@
-"""What a judge can tell: every question against every control, with intervals.
+"""Detection rates of a judge: every question against every control, with intervals.
 
 A question tells a control where it raises an alarm on the control more often than on the reference
-of the same scene, beyond chance. Of a law of physics a judge is believed only through questions
+of the same scene, beyond chance. Of a law of physics a judge is trusted only through questions
 that tell a control they are meant for.
 """
 
@@ -160,7 +160,7 @@ def trusted_questions(
 
 @dataclass(frozen=True)
 class MethodMark:
-    """How well one method does in a group of scenes, by questions that are believed."""
+    """How well one method does in a group of scenes, by questions that are trusted."""
 
     method: str
     group: str
@@ -181,7 +181,7 @@ def method_mark(
         videos: Of the group's scenes.
         method: Name among the conditions.
         group: What the scenes or questions have in common.
-        questions: That are believed.
+        questions: That are trusted.
 
     """
     shares = []

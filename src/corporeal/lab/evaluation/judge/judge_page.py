@@ -1,4 +1,4 @@
-"""The page of a judged evaluation: first what the judge cannot tell, at the end every video."""
+"""Report of a judged evaluation: detection rates first, then all videos."""
 
 import io
 from collections.abc import Callable, Sequence
@@ -34,7 +34,7 @@ def write_judge_page(
         judged: What was said of which videos.
         result: What follows.
         path: Of the page.
-        progress: Told the fraction done and which video is rendered.
+        progress: Called with the fraction done and which video is rendered.
 
     Raises:
         UserError: The file cannot be written.
@@ -65,7 +65,7 @@ def write_judge_page(
 
 
 def blind_spots_sentence(result: JudgeResult) -> str:
-    """Say in a sentence which laws of physics the judge cannot tell."""
+    """Return in a sentence which laws of physics the judge cannot tell."""
     none = [law for law, questions in result.believed.items() if not questions]
     if not none:
         return "Of each law of physics at least one question tells a control it is meant for."

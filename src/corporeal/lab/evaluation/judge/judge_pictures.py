@@ -1,4 +1,4 @@
-"""What a judge is shown of a video in one look."""
+"""Pictures of a video for one look of a judge."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -79,6 +79,6 @@ def judge_pictures(
 
 
 def pictures_description(look: int) -> str:
-    """Say in words how the pictures of a look are taken; recordings compare this."""
+    """Describe in words how the pictures of a look are taken; recordings compare this."""
     size = f"{PICTURE_SIZE_PX[0]} x {PICTURE_SIZE_PX[1]}"
     return f"{DATED_PICTURES} dated pictures, {CLOSE_UP_PICTURES} close-ups, paths; {size}; turned {LOOK_TURNS_DEG[look]:+g}°"

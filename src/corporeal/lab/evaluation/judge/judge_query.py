@@ -1,4 +1,4 @@
-"""Ask a judge about videos: the price first, every video in a conversation of its own."""
+"""Questions to a judge about videos, each in a separate conversation, after a cost estimate."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -46,7 +46,7 @@ def query_judge(
         videos: From ``gather_videos``.
         config: Who judges.
         say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         judge: Who answers, instead of ``config.judge``.
 
     Raises:
@@ -101,14 +101,12 @@ def connect_judge(config: JudgeConfig) -> VlmClient | None:
 
 def _somebody(model: VlmClient | None) -> VlmClient:
     if model is None:
-        raise UserError(
-            "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."
-        )
+        raise UserError("No judge. Choose one: --judge openai:MODEL, ask:FOLDER or replay:FOLDER.")
     return model
 
 
 def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
-    """Say what asking takes."""
+    """Describe what asking takes."""
     words = f"{reckoned.videos} videos to judge, about {reckoned.tokens:,} tokens"
     if not is_paid(config.judge):
         return f"{words}; {config.judge.partition(':')[0]} costs nothing."
@@ -128,6 +126,6 @@ def _agreed(reckoned: JudgingCost, config: JudgeConfig) -> None:
         return
     if reckoned.dollars is None or reckoned.dollars > CONFIRM_ABOVE_USD:
         raise UserError(
-            f"{price_words(reckoned, config)} Add --yes to ask all the same, or judge fewer: "
+            f"{price_words(reckoned, config)} Add --yes to confirm, or judge fewer: "
             "--looks 1 --control-scenes 3."
         )

@@ -1,4 +1,4 @@
-"""Judge the runs that lie in the folder of an evaluation: OUT/SCENE/METHOD."""
+"""Judgement of the runs in the folder of an evaluation: OUT/SCENE/METHOD."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ def judge_runs(
         out: Holds ``SCENE/METHOD``, each a run.
         config: Who judges, how often.
         say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: There are no such runs, nobody judges, or it costs more than was agreed to.

@@ -46,7 +46,8 @@ class JudgeConfig:
     """Folder where its answers are recorded, for replay:FOLDER."""
     looks: int = 1
     """Times that each video is judged, each from another side and with questions in another order:
-    1 to 3."""
+    1 to 3.
+    """
     control_scenes: int = DEFAULT_CONTROL_SCENES
     """Scenes of which controls are judged."""
     yes: bool = False
@@ -128,7 +129,7 @@ def gather_videos(
         scenes: With finished runs.
         out: Folder of the evaluation; runs of controls go to ``OUT/SCENE/control-NAME``.
         config: How many looks, and controls of how many scenes.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
     videos = JudgedVideos([], [], [], {}, methods_of(scenes))
@@ -215,7 +216,7 @@ def _run(scene: SceneRuns, method: str) -> tuple[SimulationResult | None, str]:
 
 
 def audit_breach(audit: Audit) -> str:
-    """Say what keeps a run from being judged as physics; "": nothing."""
+    """Describe what keeps a run from being judged as physics; "": nothing."""
     if audit.nan_count or audit.particles_out_of_domain:
         return "the simulation lost particles"
     if audit.mechanical_growth > ALLOWED_BREACHES["mechanical_growth"]:

@@ -123,7 +123,7 @@ def judge_tables(judged: JudgeVerdicts, result: JudgeResult) -> list[ResultTable
 
 def _laws(result: JudgeResult) -> ResultTable:
     rows = [
-        (law, CANNOT_TELL_TEXT if not told else f"believed by: {', '.join(told)}", f"{alarms:.0%}")
+        (law, CANNOT_TELL_TEXT if not told else f"trusted by: {', '.join(told)}", f"{alarms:.0%}")
         for law, told in result.believed.items()
         for alarms in [result.false_alarms[law]]
     ]

@@ -66,7 +66,7 @@ def _moving(velocity: Vector) -> str:
 
 
 def _acts(scene: Scene, k: int) -> str:
-    """Say what pushes an object, blows on it or leads it."""
+    """Describe what pushes an object, blows on it or leads it."""
     thing, said = scene.objects[k], []
     if isinstance(thing.push, Push):
         said.append(

@@ -1,4 +1,4 @@
-"""How one scene moves in one video: a prepared scene and its matter at any instant."""
+"""How one scene moves in one video: a prepared scene and its material at any instant."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class VideoMotion:
 
     prepared: PreparedScene
     at: Callable[[float], Frame]
-    """Instant [s] → where the matter is then."""
+    """Instant [s] → where the material is then."""
     bound_as: "VideoMotion | None" = None
     """Another video of the same prepared scene, whose surfaces need not be bound again."""
 
