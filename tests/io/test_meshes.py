@@ -14,6 +14,7 @@ from corporeal.core.errors import BadFileError
 from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.io import registry
 from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
+from corporeal.io.input_files import list_companions
 from corporeal.io.mesh.mesh_loader import load_mesh
 from corporeal.io.mesh.raw_mesh import MAX_PIECES
 from corporeal.io.ply_container import kind_of_ply

@@ -44,7 +44,7 @@ def splat(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(splat):
-    config = replace(object_names=("crate", "blue pillar"))
+    config = replace(COARSE, object_names=("crate", "blue pillar"))
     return reconstruct(splat, config, ("crate=0.4",))
 
 
@@ -186,7 +186,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     monkeypatch.setattr(point_features, "connect_encoder", lambda spec, folder: Colours())
     small = radiance_field.FieldPreset(100, 160, 2048)
     monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", small)
-    config = replace(object_names=("a", "b"), training="draft", lifting=lifting)
+    config = replace(COARSE, object_names=("a", "b"), training="draft", lifting=lifting)
     with pytest.raises(Enough) as caught:
         reconstruct(splat, config)
     (cloud,) = caught.value.args
@@ -209,7 +209,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
         (
             {"count": 3, "object_names": ("crate",)},
             (),
-            "--count says 3 objects, --object-names names 1",
+            "--count is 3, but --object-names names 1 objects",
         ),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
         ({"floor_at": float("nan")}, (), "--floor-at is nan"),

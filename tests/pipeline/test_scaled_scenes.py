@@ -93,7 +93,8 @@ def test_both_masses_stand_side_by_side(life, large, tmp_path):
         "their object"
     ) in told
     assert (
-        f"In life, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick." in told
+        f"At real size, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick."
+        in told
     )
     assert "<td>wall thickness</td>" not in told, "the wall is as stated, not as its material says"
     assert "life-size" not in page(a_can(), life, tmp_path)

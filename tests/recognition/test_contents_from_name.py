@@ -58,7 +58,7 @@ def test_a_vessel_is_as_full_as_its_name_says(name, contents, fill):
     [
         ("half full box", "contents are not named"),
         ("half full thingamajig", "no known vessel"),
-        ("plasticine mug half full", "plasticine has no wall"),
+        ("plasticine mug half full", "no wall thickness of plasticine is known"),
     ],
 )
 def test_what_a_name_says_of_contents_and_is_not_used_is_told(name, why):

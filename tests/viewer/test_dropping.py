@@ -147,5 +147,5 @@ def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
     live._both(1 / 60)
     with pytest.raises(UserError):
         parse_command(json.dumps({"do": RECORDED_ADD}))
-    with pytest.raises(UserError, match="no name"):
+    with pytest.raises(UserError, match="not a name"):
         parse_command(json.dumps({"do": "add", "thing": 3}))

@@ -23,7 +23,7 @@ def test_what_is_too_large_has_half_the_pictures_and_then_none(made):
     thin = view(made, whole - 1)
     assert 0 < len(thin) < whole and "<script" in thin
     said = view(made, 1000)
-    assert "would take more than" in said and "corporeal view RUN" in said
+    assert "is larger than" in said and "corporeal view RUN" in said
 
 
 def test_a_view_of_two_balls_with_three_js_takes_less_than_two_and_a_half_megabytes(made):

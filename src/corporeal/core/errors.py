@@ -54,7 +54,7 @@ class OutOfRangeError(UserError):
 
 
 def check_range(name: str, value: float | None, low: float, high: float) -> None:
-    """Refuse a setting that somebody typed and that cannot be right; None: nobody typed any.
+    """Raise for a setting outside its range; None: not set.
 
     Raises:
         UserError: It is not from low to high, or no number.

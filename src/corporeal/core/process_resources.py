@@ -59,7 +59,7 @@ def relax_garbage_collection() -> None:
 
 
 def _quota_cores(quota: Path) -> int:
-    """Give the cores that a container's quota amounts to; very many where there is none."""
+    """Return the cores that a container's quota amounts to; very many where there is none."""
     try:
         share, period = quota.read_text(encoding="ascii").split()
     except (OSError, ValueError):
@@ -68,6 +68,6 @@ def _quota_cores(quota: Path) -> int:
 
 
 def _environment_threads() -> int:
-    """Give the threads that the environment grants; very many where it says nothing."""
+    """Return the threads that the environment grants; very many where it says nothing."""
     asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
     return int(asked) if asked.isdecimal() and int(asked) > 0 else UNLIMITED_CORES

@@ -10,7 +10,7 @@ def subprogress(progress: Progress, begin: float, end: float, what: str = "") ->
     """Tell of a part of the work as of the whole.
 
     Args:
-        progress: Told of the whole.
+        progress: Callback of the whole.
         begin: Fraction of the whole that is done when the part begins.
         end: The same when it ends.
         what: Tells this part from others in which the same is done; follows the words.

@@ -73,7 +73,7 @@ def disk_errors(path: Path) -> Iterator[None]:
 
 
 def require_disk_space(folder: Path, needed: int) -> None:
-    """Refuse to begin what the disk cannot hold.
+    """Reject to begin what the disk cannot hold.
 
     Args:
         folder: Where it would be written.

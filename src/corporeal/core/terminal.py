@@ -23,9 +23,9 @@ LOG_START_DELAY_S = 2.0
 and an error stands alone [s].
 """
 MIN_FRACTION_FOR_ESTIMATE = 0.05
-"""Share of a stage that has to be done while somebody looks before its time left is told [-]."""
+"""Share of a stage after which the remaining time is shown [-]."""
 MINUTE_S, HOUR_S, SHORT_DURATION_S = 60.0, 3600.0, 90.0
-"""[s]; what is brief is told in seconds."""
+"""[s]; short times are shown in seconds."""
 
 
 def show_table(
@@ -55,7 +55,7 @@ def print_line(line: str, where: Console = console) -> None:
 
 @contextmanager
 def progress_bars() -> Iterator[ProgressOfStage]:
-    """Draw one bar per stage, with the time left; where nobody watches, say it in lines of a log."""
+    """Draw one bar per stage, with the time left; without a terminal, in lines of a log."""
     with _bars() if console.is_terminal else log_lines(console) as tell:
         yield tell
 
@@ -96,11 +96,12 @@ class StageProgress:
     fraction: float = 0.0
     words: str = ""
     first: tuple[float, float] | None = None
-    """When something was told first [s], and the fraction that was done then: what an interrupted
-    run left counts for no speed."""
+    """Time of the first report [s], and the fraction that was done then: what an interrupted run
+    left counts for no speed.
+    """
 
     def told(self, fraction: float, words: str, now: float) -> None:
-        """Take note of what was told."""
+        """Update by a report."""
         self.fraction, self.words = fraction, words
         self.first = self.first or (now, fraction)
 
@@ -113,7 +114,7 @@ class StageProgress:
         )
 
     def _speed(self, now: float) -> float:
-        """Return the share that is done in a second; 0: nobody knows yet [1/s]."""
+        """Return the share that is done in a second; 0: unknown yet [1/s]."""
         since, begun = self.first or (now, 0.0)
         done = self.fraction - begun
         return done / (now - since) if done >= MIN_FRACTION_FOR_ESTIMATE and now > since else 0.0

@@ -292,9 +292,9 @@ def infer_structure(member: MeasuredPart, piece: PieceSpecification) -> PartMode
     Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ V (1 - (1 - A t / (n V))^n) with the
     area A of one face: not of the inside of a shade, whose outside counts; about ρ A t where it is
     thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
-    is 2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
-    scans as in models; of open ware from pictures, whose inside may be plain, only where nobody
-    knows how thick such walls usually are. Such ware weighs ρ A t with the area of its outside
+    is 2 V / A thick unless stated or judged otherwise: thin walls are drawn too thick, in scans as
+    in models; of open ware from pictures, whose inside may be plain, only if the usual thickness of
+    such walls is unknown. Such ware weighs ρ A t with the area of its outside
     (``open_ware.sheet_area``), whatever is drawn in its hollow. Open sheets weigh ρ A t. Of a
     piece, its shares of V and A count, less the volume of what lies inside it; a piece that the
     mesh lacks is not bounded by the mesh. Of what is packed of parts and air, the share that is

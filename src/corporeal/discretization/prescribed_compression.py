@@ -123,7 +123,7 @@ class FreeObjects:
     def pressed(
         self, pressers: list[PresserPath], planes: list[CompressionPlane]
     ) -> Float[np.ndarray, " F"]:
-        """Give the greatest pressure on each [Pa]."""
+        """Return the greatest pressure on each [Pa]."""
         greatest = np.zeros(len(self.objects))
         for plane in planes:
             for presser in pressers:
@@ -161,7 +161,7 @@ class FreeObjects:
         upper: PresserPath,
         along: Float[np.ndarray, "3"],
     ) -> Float[np.ndarray, " F"]:
-        """Give the greatest pressure on each free object between two [Pa].
+        """Return the greatest pressure on each free object between two [Pa].
 
         From each instant on, as long as both stay over an object, they are followed as if they did
         not meet anything.

@@ -65,7 +65,7 @@ def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdic
 
 
 def explain_rigidity(strain: float, speed: float, yields_at: float) -> str:
-    """Give the verdict in words."""
+    """Return the verdict in words."""
     if strain >= MAX_INVISIBLE_STRAIN:
         return f"it would visibly flex: a strain of about {strain:.2g} is expected"
     if speed >= yields_at:

@@ -175,7 +175,7 @@ class MeshCurvature:
 
 
 def _next_corners(corner: Int[np.ndarray, " C"]) -> Int[np.ndarray, " C"]:
-    """Give the next corners of the same triangles."""
+    """Return the next corners of the same triangles."""
     return corner - corner % 3 + (corner + 1) % 3
 
 

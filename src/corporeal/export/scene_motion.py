@@ -202,7 +202,7 @@ def motion_of_run(played: SimulationResult, at: str) -> SceneMotion:
 
 
 def frame_at(at: str, time: Float[np.ndarray, " F"]) -> int:
-    """Return the number of the frame that somebody asks for.
+    """Return the number of the frame for --at.
 
     Raises:
         UserError: There is no such instant.
@@ -287,7 +287,7 @@ def _scene_skin(prepared: PreparedScene) -> SkinBinding:
 
 
 def motion_of_scene(prepared: PreparedScene) -> SceneMotion:
-    """Take a scene that nobody has simulated: one instant."""
+    """Return the motion of a scene without simulation: one instant."""
     particles, scene = prepared.particles, prepared.scene
     posed = build_model(scene, particles, prepared.field)
     count = len(scene.objects)

@@ -54,7 +54,7 @@ class QueryMesh:
         return unbalanced_edges(self.mesh)
 
     def moved(self, vertices: Float[np.ndarray, "V 3"]) -> "QueryMesh":
-        """Give the same triangles with their vertices elsewhere, which have the same open edges."""
+        """Return the same triangles with their vertices elsewhere, which have the same open edges."""
         other = QueryMesh(Mesh(vertices, self.mesh.triangles))
         other.__dict__["open_edges"] = self.open_edges
         return other

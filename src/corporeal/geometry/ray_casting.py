@@ -48,12 +48,12 @@ class RayCaster:
             TriangleMesh(self._scene, seen, mesh.triangles.astype(np.uint32))
 
     def first(self, origins: RayPoints, directions: RayPoints) -> Int[np.ndarray, " N"]:
-        """Give the first triangle along each ray; -1: none. Origins are in single precision."""
+        """Return the first triangle along each ray; -1: none. Origins are in single precision."""
         begin, way = origins.astype(np.float32), directions.astype(np.float32)
         return self._cast(begin.astype(np.float64), _unit_or_same(way))
 
     def hits(self, origins: RayPoints, directions: RayPoints) -> RayHits:
-        """Give the places where rays meet the mesh first."""
+        """Return the places where rays meet the mesh first."""
         origin, way = np.array(origins, dtype=np.float64), _unit_or_same(directions)
         triangle = self._cast(origin, way)
         ray = np.flatnonzero(triangle >= 0)

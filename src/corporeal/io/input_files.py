@@ -1,4 +1,4 @@
-"""Which files a scene is made of: a result is stale when any of them changes."""
+"""Input files of a scene, whose content is part of the freshness keys."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Read a model of any kind: glTF, or a mesh file in a child process."""
+"""Loading of models: glTF, or mesh files in a child process."""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ BLENDER_CONVERT_SCRIPTS = {
 
 @dataclass(frozen=True)
 class MeshFrame:
-    """What a person says of the axes and the unit of a mesh file."""
+    """Axes and unit of a mesh file as given by the user."""
 
     up: UpAxis | None = None
     """Axis of the file that points up; None: as the file states, or as its kind usually has it."""
@@ -122,7 +122,7 @@ def _not_read_error(path: Path) -> UserError:
     if kind in (*READABLE_IMAGE_SUFFIXES, *HEIC_SUFFIXES, *UNREAD_IMAGE_SUFFIXES):
         return BadFileError(path, "is a single picture, which shows no depth.", PHOTOGRAPH_ADVICE)
     return BadFileError(
-        path, f"is no model ({readable_model_formats()} are read).", "Convert it to .glb."
+        path, f"is not a model ({readable_model_formats()} are read).", "Convert it to .glb."
     )
 
 

@@ -1,4 +1,4 @@
-"""Which pieces of a file are objects of their own, where the file itself does not say.
+"""Grouping of a file's pieces into objects.
 
 Pieces that touch are one object, as the legs and the seat of a chair are, unless their names say
 that each is an object by itself, as a cup and its saucer are. Why so: decision 62.
@@ -142,6 +142,6 @@ def _merge_groups(scene: Scene, group: np.ndarray) -> Scene:
 def _grouping_note(names: Sequence[str], file: str) -> str:
     shown = ", ".join(names[:4]) + (", …" if len(names) > 4 else "")
     return (
-        f"{file} was taken for {len(names)} objects ({shown}), because they do not touch or are "
+        f"{file} was split into {len(names)} objects ({shown}), because they do not touch or are "
         "named as different objects. --objects one keeps the file together."
     )

@@ -48,7 +48,7 @@ PLY_EXPORT_ADVICE = "Export it again."
 
 @dataclass(frozen=True)
 class PlyElement:
-    """What the header says of one element."""
+    """Header of one element."""
 
     name: str
     count: int

@@ -81,7 +81,7 @@ def _first_line(error: Exception) -> str:
 
 
 def _check_address(address: str) -> None:
-    """Refuse an address where nobody answers: Ray itself would try for minutes."""
+    """Reject an address without a server: Ray itself would retry for minutes."""
     host, _, port = address.rpartition("/")[2].partition(":")
     if not host or not port.isdecimal():
         return  # "auto", or none

@@ -79,8 +79,8 @@ def triangular_quantile(quantile: float, low: float, peak: float, high: float) -
 def draw_hypotheses(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
     """Sample a hypothesis for every part by their probabilities.
 
-    Ways that share a reading of the object ("imitation") are drawn together. What nobody recognised
-    may be of any of the library's materials. Where several answers were given, one of them is drawn
+    Ways that share a reading of the object ("imitation") are drawn together. Unrecognised parts may
+    be of any of the library's materials. Where several answers were given, one of them is drawn
     first, since its ways and its values fit each other.
     """
     return replace(

@@ -352,7 +352,7 @@ OVERLAP_DEPTH_PARTICLES = 8
 OUT_OF_BLOCK_FRACTION = 0.1
 """Share of a field's particles outside of their blocks from which it is sorted with others [-]."""
 POLL_INTERVAL_S = 0.2
-"""Computing time after which Python looks whether somebody wants to stop [s]."""
+"""Computing time after which Python checks for interrupts [s]."""
 
 
 def constants_by_name() -> dict[str, int | float]:
@@ -372,5 +372,5 @@ def cpp_definitions(given: Mapping[str, int | float]) -> str:
 
 
 def cpp_type(value: int | float) -> str:
-    """Give the C++ type of a number."""
+    """Return the C++ type of a number."""
     return "int" if isinstance(value, int) else "double"

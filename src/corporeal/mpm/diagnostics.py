@@ -170,4 +170,4 @@ class EngineReadout(ABC):
 
     @abstractmethod
     def _booked(self) -> EngineLedger:
-        """Give the ledger, with everything entered that has happened."""
+        """Return the ledger, with everything entered that has happened."""

@@ -145,7 +145,7 @@ class MaterialTable:
         return YieldParameters(drag=drag, **{name: getattr(self, name)[row] for name in given})
 
     def of_bodies(self, bodies: list[int]) -> "MaterialTable":
-        """Give the rows of some bodies."""
+        """Return the rows of some bodies."""
         mine = np.isin(self.body, bodies)
         return MaterialTable(*(getattr(self, name)[mine] for name in _COLUMNS))
 

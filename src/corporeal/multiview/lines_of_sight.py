@@ -3,7 +3,7 @@
 Structure from motion says of each of its points which pictures show it. Labatut, Pons and Keriven,
 "Efficient multi-view reconstruction of large-scale scenes using interest points, Delaunay
 triangulation and graph cuts" (ICCV 2007), carve space by that; here it empties what silhouettes
-cannot: the mouth of a vessel that nobody photographed from the side.
+cannot: the mouth of a vessel seen from above.
 """
 
 from collections.abc import Sequence

@@ -32,7 +32,8 @@ class MetricScale:
     """[m]"""
     source: Literal["file", "distance", "extent", "nobody"]
     """The file's kind is in metres; two points whose distance is known; how large such an object is
-    as a rule, which somebody or a model said; a neutral stand-in."""
+    as a rule, stated or by a model; a default size.
+    """
     reason: str
     """In one sentence."""
     warnings: tuple[str, ...] = ()
@@ -61,8 +62,8 @@ def choose_metric_scale(
 ) -> MetricScale:
     """Return the scale that the best witness names, and what the others say against it.
 
-    In this order: a distance that somebody measured, sizes of objects that somebody stated, a file
-    in metres, how large such objects usually are, and for want of all a neutral stand-in.
+    In this order: a measured distance, stated sizes of objects, a file in metres, how large such
+    objects usually are, and for want of all a neutral stand-in.
 
     Args:
         distance: Of two points, or of cameras.
@@ -158,7 +159,7 @@ def scale_from_distance(a: Vector, b: Vector, metres: float) -> MetricScale:
 def stated_metric_scale(
     per_unit: float | None, points: MeasuredDistance | None, who: str
 ) -> MetricScale | None:
-    """Return what somebody measured of a file's unit; None: nobody did.
+    """Return the measured unit of a file; None: not measured.
 
     Args:
         per_unit: What one unit is [m].

@@ -65,8 +65,8 @@ def estimate_up_direction(cameras: tuple[Camera, ...]) -> UpDirection:
     flat = np.where(rolled[:, None], above, right)
     up, weight = _perpendicular_to_most(flat, start)
     share, more = np.linalg.eigvalsh(_axis_spread(flat, weight))[1:]
-    # Of parallel x-axes on less than half a circle nobody knows whether they are all level or all
-    # upright: an arm that swings up is a ring of cameras on their sides.
+    # Of parallel x-axes on less than half a circle it is ambiguous whether they are all level or
+    # all upright: an arm that swings up is a ring of cameras on their sides.
     parallel = np.linalg.eigvalsh(right.T @ right / len(right))[1] < MIN_SPANNED_FRACTION
     alike = parallel and np.linalg.norm(back.mean(axis=0)) > HALF_RING_MEAN_AXIS_LENGTH
     warnings = []

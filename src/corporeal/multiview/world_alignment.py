@@ -55,8 +55,9 @@ class WorldAlignment:
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str
-    """"plane": it is in the pictures; "person": somebody said it; "objects": their lowest points;
-    "nothing": there are none."""
+    """"plane": it is in the pictures; "person": stated by the user; "objects": their lowest points;
+    "nothing": there are none.
+    """
     radius: float
     """Of the scene, in the file's unit."""
     reason: str
@@ -103,7 +104,7 @@ def align_world(
         z_up: Whether the file says that its +z is up.
         of_objects: Points that are on objects for sure, as masks tell; None: unknown.
         usual: What is up in such files as a rule; for want of cameras.
-        stated: What somebody says.
+        stated: Stated by the user.
 
     """
     points, of_objects = (
@@ -191,7 +192,7 @@ def _up_from_resting(told: _UpEvidence, points: np.ndarray) -> _UpEvidence:
 
 
 def _unknown_up_note(more: str) -> Note:
-    """State that nobody said what is up, and more of it."""
+    """Note that the up direction is unknown."""
     return Note(UNKNOWN_UP_NOTE + more, NoteKind.ASSUMED)
 
 

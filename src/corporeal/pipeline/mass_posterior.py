@@ -190,11 +190,10 @@ class MassSampler:
 def volume_log_std(member: MeasuredPart) -> float:
     """Return how far the mesh leaves the enclosed volume open: deviation of its logarithm [-].
 
-    Of a scan h / (√3 τ) (``scan_volume_log_deviation``). It is more often too large than too
-    small, by half of that, .29 h / τ: fusing views thickens what is thin (boards of 16 mm that
-    were reconstructed on cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ
-    both). Where somebody who looked says how much too thick it is, that stands instead of this
-    mean.
+    Of a scan h / (√3 τ) (``scan_volume_log_deviation``). It is more often too large than too small,
+    by half of that, .29 h / τ: fusing views thickens what is thin (boards of 16 mm that were
+    reconstructed on cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ both).
+    A stated ratio of thickness replaces this mean.
     """
     found = 0.0 if member.closed else OPEN_MESH_VOLUME_LOG_STD
     edge = scan_edge_length(member.body)

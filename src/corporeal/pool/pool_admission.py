@@ -111,8 +111,8 @@ def _class_in_words(class_name: str) -> str:
 def is_in_metres(candidate: PoolCandidate, extent: float, words: str) -> bool:
     """Return whether lengths are metres: as declared, unless the mesh has another extent.
 
-    Where nobody says, they are if the object is then as large as such objects are: glTF is in
-    metres by its specification, and most files are not.
+    If not stated, they are if the object is then as large as such objects are: glTF is in metres by
+    its specification, and most files are not.
     """
     declared = candidate.declared
     if (

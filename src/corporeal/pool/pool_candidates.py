@@ -20,7 +20,7 @@ CONTAINER_FOLDER_NAMES = frozenset(
 
 @dataclass(frozen=True)
 class PoolCandidate:
-    """A model file, with what somebody says about it; empty or None: nothing."""
+    """A model file with declared metadata; empty or None: nothing."""
 
     file: Path
     declared: ModelRow = field(default_factory=ModelRow)
@@ -37,8 +37,8 @@ def candidates_in(
 
     Args:
         folders: Searched with all their folders below.
-        table: CSV of classes; what it says goes before a manifest. What it names and is not there
-            is a candidate too, so that somebody hears of it.
+        table: CSV of classes; what it says goes before a manifest. What it names and is missing is
+            a candidate too, so that it is reported.
         pool: A folder whose own copies are no candidates.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Objects that were found in pictures or in a splat, and which of those that were named each is."""
+"""Objects found in pictures or in a splat, matched to given names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Masks by a model that finds objects in one picture, and whether they are of one object at all.
+"""Masks by a learned segmentation model, and their consistency.
 
 A model sees one picture at a time and may take something else for the object in each. What it
 found is asked what grown masks are asked: whether pictures hold it, and whether its outlines are
@@ -59,8 +59,8 @@ def masks_from_model(
         if why is not None and not config.force:
             what = f"masks by {masker.name()} are of no one thing: {why}."
             advice = (
-                f"Look at {learned.folder / MASK_FOLDERS[0]} and correct them, take other weights or "
-                "words, or leave --masks out, and masks are grown. --force goes on all the same."
+                f"Check and correct {learned.folder / MASK_FOLDERS[0]}, use other weights or "
+                "words, or omit --masks to grow masks. --force continues anyway."
             )
             raise BadFileError(source, what, advice)
     doubts = [] if why is None else [Note(f"Masks are of no one thing: {why}.", NoteKind.GRAVE)]

@@ -1,4 +1,4 @@
-"""Points on objects, and what their pictures look like."""
+"""Points on objects, with their features."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""How photographs or a splat are made objects, and which settings cannot be right."""
+"""Settings of the stage reconstruct, with validation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -121,8 +121,8 @@ def validate_reconstruct(
     check_range("--floor-at", config.floor_at, -MAX_COORDINATE_UNITS, MAX_COORDINATE_UNITS)
     if config.count and config.object_names and config.count != len(config.object_names):
         raise UserError(
-            f"--count says {config.count} objects, --object-names names {len(config.object_names)}. Leave "
-            "--count out, or name all of them."
+            f"--count is {config.count}, but --object-names names {len(config.object_names)} objects. Omit "
+            "--count, or name all of them."
         )
     if config.object_names or not asked:
         check_stated_extents(

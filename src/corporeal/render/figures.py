@@ -270,7 +270,7 @@ def _shorten(name: str) -> str:
 
 
 def _scale(panel: NumericPanel) -> tuple[list[ScaleTick], np.ndarray]:
-    """Give the lowest value, the highest and what lies between, and the colours along them."""
+    """Return the lowest value, the highest and what lies between, and the colours along them."""
     _, low, high = colours.turbo(panel.value or [0.0], panel.log)
     ramp = colours.ramp_colours(np.linspace(0, 1, 256))
     if high - low <= 1e-9 * max(abs(high), 1e-30):

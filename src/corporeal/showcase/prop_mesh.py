@@ -1,4 +1,4 @@
-"""Mesh, Part, Model: what a prop is made of."""
+"""Meshes, parts and models of props."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

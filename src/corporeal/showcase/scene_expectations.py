@@ -1,4 +1,4 @@
-"""What must be seen in each showcase scene, as numbers: data, and a function that compares.
+"""Expected outcomes of the showcase scenes, and their comparison.
 
 The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order.
 Each expectation bounds a measure from both sides where too much is as wrong as too little, and

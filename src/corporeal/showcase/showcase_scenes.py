@@ -1,4 +1,4 @@
-"""The ten showcase scenes: who stands where before the first step, and what is done to them.
+"""The ten showcase scenes: initial states and forces.
 
 Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
 has there: the video begins when something is about to happen. Nothing numerical is in a scene.
@@ -97,15 +97,14 @@ def duck_on_mud() -> ShowcaseComposition:
 def duck_on_can() -> ShowcaseComposition:
     """Throw the duck down onto an empty can that lies on its side.
 
-    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic
-    dent of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and
-    Suh 1988). With 285 MPa and t = 0.1 mm that is 73 N at 1 mm and 230 N at 10 mm, which costs
-    (2/3) P δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with
-    k ≈ 2.3 E h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J,
-    50 N) it only bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with
-    75 N, which in reality leaves a dent of a millimetre or two. The simulated dent is far deeper:
-    a wall that the grid must thicken is softer in its plane. Its place and that it stays are
-    reliable, its depth is not.
+    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic dent
+    of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and Suh
+    1988). With 285 MPa and t = 0.1 mm that is 73 N at 1 mm and 230 N at 10 mm, which costs (2/3) P
+    δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with k ≈ 2.3 E
+    h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J, 50 N) it only
+    bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with 75 N, which in
+    reality leaves a dent of a millimetre or two. The simulated dent is far deeper: a wall that the
+    grid must thicken is softer in its plane. Its place and its rest are reliable, its depth is not.
     """
     can = PlacedModel("soda_can", (-0.0575, 0, 0.0331), (0, 90, 0))
     duck = PlacedModel("rubber_duck", (-0.005, 0.0, 0.24), (0, 0, -15), (0.0, 0.0, -6.0))

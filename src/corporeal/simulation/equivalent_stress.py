@@ -17,7 +17,7 @@ def equivalent_stress(tau: Float[np.ndarray, "P 3 3"]) -> Float[np.ndarray, " P"
 
 
 def equivalent_of_principal(tau: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:
-    """Give the same of principal stresses [Pa]."""
+    """Return the same of principal stresses [Pa]."""
     return np.sqrt(1.5 * np.sum((tau - tau.mean(axis=1, keepdims=True)) ** 2, axis=1))
 
 

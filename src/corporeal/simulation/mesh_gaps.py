@@ -64,7 +64,7 @@ class TrackedSurface:
         return self.surface.moved(self.skin.carried(frame)[0])
 
     def points(self, shape: QueryMesh) -> Float[np.ndarray, "N 3"]:
-        """Give the points on it that are asked [m]."""
+        """Return the points on it that are asked [m]."""
         corners = shape.mesh.vertices[shape.mesh.triangles[self.sample]]
         return np.einsum("nk,nkd->nd", self.weight, corners)
 

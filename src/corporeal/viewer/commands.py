@@ -1,4 +1,4 @@
-"""What a page may ask of a live simulation: a closed table; every number finite and bounded."""
+"""Validated commands of a page to a live simulation."""
 
 import json
 import math
@@ -102,20 +102,20 @@ def _number(value: Any) -> float:
 
 def _name(value: Any) -> str:
     if not isinstance(value, str) or len(value) > MAX_NAME_CHARACTERS:
-        raise UserError("The object of an order is no name.")
+        raise UserError("The object of a command is not a name.")
     return value
 
 
 def _whole(asked: Mapping[str, Any], name: str) -> int:
     value = _number(asked.get(name, 0))
     if value != int(value) or not 0 <= value < 2**31:
-        raise UserError(f"{name} of an order is no number of anything.")
+        raise UserError(f"{name} of a command is not a valid number.")
     return int(value)
 
 
 def _vector(asked: Mapping[str, Any], name: str, limit: float) -> Vector:
     value = asked.get(name, (0, 0, 0))
     if not isinstance(value, list | tuple) or len(value) != 3:
-        raise UserError(f"{name} of an order is no three numbers.")
+        raise UserError(f"{name} of a command is not three numbers.")
     x, y, z = (min(max(_number(v), -limit), limit) for v in value)
     return x, y, z

@@ -1,4 +1,4 @@
-"""An engine that obeys orders, and a record of them from which it does the same again."""
+"""Applies commands to an engine, and records them for replay."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -236,7 +236,7 @@ class InteractionController:
         away = self.engine.snapshot().position - np.array(one.foot)
         near = 0.5 * self.engine.problem.cell
         if ((away > low - near) & (away < high + near)).all(axis=1).any():
-            raise UserError(f"There is no room for {one.thing} there: something is in the way.")
+            raise UserError(f"There is no space for {one.thing} there: something is in the way.")
         added = (*self.added, one)
         posed = self._growing.at(added).posed
         self.engine = require(self.engine, BodyAddingEngine).with_added_bodies(posed.problem)

@@ -1,4 +1,4 @@
-"""What can be dropped into a live simulation: models of the showcase, and objects of the runs."""
+"""Objects for live simulations: models of the showcase, and objects of runs."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -38,7 +38,7 @@ class AssetKey:
         """
         place, slash, name = text.partition("/")
         if not (place and slash and name):
-            raise UserError("Say what to drop: corporeal/MODEL or RUN/OBJECT.")
+            raise UserError("Name the object to drop: corporeal/MODEL or RUN/OBJECT.")
         return cls(place, name)
 
 
@@ -69,7 +69,9 @@ class LiveAssets:
             names = [o.name for o in whole.scene.objects]
             if key.name in names:
                 return isolate_object(whole, names.index(key.name))
-        raise UserError(f"There is no {text!r} to drop: no model of corporeal, no object of a run.")
+        raise UserError(
+            f"There is no {text!r} to drop: it is neither a model of corporeal nor an object of a run."
+        )
 
     def _filled(self) -> list[str]:
         return [row["name"] for row in self.shelf.listed() if row["shown"]]

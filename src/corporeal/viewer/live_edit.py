@@ -1,4 +1,4 @@
-"""A filled scene to which objects are added while it is simulated, at its own grid spacing."""
+"""Adding objects to a scene during the simulation, at its grid spacing."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

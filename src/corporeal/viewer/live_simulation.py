@@ -1,4 +1,4 @@
-"""A simulation that runs while pages watch and touch it: of pictures, the newest only."""
+"""Live simulation with interaction; pages get the newest frame only."""
 
 import threading
 import time
@@ -238,7 +238,7 @@ class LiveSimulation:
     # ---------------------------------------------------------------- two threads
 
     def _run(self) -> None:
-        """Obey and step; what there is to see is handed over, and nobody waited for."""
+        """Obey and step; frames are handed over without waiting."""
         self._hand_over()
         while not self.closed:
             begun, worked = time.perf_counter(), time.thread_time()

@@ -1,4 +1,4 @@
-"""A record of what was done to a live simulation, and the same once more, as finely as a draft.
+"""Records of live simulations, and their replay at higher resolution.
 
 The record holds every order and the instant of every advance. What was taken hold of is told by
 where its material was at the start, so that a scene filled more finely obeys it as well.

@@ -1,4 +1,4 @@
-"""Runs that the page asked for: one after the other, each in its own process.
+"""Queue of runs started from the page, each in its own process.
 
 What was asked stands in ``.queue.json``. A job that is stopped, or whose server is killed, goes on
 in the same folder from where it was.

@@ -1,4 +1,4 @@
-"""What a page may start: runs of uploads, and runs like others with something changed."""
+"""Requests of a page for runs: of uploads, or of edited runs."""
 
 import secrets
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The runs that a server shows, and what of them has been read."""
+"""Runs shown by the server, with cached results."""
 
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -173,7 +173,7 @@ def _row(name: str, run: Path) -> dict[str, Any]:
 
 
 def _input_name(path: Path) -> str:
-    """Return what to call an input; names of uploads are ours and tell nobody anything."""
+    """Return what to call an input; names of uploads are generated."""
     return UPLOADED_NAME if INBOX_FOLDER in path.parts else path.name
 
 

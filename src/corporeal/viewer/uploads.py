@@ -1,4 +1,4 @@
-"""Files that come through the page: into a folder of their own, known by their first bytes."""
+"""Uploaded files, validated by their first bytes."""
 
 import asyncio
 import re

@@ -316,7 +316,7 @@ def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
 
 
 def things_complaints(answer: ObjectsAnswer) -> list[str]:
-    """Check that there are objects, and not more than can be told apart."""
+    """Check that there are objects, and not more than can be separated."""
     if 1 <= len(answer.things) <= MAX_OBJECTS_IN_SCENE:
         return []
     return [f"Name 1 to {MAX_OBJECTS_IN_SCENE} things; you named {len(answer.things)}."]

@@ -235,7 +235,7 @@ def check_stated_extents(
 
     Args:
         stated: Sizes that a person gave for some, such as "duck=0.1" [m].
-        objects: What there is, as far as anybody will say; others are objects.
+        objects: Known objects; others are objects.
         source: What the pictures are called, by which a lone object may be called.
 
     """

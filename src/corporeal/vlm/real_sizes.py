@@ -86,7 +86,8 @@ def find_class_sizes(
         record: Folder where every answer is kept for "replay:FOLDER".
 
     Raises:
-        UserError: Nobody can be asked, a recording is missing, or questions wait for a person's
+        UserError: The model is unavailable, a recording is missing, or questions wait for a
+            person's
             answers.
 
     """

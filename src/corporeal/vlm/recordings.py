@@ -106,7 +106,7 @@ class ReplayClient:
 
 
 class RecordingClient:
-    """Ask somebody else, and keep every answer where ``ReplayClient`` finds it."""
+    """Record every answer of another client where ``ReplayClient`` finds it."""
 
     def __init__(self, model: VlmClient, folder: Path) -> None:
         self.model, self.folder, self._one = model, folder, Lock()

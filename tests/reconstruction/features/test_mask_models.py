@@ -147,7 +147,7 @@ def test_a_folder_that_is_not_there_is_named_and_nothing_is_fetched(monkeypatch)
         "corporeal.reconstruction.features.mask_models.find_spec", lambda package: True
     )
     for spec in ("sam2:", "sam3:nowhere", "birefnet:facebook/sam2"):
-        with pytest.raises(UserError, match="none are fetched"):
+        with pytest.raises(UserError, match="none are downloaded"):
             connect_mask_model(spec)
     with pytest.raises(UnknownChoiceError, match="sam3"):
         split_model_spec("sam9:folder")

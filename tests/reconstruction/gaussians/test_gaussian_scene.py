@@ -124,8 +124,8 @@ def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):
     ("quality", "said"),
     [
         (GOOD, ()),
-        (None, ("3 photographs are so few that none was held back",)),
-        (replace(GOOD, psnr=14.0), ("look otherwise (14.0 dB)",)),
+        (None, ("3 photographs are too few for a validation set",)),
+        (replace(GOOD, psnr=14.0), ("differ from their rendering (14.0 dB)",)),
     ],
 )
 def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):

@@ -132,7 +132,7 @@ def test_a_box_leaves_out_what_is_beside_it():
 def test_pointing_at_what_is_everywhere_is_refused():
     views = scene()[0]
     plain = Views(np.full_like(views.rgb, 90), views.cameras)
-    with pytest.raises(UserError, match="cannot be told from what is around it"):
+    with pytest.raises(UserError, match="cannot be separated from its surroundings"):
         seeds_from_prompt(plain, None, PicturePrompt(0, np.array([[40.0, 30.0], [50.0, 40.0]])))
 
 

@@ -63,8 +63,7 @@ class Material:
     yield_shear: float = 0.0
     """Shear stress below which a paste does not flow [Pa]."""
     strength_local: float | None = None
-    """Tension that a brittle material bears over a square millimetre [Pa]; None: not brittle, or
-    nobody measured it."""
+    """Tension that a brittle material bears over a square millimetre [Pa]; None: not brittle, or not measured."""
     grounds: dict[str, Provenance] = field(default_factory=dict)
     """Field name → why, for every measured number above."""
 
@@ -134,7 +133,7 @@ class AnsweredMass:
     mass: float
     """Median over its own ways and ranges, without outside evidence [kg]."""
     judged: float | None
-    """What it was judged to weigh outright [kg]; None: nobody was asked, or no usable answer."""
+    """What it was judged to weigh outright [kg]; None: not asked, or no usable answer."""
     low: float = 0.0
     """5 % [kg]; 0, as ``high``: older runs did not keep it."""
     high: float = 0.0

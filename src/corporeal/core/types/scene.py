@@ -8,7 +8,7 @@ from jaxtyping import Float, Int, UInt8
 
 Vector = tuple[float, float, float]
 GRAVITY_M_S2 = 9.81
-"""Where nobody states another [m/s²]."""
+"""Default gravity [m/s²]."""
 GRAVITY_VECTOR: Vector = (0.0, 0.0, -GRAVITY_M_S2)
 """The same as a vector [m/s²]."""
 SUBSTANCE_KEY, STATED_MATTER_KEY = "substance", "stated_matter"

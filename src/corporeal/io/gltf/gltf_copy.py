@@ -1,9 +1,8 @@
-"""Meshes and looks of one glTF file, copied byte for byte into another file that is being made.
+"""Copying of meshes and materials of a glTF file, byte for byte, into another.
 
-Everything is copied when it is first asked for, so that nothing arrives that nobody uses, and only
-once, however often it is asked for. Whatever an index points to gets a new number; all else passes
-as it is. glTF 2.0 specification, sections 3.6 to 3.9, and the extensions named below, Khronos
-Group.
+Entries are copied once, on first use. Whatever an index points to gets a new number; all else
+passes as it is. glTF 2.0 specification, sections 3.6 to 3.9, and the extensions named below,
+Khronos Group.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""A glTF file as numbers and words that were checked before use.
+"""Validated access to the JSON of a glTF file.
 
 Every look-up goes through an ``GltfEntry``, which knows its place in the JSON, so that any
 complaint names it ("/meshes/0/primitives/1"). Nothing is allocated by a size that the file merely
@@ -37,7 +37,7 @@ class GltfEntry:
     pointer: str
 
     def fail(self, what: str, next_step: str = GLTF_EXPORT_ADVICE) -> NoReturn:
-        """Refuse the file because of this entry."""
+        """Reject the file because of this entry."""
         where = f"at {self.pointer}: " if self.pointer else ""
         raise BadFileError(self.document.path, where + what, next_step)
 
@@ -237,7 +237,7 @@ class GltfDocument:
                 "Convert it, for example with Blender or gltf-pipeline.",
             )
         if not version:
-            self.warn("does not say its glTF version; taken as 2.0.")
+            self.warn("does not state its glTF version; read as 2.0.")
         least = asset.text("minVersion") if asset else ""
         if least and least != "2.0":
             self.root.fail(f"the file asks for a reader of glTF {least[:8]}; this one reads 2.0.")

@@ -1,4 +1,4 @@
-"""What a glTF file says in ``extras``: anybody's class and size, and our own files' motion."""
+"""``extras`` of glTF files: class and size, and motion in files written here."""
 
 import math
 from itertools import pairwise
@@ -21,7 +21,7 @@ def is_own_file(document: GltfDocument) -> bool:
 
 
 def scene_from_extras(document: GltfDocument, root: GltfEntry) -> dict:
-    """Return what a file of ours says of the whole scene; empty for other files."""
+    """Return scene data of a file written here; empty for other files."""
     if not is_own_file(document) or not isinstance(root.value.get("extras"), dict):
         return {}
     extras = root.needed("extras")

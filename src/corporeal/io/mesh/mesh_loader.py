@@ -1,7 +1,7 @@
-"""Read OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene: +Z up.
+"""Loading of OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene, +Z up.
 
 The libraries that read them run in a child process with limits of time and memory; what it hands
-over is checked as any file's. Facts of each kind, docs/inputs.md, "Meshes".
+over is checked as any file's. Facts of each kind, docs/reference/input-files.md, "Meshes".
 """
 
 import os
@@ -157,7 +157,7 @@ def _reader_process_error(path: Path, done: subprocess.CompletedProcess[bytes]) 
 
 
 def _check_numbers(path: Path, raw: RawMesh) -> None:
-    """Refuse numbers that cannot be.
+    """Reject numbers that cannot be.
 
     Raises:
         BadFileError: There are some, or there are no triangles.
@@ -184,7 +184,7 @@ def _check_numbers(path: Path, raw: RawMesh) -> None:
 
 
 def _assumed_up_axis(path: Path, raw: RawMesh, usual: UpAxis) -> tuple[UpAxis, tuple[str, ...]]:
-    """Return what is taken for up where nobody says it, and what there is to say of that."""
+    """Return the assumed up axis if none is stated, with notes."""
     if raw.up is not None:
         said = (Note(f"{path.name}: {raw.up_note}", NoteKind.ASSUMED),) if raw.up_note else ()
         return raw.up, said
@@ -199,7 +199,7 @@ def _assumed_up_axis(path: Path, raw: RawMesh, usual: UpAxis) -> tuple[UpAxis, t
     kind = path.suffix.lower()
     said = f"{path.name} does not state what is up. {usual} was taken, as is usual in {kind}, "
     return usual, (
-        Note(f"{said}{why}. If it lies on its side, say --up {axis[1]}.", NoteKind.ASSUMED),
+        Note(f"{said}{why}. If it lies on its side, use --up {axis[1]}.", NoteKind.ASSUMED),
     )
 
 

@@ -80,7 +80,7 @@ class _ObjMaterials(_CompanionResolver):
 
 
 def read_obj(path: Path) -> RawMesh:
-    """Read a Wavefront OBJ with its materials; nobody says its unit, and up only a comment.
+    """Read a Wavefront OBJ with its materials; its unit is unknown, its up axis at most a comment.
 
     Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
     but one of the two.
@@ -101,19 +101,19 @@ def read_obj(path: Path) -> RawMesh:
 
 
 def read_ply(path: Path) -> RawMesh:
-    """Read a PLY with faces; nobody says its unit and what is up."""
+    """Read a PLY with faces; unit and up axis unknown."""
     data, lost = triangulate_mixed_faces(path, read_file_bytes(path))
     scene = _load_with_trimesh(path, "ply", data)
     return RawMesh(*_finished_meshes(scene, lambda *_: (path.stem,)), lost=lost)
 
 
 def read_stl(path: Path) -> RawMesh:
-    """Read an STL, in text or in bytes; nobody says its unit and what is up."""
+    """Read an STL, in text or in bytes; unit and up axis unknown."""
     return RawMesh(*_finished_meshes(_load_with_trimesh(path, "stl"), lambda *_: (path.stem,)))
 
 
 def read_off(path: Path) -> RawMesh:
-    """Read an OFF; nobody says its unit and what is up."""
+    """Read an OFF; unit and up axis unknown."""
     return RawMesh(*_finished_meshes(_load_with_trimesh(path, "off"), lambda *_: (path.stem,)))
 
 

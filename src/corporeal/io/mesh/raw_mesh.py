@@ -1,4 +1,4 @@
-"""What a child process that reads a mesh file hands to its parent."""
+"""Mesh data passed from the reader process to its parent."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -35,7 +35,7 @@ class RawMesh:
     """Path of each body that the file states → ``title``, ``mass`` [kg], ``velocity`` [m/s, the
     file's axes], and ``custom``, what our own writer states of it."""
     custom: Mapping[str, Any] = field(default_factory=dict)
-    """What our own writer says of the whole scene; empty of other files."""
+    """Scene data of files written here; empty for other files."""
 
 
 def write_raw_mesh(path: Path, raw: RawMesh) -> None:

@@ -1,4 +1,4 @@
-"""Whether a mesh whose file does not state what is up lies on its side as it is taken.
+"""Inference of the up axis of meshes that don't state it.
 
 Two things tell. As it is taken it would tip over, and does not if the other usual axis points up.
 Or it stands on the plane through the origin that the other axis is normal to, as models are placed
@@ -25,7 +25,7 @@ CENTRED_SIDE_FRACTION = 0.05
 def infer_up_axis(
     vertices: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, "T 3"], taken: UpAxis
 ) -> tuple[UpAxis, str] | None:
-    """Return the axis that is likelier up, and why; None: nothing speaks against what is taken.
+    """Return the axis that is likelier up, and why; None: the default is plausible.
 
     Args:
         vertices: In the file's axes and unit.

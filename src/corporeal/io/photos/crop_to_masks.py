@@ -1,4 +1,4 @@
-"""Windows of photographs about what their masks show, so that reducing them loses less of it.
+"""Cropping of photographs to their masks before downscaling.
 
 An object that fills a third of each photograph has a third of the pixels along its sides that a
 reduced photograph has: its thin parts and walls are lost. What is around it is of no use where

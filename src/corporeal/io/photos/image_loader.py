@@ -1,4 +1,4 @@
-"""Photographs developed: read, straightened and brought to one size, with the cameras that took it.
+"""Loading of photographs: decoded, undistorted and scaled to one size, with cameras.
 
 A few bad ones among many are left out and named.
 """
@@ -399,7 +399,7 @@ def _refuse_if_most_unusable(source: Path, total: int, bad: list[UnusablePhoto])
     good = total - len(bad)
     if len(bad) > MAX_UNUSABLE_PHOTOS_FRACTION * total:
         what = f"{len(bad)} of {total} pictures cannot be used: {_list_reasons(bad)}."
-        raise BadFileError(source, what, "Put them where the file says, or correct the file.")
+        raise BadFileError(source, what, "Move them there, or correct the file.")
     if good < MIN_PHOTOS:
         what = f"{good} of {total} pictures can be used, but at least {MIN_PHOTOS} are needed."
         step = "Photograph the scene from all sides: 20 to 50 pictures are good."

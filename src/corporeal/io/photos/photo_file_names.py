@@ -1,4 +1,4 @@
-"""What files and folders of photographs are called."""
+"""Names of files and folders of photographs."""
 
 READABLE_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 """Pictures that are read."""

@@ -1,4 +1,4 @@
-"""Posed photographs of any kind: what a folder holds tells how they are read."""
+"""Posed photographs of any format, detected by the content of the folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +60,7 @@ POSED_PHOTOS_ADVICE = (
 
 @dataclass(frozen=True)
 class PosedPhotos:
-    """Posed pictures, and what else the file says of the scene."""
+    """Posed pictures, with further scene data of the file."""
 
     views: Views
     """Where there is a mask, all outside it is white. ``object_of_pixel``: what instance masks say,
@@ -76,7 +76,7 @@ class PosedPhotos:
     colours: UInt8[np.ndarray, "N 3"] | None = None
     """Of the points, sRGB."""
     lines: LinesOfSight | None = None
-    """Which pictures show which points; None: nobody says."""
+    """Which pictures show which points; None: unknown."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
     done: tuple[str, ...] = ()
@@ -98,7 +98,7 @@ class PosedPhotos:
 
 @dataclass(frozen=True)
 class PhotoListing:
-    """What a folder says of its photographs, before any is read."""
+    """Listing of a folder's photographs, before any is read."""
 
     source: Path
     """Named in errors."""

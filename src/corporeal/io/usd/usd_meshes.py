@@ -132,7 +132,7 @@ def _open_stage(path: Path) -> Usd.Stage:
 
 
 def _check_layers(path: Path) -> None:
-    """Refuse a file whose layers lead out of its folder, before any of these is opened."""
+    """Reject a file whose layers lead out of its folder, before any of these is opened."""
     known, todo = set(), [str(path)]
     while todo:
         name = todo.pop()

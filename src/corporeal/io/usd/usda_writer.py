@@ -1,8 +1,8 @@
 """Write OpenUSD's text format (.usda): layers of prims with attributes, samples and metadata.
 
-Text needs no library, every tool reads it, and a person can. Grammar: OpenUSD's "Crate and text
-file formats", https://openusd.org/release/spec.html. Numbers are written in nine digits, which
-single precision survives unchanged, or shortest in double.
+Text needs no library and is readable. Grammar: OpenUSD's "Crate and text file formats",
+https://openusd.org/release/spec.html. Numbers are written in nine digits, which single precision
+survives unchanged, or shortest in double.
 """
 
 import re
@@ -35,7 +35,7 @@ class UsdSampleStream:
 
 @dataclass
 class UsdPrim:
-    """One prim: its type, what it states, and what is below it."""
+    """One prim: type, properties, children."""
 
     kind: str
     """Schema ("Mesh"); "": an over that adds to a prim of another layer."""

@@ -85,7 +85,7 @@ class MassPrediction:
     mixture_low: float
     mixture_high: float
     direct: float | None
-    """What a model said outright; None: nobody was asked."""
+    """Direct estimate of a model; None: not asked."""
     warning: str
     """Where that contradicts all the rest; "": nowhere."""
     volume_m3: float

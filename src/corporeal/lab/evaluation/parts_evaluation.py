@@ -47,8 +47,7 @@ SHOWCASE_MODELS = ("potted_ficus", "armchair", "floor_lamp", "couch")
 NAMES_FILE_ADVICE = "Write [file] with part = 'its everyday name', as in pot = 'clay pot'."
 
 PartNames = Mapping[str, Mapping[str, str]]
-"""File's stem → part as the file calls it → as somebody calls it who sees it.
-What is called the same is one part."""
+"""File's stem → part as the file calls it → its everyday name. What is called the same is one part."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ class PartsRow:
     best_iou: float
     """Of clusters that are named after what most of their points are: no naming could do better."""
     found_iou: float
-    """Of named parts, paired by the Hungarian method: how well they are told apart."""
+    """Of named parts, paired by the Hungarian method: how well they are separated."""
     named_iou: float
     """Of named parts, each with its own name's: whether they are also called what they are."""
     right: float
@@ -123,7 +122,7 @@ class FeatureModels:
     structural: Any
     """None: the descriptor."""
     semantic: Any
-    """None: nobody compares points with words."""
+    """None: no model compares points with words."""
 
 
 Progress = Callable[[float, str], None]

@@ -51,7 +51,7 @@ class MeasuredRebound:
     blind: bool = False
     """Whether it was written down before it was tried for the first time."""
     scene: str = ""
-    """What several rows measured alike, the same thing on the same; "": nobody else did."""
+    """What several rows measured alike, the same thing on the same; "": none."""
 
     def off(self, restitution: float) -> float:
         """Return how far a restitution is from the range [-]; 0 in it."""

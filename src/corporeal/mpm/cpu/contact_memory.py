@@ -187,7 +187,7 @@ class ContactMemory:
         self.lengthen()
 
     def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
-        """Give the plane that a window reaches, and its normal; -1 and 0 if none or several.
+        """Return the plane that a window reaches, and its normal; -1 and 0 if none or several.
 
         Args:
             origin: The window's first block.

@@ -52,7 +52,7 @@ class FieldWindow:
     table: np.ndarray
     """Number of each node block, -1: none."""
     where: np.ndarray
-    """Coordinates of node blocks, (blocks, 4); the last stands for those that nobody reaches."""
+    """Coordinates of node blocks, (blocks, 4); the last stands for unreached ones."""
     used: np.ndarray
     """Which of the two sets of nodes hold anything in each node block: bits."""
     have: np.ndarray

@@ -92,7 +92,7 @@ class SpringRecords:
         return total
 
     def take_work(self) -> float:
-        """Give the work that grips did since last asked [J]."""
+        """Return the work that grips did since last asked [J]."""
         total = float(self.grip["work"].sum())
         self.grip["work"] = 0.0
         return total

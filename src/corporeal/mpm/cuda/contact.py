@@ -398,7 +398,7 @@ def mean_of(c: DeviceContacts, g: BlockGrid, s: StepGlobals, entry: int):
 def faces_seen(
     g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, b: int, e: int
 ):
-    """Give the flat faces of a rigid body as a node sees them."""
+    """Return the flat faces of a rigid body as a node sees them."""
     x = wp.transpose(r.turn[b]) * (c.point[t] - r.centre[b])
     m = mean_of(c, g, s, e)
     first = D(r.facet_first[b])

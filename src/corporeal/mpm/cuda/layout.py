@@ -276,7 +276,7 @@ class BlockGrid:
     nearly incompressible material.
     """
     meet: wp.array(dtype=wp.int32)
-    """1 + the field's entry where it meets others; 0: nobody."""
+    """1 + the field's entry where it meets others; 0: none."""
     was: wp.array(dtype=wp.int32)
     """1 + the first kept choice of the field's node; 0: none."""
     held: wp.array(dtype=wp.int32)

@@ -22,7 +22,7 @@ def _load_law(law: Law) -> ConstitutiveLaw:
     except ModuleNotFoundError as error:
         raise ImportError(
             f"types.Law has {law.name}, but there is no mpm/laws/{name}.py. Write the law there: "
-            "docs/extend.md says how."
+            "docs/how-to/add-a-law-material-provider-or-format.md says how."
         ) from error
 
 
@@ -40,7 +40,7 @@ LawNumbers = Int[np.ndarray, " P"]
 
 
 def psi(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
-    """Give the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
+    """Return the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
     out = np.empty(len(F))
     for rule, k in _by_law(law):
         out[k] = rule.psi(F[k], mu[k], lam[k])
@@ -48,7 +48,7 @@ def psi(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 
 
 def tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
-    """Give the Kirchhoff stress τ [Pa] of particles with different laws."""
+    """Return the Kirchhoff stress τ [Pa] of particles with different laws."""
     out = np.empty_like(F)
     for rule, k in _by_law(law):
         out[k] = rule.tau(F[k], mu[k], lam[k])
@@ -56,7 +56,7 @@ def tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
 
 
 def principal_tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Vectors:
-    """Give the principal Kirchhoff stresses of ``tau`` [Pa], in no order, far faster."""
+    """Return the principal Kirchhoff stresses of ``tau`` [Pa], in no order, far faster."""
     out = np.empty(F.shape[:2])
     for rule, k in _by_law(law):
         if rule.principal_tau is None:
@@ -112,7 +112,7 @@ def mean_pressure(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
 
 
 def psi_mean(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
-    """Give the stored energy [J/m³] of a mean volume J̄: ``mean_pressure`` is its slope."""
+    """Return the stored energy [J/m³] of a mean volume J̄: ``mean_pressure`` is its slope."""
     return bulk * _volumetric_by_law("psi", law, J)
 
 

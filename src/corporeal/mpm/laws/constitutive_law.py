@@ -52,7 +52,7 @@ class YieldParameters:
     """n [-]"""
 
     def of(self, chosen: np.ndarray) -> "YieldParameters":
-        """Give the numbers of some of the particles."""
+        """Return the numbers of some of the particles."""
         return YieldParameters(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 

@@ -135,7 +135,7 @@ def gap_to_wall(mean: Vectors, height: Scalars, normal: Vectors, cell: float) ->
 
 
 def gap_to_plane(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:
-    """Give the same at nodes however high above the wall [m]."""
+    """Return the same at nodes however high above the wall [m]."""
     h = height / cell
     xi = np.sum(mean * normal, axis=1) / cell
     return (-half_space_mean(-h) - xi - touching_distance(h)) * cell

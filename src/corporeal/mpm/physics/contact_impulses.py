@@ -104,7 +104,7 @@ class ReboundRules(NamedTuple):
 def target_speeds(
     contacts: ContactList, speed: Scalars, rebound: ReboundRules, cell: float, dt: float
 ) -> tuple[Scalars, Bool[np.ndarray, " E"]]:
-    """Give the normal speed each contact may keep [m/s], and whose pairs are in an impact.
+    """Return the normal speed each contact may keep [m/s], and whose pairs are in an impact.
 
     An open gap may close within the step, max(g, 0)/dt. Where one contact of a rigid pair closes
     with v_app > .05 m/s, all its contacts within .1 dx or closing get -e v_app: one impact is one
@@ -213,7 +213,7 @@ def solve(
 
 
 def _sweep_orders(contacts: ContactList, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
-    """Give the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
+    """Return the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
 
     In the order in which the contacts of a rigid body lie next to one another the first would carry
     more, and what rests on many points would tilt and sink; with one order for all sweeps stacks

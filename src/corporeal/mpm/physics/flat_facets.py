@@ -114,7 +114,7 @@ def facet_normals(
     first: FacetsAtNodes,
     second: FacetsAtNodes,
 ) -> Float[np.ndarray, "E 3"]:
-    """Give the normals along which two bodies of flat faces meet at nodes, a to c.
+    """Return the normals along which two bodies of flat faces meet at nodes, a to c.
 
     Near an edge the normal of a node leans, and what slides along a face seems to come nearer:
     where the lean feigns more of that than there is, the normal becomes that of the face, which is

@@ -45,7 +45,7 @@ class Grip:
     def impulse(
         self, place: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], dt: float
     ) -> Float[np.ndarray, "3"]:
-        """Give the spring's impulse in a step [N s]: J = dt (k (x_target - x) - c v).
+        """Return the spring's impulse in a step [N s]: J = dt (k (x_target - x) - c v).
 
         k and c are at most what the step can follow with the mass that moves at once.
         """
@@ -108,7 +108,7 @@ def updated_grips(
 
 
 def check_grip(problem: Problem, body: int, *vectors: Vector | None) -> None:
-    """Refuse bodies that are not there or follow a path, and what is no number.
+    """Reject bodies that are not there or follow a path, and what is no number.
 
     Raises:
         UserError: It says what to give.

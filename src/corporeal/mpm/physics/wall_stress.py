@@ -39,7 +39,7 @@ class FlowCurve(NamedTuple):
 
 
 def flow_curve(body: Body, cell: float) -> FlowCurve:
-    """Give the flow curve of a body's liquid, of several the most viscous; zeros of what is none.
+    """Return the flow curve of a body's liquid, of several the most viscous; zeros of what is none.
 
     Args:
         body: The liquid.

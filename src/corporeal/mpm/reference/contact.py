@@ -259,7 +259,7 @@ class NodeSamples:
     """How fields look from some slots. M links, each one particle seen from one slot."""
 
     mean: Float[np.ndarray, "A 3"]
-    """X̄: mean offset of the field's material from the node [m]; 0 where nobody looks."""
+    """X̄: mean offset of the field's material from the node [m]; 0 where unused."""
     outward: Float[np.ndarray, "A 3"]
     """g = Σ J V₀ ∇N [m²]."""
     slot: Int[np.ndarray, " M"]

@@ -160,7 +160,7 @@ class ContactScene:
         return len(self.problem.bodies) + self.grid.count
 
     def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
-        """Give the rigid body that owns the slot, or the slot itself."""
+        """Return the rigid body that owns the slot, or the slot itself."""
         bodies = len(self.problem.bodies)
         stiff = np.array([self.is_rigid(f) for f in range(bodies)])
         field = self.grid.field[slot]

@@ -26,7 +26,7 @@ class ParticleLoads:
 
     @classmethod
     def none(cls) -> "ParticleLoads":
-        """Give nothing to nobody."""
+        """Return no impulses."""
         return cls(np.zeros(0, np.int64), np.zeros((0, 3)))
 
     def joined(self, other: "ParticleLoads") -> "ParticleLoads":

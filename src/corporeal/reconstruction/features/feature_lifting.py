@@ -1,4 +1,4 @@
-"""From maps on views to features on points: mean of what each point looks like where it is seen.
+"""Lifting of feature maps to points: mean over the views that see a point.
 
 Two ways to say how much of which pixel belongs to a point, and one sum over the views:
 ``back_projection`` asks where the point falls and whether it is seen there; ``uplift_features``
@@ -88,7 +88,7 @@ def lift_features(
 
 
 def known_features(mean: Float32[np.ndarray, "N D"]) -> LiftedFeatures:
-    """Return features that came onto points otherwise; where they are 0 nobody knows them."""
+    """Return features that came onto points otherwise; where they are 0 they are unknown."""
     return LiftedFeatures(mean, np.any(mean, axis=1).astype(np.int64))
 
 

@@ -1,4 +1,4 @@
-"""Masks and instances of photographs by a model that finds objects in one picture."""
+"""Masks and instances of photographs by a learned segmentation model."""
 
 import shutil
 from collections.abc import Callable, Sequence
@@ -60,7 +60,7 @@ def learned_masks(
     Args:
         source: A folder of photographs with poses.
         folder: Gets ``masks``, ``instances`` and ``masks.json``. Those that lie there by the same
-            model are kept, and what somebody corrected in them.
+            model are kept, with their corrections.
         masker: The model.
         words: What is looked for.
         progress: Called with the fraction done and a description.

@@ -1,4 +1,4 @@
-"""SAM 2 (Ravi et al. 2024): what is at a place of a picture. Apache-2.0; it knows no words."""
+"""SAM 2 (Ravi et al. 2024): segmentation by prompts. Apache-2.0; without text."""
 
 from collections.abc import Sequence
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""SAM 3 (Carion et al. 2025): all objects that a word names. Under the SAM License."""
+"""SAM 3 (Carion et al. 2025): segmentation of all objects named by a text. Under the SAM License."""
 
 from collections.abc import Sequence
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""The part of space that masks, lines of sight and stereo leave to objects."""
+"""Volume of objects carved by masks, lines of sight and stereo."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Brightness that differs from photograph to photograph: cameras choose exposure and white balance.
+"""Per-photograph gains for exposure and white balance.
 
 One gain for each photograph and channel, on sRGB values: an exposure multiplies light, and sRGB is
 nearly a power of light. Gains are relative: their geometric mean over all photographs is 1.

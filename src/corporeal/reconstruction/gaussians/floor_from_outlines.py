@@ -1,11 +1,11 @@
-"""How low objects reach, as their outlines tell: the height of a floor that masks hide.
+"""Height of the floor from the outlines of objects.
 
-Gaussians say it badly: nobody sees undersides, and what all masks allow bulges below them. But
+Gaussians show it badly: undersides are not seen, and what all masks allow bulges below them. But
 where an object touches the floor its lower outlines all meet: a ray through an outline touches what
-all masks allow in a short stretch there, and that lies on the object. Of what stands on a flat
-foot most rays say the same height but for noise, and the floor is there: the lowest of them are
-wrong by twice their noise. What is round below touches no outline where it touches the floor, and
-its rays say many heights.
+all masks allow in a short stretch there, and that lies on the object. Of what stands on a flat foot
+most rays say the same height but for noise, and the floor is there: the lowest of them are wrong by
+twice their noise. What is round below touches no outline where it touches the floor, and its rays
+say many heights.
 """
 
 import numpy as np

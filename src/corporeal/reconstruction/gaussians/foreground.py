@@ -1,4 +1,4 @@
-"""Which Gaussians belong to the objects: not the floor, not what is behind, no haze."""
+"""Foreground Gaussians: without floor, background and haze."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Gaussians that move with material: what the video of a deformed scene is drawn from."""
+"""Gaussians deformed with the material, for rendering."""
 
 from dataclasses import replace
 

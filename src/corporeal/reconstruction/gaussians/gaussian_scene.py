@@ -1,4 +1,4 @@
-"""Gaussians from whatever a person has: photographs that they are learned from, or a splat."""
+"""Gaussians trained on photographs, or read from a splat."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -51,12 +51,12 @@ MASK_MIN_U8 = 128
 POOR_PSNR_DB = 20.0
 """Held-out photographs agree worse than this only where something is wrong [dB]."""
 CUT_ABOVE_FLOOR_STATEMENT = (
-    "There were no masks: what is above the floor was taken for objects. What lies on it and is "
-    "thinner than 0.5 % of the scene is lost."
+    "There were no masks: everything above the floor was assumed to be objects. Objects on it "
+    "thinner than 0.5 % of the scene are lost."
 )
 NO_FLOOR_NOTE = Note(
-    "There were no masks, and no floor to tell objects from: all that most photographs "
-    "show was taken for objects. Give masks, or say where the floor is with --floor-at.",
+    "There were no masks and no floor to separate objects from: all that most photographs show was "
+    "assumed to be objects. Give masks, or the height of the floor with --floor-at.",
     NoteKind.ASSUMED,
 )
 INVERTED_MASKS_MESSAGE = (
@@ -72,7 +72,7 @@ FIRST_TRAINING_PROGRESS = 0.8
 """Share of the work that is done when such masks were learned from once: four of 21 sets are
 learned from again, so that 1.2 trainings are to be expected."""
 OVERVIEW_PICTURES = 4
-"""Pictures that somebody is shown of the whole scene."""
+"""Pictures of the whole scene for questions to a model."""
 UP_BY_AXIS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -286,8 +286,8 @@ class _TrainingInput:
         share = np.count_nonzero(odd) / np.count_nonzero(masks)
         views = np.count_nonzero(odd.any(axis=(1, 2)))
         said = (
-            f"{share:.1%} of what masks hold shows in {views} of {len(masks)} photographs what no "
-            "other shows at the same place: it stands behind, and was left out."
+            f"{share:.1%} of what masks hold is in {views} of {len(masks)} photographs "
+            "inconsistent with all others: it is background, and was left out."
         )
         return replace(self, checkpoint=kept, progress=later).of(left), left, (said,)
 
@@ -341,7 +341,7 @@ def _lower_to_silhouettes(
         return frame
     if height is None:
         return frame
-    reason = f"{frame.reason} How low these are, outlines in masks say."
+    reason = f"{frame.reason} Their height is from outlines in masks."
     way = similarity_matrix(shift=(0.0, 0.0, -height)) @ frame.world_from_file
     return replace(frame, world_from_file=way, reason=reason)
 
@@ -405,8 +405,8 @@ def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str
     if trained.quality is None:
         return (
             Note(
-                f"{photographs} photographs are so few that none was held back to compare with: "
-                "what they do not show is made up. Take 20 to 50, from all sides.",
+                f"{photographs} photographs are too few for a validation set: unseen surfaces are "
+                "invented. Take 20 to 50, from all sides.",
                 NoteKind.GRAVE,
             ),
         )
@@ -414,9 +414,9 @@ def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str
         return ()
     return (
         Note(
-            "Photographs that were not learned from look otherwise "
-            f"({trained.quality.psnr:.1f} dB): shapes are not to be trusted. Look at poses and "
-            "lenses, at what moved, and take more pictures.",
+            "Held-out photographs differ from their rendering "
+            f"({trained.quality.psnr:.1f} dB): shapes are unreliable. Check poses, lenses and "
+            "moving objects, and take more pictures.",
             NoteKind.GRAVE,
         ),
     )

@@ -1,4 +1,4 @@
-"""How near pictures of Gaussians come to photographs that they were not learned from."""
+"""Rendering quality on held-out photographs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

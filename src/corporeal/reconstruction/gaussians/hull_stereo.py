@@ -1,10 +1,10 @@
-"""Hollows that outlines cannot show, seen by stereo inside the visual hull.
+"""Stereo inside the visual hull, for concavities.
 
-No silhouette shows the mouth of a vessel that everybody looked into from above: the hull closes it.
-For pixels of every view, the depth is looked for between the front and the back of the hull at
-which patches of neighbouring views correlate best, as Goesele, Curless and Seitz (2006) do, and
-those kept that other views do not contradict. What lies on the way there is empty where two views
-see past it, and more of them than see something there.
+No silhouette shows the mouth of a vessel seen from above: the hull closes it. For pixels of every
+view, the depth is looked for between the front and the back of the hull at which patches of
+neighbouring views correlate best, as Goesele, Curless and Seitz (2006) do, and those kept that
+other views do not contradict. What lies on the way there is empty where two views see past it, and
+more of them than see something there.
 """
 
 import numpy as np
@@ -54,8 +54,8 @@ def hull_cells_seen_past(
 
     """
     looks = HullStereoImages(views, masks)
-    # Of plain faces few views know a depth. One that nobody speaks for stays, since what it empties
-    # is voted on once more, cell by cell.
+    # Of plain faces few views know a depth. One without support stays, since what it empties is
+    # voted on once more, cell by cell.
     depths = looks.depths(hull, 0, pool)
     points = hull.cells[hull.inside]
     votes = np.empty((len(points), 2))

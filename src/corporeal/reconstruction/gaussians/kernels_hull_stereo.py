@@ -1,4 +1,4 @@
-"""Depths that pictures agree on between the front and the back of a hull. Compiled by numba."""
+"""Stereo depths between the front and the back of a hull. Compiled by numba."""
 
 import numba
 import numpy as np

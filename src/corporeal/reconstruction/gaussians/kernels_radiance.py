@@ -1,4 +1,4 @@
-"""Rays through a grid of density and colour, there and back. Compiled by numba.
+"""Volume rendering of a grid of density and colour, with gradients. Compiled by numba.
 
 A grid has nodes; between eight of them is a cube. ``row`` (X, Y, Z) says where a node's four
 numbers are among ``values`` (N, 4): the density's, then the logits of red, green and blue. ``gap``

@@ -1,4 +1,4 @@
-"""Parts of masks that show what no other photograph shows there.
+"""Detection of background in masks by inconsistency with other photographs.
 
 Masks that are grown from colours take in pieces of what stands behind an object, where these have
 its colours. If every view that could see past such a place has a piece of something there, the

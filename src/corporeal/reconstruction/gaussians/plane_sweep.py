@@ -1,4 +1,4 @@
-"""Points on what posed pictures show, found by sweeping planes through space (Collins 1996).
+"""Points by plane-sweep stereo of posed pictures (Collins 1996).
 
 For pixels of every view, the depth at which the views beside it show the same; kept is what other
 views confirm. No mask and no mesh is needed. Where pictures are too smooth to say, objects are

@@ -287,7 +287,7 @@ def field_camera_rows(grid: VoxelGrid, cameras: tuple[Camera, ...]) -> Float32[n
     for r, camera in zip(made, cameras, strict=True):
         K, pose = camera.K, camera.world_from_camera
         if abs(K[0, 1]) > 1e-6 * K[0, 0]:
-            raise UserError("A camera's K is skewed: its pixels are no rectangles. Rectify.")
+            raise UserError("A camera's K is skewed: its pixels are not rectangular. Rectify.")
         r[:9] = (pose[:3, :3] / grid.cell).ravel()
         r[9:12] = (pose[:3, 3] - grid.low) / grid.cell
         r[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]

@@ -1,4 +1,4 @@
-"""Pictures of Gaussians and gradients on a GPU, by gsplat 1.5 (Ye et al. 2025) on CUDA.
+"""Rasteriser of Gaussians with gradients on a GPU, by gsplat 1.5 (Ye et al. 2025) on CUDA.
 
 The same two functions as ``raster``. What is drawn differs a little: an alpha may be 0.999 instead
 of 0.99, and a Gaussian ends at three standard deviations.

@@ -1,4 +1,4 @@
-"""Masks of objects on a floor, where none are given, from Gaussians of whole photographs.
+"""Masks of objects on a floor from Gaussians of whole photographs.
 
 Where objects are decides, not how they look: what lies in the floor's plane is floor, whatever its
 colour. So shadows are none of the objects, and objects of the floor's own colour are.

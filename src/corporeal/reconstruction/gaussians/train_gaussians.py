@@ -1,4 +1,4 @@
-"""Gaussians from posed pictures.
+"""Training of Gaussians on posed pictures.
 
 Adam on the loss of ``image_loss``, one view a step, before random backgrounds: where there are
 masks, nothing beside the objects is drawn, and without, no place is left empty. The first steps

@@ -1,4 +1,4 @@
-"""The square of floor under what cameras look at, and where their rays meet it."""
+"""Grid on the floor under the objects, and its intersections with rays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

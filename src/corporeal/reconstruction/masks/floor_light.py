@@ -1,4 +1,4 @@
-"""What the floor shows, and the light that each picture has on it.
+"""Texture of the floor, and its lighting in each picture.
 
 A picture has its own exposure and white balance, and a flash lights what is near more than what is
 far, from another place in every picture. Both are smooth over the floor, and its print is not: of

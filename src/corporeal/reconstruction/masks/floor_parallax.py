@@ -1,4 +1,4 @@
-"""What stands on the floor, told by its plane, whatever its colours.
+"""Objects on the floor by parallax to its plane.
 
 Taken to the plane of the floor, views from all sides agree about all that lies there, shadows and
 prints too, and not about what rises above it (plane and parallax: Irani and Anandan, "A unified

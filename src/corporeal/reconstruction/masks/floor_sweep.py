@@ -1,4 +1,4 @@
-"""The floor under what cameras look at, where no points show it.
+"""Floor height by plane sweep, where no points show it.
 
 A table top of smooth wood has no corners that pictures could be matched by, and yet has a grain.
 Where level cameras say what up is, a level plane is moved through the ball that all look at

@@ -1,4 +1,4 @@
-"""How well pixels fit what the floor shows at their place, whatever its colours are elsewhere.
+"""Likelihood of pixels under the floor's texture at their place.
 
 An object on a newspaper is as white and black as this, so that colours alone do not tell them
 apart. But the floor is one plane: taken to it, all views see one print there, but for light. A
@@ -66,7 +66,7 @@ def floor_fit(
 
     Args:
         views: The pictures.
-        floor: The plane that objects stand on; None: nobody knows it, nor anything of a pixel.
+        floor: The plane that objects stand on; None: unknown, nor anything of a pixel.
         around: The ball that all look at.
         sure: Pixels that show the floor for certain, by its pattern.
 

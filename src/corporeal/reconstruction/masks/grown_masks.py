@@ -1,4 +1,4 @@
-"""Masks of photographs that have none, grown, and written where people can correct them."""
+"""Grown masks of photographs, written to editable files."""
 
 import shutil
 from collections.abc import Sequence
@@ -47,13 +47,9 @@ from corporeal.reconstruction.masks.region_growing import (
     grow_masks,
 )
 
-FLAT_TAKEN_STATEMENT = (
-    "What has their colours and lies flat on the floor was taken for objects, too."
-)
+FLAT_TAKEN_STATEMENT = "Flat areas of their colours on the floor were segmented as objects, too."
 OTHER_COLOURS_STATEMENT = "What stands there and borders on it in other colours was taken in."
-BY_FLOOR_STATEMENT = (
-    "It was told from a floor of its colours by what the floor shows at each of its places."
-)
+BY_FLOOR_STATEMENT = "It was separated from a floor of its colours by the floor's texture."
 DOUBTED_FOLDER = "doubted"
 """Folder of masks that are unreliable: what colours alone would take for objects."""
 MASKS_METHOD_VERSION = 15
@@ -104,7 +100,7 @@ def grown_masks(
     Args:
         source: A folder of photographs with poses. Masks that it has are not looked at.
         folder: Gets ``masks`` and ``masks.json``, or ``doubted/masks``. Masks of the same that lie
-            there are kept, and what somebody corrected in them.
+            there are kept, with their corrections.
         pointed: At what, in which photograph; None: at what all cameras look at.
         progress: Called with the fraction done and a description.
         testing: Whether poses are tested by them: places of the floor, which these poses know, are
@@ -245,7 +241,7 @@ def _is_sound(grown: RegionGrowingResult) -> bool:
 
 
 def _is_better(one: RegionGrowingResult, other: RegionGrowingResult) -> bool:
-    """Return whether colours are told apart better, and masks agree better with their hull."""
+    """Return whether colours are separated better, and masks agree better with their hull."""
     return one.alike < other.alike and one.coherence > other.coherence
 
 
@@ -305,8 +301,8 @@ def describe_masks_in(folder: Path | None) -> str:
         return ""
     how = "" if place == folder else ", and rejected,"
     return (
-        f"Masks that were grown from colours{how} lie in {place / MASK_FOLDERS[0]}: look at them, correct "
-        f"what is wrong, and give them with --masks {place}."
+        f"Masks that were grown from colours{how} lie in {place / MASK_FOLDERS[0]}: check and "
+        f"correct them, and use them with --masks {place}."
     )
 
 

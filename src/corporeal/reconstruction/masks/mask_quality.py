@@ -1,4 +1,4 @@
-"""Whether masks that nobody drew are of what the photographs are of."""
+"""Plausibility of automatic masks."""
 
 from corporeal.reconstruction.masks.floor_parallax import MIN_TOP_HEIGHT_RADII, pixels_to_mask_ratio
 from corporeal.reconstruction.masks.region_growing import SETTLED_AGREEMENT, RegionGrowingResult
@@ -62,7 +62,7 @@ def _doubt_before_outlines(grown: RegionGrowingResult) -> str | None:
     if not MIN_OBJECT_FRACTION <= grown.share <= MAX_OBJECT_FRACTION:
         return f"it would fill {grown.share:.1%} of the photographs"
     if grown.outer > MAX_OUTER_HULL_FRACTION or grown.cropped > MAX_CROPPED_FRACTION:
-        return "it reaches beyond what all cameras look at"
+        return "it reaches beyond the cameras' common focus"
     if grown.faint > MAX_FAINT_OUTLINE_FRACTION:
         return f"along {grown.faint:.0%} of its outline the photographs show no edge"
     return None
@@ -95,7 +95,7 @@ def lacking_attachment_reason(grown: RegionGrowingResult | None) -> str | None:
 
 
 def _incompleteness_clause(taken: str, much: float, more: str) -> str:
-    ground = "not all of it can be told from its ground"
+    ground = "not all of it can be separated from its ground"
     return f"{ground}: beside {taken}, {much:.1f} times as much {more}"
 
 

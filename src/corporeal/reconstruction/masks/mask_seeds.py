@@ -1,4 +1,4 @@
-"""Where growing begins: at what all cameras look at, or at what a person points at."""
+"""Seeds of growing: the cameras' common focus, or a point given by the user."""
 
 from dataclasses import dataclass
 

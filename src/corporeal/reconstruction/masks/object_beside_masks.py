@@ -1,4 +1,4 @@
-"""Something that stands on the floor beside what masks show, and is in none of them.
+"""Detection of objects beside the masks.
 
 Masks are of what has the colours of the middle, so that a second object of other colours is lost
 without a word. But it stands up, and what of the hull of all that does is seen beside masks is

@@ -1,4 +1,4 @@
-"""What outlines of masks are worth: whether photographs show an edge there, and how thin they are.
+"""Quality of mask outlines: image edges, and thickness.
 
 A cut through a table, where the light of a flash falls off, has colours of its own on either side
 and agrees with its hull as well as any. But nothing changes across it.

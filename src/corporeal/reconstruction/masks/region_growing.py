@@ -94,8 +94,9 @@ class RegionGrowingResult:
     thinness: float
     """Share of masks that their outermost pixels are."""
     lowest: float
-    """Height of their hull's lowest cell above the floor, in radii of the ball; 0 where nobody
-    knows the floor, or what lies flat on it may be objects."""
+    """Height of their hull's lowest cell above the floor, in radii of the ball; 0 where the
+    floor is unknown, or what lies flat on it may be objects.
+    """
     masks: Bool[np.ndarray, "V H W"]
     """The pixels that are inside, at ROUGH pixels."""
     hanging: MaskAttachments | None = None

@@ -1,4 +1,4 @@
-"""Cells of space that objects may fill, carved by masks, and the silhouettes of what is left."""
+"""Voxels carved by masks, and their silhouettes."""
 
 from dataclasses import dataclass, replace
 
@@ -43,7 +43,7 @@ class VoxelVolume:
     outer: Bool[np.ndarray, " M"]
     """Whether a cell is at the edge of the ball."""
     height: Float[np.ndarray, " M"]
-    """Above the floor, in radii of the ball; 0 where nobody knows it."""
+    """Above the floor, in radii of the ball; 0 where it is unknown."""
 
     @property
     def tall(self) -> Bool[np.ndarray, " M"]:
@@ -137,7 +137,7 @@ def voxel_volume(
     Args:
         cameras: Of the pictures.
         around: The ball.
-        floor: Nothing is below it, and nothing in a thin layer above; None: nobody knows.
+        floor: Nothing is below it, and nothing in a thin layer above; None: unknown.
         cone: Pixels that cells must be seen in, if a view shows them; None: any.
 
     """

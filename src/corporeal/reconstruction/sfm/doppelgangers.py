@@ -1,4 +1,4 @@
-"""Pictures that a model puts beside others with which they share too little to stand there.
+"""Detection of wrong registrations of similar sides (doppelgangers).
 
 Two sides of an object that look alike, such as those of a block, are taken for one: the pictures of
 one side are put among those of the other, by points on the object alone, with a low reprojection

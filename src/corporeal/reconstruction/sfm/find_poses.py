@@ -1,4 +1,4 @@
-"""Find where photographs were taken from, in up to three attempts, or say why that cannot be."""
+"""Pose estimation of photographs in up to three attempts."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -308,7 +308,7 @@ def _refusal(
     others: int = 0,
     tried: tuple[SfmRun, ...] = (),
 ) -> _PosesRecord:
-    """Refuse, and say which pictures are blurred, if that may be why."""
+    """Reject, and say which pictures are blurred, if that may be why."""
     total = len(gathered.names)
     if smeared:
         why = [*why, f"{len(smeared)} of {total} pictures are blurred ({some_names(smeared)})"]

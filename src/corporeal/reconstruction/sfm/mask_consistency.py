@@ -1,4 +1,4 @@
-"""What masks say of poses: whether silhouettes are those of one object that stood still.
+"""Consistency of masks and poses by silhouette coherence.
 
 A pattern that repeats puts a camera on the wrong one of its pieces, and an object that was turned
 over between two rounds leaves all cameras right about the floor alone. Neither shows in the

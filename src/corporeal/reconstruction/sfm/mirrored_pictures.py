@@ -1,4 +1,4 @@
-"""Whether some photographs are mirrored, as cameras that show their own user write them.
+"""Detection of mirrored photographs of front cameras.
 
 A printed sheet that is seen in a mirror is a sheet that is seen from below: both fit one model,
 with a low reprojection error, half of its cameras under the floor and what stands on it there

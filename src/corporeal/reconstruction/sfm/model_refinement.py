@@ -1,4 +1,4 @@
-"""The last adjustment of a model that COLMAP found: cameras and points, by robust least squares."""
+"""Final robust bundle adjustment of a COLMAP model."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping

@@ -1,4 +1,4 @@
-"""Whether pictures were taken from one place: a tripod, or one picture cut in many ways.
+"""Detection of pictures from one viewpoint: a tripod, or crops of one picture.
 
 There nothing is nearer than anything else. What two such pictures share differs by a shift, a turn
 and a scale alone, and COLMAP looks for depth in vain, or finds what is not there. Whoever takes but

@@ -1,4 +1,4 @@
-"""How blurred a photograph is, by the sharpest edges in its middle.
+"""Blur of photographs by the sharpest edges in their middle.
 
 An edge that is smeared by s rises over a distance that grows with s: smoothed by σ its steepest
 slope is proportional to 1 / √(σ² + s²). Two smoothings tell s whatever the contrast (Elder and

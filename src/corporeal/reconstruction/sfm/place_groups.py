@@ -1,4 +1,4 @@
-"""Whether photographs show one place: a quick look at small copies, before the long search.
+"""Grouping of photographs by place on downscaled copies, before pose estimation.
 
 A folder of which a part shows something else would cost many minutes before COLMAP says that the
 pictures fall apart. Small pictures share enough points with their neighbours to see two separate

@@ -1,7 +1,8 @@
-"""Whether a model that COLMAP found can be accepted, and what to photograph next time.
+"""Acceptance tests of COLMAP models, with advice.
 
 A wrong model looks like a model: low reprojection error says nothing. What speaks against one was
-found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
+found on right and wrong models of the same pictures, docs/reference/input-files.md, "Photographs
+without poses".
 """
 
 from dataclasses import replace
@@ -57,7 +58,7 @@ def model_doubts(told: SfmRun) -> list[str]:
         or told.bent > MAX_RADIAL_DISTORTION
     ):
         found.append(
-            f"it takes a lens that nobody has (focal length {told.focal:g} × the longer side, "
+            f"it needs an implausible lens (focal length {told.focal:g} × the longer side, "
             f"k1 {told.bent:g})"
         )
     if told.others and told.others[0] > RIVAL_GROUP_FRACTION * told.registered:
@@ -123,7 +124,7 @@ def mask_contradiction_doubt(told: SfmRun) -> str | None:
     placed = "some pictures were put in wrong places, " if told.parted else ""
     return Note(
         f"All masks together leave {told.filled:.0%} of what each shows: {placed}the object was "
-        "moved or turned over between the pictures, or masks miss parts of it. Look at the masks.",
+        "moved or turned over between the pictures, or masks miss parts of it. Check the masks.",
         NoteKind.GRAVE,
     )
 

@@ -1,4 +1,4 @@
-"""Photographs made ready to be posed: upright, of moderate size, each once, and their masks."""
+"""Preparation of photographs for pose estimation: orientation, size, duplicates, masks."""
 
 import numbers
 import re
@@ -212,7 +212,7 @@ def _cropping_note(sizes: Sequence[tuple[int, int]]) -> list[str]:
 
 
 def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], twins: int) -> None:
-    """Refuse what shows too little; that some show the same as others says nothing against these.
+    """Reject what shows too little; that some show the same as others says nothing against these.
 
     Args:
         source: The folder.
@@ -360,7 +360,7 @@ def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> l
     if len(parted) <= total / 2:
         return [
             f"{len(alphas) - len(clear)} of {total} photographs are transparent in parts or all "
-            "over, and most were not cut out: this was not taken for masks. Cut out all of them, "
+            "over, and most were not cut out: this was not used as masks. Cut out all of them, "
             "or none."
         ]
     for name, alpha in alphas.items():

@@ -1,4 +1,4 @@
-"""Whether lenses looked through the middles of the pictures, as they do unless somebody cropped.
+"""Principal points, which reveal cropped photographs.
 
 Photographs that were cropped, each in another way, fit together as if their lenses were longer and
 stood elsewhere: 25 of 25 were placed, 6° wrong, with a reprojection error below 1 px. Where each
@@ -26,7 +26,7 @@ SLIGHT_SPREAD_FRACTION = 0.02
 """Spread of the middles, in the longer side, from which on it is said: it turns a view by 1.3°."""
 CROPPED_SPREAD_FRACTION = 0.05
 """The same, from which on poses are rejected: 3.3°."""
-UNCROPPED_HINT = "Give the photographs as the camera took them; crop none, or all in the same way."
+UNCROPPED_HINT = "Use the original photographs; crop none, or all in the same way."
 
 
 def principal_point_spread(place: Path) -> float:

@@ -1,4 +1,4 @@
-"""Whether a video shows a page that is scrolled on a screen.
+"""Detection of screen recordings of scrolled pages.
 
 What a page shows is pushed aside as a whole, by many times the height of the screen in the end; all
 of it looks as it did, so that pictures share points and COLMAP looks for depth for minutes. Who

@@ -1,4 +1,4 @@
-"""One attempt at the poses of photographs by COLMAP, through pycolmap, on the processor.
+"""One run of COLMAP through pycolmap, on the CPU.
 
 SIFT, matching, and incremental mapping (Schönberger & Frahm, "Structure-from-Motion Revisited",
 CVPR 2016). Nothing that would be fetched over the network is asked for: no learned features, and

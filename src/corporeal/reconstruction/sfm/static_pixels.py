@@ -1,4 +1,4 @@
-"""How much of what a video shows never moves: a screen's frame, or all around a turntable.
+"""Share of static pixels of a video: a screen's frame, or the surroundings of a turntable.
 
 Where a camera moves about an object, whatever has contrast moves in its pictures. What does not
 would be taken for the world that stands still, and all cameras put at one place.

@@ -1,4 +1,4 @@
-"""Frames of a video that are sharp and differ from one another.
+"""Selection of sharp, distinct frames of a video.
 
 ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen.
 It turns pictures as the video's own matrix says.
@@ -46,7 +46,7 @@ VIDEO_HINT = "Record the object slowly, all around and from above, for 20 to 60 
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a video states."""
+    """Metadata of a video."""
 
     path: Path
     seconds: float

@@ -1,4 +1,4 @@
-"""Discs just below a closed surface: what shines through Gaussians is the object, not the floor.
+"""Surfels below a closed surface that back transparent Gaussians.
 
 Gaussians are learned to look right from where photographs were taken. From the side of a video they
 are thin where only those behind them, or those below the floor, which are taken away, made them

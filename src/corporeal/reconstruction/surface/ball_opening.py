@@ -1,4 +1,4 @@
-"""Hollows that photographs see into, and caverns that they do not.
+"""Morphological opening of carved cavities by a ball.
 
 Where a face shines, stereo finds highlights behind it, here and there. Carved as deep, a wet object
 is full of caverns with mouths of some pixels. What a camera truly looks into has a mouth as wide as

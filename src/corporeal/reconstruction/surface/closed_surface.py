@@ -1,4 +1,4 @@
-"""One closed surface for each object that Gaussians show.
+"""Closed surfaces of objects from Gaussians.
 
 Cameras look at the Gaussians, space is carved by what they see, the floor closes what stands on it,
 and where objects touch every place inside belongs to the nearer one's Gaussians. Marching cubes
@@ -247,8 +247,8 @@ def _survey_objects(
 def _missing_object_error(k: int) -> UserError:
     return UserError(
         f"Nothing solid is found of object {k + 1}: no camera sees it, or its Gaussians are haze. "
-        "Look whether masks, where there are some, show one thing in all photographs; say the "
-        "number of objects with --count; or photograph it from more sides."
+        "Check that masks, if any, show the same object in all photographs; give the number of "
+        "objects with --count; or photograph it from more sides."
     )
 
 

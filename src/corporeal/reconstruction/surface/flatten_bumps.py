@@ -1,4 +1,4 @@
-"""Bumps at the rim of a face that photographs know, laid on it.
+"""Flattening of bumps at the rim of observed faces.
 
 A patch that is partly beside the object tells nothing, so that photographs know a face (see
 ``photometric.py``) only from some pixels on from its edges and from the floor. In that strip it is

@@ -1,4 +1,4 @@
-"""Pieces of what stands in space that cameras see to be empty.
+"""Separation of pieces by observed free space.
 
 Means of Gaussians are poor witnesses of gaps: a plain face or neck has few, far apart. Cameras see
 that it is there, and see through between objects that are apart. So space is carved by what they

@@ -1,4 +1,4 @@
-"""A roof of rays over what no camera looked along, lowered to where its top is to be expected.
+"""Lowering of the visual hull's roof over unobserved tops.
 
 Cameras that look down at an angle bound what is plain from above by nothing but the rays that graze
 it: the visual hull is a roof over it (Laurentini 1994). The object touches each of these rays
@@ -47,7 +47,7 @@ class HullTop:
         if self.share <= MIN_SAID_HEIGHT_FRACTION:
             return ()
         return (
-            f"Its height is known to ±{self.share:.0%} only: no photograph looked along its top, "
+            f"Its height is known to ±{self.share:.0%} only: no photograph is level with its top, "
             f"the lowest looks down at {self.lowest:.0f}°, and what is plain there shows no depth. "
             "Take some pictures from low down.",
         )
@@ -65,7 +65,7 @@ def lower_hull_top(
 
     Args:
         mesh: Closed, +z up.
-        confidence: How far photographs know each vertex [0–1].
+        belief: How far photographs know each vertex [0–1].
         still: Vertices that stay where they are: where these are in the roof, all of it does.
         cameras: As ``DepthRendering.rows``.
         shape: Rows and columns of their pictures.

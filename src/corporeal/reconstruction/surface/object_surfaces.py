@@ -1,4 +1,4 @@
-"""From points on objects to connected pieces, and of segmented ones to closed surfaces."""
+"""Connected pieces of object points, and closed surfaces of segmented ones."""
 
 from dataclasses import dataclass
 

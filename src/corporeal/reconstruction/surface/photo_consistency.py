@@ -1,4 +1,4 @@
-"""Surfaces moved to where photographs of them agree.
+"""Refinement of surfaces by photo-consistency.
 
 Depths of Gaussians have bumps of a pixel or two, which no outline sees in the middle of a face.
 Where a face has a pattern, patches of all views that see it correlate best at its true depth, to a

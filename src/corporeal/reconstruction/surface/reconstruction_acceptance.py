@@ -1,4 +1,4 @@
-"""Whether what was found in pictures is worth simulating, or a video of the room."""
+"""Acceptance tests of reconstructions before simulation."""
 
 from collections.abc import Sequence
 
@@ -37,11 +37,11 @@ MIN_MASK_OVERLAP = 0.35
 most objects; foliage and wires, whose gaps close, have less."""
 COMPARED_VIEWS = 12
 """Views in which that is compared."""
-FORCE_HINT = "--force goes on all the same."
+FORCE_HINT = "--force continues anyway."
 MASKS_HINT = (
-    "What the object is was not told from the room: give masks (a folder 'masks' with the names of "
-    "the pictures), or grow them with 'corporeal masks' from a point or a box and correct them, or "
-    f"say where the floor is with --floor-at. {FORCE_HINT}"
+    "The object was not separated from the background: give masks (a folder 'masks' with the "
+    "names of the pictures), or grow them with 'corporeal masks' from a point or a box and correct "
+    f"them, or give the height of the floor with --floor-at. {FORCE_HINT}"
 )
 
 
@@ -63,12 +63,12 @@ def boxes_rejection_reason(
     if not cameras:
         return None
     if (why := depth_doubt_text(cameras)) is not None:
-        return f"The shape would be made up: {why}. Photograph it from all sides. {FORCE_HINT}"
+        return f"The shape would be invented: {why}. Photograph it from all sides. {FORCE_HINT}"
     if quality is not None and quality.psnr < GREY_PICTURE_PSNR_DB:
         return (
-            f"The shapes would be made up: photographs that were not learned from look otherwise "
-            f"({quality.psnr:.1f} dB, as a plain grey picture has). Look at poses and lenses, at "
-            f"what moved, and take more photographs. {FORCE_HINT}"
+            f"The shapes would be invented: held-out photographs differ from their rendering "
+            f"({quality.psnr:.1f} dB, as a plain grey picture has). Check poses, lenses and moving "
+            f"objects, and take more photographs. {FORCE_HINT}"
         )
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     radius = find_viewed_region(tuple(cameras)).radius
@@ -76,7 +76,7 @@ def boxes_rejection_reason(
         inside = int(((eyes > low) & (eyes < high)).all(axis=1).sum())
         if inside >= CAMERAS_IN_BOX_FRACTION * len(cameras):
             what = f"its box holds {inside} of {len(cameras)} cameras"
-            return f"The object would be as large as the room: {what}. {MASKS_HINT}"
+            return f"The object would be as large as the surroundings: {what}. {MASKS_HINT}"
         longest = float((high - low).max())
         if not masked and longest > BOX_TO_REGION_RATIO * radius:
             what = f"{longest / radius / 2:.1f} times as long as the ball that the cameras look at"
@@ -98,9 +98,10 @@ def pieces_rejection_reason(pieces: int, cameras: Sequence[Camera]) -> str | Non
     if pieces < 2 or not cameras or (unseen := widest_unseen_angle(cameras)) < UNSEEN_HALF_GAP_DEG:
         return None
     return (
-        f"The shape contradicts itself: what was looked at came out in {pieces} pieces, and from "
-        f"{unseen:.0f}° of the circle around it nobody looked. Photograph it from there, too; or, "
-        f"if these are several objects, say how many with --count. {MASKS_HINT}"
+        f"The shape contradicts itself: the object came out in {pieces} pieces, and from "
+        f"{unseen:.0f}° of the circle around it there are no photographs. Photograph it from "
+        "there, too; or, if these are several objects, give their number with --count. "
+        f"{MASKS_HINT}"
     )
 
 
@@ -115,7 +116,7 @@ def cropping_rejection_reason(masks: Bool[np.ndarray, "V H W"]) -> str | None:
     if count <= MAX_CROPPED_FRACTION * len(masks):
         return None
     what = f"{count} of {len(masks)} photographs show but a part of it"
-    return f"The object would go on beyond the pictures: {what}. {MASKS_HINT}"
+    return f"The object would extend beyond the pictures: {what}. {MASKS_HINT}"
 
 
 def colour_rejection_reason(
@@ -127,7 +128,7 @@ def colour_rejection_reason(
 
     Args:
         masks: Which pixels show what was taken for objects, by where it is.
-        coloured: The same, by its colours, which are unreliable alone; None: nobody knows.
+        coloured: The same, by its colours, which are unreliable alone; None: unknown.
 
     """
     if coloured is None or not coloured.any():
@@ -166,14 +167,14 @@ def overlap_rejection_reason(
     if overlap < MIN_MASK_OVERLAP:
         return (
             "The closed surfaces are not what masks show: their silhouettes overlap by "
-            f"{overlap:.0%} only. Look whether masks and poses belong to the pictures, and take "
+            f"{overlap:.0%} only. Check that masks and poses belong to the pictures, and take "
             f"more photographs from more sides. {FORCE_HINT}"
         )
     if given or filled >= MIN_MASK_FILLED_FRACTION:
         return None
     return (
-        f"The shape contradicts the photographs: it fills {filled:.0%} of what was taken for the "
-        "object in them. The rest is something else, such as what is behind it, or some were "
+        f"The shape contradicts the photographs: it fills {filled:.0%} of the object's masks in "
+        "them. The rest is something else, such as what is behind it, or some were "
         "placed "
         "wrongly. Correct the masks, or photograph the object from all sides, where nothing else "
         f"stands close behind it. {FORCE_HINT}"

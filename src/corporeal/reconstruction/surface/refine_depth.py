@@ -1,4 +1,4 @@
-"""Depths that photographs agree on, where Gaussians stand before them.
+"""Refinement of depths by stereo behind floating Gaussians.
 
 Gaussians are learned as balls some pixels wide, and of what is plain, such as the black inside of a
 pan, no picture says where they are: their depth is that of a hump. Neighbouring photographs say how

@@ -7,7 +7,7 @@ export const NAMES = {
   restitution: 'restitution e', loss: 'loss factor η', shell_thickness: 'wall thickness',
 }
 const ANSWERED = {annotation: 'your annotation', recording: 'a recorded answer', model: 'a model', metadata: 'metadata of the file',
-  unknown: 'nobody: a neutral material'}
+  unknown: 'unknown: neutral material'}
 
 // An element with properties and children; strings become text nodes.
 export function el(tag, props = {}, ...children) {

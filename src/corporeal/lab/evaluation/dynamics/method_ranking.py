@@ -48,7 +48,7 @@ class SceneRanking:
 
 
 def rank_scene(scene: str, rows: Mapping[str, MethodResult]) -> SceneRanking | None:
-    """Compare ours with every baseline that was run, column by column; None: nobody to compare.
+    """Compare ours with every baseline that was run, column by column; None: nothing to compare.
 
     Paths closer to the reference than ours count as equal: ours at this detail is the yardstick.
     """

@@ -26,7 +26,7 @@ PICTURES_PER_LOOK = DATED_PICTURES + CLOSE_UP_PICTURES + 1
 
 
 class SequentialPictures(Sequence[np.ndarray]):
-    """Pictures each of which is rendered when somebody first looks at it."""
+    """Pictures that are rendered on first access."""
 
     def __init__(self, takes: Sequence[Callable[[], np.ndarray]]) -> None:
         self._takes = takes

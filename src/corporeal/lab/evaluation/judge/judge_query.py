@@ -14,7 +14,7 @@ from corporeal.vlm.thread_map import thread_map
 
 Progress = Callable[[float, str], None]
 CONFIRM_ABOVE_USD = 5.0
-"""Above this nobody is asked without ``--yes`` [US$]."""
+"""Above this cost ``--yes`` is required [US$]."""
 MAX_PARALLEL_QUESTIONS = 4
 """Questions under way at the same time."""
 
@@ -44,13 +44,13 @@ def query_judge(
 
     Args:
         videos: From ``gather_videos``.
-        config: Who judges.
-        say: Told the price before anybody is asked.
+        config: Settings of the judge.
+        say: Called with the price before the first question.
         progress: Called with the fraction done and a description.
         judge: Who answers, instead of ``config.judge``.
 
     Raises:
-        UserError: Nobody judges, it costs more than was agreed to, or answers are absent.
+        UserError: There is no judge, it costs more than allowed, or answers are absent.
 
     """
     asking = _somebody(judge or connect_judge(config))
@@ -89,7 +89,7 @@ def _named(asked: VideoQuestion) -> tuple[str, int, str]:
 
 
 def connect_judge(config: JudgeConfig) -> VlmClient | None:
-    """Connect to who judges; None: nobody was asked for.
+    """Connect to the judge; None: none was asked for.
 
     Raises:
         UserError: A setting cannot be right, the name is unknown, or its key is not set.
@@ -116,12 +116,12 @@ def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
 
 
 def is_paid(spec: str) -> bool:
-    """Whether somebody is paid for answers."""
+    """Whether answers are paid."""
     return spec.partition(":")[0] in LIVE_CLIENTS
 
 
 def _agreed(reckoned: JudgingCost, config: JudgeConfig) -> None:
-    """Raise UserError where more would be spent than somebody agreed to."""
+    """Raise UserError where the cost exceeds the limit."""
     if not is_paid(config.judge) or config.yes:
         return
     if reckoned.dollars is None or reckoned.dollars > CONFIRM_ABOVE_USD:

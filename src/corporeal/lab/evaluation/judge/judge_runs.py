@@ -34,12 +34,12 @@ def judge_runs(
 
     Args:
         out: Holds ``SCENE/METHOD``, each a run.
-        config: Who judges, how often.
-        say: Told the price before anybody is asked.
+        config: Settings of the judge.
+        say: Called with the price before the first question.
         progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: There are no such runs, nobody judges, or it costs more than was agreed to.
+        UserError: There are no such runs, there is no judge, or it costs more than allowed.
 
     """
     check_judging(config)

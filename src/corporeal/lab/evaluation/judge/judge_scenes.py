@@ -67,7 +67,7 @@ class SceneRuns:
 
 @dataclass(frozen=True)
 class FailedVideo:
-    """A video that nobody judges, and why."""
+    """A video that could not be made, and why."""
 
     scene: str
     condition: str

@@ -103,7 +103,7 @@ def _template() -> Prompt:
 
 @dataclass(frozen=True)
 class JudgingCost:
-    """What asking takes, reckoned before anybody is asked."""
+    """Estimated cost of the questions."""
 
     videos: int
     """Videos times looks."""
