@@ -28,7 +28,7 @@ class Finish:
     metallic: float = 0.0
     roughness: float = 1.0
     transmission: float = 0.0
-    glow: float = 0.0
+    emission: float = 0.0
     """Emitted light as a multiple of the base colour."""
     alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alpha_cutoff: float = 0.5
