@@ -14,7 +14,7 @@ from corporeal.core.version import __version__
 
 API_KEY_VARIABLES = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
 LIBRARY_USES = {
-    "embreex": "films and pictures",
+    "embreex": "videos and pictures",
     "igl": "filling of meshes",
     "DracoPy": "Draco files",
     "pycolmap": "photographs without poses, and videos",

@@ -1,4 +1,4 @@
-"""The questions about a film, the laws they belong to, and the controls they are meant to catch."""
+"""The questions about a video, their laws, and the controls they detect."""
 
 import tomllib
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from corporeal.vlm import AnswerSchema
 
 QuestionAnswer = Literal["yes", "no", "unclear", "na"]
 MAX_DESCRIPTION_CHARACTERS = 1000
-"""Longest description of a film [characters]."""
+"""Longest description of a video [characters]."""
 MIN_MARK, MAX_MARK = 1, 5
 """Of the mark for a whole film."""
 
