@@ -14,7 +14,7 @@ from corporeal import cli
 from corporeal.cli.help_layout import OPTIONS_BEFORE_MORE, lay_out, options_of
 from corporeal.pipeline.run_pipeline import Settings
 
-NEEDED = ("detail", "vlm", "annotations", "drop", "things", "out")
+NEEDED = ("detail", "vlm", "annotations", "drop", "object-names", "out")
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def headings(said):
 def test_no_verb_shows_more_than_six_options_before_the_others(command, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     seen = dict(verbs_of(command))
-    assert ("evaluate", "parts") in seen and ("corpus", "run") in seen and ("film",) in seen
+    assert ("evaluate", "parts") in seen and ("corpus", "run") in seen and ("video",) in seen
     for words, said in seen.items():
         found = headings(said)
         before = [flag for flag, heading in found.items() if not heading.startswith("more")]

@@ -132,8 +132,8 @@ def test_a_setting_of_ones_own_for_memory_stays(monkeypatch):
 
 
 LOOPED = """
-from corporeal.core.process_resources import collect_seldom
-collect_seldom()
+from corporeal.core.process_resources import relax_garbage_collection
+relax_garbage_collection()
 class Loop:
     def __init__(self):
         self.itself = self
@@ -146,6 +146,6 @@ Loop()
 def test_a_process_that_ends_searches_for_no_cycles():
     command = [sys.executable, "-c", LOOPED]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
-    plain = [sys.executable, "-c", LOOPED.replace("collect_seldom()\n", "")]
+    plain = [sys.executable, "-c", LOOPED.replace("relax_garbage_collection()\n", "")]
     told = subprocess.run(plain, capture_output=True, text=True, check=True)
     assert told.stdout == "searched for\n"

@@ -26,7 +26,7 @@ import sys
 from pathlib import Path
 from corporeal.simulation import checkpoint
 from corporeal.pipeline.run_pipeline import Settings, run
-checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
+checkpoint.MIN_INTERVAL_S, checkpoint.MAX_WRITE_TIME_FRACTION = 0.05, 1.0
 silent = lambda fraction, words: None
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
 slow_to_import = {"trimesh", "networkx", "matplotlib", "scipy.cluster", "torch", "pydantic_ai"}

@@ -30,8 +30,8 @@ from corporeal.scene.interactions import (
 
 PRINT = """
 import sys, test_plan as t
-from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan
-print(repr(plan(t.pool(20), CorpusConfig(seed=int(sys.argv[1]))).scenes))
+from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan_corpus
+print(repr(plan_corpus(t.pool(20), CorpusConfig(seed=int(sys.argv[1]))).scenes))
 """
 
 

@@ -217,9 +217,9 @@ def test_two_processes_may_compile_at_once(tmp_path):
     code = (
         f"import warp as wp; wp.config.kernel_cache_dir = {str(tmp_path)!r}\n"
         "import numpy as np\n"
-        "from corporeal.mpm.cpu.layout import WORLD\n"
-        "from corporeal.mpm.cpu.program import Program\n"
-        "Program(np.zeros(1, WORLD.dtype), 1)\n"
+        "from corporeal.mpm.cpu.layout import WORLD_RECORD\n"
+        "from corporeal.mpm.cpu.program import CpuProgram\n"
+        "CpuProgram(np.zeros(1, WORLD_RECORD.dtype), 1)\n"
     )
     running = [
         subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE) for _ in range(2)

@@ -39,9 +39,9 @@ print(json.dumps([swing.swing(name, build) for name in sys.argv[2:]]))
 """
 CARDS = """
 import sys
-from corporeal.mpm.cuda import step
+from corporeal.mpm.cuda import timestep
 from corporeal.mpm.quiet_warp import wp
-made = wp.compile_aot_module(step, arch=[86, 90, 120], module_dir=sys.argv[1])
+made = wp.compile_aot_module(timestep, arch=[86, 90, 120], module_dir=sys.argv[1])
 print(*(path.name for path in made if path.stat().st_size > 10_000))
 """
 

@@ -269,11 +269,12 @@ def test_a_mistake_of_ours_ends_one_file_only(tmp_path, monkeypatch):
     assert "internal error (ZeroDivisionError" in reasons(pool)["a"]
 
 
-def test_too_many_triangles_to_decimate_are_refused_at_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(quality_gate, "MAX_READ_TRIANGLES", 2000)
-    put(tmp_path / "in", x=plain_ball())
-    said = reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["x"]
-    assert said == "has 2,208 triangles; at most 2,000 are decimated"
+def test_too_many_triangles_to_decimate_are_refused_at_once(tmp_path):
+    put(tmp_path, x=plain_ball())
+    scene = read_glb(tmp_path / "x.glb")
+    with pytest.raises(quality_gate.ModelRejectedError) as refused:
+        quality_gate.inspect_model(scene, max_read_triangles=2000)
+    assert str(refused.value) == "has 2,208 triangles; at most 2,000 are decimated"
 
 
 @pytest.mark.slow

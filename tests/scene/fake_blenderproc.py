@@ -46,10 +46,10 @@ def main():
     if fake == "nothing":
         return
     if fake.startswith("hang "):
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
         with open(fake[5:], "w") as file:
             file.write(str(child.pid))
-        time.sleep(60)
+        time.sleep(600)
     text = json.dumps(dropped(job, gap=1.0 if fake == "hover" else 0.0))
     if fake.startswith("say "):
         text = fake[4:]

@@ -112,8 +112,8 @@ def test_flat_and_tiny_things_settle_too():
 SCENE = """
 import sys; sys.path.insert(0, {folder!r})
 from bodies import ball, box, table
-from corporeal.scene.settle_bodies import at_rest
-poses, _ = at_rest([table(), ball(0.1), box(0.2, 0.1, 0.1)], {arrangement!r}, 7, 1e-3)
+from corporeal.scene.settle_bodies import settle_bodies
+poses, _ = settle_bodies([table(), ball(0.1), box(0.2, 0.1, 0.1)], {arrangement!r}, 7, 1e-3)
 print(repr(poses))
 """
 

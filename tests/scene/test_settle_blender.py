@@ -120,7 +120,7 @@ def test_what_takes_too_long_is_ended_with_all_that_it_started(fake, tmp_path):
     fake(f"hang {tmp_path / 'child'}")
     begun = time.perf_counter()
     assert "no rest within 0.7 s" in refusal(BlenderConfig(patience=0.7))
-    assert time.perf_counter() - begun < 50, "it would have gone on for a minute"
+    assert time.perf_counter() - begun < 300, "it would have gone on for ten minutes"
     child = int((tmp_path / "child").read_text())
     for _ in range(100):
         if not alive(child):

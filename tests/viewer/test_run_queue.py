@@ -19,8 +19,8 @@ from corporeal.viewer.run_queue import QUEUE_FILE, QueuedRun, RunQueue
 SERVER = """
 import sys, time
 from pathlib import Path
-from corporeal.viewer.run_queue import Queue
-queue = Queue(Path(sys.argv[1]))
+from corporeal.viewer.run_queue import RunQueue
+queue = RunQueue(Path(sys.argv[1]))
 print("up", flush=True)
 while True:
     time.sleep(1)

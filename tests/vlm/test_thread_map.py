@@ -52,7 +52,7 @@ def test_a_fatal_error_ends_it_at_once_and_drops_what_waits():
 
     def slow(k):
         started.append(k)
-        let_go.wait(60)
+        let_go.wait(600)
 
     start = time.monotonic()
     with pytest.raises(OSError, match="over"):
@@ -61,7 +61,7 @@ def test_a_fatal_error_ends_it_at_once_and_drops_what_waits():
             2,
             fatal=lambda error: isinstance(error, OSError),
         )
-    assert time.monotonic() - start < 50, "it waited for what had begun"
+    assert time.monotonic() - start < 300, "it waited for what had begun"
     let_go.set()
     assert len(started) <= 3
 

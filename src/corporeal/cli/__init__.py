@@ -61,7 +61,7 @@ def command_run() -> None:
     SCENE is a model (GLB, glTF, OBJ, PLY, STL, OFF, 3MF, DAE, USD), several of them (each one
     object), or a scene.toml; or a folder of photographs, with poses (transforms.json, COLMAP,
     3 x 4 matrices) or without, a video, or a trained Gaussian splat.
-    Results are written to runs/<name>/: film.mp4, report.html, materials.json, audit.json and
+    Results are written to runs/<name>/: video.mp4, report.html, materials.json, audit.json and
     pictures.
     Results that are up to date are reused.
     """
@@ -73,7 +73,7 @@ def command_run() -> None:
         where: RunFolder = RunFolder()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    first = ("detail", "vlm", "annotations", "drop", "things", "out")
+    first = ("detail", "vlm", "annotations", "drop", "object-names", "out")
     asked = parse(Run, "run", command_run.__doc__, first=first)
     _run_stages(
         list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where
@@ -107,8 +107,10 @@ def command_demo() -> None:
     with console.status("building the scene"):
         path = write_cached_showcase(asked.scene, folder / "input")
     settings = asked.settings
-    if settings.film.view is None:
-        settings = replace(settings, film=replace(settings.film, view=view_direction(asked.scene)))
+    if settings.video.view is None:
+        settings = replace(
+            settings, video=replace(settings.video, view=view_direction(asked.scene))
+        )
     _run_stages([path], folder, settings, where)
 
 
@@ -270,10 +272,10 @@ COMMANDS: dict[str, Callable[[], None]] = {
     "doctor": command_doctor,
 }
 FIRST_OPTIONS = {
-    "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
+    "reconstruct": ("object-names", "count", "up", "metres-per-unit", "training", "apart"),
     "assemble": ("drop", "lift", "velocity", "extent", "stack", "duration"),
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
-    "film": ("quality", "width", "height", "speed", "view", "colour-by"),
+    "video": ("quality", "width", "height", "speed", "view", "colour-by"),
 }
 """Options of a command that are listed first in its help."""
 REDO_COMMANDS = (
@@ -284,7 +286,7 @@ REDO_COMMANDS = (
     "ground",
     "fill",
     "simulate",
-    "film",
+    "video",
 )
 REDO_COMMANDS = (*REDO_COMMANDS, "report")
 COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
@@ -327,7 +329,7 @@ def _run_stages(
     if until == "report":
         show_summary(folder)
         print(folder / "report.html")
-        print(folder / "film.mp4")
+        print(folder / "video.mp4")
     else:
         print(f"{until} done. Go on with: corporeal report {quote(str(folder))}")
 

@@ -27,7 +27,7 @@ def command_assets() -> None:
 def _index() -> None:
     """Check every model below the folders, and add those that pass to a pool.
 
-    A model is a .glb, .gltf or .obj file. Its class is what a table says (--csv, or a manifest.csv
+    A model is a glTF or a mesh file. Its class is what a table says (--csv, or a manifest.csv
     in the folder or above it), else the folder it lies in, else its own name. A rejected file gets
     a reason. Models that were checked before are not checked again.
     """

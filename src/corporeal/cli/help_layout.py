@@ -14,6 +14,8 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
+from corporeal.core.setting_types import NoOption
+
 OPTIONS_BEFORE_MORE = 6
 """At most this many options are listed first."""
 
@@ -61,6 +63,8 @@ class HelpLayout:
     def _made(self, kind: type, path: tuple[str, ...], typed: Any) -> Any:
         values = {}
         for f in fields(kind):
+            if not _is_offered(kind, f.name):
+                continue
             slot = self.slots.get((*path, f.name))
             if slot is None:
                 values[f.name] = self._made(_dataclass_of(kind, f.name), (*path, f.name), typed)
@@ -113,6 +117,8 @@ def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> lis
     hints = get_type_hints(kind, include_extras=True)
     found = []
     for f in fields(kind):
+        if not _is_offered(kind, f.name):
+            continue
         default = _default(f) if given is None else getattr(given, f.name)
         if is_dataclass(_bare(hints[f.name])):
             inner = None if default is MISSING else default
@@ -163,6 +169,12 @@ def field_docstrings(kind: type) -> dict[str, str]:
 
 
 # ---------------------------------------------------------------- types
+
+
+def _is_offered(kind: type, name: str) -> bool:
+    """Tell whether a field is an option, or holds some."""
+    hint = get_type_hints(kind, include_extras=True)[name]
+    return not any(isinstance(one, NoOption) for one in _metadata(hint))
 
 
 def _metadata(annotation: Any) -> tuple[Any, ...]:

@@ -33,7 +33,7 @@ def validate_settings(folder: Path, settings: Settings) -> None:
     segment_config.validate(settings.segment)
     fill_config.validate(settings.fill)
     simulate_config.validate(settings.simulate)
-    video_config.validate(settings.film)
+    video_config.validate(settings.video)
     if known is None or known.describe != settings.describe:
         _validate_answers(settings.describe)
     if known is None or known.ground != settings.ground:

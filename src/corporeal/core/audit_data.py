@@ -156,9 +156,9 @@ class PartAudit:
     """rigid, deformable, shell or foliage."""
     structure: str
     """solid, shell or filled."""
-    E: float
+    young_pa: float
     """Young's modulus of the material [Pa]."""
-    E_sim: float
+    simulated_young_pa: float
     """As simulated [Pa]."""
     nu: float
     """Poisson's ratio [-]."""
@@ -182,7 +182,7 @@ class PartAudit:
     """Estimated, at the scene's scale [kg]."""
     real_mass_kg: float | None
     """Of the real object [kg]."""
-    why: str
+    reason: str
     """Why it is simulated so."""
 
 

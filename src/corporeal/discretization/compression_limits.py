@@ -42,7 +42,7 @@ def too_stiff_to_compress(
         )
         if _only_soft_by_compression(verdict)
         and part.pressed
-        and made.young < MIN_STIFFNESS_RATIO * true.young
+        and made.simulated_young_pa < MIN_STIFFNESS_RATIO * true.simulated_young_pa
     }
     if not hard:
         return {}
@@ -78,7 +78,11 @@ def warn_of_wrong_compression(
         if part.pressed < MAX_INVISIBLE_STRAIN:
             continue
         name = f"Object {part.object + 1} of the scene"
-        share = treatment.young / true.young if true.young > 0.0 else 1.0
+        share = (
+            treatment.simulated_young_pa / true.simulated_young_pa
+            if true.simulated_young_pa > 0.0
+            else 1.0
+        )
         if treatment.kind == "rigid":
             told.append(
                 f"{name} is pressed by about {part.pressed:.2g} of its thickness by prescribed "

@@ -38,9 +38,9 @@ from corporeal.mpm.physics.time_step_limits import (
     stable_step,
 )
 
-PartRole = Literal["soft", "rigid", "frame", "trinket", "crown"]
-"""A frame is a rigid inclusion: it holds the softer parts of its object. A trinket is too small to
-be one and goes with them. A crown is leaves on springs."""
+PartRole = Literal["soft", "rigid", "inclusion", "subgrid", "foliage"]
+"""An inclusion is rigid and holds the softer parts of its object. A subgrid part is too small to
+be one and goes with them. Foliage is leaves on springs."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,9 @@ def effective_parameters(
 ) -> Discretization:
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
     cell = resolved.cell
-    if role == "crown":
+    if role == "foliage":
         return foliage_parameters(part, verdict, motion)
-    soft = role in ("soft", "trinket")
+    soft = role in ("soft", "subgrid")
     part = part_as_contents(part, motion.impact_speed) if soft else part
     material, structure = part.material, part.structure
     thicker = choose_thickening(part, role, 2 * cell, motion.impact_speed)
@@ -105,11 +105,11 @@ def effective_parameters(
     # What the grid does not dissipate by itself, and the waves that limit the step.
     shell = structure.kind == "shell" and structure.thickness is not None
     loss = remaining_loss_factor(part, motion, resolved.across) if soft else 0.0
-    wave = wave_speed(young * thicker.young, poisson, density, loss) if soft else 0.0
+    wave = wave_speed(young * thicker.young_factor, poisson, density, loss) if soft else 0.0
     return Discretization(
         kind=("shell" if shell else "deformable") if soft else "rigid",
-        young_real=real,
-        young=young * thicker.young if soft else material.young,
+        young_pa=real,
+        simulated_young_pa=young * thicker.young_factor if soft else material.young,
         poisson=poisson,
         density=density,
         yield_stress=strong * thicker.strength if soft and strong is not None else strong,
@@ -119,7 +119,7 @@ def effective_parameters(
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
-        why="".join(
+        reason="".join(
             (
                 treatment_reason(verdict, role),
                 wall_reason(part, thicker.wall, motion.impact_speed) if soft else "",
@@ -140,7 +140,7 @@ class ThickeningFactors:
     """Thickness of its wall over the simulated one [-]; 1: as it is."""
     rod: float
     """Diameter of a rod over the simulated one [-]; 1: as it is."""
-    young: float
+    young_factor: float
     """Factor on E [-]."""
     strength: float
     """Factor on the yield stress [-]."""
@@ -177,8 +177,8 @@ def foliage_parameters(
     """Give foliage no stress of its own."""
     return Discretization(
         kind="foliage",
-        young_real=part.material.young,
-        young=0.0,
+        young_pa=part.material.young,
+        simulated_young_pa=0.0,
         poisson=0.0,
         density=part.material.density,
         yield_stress=None,
@@ -187,7 +187,7 @@ def foliage_parameters(
         impact_speed=motion.impact_speed,
         wave_speed=0.0,
         step=inf,
-        why=f"{FOLIAGE_REASON}, because {verdict.reason} and the wood stays rigid.",
+        reason=f"{FOLIAGE_REASON}, because {verdict.reason} and the wood stays rigid.",
     )
 
 
@@ -195,8 +195,8 @@ def treatment_reason(verdict: RigidityVerdict, role: PartRole) -> str:
     """Say in one sentence why a part is treated as it is."""
     return {
         "rigid": f"Rigid, because {verdict.reason}.",
-        "frame": f"A rigid frame that holds the soft parts around it, because {verdict.reason}.",
-        "trinket": "Deformable with the rest of its object; by itself it would be rigid.",
+        "inclusion": f"A rigid inclusion that holds the soft parts around it, because {verdict.reason}.",
+        "subgrid": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
 

@@ -44,7 +44,7 @@ def part_as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
             part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2
         )
         loss = inner.loss if part.structure.rebound is not None else blow.loss
-        spread = replace(spread, young=blow.young, loss=loss)
+        spread = replace(spread, young=blow.young_pa, loss=loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
 
 

@@ -110,5 +110,5 @@ def impacts_on_objects(
 
 def impact_compliance(treatment: Discretization) -> float:
     """(1 - ν²)/E as simulated [1/Pa]; 0: nothing dents it."""
-    soft = treatment.kind in ("deformable", "shell") and treatment.young > 0.0
-    return (1.0 - treatment.poisson**2) / treatment.young if soft else 0.0
+    soft = treatment.kind in ("deformable", "shell") and treatment.simulated_young_pa > 0.0
+    return (1.0 - treatment.poisson**2) / treatment.simulated_young_pa if soft else 0.0

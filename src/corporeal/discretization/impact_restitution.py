@@ -13,7 +13,7 @@ from corporeal.materials import ImpactBody, RestitutionLaw
 from corporeal.materials.restitution_speed import NOMINAL_IMPACT_SPEED_M_S
 
 CONSTANT_RESTITUTION_LAW = (NOMINAL_IMPACT_SPEED_M_S, 0.0, 0.0, 0.0, 1.0)
-"""The law of what does not change: see ``Problem.blows``."""
+"""The law of what does not change: see ``Problem.restitution_law``."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class PairRestitutions:
     restitution: Float[np.ndarray, "K1 K1"]
     """At the speeds of their first impacts [-]."""
     laws: Float[np.ndarray, "K1 K1 5"]
-    """How it changes with speed: see ``Problem.blows``."""
+    """How it changes with speed: see ``Problem.restitution_law``."""
 
 
 def restitutions_at_impact(
@@ -64,7 +64,7 @@ def restitutions_at_impact(
             law = layered_restitution_law(field, shapes or {}, (i, j), speed, law.value) or law
             table[i, j] = table[j, i] = law.value
             laws[i, j] = laws[j, i] = law.speed, law.slope, law.exponent, law.least, law.most
-    for k in (k for k, treatment in enumerate(treatments) if treatment.laid):
+    for k in (k for k, treatment in enumerate(treatments) if treatment.is_floor_covering):
         table[k, :-1] = table[:-1, k] = table[-1, :-1]
         laws[k, :-1] = laws[:-1, k] = laws[-1, :-1]
     return PairRestitutions(table, laws)

@@ -98,7 +98,7 @@ def mark_thin_floor_sheets(
 
     """
     return tuple(
-        replace(treatment, laid=True)
+        replace(treatment, is_floor_covering=True)
         if treatment.kind == "rigid"
         and is_flat_wall(part)
         and _rests_on_floor(motions[part.object])

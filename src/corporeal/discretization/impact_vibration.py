@@ -89,10 +89,10 @@ def _excess_vibration_loss(
     part: PartGeometry, true: Discretization, made: Discretization, speed: float
 ) -> float:
     """Loss factor [-] that vibrations take beyond those of life."""
-    here = vibration_loss(made.density, speed, made.young)
+    here = vibration_loss(made.density, speed, made.simulated_young_pa)
     if part.structure.inflated:
         return here
-    return here - vibration_loss(true.density, speed, true.young)
+    return here - vibration_loss(true.density, speed, true.simulated_young_pa)
 
 
 def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Discretization:
@@ -101,13 +101,13 @@ def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Disc
     if taken < MIN_NOTABLE_LOSS_FACTOR:
         return made
     loss = made.loss - taken
-    wave = wave_speed(made.young, made.poisson, made.density, loss)
+    wave = wave_speed(made.simulated_young_pa, made.poisson, made.density, loss)
     return replace(
         made,
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, made.impact_speed, cell),
-        why=f"{made.why} Its simulated vibrations in a hard impact dissipate as much as a loss "
+        reason=f"{made.reason} Its simulated vibrations in a hard impact dissipate as much as a loss "
         f"factor of {taken:.2g}, beyond those of the real object: its loss factor is reduced by "
         "that.",
     )

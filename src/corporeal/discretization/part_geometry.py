@@ -16,7 +16,7 @@ from corporeal.mpm.physics.time_step_limits import (
 )
 
 MAX_SUBGRID_CELLS_COUNT, MAX_SUBGRID_LENGTH_CELLS = 8.0, 5.0
-"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
+"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a subgrid part:
 its own stiffness cannot be seen."""
 
 MIN_COMPACT_SIDE_RATIO = 0.5

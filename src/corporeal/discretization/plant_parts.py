@@ -24,7 +24,7 @@ class PartVerdicts:
 
     verdicts: Sequence[RigidityVerdict]
     """One per part."""
-    crowns: frozenset[int] = frozenset()
+    foliage_parts: frozenset[int] = frozenset()
     """Numbers of parts."""
 
 
@@ -39,7 +39,7 @@ def judge_plants(
 
     """
     judged = list(verdicts)
-    crowns: set[int] = set()
+    foliage_parts: set[int] = set()
     leafy = {k for k, p in enumerate(parts) if p.leaves >= MIN_FOLIAGE_LEAVES and not p.prescribed}
     for number in sorted({parts[k].object for k in leafy}):
         mine = [k for k, p in enumerate(parts) if p.object == number]
@@ -49,5 +49,5 @@ def judge_plants(
         if firm and all(judged[k].rigid for k in firm):
             for k in soil:
                 judged[k] = replace(judged[k], rigid=True, reason=POTTED_SOIL_REASON)
-            crowns |= leafy & set(mine)
-    return PartVerdicts(judged, frozenset(crowns))
+            foliage_parts |= leafy & set(mine)
+    return PartVerdicts(judged, frozenset(foliage_parts))

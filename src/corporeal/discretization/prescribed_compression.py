@@ -116,7 +116,7 @@ def compression_planes(scene: Scene) -> list[CompressionPlane]:
 class FreeObjects:
     """The objects that are free to move."""
 
-    things: list[PlacedObject]
+    objects: list[PlacedObject]
     compliances: list[float]
     """1/E [1/Pa]"""
 
@@ -124,7 +124,7 @@ class FreeObjects:
         self, pressers: list[PresserPath], planes: list[CompressionPlane]
     ) -> Float[np.ndarray, " F"]:
         """Return the greatest pressure on each [Pa]."""
-        greatest = np.zeros(len(self.things))
+        greatest = np.zeros(len(self.objects))
         for plane in planes:
             for presser in pressers:
                 if comes_closer(presser, plane.normal):
@@ -138,7 +138,7 @@ class FreeObjects:
     def _closing(self, lower: PresserPath, upper: PresserPath) -> list[Float[np.ndarray, "3"]]:
         """Find unit vectors from one to the other along which they close, where objects are."""
         ways = []
-        for thing in self.things:
+        for thing in self.objects:
             middle = thing.thing.middle
             there = [
                 np.array([p.out(presser[0].back(middle)) for p in presser])
@@ -167,7 +167,7 @@ class FreeObjects:
         not meet anything.
         """
         stacked = self._stacked(along)
-        greatest = np.zeros(len(self.things))
+        greatest = np.zeros(len(self.objects))
         below = [self._side(lower, t, along, upper=False) for t in range(len(upper))]
         above = [self._side(upper, t, along, upper=True) for t in range(len(upper))]
         for start in range(len(upper) - 1):
@@ -197,32 +197,32 @@ class FreeObjects:
     ) -> "CompressionSide":
         """Measure how far one of the two is from every free object."""
         if isinstance(side, CompressionPlane):
-            gaps = [side.gap(thing) for thing in self.things]
+            gaps = [side.gap(thing) for thing in self.objects]
             return CompressionSide(None, gaps, [True] * len(gaps), 1.0)
         there = side[t]
         gaps = [
             measure_clearance(thing, there, along)
             if upper
             else measure_clearance(there, thing, along)
-            for thing in self.things
+            for thing in self.objects
         ]
-        shadows = [overlap_along(there, thing, along) for thing in self.things]
+        shadows = [overlap_along(there, thing, along) for thing in self.objects]
         return CompressionSide(there, gaps, shadows, 1.0 if upper else -1.0)
 
     def _stacked(self, along: Float[np.ndarray, "3"]) -> "StackedGaps":
         """Push all free objects together along a direction: shortest ways of all pairs."""
-        count = len(self.things)
+        count = len(self.objects)
         gaps = np.full((count, count), inf)
         soft = np.array(
             [
                 max(thing.thing.length(along), MIN_MOVING_DISTANCE_M) * compliance
-                for thing, compliance in zip(self.things, self.compliances, strict=True)
+                for thing, compliance in zip(self.objects, self.compliances, strict=True)
             ]
         )
         for i in range(count):
             for j in range(count):
                 if i != j:
-                    gaps[i, j] = measure_clearance(self.things[i], self.things[j], along).gap
+                    gaps[i, j] = measure_clearance(self.objects[i], self.objects[j], along).gap
         # Above oneself there is nothing to go; its own compliance is counted once, at the end.
         np.fill_diagonal(gaps, 0.0)
         beyond = np.tile(soft, (count, 1))

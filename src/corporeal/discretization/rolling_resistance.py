@@ -43,7 +43,7 @@ class RollingBody:
         Weight is that under usual gravity: it is how hard the body lies on what it rolls on.
         """
         mass = float(body.density @ body.volume)
-        rows = body.rounding
+        rows = body.curvature
         curved = rows[rows[:, 6:8].sum(axis=1) > 0.0]
         if not body.rigid or len(curved) == 0:
             return cls(0.0, 0.0)

@@ -48,13 +48,13 @@ def slow_subgrid_parts(
     """
     small = [is_subgrid_part(p, cell) for p in parts]
     fastest = dict.fromkeys((p.object for p in parts), 0.0)
-    for part, treatment, trinket in zip(parts, treatments, small, strict=True):
-        if not trinket:
+    for part, treatment, subgrid in zip(parts, treatments, small, strict=True):
+        if not subgrid:
             fastest[part.object] = max(fastest[part.object], treatment.wave_speed)
     because = "Too small for the grid to resolve its stiffness, it is softened to its surroundings"
     return [
-        slow_waves(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
-        for p, t, trinket in zip(parts, treatments, small, strict=True)
+        slow_waves(t, fastest[p.object], cell, because) if subgrid and fastest[p.object] > 0 else t
+        for p, t, subgrid in zip(parts, treatments, small, strict=True)
     ]
 
 
@@ -104,17 +104,24 @@ def fit_step_budget(
     if fastest <= limit * (1 + 1e-9):
         return BudgetedTreatments(treatments)
     because = "The step budget reduces its wave speed"
-    bends = [(t.young, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
+    bends = [(t.simulated_young_pa, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
     knee, power = fit_young_compression(bends, limit)
     fitted = [
         slow_waves(
-            t, t.wave_speed * sqrt(compress_young(t.young, knee, power) / t.young), cell, because
+            t,
+            t.wave_speed
+            * sqrt(compress_young(t.simulated_young_pa, knee, power) / t.simulated_young_pa),
+            cell,
+            because,
         )
         if t.wave_speed > 0
         else t
         for t in treatments
     ]
-    changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
+    changed = sum(
+        a.simulated_young_pa != b.simulated_young_pa
+        for a, b in zip(treatments, fitted, strict=True)
+    )
     softer = (
         "is simulated softer than it is" if changed == 1 else "are simulated softer than they are"
     )
@@ -141,7 +148,7 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         return treatment
 
     def at(poisson: float) -> Discretization:
-        wave = wave_speed(treatment.young, poisson, treatment.density, treatment.loss)
+        wave = wave_speed(treatment.simulated_young_pa, poisson, treatment.density, treatment.loss)
         step = stable_step(wave, treatment.impact_speed, cell)
         return replace(treatment, poisson=poisson, wave_speed=wave, step=step)
 
@@ -154,7 +161,7 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         lower = float(brentq(excess, MIN_REDUCED_POISSON_RATIO, treatment.poisson))  # pyright: ignore[reportArgumentType]
     return replace(
         at(lower),
-        why=f"{treatment.why} The step budget lowers its Poisson's ratio from "
+        reason=f"{treatment.reason} The step budget lowers its Poisson's ratio from "
         f"{treatment.poisson:.3g} to {lower:.3g}.",
     )
 
@@ -259,14 +266,14 @@ def _ball_dents(
         return _BallDents(
             *(
                 hertz_dent_of_ball(young, true.poisson, true.density, true.impact_speed)
-                for young in (true.young, soft.young)
+                for young in (true.simulated_young_pa, soft.simulated_young_pa)
             )
         )
     if soft.kind != "shell" or not part.structure.sealed or not soft.thickness:
         return None
     speed, radius, made = true.impact_speed, 0.5 * part.size[0], part.material
     real = (made.young, made.poisson, made.density, part.structure.thickness or soft.thickness)
-    slow = (soft.young, soft.poisson, soft.density, soft.thickness)
+    slow = (soft.simulated_young_pa, soft.poisson, soft.density, soft.thickness)
     return _BallDents(*(dent_of_hollow_ball(*wall, radius, speed) for wall in (real, slow)))
 
 
@@ -295,8 +302,10 @@ def _sags_too_far(
     numbers.
     """
     pull = motion.driven if part.burden else motion.acceleration
-    squashed = soft.density * pull * part.size[2] / soft.young
-    sags = min(1.0, max(squashed, verdict.weight * true.young / soft.young))
+    squashed = soft.density * pull * part.size[2] / soft.simulated_young_pa
+    sags = min(
+        1.0, max(squashed, verdict.weight * true.simulated_young_pa / soft.simulated_young_pa)
+    )
     return sags - min(1.0, verdict.weight) > max(verdict.weight, MAX_INVISIBLE_STRAIN)
 
 
@@ -348,11 +357,11 @@ def slow_waves(
     strong = treatment.yield_stress
     return replace(
         treatment,
-        young=treatment.young * factor**2,
+        simulated_young_pa=treatment.simulated_young_pa * factor**2,
         yield_stress=None if strong is None else strong * factor,
         wave_speed=speed,
         step=stable_step(speed, treatment.impact_speed, cell),
-        why=f"{treatment.why} {because}: {1 / factor:.3g} times.",
+        reason=f"{treatment.reason} {because}: {1 / factor:.3g} times.",
     )
 
 
@@ -365,10 +374,10 @@ def cap_stiffness(part: PartGeometry, treatment: Discretization, cell: float) ->
     strong = material.yield_stress
     return replace(
         treatment,
-        young=young,
+        simulated_young_pa=young,
         poisson=poisson,
         yield_stress=None if strong is None else strong * young / material.young,
         wave_speed=wave,
         step=stable_step(wave, treatment.impact_speed, cell),
-        why="Deformable with the published cap on Young's modulus.",
+        reason="Deformable with the published cap on Young's modulus.",
     )

@@ -19,14 +19,14 @@ from corporeal.core.version import __version__
 from corporeal.export.export_target import ExportRequest, NothingToWriteError, WrittenTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
 
-ALEMBIC_FILE_NAME = "film.abc"
+ALEMBIC_FILE_NAME = "video.abc"
 Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rows: Alembic's x, y and z of ours."""
 PROVENANCE_PROPERTY = "corporeal"
 
 
 def write_alembic(asked: ExportRequest, folder: Path) -> WrittenTarget:
-    """Write ``film.abc``.
+    """Write ``video.abc``.
 
     Raises:
         NothingToWriteError: Nothing moves.

@@ -78,11 +78,11 @@ def read_animated_glb(path: Path) -> AnimatedGlb:
         BadFileError: It cannot be read.
 
     """
-    film = AnimatedGlb(GltfDocument(path))
-    for animation in film.document.entries("animations"):
+    video = AnimatedGlb(GltfDocument(path))
+    for animation in video.document.entries("animations"):
         samplers = animation.value["samplers"]
         for channel in animation.value["channels"]:
             target = channel["target"]
-            values = film._values(samplers[channel["sampler"]]["output"])
-            film.tracks[target["node"], target["path"]] = values
-    return film
+            values = video._values(samplers[channel["sampler"]]["output"])
+            video.tracks[target["node"], target["path"]] = values
+    return video

@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
-from corporeal.core import registry, store
+from corporeal.core import store
 from corporeal.core.errors import UnknownChoiceError, UserError
+from corporeal.core.registry import load_function
 from corporeal.export.check_exports import check_target
-from corporeal.export.corpus_export import DATASET_WRITERS, export_dataset, finished_runs, is_corpus
+from corporeal.export.corpus_export import export_dataset, finished_runs, is_corpus
 from corporeal.export.export_record import ExportRecord, TargetRecord, write_record
 from corporeal.export.export_target import (
     DEFAULT_EXPORT,
@@ -20,7 +21,7 @@ from corporeal.export.export_target import (
     ExportRequest,
     ExportTarget,
     NothingToWriteError,
-    Writer,
+    TargetWriter,
     WrittenTarget,
 )
 from corporeal.export.physical_scene import physical_scene
@@ -105,14 +106,14 @@ def _export_corpus(
     config: ExportConfig,
     progress: ExportProgress,
 ) -> ExportRecord:
-    each: list[ExportTarget] = [t for t in targets if t not in DATASET_WRITERS]
+    each: list[ExportTarget] = [t for t in targets if not EXPORT_WRITERS[t].write_dataset]
     runs = finished_runs(corpus)
     for k, run in enumerate(runs if each else ()):
         progress(k / (len(runs) + 1), run.name)
         asked, name = _export_request(run, config)
         _export_targets(asked, name, each, out / run.name, ignore_progress)
     progress(len(runs) / (len(runs) + 1), "data set")
-    return export_dataset(corpus, [t for t in targets if t in DATASET_WRITERS], out, config)
+    return export_dataset(corpus, [t for t in targets if t not in each], out, config)
 
 
 def _export_request(
@@ -157,7 +158,7 @@ def _default_folder(source: str | Path | SimulationResult | PreparedScene, name:
 
 
 def _write_target(asked: ExportRequest, target: ExportTarget, out: Path) -> TargetRecord:
-    writer: Writer = registry.load_backend("target", target, EXPORT_WRITERS)
+    writer: TargetWriter = load_function(EXPORT_WRITERS[target].write, f"The target {target!r}")
     try:
         with store.whole_folder(out / target) as folder:
             written = writer(asked, folder)

@@ -203,7 +203,10 @@ def _flex(solid: ExportedSolid, scene: PhysicalScene, world: ET.Element) -> None
         element=" ".join(map(str, mesh.corners.ravel().tolist())),
     )
     poisson = min(matter.treatment.poisson, MAX_FLEX_POISSON_RATIO)
-    elastic = {"young": xml_numbers([matter.treatment.young]), "poisson": xml_numbers([poisson])}
+    elastic = {
+        "young": xml_numbers([matter.treatment.simulated_young_pa]),
+        "poisson": xml_numbers([poisson]),
+    }
     ET.SubElement(item, "elasticity", elastic | {"damping": xml_numbers([FLEX_DAMPING_S])})
     ET.SubElement(
         item,

@@ -79,8 +79,8 @@ def read_particle_table(asked: ExportRequest) -> ParticleTable:
 def _part_values(treatments: list[Discretization]) -> dict[str, np.ndarray]:
     """Values of every part as simulated; what does not yield has an infinite yield stress."""
     return {
-        "young": np.array([t.young for t in treatments]),
-        "young_real": np.array([t.young_real for t in treatments]),
+        "simulated_young_pa": np.array([t.simulated_young_pa for t in treatments]),
+        "young_pa": np.array([t.young_pa for t in treatments]),
         "poisson": np.array([t.poisson for t in treatments]),
         "yield_stress": np.array([t.yield_stress or np.inf for t in treatments]),
     }

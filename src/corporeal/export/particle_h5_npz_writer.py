@@ -79,7 +79,7 @@ def save_npz(folder: Path, runs: Iterable[ExportRequest]) -> WrittenTarget:
     rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for asked in runs:
         table = read_particle_table(asked)
-        rows.append((table.position, table.kind, np.log10(table.columns["young"])))
+        rows.append((table.position, table.kind, np.log10(table.columns["simulated_young_pa"])))
         provenance.append(table.provenance)
         statistics.add(table)
     items = np.empty(len(rows), dtype=object)

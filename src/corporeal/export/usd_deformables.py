@@ -140,7 +140,9 @@ def set_deformable_material(prim: UsdPrim, matter: PartMaterial) -> None:
     """Say E and ν as simulated in every dialect that is read today, and how it yields."""
     prim.schemas += DEFORMABLE_MATERIAL_APIS
     for space in USD_DIALECTS:
-        prim.set("float", f"{space}:youngsModulus", usda_number(matter.treatment.young))
+        prim.set(
+            "float", f"{space}:youngsModulus", usda_number(matter.treatment.simulated_young_pa)
+        )
         prim.set("float", f"{space}:poissonsRatio", usda_number(matter.treatment.poisson))
     for name, value in newton_yield_parameters(matter).items():
         prim.set("float", f"newton:mpm:{name}", usda_number(value))

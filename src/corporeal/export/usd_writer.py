@@ -1,4 +1,4 @@
-"""A scene as OpenUSD in text: ``sim.usda`` to simulate, ``film.usda`` to show.
+"""A scene as OpenUSD in text: ``sim.usda`` to simulate, ``video.usda`` to show.
 
 ``geometry.usda`` has the shapes, ``physics.usda`` what simulates, ``motion.usda`` the samples.
 Never samples and physics in one stage: a simulated body with samples contradicts itself, and
@@ -25,7 +25,7 @@ GEOMETRY_FILE_NAME, PHYSICS_FILE_NAME, MOTION_FILE_NAME = (
     "physics.usda",
     "motion.usda",
 )
-SIMULATION_FILE_NAME, VIDEO_FILE_NAME = "sim.usda", "film.usda"
+SIMULATION_FILE_NAME, VIDEO_FILE_NAME = "sim.usda", "video.usda"
 
 
 def write_usd(asked: ExportRequest, folder: Path) -> WrittenTarget:

@@ -136,7 +136,7 @@ class InflatedBall:
 class EquivalentSolid:
     """The soft solid that a sealed ball is in one impact."""
 
-    young: float
+    young_pa: float
     """[Pa]"""
     loss: float
     """[-]"""
@@ -174,7 +174,7 @@ def inflated_ball_material(ball: InflatedBall) -> Material:
     bounces = restitution_of_loss(light.loss)
     why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa act in parallel"
     values = {
-        "young": _ground(0.5 * light.young, light.young, 1.5 * light.young, why),
+        "young": _ground(0.5 * light.young_pa, light.young_pa, 1.5 * light.young_pa, why),
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "as of a ball full of air"),
         "density": _ground(density, density, density, "air at this pressure"),
         "restitution": _ground(0.0, bounces, 1.0, "the wall's share of the loss"),

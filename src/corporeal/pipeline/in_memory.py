@@ -9,26 +9,24 @@ import weakref
 from collections.abc import Callable
 from pathlib import Path
 
-from corporeal.core import registry
 from corporeal.core.errors import UserError
 from corporeal.core.types import Scene
 from corporeal.discretization.build_model import build_model
 from corporeal.geometry.gaussian_transforms import UpAxisChoice, chosen_up_axis
 from corporeal.io.input_files import input_kind
-from corporeal.mpm.problem import ENGINES, Engine, Problem
+from corporeal.mpm.problem import Problem
 from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.segment import segment
-from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
+from corporeal.pipeline.stages.simulate import simulate
 from corporeal.scene.vessel_contents import add_vessel_contents
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
 Progress = Callable[[float, str], None]
 DEFAULT_SETTINGS = Settings()
-DEFAULT_ENGINE = SimulateConfig().engine
 
 
 def no_progress(fraction: float, words: str) -> None:
@@ -105,21 +103,6 @@ def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS)
     """
     contact = settings.simulate.contact
     return build_model(prepared.scene, prepared.particles, prepared.field, contact).problem
-
-
-def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE) -> Engine:
-    """Return an engine at time 0 of a problem.
-
-    Args:
-        problem: From ``pose_problem``, or built manually.
-        engine: A name from ``corporeal.ENGINES``.
-
-    Raises:
-        UnknownChoiceError: The engine is unknown.
-        UserError: The engine does not work on this machine, or cannot solve the problem.
-
-    """
-    return registry.load_backend("engine", engine, ENGINES)(problem)
 
 
 def simulate_scene(

@@ -22,7 +22,7 @@ from corporeal.simulation.simulation_result import PreparedScene, SimulationResu
 T = TypeVar("T")
 
 RUN_FILES = (
-    *("film.mp4", "report.html", "materials.json", AUDIT_FILE, "fields.png", "strip.png"),
+    *("video.mp4", "report.html", "materials.json", AUDIT_FILE, "fields.png", "strip.png"),
     "close-up.png",
     *("ensemble.json", "ensemble.png"),
 )
@@ -44,7 +44,7 @@ class StageResults:
     ground: MaterialField | None = None
     fill: Particles | None = None
     simulate: Trajectory | None = None
-    film: Video | None = None
+    video: Video | None = None
     report: None = None
 
     def having(self, verb: str, made: Any) -> "StageResults":
@@ -101,9 +101,9 @@ class StageResults:
         return _made(self.simulate, "simulate")
 
     @property
-    def movie(self) -> Video:
+    def rendered_video(self) -> Video:
         """From video."""
-        return _made(self.film, "film")
+        return _made(self.video, "video")
 
     @property
     def reconstruction(self) -> Reconstruction | None:
@@ -115,7 +115,7 @@ class StageResults:
         )
 
     @property
-    def filmed(self) -> Reconstruction | None:
+    def rendered_reconstruction(self) -> Reconstruction | None:
         """The reconstruction for rendering; None if some objects have no Gaussians."""
         found = self.reconstruction
         whole = found is not None and len(found.names) == len(
@@ -131,7 +131,7 @@ class StageResults:
     @property
     def played(self) -> SimulationResult:
         """Results up to simulate."""
-        return SimulationResult(self.prepared, self.trajectory, self.filmed)
+        return SimulationResult(self.prepared, self.trajectory, self.rendered_reconstruction)
 
 
 def _made(value: T | None, verb: str) -> T:

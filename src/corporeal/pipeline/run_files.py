@@ -68,20 +68,20 @@ def write_run_files(
     # Figures.
     figures = {
         "The video as a row of frames": folder / "strip.png",
-        **_close_up(made.movie, folder / "close-up.png"),
+        **_close_up(made.rendered_video, folder / "close-up.png"),
         "Materials, laws and values of every part": folder / "fields.png",
         **(more or {}),
     }
     fields_figure(made.scene, made.parts, made.field, folder / "fields.png")
     progress(0.5, "drawing the figures")
-    write_filmstrip(made.movie, folder / "strip.png")
+    write_filmstrip(made.rendered_video, folder / "strip.png")
     # What happened, and what it took.
     happened = made.played.outcome
     seen = tuple(compare_with_expectations(made.scene.name, happened))
     spent.seconds["report"] = time.perf_counter() - started
     whole = run_audit(made, audit, happened, seen, spent)
     # Files.
-    shutil.copyfile(made.movie.path, folder / "film.mp4")
+    shutil.copyfile(made.rendered_video.path, folder / "video.mp4")
     write_audit(folder, whole)
     heavy = made.particles.mass_real, part_scales(made.scene, made.parts)
     listed = materials.materials_json(made.field, made.parts, *heavy)
@@ -91,7 +91,7 @@ def write_run_files(
         parts=made.parts,
         field=made.field,
         particles=made.particles,
-        film=made.movie,
+        video=made.rendered_video,
         audit=whole,
         figures=figures,
         sources=materials.cited_sources(),
@@ -101,26 +101,26 @@ def write_run_files(
     report(story, folder / "report.html")
 
 
-def _close_up(movie: Video, path: Path) -> dict[str, Path]:
+def _close_up(video: Video, path: Path) -> dict[str, Path]:
     """Copy the video's close-up beside the other files, where it has one."""
-    drawn = movie.path.parent / CLOSE_UP_FILE
+    drawn = video.path.parent / CLOSE_UP_FILE
     if not drawn.exists():
         return {}
     shutil.copyfile(drawn, path)
     return {"The first contact from close by": path}
 
 
-def _view(made: StageResults, audit: RunAudit) -> str:
+def _view(made: StageResults, audit: RunAudit, max_bytes: int = MAX_VIEW_BYTES) -> str:
     """Return the 3D view for the report, decimated in time to fit its size."""
     cast = bind_scene(made.prepared)
     recording = record_trajectory(cast, made.trajectory)
     for step in FRAME_STRIDES:
         taken = viewer_recording(made.prepared, cast, audit.outcome, recording.every(step), audit)
         view = inline_view(taken)
-        if len(view) <= MAX_VIEW_BYTES:
+        if len(view) <= max_bytes:
             return view
     return (
-        f'<p class="lead">The 3D view of this run is larger than {MAX_VIEW_BYTES / 1e6:.0f} MB and is '
+        f'<p class="lead">The 3D view of this run is larger than {max_bytes / 1e6:.0f} MB and is '
         "left out. Open it with: corporeal view RUN</p>"
     )
 

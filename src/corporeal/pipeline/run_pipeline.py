@@ -33,8 +33,15 @@ from corporeal.core.types import (
 )
 from corporeal.geometry.gaussian_transforms import chosen_up_axis
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.io.input_files import input_kind, list_input_files, photographed_input, scene_name
-from corporeal.io.scene_toml import read_scene_file, write_scene_file
+from corporeal.io.input_files import (
+    input_kind,
+    is_scene_file,
+    list_input_files,
+    photographed_input,
+    read_scene,
+    scene_name,
+)
+from corporeal.io.scene_toml import write_scene_file
 from corporeal.pipeline.results import RUN_FILES, StageResults
 from corporeal.pipeline.settings.ground_config import GroundConfig
 from corporeal.pipeline.settings.settings import Settings
@@ -53,7 +60,7 @@ STAGE_FOLDERS = {
     "ground": "6-ground",
     "fill": "7-fill",
     "simulate": "8-simulate",
-    "film": "9-film",
+    "video": "9-video",
     "report": "10-report",
 }
 STAGES = tuple(STAGE_FOLDERS)
@@ -168,7 +175,7 @@ def _read_stage_result(verb: str, folder: Path) -> Any:
         return None
     found = store.load(folder / store.DATA_FILE)
     # paths in the results may be stale: the run may have been moved
-    return replace(found, path=folder / found.path.name) if verb == "film" else found
+    return replace(found, path=folder / found.path.name) if verb == "video" else found
 
 
 def digests_of_named_files(config: Any) -> list[str]:
@@ -341,7 +348,7 @@ class _Run:
         if verb == "reconstruct":
             from corporeal.io.photos.mask_files import edited_masks
 
-            asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
+            asked = [] if self.settings.reconstruct.object_names else [self.settings.describe.vlm]
             by_hand = sorted(edited_masks(self.folder / STAGE_FOLDERS[verb]).items())
             return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
         if verb == "assemble":
@@ -412,7 +419,7 @@ class _Run:
             ]
             config = replace(config, extent=())  # they determine the scale of the reconstruction
             scene = assemble(inputs, config)
-            if self.inputs[0].suffix.lower() == ".toml":
+            if is_scene_file(self.inputs[0]):
                 scene = replace(scene, name=scene_title(self.inputs[0]))
             return self._keep(folder, scene)
         return self._keep(
@@ -463,11 +470,11 @@ class _Run:
         made, config = self.made, self.settings.simulate
         return simulate(made.scene, made.particles, made.field, config, folder, progress)
 
-    def _film(self, folder: Path, progress: Progress) -> Video:
+    def _video(self, folder: Path, progress: Progress) -> Video:
         from corporeal.pipeline.stages.video import render_video
 
         return self._keep(
-            folder, render_video(self.made.played, self.settings.film, folder, progress)
+            folder, render_video(self.made.played, self.settings.video, folder, progress)
         )
 
     def _report(self, folder: Path, progress: Progress) -> None:
@@ -489,9 +496,9 @@ class _Run:
 def _reconstructed_model(asked: Path, folder: Path) -> Path:
     """Return the model that was reconstructed, with all that a scene file says beside it."""
     model = next(folder.glob("*.glb"))
-    if asked.suffix.lower() != ".toml":
+    if not is_scene_file(asked):
         return model
-    write_scene_file(folder / "scene.toml", replace(read_scene_file(asked), file=model))
+    write_scene_file(folder / "scene.toml", replace(read_scene(asked), file=model))
     return folder / "scene.toml"
 
 

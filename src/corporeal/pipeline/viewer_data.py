@@ -105,7 +105,7 @@ def part_cards(prepared: PreparedScene) -> list[dict]:
     heavy = particles.mass_real, part_scales(scene, parts)
     listed = materials.materials_json(prepared.field, parts, *heavy)["parts"]
     for k, (card, treatment) in enumerate(zip(listed, particles.treatments, strict=True)):
-        numbers = ("kind", "young", "young_real", "density", "why")
+        numbers = ("kind", "simulated_young_pa", "young_pa", "density", "reason")
         card["simulated"] = {name: getattr(treatment, name) for name in numbers}
         card["fill"] = particles.fills[k] if k < len(particles.fills) else ""
     return listed
@@ -115,9 +115,10 @@ def resolution_statement(prepared: PreparedScene) -> str:
     """Describe the resolution of a scene in one line, and what is softened."""
     particles = prepared.particles
     softer = sorted(
-        (t.young / t.young_real, prepared.scene.objects[part.object].name, part.name)
+        (t.simulated_young_pa / t.young_pa, prepared.scene.objects[part.object].name, part.name)
         for part, t in zip(prepared.parts.catalogue, particles.treatments, strict=True)
-        if t.kind not in ("rigid", "foliage") and t.young < UNSOFTENED_MODULUS_RATIO * t.young_real
+        if t.kind not in ("rigid", "foliage")
+        and t.simulated_young_pa < UNSOFTENED_MODULUS_RATIO * t.young_pa
     )
     size = f"{particles.count:,} particles, cells of {1e3 * particles.cell:.3g} mm"
     if not softer:

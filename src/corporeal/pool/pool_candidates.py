@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from corporeal.core.errors import UserError
-from corporeal.io.input_files import GLTF_SUFFIXES
-from corporeal.io.mesh.mesh_suffixes import is_mesh_file
+from corporeal.io.input_files import is_model_file
 from corporeal.pool.model_table import ModelRow, read_model_table
 from corporeal.recognition.readable_names import everyday_words
 
@@ -72,7 +71,7 @@ def model_files_below(folder: Path, pool: Path | None = None) -> list[Path]:
     return [
         path
         for path in sorted(folder.rglob("*"))
-        if (path.suffix.lower() in GLTF_SUFFIXES or is_mesh_file(path))
+        if is_model_file(path)
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
         and (own is None or not path.resolve().is_relative_to(own))

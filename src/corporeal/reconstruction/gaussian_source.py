@@ -83,8 +83,16 @@ def gaussians_from_source(
         BadFileError: Where pictures were taken from, or what they are of, cannot be told.
 
     """
-    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
-    kept = None if folder is None else folder / "training.npz"
+    if folder is None:
+        with tempfile.TemporaryDirectory(prefix="corporeal-") as name:
+            return gaussians_from_source(source, config, Path(name), progress)
+    training = TrainConfig(
+        config.training,
+        seed=config.training_seed,
+        rasteriser=config.rasteriser,
+        hull=config.resolution.hull,
+    )
+    kept = folder / "training.npz"
     instances = config.apart == "masks"
     if input_kind([source]) == "splat":
         return load_or_train_gaussians(source, training, kept, progress, instances), False
@@ -101,9 +109,8 @@ def gaussians_from_source(
             doubt = pose_warnings(posed.folder)
             raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), GIVE_MASKS_HINT)
         later = subprogress(progress, begun + MASKED_PROGRESS, 1.0)
-        if folder is not None:
-            (folder / MASKS_FIGURE_FILE).unlink(missing_ok=True)
-            masks_figure(posed.folder, found.folder, folder / MASKS_FIGURE_FILE)
+        (folder / MASKS_FIGURE_FILE).unlink(missing_ok=True)
+        masks_figure(posed.folder, found.folder, folder / MASKS_FIGURE_FILE)
         # corrected masks are reliable
         grown = found.grown and found.folder is not None and not edited_masks(found.folder)
         masked = MaskSource(found.folder, grown)
@@ -135,7 +142,7 @@ class _MasksFound:
 
 
 def find_or_grow_masks(
-    config: ReconstructConfig, source: Path, folder: Path | None, progress: Progress
+    config: ReconstructConfig, source: Path, folder: Path, progress: Progress
 ) -> _MasksFound:
     """Take masks from a folder, find them with a model, or grow them where there are none."""
     if config.masks not in (MASKS_AUTO, MASKS_NONE) and split_model_spec(config.masks) is None:
@@ -143,10 +150,9 @@ def find_or_grow_masks(
     shots = list_posed_photos(source).shots
     if config.masks == MASKS_NONE or (config.masks == MASKS_AUTO and has_masks(shots)):
         return _MasksFound()
-    place = folder or Path(tempfile.mkdtemp(prefix="corporeal-"))
     if config.masks != MASKS_AUTO:
-        return _MasksFound(*masks_from_model(config, source, place, progress))
-    grown = grown_masks(source, place, progress=progress)
+        return _MasksFound(*masks_from_model(config, source, folder, progress))
+    grown = grown_masks(source, folder, progress=progress)
     if grown.folder is None:
         return _MasksFound(None, (), grown.said, False, grown.doubted, grown.incomplete)
     kind = NoteKind.GRAVE if grown.incomplete else NoteKind.ASSUMED
@@ -167,7 +173,7 @@ def _read_masks_at_size(
 
 
 def _find_source_poses(
-    source: Path, config: ReconstructConfig, folder: Path | None, progress: Progress
+    source: Path, config: ReconstructConfig, folder: Path, progress: Progress
 ) -> FoundPoses | None:
     """Find where pictures were taken from; None: that is known, or there are none.
 
@@ -177,10 +183,9 @@ def _find_source_poses(
     """
     if not lacks_poses(source):
         return None
-    place = Path(tempfile.mkdtemp(prefix="corporeal-")) if folder is None else folder
     posed = find_poses(
         source,
-        place / POSES_FOLDER,
+        folder / POSES_FOLDER,
         subprogress(progress, 0.0, POSED_PROGRESS * WHOLE_PICTURES_PROGRESS),
     )
     with notes_on_error(posed.warnings):
@@ -190,7 +195,7 @@ def _find_source_poses(
             masks = posed.folder / MASK_FOLDERS[0]
             sure = config.force or not posed.doubt or describe_moved_object(posed, masks) is None
             return _refuse_doubted_poses(source, posed, sure, LOOK_AT_MASKS_HINT)
-        return _test_poses_by_masks(source, posed, config.force, place, progress)
+        return _test_poses_by_masks(source, posed, config.force, folder, progress)
 
 
 def _test_poses_by_masks(

@@ -50,7 +50,7 @@ def masks_from_model(
 
     """
     masker = connect_mask_model(config.masks)
-    learned = learned_masks(source, place, masker, config.things, progress)
+    learned = learned_masks(source, place, masker, config.object_names, progress)
     said = (*learned.said, CORRECT_MASKS_HINT)
     shown = read_posed_photos(source, FEATURE_IMAGE_SIDE_PX, learned.folder)
     assert shown.masks is not None, "they were written"

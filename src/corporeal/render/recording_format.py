@@ -254,7 +254,7 @@ def pack_recording(
         ],
         "surfaces": _surfaces(scene, parts, cast, block),
         "finishes": [_finish(f) for f in scene.finishes],
-        "film": None if recording is None else _frames_block(recording, block),
+        "video": None if recording is None else _frames_block(recording, block),
         "splats": None if splats is None else _splats(splats, block),
     }
     return block.under({**header, **summary})

@@ -105,13 +105,13 @@ def open_video(
         log = tempfile.TemporaryFile()
     try:
         options = [*_picture_options(fps, size), *_credit_options(credit)]
-        film = VideoWriter(_encoder(partial, options, log), log, path)
+        video = VideoWriter(_encoder(partial, options, log), log, path)
         try:
-            yield film
-            film.close()
+            yield video
+            video.close()
         except BaseException:
-            film.program.kill()
-            film.program.wait()
+            video.program.kill()
+            video.program.wait()
             raise
         with disk_errors(path):
             partial.replace(path)

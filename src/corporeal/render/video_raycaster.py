@@ -104,7 +104,8 @@ class VideoRaycaster:
     A stage that is given twice, to the same camera, is cast once.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, empty_band_tiles: int = EMPTY_BAND_TILES) -> None:
+        self._empty_band_tiles = empty_band_tiles
         self._empty: _EmptyStudio | None = None
         self._last: tuple[RayScene, CameraAim, Quality, np.ndarray] | None = None
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
@@ -145,7 +146,9 @@ class VideoRaycaster:
         pool = self._workers(threads)
         known = self._empty
         if known is None or (known.aim, known.place) != (camera, _scene_and_floor_key(stage)):
-            known = self._empty = _cast_empty_studio(stage, camera, SKY_SAMPLING[quality], pool)
+            known = self._empty = _cast_empty_studio(
+                stage, camera, SKY_SAMPLING[quality], pool, self._empty_band_tiles
+            )
         out = known.printed.copy()
         job = _FrameRender(stage, camera, SKY_SAMPLING[quality], known)
         for _ in pool.map(lambda r: job.band(r, out), rows):
@@ -162,9 +165,10 @@ def _cast_empty_studio(
     camera: CameraAim,
     plan: _SkySampling,
     pool: ThreadPoolExecutor,
+    band_tiles: int,
 ) -> _EmptyStudio:
-    """Cast the studio without objects."""
-    band = EMPTY_BAND_TILES * TILE_PX
+    """Cast the studio without objects, so many rows of tiles at once."""
+    band = band_tiles * TILE_PX
     rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
     pixels, cleared = camera.width * camera.height, stage.cleared()
     rays = RenderJob(cleared, camera, RaySampling(1, 1, 1)).rays((0, camera.height))

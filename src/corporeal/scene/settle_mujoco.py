@@ -131,12 +131,18 @@ class MujocoScene:
     """One scene in MuJoCo, in lengths of the scene's unit."""
 
     def __init__(
-        self, bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], step: float
+        self,
+        bodies: Sequence[SettlingBody],
+        poses: Sequence[BodyPose],
+        step: float,
+        contact_memory_bytes: int = CONTACT_MEMORY_BYTES,
     ) -> None:
         self.unit, self.count = scene_unit_of(bodies), len(bodies)
         farthest = [np.linalg.norm(b.hull.vertices, axis=1).max() for b in bodies]
         self._radius = np.array(farthest) / self.unit
-        self.model = _scene_spec(bodies, poses, self.unit, step).compile()
+        spec = _scene_spec(bodies, poses, self.unit, step)
+        spec.memory = contact_memory_bytes
+        self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
 
     def step(self) -> None:
@@ -245,7 +251,6 @@ def _floor_spec(step: float) -> mujoco.MjSpec:
     spec.option.iterations = 100
     spec.option.noslip_iterations = 4
     spec.option.tolerance = 1e-10
-    spec.memory = CONTACT_MEMORY_BYTES
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[5, 5, 0.1],

@@ -58,7 +58,7 @@ class ShowcaseComposition:
 
     story: str
     """What should be seen, in one sentence."""
-    things: tuple[PlacedModel, ...]
+    models: tuple[PlacedModel, ...]
     view: PropPoint
     """Direction from the scene to the camera."""
     duration: float
@@ -263,7 +263,7 @@ def build_showcase_scene(name: str) -> Scene:
     """
     composition = _composition_of(name)
     return scene_of_models(
-        name, place_models(composition), composition.things, composition.duration
+        name, place_models(composition), composition.models, composition.duration
     )
 
 
@@ -320,7 +320,7 @@ def place_models(composition: ShowcaseComposition) -> list[PropModel]:
     """Build the models and put them where they stand."""
     models = [
         _without_parts_of_model(PROP_BUILDERS[t.model](), t.without).moved(t.at, t.turn)
-        for t in composition.things
+        for t in composition.models
     ]
     for inner, outer in composition.planted.items():
         models[outer] = _cut_room_in_heap(models[outer], models[inner])

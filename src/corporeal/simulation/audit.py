@@ -247,8 +247,8 @@ def part_row(
         law=acts.law.name.lower(),
         treatment=treatment.kind,
         structure=structure.kind,
-        E=treatment.young_real,
-        E_sim=treatment.young,
+        young_pa=treatment.young_pa,
+        simulated_young_pa=treatment.simulated_young_pa,
         nu=acts.poisson,
         density=material.density,
         density_sim=treatment.density,
@@ -260,5 +260,5 @@ def part_row(
         thickness_sim_m=treatment.thickness,
         mass_kg=mass,
         real_mass_kg=None if owner is None else mass / owner.scale**3,
-        why=treatment.why,
+        reason=treatment.reason,
     )

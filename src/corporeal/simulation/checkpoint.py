@@ -38,24 +38,40 @@ class CheckpointState:
     """State of the engine; empty at the start."""
 
 
+@dataclass(frozen=True)
+class CheckpointConfig:
+    """How often checkpoints are written."""
+
+    min_interval_s: float = 10.0
+    """Least time of computing between two of them [s]."""
+    max_write_time_fraction: float = 0.05
+    """Largest fraction of the time that may be spent on writing them [1]."""
+
+
+DEFAULT_CHECKPOINTS = CheckpointConfig()
+
+
 class Checkpoints:
     """The last two states of one simulation in one folder."""
 
-    def __init__(self, folder: Path, name: str) -> None:
+    def __init__(
+        self, folder: Path, name: str, config: CheckpointConfig = DEFAULT_CHECKPOINTS
+    ) -> None:
         """Manage the checkpoints in a folder.
 
         Args:
             folder: Where they are, beside the frames.
             name: Fingerprint of the problem; checkpoints with another one are ignored.
+            config: How often they are written.
 
         """
-        self.folder, self.name = folder, name
+        self.folder, self.name, self.config = folder, name, config
         self.written, self.seconds = time.monotonic(), 0.0
 
     @property
     def due(self) -> bool:
         """Whether the next checkpoint is due."""
-        pause = max(MIN_INTERVAL_S, self.seconds / MAX_WRITE_TIME_FRACTION)
+        pause = max(self.config.min_interval_s, self.seconds / self.config.max_write_time_fraction)
         return time.monotonic() - self.written >= pause
 
     def keep(self, saved: dict[str, np.ndarray], done: int) -> None:

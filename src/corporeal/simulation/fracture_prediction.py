@@ -104,7 +104,7 @@ def fracture_event_of(one: FractureEvent, scene: Scene, field: MaterialField) ->
         by=one.by,
         time=one.time,
         speed=one.speed,
-        energy=one.blow,
+        energy=one.impact_energy,
         ratio=one.ratio,
         word=breakage_word(one.ratio),
         pieces=len(one.surfaces),

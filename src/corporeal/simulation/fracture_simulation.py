@@ -15,9 +15,15 @@ from corporeal.core.types import FractureEvent, Surface
 from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import Snapshot
-from corporeal.mpm.split_body import BodySplit, ParentMap, can_split, split_problem
+from corporeal.mpm.engines import require
+from corporeal.mpm.problem import (
+    BodySplit,
+    BodySplittingEngine,
+    Engine,
+    InteractiveEngine,
+    Snapshot,
+)
+from corporeal.mpm.split_body import can_split
 from corporeal.simulation.fracture_prediction import (
     BrittleImpact,
     encloses_cavity,
@@ -39,9 +45,8 @@ class FracturedRun:
     """A run with one more fractured object."""
 
     stage: FractureState
-    engine: CpuEngine
+    engine: Engine
     breaks: tuple[FractureEvent, ...]
-    heirs: ParentMap
 
 
 def next_breaking_impact(
@@ -79,7 +84,7 @@ def next_breaking_impact(
 
 
 def fracture_body(
-    stage: FractureState, engine: CpuEngine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
+    stage: FractureState, engine: Engine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
 ) -> FracturedRun | None:
     """Replace the struck object by fragments just before the impact; None: it cannot be cut.
 
@@ -88,6 +93,9 @@ def fracture_body(
         engine: At an instant before the impact; goes on to just before it.
         blow: The impact.
         breaks: Earlier fractures.
+
+    Raises:
+        UserError: The engine cannot break bodies.
 
     """
     owner = stage.posed.object_of_body
@@ -106,10 +114,8 @@ def fracture_body(
     _take_energy(engine, stage, blow)
     one = _break(blow, pieces)
     split = _split(stage, engine, body, one)
-    heirs, problem = ParentMap.of(engine.problem, split), split_problem(engine.problem, split)
-    after = CpuEngine(problem, engine.threads)
-    after.inherit(engine.save(), heirs)
-    return FracturedRun(stage.with_pieces(one, split, problem, now), after, (*breaks, one), heirs)
+    after = require(engine, BodySplittingEngine).with_split_body(split)
+    return FracturedRun(stage.with_pieces(one, split, after.problem, now), after, (*breaks, one))
 
 
 # ---------------------------------------------------------------- the pieces
@@ -160,13 +166,13 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
         ratio=said.ratio,
         by=said.by,
         speed=said.speed,
-        blow=said.energy,
+        impact_energy=said.energy,
         piece=pieces.of_particle,
         surfaces=pieces.surfaces,
     )
 
 
-def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -> None:
+def _take_energy(engine: Engine, stage: FractureState, blow: BrittleImpact) -> None:
     """Subtract the fracture energy from the impact; the struck body recoils.
 
     J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
@@ -179,10 +185,10 @@ def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -
         if number is not None and stage.scene.objects[number].path is None:
             body = int(np.flatnonzero(stage.posed.object_of_body == number)[0])
             a, b, c = (sign * impulse).tolist()
-            engine.apply_impulse(body, (x, y, z), (a, b, c))
+            require(engine, InteractiveEngine).apply_impulse(body, (x, y, z), (a, b, c))
 
 
-def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEvent) -> BodySplit:
+def _split(stage: FractureState, engine: Engine, body: int, one: FractureEvent) -> BodySplit:
     """Return positions and motions of the fragments."""
     now, mine = engine.snapshot(), stage.rows(body)
     start = stage.particles.position[stage.particles.object == one.object].astype(float)

@@ -7,8 +7,7 @@ from jaxtyping import Float
 
 from corporeal.core.types import FractureEvent, MaterialField, Particles, Scene
 from corporeal.discretization.build_model import ModelMapping
-from corporeal.mpm.problem import Problem, Snapshot
-from corporeal.mpm.split_body import BodySplit
+from corporeal.mpm.problem import BodySplit, Problem, Snapshot
 from corporeal.scene.fractured_scene import (
     fractured_field,
     fractured_particles,

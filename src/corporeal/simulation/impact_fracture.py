@@ -40,7 +40,7 @@ CERTAIN_BREAK_ENERGY_RATIO = 10.0
 class ElasticSolid:
     """Elastic constants of an isotropic solid."""
 
-    young: float
+    young_pa: float
     """E [Pa]."""
     poisson: float
     """ν [-]"""
@@ -48,7 +48,7 @@ class ElasticSolid:
     @property
     def compliance(self) -> float:
         """(1 - ν²)/E [1/Pa]."""
-        return (1.0 - self.poisson**2) / self.young
+        return (1.0 - self.poisson**2) / self.young_pa
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class BrittlePart:
     def shell_stiffness(self) -> float:
         """Of a closed round wall under a point load, 4 E t²/(R √(3 (1 - ν²))) [N/m] (Reissner)."""
         poisson = self.solid.poisson
-        plain = 4.0 * self.solid.young * self.thickness**2
+        plain = 4.0 * self.solid.young_pa * self.thickness**2
         return plain / (self.radius * sqrt(3.0 * (1.0 - poisson**2)))
 
     @property

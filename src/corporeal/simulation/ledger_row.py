@@ -35,7 +35,7 @@ def ledger_row(
     # The bodies of one object become one.
     group = object_of_body(problem)
     squeezed = np.split(volume_shares(now), ends)
-    if problem.bonds or problem.apart:
+    if problem.bonds or problem.excluded_pairs:
         found |= sum_by_object(found, group)
         one = [np.flatnonzero(group == k) for k in range(group.max() + 1)]
         position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
@@ -97,7 +97,7 @@ def rotate_with_body(
 
 def object_of_body(problem: Problem) -> np.ndarray:
     """Return which object each body is of (B,): bodies held together or kept apart are of one."""
-    first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.apart)}
+    first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.excluded_pairs)}
     group: list[int] = []
     for b in range(len(problem.bodies)):
         group.append(group[first[b]] if b in first else max(group, default=-1) + 1)

@@ -105,15 +105,16 @@ class DynamicRelaxation:
         self.energy[:] = 0.0
         self.anchor, self.since, self.count, self.watching = self.start.copy(), 0.0, 0, False
 
-    def run(self, pause: SaveCallback) -> StaticEquilibrium:
-        """Run until equilibrium, or for ``MAX_RELAXATION_S``.
+    def run(self, pause: SaveCallback, max_seconds: float = MAX_RELAXATION_S) -> StaticEquilibrium:
+        """Run until equilibrium, or time is up.
 
         Args:
             pause: Called with the time [s] whenever the state can be saved.
+            max_seconds: Gives up after so long [s].
 
         """
         found = False
-        while not found and self.engine.time < MAX_RELAXATION_S:
+        while not found and self.engine.time < max_seconds:
             if self.count % CHECKS_BETWEEN_SAVE_POINTS == 0:
                 pause(self.engine.time)
             self.count += 1

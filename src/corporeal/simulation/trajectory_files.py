@@ -182,15 +182,15 @@ def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
 class FrameSequence(Sequence[Frame]):
     """The frames of one trajectory, read from disk when asked for; the first ones only once.
 
-    Audit, video and report each read most of them. What is beyond ``FRAME_CACHE_BYTES`` is read
+    Audit, video and report each read most of them. What is beyond ``cache_bytes`` is read
     again.
     """
 
-    def __init__(self, folder: Path, count: int) -> None:
+    def __init__(self, folder: Path, count: int, cache_bytes: int = FRAME_CACHE_BYTES) -> None:
         self.folder, self.length = folder, count
         self.layout = read_layout(folder)
         self._kept: dict[int, dict[str, np.ndarray]] = {}
-        self._room = FRAME_CACHE_BYTES
+        self._room = cache_bytes
 
     def __len__(self) -> int:
         return self.length

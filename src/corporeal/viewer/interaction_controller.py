@@ -8,8 +8,8 @@ import numpy as np
 from corporeal.core.errors import UserError
 from corporeal.core.types import Vector
 from corporeal.discretization.build_model import ModelMapping
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import Problem
+from corporeal.mpm.engines import DEFAULT_ENGINE, build_engine, require
+from corporeal.mpm.problem import BodyAddingEngine, InteractiveEngine, Problem, VariableLoadEngine
 from corporeal.viewer.commands import Command
 from corporeal.viewer.live_edit import MAX_DROP_HEIGHT_M, AddedObject, LiveEditor
 
@@ -54,7 +54,12 @@ class InteractionController:
     """Acts on one engine; all that is done goes into ``touches``."""
 
     def __init__(
-        self, posed: ModelMapping, problem: Problem, threads: int, growth: LiveEditor | None = None
+        self,
+        posed: ModelMapping,
+        problem: Problem,
+        threads: int,
+        growth: LiveEditor | None = None,
+        engine: str = DEFAULT_ENGINE,
     ) -> None:
         """Begin at time 0.
 
@@ -63,9 +68,13 @@ class InteractionController:
             problem: Its own, or the control with one velocity field.
             threads: Of the engine.
             growth: Gives the scene with objects that are added; None: nothing can be.
+            engine: Its name.
+
+        Raises:
+            UserError: The engine cannot solve the problem, or does not work on this machine.
 
         """
-        self.engine, self.growth = CpuEngine(problem, threads), growth
+        self.engine, self.growth = build_engine(problem, engine, threads), growth
         self.added: tuple[AddedObject, ...] = ()
         self._know(posed)
         self.held: SpringGrip | None = None
@@ -172,26 +181,31 @@ class InteractionController:
         mass = float(self.engine.measure().mass[spot.body])
         stiffness = mass * (2 * np.pi * order.firm) ** 2
         x, y, z = point.tolist()
-        self.engine.pull(spot.body, (x, y, z), order.to, stiffness)
+        require(self.engine, InteractiveEngine).attach_spring(
+            spot.body, (x, y, z), order.to, stiffness
+        )
         self.held = SpringGrip(spot.body, stiffness, order.to)
 
     def _pull(self, order: Command) -> None:
         if self.held is not None:
-            self.engine.pull(self.held.body, None, order.to, self.held.stiffness)
+            held, engine = self.held, require(self.engine, InteractiveEngine)
+            engine.attach_spring(held.body, None, order.to, held.stiffness)
             self.held = SpringGrip(self.held.body, self.held.stiffness, order.to)
 
     def _drop(self, order: Command) -> None:
         if self.held is not None:
-            self.engine.pull(self.held.body, None, self.held.to, 0.0)
+            engine = require(self.engine, InteractiveEngine)
+            engine.attach_spring(self.held.body, None, self.held.to, 0.0)
             self.held = None
 
     def _gravity(self, order: Command) -> None:
-        self.engine.weigh(order.to)
+        require(self.engine, VariableLoadEngine).set_gravity(order.to)
 
     def _wind(self, order: Command) -> None:
+        engine, known = require(self.engine, VariableLoadEngine), self.engine.problem.bodies
         for body in self._bodies(order.object):
-            if len(self.engine.problem.bodies[body].faces.area):
-                self.engine.blow(body, order.to)
+            if len(known[body].faces.area):
+                engine.set_wind(body, order.to)
 
     # ---------------------------------------------------------------- objects that are added
 
@@ -225,7 +239,7 @@ class InteractionController:
             raise UserError(f"There is no space for {one.thing} there: something is in the way.")
         added = (*self.added, one)
         posed = self._growing.at(added).posed
-        self.engine = self.engine.joined_by(posed.problem)
+        self.engine = require(self.engine, BodyAddingEngine).with_added_bodies(posed.problem)
         self.added = added
         self._know(posed)
 
@@ -246,12 +260,7 @@ class InteractionController:
         """
         if self.held is None:
             return None
-        hold = self.engine.grips[self.held.body].hold
-        state = self.engine._rigid_bodies().get(self.held.body)
-        if state is not None:  # its particles' mean is off by a share of a cell
-            return state.centre + state.rotation @ hold.arm
-        mine = position[self.first[self.held.body] : self.first[self.held.body + 1]]
-        return hold.share @ mine[hold.particle]
+        return require(self.engine, InteractiveEngine).grip_point(self.held.body, position)
 
     def force(self, position: np.ndarray) -> float:
         """How hard the hand pulls now [N]."""

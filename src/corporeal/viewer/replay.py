@@ -17,6 +17,7 @@ from corporeal.core.deserialize import from_plain
 from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Frame, Particles
 from corporeal.discretization.discretization_plan import QUALITY_PRESETS
+from corporeal.mpm.engines import DEFAULT_ENGINE
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import read_run, read_run_request
 from corporeal.pipeline.stages.fill import FillConfig, fill
@@ -90,7 +91,8 @@ def write_replays(
     cast = bind_scene(whole)
     for k, contact in enumerate(CONTACT_MODES):
         tell = partial(_tell, progress, k, contact)
-        recording = record_frames(cast, replay_frames(growth, contact, done, tell))
+        frames = replay_frames(growth, contact, done, tell, settings.simulate.engine)
+        recording = record_frames(cast, frames)
         recording = replace(recording, since=appearance_times(growth, done))
         take = viewer_recording(whole, cast, recording=recording)
         (place / f"{contact}.take").write_bytes(take)
@@ -129,7 +131,11 @@ def appearance_times(growth: LiveEditor, done: InteractionRecord) -> dict[int, f
 
 
 def replay_frames(
-    growth: LiveEditor, contact: Contact, done: InteractionRecord, tell: Callable[[float], None]
+    growth: LiveEditor,
+    contact: Contact,
+    done: InteractionRecord,
+    tell: Callable[[float], None],
+    engine: str = DEFAULT_ENGINE,
 ) -> Iterator[Frame]:
     """Do again what a record says; yield frames, its first and last instant among them.
 
@@ -141,12 +147,15 @@ def replay_frames(
         contact: As in reality, or the control.
         done: What to do.
         tell: Called with the fraction done.
+        engine: The name of the engine.
 
     """
     posed = growth.at(()).posed
     whole = growth.at(tuple(one for _, one in drop_events(done))).prepared.particles
     problem = replace(posed.problem, contact=contact)
-    hands = InteractionController(posed, problem, min(MAX_REPLAY_THREADS, usable_cores()), growth)
+    hands = InteractionController(
+        posed, problem, min(MAX_REPLAY_THREADS, usable_cores()), growth, engine
+    )
     moments, shown = SnapshotFrames(posed), 0.0
     yield with_waiting_objects(moments.frame(hands.engine.snapshot()), whole)
     for touch in done.touches:

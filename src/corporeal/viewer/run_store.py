@@ -11,6 +11,7 @@ from corporeal.core.audit_data import RunAudit
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
 from corporeal.discretization.discretization_plan import DetailLevel
+from corporeal.mpm.engines import DEFAULT_ENGINE
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import RUN_FILE, STAGE_FOLDERS, read_run, read_run_request
 from corporeal.pipeline.stages.ground import DEFAULT_CONFIG, GroundConfig
@@ -48,6 +49,8 @@ class LiveInput:
     """With which it was filled."""
     ground: GroundConfig = DEFAULT_CONFIG
     """From which its materials came."""
+    engine: str = DEFAULT_ENGINE
+    """Which simulates it."""
 
 
 class RunStore:
@@ -107,7 +110,8 @@ class RunStore:
 
         """
         settings = read_run_request(self.path(name)).settings
-        return LiveInput(self.open(name).made, settings.fill.detail, settings.ground)
+        made, engine = self.open(name).made, settings.simulate.engine
+        return LiveInput(made, settings.fill.detail, settings.ground, engine)
 
     def asked(self, name: str) -> dict[str, Any]:
         """Return how a run was asked to begin: detail, drop; lift and velocity of every object."""
@@ -134,12 +138,19 @@ def load_run(run: Path) -> LoadedRun:
         raise UserError(f"{run} has no {REQUIRED_STAGE} yet: nothing of it can be shown in 3D.")
     cast = bind_scene(made.prepared)
     if made.simulate is None:
-        return LoadedRun(made, viewer_recording(made.prepared, cast, found=made.filmed))
+        return LoadedRun(
+            made, viewer_recording(made.prepared, cast, found=made.rendered_reconstruction)
+        )
     audit = run / AUDIT_FILE
     whole = from_plain(RunAudit, store.read_json(audit)) if audit.exists() else None
     recording = record_trajectory(cast, made.trajectory, MAX_RECORDING_FPS)
     shown = viewer_recording(
-        made.prepared, cast, made.played.outcome, recording, whole, found=made.filmed
+        made.prepared,
+        cast,
+        made.played.outcome,
+        recording,
+        whole,
+        found=made.rendered_reconstruction,
     )
     return LoadedRun(made, shown)
 
@@ -156,7 +167,7 @@ def _row(name: str, run: Path) -> dict[str, Any]:
         "input": ", ".join(map(_input_name, asked.inputs)),
         "detail": asked.settings.fill.detail,
         "shown": (run / STAGE_FOLDERS[REQUIRED_STAGE] / store.META_FILE).exists(),
-        "picture": (run / STAGE_FOLDERS["film"] / THUMBNAIL_FILE).exists(),
+        "picture": (run / STAGE_FOLDERS["video"] / THUMBNAIL_FILE).exists(),
         "report": (run / "report.html").exists(),
     }
 

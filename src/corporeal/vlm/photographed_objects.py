@@ -197,7 +197,7 @@ def named_object_note(source: str, seen: SeenObject, name: str) -> str:
         more = f", and how large with --extent {name}=METRES"
     return Note(
         f"The object was not named: from the name {source!r} it was called "
-        f"{seen.class_name}{size}. Name it with --things{more}.",
+        f"{seen.class_name}{size}. Name it with --object-names{more}.",
         NoteKind.ASSUMED,
     )
 
@@ -244,7 +244,9 @@ def check_stated_extents(
     for text in stated:
         name, _ = parse_extent(text, (known or [UNKNOWN_CLASS])[0])
         if name not in known and not name.startswith(UNKNOWN_CLASS):
-            step = f"Choose one of: {', '.join(known)}." if known else "Name it with --things."
+            step = (
+                f"Choose one of: {', '.join(known)}." if known else "Name it with --object-names."
+            )
             raise UserError(f"--extent: no object {name!r}. {step}")
 
 

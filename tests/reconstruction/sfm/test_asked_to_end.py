@@ -9,8 +9,8 @@ pytest.importorskip("pycolmap")
 
 ASKED = """
 import os, signal
-from corporeal.reconstruction.sfm.sfm_run import require
-require()
+from corporeal.reconstruction.sfm.sfm_run import require_pycolmap
+require_pycolmap()
 os.kill(os.getpid(), signal.SIGTERM)
 """
 

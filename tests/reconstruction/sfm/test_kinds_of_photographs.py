@@ -213,12 +213,12 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([tmp_path / "DCIM"])
     with pytest.raises(UserError, match=r"is a single picture, which shows no depth\. Take 40"):
         assemble([lost / "a.jpg"])
-    (tmp_path / "films").mkdir()
-    (tmp_path / "films" / "a.MOV").touch()
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "a.MOV").touch()
     with pytest.raises(
         UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"
     ):
-        assemble([tmp_path / "films"])
+        assemble([tmp_path / "videos"])
 
 
 @pytest.mark.parametrize(
@@ -242,7 +242,7 @@ def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, grey
         gathered(tmp_path)
 
 
-def test_half_a_film_is_not_told_to_become_the_kind_it_is(tmp_path):
+def test_half_a_video_is_not_told_to_become_the_kind_it_is(tmp_path):
     (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
     with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
         write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)

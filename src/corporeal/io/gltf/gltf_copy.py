@@ -27,7 +27,8 @@ IMPLICIT_EXTENSIONS = ("KHR_mesh_quantization",)
 class MergedDocument:
     """The JSON and the binary chunk of the file in the making."""
 
-    def __init__(self) -> None:
+    def __init__(self, max_bytes: int = MAX_MODEL_FILE_BYTES) -> None:
+        self.max_bytes = max_bytes
         self.json: dict[str, Any] = {}
         self.binary = bytearray()
         self.used: set[str] = set()
@@ -46,9 +47,9 @@ class MergedDocument:
 
         """
         self.binary += b"\0" * (-len(self.binary) % 4)
-        if len(self.binary) + len(data) > MAX_MODEL_FILE_BYTES:
+        if len(self.binary) + len(data) > self.max_bytes:
             raise UserError(
-                f"The merged file would be larger than {MAX_MODEL_FILE_BYTES >> 30} GiB. "
+                f"The merged file would be larger than {self.max_bytes >> 30} GiB. "
                 "Take fewer objects, or smaller textures."
             )
         place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}

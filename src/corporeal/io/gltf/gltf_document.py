@@ -21,7 +21,7 @@ from corporeal.io.gltf.gltf_container import (
     read_file_bytes,
     split_glb,
 )
-from corporeal.io.referenced_files import decode_data_uri, read_beside
+from corporeal.io.referenced_files import decode_data_uri, path_beside, read_beside
 
 MAX_UNPACKED_ROWS = 60_000_000
 """Indices, vertices and triangles together that are unpacked from one file, copies included;
@@ -241,3 +241,18 @@ class GltfDocument:
         least = asset.text("minVersion") if asset else ""
         if least and least != "2.0":
             self.root.fail(f"the file asks for a reader of glTF {least[:8]}; this one reads 2.0.")
+
+
+def gltf_companions(path: Path) -> list[Path]:
+    """Return the buffers and pictures beside a glTF file.
+
+    Raises:
+        BadFileError: Its JSON cannot be read.
+
+    """
+    if path.suffix.lower() == ".glb":
+        return []
+    document = GltfDocument(path)
+    uris = [e.text("uri") for e in document.entries("buffers") + document.entries("images")]
+    files = [path_beside(path.parent, u) for u in uris if u and u[:5].lower() != "data:"]
+    return [f for f in files if f is not None]

@@ -21,10 +21,12 @@ class RawMesh:
     """Surfaces in the file's own axes and unit."""
 
     surfaces: tuple[Surface, ...]
-    """All of object 0; ``extras[ALONG]``: names from the file's root to the surface."""
+    """All of object 0; ``extras[NODE_NAMES_KEY]``: names from the file's root to the surface."""
     finishes: tuple[Finish, ...]
-    up: UpAxis
-    """Axis of the file that points up: as it states, else as its kind usually has it."""
+    up: UpAxis | None = None
+    """Axis of the file that points up, as it states; None: it states none."""
+    up_note: str = ""
+    """What to say of ``up`` where it is read out of words."""
     unit: float | None = None
     """What one unit is [m], as the file states; None: it states none."""
     lost: tuple[str, ...] = ()

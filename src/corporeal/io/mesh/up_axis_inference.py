@@ -7,8 +7,6 @@ shelves also stand on their backs, and balls stand anyhow: what neither tells ma
 all the same.
 """
 
-import re
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import ConvexHull, QhullError
@@ -23,17 +21,6 @@ BASE_AT_ZERO_EXTENT_FRACTION = 0.005
 """A base so far from the origin's plane lies in it [extents]."""
 CENTRED_SIDE_FRACTION = 0.05
 """A middle so far from the origin's plane is in it [sides]."""
-Z_UP_COMMENT_PATTERN = re.compile(
-    r"(?i)\b\+?z[ _-]+(?:axis[ _-]+)?(?:is[ _-]+)?up\b|\bup[ _-]*axis\W{1,3}\+?z\b"
-)
-COMMENT_HEAD_CHARACTERS = 2000
-"""Characters at the beginning of a file where comments say how it was written."""
-
-
-def comment_says_z_up(text: str) -> bool:
-    """Return whether a comment (``#``) at the beginning of an OBJ says that +z is up."""
-    lines = text[:COMMENT_HEAD_CHARACTERS].splitlines()
-    return any(Z_UP_COMMENT_PATTERN.search(line) for line in lines if line.lstrip().startswith("#"))
 
 
 def infer_up_axis(

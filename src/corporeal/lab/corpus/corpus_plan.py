@@ -345,7 +345,7 @@ def _by_class(models: Sequence[PoolAsset]) -> dict[str, list[str]]:
 
 
 def _showcase(name: str) -> PlannedScene:
-    objects = [t.model.replace("_", " ") for t in SHOWCASE_SCENE_BUILDERS[name]().things]
+    objects = [t.model.replace("_", " ") for t in SHOWCASE_SCENE_BUILDERS[name]().models]
     kind = INTERACTION_OF_SHOWCASE[name]
     return PlannedScene(name, 0, tuple(objects), (), "scatter", kind)
 

@@ -29,7 +29,7 @@ TIME_SHARE_OF_VERB: Mapping[str, tuple[float, float]] = {
     "ground": (0.05, 0.06),
     "fill": (0.06, 0.15),
     "simulate": (0.15, 0.4),
-    "film": (0.4, 0.92),
+    "video": (0.4, 0.92),
     "report": (0.92, 1.0),
 }
 """Where each stage begins and ends in the time of a run at draft detail, roughly."""
@@ -81,9 +81,9 @@ def run_corpus(
 
 def _with_showcase_view(plan: CorpusPlan, scene: PlannedScene, settings: Settings) -> Settings:
     """Let a scene of the showcase be seen from where it shows best."""
-    if plan.config.preset != "seven" or settings.film.view is not None:
+    if plan.config.preset != "seven" or settings.video.view is not None:
         return settings
-    return replace(settings, film=replace(settings.film, view=view_direction(scene.name)))
+    return replace(settings, video=replace(settings.video, view=view_direction(scene.name)))
 
 
 def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[str]) -> Job:

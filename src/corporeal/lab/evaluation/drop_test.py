@@ -6,8 +6,9 @@ import numpy as np
 
 from corporeal.core.types import GRAVITY_M_S2, Scene
 from corporeal.lab.evaluation.rebound_data import MeasuredRebound
+from corporeal.mpm.engines import build_engine
 from corporeal.mpm.problem import Diagnostics, Engine
-from corporeal.pipeline.in_memory import build_engine, pose_problem, prepare_scene
+from corporeal.pipeline.in_memory import pose_problem, prepare_scene
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.scene.scene_building import ball, box, build_scene
 
@@ -85,7 +86,7 @@ def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
         float(max(after, 0.0) / speed),
         met[1] - met[0],
         treatment.kind,
-        treatment.young / treatment.young_real if not rigid else 1.0,
+        treatment.simulated_young_pa / treatment.young_pa if not rigid else 1.0,
         0.0 if rigid else unbooked_energy(first, last) / float(0.5 * first.mass[0] * speed**2),
         engine.steps.count,
     )

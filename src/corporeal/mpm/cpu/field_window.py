@@ -95,7 +95,7 @@ class FieldWindow:
         self.part = aligned_zeros((batches, CHANNELS, 8), np.float32)
         self.part.transpose(0, 2, 1)[np.arange(len(rows)) // 8, np.arange(len(rows)) % 8] = rows
         self.relieves = not material.flows
-        recalls = material.flows or material.swells
+        recalls = material.flows or material.uses_mean_dilatation
         self.history = aligned_zeros((batches if recalls else 0, HISTORY_CHANNELS, 8), np.float32)
         self.relax(material)
         self.block = np.zeros((1, BLOCK_INTEGERS), np.int32)

@@ -37,7 +37,7 @@ MAXWELL_CHANNELS = BRANCHES * BRANCH_CHANNELS
 """Channels of what all branches of a particle remember."""
 LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, FLIP_DAMPING_RATE, RHO, RIGID = range(12)
 """Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain
-p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, forgetting rate [1/s], ρ [kg/m³], 1 where
+p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, FLIP damping rate [1/s], ρ [kg/m³], 1 where
 rigid."""
 SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY, STIFFENING = (
     12,
@@ -202,7 +202,7 @@ FIELD_RECORD = NativeRecord(
     ("double *", "rigid"),  # rigid: its state
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
     ("double *", "facet facet_point"),  # rigid: [facets][FACET_ROW] flat faces; places on them
-    ("double *", "rounding"),  # rigid: [surfaces][ROUNDING], see types.ROUNDING
+    ("double *", "curvature"),  # rigid: [surfaces][CURVATURE_COLUMNS], see types.CURVATURE_COLUMNS
     ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
@@ -213,7 +213,7 @@ FIELD_RECORD = NativeRecord(
     ("double", "mass full"),  # full: of a cell full of it
     ("double[3]", "flows_by"),  # of a liquid at a wall: yield stress [Pa], K/d^n [Pa (s/m)^n], n
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
-    ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
+    ("int", "blocks pool rigids points surfaces pushed uses_mean_dilatation flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
@@ -450,5 +450,5 @@ READING_RECORD = NativeRecord(
     ("double *", "sum"),  # [runs][owners][SUMS]
     ("double", "dx"),
     ("int[3]", "origin"),
-    ("int", "runs owners blocks swells"),
+    ("int", "runs owners blocks uses_mean_dilatation"),
 )

@@ -182,7 +182,7 @@ def begin_round(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, lanes: 
         s.pace[2] = D(0.0)
         if not last:
             s.flag[FLAG_HITS] = 1
-            support_hold(c.rounds, c.restitution, c.blows, c.lightness, s.dx)
+            support_hold(c.rounds, c.restitution, c.restitution_law, c.lightness, s.dx)
     wait_for_group()
     if not last:
         for pair in range(lane, everything * everything, lanes):

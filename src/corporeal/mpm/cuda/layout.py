@@ -213,7 +213,7 @@ class DeviceParticles:
     opened: wp.array(dtype=wp.float32)
     branch: wp.array2d(dtype=wp.float32)
     """What Maxwell branches remember."""
-    relief: wp.array(dtype=wp.float32)
+    log_volume_ratio: wp.array(dtype=wp.float32)
     """Of nearly incompressible material: ln of its mean volume over its own …"""
     pressure: wp.array(dtype=wp.float32)
     """… Kirchhoff pressure of that mean [Pa] …"""

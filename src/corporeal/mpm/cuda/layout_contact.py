@@ -78,7 +78,7 @@ class DeviceContacts:
     """… and inverse masses as it takes them."""
     friction: wp.array2d(dtype=wp.float64)
     restitution: wp.array2d(dtype=wp.float64)
-    blows: wp.array2d(dtype=wp.float64)
+    restitution_law: wp.array2d(dtype=wp.float64)
     """How it changes with the speed of an impact: 5 numbers a pair."""
     rolling: wp.array2d(dtype=wp.float64)
     """c [m]; unused without rolling friction."""

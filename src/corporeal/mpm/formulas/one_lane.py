@@ -64,10 +64,12 @@ def mean_bulk(law: wp.float32, mu: wp.float32, lam: wp.float32) -> wp.float32: .
   mpm::Material<float> t = {law};
   float F[9], wave = 0.0f;
   for (int k = 0; k < 9; k++) F[k] = H.data[k / 3][k % 3];
-  float p = mpm::Laws<float>::mean_pressure(t, bulk, mpm::Strain<float>::volume(F), relief, wave);
+  float p = mpm::Laws<float>::mean_pressure(t, bulk, mpm::Strain<float>::volume(F), log_volume_ratio, wave);
   return wp::vec_t<2, wp::float32>(p, wave);
 """)
-def mean_pressure(law: wp.float32, bulk: wp.float32, H: wp.mat33, relief: wp.float32) -> wp.vec2:
+def mean_pressure(
+    law: wp.float32, bulk: wp.float32, H: wp.mat33, log_volume_ratio: wp.float32
+) -> wp.vec2:
     """Kirchhoff pressure of the mean dilatation and what it adds to ρ c² [Pa]."""
     ...
 

@@ -1,6 +1,6 @@
 """Contact of round bodies with convex or concave surfaces.
 
-Twin of ``Curved`` in surfaces.h. Rows are those of ``types.ROUNDING``.
+Twin of ``Curved`` in surfaces.h. Rows are those of ``types.CURVATURE_COLUMNS``.
 """
 
 from typing import NamedTuple

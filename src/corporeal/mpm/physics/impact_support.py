@@ -35,7 +35,7 @@ class ImpactBodies:
     """Inverse masses [1/kg]; 0 of planes and prescribed motion, -1 of what is not rigid."""
     restitution: Float[np.ndarray, "N N"]
     """Newton's e of every pair …"""
-    blows: Float[np.ndarray, "N N 5"]
+    restitution_law: Float[np.ndarray, "N N 5"]
     """… and how it changes with the speed of an impact: see ``restitution_at_speed``."""
 
 
@@ -164,7 +164,9 @@ class ImpactRound:
             normal = normal / max(float(np.linalg.norm(normal)), TINY_DOUBLE)
             both = np.divmod(pair, len(bodies.light))
             blow = float(seen.blow[mine].max())
-            e = restitution_at_speed(float(bodies.restitution[both]), bodies.blows[both], blow)
+            e = restitution_at_speed(
+                float(bodies.restitution[both]), bodies.restitution_law[both], blow
+            )
             width = contact_disc_radius(seen.point[near], normal, cell)
             place = seen.point[near].mean(axis=0)
             found[int(pair)] = ImpactPair(

@@ -14,7 +14,7 @@ from corporeal.mpm.constants import FRAME_LAYER_DX, FRAME_REACH_DX, PARTICLES_PE
 from corporeal.mpm.problem import Body
 
 
-def frame_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
+def inclusion_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
     """Mean densities [kg/m³] of a frame and of the soft material around it; masses give volumes.
 
     On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin
@@ -28,7 +28,7 @@ def frame_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float,
     return float(frame.volume @ frame.density) / max(float(frame.volume.sum()), layer), held
 
 
-def frame_particles_near(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
+def inclusion_particles_near(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
     """Particles of a frame that what it holds could ever meet; those far inside don't matter."""
     far = KDTree(soft.position).query(frame.position, distance_upper_bound=FRAME_REACH_DX * cell)[0]
     return np.flatnonzero(np.isfinite(far))

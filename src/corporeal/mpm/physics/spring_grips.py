@@ -118,5 +118,15 @@ def check_grip(problem: Problem, body: int, *vectors: Vector | None) -> None:
         raise UserError(f"There is no body {body}. Choose 0 to {len(problem.bodies) - 1}.")
     if problem.bodies[body].path is not None:
         raise UserError(f"{problem.bodies[body].name!r} follows a path: nothing else moves it.")
+    require_finite(*vectors)
+
+
+def require_finite(*vectors: Vector | None) -> None:
+    """Refuse what is no number.
+
+    Raises:
+        UserError: It says what to give.
+
+    """
     if not all(np.isfinite(v).all() for v in vectors if v is not None):
-        raise UserError("A point or an impulse is not finite. Give three numbers.")
+        raise UserError("A vector is not finite. Give three numbers.")

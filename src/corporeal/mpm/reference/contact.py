@@ -182,7 +182,7 @@ def _rebound(
         bodies=impact_support.ImpactBodies(
             np.concatenate([np.where(stiff[:bodies], light, -1.0), np.zeros(planes)]),
             np.asarray(problem.restitution, dtype=float),
-            problem.blow_laws,
+            problem.restitution_law_of_pair,
         ),
     )
 
@@ -194,7 +194,7 @@ def find_contacts(scene: ContactScene) -> list[PossibleContacts]:
     """List everything that touches or may touch in this step."""
     fields = np.unique(scene.grid.field).tolist()
     rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
     apart = [p for p in combinations(fields, 2) if p not in bonded]
     pairs = {p: _common_slots(scene.grid, rows, p) for p in apart}
     shared = [np.zeros(0, np.int64), *(slot for both in pairs.values() for slot in both)]

@@ -76,13 +76,13 @@ class ContactScene:
         And whether it is that point's at all, and not its neighbours'.
         """
         R = self.state.rotation[body]
-        rows = self.matter.rounding[body]
+        rows = self.matter.curvature[body]
         shift, own = support_point_shift(rows, np.tile(towards @ R, (len(rows), 1)))
         return self.surface(body) + shift @ R.T, own
 
     def wetted(self, body: int) -> WettedSurface | None:
         """Where liquids touch a rigid body now; None: as everything else does."""
-        given = self.problem.bodies[body].wetted
+        given = self.problem.bodies[body].wetted_surface
         if given is None or not self.is_rigid(body):
             return None
         R = self.state.rotation[body].T

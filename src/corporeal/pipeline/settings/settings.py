@@ -23,4 +23,4 @@ class Settings:
     ground: GroundConfig = field(default_factory=GroundConfig)
     fill: FillConfig = field(default_factory=FillConfig)
     simulate: SimulateConfig = field(default_factory=SimulateConfig)
-    film: VideoConfig = field(default_factory=VideoConfig)
+    video: VideoConfig = field(default_factory=VideoConfig)

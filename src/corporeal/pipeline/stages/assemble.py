@@ -21,9 +21,15 @@ from corporeal.geometry.scene_transforms import (
     scale_scene,
     surfaces_bounding_box,
 )
-from corporeal.io.input_files import images_in_folder, model_files_in, videos_in_folder
-from corporeal.io.load_model import READABLE_MODEL_FORMATS, MeshFrame, load_model
-from corporeal.io.scene_toml import ObjectEntry, SceneFile, read_scene_file
+from corporeal.io.input_files import (
+    images_in_folder,
+    is_scene_file,
+    model_files_in,
+    read_scene,
+    videos_in_folder,
+)
+from corporeal.io.load_model import MeshFrame, load_model, readable_model_formats
+from corporeal.io.scene_toml import ObjectEntry, SceneFile
 from corporeal.pipeline.settings.assemble_config import AssembleConfig, validate
 from corporeal.recognition.length_unit_inference import (
     InferredUnit,
@@ -87,11 +93,11 @@ def _scene_file_for(inputs: list[Path]) -> SceneFile:
     """Return a scene file for the inputs."""
     if not inputs:
         raise UserError("No input. Name a model, several of them, or a scene.toml.")
-    if any(p.suffix.lower() == ".toml" for p in inputs):
+    if any(map(is_scene_file, inputs)):
         if len(inputs) > 1:
             step = "Name the models in the scene file instead."
             raise BadFileError(inputs[0], "a scene file stands alone.", step)
-        return read_scene_file(inputs[0])
+        return read_scene(inputs[0])
     files = [f for p in inputs for f in (_models_in(p) if p.is_dir() else [p])]
     if len(files) == 1:
         return SceneFile(files[0], file=files[0])
@@ -110,12 +116,12 @@ def _models_in(folder: Path) -> list[Path]:
             what += f" and {len(places) - 1} more folders"
             step = "Put the photographs of one object into one folder, and name that."
         raise BadFileError(folder, f"{what}.", step)
-    if films := videos_in_folder(folder):
-        what = f"the folder holds {len(films)} videos and no model."
-        raise BadFileError(folder, what, f"Name the video itself: {films[0]}.")
+    if videos := videos_in_folder(folder):
+        what = f"the folder holds {len(videos)} videos and no model."
+        raise BadFileError(folder, what, f"Name the video itself: {videos[0]}.")
     step = "Name a model, a folder of models, or photographs with poses."
     raise BadFileError(
-        folder, f"the folder holds no model ({READABLE_MODEL_FORMATS}) and no pictures.", step
+        folder, f"the folder holds no model ({readable_model_formats()}) and no pictures.", step
     )
 
 
@@ -348,7 +354,7 @@ def _merge_blocks(plan: SceneFile, blocks: list[_FileObjects]) -> Scene:
 
 def _title(plan: SceneFile, blocks: list[_FileObjects]) -> str:
     """Return the scene's name: the scene file's, or its folder's, or the models'."""
-    if plan.path.suffix.lower() == ".toml":
+    if is_scene_file(plan.path):
         return scene_title(plan.path)
     return safe_name("-".join(b.scene.name for b in blocks))[:60] or "scene"
 

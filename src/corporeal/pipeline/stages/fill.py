@@ -240,7 +240,7 @@ def gather_particles(
         treatments=chosen.treatments,
         surface=np.concatenate([points for points, _ in surfaces]),
         object_of_surface=np.repeat(np.arange(len(surfaces)), [len(s) for s, _ in surfaces]),
-        rounding=np.concatenate([rounding for _, rounding in surfaces]),
+        curvature=np.concatenate([curvature for _, curvature in surfaces]),
         face=np.concatenate([face for face, _ in windward]),
         particle_of_face=np.concatenate(
             [first + bearer for first, (_, bearer) in zip(firsts, windward, strict=True)]

@@ -86,8 +86,6 @@ from corporeal.vlm.photographed_objects import (
 
 SURFACE_ROUGHNESS = 0.8
 """Roughness of surfaces: pictures do not separate it from light."""
-RENDERED_VIEWS, RENDERED_SIZE_PX = 48, (384, 384)
-"""Of a splat that comes without cameras."""
 NORMAL_NEIGHBOURS = 16
 """Points that a normal is found from."""
 SPLIT_BY_PLACE_WARNING = "Without masks, its extent was decided by place alone."
@@ -126,7 +124,7 @@ def reconstruct(
         source: A folder of photographs, a video, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
-        viewer: Model that names the objects if ``config.things`` does not.
+        viewer: Model that names the objects if ``config.object_names`` does not.
         folder: Folder of checkpoints and feature maps.
         progress: Called with the fraction done and a description.
 
@@ -145,7 +143,10 @@ def reconstruct(
     photographers = taken.cameras
     if not taken.cameras:
         taken = replace(
-            taken, cameras=cameras_around(taken.solid, RENDERED_VIEWS, RENDERED_SIZE_PX)
+            taken,
+            cameras=cameras_around(
+                taken.solid, config.resolution.rendered_views, config.resolution.rendered_size_px
+            ),
         )
     # Points of the foreground, with features of what the pictures show.
     progress(PROGRESS_AFTER_TRAINING, "segmenting foreground from background")
@@ -174,11 +175,10 @@ def reconstruct(
     split = assign_instances(cloud, config.apart, count, normal, drawn, space)
     # One closed surface for each object.
     progress(PROGRESS_AFTER_OBJECTS, "closing surfaces")
-    found = FoundObjects(
-        taken,
-        cloud,
-        build_object_surfaces(taken, front.on_objects, cloud.position, split.object_of_point),
+    closed = build_object_surfaces(
+        taken, front.on_objects, cloud.position, split.object_of_point, config.resolution.surface
     )
+    found = FoundObjects(taken, cloud, closed)
     if not config.force and (why := _reason_not_worth(found, photographers, masked, count)):
         raise _not_worth_error(source, why, describe_masks_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.

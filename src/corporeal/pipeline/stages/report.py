@@ -90,7 +90,7 @@ class ReportContent:
     parts: Parts
     field: MaterialField
     particles: Particles
-    film: Video
+    video: Video
     audit: RunAudit
     figures: Mapping[str, Path]
     """Caption → picture, in order."""
@@ -111,8 +111,8 @@ def report(story: ReportContent, path: Path) -> None:
         title=escape_html(story.scene.name),
         summary=_summary(story),
         view=story.view,
-        film=data_url_of_file(story.film.path),
-        width=story.film.width,
+        video=data_url_of_file(story.video.path),
+        width=story.video.width,
         caption=_caption(audit.breakage),
         figures="".join(
             html_figure(caption, data_url_of_file(file)) for caption, file in story.figures.items()
@@ -309,9 +309,9 @@ def stiffness_words(treatment: Discretization, *, liquid: bool = False) -> str:
         return "rigid"
     if liquid:
         return f"liquid, its sound slowed to {treatment.wave_speed:.2g} m/s"
-    ratio = treatment.young / treatment.young_real
+    ratio = treatment.simulated_young_pa / treatment.young_pa
     factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
-    return f"{si_text(treatment.young, 'Pa')} ({factor})"
+    return f"{si_text(treatment.simulated_young_pa, 'Pa')} ({factor})"
 
 
 def _grounds(story: ReportContent, k: int) -> str:
@@ -327,7 +327,7 @@ def _grounds(story: ReportContent, k: int) -> str:
         f"{escape_html(story.scene.objects[part.object].name)}: {escape_html(material.name)}</summary>"
         f"<p>{escape_html(words.reason)} (margin {words.margin:.2f}; {SOURCE_WORDS[words.answered_by]})"
         f"{alternative_words(words)}<br>{escape_html(structure.reason)} {escape_html(fill)}<br>"
-        f"{escape_html(story.particles.treatments[k].why)}{_impact_words(story, k)}</p>{tables}</details>"
+        f"{escape_html(story.particles.treatments[k].reason)}{_impact_words(story, k)}</p>{tables}</details>"
     )
 
 

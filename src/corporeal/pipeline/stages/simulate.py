@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.core import registry, store
+from corporeal.core import store
 from corporeal.core.audit_data import SettledObjectOutcome, SettlingOutcome
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import SimulationError
 from corporeal.core.types import FractureEvent, Frame, MaterialField, Particles, Scene, Trajectory
 from corporeal.core.version import __version__
 from corporeal.discretization.build_model import ModelMapping, build_model, standing_objects
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import ENGINES, Engine, Problem
+from corporeal.mpm.engines import build_engine
+from corporeal.mpm.problem import Engine, Problem
 from corporeal.pipeline.settings.simulate_config import SimulateConfig, validate
 from corporeal.simulation.audit import audit
 from corporeal.simulation.audit_file import write_audit
@@ -83,7 +83,7 @@ def simulate(
     """
     validate(config)
     posed = build_model(scene, particles, field, config.contact)
-    build: EngineBuilder = registry.load_backend("engine", config.engine, ENGINES)
+    build: EngineBuilder = partial(build_engine, engine=config.engine)
     times = frame_times(scene)
     lying = bodies_to_relax(scene, particles, posed)
     if lying:
@@ -253,7 +253,6 @@ class SimulationRun:
             if blow is None:
                 return
             self.engine.restore(saved)
-            assert isinstance(self.engine, CpuEngine)
             broken = fracture_body(self.stage, self.engine, blow, self.breaks)
             if broken is None:
                 # objects that cannot be cut stay whole

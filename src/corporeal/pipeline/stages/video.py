@@ -61,7 +61,7 @@ from corporeal.simulation.moving_gaussians import (
 )
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
-VIDEO_FILE = "film.mp4"
+VIDEO_FILE = "video.mp4"
 THUMBNAIL_FILE = "thumbnail.png"
 CLOSE_UP_FILE = "close-up.png"
 CLOSE_UP_SIZE_PX = (340, 256)
@@ -93,7 +93,7 @@ def render_video(
     folder: Path,
     progress: Progress = lambda fraction, words: None,
 ) -> Video:
-    """Write ``film.mp4`` and ``thumbnail.png``: the scene, moved by its particles.
+    """Write ``video.mp4`` and ``thumbnail.png``: the scene, moved by its particles.
 
     Args:
         played: Surfaces, or Gaussians if the scene was reconstructed, bound to material points at

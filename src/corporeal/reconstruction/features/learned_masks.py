@@ -71,7 +71,7 @@ def learned_masks(
 
     """
     if masker.needs_words and not words:
-        raise UserError("These masks are found by words: name the objects with --things.")
+        raise UserError("These masks are found by words: name the objects with --object-names.")
     made_by = store.result_key("learned masks", masker.name(), [store.path_digest(source), *words])
     record = read_mask_record(folder)
     if record is not None and record.made_by == made_by:

@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter1d, shift
 
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import (
     VisualHull,
@@ -38,7 +39,10 @@ MIN_FLOOR_RAYS = 20
 
 
 def floor_height_from_outlines(
-    views: Views, masks: Bool[np.ndarray, "V H W"], threads: int | None = None
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    threads: int | None = None,
+    config: HullConfig = DEFAULT_HULL,
 ) -> float | None:
     """Return the height that objects stand on [m], +z up; None: outlines do not tell.
 
@@ -47,7 +51,7 @@ def floor_height_from_outlines(
 
     """
     with ThreadPool(threads) as pool:
-        hull = carve_tight_hull(views, masks, pool)
+        hull = carve_tight_hull(views, masks, pool, config)
     around = find_viewed_region(views.cameras)
     pairs = zip(views.cameras, masks, strict=True)
     found = [_touched_heights(hull, c, m, np.array(around.centre), around.radius) for c, m in pairs]

@@ -92,7 +92,11 @@ def gaussian_visibility(
 
 
 def foreground_gaussians(
-    gaussians: Gaussians, cameras: Sequence[Camera], seen: GaussianVisibility, floor: bool = True
+    gaussians: Gaussians,
+    cameras: Sequence[Camera],
+    seen: GaussianVisibility,
+    floor: bool = True,
+    layer_radii: float = FLOOR_LAYER_RADII,
 ) -> Bool[np.ndarray, " N"]:
     """Return which Gaussians belong to the objects.
 
@@ -105,6 +109,7 @@ def foreground_gaussians(
         cameras: In the same frame.
         seen: What they see of the Gaussians, and what of that is inside masks.
         floor: Whether a floor is among the Gaussians; masks leave none.
+        layer_radii: Height of the layer that is floor, in radii of what the cameras look at [-].
 
     """
     kept = (seen.weight > seen.least) & (gaussians.opacity > FAINT_OPACITY)
@@ -116,7 +121,7 @@ def foreground_gaussians(
     kept &= gaussians.scale.max(axis=1) < HAZE_WIDTH_RADII * around.radius
     kept &= seen.views >= MIN_VIEWS_FRACTION * len(cameras)
     if floor:
-        kept &= gaussians.mean[:, 2] > FLOOR_LAYER_RADII * around.radius
+        kept &= gaussians.mean[:, 2] > layer_radii * around.radius
     return kept
 
 

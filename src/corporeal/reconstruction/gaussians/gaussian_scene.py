@@ -10,10 +10,11 @@ from jaxtyping import Bool, Float, UInt8
 from corporeal.core.errors import UserError
 from corporeal.core.progress import Progress, subprogress
 from corporeal.core.types import Camera, Gaussians, Note, NoteKind, Vector, Views
-from corporeal.geometry.gaussian_transforms import UpAxisChoice
+from corporeal.geometry.gaussian_transforms import UpAxis, UpAxisChoice
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.io.input_files import input_kind
 from corporeal.io.photos.posed_photos import NO_INSTANCES_MESSAGE, PosedPhotos, read_posed_photos
+from corporeal.io.registry import reader_of
 from corporeal.io.splat.load_splat import load_splat
 from corporeal.multiview.feature_matching import FEATURE_IMAGE_SIDE_PX
 from corporeal.multiview.inverted_masks import are_masks_inverted
@@ -73,8 +74,6 @@ learned from again, so that 1.2 trainings are to be expected."""
 OVERVIEW_PICTURES = 4
 """Pictures of the whole scene for questions to a model."""
 UP_BY_AXIS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-UP_BY_SUFFIX: dict[str, Vector] = {".spz": (0.0, 1.0, 0.0)}
-"""What is up in files of a kind as a rule; in others it is -y."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +221,8 @@ def load_or_train_gaussians(
 
 def _load_splat(source: Path) -> GaussianScene:
     given = load_splat(source)
-    usual = UP_BY_SUFFIX.get(source.suffix.lower(), (0.0, -1.0, 0.0))
+    reader = reader_of(source, "splat")
+    usual = _stated_up(reader.usual_up if reader else "-y")
     read = (f"{given.count:,} Gaussians were read from {source.name}.",)
     return GaussianScene(given, usual=usual, statements=read, warnings=given.warnings)
 
@@ -422,7 +422,7 @@ def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str
     )
 
 
-def _stated_up(up: UpAxisChoice) -> Vector | None:
+def _stated_up(up: UpAxisChoice | UpAxis) -> Vector | None:
     if up == "auto":
         return None
     sign = -1.0 if up[0] == "-" else 1.0
@@ -450,7 +450,9 @@ def _training_statements(trained: TrainedGaussians, photographs: int) -> tuple[s
 
 
 def _agreement_words(quality: HeldOutQuality) -> str:
-    shown = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on objects"
+    shown = (
+        "" if quality.psnr_on_objects is None else f", {quality.psnr_on_objects:.1f} dB on objects"
+    )
     return (
         f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
         f"from to {quality.psnr:.1f} dB{shown}."

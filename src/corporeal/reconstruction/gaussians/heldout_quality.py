@@ -28,7 +28,7 @@ class HeldOutQuality:
 
     psnr: float
     """Whole pictures [dB]."""
-    psnr_things: float | None
+    psnr_on_objects: float | None
     """Only pixels on objects [dB]; None without masks."""
     ssim: float
     """Of whole pictures."""

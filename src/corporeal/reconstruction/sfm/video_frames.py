@@ -59,24 +59,27 @@ class VideoInfo:
         return min(self.rate, MAX_DECODED_FRAMES / max(self.seconds, 1e-3))
 
 
-def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
+def write_video_frames(
+    path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S
+) -> list[str]:
     """Write the chosen frames of a video as PNG; return what is to be said of them.
 
     Args:
         path: The video.
         folder: Where frames go, named by their number.
         progress: Called with the fraction done and a description.
+        max_seconds: Longer films are refused [s].
 
     Raises:
         BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it
             is a recording of a screen.
 
     """
-    film = _open_video(path)
+    video = _open_video(path, max_seconds)
     change, sharp = [0.0], []
     before, standstill = None, StaticPixels()
-    expected = max(film.looked * film.seconds, 1.0)
-    for grey in _grey_frames(film):
+    expected = max(video.looked * video.seconds, 1.0)
+    for grey in _grey_frames(video):
         small = np.asarray(
             Image.fromarray(grey).resize(CHANGE_THUMBNAIL_PX, Image.Resampling.BOX), float
         )
@@ -100,7 +103,7 @@ def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str
         what += " of a screen, or the camera stood still."
         raise BadFileError(path, what, f"{VIDEO_HINT} Do not turn the object instead.")
     progress(0.7, "writing frames")
-    _write_chosen(film, chosen, folder)
+    _write_chosen(video, chosen, folder)
     if is_screen_recording(sorted(folder.glob("frame_*.png"))):
         what = "what it shows is pushed aside as a whole, many times as far as a picture is long: "
         raise BadFileError(path, f"{what}it is a recording of a page that is scrolled.", VIDEO_HINT)
@@ -135,13 +138,13 @@ def choose_frames(
     return chosen
 
 
-def _open_video(path: Path) -> VideoInfo:
+def _open_video(path: Path, max_seconds: float) -> VideoInfo:
     # It warns that a turned video is not as wide as its frames are stored: so it should be.
     logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
     reading = imageio_ffmpeg.read_frames(str(path))
     try:
         said = next(reading)
-        film = VideoInfo(path, float(said["duration"]), float(said["fps"]))
+        video = VideoInfo(path, float(said["duration"]), float(said["fps"]))
     except Exception as problem:  # it raises what ffmpeg says, of several kinds
         what = "cannot be read as a video: it is damaged, or holds no moving pictures."
         step = "Copy it from the camera again, to its end, or convert it to MP4."
@@ -149,19 +152,19 @@ def _open_video(path: Path) -> VideoInfo:
     finally:
         with contextlib.suppress(Exception):
             reading.close()
-    if film.seconds > MAX_VIDEO_S:
-        what = f"is {film.seconds / 60:.0f} minutes long; at most {MAX_VIDEO_S / 60:.0f} are looked at."
+    if video.seconds > max_seconds:
+        what = f"is {video.seconds / 60:.0f} minutes long; at most {max_seconds / 60:.0f} are looked at."
         raise BadFileError(path, what, "Cut out the part that goes around the object.")
-    return film
+    return video
 
 
-def _grey_frames(film: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
+def _grey_frames(video: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
     """Yield the frames that are looked at, small and grey."""
     scale = (
         f"scale={SHARPNESS_PICTURE_PX}:{SHARPNESS_PICTURE_PX}:force_original_aspect_ratio=decrease"
     )
     command = [
-        *_decode_command(film, scale),
+        *_decode_command(video, scale),
         "-pix_fmt",
         "gray",
         "-c:v",
@@ -186,22 +189,22 @@ def _grey_frames(film: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
             program.kill()
 
 
-def _decode_command(film: VideoInfo, *filters: str) -> list[str]:
+def _decode_command(video: VideoInfo, *filters: str) -> list[str]:
     """Return a command that decodes the frames that are looked at."""
-    thinned = [f"fps={film.looked:.6f}"] if film.looked < film.rate else []
+    thinned = [f"fps={video.looked:.6f}"] if video.looked < video.rate else []
     program = imageio_ffmpeg.get_ffmpeg_exe()
     chain = ",".join([*thinned, *filters])
-    return [program, "-v", "error", "-i", str(film.path), "-vf", chain, "-fps_mode", "passthrough"]
+    return [program, "-v", "error", "-i", str(video.path), "-vf", chain, "-fps_mode", "passthrough"]
 
 
-def _write_chosen(film: VideoInfo, chosen: list[int], folder: Path) -> None:
+def _write_chosen(video: VideoInfo, chosen: list[int], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     wanted = "+".join(f"eq(n\\,{k})" for k in chosen)
-    out = [*_decode_command(film, f"select={wanted}"), str(folder / "%05d.png")]
+    out = [*_decode_command(video, f"select={wanted}"), str(folder / "%05d.png")]
     done = subprocess.run(out, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     written = sorted(folder.glob("?????.png"))
     if done.returncode or len(written) != len(chosen):
         words = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason"]
-        raise BadFileError(film.path, f"its frames cannot be written ({words[0][:80]}).")
+        raise BadFileError(video.path, f"its frames cannot be written ({words[0][:80]}).")
     for file, number in zip(written, chosen, strict=True):
         file.rename(folder / f"frame_{number:05d}.png")

@@ -26,9 +26,8 @@ from corporeal.reconstruction.gaussians.space_carving import (
     grid_over_box,
 )
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
+from corporeal.reconstruction.surface.surface_config import DEFAULT_FREE_SPACE, FreeSpaceConfig
 
-FREE_SPACE_GRID_CELLS = 1_000_000
-"""Of the grid about everything, about."""
 GRID_PADDING_FRACTION = 0.1
 """About points, on each side, as a share of their extent."""
 STRAY_POINTS_PERCENT = 0.1
@@ -50,7 +49,7 @@ def pieces_by_free_space(
     of_object: Bool[np.ndarray, " G"],
     cameras: tuple[Camera, ...],
     masks: Bool[np.ndarray, "V H W"] | None = None,
-    threads: int | None = None,
+    config: FreeSpaceConfig = DEFAULT_FREE_SPACE,
 ) -> Int[np.ndarray, " N"]:
     """Return which connected piece each point is of, the one with most points first.
 
@@ -60,13 +59,13 @@ def pieces_by_free_space(
         of_object: Which of them are objects'.
         cameras: From where they were learned, or are looked at.
         masks: Pixels that show objects, where given.
-        threads: None: one per core that this process may use.
+        config: How finely.
 
     """
     low, high = np.percentile(position, (STRAY_POINTS_PERCENT, 100 - STRAY_POINTS_PERCENT), axis=0)
     room = GRID_PADDING_FRACTION * (high - low)
-    grid = grid_over_box(low - room, high + room, FREE_SPACE_GRID_CELLS, FLOOR_HEIGHT_M)
-    with ThreadPool(threads) as pool:
+    grid = grid_over_box(low - room, high + room, config.grid_cells, FLOOR_HEIGHT_M)
+    with ThreadPool(config.threads) as pool:
         rendering = render_depth(gaussians, cameras, pool)
         rendering = restrict_depth_to_objects(rendering, of_object, masks)
         distance = carve_signed_distance(grid, rendering, FLOOR_HEIGHT_M, pool)

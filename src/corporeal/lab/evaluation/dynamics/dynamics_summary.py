@@ -269,7 +269,7 @@ def _ranks(
         # Contents that move by themselves in ours alone are left out.
         bodies = [b for b in ours.bodies if b.name in happened]
         stiff.append(
-            [(b.young, -happened[b.name].shape_error_max) for b in bodies if b.name in touched]
+            [(b.young_pa, -happened[b.name].shape_error_max) for b in bodies if b.name in touched]
         )
         ratios = [(b.restitution, happened[b.name].rebound_ratio) for b in bodies]
         bouncy.append([(e, ratio) for e, ratio in ratios if ratio is not None])

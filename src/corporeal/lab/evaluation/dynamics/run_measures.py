@@ -29,7 +29,7 @@ class ObjectMeasures:
     """Of its box at the start [m]."""
     path: tuple[Vector, ...]
     """One place per instant [m]."""
-    young: float
+    young_pa: float
     """Of its materials, the mean of their logarithms by mass [Pa]: as they are in reality."""
     restitution: float
     """Of its heaviest part's material [-]."""
@@ -111,13 +111,13 @@ def _body(
     mass = np.array([particles.mass_real[k] for k in own])
     start = particles.position[particles.object == number]
     path = made.trajectory.ledger.centre[:, number]
-    young = np.array([rows[k].E for k in own])
+    young = np.array([rows[k].young_pa for k in own])
     heaviest = made.field.materials[own[int(mass.argmax())]]
     return ObjectMeasures(
         name=thing.name,
         diagonal=float(np.linalg.norm(np.ptp(start, axis=0))),
         path=tuple((x, y, z) for x, y, z in path.tolist()),
-        young=float(np.exp(np.average(np.log(young), weights=np.maximum(mass, 1e-30)))),
+        young_pa=float(np.exp(np.average(np.log(young), weights=np.maximum(mass, 1e-30)))),
         restitution=heaviest.restitution,
         groups=tuple(dict.fromkeys(_group(rows[k].material, library) for k in own)),
         laws=tuple(

@@ -73,14 +73,14 @@ def compare_motions(
 
 
 def principal_widths(
-    film: VideoMotion, times: Float[np.ndarray, " T"]
+    video: VideoMotion, times: Float[np.ndarray, " T"]
 ) -> Float[np.ndarray, "T B 3"]:
     """Return standard deviations of every object's material along its principal axes [m]."""
-    mass = film.prepared.particles.mass
+    mass = video.prepared.particles.mass
     rows = []
     for time in times.tolist():
-        x = film.at(time).position.astype(float)
-        rows.append([_widths(x[m], mass[m]) for m in film.members])
+        x = video.at(time).position.astype(float)
+        rows.append([_widths(x[m], mass[m]) for m in video.members])
     return np.array(rows)
 
 

@@ -41,8 +41,8 @@ def write_judge_page(
 
     """
     trusted = {q for questions in result.believed.values() for q in questions}
-    looked = {(a.scene, a.condition): a for a in judged.films.asked if a.look == 0}
-    films = []
+    looked = {(a.scene, a.condition): a for a in judged.videos.asked if a.look == 0}
+    videos = []
     strips: dict[tuple[str, str], bytes] = {}
     for number, verdict in enumerate(judged.verdicts):
         progress(number / len(judged.verdicts), f"{verdict.scene} {verdict.condition}")
@@ -51,14 +51,14 @@ def write_judge_page(
         motion = question.scene, question.prompt
         if motion not in strips:
             strips[motion] = _strip(question.pictures)
-        films.append(_video_section(verdict, strips[motion], trusted))
+        videos.append(_video_section(verdict, strips[motion], trusted))
     text = fill_page(
         "corporeal.lab.evaluation.judge",
         "judge.html",
         summary=escape_html(_summary(judged)),
         cannot=escape_html(blind_spots_sentence(result)),
         tables="\n".join(_table(t) for t in judge_tables(judged, result) if t.rows),
-        films="\n".join(films),
+        videos="\n".join(videos),
         footer=escape_html(f"Judge: {judged.judge}"),
     )
     write_bytes(path, text.encode())

@@ -45,12 +45,12 @@ class SequentialPictures(Sequence[np.ndarray]):
 
 
 def judge_pictures(
-    film: VideoMotion, staging: Staging, look: int
+    video: VideoMotion, staging: Staging, look: int
 ) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
     """Show a video: dated pictures, close-ups, and the diagram of its paths.
 
     Args:
-        film: What moves.
+        video: What moves.
         staging: When and from where.
         look: Which of ``LOOK_TURNS_DEG``.
 
@@ -58,11 +58,11 @@ def judge_pictures(
         ``PICTURES_PER_LOOK`` pictures, each rendered when it is looked at.
 
     """
-    stage = RayScene(film.prepared.scene, StudioLight(front=staging.view))
+    stage = RayScene(video.prepared.scene, StudioLight(front=staging.view))
     wide = staging.wide(look)
 
     def picture(time: float, camera: CameraAim, words: str) -> np.ndarray:
-        posed = stage.posed(*film.cast.skin.pose(film.at(time)))
+        posed = stage.posed(*video.cast.skin.pose(video.at(time)))
         return video_overlay.draw_caption(
             render_image(posed, camera, "draft", usable_cores()), words
         )
@@ -75,7 +75,7 @@ def judge_pictures(
         partial(picture, c.time, staging.near(c, look), f"close   t = {c.time:.3f} s")
         for c in staging.closes
     ]
-    return SequentialPictures([*dated, *close, partial(path_diagram, film, staging, wide)])
+    return SequentialPictures([*dated, *close, partial(path_diagram, video, staging, wide)])
 
 
 def pictures_description(look: int) -> str:

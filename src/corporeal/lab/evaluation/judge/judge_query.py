@@ -23,7 +23,7 @@ MAX_PARALLEL_QUESTIONS = 4
 class JudgeVerdicts:
     """What a judge said."""
 
-    films: JudgedVideos
+    videos: JudgedVideos
     verdicts: list[VideoVerdict]
     unanswered: int
     """Looks to which there is no usable answer."""
@@ -34,7 +34,7 @@ class JudgeVerdicts:
 
 
 def query_judge(
-    films: JudgedVideos,
+    videos: JudgedVideos,
     config: JudgeConfig,
     say: Callable[[str], None],
     progress: Progress = lambda fraction, words: None,
@@ -43,7 +43,7 @@ def query_judge(
     """Ask about all videos, each in a conversation of its own, in an order that tells nothing.
 
     Args:
-        films: From ``gather_films``.
+        videos: From ``gather_videos``.
         config: Settings of the judge.
         say: Called with the price before the first question.
         progress: Called with the fraction done and a description.
@@ -54,7 +54,7 @@ def query_judge(
 
     """
     asking = _somebody(judge or connect_judge(config))
-    jobs = distinct_questions(films.asked)
+    jobs = distinct_questions(videos.asked)
     reckoned = estimate_cost(jobs, config.judge)
     say(price_words(reckoned, config))
     _agreed(reckoned, config)
@@ -67,13 +67,13 @@ def query_judge(
     refuse_pending(results, config.judge)
     replies = {_named(a): r for a, r in zip(jobs, results, strict=True) if isinstance(r, Reply)}
     looks: dict[tuple[str, str], list[Verdict]] = {}
-    for asked in films.asked:
+    for asked in videos.asked:
         if _named(asked) in replies:
             said = looks.setdefault((asked.scene, asked.condition), [])
             said.append(replies[_named(asked)].answer)
-    verdicts = [video_verdict(*film, said) for film, said in sorted(looks.items())]
+    verdicts = [video_verdict(*video, said) for video, said in sorted(looks.items())]
     by = tuple(sorted({reply.model for reply in replies.values()}))
-    return JudgeVerdicts(films, verdicts, len(jobs) - len(replies), config.judge, reckoned, by)
+    return JudgeVerdicts(videos, verdicts, len(jobs) - len(replies), config.judge, reckoned, by)
 
 
 def distinct_questions(asked: Sequence[VideoQuestion]) -> list[VideoQuestion]:
@@ -107,7 +107,7 @@ def _somebody(model: VlmClient | None) -> VlmClient:
 
 def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
     """Describe what asking takes."""
-    words = f"{reckoned.films} videos to judge, about {reckoned.tokens:,} tokens"
+    words = f"{reckoned.videos} videos to judge, about {reckoned.tokens:,} tokens"
     if not is_paid(config.judge):
         return f"{words}; {config.judge.partition(':')[0]} costs nothing."
     if reckoned.dollars is None:

@@ -44,8 +44,8 @@ def judge_runs(
     """
     check_judging(config)
     scenes = judged_scenes_in(out)
-    films = gather_videos(scenes, out, config, progress)
-    judged = query_judge(films, config, say, progress)
+    videos = gather_videos(scenes, out, config, progress)
+    judged = query_judge(videos, config, say, progress)
     return JudgedRuns(judged, weigh_judge(judged))
 
 
