@@ -91,7 +91,7 @@ class Keyframes:
 
 @dataclass(frozen=True)
 class Wind:
-    """Air that blows on one whole object within a time window; at rest it only slows down."""
+    """Wind on one whole object within a time window; at rest it only slows down."""
 
     velocity: Vector
     """Of the air [m/s]."""
