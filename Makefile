@@ -1,4 +1,4 @@
-# make demo: from nothing to a film and a report.   make test: from nothing to passed tests.
+# make demo: from nothing to a video and a report.   make test: from nothing to passed tests.
 # make docs: the documentation as a site, build/site/index.html.
 VENV := .venv
 BIN := $(VENV)/bin

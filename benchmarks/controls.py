@@ -44,11 +44,11 @@ def dent_profile(told: Told) -> tuple[np.ndarray, np.ndarray]:
     can = told.particles.object == next(
         k for k, o in enumerate(told.scene.objects) if o.name == "soda_can_0"
     )
-    start = told.film.frames[0].position[can].astype(float)
+    start = told.video.frames[0].position[can].astype(float)
     fit = fit_rigid_motion(
-        start, told.film.frames[-1].position[can].astype(float), np.ones(can.sum())
+        start, told.video.frames[-1].position[can].astype(float), np.ones(can.sum())
     )
-    shift = fit.undo(told.film.frames[-1].position[can].astype(float)) - start
+    shift = fit.undo(told.video.frames[-1].position[can].astype(float)) - start
     middle = start.mean(axis=0)
     outward = (start - middle) * [0.0, 1.0, 1.0]
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
@@ -76,7 +76,7 @@ def draw_dents(axes: Axes, told: dict[str, Told]) -> None:
 def draw_gaps(axes: Axes, told: dict[str, Told], pair: tuple[int, int], title: str) -> None:
     """Draw the distance between two objects over time."""
     for name, run in told.items():
-        axes.plot(run.film.time, run.gap(*pair), color=COLOURS[name], label=name, lw=2)
+        axes.plot(run.video.time, run.gap(*pair), color=COLOURS[name], label=name, lw=2)
     axes.axhline(1.0, color="black", lw=0.8, ls=":")
     axes.annotate("parted: more than one cell", (0.0, 1.0), fontsize=8, va="bottom")
     axes.set(title=title, xlabel="time [s]", ylabel="gap [cells]")

@@ -1,4 +1,4 @@
-"""How wide a dent is in the close-up of a film.
+"""How wide a dent is in the close-up of a video.
 
     python benchmarks/dent.py RUN [RUN ...] [--size 1280 720]
 
@@ -79,7 +79,7 @@ def on_picture(points: np.ndarray, aim: CameraAim) -> np.ndarray:
 
 def main() -> None:
     """Measure runs and print a table."""
-    parser = argparse.ArgumentParser(description="How wide a dent is in a film's close-up.")
+    parser = argparse.ArgumentParser(description="How wide a dent is in a video's close-up.")
     parser.add_argument("runs", nargs="+", type=Path)
     parser.add_argument("--size", nargs=2, type=int, default=(1280, 720), help="of pictures [px]")
     asked = parser.parse_args()

@@ -78,7 +78,7 @@ def stuff(material: Material, treatment: Discretization) -> Stuff:
     """Join what a treatment says with what it leaves as it is."""
     return Stuff(
         law=material.law,
-        young=treatment.young,
+        young=treatment.simulated_young_pa,
         poisson=treatment.poisson,
         density=treatment.density,
         friction_angle=material.friction_angle or 0.0,

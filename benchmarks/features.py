@@ -150,8 +150,8 @@ def _row(scene: Path, preset: str) -> list[str]:
     wide = time.process_time() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     good = made.quality
-    assert good is not None and good.psnr_things is not None
-    numbers = f"{good.psnr:.1f} {good.psnr_things:.1f} {spent / CORES:.0f} {len(told)}"
+    assert good is not None and good.psnr_on_objects is not None
+    numbers = f"{good.psnr:.1f} {good.psnr_on_objects:.1f} {spent / CORES:.0f} {len(told)}"
     off = np.quantile(pixels, (0.5, 0.9))
     rest = f"{off[0]:.1f} {off[1]:.1f} {right:.4f} {wide / CORES:.0f} {peak:.1f}"
     return [scene.name, str(len(made.field.values)), *numbers.split(), *rest.split()]

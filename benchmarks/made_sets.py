@@ -2,7 +2,7 @@
 
     python benchmarks/made_sets.py MODEL OUT [--pictures 30] [--rounds 20 45] [--size 640 480]
         [--seed 0] [--plain] [--wall] [--clutter] [--flash] [--rolled] [--stop] [--turned]
-        [--on table|cloth|newspaper|grass] [--film] [--zoomed 1.6]
+        [--on table|cloth|newspaper|grass] [--video] [--zoomed 1.6]
 
 MODEL is what ``corporeal run`` takes. Somebody walks around it once for each of the rounds, at such
 an angle above the floor [deg], with unsteady hands and at no constant pace. The room and how badly
@@ -10,7 +10,7 @@ the pictures are taken are those of ``as_photographed.py``; with ``--plain`` flo
 one colour each. With ``--wall`` half of each round is walked, before it.
 OUT is a set for ``real_photographs.py``: ``images``, true ``masks``, true poses in ``sparse/0``,
 and ``known.toml`` with up, the sides of what is seen, and those of all that is there: nobody sees
-the underside of a ball. With ``--film`` the way is walked once, in frames of a film, ``film.mp4``,
+the underside of a ball. With ``--video`` the way is walked once, in frames of a video, ``video.mp4``,
 whose numbers are those of the images. With ``--zoomed`` every second picture is taken through a
 lens so many times as long; pictures state theirs in EXIF.
 """
@@ -41,7 +41,7 @@ PACE, REACH, HEIGHT, AIM = 0.25, 0.06, 3.0, 0.04
 """Standard deviations: of steps along the way, in steps; of distances, in distances; of angles
 above the floor [deg]; of where hands point, in distances."""
 RATE = 10
-"""Frames of a film a second."""
+"""Frames of a video a second."""
 QUALITY = 92
 """Of the photographs."""
 FINE = 2
@@ -55,12 +55,12 @@ def way_around(
     middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
     away = radius / (FILLED * np.tan(np.radians(FIELD / 2)))
     count, rounds = asked.pictures, asked.rounds
-    steps = np.arange(count) + (0 if asked.film else PACE) * rng.normal(size=count)
+    steps = np.arange(count) + (0 if asked.video else PACE) * rng.normal(size=count)
     turn = 2 * np.pi * len(rounds) * steps / count
     if asked.wall:  # it is behind the thing: there and back, before it
         turn = np.pi + np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
     slant = np.array(rounds)[np.minimum(np.arange(count) * len(rounds) // count, len(rounds) - 1)]
-    shaken = [_unsteady(count, asked.film, rng) for _ in range(5)]
+    shaken = [_unsteady(count, asked.video, rng) for _ in range(5)]
     slant = np.radians(slant + HEIGHT * shaken[0])
     far = away * (1 + REACH * shaken[1])
     flat = np.cos(slant)
@@ -102,7 +102,7 @@ def sides_of(views: Views) -> np.ndarray:
 
 
 def write_set(
-    out: Path, views: Views, sides: np.ndarray, note: str, film: bool, zoomed: bool
+    out: Path, views: Views, sides: np.ndarray, note: str, video: bool, zoomed: bool
 ) -> None:
     """Write what ``real_photographs.py`` reads.
 
@@ -111,12 +111,12 @@ def write_set(
         views: Photographs.
         sides: Of what is seen, and of all that is there (2, 3) [m].
         note: How it was made.
-        film: Whether photographs are frames of a film, which is written, too.
+        video: Whether photographs are frames of a video, which is written, too.
         zoomed: Whether photographs state their lenses.
 
     """
     assert views.object_of_pixel is not None
-    names = tuple(f"{'frame' if film else 'img'}_{k:05d}" for k in range(len(views.cameras)))
+    names = tuple(f"{'frame' if video else 'img'}_{k:05d}" for k in range(len(views.cameras)))
     for name in ("images", "masks"):
         (out / name).mkdir(parents=True, exist_ok=True)
     for name, rgb, owner, camera in zip(
@@ -130,8 +130,8 @@ def write_set(
     seen, there = (", ".join(f"{side:.4f}" for side in three) for three in sides)
     facts = f"unit = 1.0\nup = [0.0, 0.0, 1.0]\nsides = [{seen}]\nall_sides = [{there}]\n"
     (out / "known.toml").write_text(f"{facts}note = {json.dumps(note)}\n", encoding="utf-8")
-    if film:
-        _write_film(out / "film.mp4", views.rgb)
+    if video:
+        _write_video(out / "video.mp4", views.rgb)
 
 
 def _lens(camera: Camera) -> Image.Exif:
@@ -141,7 +141,7 @@ def _lens(camera: Camera) -> Image.Exif:
     return exif
 
 
-def _write_film(path: Path, frames: np.ndarray) -> None:
+def _write_video(path: Path, frames: np.ndarray) -> None:
     size = frames.shape[2], frames.shape[1]
     writer = imageio_ffmpeg.write_frames(str(path), size, fps=RATE, quality=8, macro_block_size=2)
     writer.send(None)
@@ -163,7 +163,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--zoomed", type=float, default=1.0)
     add_switches(parser)
-    for name in ("plain", "film"):
+    for name in ("plain", "video"):
         parser.add_argument(f"--{name}", action="store_true")
     asked = parser.parse_args()
     if asked.pictures < 3:
@@ -181,7 +181,7 @@ def main() -> None:
     options = [word for word in sys.argv[1:] if word not in map(str, (*asked.model, asked.out))]
     note = f"{', '.join(p.name for p in asked.model)}, {' '.join(options)}"
     sides, zoomed = np.stack([sides_of(views), high - low]), asked.zoomed != 1
-    write_set(asked.out, degraded(views, look), sides, note, asked.film, zoomed)
+    write_set(asked.out, degraded(views, look), sides, note, asked.video, zoomed)
 
 
 if __name__ == "__main__":

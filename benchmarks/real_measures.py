@@ -197,7 +197,7 @@ def whole(result: Came) -> dict[str, Any]:
     """Say whether each surface is watertight and one piece."""
     made = [trimesh.Trimesh(m.vertices, m.triangles, process=False) for m in result.meshes]
     return {
-        "things": len(made),
+        "objects": len(made),
         "watertight": all(m.is_watertight for m in made),
         "pieces": [int(m.body_count) for m in made],
     }

@@ -67,18 +67,18 @@ def run(path: Path, out: Path, size: float | None, detail: str) -> dict:
     materials = " + ".join(dict.fromkeys(p.material for p in audit.parts))
     treatments = " + ".join(dict.fromkeys(p.treatment for p in audit.parts))
     made = {n: getattr(audit, n) for n in names} | {"materials": materials, "treatment": treatments}
-    film = (out / path.stem / "film.mp4").stat().st_size
+    video = (out / path.stem / "video.mp4").stat().st_size
     scene = store.load(next((out / path.stem).glob("*-assemble")) / store.DATA_FILE)
     said = {
         "mass_kg": sum(p.mass_kg for p in audit.parts),
         "extent_m": max(o.real_extent for o in scene.objects),
         "warnings": list(audit.warnings),
     }
-    return row | made | said | {"film_kb": film // 1000}
+    return row | made | said | {"video_kb": video // 1000}
 
 
 def weigh(path: Path, size: float | None) -> dict:
-    """Find what one object is made of, how heavy it is and what is said of it; no film."""
+    """Find what one object is made of, how heavy it is and what is said of it; no video."""
     start = time.perf_counter()
     extents = () if size is None else (f"{path.stem}={size}",)
     try:

@@ -5,8 +5,8 @@
 
 Each folder in FOLDER with ``images`` and a COLMAP model, ``sparse/0``, is a set; it may have
 ``masks``. It is reconstructed in up to four cases: with all that it has, without its masks, without
-its poses, and from the photographs alone (bare); or, where it has ``film.mp4`` whose frames have
-the numbers of its images, from the film. Measured are: photographs registered, of these the
+its poses, and from the photographs alone (bare); or, where it has ``video.mp4`` whose frames have
+the numbers of its images, from the video. Measured are: photographs registered, of these the
 share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
 whole and on objects; the angle between up and the normal of the plane with the most sparse points,
 where the object is known to stand on one; sides of all things together against what the set's
@@ -40,16 +40,16 @@ from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESET
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.reconstruction.sfm.find_poses import POSES_FOLDER
 
-Case = Literal["all", "unmasked", "unposed", "bare", "film"]
+Case = Literal["all", "unmasked", "unposed", "bare", "video"]
 WORDS: dict[Case, str] = {
     "all": "as given",
     "unmasked": "no masks",
     "unposed": "no poses",
     "bare": "photographs alone",
-    "film": "a film alone",
+    "video": "a video alone",
 }
-ALONE: tuple[Case, ...] = ("bare", "film")
-FILM = "film.mp4"
+ALONE: tuple[Case, ...] = ("bare", "video")
+VIDEO = "video.mp4"
 HEADS = (
     "set", "given", "training", "registered", "right", "rotation off", "place off",
     "held out, thing [dB]", "up off", "size off", "IoU, worst", "one closed piece", "minutes",
@@ -95,17 +95,17 @@ class Clock:
 
 def cases_of(folder: Path) -> list[Case]:
     """Return in which ways a set can be given, none twice."""
-    if (folder / FILM).exists():
-        return ["film"]
+    if (folder / VIDEO).exists():
+        return ["video"]
     masked = (folder / "masks").is_dir()
     return ["all", "unmasked", "unposed", "bare"] if masked else ["all", "bare"]
 
 
 def given_as(folder: Path, case: Case, place: Path) -> Path:
     """Copy of a set what a case gives."""
-    if case == "film":
+    if case == "video":
         place.mkdir(parents=True, exist_ok=True)
-        return Path(shutil.copy(folder / FILM, place / f"{folder.name}.mp4"))
+        return Path(shutil.copy(folder / VIDEO, place / f"{folder.name}.mp4"))
     photos = place / folder.name
     wanted = ["images"]
     wanted += ["masks"] if case in ("all", "unposed") else []
@@ -187,7 +187,7 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     registered = f"{row['registered']}/{pictures}" if "registered" in row else "–"
     good = "–"
     if "watertight" in row:
-        pieces = row["things"] == 1 and row["pieces"] == [1]
+        pieces = row["objects"] == 1 and row["pieces"] == [1]
         good = "yes" if row["watertight"] and pieces else f"{row['things']} things"
     return (
         row["set"],

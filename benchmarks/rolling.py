@@ -65,7 +65,7 @@ def moved(problem: Problem, time: float) -> tuple[float, float, float]:
 
 def unknown(problem: Problem) -> Problem:
     """Return the same problem, in which nobody knows what is round."""
-    bodies = (replace(b, rounding=np.zeros((0, CURVATURE_COLUMNS))) for b in problem.bodies)
+    bodies = (replace(b, curvature=np.zeros((0, CURVATURE_COLUMNS))) for b in problem.bodies)
     return replace(problem, bodies=tuple(bodies))
 
 
@@ -149,7 +149,7 @@ def stopped(material: str, radius: float, floor: str) -> tuple[float, float, flo
     settings = replace(settings, ground=replace(settings.ground, floor=floor))
     prepared = co.prepare_scene(co.build_scene(ball), settings)
     problem = replace(co.pose_problem(prepared, settings), gravity_ramp=0.0)
-    matter, rolling = ParticleConstants.of(problem), problem.rolling
+    matter, rolling = ParticleConstants.of(problem), problem.rolling_resistance
     if rolling is None or not problem.bodies[0].rigid:
         return float("nan"), float("nan"), float("nan")
     c, share = rolling[0, 1] / radius, matter.inertia[0][1, 1] / (matter.total[0] * radius**2)

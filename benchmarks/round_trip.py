@@ -325,7 +325,7 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
         again = replace(
             settings(detail),
             reconstruct=ReconstructConfig(
-                things=names, training=training, apart="look", floor_at=0.0
+                object_names=names, training=training, apart="look", floor_at=0.0
             ),
             describe=DescribeConfig(annotations=said),
         )

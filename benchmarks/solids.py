@@ -29,9 +29,12 @@ from corporeal.pipeline.stages.assemble import assemble
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface, build_closed_surfaces
+from corporeal.reconstruction.surface.surface_config import ClosedSurfaceConfig
 
 PAGE = Path(__file__).parents[1] / "docs" / "solids.md"
 CORES = 2
+SURFACES = ClosedSurfaceConfig(threads=CORES)
+"""How finely surfaces are carved."""
 PLACES = 400_000
 """At which inside and outside are compared."""
 CLAD = 30_000
@@ -125,7 +128,7 @@ def judged(folder: Path, preset: str | None, out: Path) -> list[str]:
     start = time.process_time()
     assert views.object_of_pixel is not None
     masks, owner = views.object_of_pixel >= 0, np.argmin(away, axis=0)
-    made = build_closed_surfaces(gaussians, owner, views.cameras, masks, threads=CORES)
+    made = build_closed_surfaces(gaussians, owner, views.cameras, masks, config=SURFACES)
     spent = (time.process_time() - start) / CORES
     rows, name = [], folder.name if preset else f"{folder.name}, clad"
     shapes = [QueryMesh(Mesh(s.vertices, s.triangles)) for s in made]
@@ -253,9 +256,9 @@ TAIL = (
     "with boards of 16 mm and pixels of 8 mm, came out a quarter too heavy on cells of 12 mm and "
     "a seventh too heavy on cells of 7 mm.",
     "",
-    "## Films",
+    "## Videos",
     "",
-    "`corporeal film` draws a scene that was made of Gaussians from them: each is bound at the "
+    "`corporeal video` draws a scene that was made of Gaussians from them: each is bound at the "
     "start to the nearest particles of its own object, with the same skinning weights as mesh "
     "vertices. Its covariance becomes F Σ F^T, and its spherical harmonics turn with the "
     "rotation of F. Gaussians of floor and background stand still. Behind them are the usual "

@@ -73,7 +73,7 @@ def learned(scene: Path, preset: str, masked: bool) -> dict:
         "views": len(views.cameras),
         "size": list(views.rgb.shape[1:3]),
         "psnr": found.psnr,
-        "psnr_things": found.psnr_things,
+        "psnr_on_objects": found.psnr_on_objects,
         "ssim": found.ssim,
         **misplaced(out.gaussians, seen),
         "gaussians": out.gaussians.count,
@@ -141,7 +141,7 @@ def lines(rows: list[dict], raster: dict) -> list[str]:
         source = "pictures, masks" if r["masked"] else "pictures"
         text.append(
             f"| {r['scene']} | {r['preset']} | {source} | {r['psnr']:.1f} | "
-            f"{r['psnr_things']:.1f} | {r['ssim']:.3f} | {100 * r['deep']:.1f} | "
+            f"{r['psnr_on_objects']:.1f} | {r['ssim']:.3f} | {100 * r['deep']:.1f} | "
             f"{100 * r['near']:.1f} | {r['two_cores_s']:.0f} | {r['clock_s']:.0f} |"
         )
     count, side = LARGE

@@ -29,7 +29,7 @@ class Told:
     scene: Scene
     particles: Particles
     field: MaterialField
-    film: Trajectory
+    video: Trajectory
     audit: Audit
     seconds: float
     """Of simulating alone."""
@@ -37,7 +37,7 @@ class Told:
     @cached_property
     def outcome(self) -> Outcome:
         """Who met whom, who was dented where, who bounced how high."""
-        return measure_outcome(self.scene, self.particles, self.field, self.film)
+        return measure_outcome(self.scene, self.particles, self.field, self.video)
 
     def expectations(self) -> list[Expectation]:
         """Compare what happened with what must be seen."""
@@ -54,7 +54,7 @@ class Told:
         cell = self.particles.cell
         nearest = [
             KDTree(frame.position[one]).query(frame.position[other])[0].min() / cell
-            for frame in self.film.frames
+            for frame in self.video.frames
         ]
         return np.array(nearest) - 2 * PARTICLE_RADIUS_DX
 

@@ -20,7 +20,7 @@ def main() -> float:
     given = float(engine.measure().momentum[0, 0])
     x, y, z = engine.measure().centre[0]
     engine.stop([0])
-    engine.pull(0, (x, y, z), (x, y, z + REACH), stiffness=200.0)
+    engine.attach_spring(0, (x, y, z), (x, y, z + REACH), stiffness=200.0)
     engine.advance(0.5)
     lifted = engine.measure().centre[0, 2] - z
     print(f"kicked: {given:.4f} of {IMPULSE:.4f} N s; then lifted by {100 * lifted:.1f} cm")

@@ -8,7 +8,7 @@ import corporeal as co
 
 SETTINGS = co.Settings(
     assemble=co.AssembleConfig(duration=0.1, fps=10),
-    film=co.VideoConfig(width=160, height=120),
+    video=co.VideoConfig(width=160, height=120),
 )
 
 

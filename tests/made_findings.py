@@ -31,10 +31,10 @@ def part_audit(**what):
     """A part of something soft."""
     said = {
         "name": "part", "object": "thing_0", "material": "rubber", "law": "neo_hookean",
-        "treatment": "deformable", "structure": "solid", "E": 1e6, "E_sim": 1e6, "nu": 0.45,
+        "treatment": "deformable", "structure": "solid", "young_pa": 1e6, "simulated_young_pa": 1e6, "nu": 0.45,
         "density": 1e3, "density_sim": 1e3, "yield_stress": None, "yield_stress_sim": None,
         "thickness_m": None, "contents": None, "fill": None, "thickness_sim_m": None,
-        "mass_kg": 1.0, "real_mass_kg": 1.0, "why": "",
+        "mass_kg": 1.0, "real_mass_kg": 1.0, "reason": "",
     }  # fmt: skip
     return PartAudit(**said | what)
 

@@ -13,8 +13,7 @@ from corporeal.description.describe_config import DescribeConfig
 from corporeal.geometry.gaussian_transforms import transform_gaussians
 from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.pipeline.run_pipeline import Settings, open_run
-from corporeal.pipeline.stages import reconstruct as stage
-from corporeal.reconstruction.surface import closed_surface
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig, ReconstructionResolution
 from gaussian_boxes import DOWN, box, together
 from oracle import decomposed, part, weighs
 
@@ -80,9 +79,7 @@ def answer(text):
 @pytest.mark.slow
 def test_a_model_counts_names_and_takes_apart_what_a_splat_shows(monkeypatch, tmp_path):
     monkeypatch.setenv("CORPOREAL_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(stage, "RENDERED_VIEWS", 16)
-    monkeypatch.setattr(stage, "RENDERED_SIZE_PX", (160, 160))
-    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 250_000)
+    coarse = ReconstructionResolution(16, (160, 160), object_grid_cells=250_000)
     crate = box((0.4, 0.3, 0.2), (0.0, 0.0, 0.1), RED)
     base = box((0.16, 0.16, 0.15), (0.35, 0.1, 0.075), BLUE)
     top = box((0.16, 0.16, 0.15), (0.35, 0.1, 0.225), YELLOW)
@@ -90,7 +87,8 @@ def test_a_model_counts_names_and_takes_apart_what_a_splat_shows(monkeypatch, tm
     write_splat_ply(splat, transform_gaussians(together(crate, base, top), DOWN, 2.0))
     with FakeServer(lambda request: {"content": json.dumps(answer(text_of(request)))}) as server:
         asking = DescribeConfig(vlm=f"openai:gpt-5.4@{server.url}", view_size=64)
-        settings, folder = Settings(describe=asking), tmp_path / "run"
+        settings = Settings(describe=asking, reconstruct=ReconstructConfig(resolution=coarse))
+        folder = tmp_path / "run"
         validate_settings(folder, settings)
         with open_run([splat], folder, settings, lambda verb: lambda *_: None, "ground") as done:
             scene, parts, field = done.made.scene, done.made.parts, done.made.field

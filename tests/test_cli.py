@@ -51,7 +51,7 @@ def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
     code, text = typed("run", "box.glb", *SMALL)
     assert code == 0, text.err
     folder = tmp_path / "runs" / "box"
-    for name in ("film.mp4", "report.html", "materials.json", "audit.json", "strip.png"):
+    for name in ("video.mp4", "report.html", "materials.json", "audit.json", "strip.png"):
         assert (folder / name).stat().st_size > 500, name
     audit = json.loads((folder / "audit.json").read_text())
     assert audit["nan_count"] == 0
@@ -67,7 +67,7 @@ def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
     assert typed("run", "box.glb", *SMALL)[0] == 0
     assert (folder / "8-simulate" / store.META_FILE).stat().st_mtime_ns == before, "done twice"
 
-    assert typed("film", "runs/box", "--width", "200", "--height", "150")[0] == 0
+    assert typed("video", "runs/box", "--width", "200", "--height", "150")[0] == 0
     assert not (folder / "report.html").exists(), "a stale report was left"
     code, text = typed("status", "runs/box")
     assert "not yet" in text.out or "unfinished" in text.out
@@ -94,7 +94,7 @@ def test_the_package_runs_as_a_module():
 
 
 def test_an_unknown_verb_shows_the_menu(typed):
-    refused(typed("simulat"), "Unknown verb", "simulate")
+    refused(typed("simulat"), "Unknown command", "simulate")
 
 
 def test_a_missing_file_is_named(typed):
@@ -111,14 +111,14 @@ def test_a_folder_that_is_not_there_is_said_to_be_missing(typed):
 
 def test_a_folder_that_is_no_run_is_refused(typed, tmp_path):
     (tmp_path / "x").mkdir()
-    refused(typed("film", "x"), "not a run")
+    refused(typed("video", "x"), "not a run")
 
 
 @pytest.mark.parametrize("content", [b"", b"glTF", b"\0" * 100, b"{}", b"not a model at all"])
 def test_a_file_that_is_no_scene_is_refused(typed, tmp_path, content):
     (tmp_path / "bad.glb").write_bytes(content)
     refused(typed("run", "bad.glb"), "bad.glb")
-    assert not (tmp_path / "runs" / "bad" / "film.mp4").exists()
+    assert not (tmp_path / "runs" / "bad" / "video.mp4").exists()
     assert json.loads((tmp_path / "runs" / "bad" / "run.json").read_text())["state"] == "failed"
 
 
@@ -151,7 +151,7 @@ def test_an_unknown_material_in_an_annotation_shows_the_menu(typed, tmp_path):
     [
         (("--speed", "nan"), "--speed is nan"),
         (("--width", "100000"), "100000 × 720"),
-        (("--view", "0", "0", "0"), "no direction"),
+        (("--view", "0", "0", "0"), "not a direction"),
         (("--seed", "-1"), "--seed is -1"),
         (("--position-weight", "nan"), "--position-weight is nan"),
         (("--extent", "box"), "NAME=METRES"),

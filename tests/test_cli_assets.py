@@ -28,7 +28,7 @@ def test_a_pool_is_made_listed_and_drawn(typed, tmp_path):
     assert code == 0, text.err
     assert text.out.splitlines() == [
         "pool: 3 assets of 1 class, 1 rejected.",
-        "Of 1 asset neither licence nor maker is known.",
+        "Of 1 asset neither licence nor author is known.",
         "The reason: corporeal assets list --pool pool --rejected",
     ]
     assert len(read_pool(tmp_path / "pool").assets) == 3

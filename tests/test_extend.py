@@ -22,7 +22,7 @@ def blocks(kind):
 def test_every_file_that_it_names_is_there():
     named = re.findall(r"`((?:examples|tests|src)/[\w/.]+)", PAGE)
     named += re.findall(r"(?:tests|examples)/[\w/.]+", "".join(blocks("")))
-    rooms = re.findall(r"`((?:mpm|materials|vlm|formats)/[\w/]+\.\w+)`", PAGE)
+    rooms = re.findall(r"`((?:mpm|materials|vlm|io|export)/[\w/]+\.\w+)`", PAGE)
     assert len(named) > 8 and len(rooms) > 8
     for name in named:
         assert (ROOT / name).exists(), name

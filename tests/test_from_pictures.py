@@ -1,6 +1,7 @@
 """The whole way from photographs: written as other programs do, run, killed, gone on with."""
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.transforms_json import write_views
 from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
+from corporeal.reconstruction import gaussian_source
 from corporeal.reconstruction.gaussians import train_gaussians, training_schedule
 from corporeal.render import figures
 
@@ -64,15 +66,17 @@ def colmap(folder, views, matrix):
     return folder
 
 
-def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
+def test_photographs_become_a_video_of_things_that_fall(typed, views, tmp_path):
     write_views(tmp_path / "photos", views)
-    code, said = typed("run", "photos", "--things", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL)
+    code, said = typed(
+        "run", "photos", "--object-names", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL
+    )
     assert code == 0, said.err
     run = tmp_path / "runs" / "photos"
     report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())
     assert "Gaussians were learned from 20 photographs" in report
     assert "discs were laid along the closed surface" in report
-    assert (run / "film.mp4").stat().st_size > 1000
+    assert (run / "video.mp4").stat().st_size > 1000
     assert (run / "0-reconstruct" / "gaussians.ply").stat().st_size > 10_000
     moved = audit["outcome"]["objects"]
     assert list(moved) == list(NAMES)
@@ -82,14 +86,14 @@ def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
     assert "reconstruct" in said.out
     code, said = typed("reconstruct", run, "--count", "1")
     assert code == 2
-    assert "--things names 2" in said.err
+    assert "--object-names names 2" in said.err
 
 
 def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
     turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
     moved = similarity_matrix(turn, 3.7, (5.0, -2.0, 1.0))
     colmap(tmp_path / "scan", views, moved)
-    words = ("--things", *NAMES, "--extent", "crate=0.3", *BRIEF)
+    words = ("--object-names", *NAMES, "--extent", "crate=0.3", *BRIEF)
     code, said = typed("run", "scan", *words, *SMALL)
     assert code == 0, said.err
     found = store.load(tmp_path / "runs/scan/0-reconstruct/data.npz")
@@ -105,7 +109,8 @@ def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
 def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch):
     """What comes of it to the last bit: see tests/reconstruct/gaussians/test_train.py."""
     write_views(tmp_path / "photos", views)
-    monkeypatch.setattr(train_gaussians, "CHECKPOINT_INTERVAL_S", 0.0)
+    often = partial(training_schedule.TrainConfig, checkpoint_interval_s=0.0)
+    monkeypatch.setattr(gaussian_source, "TrainConfig", often)
     steps, step = [], train_gaussians._step
 
     def stopping(training, *rest):
@@ -115,7 +120,7 @@ def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch)
         return step(training, *rest)
 
     monkeypatch.setattr(train_gaussians, "_step", stopping)
-    words = ("run", "photos", "--things", *NAMES, *BRIEF, *SMALL)
+    words = ("run", "photos", "--object-names", *NAMES, *BRIEF, *SMALL)
     for _ in range(2):
         code, _ = typed(*words)
         assert code == 130

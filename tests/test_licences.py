@@ -42,17 +42,17 @@ def a_pool(folder):
         table.writerow(("box/box.glb", "CC-BY-4.0", "Ada <ada@example.org>"))
 
 
-def told_by(film):
-    """What players show of a film's tags."""
+def told_by(video):
+    """What players show of a video's tags."""
     probe = subprocess.run(
-        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(film)], capture_output=True, text=True
+        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(video)], capture_output=True, text=True
     ).stderr
     said = dict(line.split(":", 1) for line in probe.splitlines() if ":" in line)
     return {key.strip(): value.strip() for key, value in said.items()}
 
 
 @pytest.mark.slow
-def test_scene_film_and_report_name_the_makers_of_what_a_pool_gave(typed, tmp_path):
+def test_scene_video_and_report_name_the_makers_of_what_a_pool_gave(typed, tmp_path):
     a_pool(tmp_path / "models")
     typed("assemble", "--from", "models", "--classes", "box", "plank", "--views", "0")
     folder = tmp_path / "scenes" / "box-plank-0"
@@ -62,7 +62,7 @@ def test_scene_film_and_report_name_the_makers_of_what_a_pool_gave(typed, tmp_pa
     typed("run", folder / "scene.toml", *short)
     run = tmp_path / "runs" / "box-plank-0"
     page = (run / "report.html").read_text()
-    tags = told_by(run / "film.mp4")
+    tags = told_by(run / "video.mp4")
     assert tags["copyright"] == tags["comment"] == f"{BY_TABLE}; {BY_FILE}"
     for credit in (BY_TABLE, BY_FILE):
         assert f"<li>{credit.replace('<', '&lt;').replace('>', '&gt;')}</li>" in page

@@ -22,7 +22,7 @@ SIZE = 2.0
 
 @pytest.fixture(scope="module")
 def walked():
-    plain = {"wall": False, "film": False, "zoomed": 1.0}
+    plain = {"wall": False, "video": False, "zoomed": 1.0}
     asked = Namespace(pictures=8, rounds=[20.0, 45.0], size=[160, 120], **plain)
     low, high = np.array([-0.3, -0.3, -0.02]), np.array([0.3, 0.3, 0.12])
     return render_views(patterned(), way_around(low, high, asked, np.random.default_rng(0)))
@@ -54,7 +54,7 @@ LOOKS = [
 @pytest.mark.parametrize("look", LOOKS)
 def test_a_set_is_read_as_it_was_written(walked, look, tmp_path):
     pictured, sides = degraded(walked, look), np.stack([SIDES, SIDES + 0.01])
-    write_set(tmp_path / "block", pictured, sides, "a block", film=False, zoomed=False)
+    write_set(tmp_path / "block", pictured, sides, "a block", video=False, zoomed=False)
     facts = measure.known(tmp_path / "block")
     assert facts.note == "a block" and facts.unit == 1 and facts.up == (0, 0, 1)
     np.testing.assert_allclose(facts.sides, SIDES, atol=1e-4)

@@ -40,13 +40,13 @@ def test_a_failed_run_says_why(tmp_path):
     assert "nowhere.glb" in said["error"]
 
 
-def test_a_run_that_was_moved_finds_its_film(tmp_path):
-    made = Path("runs/a/9-film")
+def test_a_run_that_was_moved_finds_its_video(tmp_path):
+    made = Path("runs/a/9-video")
     there = tmp_path / "moved"
     store.write_json(there / "run.json", {"state": "finished", "inputs": [], "settings": {}})
-    store.save(there / "9-film" / store.DATA_FILE, Video(made / "film.mp4", 30, 64, 64))
-    store.finish_result(there / "9-film", "key", None, 1.0)
-    assert run_pipeline.read_run(there).movie.path == there / "9-film" / "film.mp4"
+    store.save(there / "9-video" / store.DATA_FILE, Video(made / "video.mp4", 30, 64, 64))
+    store.finish_result(there / "9-video", "key", None, 1.0)
+    assert run_pipeline.read_run(there).rendered_video.path == there / "9-video" / "video.mp4"
 
 
 def test_an_edited_annotation_makes_its_answers_stale(tmp_path):

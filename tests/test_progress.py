@@ -24,16 +24,16 @@ def test_a_part_is_told_as_of_the_whole():
 @pytest.mark.parametrize(
     ("told", "now", "said"),
     [
-        ([], 40.0, "film 0% after 40 s"),
-        ([(0.01, 3.0)], 40.0, "film 1% after 40 s: drawing"),
-        ([(0.0, 0.0), (0.25, 40.0)], 40.0, "film 25% after 40 s, about 2 min left: drawing"),
+        ([], 40.0, "video 0% after 40 s"),
+        ([(0.01, 3.0)], 40.0, "video 1% after 40 s: drawing"),
+        ([(0.0, 0.0), (0.25, 40.0)], 40.0, "video 25% after 40 s, about 2 min left: drawing"),
         # Goes on from what an interrupted run left: that took no time now.
-        ([(0.6, 0.0), (0.7, 40.0)], 40.0, "film 70% after 40 s, about 2 min left: drawing"),
-        ([(0.6, 0.0)], 40.0, "film 60% after 40 s: drawing"),
+        ([(0.6, 0.0), (0.7, 40.0)], 40.0, "video 70% after 40 s, about 2 min left: drawing"),
+        ([(0.6, 0.0)], 40.0, "video 60% after 40 s: drawing"),
     ],
 )
 def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, said):
-    verb = StageProgress("film", 0.0)
+    verb = StageProgress("video", 0.0)
     for fraction, when in told:
         verb.told(fraction, "drawing", when)
     assert verb.line(now) == said
@@ -69,13 +69,13 @@ def test_a_log_has_a_line_where_a_verb_begins_and_ends():
     with log_lines(Console(file=where), now=lambda: 0.0, soon=0.01) as tell:
         tell("fill")(0.5, "[b]half[/b]")
         assert where.waits_for("fill begins")
-        tell("film")
-        assert where.waits_for("film begins")
+        tell("video")
+        assert where.waits_for("video begins")
     assert where.getvalue().splitlines() == [
         "fill begins",
         "fill done in 0 s",
-        "film begins",
-        "film done in 0 s",
+        "video begins",
+        "video done in 0 s",
     ]
 
 

@@ -57,7 +57,7 @@ def test_a_row_measures_what_is_known_and_is_kept(sets, tmp_path, monkeypatch):
     monkeypatch.setattr(measure, "known", lambda folder: FACTS)
     row = benchmark.row_of(sets / "block", "all", "preview", tmp_path)
     assert "why" not in row, row
-    assert row["registered"] == COUNT and row["watertight"] and row["things"] == 1
+    assert row["registered"] == COUNT and row["watertight"] and row["objects"] == 1
     assert row["iou"] > 0.7 and row["up_off_deg"] < 5, row
     assert abs(row["size_off"]) < 0.2 and row["psnr_thing"] > 12, row
     monkeypatch.setattr(benchmark, "reconstruct", None)

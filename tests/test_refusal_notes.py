@@ -64,7 +64,7 @@ def test_a_room_that_is_refused_says_why_masks_were_doubted(tmp_path, monkeypatc
     taken = GaussianScene(nothing, warnings=(DOUBTED,))
     room = GaussianScene(nothing, masks=np.ones((4, 6, 8), bool))
     monkeypatch.setattr(reconstruct, "turn_upright", lambda *_: room)
-    with pytest.raises(UserError, match="go on beyond the pictures") as refusal:
+    with pytest.raises(UserError, match="extend beyond the pictures") as refusal:
         reconstruct._align_upright(tmp_path, taken, ReconstructConfig(), None)
     assert notes_of(refusal) == [DOUBTED]
 

@@ -11,7 +11,7 @@ from corporeal.io.photos.transforms_json import write_views
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
 from corporeal.reconstruction.gaussians import training_schedule
-from corporeal.reconstruction.surface import closed_surface
+from corporeal.reconstruction.surface.surface_config import ClosedSurfaceConfig
 
 
 @pytest.fixture
@@ -42,8 +42,8 @@ def bench(monkeypatch):
     monkeypatch.setattr(solids, "POINTS", 2_000)
     monkeypatch.setattr(solids, "CLAD", 4_000)
     monkeypatch.setattr(solids, "CORES", 1)
-    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 60_000)
-    monkeypatch.setattr(closed_surface, "SURVEY_GRID_CELLS", 20_000)
+    coarse = ClosedSurfaceConfig(object_grid_cells=60_000, survey_grid_cells=20_000, threads=1)
+    monkeypatch.setattr(solids, "SURFACES", coarse)
     return solids
 
 

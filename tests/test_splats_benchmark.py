@@ -10,7 +10,7 @@ import pytest
 from corporeal.io.photos.transforms_json import write_views
 
 HERE = Path(__file__).parent
-ROW = {"scene", "preset", "masked", "views", "size", "psnr", "psnr_things", "ssim", "deep", "near",
+ROW = {"scene", "preset", "masked", "views", "size", "psnr", "psnr_on_objects", "ssim", "deep", "near",
        "gaussians", "two_cores_s", "clock_s"}  # fmt: skip
 
 
@@ -43,6 +43,6 @@ def test_rows_and_page_are_made_from_one_run(bench, tmp_path, monkeypatch, capsy
     page = (tmp_path / "page.md").read_text()
     assert "| tiny | draft | pictures, masks |" in page and "0k Gaussians of degree 3" in page
     row = bench.kept(out, "tiny-draft-masks", lambda: pytest.fail("measured twice"))
-    assert set(row) == ROW and row["views"] == 16 and row["psnr_things"] < row["psnr"]
+    assert set(row) == ROW and row["views"] == 16 and row["psnr_on_objects"] < row["psnr"]
     assert 0 <= row["deep"] <= 1 and 0 <= row["near"] <= 1
     capsys.readouterr()

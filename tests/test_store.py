@@ -140,7 +140,7 @@ def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkey
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(store.DiskError, match="disk is full"):
-        store.write_bytes(tmp_path / "film.mp4", b"x")
+        store.write_bytes(tmp_path / "video.mp4", b"x")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,7 +1,9 @@
-"""The wheel holds all that the package reads, and works in an empty environment."""
+"""Wheel and sdist hold all that the package reads, and work in an empty environment."""
 
 import os
+import re
 import subprocess
+import tarfile
 import venv
 import zipfile
 from pathlib import Path
@@ -49,23 +51,39 @@ def test_no_file_of_the_package_is_ignored_by_git():
     assert said.stdout == ""
 
 
+def links_of_wheel(wheel):
+    """Return the targets of links and images in the description that PyPI shows."""
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        text = archive.read(name).decode()
+    assert "corporeal" in text
+    return re.findall(r"\]\(([^)\s]+)\)", text)
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(1500)
-def test_the_wheel_works_in_an_empty_environment(tmp_path):
+def test_wheel_and_sdist_work_in_an_empty_environment(tmp_path):
     venv.create(tmp_path / "empty", with_pip=True)
     python = tmp_path / "empty" / "bin" / "python"
     pip = (python, "-m", "pip", "--disable-pip-version-check", "--quiet")
     reached = subprocess.run(
-        [*map(str, pip), "download", "--no-deps", "--dest", str(tmp_path / "tools"), "hatchling"],
+        [*map(str, pip), "install", "build"],
         capture_output=True, text=True, timeout=300, check=False,
     )  # fmt: skip
     if reached.returncode:
         pytest.skip("the package registry cannot be reached, so nothing can be installed")
 
-    do(*pip, "wheel", "--no-deps", "--wheel-dir", tmp_path, ROOT, cwd=tmp_path)
-    (wheel,) = tmp_path.glob("corporeal-*.whl")
-    held = set(zipfile.ZipFile(wheel).namelist())
+    # The sdist from the checkout, then the wheel from the sdist.
+    do(python, "-m", "build", "--outdir", tmp_path / "dist", ROOT, cwd=tmp_path, minutes=15)
+    (sdist,) = (tmp_path / "dist").glob("corporeal-*.tar.gz")
+    (wheel,) = (tmp_path / "dist").glob("corporeal-*.whl")
+    with tarfile.open(sdist) as archive:
+        held = {name.partition("/src/")[2] for name in archive.getnames()}
     assert package_files() <= held
+    assert package_files() <= set(zipfile.ZipFile(wheel).namelist())
+    links = links_of_wheel(wheel)
+    assert links
+    assert [link for link in links if not link.startswith(("https://", "#"))] == []
     do(*pip, "install", wheel, cwd=tmp_path, minutes=15)
 
     where = do(python, "-c", "import corporeal; print(corporeal.__file__)", cwd=tmp_path)

@@ -52,7 +52,7 @@ class Tumbler:
             name="glass",
             rigid=True,
             surface=points,
-            wetted=WettedSurface(points, normals) if self.wetted else None,
+            wetted_surface=WettedSurface(points, normals) if self.wetted else None,
         )
         levels = _between(self.base, self.base + self.level, h)
         poured = np.concatenate([_disc(inner, z, h) for z in levels])

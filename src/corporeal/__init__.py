@@ -27,10 +27,10 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.lab.evaluation.outcome_ensemble import simulate_ensemble
     from corporeal.materials import citation, friction_between, library
     from corporeal.materials import find_material as material
+    from corporeal.mpm.engines import build_engine
     from corporeal.mpm.problem import ENGINES as ENGINES
     from corporeal.mpm.problem import FLOOR, Body, Engine, Plane, Problem
     from corporeal.pipeline.in_memory import (
-        build_engine,
         load_scene,
         pose_problem,
         prepare_scene,
@@ -106,7 +106,7 @@ _HOME = {
     "read_usd_physics": "io.usd.usd_bodies:read_usd_physics",
     # the engine
     "pose_problem": "pipeline.in_memory:pose_problem",
-    "build_engine": "pipeline.in_memory:build_engine",
+    "build_engine": "mpm.engines:build_engine",
     "ENGINES": "mpm.problem:ENGINES",
     "Engine": "mpm.problem:Engine",
     "Problem": "mpm.problem:Problem",

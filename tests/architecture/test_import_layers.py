@@ -33,7 +33,8 @@ SOLVER = [
     {"formulas", "substance"},
     {"state"},
     {"measure"},
-    {"interaction", "joining", "splitting"},
+    {"engines", "interaction", "joining", "splitting"},
+    {"body_changes"},
     {"reference", "cpu", "cuda"},
 ]
 """Layers within ``mpm``: engines do not import each other."""
@@ -119,6 +120,14 @@ def test_the_solver_depends_on_core_only():
     for path in (ROOT / "mpm").rglob("*.py"):
         used = {module.split(".")[1] for module in imported(path) if "." in module}
         assert used <= {"mpm", "core"}, path
+
+
+def test_engines_are_known_by_name_and_contract_only():
+    """What runs an engine imports none: each on the menu must do for all."""
+    engines = ("corporeal.mpm.cpu", "corporeal.mpm.cuda", "corporeal.mpm.reference")
+    for package in ("lab", "pipeline", "simulation", "viewer"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert not [m for m in imported(path) if m.startswith(engines)], path
 
 
 def test_every_test_file_has_a_name_of_its_own():

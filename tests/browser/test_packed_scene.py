@@ -32,7 +32,7 @@ def report(small_run, tmp_path_factory):
     cast = bind_scene(made.prepared)
     recording = record_trajectory(cast, made.trajectory)
     view = inline_view(viewer_recording(made.prepared, cast, made.played.outcome, recording))
-    above = ("summary", "film", "caption", "verdict", "expectations", "parts", "masses", "figures")
+    above = ("summary", "video", "caption", "verdict", "expectations", "parts", "masses", "figures")
     empty = dict.fromkeys((*above, "grounds", "audit", "sources", "credits", "settings"), "")
     text = fill_page(
         "corporeal.pipeline.stages",
@@ -222,7 +222,7 @@ def test_a_browser_that_cannot_run_the_view_says_so_in_a_sentence(report, tmp_pa
             tab.ask("Page.addScriptToEvaluateOnNewDocument", source=source)
         tab.open(report.as_uri())
         said = "document.querySelector('#view')?.innerText ?? ''"
-        tab.until(f"/film below/.test({said})")
+        tab.until(f"/video below/.test({said})")
         if without == "streams":  # a script replaces what stands there for those without any
             tab.until(f"/DecompressionStream/.test({said})")
         else:

@@ -27,17 +27,14 @@ def drop(tab, name, data):
 
 
 @pytest.mark.slow
-def test_from_an_upload_to_an_export_by_the_page_alone(tmp_path, monkeypatch):
-    from corporeal.viewer import uploads
+def test_from_an_upload_to_an_export_by_the_page_alone(tmp_path):
     from corporeal.viewer.run_exports import RunExports
     from corporeal.viewer.run_requests import RunRequests
     from corporeal.viewer.run_store import RunStore
+    from corporeal.viewer.uploads import UploadLimits
     from corporeal.viewer.web_app import SiteOptions, make_app
     from viewer_served import LOCAL, serving
 
-    monkeypatch.setattr(
-        uploads, "MIN_FREE_DISK_BYTES", 0
-    )  # the disk of who runs this may be nearly full
     runs = tmp_path / "runs"
     runs.mkdir()
     block = co.ball("wood", radius=0.05, at=(0, 0, 0.05), name="wooden_ball")
@@ -45,6 +42,8 @@ def test_from_an_upload_to_an_export_by_the_page_alone(tmp_path, monkeypatch):
     write_glb(model, co.build_scene(block, duration=0.1, fps=30))
     shelf = RunStore((), runs)
     work = RunRequests(shelf, runs)
+    # The disk of who runs this may be nearly full.
+    work.inbox.limits = UploadLimits(free_disk_bytes=0)
     app = make_app(
         SiteOptions(shelf, works=True), LOCAL, (*work.routes(), *RunExports(shelf).routes())
     )

@@ -78,7 +78,7 @@ def test_it_is_said_how_thick_a_wall_is_taken_to_be_and_why(tmp_path):
     assert "as thick as such walls usually are" in warning
     seen = weigh(shape(PAN), tmp_path / "copper saucepan.glb", from_pictures=True)
     reason = seen.field.structures[0].reason
-    assert "2.5 mm, is usual of such things: the gauges of such pans." in reason
+    assert "2.5 mm, is usual of such objects: the gauges of such pans." in reason
 
 
 def test_every_wall_of_ware_says_where_it_is_from():

@@ -26,7 +26,7 @@ def prepared(material, on, size, speed=3.0, at=None):
 def test_a_rubber_mat_on_the_floor_that_steps_would_soften_is_rigid():
     ready = prepared("potato", "rubber", (0.12, 0.12, 0.01), 2.0)
     assert [t.kind for t in ready.particles.treatments] == ["rigid", "rigid"]
-    assert "the floor holds it" in ready.particles.treatments[1].why
+    assert "the floor holds it" in ready.particles.treatments[1].reason
     # In the air it stays soft.
     hung = prepared("potato", "rubber", (0.12, 0.12, 0.01), 2.0, at=(0, 0, 0.007))
     assert hung.particles.treatments[1].kind == "deformable"

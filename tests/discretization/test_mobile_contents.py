@@ -44,9 +44,9 @@ def test_its_mass_and_level_are_those_of_its_share(glass):
 def test_liquids_find_points_on_both_faces_of_the_wall(glass):
     particles = glass.particles
     assert set(particles.object_of_wetted) == {0}
-    r = np.hypot(*particles.wetted[:, :2].T)
-    outward = np.sum(particles.wetted[:, :2] * particles.wetted_normal[:, :2], axis=1)
-    height = particles.wetted[:, 2]
+    r = np.hypot(*particles.wetted_point[:, :2].T)
+    outward = np.sum(particles.wetted_point[:, :2] * particles.wetted_normal[:, :2], axis=1)
+    height = particles.wetted_point[:, 2]
     side = (np.abs(particles.wetted_normal[:, 2]) < 0.3) & (height > 0.02) & (height < 0.09)
     assert (outward[side & (r > 0.0335)] > 0).all()
     assert (outward[side & (r < 0.0325)] < 0).all()

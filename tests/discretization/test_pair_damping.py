@@ -76,8 +76,8 @@ def test_all_else_keeps_the_very_loss_of_its_material(parts, motions, floor):
 def mat(young=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
     return Discretization(
         kind=kind,
-        young_real=young,
-        young=young,
+        young_pa=young,
+        simulated_young_pa=young,
         poisson=0.5,
         density=1000.0,
         yield_stress=None,
@@ -86,7 +86,7 @@ def mat(young=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
         impact_speed=2.0,
         wave_speed=1.0,
         step=1.0,
-        why="",
+        reason="",
         loss=loss,
     )
 
@@ -143,7 +143,7 @@ def test_a_verb_says_what_a_slab_loses_for():
     ready = co.prepare_scene(made)
     fruit, rubber = ready.particles.treatments
     assert fruit.kind == "rigid"
-    assert "apple" in rubber.why
+    assert "apple" in rubber.reason
     both = contact_loss_factor(*ready.field.materials)
     assert both > ready.field.materials[1].loss + 0.1
     across = max(0.01 / ready.particles.cell, MIN_CELLS_FOR_GRID_LOSS)

@@ -54,7 +54,7 @@ def test_only_what_is_round_and_rigid_is_braked():
     prepared = co.prepare_scene(co.build_scene(marble, die))
     problem = co.pose_problem(prepared)
     glass, wood, concrete = (material(m) for m in ("glass", "wood", "concrete"))
-    rolling = problem.rolling
+    rolling = problem.rolling_resistance
     assert rolling is not None
     roller = RollingBody.of(problem.bodies[0])
     assert roller.radius == pytest.approx(0.01, rel=0.02) and roller.length == 0.0

@@ -24,7 +24,7 @@ def pressed(stiffness):
     found = plan_discretization(parts, [ExpectedMotion(3.0, 9.81)] * 2, "draft", stiffness)
     cell, balls, plates = found.cell, [], []
     for k, t in enumerate(found.treatments):
-        stuff = Stuff(young=t.young, poisson=t.poisson, density=t.density)
+        stuff = Stuff(young=t.simulated_young_pa, poisson=t.poisson, density=t.density)
         place = (3.0 * k * DIAMETER, 0.0, DIAMETER / 2)
         balls.append(ball(place, DIAMETER / 2, cell / 2, stuff=stuff))
         wide = (DIAMETER, DIAMETER, 2 * cell)

@@ -36,7 +36,7 @@ def test_the_loader_of_gns_reads_positions_kinds_and_a_property(written, asked, 
     frames, particles = len(asked.motion.time), played.prepared.particles.count
     assert position.shape == (frames, particles, 3) and position.dtype == np.float32
     assert kind.shape == stiffness.shape == (particles,)
-    young = np.array([m.treatment.young for m in asked.scene.matter])
+    young = np.array([m.treatment.simulated_young_pa for m in asked.scene.matter])
     np.testing.assert_allclose(10**stiffness, young[played.prepared.particles.part])
     assert said[0]["values"]["young"]["source"]
 

@@ -105,7 +105,7 @@ def test_soft_matter_keeps_mass_modulus_and_parts(usd, asked):
             material = f"/World/Matter/part_{part}"
             for dialect in ("physics", "omniphysics", "newton:mpm"):
                 young = attribute(stage, material, f"{dialect}:youngsModulus")
-                assert young == pytest.approx(treatment.young, rel=1e-6)
+                assert young == pytest.approx(treatment.simulated_young_pa, rel=1e-6)
             subset = UsdGeom.Subset(stage.GetPrimAtPath(f"{path}/part_{part}"))
             chosen = np.array(subset.GetIndicesAttr().Get())
             np.testing.assert_array_equal(chosen, np.flatnonzero(solid.grains.part == part))
@@ -149,8 +149,8 @@ def test_one_of_two_ways_to_simulate_lives(usd, asked):
             assert not stage.GetPrimAtPath(f"/World/{solid.name}/{other}").IsActive()
 
 
-def test_the_film_moves_as_the_run_did(usd, asked):
-    stage = opened(usd, "film.usda")
+def test_the_video_moves_as_the_run_did(usd, asked):
+    stage = opened(usd, "video.usda")
     assert stage.GetTimeCodesPerSecond() == asked.scene.fps
     assert stage.GetEndTimeCode() == len(asked.motion.time) - 1
     shapes = asked.motion.shapes(asked.scene.solids)
@@ -165,8 +165,8 @@ def test_the_film_moves_as_the_run_did(usd, asked):
 
 
 def test_no_stage_has_both_physics_and_motion(usd):
-    film, sim = opened(usd, "film.usda"), opened(usd)
-    assert not any(p.HasAPI(UsdPhysics.RigidBodyAPI) for p in film.Traverse())
+    video, sim = opened(usd, "video.usda"), opened(usd)
+    assert not any(p.HasAPI(UsdPhysics.RigidBodyAPI) for p in video.Traverse())
     for prim in sim.Traverse():
         assert not any(a.GetNumTimeSamples() for a in prim.GetAttributes())
 
@@ -181,7 +181,7 @@ def test_every_value_says_its_range_and_source(usd, asked):
             assert tuple(told["range"]) == (ground.range.low, ground.range.high)
             assert told["chosen_by"] == ground.chosen_by
             assert told["source"] and told["reason"] == ground.reason
-        assert said["simulated"]["young"] == matter.treatment.young
+        assert said["simulated"]["simulated_young_pa"] == matter.treatment.simulated_young_pa
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 import corporeal as co
 from corporeal.core import store
+from corporeal.core.registry import load_function
 from corporeal.export import export_scene as verb
 from corporeal.export.export_record import read_record
 from corporeal.export.export_target import EXPORT_WRITERS
@@ -56,7 +57,7 @@ def test_without_a_place_it_goes_into_the_run(run_folder, tmp_path):
     run = tmp_path / "run"
     shutil.copytree(run_folder, run)
     verb.export_scene(run, ["glb"])
-    assert (run / "export" / "glb" / "film.glb").exists()
+    assert (run / "export" / "glb" / "video.glb").exists()
     # The run is none the staler for it.
     from corporeal.pipeline.run_pipeline import stage_states
 
@@ -113,7 +114,7 @@ def test_a_run_without_matter_is_told_how_to_go_on(command, run_folder, tmp_path
     code, said = command("export", run, "--to", "glb")
     assert code == 2
     # As a shell takes it, blanks and all.
-    assert said.err.strip().endswith(f"has no matter yet. Go on with: corporeal fill '{run}'")
+    assert said.err.strip().endswith(f"has no particles yet. Next: corporeal fill '{run}'")
 
 
 def test_a_scene_can_leave_before_it_was_simulated(tmp_path, monkeypatch):
@@ -123,7 +124,7 @@ def test_a_scene_can_leave_before_it_was_simulated(tmp_path, monkeypatch):
     record = verb.export_scene("сцена.glb", ["usd", "mjcf", "glb"])
     assert not any(row.skipped for row in record.targets.values())
     assert (tmp_path / "сцена-export" / "usd" / "sim.usda").exists()
-    assert not (tmp_path / "сцена-export" / "usd" / "film.usda").exists()
+    assert not (tmp_path / "сцена-export" / "usd" / "video.usda").exists()
     with pytest.raises(co.UserError, match="only start is known"):
         verb.export_scene("сцена.glb", ["usd"], config=verb.ExportConfig(at="end"))
 
@@ -201,7 +202,7 @@ def test_what_a_killed_export_left_is_cleared_away(run_folder, tmp_path):
     with pytest.raises(KeyboardInterrupt), store.whole_folder(tmp_path / "glb") as folder:
         (folder / "half.glb").write_text("half")
         raise KeyboardInterrupt
-    assert [p.name for p in (tmp_path / "glb").iterdir()] == ["film.glb"]
+    assert [p.name for p in (tmp_path / "glb").iterdir()] == ["video.glb"]
     assert left(tmp_path) == []
 
 
@@ -232,11 +233,9 @@ def test_earlier_targets_stay_in_the_record(run_folder, tmp_path):
 
 
 def test_the_menu_has_a_writer_for_every_target():
-    from importlib import import_module
-
-    for place in EXPORT_WRITERS.values():
-        module, _, name = place.partition(":")
-        assert callable(getattr(import_module(module), name))
+    for row in EXPORT_WRITERS.values():
+        for place in filter(None, (row.write, row.check, row.write_dataset)):
+            assert callable(load_function(place))
 
 
 # ---------------------------------------------------------------- many scenes
@@ -256,7 +255,7 @@ def test_a_corpus_becomes_one_data_set(run_folder, tmp_path):
     with np.load(corpus / "export" / "npz" / "train.npz", allow_pickle=True) as file:
         assert len(file["gns_data"]) == 2
     for name in ("scene_0", "scene_1"):
-        assert (corpus / "export" / name / "glb" / "film.glb").exists()
+        assert (corpus / "export" / name / "glb" / "video.glb").exists()
         assert set(read_record(corpus / "export" / name / "export.json").targets) == {"glb"}
     assert "scene_0, scene_1" in json.dumps(record.targets["npz"].unsaid)
 

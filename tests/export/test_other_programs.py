@@ -86,7 +86,7 @@ def compare_with_newton(said, asked):
     counts = {}
     for solid in soft(asked):
         for part in solid.parts:
-            young = asked.scene.matter[part].treatment.young
+            young = asked.scene.matter[part].treatment.simulated_young_pa
             counts[young] = counts.get(young, 0) + int((solid.grains.part == part).sum())
     wanted = sorted(counts.items())
     assert [c for _, c in said["young"]] == [c for _, c in wanted]
@@ -166,7 +166,7 @@ def test_pybullet_loads_every_urdf(written, asked):
         compare_with_bullet(told("pybullet", "pybullet_urdf.py", *paths), asked, folder)
 
 
-# ---------------------------------------------------------------- films in Blender
+# ---------------------------------------------------------------- videos in Blender
 
 FRAMES = (0, 2, 4)
 
@@ -174,7 +174,7 @@ FRAMES = (0, 2, 4)
 def posed_in_blender(path, asked, tmp_path):
     """For each of three frames the vertices of every mesh, in the world."""
     seconds = [asked.motion.time[k] for k in FRAMES]
-    run(python_of("bpy"), "blender_film.py", path, tmp_path / "posed.npz", 40, *seconds)
+    run(python_of("bpy"), "blender_video.py", path, tmp_path / "posed.npz", 40, *seconds)
     with np.load(tmp_path / "posed.npz") as file:
         return [
             [file[name] for name in file.files if name.startswith(f"{number}|")]
@@ -199,9 +199,9 @@ def largest_error(posed, asked):
 @pytest.mark.parametrize(
     ("writer", "name", "bound"),
     [
-        (write_usd, "film.usda", 1e-5),
-        (write_alembic, "film.abc", 1e-5),
-        (write_animated_glb, "film.glb", 1e-3),
+        (write_usd, "video.usda", 1e-5),
+        (write_alembic, "video.abc", 1e-5),
+        (write_animated_glb, "video.glb", 1e-3),
     ],
     ids=["usd", "alembic", "glb"],
 )
@@ -247,7 +247,7 @@ def test_the_loader_of_gns_opens_ours(written, asked):
     said = json.loads(out)
     assert said["samples"] == len(asked.motion.time) - length
     compare_windows(said, asked, len(asked.motion.time) - 1)
-    young = sorted({m.treatment.young for m in asked.scene.matter})
+    young = sorted({m.treatment.simulated_young_pa for m in asked.scene.matter})
     np.testing.assert_allclose(said["young"], young, rtol=1e-6)
 
 

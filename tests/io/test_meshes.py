@@ -12,11 +12,12 @@ from PIL import Image
 
 from corporeal.core.errors import BadFileError
 from corporeal.geometry.srgb import srgb_to_linear
+from corporeal.io import registry
 from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
-from corporeal.io.mesh import mesh_loader
-from corporeal.io.mesh.mesh_loader import load_mesh, mesh_companions
-from corporeal.io.mesh.mesh_suffixes import MESH_SUFFIXES, kind_of_ply
+from corporeal.io.input_files import list_companions
+from corporeal.io.mesh.mesh_loader import load_mesh
 from corporeal.io.mesh.raw_mesh import MAX_PIECES
+from corporeal.io.ply_container import kind_of_ply
 
 CORNERS = "v 0 0 0\nv 1 0 0\nv 1 2 0\nv 0 2 0\nv 0 0 3\n"
 FACES = "f 1 2 3 4\nf 1/1 2/2 5/3\n"
@@ -132,7 +133,7 @@ def written(kind, folder):
     return path
 
 
-@pytest.mark.parametrize("kind", MESH_SUFFIXES)
+@pytest.mark.parametrize("kind", registry.suffixes_of("mesh"))
 def test_one_block_has_the_same_extents_as_every_kind_of_file(kind, tmp_path):
     if kind.startswith(".usd"):
         pytest.importorskip("pxr")
@@ -260,8 +261,7 @@ def test_patches_of_a_surface_are_no_things(tmp_path):
 
 def test_a_splat_a_mesh_and_points_are_told_by_the_header(tmp_path):
     def kind(text):
-        (tmp_path / "a.ply").write_text(f"ply\nformat ascii 1.0\n{text}end_header\n")
-        return kind_of_ply(tmp_path / "a.ply")
+        return kind_of_ply(f"ply\nformat ascii 1.0\n{text}end_header\n".encode())
 
     place = "".join(f"property float {axis}\n" for axis in "xyz")
     mesh = "element face 1\nproperty list uchar int vertex_indices\n"
@@ -299,11 +299,11 @@ def test_texture_coordinates_run_down_as_in_gltf(chair):
 
 
 def test_companions_are_named_and_come_from_the_same_folder_only(chair, tmp_path):
-    assert [p.name for p in mesh_companions(chair)] == ["look.mtl", "half blue.png"]
+    assert [p.name for p in list_companions(chair)] == ["look.mtl", "half blue.png"]
     (tmp_path / "below").mkdir()
     inner = tmp_path / "below" / "x.obj"
     inner.write_text(f"mtllib ../look.mtl\n{CORNERS}usemtl red\n{FACES}")
-    assert mesh_companions(inner) == []
+    assert list_companions(inner) == []
     assert load_mesh(inner).scene.finishes[0].colour != (1, 0, 0, 1)
 
 
@@ -359,11 +359,11 @@ def test_a_picture_comes_from_the_files_own_folder_only(tmp_path):
         return read.scene.finishes[0].texture, read.scene.warnings
 
     assert look("./inside.png")[0].shape == (4, 4, 3)
-    assert [p.name for p in mesh_companions(tmp_path / "own" / "a.usda")] == ["inside.png"]
+    assert [p.name for p in list_companions(tmp_path / "own" / "a.usda")] == ["inside.png"]
     for elsewhere in ("../outside.png", str(tmp_path / "outside.png")):
         texture, told = look(elsewhere)
         assert texture is None and "pictures that are not there" in told[0]
-        assert mesh_companions(tmp_path / "own" / "a.usda") == []
+        assert list_companions(tmp_path / "own" / "a.usda") == []
 
 
 def test_a_layer_from_elsewhere_is_refused_before_it_is_opened(tmp_path):
@@ -383,7 +383,7 @@ def processor_seconds():
 
 
 @pytest.mark.slow
-def test_instances_of_instances_end_at_the_deadline(tmp_path, monkeypatch):
+def test_instances_of_instances_end_at_the_deadline(tmp_path):
     pytest.importorskip("pxr")
     lines = ['#usda 1.0\nclass "c0" {\ndef Mesh "m" {\npoint3f[] points = [(0, 0, 0)]\n}\n}\n']
     for level in range(1, 9):
@@ -393,10 +393,9 @@ def test_instances_of_instances_end_at_the_deadline(tmp_path, monkeypatch):
         )
         lines.append(f'class "c{level}" {{\n{inner}\n}}\n')
     (tmp_path / "a.usda").write_text("".join(lines) + 'def "a" (references = </c8>) {}\n')
-    monkeypatch.setattr(mesh_loader, "MAX_MESH_READ_S", 12)
     start = processor_seconds()
     with pytest.raises(BadFileError, match="is not read within 12 s"):
-        load_mesh(tmp_path / "a.usda")
+        load_mesh(tmp_path / "a.usda", max_seconds=12)
     assert processor_seconds() - start < 20
 
 
@@ -514,11 +513,10 @@ def test_a_hostile_file_ends_in_one_sentence(tmp_path, name):
 
 
 def test_the_readers_of_meshes_may_be_absent(tmp_path, monkeypatch):
-    from corporeal.io.mesh import mesh_trimesh
-
-    monkeypatch.setattr(mesh_trimesh, "find_spec", lambda name: None)
+    (tmp_path / "a.3mf").write_bytes(b"PK")
+    monkeypatch.setattr(registry, "find_spec", lambda name: None)
     with pytest.raises(BadFileError, match=r"needs lxml and networkx.*'corporeal\[meshes\]'"):
-        mesh_trimesh.read_3mf(tmp_path / "a.3mf")
+        load_mesh(tmp_path / "a.3mf")
 
 
 # ---------------------------------------------------------------- as other programs write them

@@ -690,7 +690,7 @@ def test_a_lying_count_and_an_unknown_model_are_refused(tmp_path, views):
         ("a red box on a table", "no projection matrix"),
         ("1 2 3 4 5 6 7 8", "no projection matrix"),
         ("nan 0 0 0 0 1 0 0 0 0 1 0", "no projection matrix"),
-        ("1 0 0 0 2 0 0 0 0 0 1 0", "no finite camera"),
+        ("1 0 0 0 2 0 0 0 0 0 1 0", "not the matrix of a finite camera"),
         ("1 0 0 0 0 1 0 0 0 0 1 3", "focal length of 1 and 1 pixels.*K .R . t. in pixels"),
     ],
 )

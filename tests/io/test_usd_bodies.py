@@ -107,7 +107,7 @@ def test_bodies_are_objects_and_so_is_what_they_stand_on(kitchen):
     np.testing.assert_allclose(mug.velocity, [0.0, -0.5, -2.0], atol=1e-12)  # +Y up → +Z up
     told = " ".join(scene.warnings)
     assert "spins of bodies (1)" in told
-    assert "table_0: no bodies in the file" in told
+    assert "table_0: no rigid bodies in the file" in told
     assert "no meshes" not in told
 
 

@@ -33,7 +33,7 @@ def refuse(folder, progress, words):
 
 
 def blunder(folder, progress):
-    """Make a mistake of ours."""
+    """Raise an internal error."""
     raise ZeroDivisionError("by nothing")
 
 

@@ -14,7 +14,7 @@ def body(name="ball_0", velocity=(0.0, 0.0, 0.0), **what):
     """One that moves evenly."""
     times = [k / FPS for k in range(FRAMES)]
     path = tuple(tuple(v * t for v in velocity) for t in times)
-    said = {"diagonal": 1.0, "young": 1e6, "restitution": 0.5}
+    said = {"diagonal": 1.0, "young_pa": 1e6, "restitution": 0.5}
     said |= {"groups": ("elastomer",), "laws": ("neo hookean",)}
     return ObjectMeasures(name=name, path=path, **said | what)
 

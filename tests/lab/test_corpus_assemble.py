@@ -125,7 +125,7 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
                    ComposeConfig(), SMALL)  # fmt: skip
     assert assemble_corpus(tmp_path, few, more, hands) == rows, "a plan is kept"
     settings = Settings(
-        assemble=AssembleConfig(duration=0.1), film=VideoConfig(width=64, height=48)
+        assemble=AssembleConfig(duration=0.1), video=VideoConfig(width=64, height=48)
     )
     ran = run_corpus(tmp_path, RunConfig(first=1), settings, hands)
     assert [r.status for r in ran.values()] == ["finished"], ran
@@ -133,7 +133,7 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
     assert run_corpus(tmp_path, RunConfig(first=1), settings, hands) == ran
     assert said == ["1 of 1 are done already."]
     page = report_corpus(tmp_path, silent)[0].read_text()
-    assert page.count("data:image/jpeg") == 3, "a film, and views of what was not run"
+    assert page.count("data:image/jpeg") == 3, "a video, and views of what was not run"
 
 
 def test_beginning_anew_forgets_what_was_finished_and_begun(tmp_path):

@@ -196,7 +196,7 @@ def evaluated(tmp_path):
         tmp_path / "out", (OUR_METHOD, parse_method("single")), "normal", Settings()
     )
     pairs = {"ball_0|floor": pair(0.4), "duck_0|floor": pair(0.3)}
-    bodies = [body(), body("duck_0", young=1e9)]
+    bodies = [body(), body("duck_0", young_pa=1e9)]
     soft = {"ball_0": object_outcome(shape_error_max=0.1)}
     good = expecting(run(bodies, soft, pairs), True, True)
     bad = expecting(

@@ -50,12 +50,12 @@ def test_a_run_keeps_what_is_compared(tmp_path):
     assert [b.name for b in numbers.bodies] == ["ball", "block"]
     ball, block = numbers.bodies
     assert ball.places[:, 2].min() < ball.places[0, 2] - 0.005
-    assert ball.young > 1e11 > 1e8 > block.young
+    assert ball.young_pa > 1e11 > 1e8 > block.young_pa
     assert ball.groups == ("metal",) and ball.laws == ("rigid body",)
     assert numbers.outcome.pair("ball", "block").first_contact_s is not None
     assert not numbers.faults and numbers.steps > 10
     assert numbers.source == store.source_digest() != ""
-    assert run_pipeline.stage_states(folder)[-1].state == "not yet"  # the report, as of the film
+    assert run_pipeline.stage_states(folder)[-1].state == "not yet"  # the report, as of the video
 
 
 @pytest.mark.slow

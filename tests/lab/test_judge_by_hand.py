@@ -1,4 +1,4 @@
-"""What somebody said of the films of six scenes, blind: answers before the key was opened."""
+"""What somebody said of the videos of six scenes, blind: answers before the key was opened."""
 
 import json
 from pathlib import Path
@@ -84,13 +84,13 @@ KEY = {
         "film-444c8bce4341": "wrong",
     },
 }
-"""Scene → film → what it was; written down after the answers."""
+"""Scene → video → what it was; written down after the answers."""
 
 
 @pytest.fixture(scope="module")
-def films():
+def videos():
     rows = [json.loads(path.read_text()) for path in FOLDER.glob("*.json")]
-    scene_of = {film: scene for scene, of in KEY.items() for film in of}
+    scene_of = {video: scene for scene, of in KEY.items() for video in of}
     return [
         video_verdict(
             scene_of[r["scene"]],
@@ -102,26 +102,26 @@ def films():
 
 
 @pytest.fixture(scope="module")
-def rows(films):
-    return measure_detectability(films, "ours", {c.id: c.id for c in question_catalogue().control})
+def rows(videos):
+    return measure_detectability(videos, "ours", {c.id: c.id for c in question_catalogue().control})
 
 
-def test_every_film_was_answered_once(films):
+def test_every_video_was_answered_once(videos):
     wanted = [(scene, condition) for scene, of in KEY.items() for condition in of.values()]
-    assert sorted((f.scene, f.condition) for f in films) == sorted(wanted)
+    assert sorted((f.scene, f.condition) for f in videos) == sorted(wanted)
 
 
-def test_nothing_was_reported_of_our_runs(films):
-    ours = {f.scene: f for f in films if f.condition == "ours"}
+def test_nothing_was_reported_of_our_runs(videos):
+    ours = {f.scene: f for f in videos if f.condition == "ours"}
     assert {alarm for f in ours.values() for alarm in f.alarm.values()} == {0.0}
     doubted = {scene: f.whole for scene, f in ours.items() if f.whole != 5}
     assert doubted == {"lamp-on-couch": 4}
     assert len(ours) == len(KEY)
 
 
-def test_one_film_was_marked_no_lower_than_ours_of_its_scene(films):
-    ours = {f.scene: f.whole for f in films if f.condition == "ours"}
-    others = [f for f in films if f.condition != "ours"]
+def test_one_video_was_marked_no_lower_than_ours_of_its_scene(videos):
+    ours = {f.scene: f.whole for f in videos if f.condition == "ours"}
+    others = [f for f in videos if f.condition != "ours"]
     unnoticed = [(f.scene, f.condition) for f in others if f.whole >= ours[f.scene]]
     assert unnoticed == [("vase-ball-armchair", "halfgravity")]
 
@@ -172,9 +172,9 @@ def test_what_is_not_told_everywhere_by_the_question_meant_for_it(
         ("capped", "friction", 6, 1.00),
     ],
 )
-def test_marks_of_baselines_by_laws_that_are_believed(films, rows, method, law, scenes, mark):
-    theirs = method_mark(films, method, law, trusted_questions(rows)[law])
-    ours = method_mark(films, "ours", law, trusted_questions(rows)[law])
+def test_marks_of_baselines_by_laws_that_are_believed(videos, rows, method, law, scenes, mark):
+    theirs = method_mark(videos, method, law, trusted_questions(rows)[law])
+    ours = method_mark(videos, "ours", law, trusted_questions(rows)[law])
     assert theirs is not None
     assert ours is not None
     assert (theirs.scenes, round(theirs.mark, 2)) == (scenes, mark)

@@ -1,4 +1,4 @@
-"""The page of judged films, and where the films come from."""
+"""The page of judged videos, and where the videos come from."""
 
 from dataclasses import replace
 from functools import partial
@@ -40,7 +40,7 @@ def said(condition, words, alarm=0.0):
 
 @pytest.fixture
 def judged():
-    films = JudgedVideos(
+    videos = JudgedVideos(
         [asked("ours", "film-1"), asked("single", "film-2")],
         [],
         [FailedVideo("duck", "ours", "energy grew by 12 %")],
@@ -51,7 +51,7 @@ def judged():
         said("ours", "Both <script>alert(1)</script> bounce."),
         said("single", "It sticks.", 1.0),
     ]
-    return JudgeVerdicts(films, verdicts, 0, "ask:x", JudgingCost(2, 10, None), ("by hand",))
+    return JudgeVerdicts(videos, verdicts, 0, "ask:x", JudgingCost(2, 10, None), ("by hand",))
 
 
 def test_the_page_says_first_what_the_judge_cannot_tell_and_trusts_no_words(judged, tmp_path):
@@ -75,8 +75,8 @@ def test_the_page_renders_no_picture_that_it_does_not_show_and_none_twice(judged
     pictures = SequentialPictures([partial(take, k) for k in range(16)])
     one = Question("dynamics", "?", "film-1", pictures=OnDemandPictures(lambda: pictures))
     both = [VideoQuestion("balls", c, 0, one) for c in ("ours", "single")]
-    films = replace(judged.films, asked=both)
-    judged = replace(judged, films=films)
+    videos = replace(judged.videos, asked=both)
+    judged = replace(judged, videos=videos)
     write_judge_page(judged, weigh_judge(judged), tmp_path / "judge.html")
     assert taken == sorted(set(taken)) and len(taken) == PICTURES_PER_VIDEO < len(pictures)
 

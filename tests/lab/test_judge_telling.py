@@ -57,8 +57,8 @@ def coin(dice):
 
 
 def rows_of(judge, scenes=SCENES):
-    films = [video_verdict(s, c, [judge(c)]) for s in scenes for c in (OURS, *FAULT)]
-    return measure_detectability(films, OURS, {c: c for c in FAULT})
+    videos = [video_verdict(s, c, [judge(c)]) for s in scenes for c in (OURS, *FAULT)]
+    return measure_detectability(videos, OURS, {c: c for c in FAULT})
 
 
 def told(rows):
@@ -138,10 +138,10 @@ def test_what_is_beyond_chance(wins, count, told):
 
 
 def test_a_mark_is_the_share_of_believed_questions_without_an_alarm():
-    films = [video_verdict(s, "single", [verdict(["stick"], 2)]) for s in SCENES]
-    assert method_mark(films, "single", "contact", ["stick", "react"]).mark == 0.5
-    assert method_mark(films, "single", "gravity", ["pace"]).mark == 1.0
-    assert method_mark(films, "capped", "gravity", ["pace"]) is None
+    videos = [video_verdict(s, "single", [verdict(["stick"], 2)]) for s in SCENES]
+    assert method_mark(videos, "single", "contact", ["stick", "react"]).mark == 0.5
+    assert method_mark(videos, "single", "gravity", ["pace"]).mark == 1.0
+    assert method_mark(videos, "capped", "gravity", ["pace"]) is None
     na = [video_verdict(s, "single", [verdict(also={"pace": "na"})]) for s in SCENES]
     assert method_mark(na, "single", "gravity", ["pace"]) is None
 

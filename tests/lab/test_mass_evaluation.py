@@ -207,7 +207,7 @@ def test_the_comparison_has_every_method_and_every_group(weighed, tmp_path):
     assert "Errors, all" in titles[1]
     unweighed = compare_masses([replace(p, mass_true=None) for p in weighed[1]])
     assert unweighed.metrics == {}
-    with pytest.raises(UserError, match="no mass was measured"):
+    with pytest.raises(UserError, match="no measured masses"):
         mass_figure(unweighed.rows, tmp_path / "none.png")
 
 

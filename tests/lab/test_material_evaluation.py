@@ -73,7 +73,7 @@ def test_a_person_types_it_and_gets_a_table_and_data(folder, monkeypatch, capsys
 @pytest.mark.parametrize(
     ("said", "told"),
     [
-        ("[oak_table]\n'oak table' = 'wood'", "no list of materials"),
+        ("[oak_table]\n'oak table' = 'wood'", "not a list of materials"),
         ("oak_table = 3", "must map part names"),
         ("[a]\nb = ['unobtainium']", "Unknown material 'unobtainium'"),
         ("[a", "cannot be read"),

@@ -58,7 +58,7 @@ def test_a_scene_is_judged_by_what_its_pictures_show(scene, tmp_path):
     judged = objects_evaluation.evaluate_scene("two", taken)
     row = judged.row
     assert row.identity == 1 and row.ours > 0.95 and row.with_masks > 0.95
-    assert row.components < 0.6 and row.things == ("tall", "low")
+    assert row.components < 0.6 and row.objects == ("tall", "low")
     objects_figure.draw_objects([judged], tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     with Image.open(tmp_path / "figure.png") as drawn:

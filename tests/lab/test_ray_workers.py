@@ -48,7 +48,7 @@ def test_a_killed_worker_is_replaced_and_the_manifest_is_the_same_as_here(tmp_pa
         "hopeless": ("failed", 2),
         "refused": ("failed", 1),
     }
-    assert rows["refused"].error == "no" and "process is gone" in rows["hopeless"].error
+    assert rows["refused"].error == "no" and "process died" in rows["hopeless"].error
     pids = {(tmp_path / "runs" / name / "pid").read_text() for name in "ab"}
     assert len(pids) == 2 and str(os.getpid()) not in pids
     assert (tmp_path / "runs" / "a" / "threads").read_text() == "1"

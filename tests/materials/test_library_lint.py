@@ -34,14 +34,14 @@ PLANTED = {
     ),
     "incompressible": (
         ("high = 0.3,", "high = 0.5,"),
-        "poisson: reaches 0.5: at 0.5 no volume can change at all.",
+        "poisson: reaches 0.5: 0.5 is incompressible.",
     ),
     "no source": ((', source = "my-bench" }\npoisson', " }\npoisson"), "young_GPa: has no source."),
     "empty source": (
         ('source = "my-bench" }\npoisson', 'source = "" }\npoisson'),
-        "young_GPa: has no source. Say who measured it",
+        "young_GPa: has no source. Cite its source",
     ),
-    "hearsay": (('"elastic-tables"', '"hearsay"'), "cites 'hearsay', which nothing explains."),
+    "hearsay": (('"elastic-tables"', '"hearsay"'), "cites 'hearsay', which is not defined."),
     "GPa for MPa": (("yield_MPa", "yield_GPa"), "In MPa it would fit: check the unit."),
     "MPa for GPa": (("young_GPa", "young_MPa"), "In GPa it would fit: check the unit."),
     "grams for kilograms": (
@@ -67,15 +67,21 @@ PLANTED = {
     "no yield stress": (("yield_MPa", "note = 'x' #"), "no yield stress (von_mises reads it)."),
     "never read": (("von_mises", "hencky"), "hencky never reads yield stress."),
     "no law": (('law = "von_mises"', ""), "has no law. Add law = one of: corotated"),
-    "strange law": (("von_mises", "hooke"), "law: 'hooke' is no law."),
-    "no group": (('group = "metal"', ""), "has no group, so its numbers cannot be compared"),
-    "strange group": (('"metal"', '"metals"'), "group: 'metals' is no group."),
+    "strange law": (("von_mises", "hooke"), "law: 'hooke' is not a constitutive law."),
+    "no group": (('group = "metal"', ""), "has no group, so its values cannot be compared"),
+    "strange group": (('"metal"', '"metals"'), "group: 'metals' is not a group."),
     "not a range": (("{ low = 0.28, typical = 0.29, high = 0.3,", "0.3 #"), "is 0.3, not a range."),
-    "a word for a number": (("low = 0.28", 'low = "0.28"'), "poisson: 'low' is missing or no nu"),
-    "not a number": (("low = 0.28", "low = nan"), "poisson: 'low' is missing or no number."),
+    "a word for a number": (
+        ("low = 0.28", 'low = "0.28"'),
+        "poisson: 'low' is missing or not a nu",
+    ),
+    "not a number": (("low = 0.28", "low = nan"), "poisson: 'low' is missing or not a number."),
     "strange entry": (("low = 0.28", "min = 0.1, low = 0.28"), "an unknown entry 'min'."),
-    "strange base": (("\n[sources", "extends = 'mine'\n[sources"), "extends: 'mine' is no library"),
-    "no citation": (('cite = "Our', 'site = "Our'), "says nothing that could be looked up."),
+    "strange base": (
+        ("\n[sources", "extends = 'mine'\n[sources"),
+        "extends: 'mine' is not a library",
+    ),
+    "no citation": (('cite = "Our', 'site = "Our'), "has no citation."),
     "two of one name": (
         ("[lamp_steel]", "[other]\nlaw = 'hencky'\naliases = ['Lamp_Steel']\n[lamp_steel]"),
         "'lamp_steel' also names other.",
@@ -146,8 +152,8 @@ loss = { low = 0.1, typical = 0.2, high = 0.3, source = "bench" }
 def test_a_restitution_that_contradicts_the_loss_factor_is_told_with_what_would_fit():
     assert found(SOFT) == [
         "line 11, [squashy] restitution: 0.1 to 0.5 contradicts the loss factor: with 0.1 to 0.3 a "
-        "ball keeps 0.67 to 0.87 of its speed. Correct one of the two, or say with note = '...' "
-        "what else takes the energy."
+        "ball keeps 0.67 to 0.87 of its speed. Correct one of the two, or explain with note = '...' "
+        "what else dissipates the energy."
     ]
 
 
@@ -209,7 +215,9 @@ def test_no_file_makes_the_check_itself_fail():
 
 def test_a_library_with_a_mistake_is_refused(tmp_path):
     (tmp_path / "mine.toml").write_text(SOUND.replace("von_mises", "hooke"))
-    with pytest.raises(BadFileError, match=r"mine.toml: line 6, .*'hooke' is no law"):
+    with pytest.raises(
+        BadFileError, match=r"mine.toml: line 6, .*'hooke' is not a constitutive law"
+    ):
         materials.library(str(tmp_path / "mine.toml"))
     with pytest.raises(BadFileError, match="cannot be read"):
         materials.library(str(tmp_path / "absent.toml"))

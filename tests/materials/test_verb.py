@@ -17,7 +17,7 @@ def typed(monkeypatch, command, tmp_path):
 
 def test_a_sound_library_passes_and_is_shown(typed, tmp_path):
     (tmp_path / "mine.toml").write_text(SOUND)
-    assert typed("check", "mine.toml")[:2] == (0, "mine.toml: no mistakes found.\n")
+    assert typed("check", "mine.toml")[:2] == (0, "mine.toml: no errors found.\n")
     code, out, _ = typed("--library", "mine.toml")
     assert code == 0
     assert "lamp_steel" in out

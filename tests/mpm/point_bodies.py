@@ -53,7 +53,7 @@ def round_body(centre, radius=0.05, count=200, **given):
     radii = np.tile([radius, 0.0, 0.4 * radius, 1.0], (count, 1))
     rows = np.concatenate([normal, along, radii], axis=1)
     surface = centre + radius * normal
-    return body(ball(centre, radius), rigid=True, surface=surface, rounding=rows, **given)
+    return body(ball(centre, radius), rigid=True, surface=surface, curvature=rows, **given)
 
 
 def flat_faces(size, distance=0.012):
@@ -77,7 +77,7 @@ def board(middle, size=SIZE, **given):
     axes = [np.arange(-s / 2 + CELL / 4, s / 2, CELL / 2) for s in size]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     surface, rows = flat_faces(size)
-    usual = {"surface": surface + middle, "rounding": rows, "density": 8000.0}
+    usual = {"surface": surface + middle, "curvature": rows, "density": 8000.0}
     return body(points + middle, rigid=True, name="board", **usual | given)
 
 

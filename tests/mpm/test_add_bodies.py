@@ -33,11 +33,11 @@ def problems():
 def test_who_was_there_goes_on_as_if_nothing_had_happened(problems, contact):
     few, more = (replace(p, contact=contact) for p in problems)
     engine = CpuEngine(few, 1)
-    engine.weigh((0.3, 0.0, -5.0))
+    engine.set_gravity((0.3, 0.0, -5.0))
     engine.apply_impulse(FOAM, (0.0, 0.03, 2.0), (0.005, 0.0, 0.0))
-    engine.pull(STONE, (0.5, 0.0, 2.0), (0.5, 0.0, 2.5), 40.0)
+    engine.attach_spring(STONE, (0.5, 0.0, 2.0), (0.5, 0.0, 2.5), 40.0)
     engine.advance(0.01)
-    after = engine.joined_by(more)
+    after = engine.with_added_bodies(more)
     old = engine.snapshot()
     count = len(old.position)
     assert after.time == engine.time
@@ -61,7 +61,7 @@ def test_momentum_is_that_of_the_impulses_and_energy_that_of_the_work(problems, 
     engine = CpuEngine(few, 1)
     engine.advance(0.01)
     before = engine.measure()
-    after = engine.joined_by(more)
+    after = engine.with_added_bodies(more)
     now = after.measure()
     added = now.potential.sum() - before.potential.sum()
     assert added == pytest.approx(float(9.81 * now.mass[MORE:].sum()), rel=1e-3)
@@ -86,7 +86,7 @@ def test_who_joins_meets_who_was_there(problems):
     )
     engine = CpuEngine(few, 1)
     engine.advance(0.005)
-    after = engine.joined_by(replace(more, bodies=tuple(bodies)))
+    after = engine.with_added_bodies(replace(more, bodies=tuple(bodies)))
     after.advance(0.03)
     end = after.measure()
     assert end.first_contact[STONE, MORE] > 0.005

@@ -147,7 +147,7 @@ def test_what_a_pair_that_never_touches_leaves_room_for_is_not_booked():
     """Room for contacts of the pair held what others gave in earlier steps: twice the impulse."""
     one = body(ball((0, 0, 0.055)), velocity=(1.0, 0, -1.0))
     two = body(ball((0.02, 0.03, 0.055)), velocity=(-1.0, 0.5, -1.0))
-    given = problem(one, two, apart=((0, 1),))
+    given = problem(one, two, excluded_pairs=((0, 1),))
     ours, sure = on_device(given), ReferenceEngine(given)
     for engine in (ours, sure):
         for _ in range(40):

@@ -34,15 +34,15 @@ def bowl(middle=(0.0, 0.0, HOLLOW), **given):
     rows[:, :3], rows[:, 3:6], rows[:, 10:] = -normal, along, -1 / HOLLOW
     rows[:, 8] = point_reach(HOLLOW * normal)
     surface = HOLLOW * normal + middle
-    moved = {"surface": surface, "rounding": rows, "density": 8000.0}
+    moved = {"surface": surface, "curvature": rows, "density": 8000.0}
     return body(points + middle, rigid=True, name="bowl", **moved | given)
 
 
 def marble(centre, **given):
     one = round_body(centre, RADIUS, **given)
-    rows = np.column_stack([one.rounding, np.full((len(one.rounding), 2), 1 / RADIUS)])
+    rows = np.column_stack([one.curvature, np.full((len(one.curvature), 2), 1 / RADIUS)])
     return body(
-        one.position, rigid=True, surface=one.surface, rounding=rows, velocity=one.velocity[0]
+        one.position, rigid=True, surface=one.surface, curvature=rows, velocity=one.velocity[0]
     )
 
 

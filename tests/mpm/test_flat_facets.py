@@ -62,7 +62,7 @@ def test_a_thin_board_that_is_moved_has_its_own_surface(engine, known):
     moved = replace(board(middle, size), path=up, pivot=(0.0, 0.0, TOP - size[2]))
     falling = round_body((0.12, 0.03, TOP + 0.06), velocity=(0.3, 0.1, -0.5))
     if not known:
-        falling = replace(falling, rounding=np.zeros((0, 12)))
+        falling = replace(falling, curvature=np.zeros((0, 12)))
     given = problem(falling, moved, planes=())
     ours, sure = ENGINES[engine](given), ReferenceEngine(given)
     step_together(ours, sure, 20)
@@ -77,7 +77,7 @@ def test_a_thin_board_lies_on_what_is_held_still_and_has_no_mesh(engine):
     still = Keyframes((0.0, 1.0), ((0.0, 0.0, 0.0),) * 2, ((0.0, 0.0, 0.0),) * 2)
     deep = np.array([0.2, 0.12, 0.12])
     held = board(np.array([0.0, 0.0, -deep[2] / 2]), deep, path=still, pivot=(0.0, 0.0, 0.0))
-    held = replace(held, surface=np.zeros((0, 3)), rounding=np.zeros((0, 12)))
+    held = replace(held, surface=np.zeros((0, 3)), curvature=np.zeros((0, 12)))
     thick = 0.5 * CELL
     lies = board(np.array([0.0, 0.0, 0.2 * CELL + thick / 2]), np.array([0.16, 0.1, thick]))
     run = (ENGINES | {"reference": ReferenceEngine})[engine](
@@ -94,13 +94,13 @@ def test_a_tiny_ball_is_not_held_by_the_far_face_of_a_sheet(engine):
     radius, size = 0.05 * CELL, np.array([0.2, 0.12, 0.05 * CELL])
     high = np.array([0.0, 0.0, TOP + radius])
     model = round_body((0.0, 0.0, 0.0), count=40)
-    rows = model.rounding.copy()
+    rows = model.curvature.copy()
     rows[:, 6], rows[:, 8] = radius, 0.4 * radius
-    given = {"surface": high + radius * rows[:, :3], "rounding": rows, "velocity": (0.0, 0.0, 0.2)}
+    given = {"surface": high + radius * rows[:, :3], "curvature": rows, "velocity": (0.0, 0.0, 0.2)}
     tiny = body(high[None], rigid=True, spacing=radius, **given)
     surface, faces = flat_faces(size)
     middle = np.array([0.0, 0.0, TOP - size[2] / 2])
-    sheet = board(middle, np.array([0.2, 0.12, CELL]), surface=surface + middle, rounding=faces)
+    sheet = board(middle, np.array([0.2, 0.12, CELL]), surface=surface + middle, curvature=faces)
     engines = ENGINES | {"reference": ReferenceEngine}
     run = engines[engine](problem(tiny, sheet, planes=(), gravity=(0.0, 0.0, 0.0)))
     run.advance(2e-3)
@@ -115,7 +115,7 @@ def test_a_ball_leaves_a_sheet_straight_up(engine):
     surface, faces = flat_faces(size)
     middle = np.array([0.0, 0.0, size[2] / 2])
     layer = np.array([0.4, 0.4, 0.4 * CELL])
-    sheet = board(middle, layer, surface=surface + middle, rounding=faces)
+    sheet = board(middle, layer, surface=surface + middle, curvature=faces)
     start, down = (0.0, 0.0, size[2] + 0.065), (0.0, 0.0, -3.0)
     falling = round_body(start, radius=0.055, count=646, velocity=down)
     given = problem(falling, sheet, gravity=(0.0, 0.0, 0.0), friction=0.6, restitution=0.8)
@@ -137,11 +137,11 @@ def valley(turned):
         turn = np.array([[c, 0.0, -side * c], [0.0, 1.0, 0.0], [side * c, 0.0, c]])
         # The end of each lies at the origin, its upper face towards the other one.
         shift = np.array([side * 0.08, 0.0, -0.03])
-        rows = first.rounding.copy()
+        rows = first.curvature.copy()
         rows[:, :3] = rows[:, :3] @ turn.T
         halves.append([(first.position + shift) @ turn.T, (first.surface + shift) @ turn.T, rows])
     points, surface, rows = (np.concatenate(both) for both in zip(*halves, strict=True))
-    below = body(points, rigid=True, surface=surface, rounding=rows, density=8000.0, name="valley")
+    below = body(points, rigid=True, surface=surface, curvature=rows, density=8000.0, name="valley")
     ball = round_body(
         (0.0, 0.01, 0.05 * np.sqrt(2) + 5e-4), velocity=(0.1, 0.4, -0.3), density=2000.0
     )

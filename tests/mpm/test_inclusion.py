@@ -7,7 +7,7 @@ import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.core.registry import load_backend
-from corporeal.discretization.build_model import label_clusters, label_rigid_frames
+from corporeal.discretization.build_model import label_clusters, label_rigid_inclusions
 from corporeal.mpm.physics.rigid import mass_and_inertia
 from corporeal.mpm.problem import ENGINES
 from corporeal.mpm.reference.inclusions import join_bodies
@@ -173,7 +173,7 @@ def test_a_wire_with_few_particles_is_still_one_frame():
     particles = np.array([[0.0, 0, 0], [1.0, 0, 0], [5.0, 0, 0]])
     wire = np.stack([np.linspace(0, 1, 21), np.zeros(21), np.zeros(21)], 1)
     bare = np.array([[9.0, 0, 0]])
-    found = label_rigid_frames(particles, np.concatenate([wire, bare]), 0.1)
+    found = label_rigid_inclusions(particles, np.concatenate([wire, bare]), 0.1)
     assert found.of_particle.tolist() == [0, 0, 1]
     owner = found.of_point.tolist()
     assert owner == [0] * 21 + [1], "a surface without matter goes with the nearest"

@@ -53,7 +53,10 @@ def test_the_numbers_are_those_of_the_field():
     assert table.cone[sand] == pytest.approx(np.sqrt(2) / 3 * np.sin(0.6))
     soft = ~table.rigid
     assert table.modulus[~sand & soft] == pytest.approx(METAL.p_wave_modulus)
-    assert not table.modulus[table.rigid].any() and (table.forgetting[table.rigid] == VAST).all()
+    assert (
+        not table.modulus[table.rigid].any()
+        and (table.flip_damping_rate[table.rigid] == VAST).all()
+    )
     assert np.array_equal(
         table.body[row], np.repeat([0, 1], [len(b.position) for b in given.bodies])
     )
@@ -62,9 +65,9 @@ def test_the_numbers_are_those_of_the_field():
 def test_all_that_share_a_field_forget_alike():
     """Or momentum would go astray: the fastest rate is everybody's."""
     apart, _ = MaterialTable.of(mixed())
-    assert len(set(apart.forgetting[~apart.rigid])) == 1
+    assert len(set(apart.flip_damping_rate[~apart.rigid])) == 1
     shared, _ = MaterialTable.of(mixed(contact="single"))
-    assert set(shared.forgetting) == {VAST}
+    assert set(shared.flip_damping_rate) == {VAST}
 
 
 @pytest.mark.parametrize(("poisson", "mean"), [(0.3, False), (0.4, False), (0.41, True)])
@@ -75,18 +78,18 @@ def test_pressure_is_a_mean_above_a_poissons_ratio_of_two_fifths(poisson, mean):
         table, _ = MaterialTable.of(
             problem(box((0, 0, 0), (0.04,) * 3, 0.01, stuff=stuff), cell=0.02)
         )
-        assert table.swells.all() == table.swells.any() == mean
+        assert table.uses_mean_dilatation.all() == table.uses_mean_dilatation.any() == mean
 
 
 def test_what_flows_keeps_its_own_pressure():
     stuff = replace(METAL, poisson=0.45)
     table, _ = MaterialTable.of(problem(box((0, 0, 0), (0.04,) * 3, 0.01, stuff=stuff), cell=0.02))
-    assert table.flows.all() and not table.swells.any()
+    assert table.flows.all() and not table.uses_mean_dilatation.any()
 
 
 @pytest.mark.parametrize("number", [-1, len(Law), 99])
 def test_a_law_that_there_is_not_is_refused_with_the_menu(number):
     body = box((0, 0, 0), (0.04,) * 3, 0.01)
     body.law[:] = number
-    with pytest.raises(SimulationError, match=rf"law of number {number}, .*0 \(corotated\)"):
+    with pytest.raises(SimulationError, match=rf"unknown law {number}, .*0 \(corotated\)"):
         MaterialTable.of(problem(body, cell=0.02))

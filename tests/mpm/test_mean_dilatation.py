@@ -51,14 +51,16 @@ def test_the_force_of_the_mean_pressure_is_the_slope_of_the_stored_energy(law):
     grid = stencil(start.position, matter.body, given.cell)
     rough = np.eye(3) + 1e-3 * rng.standard_normal(start.F.shape)
     gradient = grid.gather_gradient(rng.standard_normal((grid.count, 3)))
-    relief = 1e-3 * rng.standard_normal(len(start.F))
+    log_volume_ratio = 1e-3 * rng.standard_normal(len(start.F))
     spread = np.trace(gradient, axis1=1, axis2=2)
 
     def energy(by):
         F = (np.eye(3) + by * gradient) @ rough
-        return strain_energy(matter, F, relief + by * (groups.mean(spread) - spread)).sum()
+        return strain_energy(
+            matter, F, log_volume_ratio + by * (groups.mean(spread) - spread)
+        ).sum()
 
-    here, h = replace(start, F=rough, relief=relief), 1e-7
+    here, h = replace(start, F=rough, log_volume_ratio=log_volume_ratio), 1e-7
     slope = (energy(h) - energy(-h)) / (2 * h)
     own = matter.volume @ np.sum(elastic_stress(matter, here) * gradient, axis=(1, 2))
     pressure = mean_pressure(matter, here)

@@ -94,7 +94,7 @@ def rolling(c, speed=0.3, slope=0.0):
     """A ball on the floor, which may slope: it slides, and then rolls."""
     one = round_body((0.0, 0.0, RADIUS), RADIUS, velocity=(speed, 0.0, 0.0))
     gravity = (G * np.sin(slope), 0.0, -G * np.cos(slope))
-    return problem(one, gravity=gravity, restitution=0.0, rolling=np.full((2, 2), c))
+    return problem(one, gravity=gravity, restitution=0.0, rolling_resistance=np.full((2, 2), c))
 
 
 def test_a_ball_stops_where_rolling_friction_has_taken_its_energy():
@@ -137,7 +137,7 @@ def over_a_board(**given):
     under = board(np.array([0.0, 0.0, -SIZE[2] / 2]), **given)
     rolls = np.full((2, 2), 5e-3)
     still = (0.0, 0.0, 0.0)
-    return problem(one, under, planes=(), gravity=still, restitution=0.0, rolling=rolls)
+    return problem(one, under, planes=(), gravity=still, restitution=0.0, rolling_resistance=rolls)
 
 
 ALONG = Keyframes((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.4, 0.0)), ((0.0, 0.0, 0.0),) * 2)
@@ -159,7 +159,7 @@ def test_what_is_braked_moves_as_in_the_reference(engine, case):
     assert mine.angular_momentum == pytest.approx(theirs.angular_momentum, rel=2e-4, abs=1e-6)
     assert mine.friction_loss == pytest.approx(theirs.friction_loss, rel=1e-4, abs=1e-9)
     assert mine.push_work == pytest.approx(theirs.push_work, rel=1e-4, abs=1e-8)
-    free = ReferenceEngine(replace(given, rolling=None))
+    free = ReferenceEngine(replace(given, rolling_resistance=None))
     step_together(free, ReferenceEngine(given), 20)
     apart = np.abs(free.measure().angular_momentum - theirs.angular_momentum).max()
     assert apart > 1e-3 * np.abs(theirs.angular_momentum).max()

@@ -5,7 +5,8 @@ import pytest
 
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
-from corporeal.reconstruction.gaussians import carved_volume, visual_hull
+from corporeal.reconstruction.gaussians import carved_volume
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 HALF, WALL, HEIGHT = 1.0, 0.25, 1.2
@@ -91,8 +92,8 @@ def test_views_that_are_left_out_take_their_lines_along(lines):
     assert set(some.view) == {0, 1}
 
 
-def test_the_hull_of_an_open_box_seen_from_above_has_no_lid(lines, cameras, monkeypatch):
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 100_000)
+def test_the_hull_of_an_open_box_seen_from_above_has_no_lid(lines, cameras):
+    coarse = HullConfig(grid_cells=100_000)
     cells = grid()
     places = cells[(np.abs(cells[..., :2]).max(axis=-1) < HALF) & (cells[..., 2] < HEIGHT)]
     masks = np.zeros((len(cameras), 96, 96), bool)
@@ -102,8 +103,8 @@ def test_the_hull_of_an_open_box_seen_from_above_has_no_lid(lines, cameras, monk
         mask[v, u] = True
     views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)
     with ThreadPool(1) as pool:
-        with_lines = carved_volume.carve_volume(views, masks, lines, pool)
-        without = carved_volume.carve_volume(views, masks, None, pool)
+        with_lines = carved_volume.carve_volume(views, masks, lines, pool, coarse)
+        without = carved_volume.carve_volume(views, masks, None, pool, coarse)
     tops = [o.hull.cells[o.hull.inside][:, 2].max() for o in (without, with_lines)]
     assert tops[0] > HEIGHT + 0.3, "nothing but masks leaves a roof over the mouth"
     assert tops[1] < HEIGHT + 0.15

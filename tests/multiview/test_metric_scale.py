@@ -97,7 +97,7 @@ def test_a_thing_that_disagrees_with_the_others_is_named():
 def test_where_nobody_knows_a_stand_in_is_named():
     found = choose_metric_scale(size=10.0)
     assert (found.metres_per_unit, found.source) == (pytest.approx(0.05), "nobody")
-    assert "Nobody knows how large it is" in found.warnings[0]
+    assert "Its scale is unknown" in found.warnings[0]
 
 
 @pytest.mark.parametrize("metres", [0.0, -1.0, math.nan, math.inf])

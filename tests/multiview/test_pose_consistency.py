@@ -243,7 +243,7 @@ def test_poses_that_good_matches_contradict_are_hopeless(centred, monkeypatch):
 def test_shuffled_poses_are_doubted(shared_points):
     cameras = tuple(shared_points.cameras[k] for k in (2, 4, 1, 0, 3, 7, 5, 6))
     doubt = pose_consistency_doubt(replace(shared_points, cameras=cameras))
-    assert "do not agree" in doubt and "Look at the order of the pictures" in doubt
+    assert "do not agree" in doubt and "Check the order of the pictures" in doubt
 
 
 def test_a_handful_of_matches_does_not_doubt_the_poses(shared_points, monkeypatch):

@@ -44,7 +44,7 @@ def test_a_similarity_comes_apart_as_it_was_put_together(rng):
     ],
 )
 def test_what_mirrors_shears_or_projects_is_refused(bad):
-    with pytest.raises(ValueError, match="no similarity"):
+    with pytest.raises(ValueError, match="not a similarity"):
         decompose_similarity(bad)
 
 

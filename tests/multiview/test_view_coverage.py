@@ -27,7 +27,7 @@ def test_a_side_that_nobody_photographed_is_named_by_its_neighbours():
 
 @pytest.mark.parametrize(("seen", "gap"), [(90, 269), (170, 190)])
 def test_what_is_known_from_one_side_only_is_said_to_be(seen, gap):
-    """A helmet before a wall ended in a film of its front, and the fifth warning said so."""
+    """A helmet before a wall ended in a video of its front, and the fifth warning said so."""
     said = unseen_half_text(along(seen), NAMES)
     assert said is not None and "from one side only" in said
     assert f"between 24.jpg and 00.jpg lie {gap}°" in said
@@ -36,7 +36,7 @@ def test_what_is_known_from_one_side_only_is_said_to_be(seen, gap):
 
 @pytest.mark.parametrize("seen", [40, 72])
 def test_from_less_than_a_quarter_of_the_circle_nothing_says_how_deep_it_is(seen):
-    """A television seen from a fifth of it became a block of 34 cm, and was filmed."""
+    """A television seen from a fifth of it became a block of 34 cm, and was rendered."""
     why = depth_doubt_text(along(seen))
     assert why is not None and f"from {seen + 1}° of the circle" in why, "eyes go round the middle"
 

@@ -117,7 +117,7 @@ def test_a_file_with_y_up_that_should_have_z_up_is_noticed(rng):
         z_up=True,
     )
     assert off(found, made)[0] < 0.1
-    assert any("90° from it. The cameras were believed" in w for w in found.warnings)
+    assert any("90° from it. The cameras were used" in w for w in found.warnings)
 
 
 def test_cameras_that_were_held_upright_do_not_count(rng):
@@ -159,7 +159,7 @@ def test_without_cameras_what_is_usual_is_corrected_by_a_floor(rng):
     angle, floor = off(found, tilted)
     assert angle < 0.5
     assert abs(floor) < 0.004
-    assert "look at the result" in found.warnings[0]
+    assert "check the result" in found.warnings[0]
 
 
 def stool(rng):

@@ -47,19 +47,19 @@ def thrown(tmp_path_factory):
         parts, particles = (
             load(folder / STAGE_FOLDERS[v] / DATA_FILE) for v in ("segment", "fill")
         )
-        film = read_trajectory(folder / STAGE_FOLDERS["simulate"])
+        video = read_trajectory(folder / STAGE_FOLDERS["simulate"])
         names = [entry.name for entry in parts.catalogue]
-        return {name: changes(film, particles.part == k) for k, name in enumerate(names)}
+        return {name: changes(video, particles.part == k) for k, name in enumerate(names)}
 
     yield shapes
     patch.undo()
 
 
-def changes(film, mine):
+def changes(video, mine):
     """Largest shape error [-] and squeeze [m] of some particles, at any time."""
-    start = film.frames[0].position[mine].astype(float)
+    start = video.frames[0].position[mine].astype(float)
     error, squeeze = [], []
-    for frame in film.frames:
+    for frame in video.frames:
         now = frame.position[mine].astype(float)
         shift = np.linalg.norm(
             fit_rigid_motion(start, now, np.ones(len(now))).undo(now) - start, axis=1

@@ -52,7 +52,7 @@ def test_each_rise_has_the_restitution_of_its_own_blow(patient_engine, law):
     speed, e = 1.2, 0.5
     stone = steel_ball((0.003, 0.002, RADIUS + 0.001), velocity=(0, 0, -speed))
     given = problem(stone, cell=CELL, restitution=e, planes=[floor()], gravity=DOWN)
-    run = patient_engine(replace(given, blows=np.tile(law, (2, 2, 1))))
+    run = patient_engine(replace(given, restitution_law=np.tile(law, (2, 2, 1))))
     before = run.measure()
     struck = np.sqrt(speed**2 + 2 * G * 0.001)
     for _ in range(3):
@@ -231,7 +231,7 @@ def rolled_share(engine, rounded, points=300, time=0.8):
     surface = ball_surface(start, RADIUS, points)
     rows = ball_rounding(start, RADIUS, surface) if rounded else np.zeros((0, CURVATURE_COLUMNS))
     given = problem(
-        steel_ball(start, surface=surface, rounding=rows),
+        steel_ball(start, surface=surface, curvature=rows),
         cell=CELL,
         friction=0.5,
         restitution=0.6,

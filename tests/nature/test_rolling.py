@@ -22,7 +22,7 @@ def posed(*solids, gravity=(0.0, 0.0, -G), known=True):
     problem = co.pose_problem(co.prepare_scene(co.build_scene(*solids, gravity=gravity)))
     bodies = problem.bodies
     if not known:
-        bodies = tuple(replace(b, rounding=np.zeros((0, CURVATURE_COLUMNS))) for b in bodies)
+        bodies = tuple(replace(b, curvature=np.zeros((0, CURVATURE_COLUMNS))) for b in bodies)
     return replace(problem, bodies=bodies, gravity_ramp=0.0)
 
 

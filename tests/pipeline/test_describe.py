@@ -48,7 +48,7 @@ def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
     made = describe(bowl, from_pictures=[0])
     said = words(made)[("bowl_0", "bowl")]
     assert (said.structure, said.built_by, said.wall_unseen) == ("sheet", "metadata", True)
-    assert "By its name it is taken for open ware" in made.warnings[0]
+    assert "By its name it is open ware" in made.warnings[0]
     drawn = describe(bowl)
     assert words(drawn)[("bowl_0", "bowl")].structure is None and not drawn.warnings
     assert not describe(scene(THING), from_pictures=[0]).warnings
@@ -363,7 +363,7 @@ def test_a_model_that_contradicts_what_the_file_states_is_believed_and_told_once
     assert inventory.warnings == (
         "duck_0: the file states a wall 2 mm thick for body, the model said a wall 0.4 mm thick; "
         "the file states soft_PVC, a wall 2 mm thick for beak, the model said ABS, solid. "
-        "The latter was believed; --annotations decides.",
+        "The latter was used; --annotations decides.",
     )
     block = ("block_0", [("block", plain(), {"substance": "wood", "shell_thickness_m": 0.0})])
     oracle = Oracle(parts=whole("block"), materials=made_of(part("block", "wood", "hollow")))

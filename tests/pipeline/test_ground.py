@@ -63,7 +63,7 @@ def test_an_unknown_part_gets_a_stated_stand_in_and_a_warning():
     assert field.materials[0].name == "plastics-PP"
     assert field.words[0].material is None
     assert {g.chosen_by for g in field.materials[0].grounds.values()} == {"fallback"}
-    assert "Nobody knows" in field.materials[0].grounds["young"].reason
+    assert "of this part is unknown" in field.materials[0].grounds["young"].reason
     (warning,) = grounding_warnings(field, parts, made)
     assert warning.startswith("riddle_0: riddle is of unknown material")
     named = replace(made, objects=tuple(replace(o, name="riddle") for o in made.objects))
@@ -322,7 +322,7 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
     assert len(first["values"]["density"]["source"]) > 20
     assert (second["recognised"], second["material"]) == (None, "plastics-PP")
     (warning,) = grounding_warnings(field, parts, made)
-    assert warning.startswith("block_0: block: grip is of unknown material; plastics-PP stands in")
+    assert warning.startswith("block_0: block: grip is of unknown material; plastics-PP is assumed")
 
 
 @pytest.mark.parametrize(

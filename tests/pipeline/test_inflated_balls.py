@@ -36,7 +36,7 @@ def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
     skin = 1100 * 4 * np.pi * RADIUS**2 * 0.003
     assert particles.mass.sum() == pytest.approx(skin + 2.15 * volume, rel=0.05)
     np.testing.assert_allclose(particles.density, particles.mass.sum() / volume, rtol=0.02)
-    assert particles.treatments[0].young == structure.contents.young
+    assert particles.treatments[0].simulated_young_pa == structure.contents.young
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
     assert contents.loss == pytest.approx(loss_of_restitution(rebound or INFLATED_BALL_RESTITUTION))
     made = ready.particles.treatments[0]
     grid = GRID_LOSS_FACTOR / MIN_CELLS_FOR_GRID_LOSS**2 + vibration_loss(
-        made.density, 6.0, made.young
+        made.density, 6.0, made.simulated_young_pa
     )
     assert made.loss == pytest.approx(contents.loss - grid, abs=0.006)
 

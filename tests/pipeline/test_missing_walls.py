@@ -58,8 +58,8 @@ def filled(*parts):
 
 def test_a_box_weighs_the_same_whether_its_top_is_drawn_or_hidden_below_foam(drawn, hidden):
     assert hidden.mass_real[0] == pytest.approx(drawn.mass_real[0], rel=0.03)
-    assert "closed, though not shown, below what is soft" in hidden.fills[0]
-    assert "not shown" not in drawn.fills[0]
+    assert "closed below the soft part on it, though not drawn" in hidden.fills[0]
+    assert "not drawn" not in drawn.fills[0]
 
 
 def test_its_top_weighs_where_it_is(drawn, hidden):
@@ -88,12 +88,12 @@ def test_a_slab_bridges_a_hollow():
     particles = filled(*box_under(GRANITE))
     walls = 2 * HIGH * (LONG + WIDE) + LONG * WIDE
     assert particles.mass_real[0] == pytest.approx(PLYWOOD.density * T * walls, rel=0.05)
-    assert "not shown" not in particles.fills[0]
+    assert "not drawn" not in particles.fills[0]
 
 
 def test_nothing_is_closed_above_foam():
     upper, lower = (block(HIGH, 0.1, without=-1), PLYWOOD, WALL), block(0.1, 0.0, without=1)
-    assert "not shown" not in filled(upper, (lower, FOAM, SOLID)).fills[0]
+    assert "not drawn" not in filled(upper, (lower, FOAM, SOLID)).fills[0]
 
 
 def test_a_scene_is_weighed_with_its_hidden_tops(hidden):

@@ -29,7 +29,10 @@ def test_a_stem_that_ends_on_sand_is_drawn_out_into_it():
     scene, parts, field = planted()
     drawn, said = extend_plants_into_ground(scene, parts, field)
     assert lowest(drawn) == pytest.approx([0.0, TOP - 0.2 * HEIGHT])
-    assert "thing_1 grows from what it stands on" in said[0] and "0.1 m deeper" in said[0]
+    assert (
+        "thing_1 grows from what it stands on" in said[0]
+        and "0.1 m below the visible end" in said[0]
+    )
     before, after = (np.concatenate([v.vertices for v in s.surfaces]) for s in (scene, drawn))
     moved = before[:, 2] != after[:, 2]
     assert before[moved, 2].max() < TOP + 0.05 * HEIGHT
@@ -76,4 +79,4 @@ def test_fill_fills_the_foot_and_says_so():
     particles = fill(*planted())
     wood = particles.part == 1
     assert particles.position[wood, 2].min() == pytest.approx(TOP - 0.2 * HEIGHT, abs=0.02)
-    assert any("0.1 m deeper" in w for w in particles.warnings)
+    assert any("0.1 m below the visible end" in w for w in particles.warnings)

@@ -17,9 +17,8 @@ from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.pipeline.stages.reconstruct import reconstruct
 from corporeal.reconstruction.features import point_features
-from corporeal.reconstruction.gaussians import radiance_field, visual_hull
-from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.surface import closed_surface
+from corporeal.reconstruction.gaussians import radiance_field
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig, ReconstructionResolution
 from corporeal.scene.repose_reconstruction import repose_reconstruction
 from corporeal.vlm.photographed_objects import PhotoInterview, SeenObject
 from gaussian_boxes import DOWN, box, together
@@ -30,14 +29,8 @@ MIDDLES = ((0.0, 0.0, 0.1), (0.45, 0.1, 0.15))
 """Of two boxes that stand on the floor."""
 
 
-@pytest.fixture(scope="module", autouse=True)
-def fewer_cameras():
-    """Look at splats in fewer and smaller pictures, and carve more coarsely, than for people."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(stage, "RENDERED_VIEWS", 16)
-        patch.setattr(stage, "RENDERED_SIZE_PX", (160, 160))
-        patch.setattr(closed_surface, "OBJECT_GRID_CELLS", 250_000)
-        yield
+COARSE = ReconstructConfig(resolution=ReconstructionResolution(16, (160, 160), 100_000, 250_000))
+"""Looks at splats in fewer and smaller pictures, and carves more coarsely, than for people."""
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +44,7 @@ def splat(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(splat):
-    config = ReconstructConfig(things=("crate", "blue pillar"))
+    config = replace(COARSE, object_names=("crate", "blue pillar"))
     return reconstruct(splat, config, ("crate=0.4",))
 
 
@@ -130,8 +123,8 @@ def test_gaussians_follow_their_objects_beside_others(made):
     np.testing.assert_allclose(shift[:, 2], found.object_of_gaussian == 1, atol=1e-5)
     results = StageResults(reconstruct=found, assemble=more)
     assert results.reconstruction is not None
-    assert results.filmed is None, "the ball has no Gaussians"
-    assert StageResults(reconstruct=found, assemble=scene).filmed is not None
+    assert results.rendered_reconstruction is None, "the ball has no Gaussians"
+    assert StageResults(reconstruct=found, assemble=scene).rendered_reconstruction is not None
 
 
 def test_the_report_is_told_how_it_came_about(made):
@@ -163,7 +156,7 @@ class Seer(PhotoInterview):
 
 
 def test_somebody_who_sees_the_pictures_names_things_and_their_sizes(splat):
-    result = reconstruct(splat, viewer=Seer())
+    result = reconstruct(splat, COARSE, viewer=Seer())
     found, scene = result.found, result.scene
     assert [o.class_name for o in scene.objects] == ["crate", "pillar"]
     assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
@@ -191,10 +184,9 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
 
     monkeypatch.setattr(stage, "assign_instances", stopped)
     monkeypatch.setattr(point_features, "connect_encoder", lambda spec, folder: Colours())
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 100_000)
-    monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", radiance_field.FieldPreset(100, 160))
-    monkeypatch.setattr(radiance_field, "RAYS_PER_STEP", 2048)
-    config = ReconstructConfig(things=("a", "b"), training="draft", lifting=lifting)
+    small = radiance_field.FieldPreset(100, 160, 2048)
+    monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", small)
+    config = replace(COARSE, object_names=("a", "b"), training="draft", lifting=lifting)
     with pytest.raises(Enough) as caught:
         reconstruct(splat, config)
     (cloud,) = caught.value.args
@@ -214,13 +206,21 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     [
         ({"count": 0}, (), "--count is 0"),
         ({"semantic": "bert"}, (), "Unknown picture encoder 'bert'"),
-        ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
+        (
+            {"count": 3, "object_names": ("crate",)},
+            (),
+            "--count is 3, but --object-names names 1 objects",
+        ),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
         ({"floor_at": float("nan")}, (), "--floor-at is nan"),
         ({"training_seed": -1}, (), "--training-seed is -1"),
         ({"apart": "masks"}, (), "is a splat, which has no instance masks"),
-        ({"things": ("crate", "pillar")}, ("box=1",), "no object 'box'. Choose one of: crate, pil"),
-        ({}, ("box=1",), "no object 'box'. Name it with --things"),
+        (
+            {"object_names": ("crate", "pillar")},
+            ("box=1",),
+            "no object 'box'. Choose one of: crate, pil",
+        ),
+        ({}, ("box=1",), "no object 'box'. Name it with --object-names"),
         (
             {"known_distance": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)},
             (),
@@ -233,4 +233,4 @@ def test_options_that_make_no_sense_are_refused_before_anything_is_done(
 ):
     monkeypatch.setattr(stage, "turn_upright", None)
     with pytest.raises(UserError, match=told):
-        reconstruct(splat, ReconstructConfig(**config), extents)
+        reconstruct(splat, replace(COARSE, **config), extents)

@@ -40,17 +40,17 @@ def test_who_must_give_masks_hears_where_doubted_ones_lie(tmp_path, monkeypatch,
     monkeypatch.setattr(stage, "turn_upright", lambda *_: replace(taken, masks=room))
     if doubted:
         (tmp_path / "doubted" / "masks").mkdir(parents=True)
-    with pytest.raises(UserError, match="would go on beyond the pictures") as said:
+    with pytest.raises(UserError, match="would extend beyond the pictures") as said:
         stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
     place = tmp_path / "doubted"
-    assert (f"lie in {place / 'masks'}: look at them" in str(said.value)) == doubted
+    assert (f"lie in {place / 'masks'}: check and correct them" in str(said.value)) == doubted
     assert str(said.value).endswith(f"--masks {place}.") == doubted
 
 
 def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
     assert describe_masks_in(None) == describe_masks_in(tmp_path) == ""
     (tmp_path / "doubted" / "masks").mkdir(parents=True)
-    assert f"not believed, lie in {tmp_path / 'doubted' / 'masks'}" in describe_masks_in(tmp_path)
+    assert f"rejected, lie in {tmp_path / 'doubted' / 'masks'}" in describe_masks_in(tmp_path)
     (tmp_path / "masks").mkdir()
     assert f"colours lie in {tmp_path / 'masks'}" in describe_masks_in(tmp_path), (
         "those that were used"
@@ -73,7 +73,7 @@ def test_where_shapes_are_made_up_is_read_first_and_said_before_a_refusal(tmp_pa
     room = replace(taken, masks=np.ones((4, 6, 8), np.bool_))
     monkeypatch.setattr(stage, "gaussians_from_source", lambda *_: (taken, False))
     monkeypatch.setattr(stage, "turn_upright", lambda *_: room)
-    with pytest.raises(UserError, match="would go on beyond") as said:
+    with pytest.raises(UserError, match="would extend beyond") as said:
         stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
     assert half in said.value.__notes__
 
@@ -93,7 +93,7 @@ def test_who_goes_on_without_masks_hears_where_doubted_ones_lie(tmp_path, monkey
     with pytest.raises(ZeroDivisionError):
         stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
     (said,) = went_on[0].doubts
-    assert "without masks" in said and said.endswith(f"--masks {tmp_path / 'doubted'}.")
+    assert "Without masks" in said and said.endswith(f"--masks {tmp_path / 'doubted'}.")
 
 
 @pytest.mark.parametrize(("count", "refused"), [(None, True), (2, False)])

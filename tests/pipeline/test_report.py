@@ -55,8 +55,8 @@ def test_a_number_is_written_as_a_person_would(value, unit, said):
 
 def treated(kind, young):
     numbers = {"poisson": 0.3, "density": 1.0, "yield_stress": None, "thickness": None}
-    numbers |= {"strain": 0.0, "impact_speed": 0.0, "wave_speed": 1.0, "step": 1.0, "why": ""}
-    return Discretization(kind=kind, young_real=1e9, young=young, **numbers)
+    numbers |= {"strain": 0.0, "impact_speed": 0.0, "wave_speed": 1.0, "step": 1.0, "reason": ""}
+    return Discretization(kind=kind, young_pa=1e9, simulated_young_pa=young, **numbers)
 
 
 def test_the_real_stiffness_stands_beside_the_simulated_one():
@@ -119,8 +119,8 @@ def page(tmp_path):
         told = replace(told, objects=(ObjectDescription("thing_0", "thing", (words,)),))
         parts = segment(made, told)
         field = ground(made, parts, told)
-        film = Video(tmp_path / "film.mp4", 24, 64, 64)
-        film.path.write_bytes(b"")
+        video = Video(tmp_path / "video.mp4", 24, 64, 64)
+        video.path.write_bytes(b"")
         particles = fill(made, parts, field)
         report(
             ReportContent(
@@ -128,7 +128,7 @@ def page(tmp_path):
                 parts,
                 field,
                 particles,
-                film,
+                video,
                 run_audit(**audit),
                 {},
                 materials.cited_sources(),
@@ -181,7 +181,7 @@ def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
 
 def test_a_long_reason_that_all_values_share_is_said_once(page):
     told = page(PartDescription("", None))
-    reason = "Nobody knows what this part is made of"
+    reason = "The material of this part is unknown"
     assert told.count(f"Reason where none is stated: {reason}") == 1
     assert told.count(reason) == 1
     usual = page(PartDescription("", "steel", answered_by="metadata"))
@@ -189,7 +189,7 @@ def test_a_long_reason_that_all_values_share_is_said_once(page):
 
 
 def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
-    """It began with a wall of text, and doubts stood below the film."""
+    """It began with a wall of text, and doubts stood below the video."""
     warnings = (
         Note("2 of 10 photographs were left out: a.jpg.", NoteKind.LEFT_OUT),
         Note("thing_0: nobody looked into it. With --vlm somebody does.", NoteKind.ASSUMED),

@@ -87,17 +87,18 @@ def test_both_masses_stand_side_by_side(life, large, tmp_path):
     real = life[3].mass_real[0]
     told = page(scale_scene(a_can("a recorded answer"), 5.0), large, tmp_path)
     assert f">{describe_mass(125 * real, 5.0)}<" in told
-    assert f"{125 * real:.3g} ({real:.3g} in life)" == describe_mass(125 * real, 5.0)
+    assert f"{125 * real:.3g} ({real:.3g} in reality)" == describe_mass(125 * real, 5.0)
     assert (
         "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with "
         "their object"
     ) in told
     assert (
-        f"In life, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick." in told
+        f"At real size, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick."
+        in told
     )
     assert "<td>wall thickness</td>" not in told, "the wall is as stated, not as its material says"
     assert "life-size" not in page(a_can(), life, tmp_path)
-    assert "in life" not in page(a_can(), life, tmp_path).lower()
+    assert "in reality" not in page(a_can(), life, tmp_path).lower()
 
 
 def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):
@@ -116,10 +117,10 @@ def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):
 
 def page(scene, made, folder):
     _, parts, field, particles = made
-    film = Video(folder / "film.mp4", 24, 64, 64)
-    film.path.write_bytes(b"")
+    video = Video(folder / "video.mp4", 24, 64, 64)
+    video.path.write_bytes(b"")
     story = ReportContent(
-        scene, parts, field, particles, film, run_audit(), {}, materials.cited_sources()
+        scene, parts, field, particles, video, run_audit(), {}, materials.cited_sources()
     )
     report(story, folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")
@@ -206,13 +207,15 @@ def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
     gentle = ExpectedMotion(impact_speed=0.3, acceleration=9.81)
     (treated,) = plan_discretization([stick], [gentle], "fine").treatments
     assert treated.kind == "deformable"
-    assert "At its real size, 0.2 times this one, it would be judged otherwise" in treated.why
+    assert "At its real size, 0.2 times this one, it would be judged otherwise" in treated.reason
     assert (
         "otherwise"
-        not in plan_discretization([replace(stick, scale=1.0)], [gentle], "fine").treatments[0].why
+        not in plan_discretization([replace(stick, scale=1.0)], [gentle], "fine")
+        .treatments[0]
+        .reason
     )
     stiff = replace(stick, material=replace(gel, young=1e11))
-    assert "otherwise" not in plan_discretization([stiff], [gentle], "fine").treatments[0].why
+    assert "otherwise" not in plan_discretization([stiff], [gentle], "fine").treatments[0].reason
 
 
 @pytest.mark.slow
@@ -227,7 +230,7 @@ def test_a_scene_of_the_showcase_at_another_scale_has_the_same_answers(name, k):
     assert other[2].structures == field.structures
     assert np.array(other[3].mass_real) / k**3 == pytest.approx(particles.mass_real, rel=1e-9)
     for a, b in zip(particles.treatments, other[3].treatments, strict=True):
-        assert a.kind == b.kind or "flex" in b.why
+        assert a.kind == b.kind or "flex" in b.reason
 
 
 @pytest.mark.slow

@@ -129,7 +129,7 @@ def test_what_nobody_looked_at_is_said_to_be_one_material():
     made, green = potted()
     words = told(("red pot", "ceramic"), ("green leaves", "leaves-flowers"), vase_by="metadata")
     (warning,) = segment(made, words, found=seen(made, green)).warnings
-    assert warning.startswith("vase: nobody looked what it is made up of.")
+    assert warning.startswith("vase: the pieces of this object are unknown.")
     assert segment(made, words).warnings == (), "a model's own nodes are its parts"
     unknown = told(("red pot", "ceramic"), ("green leaves", "leaves-flowers"), vase_by="unknown")
     assert segment(made, unknown, found=seen(made, green)).warnings == (), "ground says more"

@@ -1,6 +1,7 @@
 """A scene that had come to rest begins in its balance; one that does not say so begins as it is."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,10 +22,11 @@ from corporeal.core.types import (
 )
 from corporeal.discretization.build_model import build_model
 from corporeal.mpm.cpu.engine import CpuEngine
+from corporeal.pipeline.stages import simulate as stage
 from corporeal.pipeline.stages.simulate import SETTLING_FILE, SimulateConfig, simulate
-from corporeal.simulation import checkpoint
 from corporeal.simulation.audit_file import read_audit
 from corporeal.simulation.audit_messages import equilibrium_message, equilibrium_warnings
+from corporeal.simulation.checkpoint import CheckpointConfig, Checkpoints
 from corporeal.simulation.static_equilibrium import settling_problem
 
 CELL, SIZE = 0.02, 0.08
@@ -178,8 +180,8 @@ def test_what_is_all_rigid_begins_at_once(tmp_path):
 def test_a_settling_that_was_cut_off_goes_on_to_the_last_bit(tmp_path, monkeypatch):
     asked = scene_of((0.0, SIZE), (FOAM, STONE))
     whole = simulate(*asked, ASKED, tmp_path / "whole")
-    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
-    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
+    often = CheckpointConfig(min_interval_s=0.0, max_write_time_fraction=np.inf)
+    monkeypatch.setattr(stage, "Checkpoints", partial(Checkpoints, config=often))
 
     class KilledError(BaseException):
         pass
@@ -222,7 +224,7 @@ def test_what_is_lossy_sinks_as_far_as_what_is_not(tmp_path):
     assert sunk[0.6] == pytest.approx(sunk[0.0], rel=0.05)
 
 
-def test_equilibrium_is_sought_without_loss_and_the_film_has_it():
+def test_equilibrium_is_sought_without_loss_and_the_video_has_it():
     scene, particles, field = scene_of((0.0,), (replace(FOAM, loss=0.6),))
     problem = build_model(scene, particles, field).problem
     lost = []

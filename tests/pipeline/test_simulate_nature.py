@@ -1,6 +1,7 @@
 """Small real scenes through the whole stage, with the production engine."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -24,9 +25,10 @@ from corporeal.discretization.discretization_plan import (
 from corporeal.discretization.point_filling import fill_body
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.pipeline.stages import simulate as stage
 from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
-from corporeal.simulation import checkpoint
 from corporeal.simulation.audit_file import read_audit
+from corporeal.simulation.checkpoint import CheckpointConfig, Checkpoints
 from corporeal.simulation.outcome import measure_outcome
 from corporeal.simulation.trajectory_files import read_trajectory
 
@@ -178,8 +180,8 @@ def test_two_balls_that_meet_part_again_and_one_field_glues_them(tmp_path):
 
 def test_a_run_that_was_cut_off_ends_exactly_like_one_that_was_not(bounce, tmp_path, monkeypatch):
     asked, whole, _ = bounce
-    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
-    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
+    often = CheckpointConfig(min_interval_s=0.0, max_write_time_fraction=np.inf)
+    monkeypatch.setattr(stage, "Checkpoints", partial(Checkpoints, config=often))
 
     def cut(fraction, words):
         if fraction > 0.4:

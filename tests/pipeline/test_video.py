@@ -101,7 +101,7 @@ def red(picture):
     return p[..., 0] > 1.6 * p[..., 2]
 
 
-def test_a_film_has_all_frames_and_any_browser_plays_it(tmp_path):
+def test_a_video_has_all_frames_and_any_browser_plays_it(tmp_path):
     told = []
     made = render_video(play(cube(), spin), SMALL, tmp_path, lambda f, words: told.append(f))
     assert (made.width, made.height, made.fps) == (128, 96, 60)
@@ -113,11 +113,11 @@ def test_a_film_has_all_frames_and_any_browser_plays_it(tmp_path):
     data = made.path.read_bytes()
     assert data.find(b"moov") < data.find(b"mdat"), "a browser wants the index first"
     assert told == sorted(told) and told[-1] == 1.0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "thumbnail.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["video.mp4", "thumbnail.png"]
     assert np.asarray(Image.open(tmp_path / "thumbnail.png")).shape == (96, 128, 3)
 
 
-def test_the_film_carries_whom_to_thank_for_what_is_seen(tmp_path):
+def test_the_video_carries_whom_to_thank_for_what_is_seen(tmp_path):
     played = play(cube(), spin, 2)
     scene = played.prepared.scene
     things = [
@@ -181,7 +181,7 @@ def test_frames_are_read_one_by_one_and_few_are_kept(tmp_path):
     assert len(given.trajectory.frames.asked) <= 3 * 6
 
 
-def test_a_failed_film_says_so_and_leaves_nothing(tmp_path, monkeypatch):
+def test_a_failed_video_says_so_and_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(video_file, "X264_CRF", "nonsense")
     with pytest.raises(UserError, match="ffmpeg"):
         render_video(play(cube(), spin), SMALL, tmp_path)
@@ -198,7 +198,7 @@ def test_a_full_disk_is_one_clear_sentence(tmp_path):
     full = Path("/dev/full")
     if not full.exists():
         pytest.skip("this system has no /dev/full")
-    (tmp_path / f".{video_file.Path('film').stem}.part.mp4").symlink_to(full)
+    (tmp_path / f".{video_file.Path('video').stem}.part.mp4").symlink_to(full)
     with pytest.raises(UserError, match=r"disk is full|ffmpeg failed"):
         render_video(play(cube(), spin), SMALL, tmp_path)
 
@@ -208,7 +208,7 @@ def test_odd_sizes_are_refused_with_a_reason(tmp_path):
         render_video(play(cube(), spin), VideoConfig(width=127, height=96), tmp_path)
 
 
-def test_a_slow_film_is_longer_and_every_picture_knows_its_time(tmp_path):
+def test_a_slow_video_is_longer_and_every_picture_knows_its_time(tmp_path):
     """Nothing touches here: all of it is slow."""
     made = render_video(play(cube(), spin), replace(SMALL, slow=2.0), tmp_path)
     assert len(made.times) == len(video_file.read_frames(made.path, list(range(11)))) == 11
@@ -249,12 +249,12 @@ def test_a_camera_goes_by_where_most_of_a_thing_is_and_sees_all_of_what_keeps_it
     assert (high - low).max() < 0.13
 
 
-def test_what_is_no_film_is_said_in_one_line(tmp_path):
-    path = tmp_path / "film.mp4"
-    with pytest.raises(UserError, match=r"film\.mp4: there is no such film\. Make it again\.$"):
+def test_what_is_no_video_is_said_in_one_line(tmp_path):
+    path = tmp_path / "video.mp4"
+    with pytest.raises(UserError, match=r"video\.mp4: there is no such video\. Make it again\.$"):
         video_file.read_frames(path, [0])
-    path.write_bytes(b"no film at all" * 100)
+    path.write_bytes(b"no video at all" * 100)
     for read in (video_file.count_frames, lambda p: video_file.read_frames(p, [0])):
-        with pytest.raises(UserError, match=r"cannot be read as a film \(.+\)\. Make it") as said:
+        with pytest.raises(UserError, match=r"cannot be read as a video \(.+\)\. Make it") as said:
             read(path)
         assert "\n" not in str(said.value)

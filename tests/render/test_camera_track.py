@@ -1,4 +1,4 @@
-"""Where a film's camera stands, and when it is slow."""
+"""Where a video's camera stands, and when it is slow."""
 
 import warnings
 
@@ -99,7 +99,7 @@ def test_the_first_contact_is_that_of_two_objects_or_else_with_the_floor():
     assert first_contact(type(told)(**{**vars(told), "first_contact": nothing}), 2) is None
 
 
-def test_a_film_in_real_time_has_every_frame_once():
+def test_a_video_in_real_time_has_every_frame_once():
     np.testing.assert_array_equal(frame_positions(TIME, 1.0, 0.4), np.arange(31))
 
 

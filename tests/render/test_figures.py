@@ -51,16 +51,14 @@ def row_of_blocks(count, names=None):
     return scene, parts, MaterialField(tuple(made), solid, words, pair, pair)
 
 
-@pytest.fixture
-def coarse(monkeypatch):
-    """Draw small pictures into the panels: the layout of the page does not depend on them."""
-    monkeypatch.setattr(figures, "PANEL_SIZE_PX", (130, 98))
+COARSE = (130, 98)
+"""Small pictures: the layout of the page does not depend on them [px]."""
 
 
 @pytest.mark.parametrize("count", [1, 30])
-def test_the_figure_takes_any_number_of_parts(count, tmp_path, coarse):
+def test_the_figure_takes_any_number_of_parts(count, tmp_path):
     scene, parts, field = row_of_blocks(count)
-    fields_figure(scene, parts, field, tmp_path / "fields.png")
+    fields_figure(scene, parts, field, tmp_path / "fields.png", COARSE)
     picture = np.asarray(Image.open(tmp_path / "fields.png").convert("RGB"))
     assert picture.shape[0] > 800 and picture.shape[1] > 1200
     edge = np.concatenate([picture[:, 0], picture[:, -1], picture[0], picture[-1]])
@@ -72,14 +70,14 @@ def apart(one, other):
 
 
 @pytest.mark.parametrize("count", [1, 2, 30])
-def test_no_label_covers_another(tmp_path, monkeypatch, coarse, count):
+def test_no_label_covers_another(tmp_path, monkeypatch, count):
     drawn, place = [], figures.panel_legend
     monkeypatch.setattr(
         figures,
         "panel_legend",
         lambda *asked: drawn.append((asked[2], place(*asked))) or drawn[-1][1],
     )
-    fields_figure(*row_of_blocks(count), tmp_path / "fields.png")
+    fields_figure(*row_of_blocks(count), tmp_path / "fields.png", COARSE)
     wide, high = figures.SHEET_PANEL_SIZE_PX
     pictures = [(x, y, x + wide, y + high) for (x, y), _ in drawn]
     labels = [line.box() for _, key in drawn for line in key.lines]
@@ -152,8 +150,8 @@ def test_numbers_are_written_as_people_read_them():
     assert si_prefix_text(0.37, "") == "0.37"
 
 
-def test_a_strip_shows_the_film_from_first_to_last_frame(tmp_path):
-    path = tmp_path / "film.mp4"
+def test_a_strip_shows_the_video_from_first_to_last_frame(tmp_path):
+    path = tmp_path / "video.mp4"
     with video_file.open_video(path, 10, (64, 48)) as reel:
         for k in range(11):
             reel.add(np.full((48, 64, 3), 20 * k, np.uint8))
@@ -165,13 +163,13 @@ def test_a_strip_shows_the_film_from_first_to_last_frame(tmp_path):
     assert (picture[24, 64:70] == 255).all(), "a white gap"
 
 
-def test_a_short_film_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_path):
-    path = tmp_path / "film.mp4"
+def test_a_short_video_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_path):
+    path = tmp_path / "video.mp4"
     with video_file.open_video(path, 10, (64, 48)) as reel:
         reel.add(np.zeros((48, 64, 3), np.uint8))
     write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png", width=64)
     assert Image.open(tmp_path / "strip.png").size[0] == 64
-    path.write_bytes(b"not a film")
+    path.write_bytes(b"not a video")
     with pytest.raises(UserError, match="Make it again"):
         write_filmstrip(Video(path, 10, 64, 48), tmp_path / "strip.png")
 

@@ -1,4 +1,4 @@
-"""When a film's picture is the one before."""
+"""When a video's picture is the one before."""
 
 import numpy as np
 import pytest

@@ -67,11 +67,11 @@ def test_a_normal_in_two_bytes_is_within_a_degree_and_a_half():
     assert angle.max() < 1.5
 
 
-def test_vertices_and_normals_of_the_take_are_those_of_the_film(played):
+def test_vertices_and_normals_of_the_take_are_those_of_the_video(played):
     cast = bind_scene(played.prepared)
     recording = record_trajectory(cast, played.trajectory)
     header, data = read(viewer_recording(played.prepared, cast, played.outcome, recording))
-    assert header["film"]["time"] == recording.time.tolist()
+    assert header["video"]["time"] == recording.time.tolist()
     assert [o["rigid"] for o in header["objects"]] == [False, True]
     times = played.trajectory.time
     numbers = [int(np.argmin(np.abs(times - time))) for time in recording.time]
@@ -79,10 +79,10 @@ def test_vertices_and_normals_of_the_take_are_those_of_the_film(played):
 
 
 def assert_played(cast, frames, header, data):
-    """The page's vertices lie within .05 mm of the film's, its normals within 1.5 degrees."""
+    """The page's vertices lie within .05 mm of the video's, its normals within 1.5 degrees."""
     count = len(frames)
     posed = [cast.skin.pose(frame) for frame in frames]
-    for k, (told, mine) in enumerate(zip(header["film"]["objects"], cast.vertices, strict=True)):
+    for k, (told, mine) in enumerate(zip(header["video"]["objects"], cast.vertices, strict=True)):
         pose = array(told["pose"], data).reshape(count, 12).astype(float)
         shift, normal = np.zeros((count, len(mine), 3)), None
         if "residual" in told:
@@ -116,7 +116,7 @@ SEVEN = tuple(SHOWCASE_SCENE_BUILDERS)[:7]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEVEN)
-def test_the_page_plays_every_scene_of_the_showcase_as_its_film_does(name):
+def test_the_page_plays_every_scene_of_the_showcase_as_its_video_does(name):
     prepared = co.prepare_scene(co.showcase_scene(name))
     cast = bind_scene(prepared)
     frames = [bent(prepared.particles, t) for t in (0.0, 0.5, 1.0)]

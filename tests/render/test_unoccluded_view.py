@@ -1,4 +1,4 @@
-"""The film looks from where things can be seen."""
+"""The video looks from where things can be seen."""
 
 import numpy as np
 import pytest
@@ -28,14 +28,14 @@ def looked_for(scene):
     return unoccluded_view([RayScene(scene)], owner, np.array([boxes]), SIZE)
 
 
-def test_what_lies_in_a_bowl_is_filmed_from_above():
+def test_what_lies_in_a_bowl_is_shown_from_above():
     scene = co.build_scene(bowl(), co.ball("glass", radius=0.012, at=(0.02, 0, 0.019)))
     view = looked_for(scene)
     assert view is not None and np.degrees(np.arcsin(view[2])) > 30
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_what_stands_free_is_filmed_as_usual(count):
+def test_what_stands_free_is_shown_as_usual(count):
     things = [co.box("wood", (0.1, 0.1, 0.1), at=(0, 0.3 * k, 0.05)) for k in range(count)]
     assert looked_for(co.build_scene(*things)) is None
 

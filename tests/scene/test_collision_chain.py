@@ -91,7 +91,7 @@ def test_how_fast_the_last_is_struck_scales_with_the_scene():
     assert np.allclose(blown_up.velocity, 2 * small.velocity, rtol=1e-6)
 
 
-def test_the_film_lasts_until_the_last_was_struck():
+def test_the_video_lasts_until_the_last_was_struck():
     still = row(4.0, 2.0, 1.0, gap=0.1)
     action = begin_interaction(still.bodies, still.poses, "chain", np.random.default_rng(0))
     assert action.entries[0].name == "cube_0" and "into cube_1" in action.words

@@ -58,7 +58,6 @@ def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
     for _ in range(3):
         engine.step()
     assert engine.data.ncon > 300 and engine.data.nefc == 6 * engine.data.ncon
-    monkeypatch.setattr(settle_mujoco, "CONTACT_MEMORY_BYTES", 1 << 22)
-    cramped = settle_mujoco.MujocoScene([plate, brush], poses, DropConfig.step)
+    cramped = settle_mujoco.MujocoScene([plate, brush], poses, DropConfig.step, 1 << 22)
     with pytest.raises(UserError, match="more places"):
         cramped.step()

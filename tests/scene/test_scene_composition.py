@@ -52,9 +52,9 @@ def test_a_scene_that_was_settled_before_there_was_a_choice_of_engines_opens(tmp
 def test_another_file_is_refused_in_one_sentence(tmp_path, text):
     (tmp_path / "composition.json").write_text(text)
     (tmp_path / "certificate.json").write_text(text)
-    with pytest.raises(BadFileError, match=r"no composition .* Assemble the scene again"):
+    with pytest.raises(BadFileError, match=r"not a composition .* Assemble the scene again"):
         read_composition(tmp_path)
-    with pytest.raises(BadFileError, match=r"no certificate .* Assemble the scene again"):
+    with pytest.raises(BadFileError, match=r"not a certificate .* Assemble the scene again"):
         read_certificate(tmp_path)
 
 

@@ -163,7 +163,7 @@ def said(*bodies, seconds=1.0, quiet=True):
 )
 def test_a_result_that_makes_no_sense_is_refused(fake, text, words):
     fake(f"say {text}")
-    with pytest.raises(BlenderError, match=f"its result makes no sense: .*{words}"):
+    with pytest.raises(BlenderError, match=f"its result is invalid: .*{words}"):
         drop_in_blender([box(0.4, 0.3, 0.2)], [BodyPose((0.0, 0.0, 1.0))])
 
 

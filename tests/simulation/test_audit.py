@@ -200,7 +200,7 @@ def test_the_stone_bounced_and_kept_its_shape(seen):
 
 @pytest.mark.parametrize(("gap", "order"), [(1.0, (("clay_0", "stone_0"),)), (0.45, ())])
 def test_what_meets_before_the_second_frame_was_apart_if_there_was_a_gap(story, gap, order):
-    """Ways between things in a row are crossed sooner than a film can show."""
+    """Ways between things in a row are crossed sooner than a video can show."""
     scene, particles, field, trajectory = story
     ledger = deepcopy(trajectory.ledger)
     ledger.first_contact[-1, 0, 1] = 0.4 / FPS

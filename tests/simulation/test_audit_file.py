@@ -35,10 +35,10 @@ BEFORE = {
     "max_penetration_dx": 0.2, "floor_penetration_m": 0.002, "pair_penetration_m": 0.0,
     "parts": [{
         "name": "can", "object": "can_0", "material": "steel", "law": "von_mises",
-        "treatment": "rigid", "structure": "filled", "E": 2e11, "E_sim": 2e11, "nu": 0.3,
+        "treatment": "rigid", "structure": "filled", "young_pa": 2e11, "simulated_young_pa": 2e11, "nu": 0.3,
         "density": 7850.0, "density_sim": 7850.0, "yield_stress": 3e8, "yield_stress_sim": 3e8,
         "thickness_m": 0.0002, "contents": "soup", "fill": 0.9, "thickness_sim_m": None,
-        "mass_kg": 0.4, "real_mass_kg": 0.4, "why": "Rigid.",
+        "mass_kg": 0.4, "real_mass_kg": 0.4, "reason": "Rigid.",
     }],
     "settling": {"seconds": 0.5, "found": True, "objects": [
         {"name": "can_0", "moved_m": [0.0, 0.0, -0.01], "moved_dx": 1.0, "farthest_m": 0.02}]},
@@ -84,7 +84,7 @@ def test_a_kind_that_there_is_not_is_refused(tmp_path):
 def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
     store.write_json(tmp_path / AUDIT_FILE, BEFORE)
     found = read_run_audit(tmp_path)
-    assert found.parts[0].E == 2e11 and found.parts[0].contents == "soup"
+    assert found.parts[0].young_pa == 2e11 and found.parts[0].contents == "soup"
     assert found.outcome.pair("floor", "can_0").contact_point == (0.0, 0.0, 0.0)
     assert found.outcome.objects["can_0"].moved_m == (0.0, 0.0, -0.1)
     assert found.questions == NO_USAGE

@@ -19,12 +19,6 @@ from corporeal.simulation.checkpoint import (
 STATE = {"place": np.arange(12.0).reshape(4, 3), "clock": np.float64(0.5)}
 
 
-@pytest.fixture(autouse=True)
-def often(monkeypatch):
-    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 0.0)
-    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", np.inf)
-
-
 def a_folder(path, done):
     """A run with ``done`` frames."""
     for number in range(done):
@@ -121,8 +115,6 @@ def test_one_whose_frames_are_gone_is_not_used(tmp_path, caplog):
 def test_writing_them_takes_a_small_share_of_the_time(tmp_path, monkeypatch):
     clock = [0.0]
     monkeypatch.setattr(checkpoint.time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(checkpoint, "MIN_INTERVAL_S", 10.0)
-    monkeypatch.setattr(checkpoint, "MAX_WRITE_TIME_FRACTION", 0.05)
 
     def slow(*_):
         clock[0] += 4.0

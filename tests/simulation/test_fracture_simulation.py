@@ -9,12 +9,15 @@ import trimesh
 import corporeal as co
 from corporeal.core.errors import UserError
 from corporeal.core.types import Surface
+from corporeal.discretization.discretization_plan import QualityPreset
 from corporeal.geometry.voronoi_fragments import (
     cut_fragments,
     fragment_cells,
     fragment_seeds,
     fragment_volumes,
 )
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.simulate import SimulateConfig
 from corporeal.simulation.audit import audit
 from corporeal.simulation.audit_messages import breakage_message
@@ -99,10 +102,51 @@ def test_a_tilted_tile_is_struck_as_the_sheet_that_it_is_and_stays_whole_unless_
     assert found.breakage[0].word == "would break"
 
 
-def test_other_engines_say_that_they_cannot():
-    config = SimulateConfig(engine="reference", breaking=True)
-    with pytest.raises(UserError, match="--breaking works with the engine cpu"):
+@pytest.mark.parametrize(
+    ("config", "word"),
+    [
+        (SimulateConfig(engine="cuda", breaking=True), "'cuda' cannot break bodies into pieces"),
+        (SimulateConfig(contact="single", breaking=True), "works with contact multi alone"),
+    ],
+)
+def test_what_cannot_break_says_so_in_a_sentence(config, word):
+    with pytest.raises(UserError, match=word):
         co.simulate_scene(tile(14.0), replace(BREAKING, simulate=config))
+
+
+def test_on_the_command_line_that_is_one_sentence_before_anything_is_done(command, tmp_path):
+    write_glb(tmp_path / "ball.glb", co.build_scene(co.ball("granite", 0.05, (0, 0, 0.1))))
+    asked = ("run", tmp_path / "ball.glb", "--out", tmp_path / "run")
+    code, said = command(*asked, "--engine", "cuda", "--breaking")
+    assert code == 2 and "Traceback" not in said.err
+    assert "The engine 'cuda' cannot break bodies into pieces. Use the engine cpu." in said.err
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_reference_engine_breaks_a_coarse_tile_as_the_cpu_engine_does():
+    quality = QualityPreset(2, 8, 1000, 20e3, np.inf, cell=0.01)
+    ready = co.prepare_scene(replace(tile(14.0, height=0.04), duration=0.003, fps=1000))
+    particles = fill(ready.scene, ready.parts, ready.field, quality=quality)
+    assert particles.count < 500
+    ready = replace(ready, particles=particles)
+    ours, sure = (
+        co.simulate_scene(ready, co.Settings(simulate=SimulateConfig(engine=engine, breaking=True)))
+        for engine in ("cpu", "reference")
+    )
+    (mine,), (theirs,) = ours.trajectory.breaks, sure.trajectory.breaks
+    assert len(theirs.surfaces) == len(mine.surfaces) > 5
+    np.testing.assert_array_equal(theirs.piece, mine.piece)
+    assert theirs.time == pytest.approx(mine.time, rel=1e-6)
+    ledgers = ours.trajectory.ledger, sure.trajectory.ledger
+    for ledger in ledgers:
+        outside = ledger.external_impulse.sum(axis=1) + ledger.plane_impulse.sum(axis=(1, 2))
+        moved = ledger.momentum.sum(axis=1) - ledger.momentum[0].sum(axis=0)
+        np.testing.assert_allclose(moved, outside, atol=1e-9)
+    before, (mine_after, sure_after) = (
+        ledgers[0].momentum[0].sum(axis=0),
+        (ledger.momentum[-1].sum(axis=0) for ledger in ledgers),
+    )
+    np.testing.assert_allclose(sure_after, mine_after, atol=0.05 * np.linalg.norm(before))
 
 
 @pytest.mark.parametrize("wall", [0.0, 0.002])

@@ -50,8 +50,8 @@ def ring():
 
 
 @pytest.fixture
-def film(tmp_path):
-    """Give a function that films a ball on its way past or through something."""
+def video(tmp_path):
+    """Give a function that records a ball on its way past or through something."""
 
     def shoot(other, way, bend=None):
         ball = trimesh.creation.icosphere(3, RADIUS)
@@ -105,24 +105,24 @@ def straight(start, end, frames):
 
 
 @pytest.mark.parametrize("frames", [3, 12, 60])
-def test_a_ball_that_goes_through_a_plate_is_named_however_fast_it_is(film, frames):
-    (pair,) = film(plate_at(), straight((0.01, 0.02, 0.2), (0.01, 0.02, 0.01), frames))
+def test_a_ball_that_goes_through_a_plate_is_named_however_fast_it_is(video, frames):
+    (pair,) = video(plate_at(), straight((0.01, 0.02, 0.2), (0.01, 0.02, 0.01), frames))
     assert (pair.first, pair.second, pair.passed) == ("target", "ball", "ball")
     assert pair.passed_s is not None and 0.0 < pair.passed_s <= (frames - 1) / FPS
     (sentence,) = surface_warnings([pair])
     assert sentence.startswith("Ball passed through target before")
 
 
-def test_a_ball_that_comes_back_or_goes_past_passes_through_nothing(film):
+def test_a_ball_that_comes_back_or_goes_past_passes_through_nothing(video):
     down = straight((0.01, 0.02, 0.2), (0.01, 0.02, 0.105), 6)
-    (pair,) = film(plate_at(), np.concatenate([down, down[::-1]]))
+    (pair,) = video(plate_at(), np.concatenate([down, down[::-1]]))
     assert pair.passed is None
     assert pair.depth_m == pytest.approx(RADIUS - 0.004, abs=THICK)
-    beside = film(plate_at(), straight((0.13, 0.02, 0.2), (0.13, 0.02, 0.02), 4))
+    beside = video(plate_at(), straight((0.13, 0.02, 0.2), (0.13, 0.02, 0.02), 4))
     assert all(pair.passed is None for pair in beside)
 
 
-def test_what_spins_fast_between_two_frames_is_not_passed_through(film):
+def test_what_spins_fast_between_two_frames_is_not_passed_through(video):
     """A chord leads through the plate where the ball is farther off than its edge reaches."""
     middle, beside = np.array((0.0, 0.0, 0.1)), (0.0, 0.121, 0.123)
 
@@ -130,27 +130,27 @@ def test_what_spins_fast_between_two_frames_is_not_passed_through(film):
         turn = Rotation.from_euler("x", 140.0 * k, degrees=True)
         return turn.apply(points - middle) + middle
 
-    assert all(pair.passed is None for pair in film(plate_at(), [beside] * 4, spun))
+    assert all(pair.passed is None for pair in video(plate_at(), [beside] * 4, spun))
 
 
-def test_a_ball_that_falls_through_a_ring_touches_nothing(film):
-    for pair in film(ring(), straight((0.0, 0.0, 0.1), (0.0, 0.0, -0.1), 5)):
+def test_a_ball_that_falls_through_a_ring_touches_nothing(video):
+    for pair in video(ring(), straight((0.0, 0.0, 0.1), (0.0, 0.0, -0.1), 5)):
         assert pair.passed is None and pair.depth_m == 0.0
 
 
-def test_a_plate_that_gives_way_is_not_passed_through(film):
+def test_a_plate_that_gives_way_is_not_passed_through(video):
     def dented(points, k):
         below = np.exp(-(((points[:, :2] - (0.01, 0.02)) / 0.05) ** 2).sum(axis=1))
         return points - np.outer(below, (0, 0, min(0.009 * k, 0.045)))
 
     way = straight((0.01, 0.02, 0.125), (0.01, 0.02, 0.08), 6)
-    (pair,) = film(plate_at(), way, dented)
+    (pair,) = video(plate_at(), way, dented)
     assert pair.passed is None
 
 
-def test_distances_are_those_of_the_meshes(film):
+def test_distances_are_those_of_the_meshes(video):
     way = np.array([(0.0, 0.0, 0.2), (0.0, 0.0, 0.1 + THICK / 2 + RADIUS + 0.0031)])
-    (pair,) = film(plate_at(), way)
+    (pair,) = video(plate_at(), way)
     assert pair.gap_end_m == pytest.approx(0.0031, abs=2e-4)
     assert pair.depth_m == 0.0
 

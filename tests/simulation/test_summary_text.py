@@ -17,7 +17,7 @@ PIECES = Note(
     NoteKind.ASSUMED,
 )
 UNKNOWN = Note(
-    "axe is of unknown material; plastics-PP stands in. Say what it is with --annotations.",
+    "axe is of unknown material; plastics-PP is assumed. State its material with --annotations.",
     NoteKind.GRAVE,
 )
 DEPTH = "Objects penetrate each other by up to 2.0 grid cells: a finer --detail reduces it."
@@ -47,7 +47,7 @@ def test_words_alone_make_no_kind(words):
     [
         (GONE, GONE),
         (PIECES, PIECES),
-        (UNKNOWN, "axe is of unknown material; plastics-PP stands in."),
+        (UNKNOWN, "axe is of unknown material; plastics-PP is assumed."),
         ("Left out: DSC_1.jpg. Put a newspaper under it.", "Left out:"),
         ("It is 0.5 m long.", "It is 0.5 m long."),
     ],

@@ -67,11 +67,10 @@ def test_an_unfinished_or_damaged_trajectory_is_named(tmp_path):
         FrameSequence(tmp_path, 3)[1]
 
 
-def test_a_frame_that_was_read_is_kept_as_long_as_there_is_room(tmp_path, monkeypatch):
+def test_a_frame_that_was_read_is_kept_as_long_as_there_is_room(tmp_path):
     written(tmp_path)
     size = sum(a.nbytes for a in read_arrays(frame_path(tmp_path, 0), without="ledger.").values())
-    monkeypatch.setattr("corporeal.simulation.trajectory_files.FRAME_CACHE_BYTES", 2 * size)
-    frames = FrameSequence(tmp_path, 3)
+    frames = FrameSequence(tmp_path, 3, 2 * size)
     before = [frame.position for frame in frames]
     frames[0].position[:] = np.nan
     for k in range(3):

@@ -126,7 +126,7 @@ def test_a_replay_at_draft_drops_it_at_the_same_time(small_run, live, tmp_path):
         data = (tmp_path / f"{contact}.take").read_bytes()
         header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
         assert [o["name"] for o in header["objects"]] == ["ball", "stone", "ball_1"]
-        assert header["film"]["since"] == {"2": when}
+        assert header["video"]["since"] == {"2": when}
 
 
 def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
@@ -147,5 +147,5 @@ def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
     live._both(1 / 60)
     with pytest.raises(UserError):
         parse_command(json.dumps({"do": RECORDED_ADD}))
-    with pytest.raises(UserError, match="no name"):
+    with pytest.raises(UserError, match="not a name"):
         parse_command(json.dumps({"do": "add", "thing": 3}))

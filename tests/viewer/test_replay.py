@@ -103,7 +103,7 @@ def test_both_takes_of_a_replay_are_written(small_run, touched, tmp_path):
     for contact in ("multi", "single"):
         data = (tmp_path / f"{contact}.take").read_bytes()
         header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
-        assert header["film"]["time"][-1] == pytest.approx(done.seconds)
+        assert header["video"]["time"][-1] == pytest.approx(done.seconds)
 
 
 def test_what_is_taken_is_told_by_where_it_was_at_the_start(touched):

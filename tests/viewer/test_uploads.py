@@ -8,10 +8,9 @@ import zipfile
 import pytest
 
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.viewer import uploads
 from corporeal.viewer import zip_unpack as unpacking
 from corporeal.viewer.run_store import RunStore
-from corporeal.viewer.uploads import INBOX_FOLDER, UploadInbox, upload_route
+from corporeal.viewer.uploads import INBOX_FOLDER, UploadInbox, UploadLimits, upload_route
 from corporeal.viewer.web_app import SiteOptions, make_app
 from corporeal.viewer.zip_unpack import unpack_zip
 from viewer_served import LOCAL, serving
@@ -87,17 +86,15 @@ def test_photographs_with_their_poses_come_out_as_they_went_in(tmp_path):
 
 
 @pytest.fixture
-def server(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        uploads, "MIN_FREE_DISK_BYTES", 0
-    )  # the disk of who runs this may be nearly full
+def server(tmp_path):
     runs = tmp_path / "runs"
     runs.mkdir()
-    inbox = UploadInbox(runs)
+    # The disk of who runs this may be nearly full.
+    inbox = UploadInbox(runs, UploadLimits(free_disk_bytes=0))
     with serving(
         make_app(SiteOptions(RunStore((), runs), works=True), LOCAL, (upload_route(inbox),))
     ) as made:
-        made.runs = runs
+        made.runs, made.inbox = runs, inbox
         yield made
 
 
@@ -128,8 +125,8 @@ def test_what_is_not_understood_is_refused_in_a_sentence_and_leaves_nothing(serv
     assert server.ask("/runs").status == 200
 
 
-def test_a_file_is_counted_while_it_comes_whatever_it_says_of_itself(server, monkeypatch):
-    monkeypatch.setattr(uploads, "MAX_FILE_BYTES", 10_000)
+def test_a_file_is_counted_while_it_comes_whatever_it_says_of_itself(server):
+    server.inbox.limits = UploadLimits(file_bytes=10_000, free_disk_bytes=0)
     answer = put(server, b"glTF" + bytes(20_000))
     assert answer.status == 400 and "the most that a page takes" in answer.json["error"]
     assert left(server) == []
@@ -156,8 +153,8 @@ def test_a_lying_length_harms_nobody(server, said):
     assert server.ask("/runs").status == 200 and left(server) == []
 
 
-def test_the_disk_keeps_its_spare_room(server, monkeypatch):
-    monkeypatch.setattr(uploads, "MIN_FREE_DISK_BYTES", 1 << 60)
+def test_the_disk_keeps_its_spare_room(server):
+    server.inbox.limits = UploadLimits(free_disk_bytes=1 << 60)
     answer = put(server, b"glTF")
     assert answer.status == 400 and answer.json["error"].startswith("The disk is nearly full: ")
     assert left(server) == []

@@ -23,7 +23,7 @@ def moved(problem, wind=None):
     """Positions after a sixtieth of a second, the ball blown at or not."""
     engine = CpuEngine(problem, 1)
     if wind:
-        engine.blow(BALL, wind)
+        engine.set_wind(BALL, wind)
     engine.advance(1 / 60)
     return engine.snapshot().position
 

@@ -43,7 +43,10 @@ def test_pieces_of_what_nobody_told_apart_may_be_named(tmp_path):
             "there is no part of 'duck_0' called 'sole'. There are: body, beak.",
         ),
         ("duck_0: {stuff: ABS}", "unknown key 'stuff'"),
-        ("duck_0: {structure: holey}", "Say one of: solid, shell, sheet, hollow, filled, packed"),
+        (
+            "duck_0: {structure: holey}",
+            "Choose one of: solid, shell, sheet, hollow, filled, packed",
+        ),
         ("duck_0: {thickness_mm: thin}", "thickness_mm must be a number"),
         ("duck_0: {thickness_mm: -1}", "above 0"),
         ("duck_0: {thickness_mm: .nan}", "must be a number"),

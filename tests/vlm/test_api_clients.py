@@ -277,7 +277,7 @@ def test_a_missing_key_is_named(spec, monkeypatch):
     name = f"{spec.partition(':')[0].upper()}_API_KEY"
     with pytest.raises(UserError, match=f"needs a key: set the environment variable {name}"):
         connect_vlm(spec)
-    with pytest.raises(UserError, match="Say which model"):
+    with pytest.raises(UserError, match="Name the model"):
         connect_vlm("openai:")
 
 

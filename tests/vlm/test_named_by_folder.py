@@ -6,10 +6,8 @@ import pytest
 from corporeal.core.errors import UserError
 from corporeal.geometry.gaussian_transforms import transform_gaussians
 from corporeal.io.splat.splat_ply import write_splat_ply
-from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.pipeline.stages.reconstruct import reconstruct
-from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.surface import closed_surface
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig, ReconstructionResolution
 from corporeal.vlm.photographed_objects import (
     check_stated_extents,
     decide_metric_scale,
@@ -22,19 +20,16 @@ from gaussian_boxes import DOWN, box
 SIDES = (0.4, 0.2, 0.2)
 
 
-@pytest.fixture(autouse=True)
-def fewer_cameras(monkeypatch):
-    """Look at splats in fewer and smaller pictures, and carve more coarsely, than for people."""
-    monkeypatch.setattr(stage, "RENDERED_VIEWS", 16)
-    monkeypatch.setattr(stage, "RENDERED_SIZE_PX", (96, 96))
-    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 60_000)
+COARSE = ReconstructionResolution(16, (96, 96), object_grid_cells=60_000)
+"""Looks at splats in fewer and smaller pictures, and carves more coarsely, than for people."""
 
 
 def made(folder, name, extents=(), **settings):
     """Reconstruct one box of a file that is called so."""
     scene = box(SIDES, (0.0, 0.0, 0.1), (0.7, 0.6, 0.1))
     write_splat_ply(folder / f"{name}.ply", transform_gaussians(scene, DOWN, 2.0, (0.0, 0.0, 5.0)))
-    return reconstruct(folder / f"{name}.ply", ReconstructConfig(**settings), extents)
+    config = ReconstructConfig(**settings, resolution=COARSE)
+    return reconstruct(folder / f"{name}.ply", config, extents)
 
 
 @pytest.mark.parametrize(
@@ -67,7 +62,7 @@ def test_a_lone_thing_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
     (said,) = [w for w in found.warnings if "banana" in w]
     assert "19 cm" in said
     assert "--extent banana=METRES" in said
-    assert "--things" in said
+    assert "--object-names" in said
     assert not any("0.5 m" in w for w in found.warnings)
 
 
@@ -81,7 +76,7 @@ def test_a_size_that_somebody_states_is_the_size_whatever_the_name_says(tmp_path
 
 
 def test_what_somebody_names_is_not_called_as_the_folder(tmp_path):
-    came = made(tmp_path, "banana", things=("crate",))
+    came = made(tmp_path, "banana", object_names=("crate",))
     assert [o.name for o in came.scene.objects] == ["crate"]
     assert not any("banana" in w for w in came.found.warnings)
 
@@ -111,10 +106,12 @@ def test_sizes_of_what_nobody_named_can_be_stated():
 
 
 def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):
-    (said,) = [w for w in made(tmp_path, "one", things=("banana",)).found.warnings if "large" in w]
+    (said,) = [
+        w for w in made(tmp_path, "one", object_names=("banana",)).found.warnings if "large" in w
+    ]
     assert said == (
-        "Nobody said how large it is: made as large as a banana usually is, 19 cm. "
+        "How large it is was not stated: assumed as large as a banana usually is, 19 cm. "
         "State a size with --extent banana=METRES."
     )
-    stated = made(tmp_path, "two", ("banana=0.2",), things=("banana",)).found.warnings
+    stated = made(tmp_path, "two", ("banana=0.2",), object_names=("banana",)).found.warnings
     assert not any("how large" in w for w in stated)

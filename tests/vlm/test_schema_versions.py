@@ -82,8 +82,11 @@ def test_every_prompt_states_a_version_of_its_own():
     found = [
         files("corporeal.description").joinpath("prompts", f"{task}.md") for task in INTERVIEW_TASKS
     ]
-    found += [files("corporeal.vlm").joinpath(f"{t}.md") for t in ("sizes", "things", "regions")]
-    found += [files("corporeal.lab.evaluation.judge").joinpath("film.md")]
+    found += [
+        files("corporeal.vlm").joinpath("prompts", f"{t}.md")
+        for t in ("sizes", "things", "regions")
+    ]
+    found += [files("corporeal.lab.evaluation.judge").joinpath("video.md")]
     prompts = [read_prompt(file) for file in found]
     assert len({prompt.version for prompt in prompts}) == len(prompts)
     assert not [prompt for prompt in prompts if "version:" in prompt.text]

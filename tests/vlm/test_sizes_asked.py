@@ -107,7 +107,7 @@ def test_a_model_that_differs_from_the_table_is_believed_and_told():
     assert sizes.usual["couch"].usual == 0.5
     (warning,) = sizes.warnings
     assert ", 50 cm is usual for objects like this: couch; the table" in warning
-    assert "knows 1 m to 4 m. The former was believed." in warning
+    assert "knows 1 m to 4 m. The former was used." in warning
 
 
 # ---------------------------------------------------------------- what is no answer
@@ -178,7 +178,7 @@ def test_a_file_in_other_units_says_nothing_of_its_size():
 def test_what_nobody_knows_gets_a_stand_in_and_a_warning():
     real = estimate_real_extent("thing_7", "widget", 41.0, False, DUCKS)
     assert (real.extent, real.said_by) == (UNKNOWN_EXTENT_M, "nobody")
-    assert "Nobody knows how large thing_7 (widget) is" in real.warnings[0]
+    assert "The size of thing_7 (widget) is unknown" in real.warnings[0]
     metric = estimate_real_extent("thing_7", "widget", 0.7, True, DUCKS)
     assert (metric.extent, metric.said_by, metric.warnings) == (0.7, "file", ())
 

@@ -1,4 +1,4 @@
-"""Command line: every verb."""
+"""Command line: the program ``corporeal`` and its commands."""
 
 import os
 import sys
@@ -56,12 +56,13 @@ class RunFolder:
 
 
 def command_run() -> None:
-    """Run all verbs on a scene: from files to a film and a report.
+    """Run all stages on a scene: from files to a video and a report.
 
     SCENE is a model (GLB, glTF, OBJ, PLY, STL, OFF, 3MF, DAE, USD), several of them (each one
     object), or a scene.toml; or a folder of photographs, with poses (transforms.json, COLMAP,
-    3 x 4 matrices) or without, a film, or a trained Gaussian splat.
-    Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
+    3 x 4 matrices) or without, a video, or a trained Gaussian splat.
+    Results are written to runs/<name>/: video.mp4, report.html, materials.json, audit.json and
+    pictures.
     Results that are up to date are reused.
     """
     from corporeal.pipeline.settings.settings import Settings
@@ -72,7 +73,7 @@ def command_run() -> None:
         where: RunFolder = RunFolder()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    first = ("detail", "vlm", "annotations", "drop", "things", "out")
+    first = ("detail", "vlm", "annotations", "drop", "object-names", "out")
     asked = parse(Run, "run", command_run.__doc__, first=first)
     _run_stages(
         list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where
@@ -106,13 +107,15 @@ def command_demo() -> None:
     with console.status("building the scene"):
         path = write_cached_showcase(asked.scene, folder / "input")
     settings = asked.settings
-    if settings.film.view is None:
-        settings = replace(settings, film=replace(settings.film, view=view_direction(asked.scene)))
+    if settings.video.view is None:
+        settings = replace(
+            settings, video=replace(settings.video, view=view_direction(asked.scene))
+        )
     _run_stages([path], folder, settings, where)
 
 
 def command_status() -> None:
-    """Show which verbs of a run are finished, and the time that each took."""
+    """Show which stages of a run are finished, and the time that each took."""
     from corporeal.pipeline.run_pipeline import stage_states
 
     @dataclass(frozen=True)
@@ -145,12 +148,12 @@ def command_materials() -> None:
     elif asked.words[0] == "check" and len(asked.words) == 2:
         problems = materials.check_library(Path(asked.words[1]))
         if problems:
-            count = "a mistake" if len(problems) == 1 else f"{len(problems)} mistakes"
+            count = "one error" if len(problems) == 1 else f"{len(problems)} errors"
             lines = [f"{asked.words[1]} has {count}:", *map(str, problems)]
             raise UserError("\n  ".join(lines))
-        print(f"{asked.words[1]}: no mistakes found.")
+        print(f"{asked.words[1]}: no errors found.")
     else:
-        raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
+        raise UserError(f"Use `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
 
 
 def command_doctor() -> None:
@@ -185,7 +188,7 @@ def _redo_command(verb: str) -> Callable[[], None]:
                     {"__annotations__": {"run": Folder, "config": type(config)}, "config": config},
                 )
             )
-        words = f"Redo `{verb}` of a run with other settings, and all verbs after it."
+        words = f"Redo `{verb}` of a run with other settings, and all later stages."
         asked = parse(shape, verb, words, first=FIRST_OPTIONS.get(verb, ()))
         before = read_run_request(asked.run)
         settings = before.settings
@@ -238,7 +241,7 @@ def command_simulate() -> None:
 
 
 def _spread(asked: Any) -> None:
-    """Simulate an ensemble, and show the spread of its outcomes."""
+    """Simulate an ensemble and print the spread of its outcomes."""
     from corporeal.lab.evaluation import ensemble_report
     from corporeal.lab.evaluation.outcome_ensemble import simulate_ensemble
 
@@ -269,12 +272,12 @@ COMMANDS: dict[str, Callable[[], None]] = {
     "doctor": command_doctor,
 }
 FIRST_OPTIONS = {
-    "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
+    "reconstruct": ("object-names", "count", "up", "metres-per-unit", "training", "apart"),
     "assemble": ("drop", "lift", "velocity", "extent", "stack", "duration"),
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
-    "film": ("quality", "width", "height", "speed", "view", "colour-by"),
+    "video": ("quality", "width", "height", "speed", "view", "colour-by"),
 }
-"""Options of a verb that come first in its help; of few options all do."""
+"""Options of a command that are listed first in its help."""
 REDO_COMMANDS = (
     "reconstruct",
     "assemble",
@@ -283,14 +286,14 @@ REDO_COMMANDS = (
     "ground",
     "fill",
     "simulate",
-    "film",
+    "video",
 )
 REDO_COMMANDS = (*REDO_COMMANDS, "report")
 COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
 COMMANDS |= {"assemble": command_assemble, "simulate": command_simulate}
 
 
-# ---------------------------------------------------------------- how a verb is done
+# ---------------------------------------------------------------- running the stages
 
 
 def _folder(where: RunFolder, inputs: list[Path]) -> Path:
@@ -312,7 +315,7 @@ def _run_stages(
     until: str = "report",
     again: bool = False,
 ) -> None:
-    """Do every verb up to ``until``, that one ``again`` even where its settings are the same."""
+    """Run all stages up to ``until``; run ``again`` even if its settings are unchanged."""
     from corporeal.cli.validate_settings import validate_settings
     from corporeal.pipeline.run_pipeline import delete_simulation, invalidate_stage, run
 
@@ -326,7 +329,7 @@ def _run_stages(
     if until == "report":
         show_summary(folder)
         print(folder / "report.html")
-        print(folder / "film.mp4")
+        print(folder / "video.mp4")
     else:
         print(f"{until} done. Go on with: corporeal report {quote(str(folder))}")
 
@@ -339,24 +342,24 @@ def _usage() -> str:
     for name, verb in COMMANDS.items():
         first = (verb.__doc__ or "").strip().splitlines()[0]
         lines.append(f"  corporeal {name:10} {first}")
-    return "\n".join([*lines, "", "Options of a verb: corporeal VERB --help"])
+    return "\n".join([*lines, "", "Options of a command: corporeal VERB --help"])
 
 
 def main() -> None:
-    """Do the verb a person typed; their mistake prints one line and exits with code 2."""
+    """Run the command line; a user's error prints one line and exits with code 2."""
     verb = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if verb in ("--help", "-h", "help"):
         print(_usage())
     elif verb == "--version":
         print(__version__)
     elif verb not in COMMANDS:
-        sys.exit(_report_error(f"Unknown verb {verb!r}. Choose one of: {', '.join(COMMANDS)}."))
+        sys.exit(_report_error(f"Unknown command {verb!r}. Choose one of: {', '.join(COMMANDS)}."))
     else:
         sys.exit(_run_command(COMMANDS[verb]))
 
 
 def _run_command(verb: Callable[[], None]) -> int:
-    """Return the exit code: 0, 1 a mistake of ours, 2 the person's, 130 stopped."""
+    """Return the exit code: 0, 1 for an internal error, 2 for a user's error, 130 if interrupted."""
     keep_freed_memory()
     relax_garbage_collection()
     try:
@@ -365,19 +368,19 @@ def _run_command(verb: Callable[[], None]) -> int:
     except UserError as error:
         return _report_error(str(error), getattr(error, "__notes__", ()))
     except KeyboardInterrupt:
-        _report_error("Stopped. What was finished is kept: the same command goes on from there.")
+        _report_error("Stopped. Finished work is kept: the same command resumes from there.")
         return 130
-    except BrokenPipeError:  # `corporeal materials | head`: nobody listens any more
+    except BrokenPipeError:  # `corporeal materials | head`: the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except MemoryError:
         return _report_error("Out of memory. Use --detail draft, or a smaller scene.")
-    except Exception as error:  # our own mistake: the details go to a file, not to the person
+    except Exception as error:  # an internal error: the details go to a file
         return _report_crash(error)
 
 
 def _report_error(message: str, notes: Sequence[str] = ()) -> int:
-    """Print what went wrong in a line, and in one each what was noticed before."""
+    """Print an error in one line, and each earlier warning in a line."""
     print(f"corporeal: {message}", file=sys.stderr)
     for note in dict.fromkeys(notes):
         print(f"  Noticed before: {note}", file=sys.stderr)
@@ -388,7 +391,7 @@ def _report_crash(error: Exception) -> int:
     path = Path("corporeal-crash.txt")
     path.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
     print(
-        f"corporeal: a mistake of ours ({type(error).__name__}: {error}). The details are in "
+        f"corporeal: internal error ({type(error).__name__}: {error}). The details are in "
         f"{path}; please report them.",
         file=sys.stderr,
     )

@@ -26,7 +26,7 @@ def compose_from_pool() -> None:
         corporeal assemble --from models/ --classes duck "soda can" --seed 7
         corporeal run scenes/duck-soda_can-7/scene.toml
 
-    `corporeal assemble RUN` instead redoes that verb of a run.
+    `corporeal assemble RUN` instead redoes that stage of a run.
     """
     from corporeal.jobs.job import Job, perform_job
     from corporeal.lab.corpus.assemble_corpus import compose_scene
@@ -85,7 +85,7 @@ def _show(folder: Path) -> None:
         f"meshes {1e3 * certificate.penetration_m:.2g} mm; {_attempts(certificate.attempts)}, "
         f"{certificate.seconds:.1f} s."
     )
-    print(f"Go on with: corporeal run {quote(str(folder / 'scene.toml'))}")
+    print(f"Next: corporeal run {quote(str(folder / 'scene.toml'))}")
 
 
 def _attempts(count: int) -> str:

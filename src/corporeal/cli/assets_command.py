@@ -1,4 +1,4 @@
-"""`corporeal assets index | list | show | props`: the pool that scenes are made of."""
+"""`corporeal assets index | list | show | props`: pools of models that scenes are composed of."""
 
 import re
 from collections.abc import Sequence
@@ -19,17 +19,17 @@ Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
 
 
 def command_assets() -> None:
-    """Make a pool of models, and look at it: `assets index FOLDER ...`, `list`, `show`."""
+    """Manage a pool of models: `assets index FOLDER ...`, `list`, `show`."""
     verbs = {"index": _index, "list": _list, "show": _show, "props": _props}
     run_subcommand("assets", verbs)
 
 
 def _index() -> None:
-    """Judge every model below the folders, and keep the good ones in a pool.
+    """Check every model below the folders, and add those that pass to a pool.
 
-    A model is a .glb, .gltf or .obj file. Its class is what a table says (--csv, or a manifest.csv
-    in the folder or above it), else the folder it lies in, else its own name in everyday words.
-    Each file gets in or gets a reason. What was judged before is not judged again.
+    A model is a glTF or a mesh file. Its class is what a table says (--csv, or a manifest.csv
+    in the folder or above it), else the folder it lies in, else its own name. A rejected file gets
+    a reason. Models that were checked before are not checked again.
     """
     from corporeal.pool.candidate_origins import CandidateOrigin, OriginConfig
     from corporeal.pool.objaverse import WantedModels
@@ -41,12 +41,11 @@ def _index() -> None:
         folders: Annotated[
             tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")
         ] = ()
-        """Searched with all folders below."""
+        """Searched recursively."""
         pool: Folder = DEFAULT_POOL
         """The pool's folder."""
         origin: Annotated[CandidateOrigin, tyro.conf.arg(name="from")] = "folders"
-        """What the folders are: plain folders, the cache of the package objaverse, or Amazon
-        Berkeley Objects."""
+        """Kind of source: plain folders, the cache of the package objaverse, or Amazon Berkeley Objects."""
         csv: Path | None = None
         """Table with columns file, class and, where known, licence, attribution, metric (whether
         lengths are metres: yes or no), extent_m, source."""
@@ -70,14 +69,14 @@ def _sum_up(pool: AssetPool) -> None:
     )
     unknown = sum(not a.credit for a in pool.assets)
     if unknown:
-        print(f"Of {_count(unknown, 'asset')} neither licence nor maker is known.")
+        print(f"Of {_count(unknown, 'asset')} neither licence nor author is known.")
     if pool.rejections:
         reasons = "reason" if len(pool.rejections) == 1 else "reasons"
         print(f"The {reasons}: corporeal assets list --pool {pool.folder} --rejected")
 
 
 def _list() -> None:
-    """List what a pool holds, or what was rejected, and why."""
+    """List the assets of a pool, or the rejected models with reasons."""
     from corporeal.pool.pool_index import read_pool
 
     @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def _list() -> None:
         pool: Folder = DEFAULT_POOL
         """The pool's folder."""
         rejected: bool = False
-        """What did not get in, with reasons."""
+        """List rejected models with reasons."""
         class_name: Annotated[str, tyro.conf.arg(name="class")] = ""
         """Only of this class."""
 
@@ -139,9 +138,9 @@ def _show() -> None:
         class_name: Annotated[str, tyro.conf.arg(name="class")] = ""
         """Only of this class."""
         out: Path | None = None
-        """Where the picture goes; by default assets.png in the pool."""
+        """File of the picture; by default assets.png in the pool."""
         size: int = 224
-        """Of one picture [px]."""
+        """Size of each tile [px]."""
 
     asked = parse(Show, "assets show", _show.__doc__, words=2)
     pool = read_pool(asked.pool)
@@ -169,7 +168,7 @@ def _count(number: int, word: str, words: str = "") -> str:
 
 
 def _props() -> None:
-    """Write the showcase's own twenty models as files: something to make a first pool of.
+    """Write the showcase's own twenty models as files: material for a first pool.
 
     corporeal assets props props/
     corporeal assets index props/
@@ -192,5 +191,5 @@ def _props() -> None:
             path = asked.folder / name.replace("_", " ") / f"{name}.glb"
             path.parent.mkdir(parents=True, exist_ok=True)
             write_glb(path, prop_scene(name))
-    print(f"{len(POOL_PROP_BUILDERS)} models in {asked.folder}. Go on with: corporeal assets index "
+    print(f"{len(POOL_PROP_BUILDERS)} models in {asked.folder}. Next: corporeal assets index "
           f"{quote(str(asked.folder))}")  # fmt: skip

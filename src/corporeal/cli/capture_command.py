@@ -1,4 +1,4 @@
-"""`corporeal capture`: posed views of a scene, for tools that reconstruct."""
+"""`corporeal capture`: posed views of a scene, for reconstruction tools."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +11,7 @@ from corporeal.core.terminal import progress_bars
 
 
 def command_capture() -> None:
-    """Take posed views of a scene: colours, depth, normals, and which object is where.
+    """Render posed views of a scene: colour, depth, normals and object ids.
 
     SCENE is what `corporeal run` takes. The folder gets transforms.json, as instant-ngp and
     nerfstudio read it, and the pictures.
@@ -26,7 +26,7 @@ def command_capture() -> None:
             tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")
         ]
         out: Path = Path("views")
-        """The folder of the views."""
+        """Output folder."""
         assemble: AssembleConfig = field(default_factory=AssembleConfig)
         capture: CaptureConfig = field(default_factory=CaptureConfig)
 

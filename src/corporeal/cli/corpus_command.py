@@ -18,19 +18,20 @@ Corpus = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CORPUS")]
 
 @dataclass(frozen=True)
 class WorkerOptions:
-    """Who does the work."""
+    """Worker processes."""
 
     workers: int = 0
-    """Scenes at the same time, each in a process of its own; 0: one per core and --threads."""
+    """Number of parallel scenes, each in its own process; 0: cores divided by --threads."""
     threads: int = 1
-    """Of each scene."""
+    """Threads per scene."""
     on: Literal["local", "ray"] = "local"
-    """Where: processes of this machine, or a Ray cluster (extra [cluster])."""
+    """Execution backend: processes of this machine, or a Ray cluster (extra [cluster])."""
     address: str = ""
-    """Of a running Ray cluster, "auto" for the one of this machine; by default one is started
-    here and ended again. The corpus must lie where every machine sees it."""
+    """Address of a Ray cluster, "auto" for the one of this machine; by default a local one is
+    started. The corpus must be on a file system shared by all machines.
+    """
     gpus: float = 0.0
-    """Share of a graphics card that each scene takes on Ray."""
+    """Share of a GPU per scene on Ray."""
 
 
 def command_corpus() -> None:
@@ -44,10 +45,9 @@ def _assemble() -> None:
         corporeal corpus assemble corpus/ --pool pool/
         corporeal corpus assemble showcase/ --preset seven
 
-    Classes, models, numbers of objects and interactions come out even. Each scene is made in a
-    process of its own and appears in CORPUS/scenes whole or not at all. Say the same again to go on
-    with what was interrupted and to try again what failed. CORPUS/manifest.json says what became of
-    each scene.
+    Classes, models, numbers of objects and interactions are balanced. Each scene is made in its own
+    process and written to CORPUS/scenes atomically. Repeat the command to resume an interrupted
+    corpus and to retry failed scenes. CORPUS/manifest.json holds the state of each scene.
     """
     from corporeal.discretization.object_scaling import SceneSizing
     from corporeal.lab.corpus.assemble_corpus import Sources, assemble_corpus
@@ -60,17 +60,17 @@ def _assemble() -> None:
     class Assemble:
         corpus: Corpus
         pool: Path = Path("pool")
-        """What scenes are made of, from `corporeal assets index`."""
+        """Pool from `corporeal assets index`."""
         plan: CorpusConfig = field(default_factory=CorpusConfig)
         sizing: SceneSizing = field(default_factory=SceneSizing)
         vlm: str = ComposeConfig.vlm
-        """Who says how large objects of a class are; by default a table."""
+        """Source of the sizes of classes; by default a table."""
         record: Path | None = None
-        """Keep a model's answers in this folder, for --vlm replay:FOLDER."""
+        """Record a model's answers in this folder, for --vlm replay:FOLDER."""
         views: int = CaptureConfig.views
-        """Posed pictures of each scene."""
+        """Number of posed views per scene."""
         size: tuple[int, int] = CaptureConfig.size
-        """Their width and height [px]."""
+        """Width and height of the views [px]."""
         crew: WorkerOptions = WorkerOptions()
 
     first = ("pool", "preset", "scenes", "seed", "views", "workers")
@@ -83,18 +83,18 @@ def _assemble() -> None:
         asked,
         "assemble",
         lambda hands: assemble_corpus(asked.corpus, asked.plan, sources, hands),
-        f"Go on with: corporeal corpus run {quote(str(asked.corpus))}",
+        f"Next: corporeal corpus run {quote(str(asked.corpus))}",
     )
 
 
 def _run() -> None:
-    """Run every scene of a corpus to its film and report, several at a time.
+    """Run every scene of a corpus, several at a time.
 
         corporeal corpus run corpus/ --detail draft --workers 4
 
-    CORPUS/runs/<scene> is a run like any other. A scene that fails or whose process is killed never
-    stops the others; what is finished is not done again, an interrupted simulation goes on from its
-    checkpoint. Say the same again to go on.
+    CORPUS/runs/<scene> is a run like any other. A failing scene doesn't stop the others. Repeat the
+    command to resume: finished scenes are skipped, and an interrupted simulation continues from its
+    checkpoint.
     """
     from corporeal.lab.corpus.run_corpus import RunConfig, run_corpus
     from corporeal.pipeline.settings.settings import Settings
@@ -112,12 +112,12 @@ def _run() -> None:
         asked,
         "run",
         lambda hands: run_corpus(asked.corpus, asked.scenes, asked.settings, hands),
-        f"Look at it: corporeal corpus report {quote(str(asked.corpus))}",
+        f"Next: corporeal corpus report {quote(str(asked.corpus))}",
     )
 
 
 def _report() -> None:
-    """Write CORPUS/report.html, report.csv and report.json of what was run so far."""
+    """Write CORPUS/report.html, report.csv and report.json for all scenes run so far."""
     from corporeal.lab.corpus.collect_results import collect_results
     from corporeal.lab.corpus.corpus_docs_page import write_corpus_page
     from corporeal.lab.corpus.corpus_report import report_corpus
@@ -126,7 +126,7 @@ def _report() -> None:
     class Report:
         corpus: Corpus
         docs: Path | None = None
-        """File for the measured rows as a page of documentation (Markdown)."""
+        """Also write the measured rows as a documentation page (Markdown)."""
 
     asked = parse(Report, "corpus report", _report.__doc__, words=2)
     with progress_bars() as tell:
@@ -137,11 +137,11 @@ def _report() -> None:
     print(*written, sep="\n")
 
 
-# ---------------------------------------------------------------- how it is done
+# ---------------------------------------------------------------- execution
 
 
 def _execute(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: str) -> None:
-    """Do it with a bar or with lines, and say what came of it."""
+    """Run the jobs with a progress bar or log lines, and print a summary."""
     from corporeal.jobs.executor import Executor
     from corporeal.jobs.local_workers import LOG_FOLDER
 
@@ -152,21 +152,21 @@ def _execute(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: str
     if failed:
         show_table(("scene", "why it failed"), [(n, r.error) for n, r in failed.items()])
     if len(failed) == len(rows):
-        raise UserError(f"Not one scene finished. {asked.corpus / LOG_FOLDER} has their words.")
+        raise UserError(f"No scene finished. Their logs are in {asked.corpus / LOG_FOLDER}.")
     print(then)
 
 
 def log_event(words: str) -> None:
-    """Say an event as a line in a log; in a terminal the bar shows it, failures aside."""
+    """Log an event as a line; in a terminal only failures are printed beside the bar."""
     if not console.is_terminal or "failed" in words or "again" in words:
         console.print(words, markup=False, highlight=False, soft_wrap=True)
 
 
 def worker_factory(crew: WorkerOptions, folder: Path) -> Callable[[], Any]:
-    """Return what opens workers, whose words go to a folder of logs in ``folder``.
+    """Return a factory of workers that log to a folder in ``folder``.
 
     Raises:
-        UserError: A number of the crew makes no sense.
+        UserError: A number of workers, threads or GPUs is invalid.
 
     """
     if crew.workers < 0 or crew.threads < 1 or crew.gpus < 0:

@@ -1,4 +1,4 @@
-"""What works on this machine, with advice."""
+"""Checks of the installation on this machine, with advice."""
 
 import os
 import platform
@@ -14,10 +14,10 @@ from corporeal.core.version import __version__
 
 API_KEY_VARIABLES = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
 LIBRARY_USES = {
-    "embreex": "films and pictures",
+    "embreex": "videos and pictures",
     "igl": "filling of meshes",
     "DracoPy": "Draco files",
-    "pycolmap": "photographs without poses, and films",
+    "pycolmap": "photographs without poses, and videos",
     "pxr": "meshes in USD",
     "lxml": "meshes in 3MF and DAE",
     "collada": "meshes in DAE",
@@ -27,17 +27,17 @@ PACKAGE_OF_MODULE = {"igl": "libigl", "pxr": "usd-core", "collada": "pycollada"}
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One line of the examination."""
+    """Result of one check."""
 
     what: str
     works: bool
     found: str
     advice: str = ""
-    """What to do, or what would be gained; empty when there is nothing to say."""
+    """What to do, or what would be gained; empty if nothing."""
 
 
 def check_installation() -> list[CheckResult]:
-    """Look at everything; a broken piece is a finding, never an exception."""
+    """Check engines, libraries, encoder and keys; a broken part is a result, never an exception."""
     checks: list[Callable[[], list[CheckResult]]] = [
         _machine,
         _engines,
@@ -61,24 +61,24 @@ def _machine() -> list[CheckResult]:
 
 
 def _cores(used: int, all_of_them: int) -> str:
-    """Say how many cores are used, and of how many where that is fewer than there are."""
+    """Describe how many cores are used, and how many the machine has if that is more."""
     said = f"{used} core{'s' * (used != 1)}"
     return said if used >= all_of_them else f"{said} of the {all_of_them} that the machine has"
 
 
 def _engines() -> list[CheckResult]:
     try:
-        from corporeal.mpm.cpu.program import wp  # started without its word about cards on stderr
+        from corporeal.mpm.cpu.program import wp  # no message about GPUs on stderr
 
         cards = [_gpu(device) for device in wp.get_cuda_devices()]
-    except Exception as error:  # whatever is broken in a native library belongs in the table
+    except Exception as error:  # a broken native library is a result, too
         return [CheckResult("cpu engine", False, str(error), "Reinstall: pip install warp-lang.")]
-    gpu = ", ".join(cards) or "no CUDA card: simulations run on the processor"
+    gpu = ", ".join(cards) or "no CUDA GPU: simulations run on the CPU"
     use = "Simulate on it with --engine cuda." if cards else "Not needed."
     return [
-        CheckResult("cpu engine", True, f"Warp {version('warp-lang')}, on the processor"),
+        CheckResult("cpu engine", True, f"Warp {version('warp-lang')}, on the CPU"),
         CheckResult("GPU", bool(cards), gpu, use),
-        CheckResult("reference engine", True, "NumPy, slow: for checking"),
+        CheckResult("reference engine", True, "NumPy, slow, for verification"),
     ]
 
 
@@ -104,17 +104,18 @@ def _encoder() -> list[CheckResult]:
 
         path = imageio_ffmpeg.get_ffmpeg_version()
     except Exception as error:  # as above
-        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
-    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for films")]
+        return [
+            CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")
+        ]
+    return [CheckResult("ffmpeg", True, f"{path}, a separate program, for videos")]
 
 
 def _keys() -> list[CheckResult]:
     present = [name for name in API_KEY_VARIABLES if os.environ.get(name)]
     found = ", ".join(present) or "no API key in the environment"
     advice = (
-        "Only to ask a model what objects are made of (--vlm openai:MODEL). Without one there are "
-        "the names in the file, --annotations, --vlm ask:FOLDER (you answer) and --vlm "
-        "replay:FOLDER."
+        "Only needed to ask a model for materials (--vlm openai:MODEL). Alternatives: names in the "
+        "file, --annotations, --vlm ask:FOLDER (you answer) and --vlm replay:FOLDER."
     )
     installed = find_spec("pydantic_ai") is not None
     client = f"pydantic-ai {version('pydantic-ai-slim')}" if installed else "not installed"

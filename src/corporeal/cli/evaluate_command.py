@@ -36,7 +36,7 @@ Target = Annotated[
 
 
 def command_evaluate() -> None:
-    """Compare predictions with what is known: mass, materials, parts, objects, dynamics, judge."""
+    """Compare predictions with ground truth: mass, materials, parts, objects, dynamics, judge."""
     run_subcommand("evaluate", EVALUATIONS)
 
 
@@ -50,8 +50,8 @@ def evaluate_mass() -> None:
     """Predict masses, and compare them with measured ones where --truth gives them.
 
     FOLDER holds models, one object each; the CSV has columns object, mass_kg and, optionally, fill
-    (solid, hollow, full), by which errors are grouped. Without --truth masses are
-    predicted only. A folder in the layout of ABO-500 needs no CSV: choose its --split.
+    (solid, hollow, full), by which errors are grouped. Without --truth, masses are only predicted.
+    A folder in the layout of ABO-500 needs no CSV: choose its --split.
     """
     from corporeal.description.describe_config import DescribeConfig
     from corporeal.lab.evaluation import mass_evaluation, mass_report, measured_masses
@@ -63,11 +63,11 @@ def evaluate_mass() -> None:
         truth: Path | None = None
         """Table of measured masses (CSV)."""
         split: str = "test"
-        """Of ABO-500; "all" for all."""
+        """Split of ABO-500; "all" for all."""
         json: Path | None = None
-        """File for rows and errors (JSON)."""
+        """Output file for rows and errors (JSON)."""
         figure: Path | None = None
-        """File for a plot of predicted against measured mass (PNG)."""
+        """Output file for a plot of predicted against measured mass (PNG)."""
         how: mass_evaluation.MassConfig = field(default_factory=mass_evaluation.MassConfig)
         describe: DescribeConfig = field(default_factory=DescribeConfig)
         ground: GroundConfig = field(default_factory=GroundConfig)
@@ -104,9 +104,9 @@ def evaluate_materials() -> None:
     class Materials:
         folder: Folder = None
         truth: Path | None = None
-        """What parts are made of (TOML)."""
+        """Accepted materials of parts (TOML)."""
         json: Path | None = None
-        """File for rows and errors (JSON)."""
+        """Output file for rows and errors (JSON)."""
         describe: DescribeConfig = field(default_factory=DescribeConfig)
         ground: GroundConfig = field(default_factory=GroundConfig)
 
@@ -114,7 +114,7 @@ def evaluate_materials() -> None:
     asked = parse(Materials, "evaluate materials", evaluate_materials.__doc__, words=2, first=first)
     if asked.truth is None:
         raise UserError(
-            f"Nothing to judge by. Say --truth TOML. {material_evaluation.TRUTH_FILE_ADVICE}"
+            f"No ground truth. Give --truth TOML. {material_evaluation.TRUTH_FILE_ADVICE}"
         )
     library = asked.ground.library
     truth = material_evaluation.read_material_truth(asked.truth, library)
@@ -131,9 +131,8 @@ def evaluate_materials() -> None:
 def evaluate_parts() -> None:
     """Compare the parts found in pictures of models with the files' own nodes and materials.
 
-    Each model is rendered from all sides, and its parts are segmented in the visible points;
-    without FOLDER, four models of the showcase are used. --structural dinov2 --semantic clip
-    selects learned features.
+    Each model is rendered from all sides and segmented in the visible points; default: four models
+    of the showcase. --structural dinov2 --semantic clip selects learned features.
     """
     from corporeal.description.describe_config import DescribeConfig
     from corporeal.lab.evaluation import parts_evaluation, parts_figure
@@ -143,11 +142,11 @@ def evaluate_parts() -> None:
     class PartsAsked:
         folder: Folder = None
         names: Path | None = None
-        """TOML with what parts are called: per file, the file's name of a part = another name."""
+        """TOML with descriptions of parts: per file, the file's name of a part = another name."""
         json: Path | None = None
-        """File for rows and errors (JSON)."""
+        """Output file for rows and errors (JSON)."""
         figure: Path | None = None
-        """File for a picture of the parts (PNG)."""
+        """Output file for a picture of the parts (PNG)."""
         look: parts_evaluation.PartsEvaluationConfig = field(
             default_factory=parts_evaluation.PartsEvaluationConfig
         )
@@ -180,9 +179,9 @@ def evaluate_objects() -> None:
     class Objects:
         folder: Folder = None
         json: Path | None = None
-        """File for rows and errors (JSON)."""
+        """Output file for rows and errors (JSON)."""
         figure: Path | None = None
-        """File for a picture of the objects (PNG)."""
+        """Output file for a picture of the objects (PNG)."""
         scenes: objects_evaluation.ObjectsEvaluationConfig = field(
             default_factory=objects_evaluation.ObjectsEvaluationConfig
         )
@@ -202,15 +201,15 @@ def evaluate_objects() -> None:
 
 
 def evaluate_dynamics() -> None:
-    """Compare how scenes move with baselines, with a finer run of ours, and with life.
+    """Compare trajectories with baselines, with a finer run, and with measured rebounds.
 
         corporeal evaluate dynamics showcase --against single capped one
         corporeal evaluate dynamics corpus/ --against vomp:fields/ --json d.json
 
-    TARGET is "showcase" or a corpus whose scenes are assembled. Each run lies in OUT/SCENE/METHOD,
-    is done in a process of its own, and is not done again; say the same again to go on. A run that
-    fails is a row. With --judge a vision-language model judges films of the runs, after proving
-    on control films what it can tell; corporeal evaluate judge OUT does the same later.
+    TARGET is "showcase" or a corpus whose scenes are assembled. Each run is written to
+    OUT/SCENE/METHOD in its own process; repeat the command to resume. A failed run is a row. With
+    --judge a vision-language model judges videos of the runs, after a test with control videos;
+    corporeal evaluate judge OUT does the same later.
     """
     from corporeal.jobs.executor import Executor
     from corporeal.lab.evaluation.dynamics import dynamics_tables
@@ -226,22 +225,23 @@ def evaluate_dynamics() -> None:
         target: Target
         how: DynamicsConfig = field(default_factory=DynamicsConfig)
         out: Path | None = None
-        """Folder of the runs; by default dynamics/ here, of a corpus CORPUS/dynamics/."""
+        """Folder of the runs; default dynamics/, of a corpus CORPUS/dynamics/."""
         json: Path | None = None
-        """File for all numbers (JSON)."""
+        """Output file for all numbers (JSON)."""
         figure: Path | None = None
-        """File for a figure (PNG)."""
+        """Output file for a figure (PNG)."""
         page: Path | None = None
-        """File of the report; by default OUT/report.html."""
+        """Output file for the report; default OUT/report.html."""
         docs: Path | None = None
-        """File for the measured rows as a page of documentation (Markdown)."""
+        """Also write the measured rows as a documentation page (Markdown)."""
         judge: str = NO_MODEL
-        """Model that also judges films of the runs, as --vlm: see evaluate judge. Its page and
-        answers lie in OUT as judge.html and judge.json; --record keeps the answers for replay."""
+        """Model that also judges videos of the runs, as --vlm: see evaluate judge. Writes
+        OUT/judge.html and judge.json; --record keeps the answers for replay.
+        """
         looks: int = 1
-        """Times that the judge looks at each film, each from another side: 1 to 3."""
+        """Number of looks at each video, each from another side: 1 to 3."""
         yes: bool = False
-        """Ask a judge that costs more than 5 US$, or whose price is not known."""
+        """Allow a judge that costs more than 5 US$, or whose price is not known."""
         crew: WorkerOptions = field(default_factory=WorkerOptions)
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
@@ -249,7 +249,7 @@ def evaluate_dynamics() -> None:
     doc = evaluate_dynamics.__doc__
     asked = parse(Dynamics, "evaluate dynamics", doc, words=2, first=first)
     how = JudgeConfig(asked.judge, asked.settings.describe.record, asked.looks, yes=asked.yes)
-    connect_judge(how)  # a key that is absent is told before hours of simulation
+    connect_judge(how)  # report a missing key before hours of simulation
     here = Path() if asked.target == "showcase" else Path(asked.target)
     out = asked.out or here / "dynamics"
     with progress_bars() as tell:
@@ -262,12 +262,12 @@ def evaluate_dynamics() -> None:
     ):
         console.print(sentence, markup=False, highlight=False)
     _write_dynamics(found, asked, out)
-    if asked.judge != NO_MODEL:  # pages and answers beside the runs
+    if asked.judge != NO_MODEL:  # pages and answers are written beside the runs
         _judge(out, how, out / "judge.json", out / "judge.html")
 
 
 def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
-    """Write the report of an evaluation of dynamics, and the files that somebody asks for."""
+    """Write the report of an evaluation of dynamics, and the files asked for."""
     from corporeal.lab.evaluation.dynamics import dynamics_figure, dynamics_page
     from corporeal.lab.evaluation.dynamics.dynamics_summary import dynamics_record
 
@@ -285,11 +285,11 @@ def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
 
 
 def evaluate_judge() -> None:
-    """Let a vision-language model judge films of runs, after judging the model by control films.
+    """Judge videos of runs with a vision-language model that is validated on control videos.
 
-    FOLDER holds SCENE/METHOD, each a run, as evaluate dynamics leaves them. Controls are the run
-    "ours" with one known fault each. Of a law of physics the judge is believed only where its
-    answers tell the controls of that law; else the tables say that this judge cannot tell.
+    FOLDER holds runs SCENE/METHOD, written by evaluate dynamics. Controls are the run "ours" with
+    one known fault each. For a law of physics the judge counts only if its answers detect the
+    controls of that law; else the tables say that this judge cannot tell.
     """
     from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
 
@@ -297,9 +297,9 @@ def evaluate_judge() -> None:
     class Judge:
         folder: Runs = None
         json: Path | None = None
-        """File for answers, intervals and marks (JSON)."""
+        """Output file for answers, intervals and marks (JSON)."""
         page: Path | None = None
-        """File for a page with every film (HTML)."""
+        """Output file for a page with every video (HTML)."""
         how: JudgeConfig = field(default_factory=JudgeConfig)
 
     first = ("judge", "looks", "record", "yes", "json", "page")
@@ -308,7 +308,7 @@ def evaluate_judge() -> None:
 
 
 def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) -> None:
-    """Judge the runs in OUT, show what follows, and keep it where somebody asks for it."""
+    """Judge the runs in OUT, print the result, and write it to the files asked for."""
     from corporeal.lab.evaluation.judge import judge_page, judge_tables
     from corporeal.lab.evaluation.judge.judge_runs import judge_runs
 

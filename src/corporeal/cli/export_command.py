@@ -10,7 +10,7 @@ from corporeal.cli.parse import parse
 from corporeal.core.terminal import progress_bars
 
 MAX_LISTED_FILES = 6
-"""Files of one target that are named."""
+"""At most this many files of one target are listed."""
 
 
 def command_export() -> None:
@@ -18,10 +18,10 @@ def command_export() -> None:
 
         corporeal export runs/duck-on-mud --to usd mjcf glb
 
-    SOURCE is the folder of a run; or a scene that nobody simulated yet, as `corporeal run` takes
-    it; or a corpus that was run. Each target has a folder of its own in RUN/export, and export.json
-    beside them says what a format could not say and by how much it is off. h5, abc and --check want
-    more libraries: pip install 'corporeal[export]'.
+    SOURCE is the folder of a run; or a scene that is not simulated yet, as `corporeal run` takes
+    it; or a corpus that was run. Each target has its own folder in RUN/export; export.json lists
+    what a format cannot represent, and the errors. h5, abc and --check need the extra export: pip
+    install 'corporeal[export]'.
     """
     from corporeal.export.export_scene import DEFAULT_TARGETS, export_scene
     from corporeal.export.export_target import ExportConfig, ExportTarget
@@ -34,9 +34,9 @@ def command_export() -> None:
             tyro.conf.arg(metavar="SOURCE", help="The folder of a run, a scene, or a corpus."),
         ]
         to: tuple[ExportTarget, ...] = DEFAULT_TARGETS
-        """Targets."""
+        """Target formats."""
         out: Path | None = None
-        """Where they go; by default RUN/export."""
+        """Output folder; by default RUN/export."""
         config: ExportConfig = field(default_factory=ExportConfig)
 
     first = ("to", "at", "soft", "check", "out", "friction-for")
@@ -52,7 +52,7 @@ def command_export() -> None:
 
 
 def _main(files: tuple[str, ...]) -> list[str]:
-    """Return what a person opens: the files of a target, without what lies below."""
+    """Return the main files of a target, without those below them."""
     first = [f for f in files if f.count("/") == 1]
     return (
         first

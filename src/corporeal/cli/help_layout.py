@@ -1,7 +1,7 @@
-"""The order of a verb's options in its help: what most people need first, all others under "more".
+"""Layout of a command's help: common options first, all others under "more".
 
-Settings are nested dataclasses, each with a heading of its own. Here their fields are dealt out to
-flat dataclasses, one for each heading of the help, and what was typed is put together again.
+Settings are nested dataclasses. Their fields are distributed to flat dataclasses, one for each
+heading of the help; the settings are rebuilt from what was parsed.
 """
 
 import ast
@@ -14,53 +14,57 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
+from corporeal.core.setting_types import NoOption
+
 OPTIONS_BEFORE_MORE = 6
-"""So many options stand before the others."""
+"""At most this many options are listed first."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """One field of the settings, however deep it lies."""
+    """One field of the settings, at any depth."""
 
     path: tuple[str, ...]
     """Names of fields that lead to it."""
     annotation: Any
     """Its type, with its settings for tyro."""
     default: Any
-    """``dataclasses.MISSING``: it must be typed."""
+    """``dataclasses.MISSING``: required."""
     kind: type
-    """The dataclass that it belongs to."""
+    """The dataclass that holds it."""
 
     @property
     def name(self) -> str:
-        """As it is typed, without the dashes."""
+        """Name on the command line, without dashes."""
         given = [m.name for m in _metadata(self.annotation) if getattr(m, "name", None)]
         return given[-1] if given else self.path[-1].replace("_", "-")
 
     @property
     def positional(self) -> bool:
-        """Whether it is typed without a name."""
+        """Whether it is positional."""
         return tyro.conf.Positional in _metadata(self.annotation)
 
 
 @dataclass(frozen=True)
 class HelpLayout:
-    """Headings of the help, and the way back from what was typed to the settings."""
+    """Headings of the help, and the mapping from parsed options to the settings."""
 
     shape: Any
-    """A dataclass that tyro reads the command line into."""
+    """Dataclass that tyro parses the command line into."""
     kind: type
     """The settings."""
     slots: dict[tuple[str, ...], tuple[str, ...]]
     """Path of an option in the settings → its path in ``shape``."""
 
     def settings(self, typed: Any) -> Any:
-        """Return the settings of what was typed, an instance of ``shape``."""
+        """Return the settings of parsed options, an instance of ``shape``."""
         return self._made(self.kind, (), typed)
 
     def _made(self, kind: type, path: tuple[str, ...], typed: Any) -> Any:
         values = {}
         for f in fields(kind):
+            if not _is_offered(kind, f.name):
+                continue
             slot = self.slots.get((*path, f.name))
             if slot is None:
                 values[f.name] = self._made(_dataclass_of(kind, f.name), (*path, f.name), typed)
@@ -70,15 +74,14 @@ class HelpLayout:
 
 
 def lay_out(kind: type, first: Sequence[str] = ()) -> HelpLayout:
-    """Deal out options to headings.
+    """Distribute options to headings.
 
     Args:
         kind: A dataclass, others within it.
-        first: Names of the options that come first, as they are typed, in that order; of few
-            options all do.
+        first: Names of the options that come first, in that order; if there are few, all.
 
     Raises:
-        ValueError: ``first`` names an option that there is not, or none or too many of many.
+        ValueError: ``first`` names an unknown option, or none or too many.
 
     """
     options = options_of(kind)
@@ -114,6 +117,8 @@ def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> lis
     hints = get_type_hints(kind, include_extras=True)
     found = []
     for f in fields(kind):
+        if not _is_offered(kind, f.name):
+            continue
         default = _default(f) if given is None else getattr(given, f.name)
         if is_dataclass(_bare(hints[f.name])):
             inner = None if default is MISSING else default
@@ -127,7 +132,7 @@ def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> lis
 
 
 def _heading(name: str, path: tuple[str, ...], group: list[Option]) -> tuple[str, Any, Any]:
-    """Return a field that stands for one heading and what is below it."""
+    """Return a field for one heading and the options below it."""
     kind = make_dataclass(name, [_row(option) for option in group], frozen=True)
     kind.__doc__ = group[0].kind.__doc__ if path else "Further options."
     title = f"more: {path[-1]}" if path else "more"
@@ -146,12 +151,12 @@ def _row(option: Option) -> tuple[Any, ...]:
 
 
 def field_docstrings(kind: type) -> dict[str, str]:
-    """Return the strings that stand below the fields of a dataclass in its source."""
+    """Return the strings below the fields of a dataclass in its source."""
     found: dict[str, str] = {}
     for one in reversed(kind.__mro__[:-1]):
         try:
             tree = ast.parse(textwrap.dedent(inspect.getsource(one)))
-        except (OSError, TypeError):  # it was not written but made
+        except (OSError, TypeError):  # no source: the class was generated
             continue
         assert isinstance(tree.body[0], ast.ClassDef)
         rows = tree.body[0].body
@@ -164,6 +169,12 @@ def field_docstrings(kind: type) -> dict[str, str]:
 
 
 # ---------------------------------------------------------------- types
+
+
+def _is_offered(kind: type, name: str) -> bool:
+    """Tell whether a field is an option, or holds some."""
+    hint = get_type_hints(kind, include_extras=True)[name]
+    return not any(isinstance(one, NoOption) for one in _metadata(hint))
 
 
 def _metadata(annotation: Any) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""`corporeal masks`: masks of photographs, grown from a point, a box, or what all look at."""
+"""`corporeal masks`: masks of photographs, grown from a point, a box, or the cameras' common focus."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +15,10 @@ from corporeal.core.terminal import progress_bars
 def command_masks() -> None:
     """Grow masks of photographs with poses, from a point or a box in one of them.
 
-    Colours and edges decide in one photograph; the visual hull carries it to the others. Without
-    a point and a box it begins at what all cameras look at. The masks are PNG pictures with the
-    names of the photographs, to be looked at, corrected, and given to `corporeal run --masks`.
+    Segmentation in one photograph uses colours and edges; the visual hull propagates it to the
+    others. Without a point or a box it begins at the cameras' common focus. The masks are PNG files
+    with the names of the photographs; check and correct them, and give them to `corporeal run
+    --masks`.
     """
     from corporeal.io.input_files import lacks_poses, scene_name
     from corporeal.io.photos.posed_photos import MASK_FOLDERS
@@ -28,11 +29,11 @@ def command_masks() -> None:
     class Masks:
         photographs: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PHOTOS")]
         at: tuple[float, float] | None = None
-        """Column and row of a pixel on the object, in the photograph's own pixels."""
+        """Column and row of a pixel on the object, in the photograph's pixels."""
         box: tuple[float, float, float, float] | None = None
-        """Left, upper, right and lower end of a box around the object [px]."""
+        """Left, upper, right and lower edge of a box around the object [px]."""
         on: str = ""
-        """Name of the photograph that --at or --box are of; by default the first."""
+        """Photograph that --at or --box refer to; by default the first."""
         out: Path | None = None
         """Folder of the masks; by default runs/masks/NAME."""
 
@@ -44,9 +45,9 @@ def command_masks() -> None:
     if lacks_poses(asked.photographs):
         poses = Path("runs", scene_name(asked.photographs), "0-reconstruct", "poses")
         raise UserError(
-            f"{asked.photographs} has no poses, by which a mask is carried from one photograph to "
-            f"the others. Let `corporeal run {quote(str(asked.photographs))}` find them, and go on "
-            f"with `corporeal masks {quote(str(poses))}`."
+            f"{asked.photographs} has no poses, which are needed to propagate a mask to the other "
+            f"photographs. Find them with `corporeal run {quote(str(asked.photographs))}`, then "
+            f"run `corporeal masks {quote(str(poses))}`."
         )
     pointed = None
     if asked.at is not None or asked.box is not None:
@@ -58,12 +59,10 @@ def command_masks() -> None:
         if pointed is None:
             raise UserError(f"{' '.join(made.said)} Point at the object with --at or --box.")
         raise UserError(
-            "What was pointed at was found in no place in space: the other photographs do not show "
-            "its colours where their poses have it. Point at another place of it, in another "
-            "photograph (--on), or at a part of one colour (--at)."
+            "The selected object was not found in the other photographs: its colours do not appear "
+            "where their poses place it. Select another point of it, in another photograph (--on), "
+            "or a part of one colour (--at)."
         )
     print(*made.said, *filter(None, [made.beside]), sep="\n")
     photographs, masks = quote(str(asked.photographs)), quote(str(out))
-    print(
-        f"Look at {out / MASK_FOLDERS[0]}. Go on with: corporeal run {photographs} --masks {masks}"
-    )
+    print(f"Check {out / MASK_FOLDERS[0]}. Next: corporeal run {photographs} --masks {masks}")

@@ -1,4 +1,4 @@
-"""From the rest of the command line to a dataclass."""
+"""Parsing of the command line into dataclasses."""
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -18,9 +18,9 @@ def parse(
 
     Args:
         kind: A dataclass.
-        verb: What was typed after the program's name ("run", "assets list").
+        verb: Command ("run", "assets list").
         description: For the help.
-        words: How many words of the command line the verb takes up.
+        words: Number of words of the command.
         first: Options that come first in the help, six at most; all others stand under "more".
 
     """
@@ -35,17 +35,12 @@ def parse(
 
 
 def run_subcommand(verb: str, verbs: Mapping[str, Callable[[], None]]) -> None:
-    """Do what the second word of the command line says, or list the words there are.
-
-    Raises:
-        UnknownChoiceError: There is no such word.
-
-    """
+    """Run the subcommand named by the second word (UnknownChoiceError for an unknown one), or list all."""
     word = sys.argv[2] if len(sys.argv) > 2 else "--help"
     if word in ("--help", "-h"):
         width = max(map(len, verbs))
         lines = (f"  corporeal {verb} {w:{width}}  {_first_line(v)}" for w, v in verbs.items())
-        print(*lines, "", f"corporeal {verb} WORD --help tells more.", sep="\n")
+        print(*lines, "", f"corporeal {verb} WORD --help shows its options.", sep="\n")
         return
     if word not in verbs:
         raise UnknownChoiceError(f"word after {verb}", word, list(verbs))

@@ -1,4 +1,4 @@
-"""The contact sheet of a pool: every asset alone on the floor, with what it is called."""
+"""The contact sheet of a pool: every asset on the floor, with its name."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from corporeal.render.embree import render_image
 from corporeal.render.ray_scene import RayScene
 
 VIEW_DIRECTION: Vector = (0.6, -1.0, 0.45)
-"""From the front, which is -Y here and +Z in the file, a little from the right and from above."""
+"""Front view (-Y here, +Z in the file), slightly from the right and from above."""
 PICTURE_FILL_FRACTION = 0.9
 """Share of a picture that an asset takes up."""
 
@@ -26,7 +26,7 @@ def write_pool_contact_sheet(
     """Write a PNG of all assets, ``size`` pixels each.
 
     Raises:
-        BadFileError: An asset's file is gone or was changed.
+        BadFileError: An asset's file is missing or was changed.
 
     """
     tiles = []

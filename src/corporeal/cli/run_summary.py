@@ -1,4 +1,4 @@
-"""What a finished run says in the terminal: what everything was taken for, and what to look at."""
+"""Summary of a finished run in the terminal: materials of the parts, and warnings."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,16 +19,16 @@ from corporeal.simulation.summary_text import (
 )
 
 MAX_PART_ROWS = 12
-"""Rows of the table; a scene of more parts is in the report."""
+"""Rows of the table; larger scenes are in the report."""
 MAX_SENTENCES_PER_SECTION = 5
-"""Sentences of a section that are printed whole."""
+"""Sentences of a section that are printed in full."""
 MAX_LISTED_IMPACTS = 3
-"""Blows that may break something and are printed."""
+"""Impacts with possible breakage that are printed."""
 TABLE_HEADS = ("object", "part", "material", "mass", "simulated as")
 
 
 def show_summary(folder: Path) -> None:
-    """Print what the parts of a finished run were taken for, and what it says last, by weight."""
+    """Print the materials of a finished run's parts, and its warnings by severity."""
     audit = read_run_audit(folder)
     rows = [_row(part) for part in audit.parts]
     print_table(TABLE_HEADS, rows[:MAX_PART_ROWS], console)
@@ -40,14 +40,14 @@ def show_summary(folder: Path) -> None:
 
 
 def _breakage_sentences(found: Sequence[PredictedBreakage]) -> None:
-    """Say what the film shows whole although it would break, and how to see it break."""
+    """Describe what the video shows whole although it would break, and how to simulate breaking."""
     doubted = [b for b in found if b.word != "holds" and not b.pieces]
     for blow in doubted[:MAX_LISTED_IMPACTS]:
         _say("hint", breakage_message(blow))
     if len(doubted) > MAX_LISTED_IMPACTS:
         print_line(f"and {len(doubted) - MAX_LISTED_IMPACTS} more that may break: see the report.")
     if any(b.word == "would break" for b in doubted):
-        _say("hint", "with --breaking what would break falls into pieces.")
+        _say("hint", "with --breaking such objects break into pieces.")
 
 
 def _row(part: PartAudit) -> tuple[str, ...]:
@@ -65,7 +65,7 @@ def _listed(section: SummarySection, sentences: Sequence[str]) -> None:
 
 
 def _say(word: str, sentences: str) -> None:
-    """Print what is the matter, and dim what follows from it; in a log, one line."""
+    """Print a warning, its details dimmed; in a log, one line."""
     if not console.is_terminal:
         print_line(f"{word}: {sentences}")
         return

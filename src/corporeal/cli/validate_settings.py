@@ -1,4 +1,4 @@
-"""Settings are validated before a run keeps them."""
+"""Validation of settings before a run stores them."""
 
 from pathlib import Path
 
@@ -19,13 +19,13 @@ from corporeal.vlm.annotation_file import read_annotation_mapping
 
 
 def validate_settings(folder: Path, settings: Settings) -> None:
-    """Refuse settings that no scene could be run with: a model without its key, a missing library.
+    """Raise for settings that cannot work: a model without its key, a missing library.
 
-    Settings that the run in ``folder`` already has are not validated again: its answers may be on
-    the disk, so that no model is needed.
+    Settings that the run in ``folder`` already has are not validated again: its answers may be
+    stored, so that no model is needed.
 
     Raises:
-        UserError: Something is missing or unknown; nothing was changed.
+        UserError: A key, library or choice is missing or unknown.
 
     """
     known = read_run_request(folder).settings if (folder / RUN_FILE).exists() else None
@@ -33,7 +33,7 @@ def validate_settings(folder: Path, settings: Settings) -> None:
     segment_config.validate(settings.segment)
     fill_config.validate(settings.fill)
     simulate_config.validate(settings.simulate)
-    video_config.validate(settings.film)
+    video_config.validate(settings.video)
     if known is None or known.describe != settings.describe:
         _validate_answers(settings.describe)
     if known is None or known.ground != settings.ground:

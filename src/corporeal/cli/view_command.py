@@ -1,4 +1,4 @@
-"""`corporeal view`: look at runs in a browser."""
+"""`corporeal view`: the viewer in a browser."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +13,7 @@ from corporeal.core.errors import UserError
 
 REQUIRED_PACKAGES = ("starlette", "uvicorn", "websockets")
 MAX_RUNS_PER_PAGE = 2
-"""Runs that one page shows."""
+"""Maximum number of runs on one page."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,9 @@ class ViewOptions:
 
 
 def command_view() -> None:
-    """Look at a run in a browser: turn it, colour it, ask what every part is and why.
+    """View a run in a browser: rotate, colour, inspect every part.
 
-    With two runs: side by side, one timeline, one camera. Without any: a list of all runs.
+    Two runs are shown side by side with one timeline and camera; without a run, all are listed.
     Needs the extra `viewer`: pip install 'corporeal[viewer]'.
     """
     asked = parse(ViewOptions, "view", command_view.__doc__)
@@ -48,7 +48,7 @@ def command_view() -> None:
     if absent:
         raise UserError(
             f"The viewer needs {', '.join(absent)}: pip install 'corporeal[viewer]'. "
-            "report.html of every run holds a 3D view that needs nothing."
+            "report.html of every run holds a 3D view without dependencies."
         )
     _show(asked)
 
@@ -98,7 +98,7 @@ def _show(asked: ViewOptions) -> None:
 
 
 def _names(asked: ViewOptions) -> tuple[str, ...]:
-    """Return the names of the runs that were asked for; refuse what is none."""
+    """Return the names of the runs asked for; raise if one is no run."""
     from corporeal.pipeline.run_pipeline import read_run_request
 
     if len(asked.runs) > MAX_RUNS_PER_PAGE:
@@ -114,10 +114,10 @@ def _names(asked: ViewOptions) -> tuple[str, ...]:
 
 
 def _begin(asked: ViewOptions) -> None:
-    """Make the folder of all runs: the first upload will be the first run.
+    """Create the folder of all runs.
 
     Raises:
-        UserError: Nothing may be changed, or the folder cannot be made.
+        UserError: The folder is read-only or cannot be made.
 
     """
     if asked.read_only or asked.out.exists():

@@ -1,4 +1,4 @@
-"""What is found in a finished simulation, as data: what happened, and whether to trust it.
+"""Data of the audit of a finished simulation: outcome and violations.
 
 Computed in ``trajectory.outcome`` and ``trajectory.audit``, kept as ``audit.json`` (``trajectory.
 audit_file``), whose keys are the names of the fields below. All quantities are SI; a name ends in
@@ -34,7 +34,7 @@ class ObjectOutcome:
     dent_depth_m: float
     """Of the largest dent that is left at the end, from averages over the last 0.3 s [m].
 
-    Of what holds together: how far a patch of its matter went from where it was (``trajectory.
+    Of what holds together: how far a patch of its material went from where it was (``trajectory.
     residual_shape``). Of grains and pastes: how deep the free surface fell (``surface_mark``).
     """
     dent_depth_dx: float
@@ -156,9 +156,9 @@ class PartAudit:
     """rigid, deformable, shell or foliage."""
     structure: str
     """solid, shell or filled."""
-    E: float
+    young_pa: float
     """Young's modulus of the material [Pa]."""
-    E_sim: float
+    simulated_young_pa: float
     """As simulated [Pa]."""
     nu: float
     """Poisson's ratio [-]."""
@@ -175,14 +175,14 @@ class PartAudit:
     contents: str | None
     """Material behind the wall."""
     fill: float | None
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     thickness_sim_m: float | None
     """Simulated thickness of the wall [m]."""
     mass_kg: float
     """Estimated, at the scene's scale [kg]."""
     real_mass_kg: float | None
     """Of the real object [kg]."""
-    why: str
+    reason: str
     """Why it is simulated so."""
 
 
@@ -242,7 +242,7 @@ class SurfacePairCheck:
 
 @dataclass(frozen=True)
 class PredictedBreakage:
-    """What the hardest first blow does to a brittle part."""
+    """What the hardest first impact does to a brittle part."""
 
     object: str
     part: str
@@ -251,9 +251,9 @@ class PredictedBreakage:
     time: float
     """[s]"""
     speed: float
-    """Along the blow, where it struck [m/s]."""
+    """Along the impact, where it struck [m/s]."""
     energy: float
-    """Of the blow [J]."""
+    """Of the impact [J]."""
     ratio: float
     """Over what half of such parts bear [-]."""
     word: Literal["holds", "may break", "would break"]
@@ -315,7 +315,7 @@ class Audit:
     settling: SettlingOutcome | None
     """None: nothing was left to settle before time 0."""
     warnings: tuple[str, ...]
-    """What to read before trusting the film, in sentences."""
+    """What to read before trusting the video, in sentences."""
     kind_of_warning: tuple[NoteKind, ...] = field(default=(), kw_only=True)
     """One for each; none: a run from before they were kept."""
     breakage: tuple[PredictedBreakage, ...] = field(default=(), kw_only=True)
@@ -352,7 +352,7 @@ class RunAudit(Audit):
     expectations: tuple[Expectation, ...]
     """Of scenes of the showcase."""
     seconds: Mapping[str, float]
-    """Verb → what it took, and "total" [s]."""
+    """Stage → what it took, and "total" [s]."""
     peak_memory_mb: float
     """Largest resident memory of the process [MB]."""
     settings: Mapping[str, str]

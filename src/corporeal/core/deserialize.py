@@ -1,8 +1,8 @@
-"""Plain data, as JSON knows it, made into frozen dataclasses by their annotations.
+"""Conversion of plain JSON data to frozen dataclasses.
 
 The inverse of ``store.plain``: what was written to a file is read by the names of fields, not by
 strings. Keys that no field has are ignored, so that a reader declares only what it needs, and a
-field with a default may be absent, as in tables that are written by hand.
+field with a default may be absent, as in tables that are written manually.
 """
 
 from collections.abc import Mapping
@@ -74,5 +74,5 @@ def _member(kind: type[Enum], data: Any) -> Enum:
     """Return what was written as its name in lower case."""
     name = str(data).upper()
     if name not in kind.__members__:
-        raise ValueError(f"{data!r} is no {kind.__name__}")
+        raise ValueError(f"{data!r} is not a {kind.__name__}")
     return kind[name]

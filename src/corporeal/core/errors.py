@@ -1,4 +1,4 @@
-"""What can go wrong for a user. Each error says what happened, where, and what to do next."""
+"""Errors for users. Each message says what happened, where, and what to do next."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -54,7 +54,7 @@ class OutOfRangeError(UserError):
 
 
 def check_range(name: str, value: float | None, low: float, high: float) -> None:
-    """Refuse a setting that somebody typed and that cannot be right; None: nobody typed any.
+    """Raise for a setting outside its range; None: not set.
 
     Raises:
         UserError: It is not from low to high, or no number.

@@ -1,4 +1,4 @@
-"""What this process may use of the machine that it runs on."""
+"""Resources available to this process."""
 
 import atexit
 import ctypes
@@ -11,7 +11,7 @@ CPU_QUOTA_FILE = Path("/sys/fs/cgroup/cpu.max")
 """Where a container's share of the processor stands, as "microseconds per-period" (Linux)."""
 UNLIMITED_CORES = 1 << 16
 KEPT_FREED_BYTES = 1 << 26
-"""Memory that was freed and stays with the process [bytes]: some pictures of a film."""
+"""Memory that was freed and stays with the process [bytes]: some pictures of a video."""
 GC_THRESHOLD_OBJECTS = 50_000
 """Objects made, less those that ended, after which unused cycles of them are looked for."""
 TRIM_THRESHOLD, MMAP_THRESHOLD, ARENA_MAX = -1, -3, -8
@@ -59,7 +59,7 @@ def relax_garbage_collection() -> None:
 
 
 def _quota_cores(quota: Path) -> int:
-    """Give the cores that a container's quota amounts to; very many where there is none."""
+    """Return the cores that a container's quota amounts to; very many where there is none."""
     try:
         share, period = quota.read_text(encoding="ascii").split()
     except (OSError, ValueError):
@@ -68,6 +68,6 @@ def _quota_cores(quota: Path) -> int:
 
 
 def _environment_threads() -> int:
-    """Give the threads that the environment grants; very many where it says nothing."""
+    """Return the threads that the environment grants; very many where it says nothing."""
     asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
     return int(asked) if asked.isdecimal() and int(asked) > 0 else UNLIMITED_CORES

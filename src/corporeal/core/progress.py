@@ -1,16 +1,16 @@
-"""How far work has come, told of a part of it as of the whole."""
+"""Nested progress callbacks."""
 
 from collections.abc import Callable
 
 Progress = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 
 
 def subprogress(progress: Progress, begin: float, end: float, what: str = "") -> Progress:
     """Tell of a part of the work as of the whole.
 
     Args:
-        progress: Told of the whole.
+        progress: Callback of the whole.
         begin: Fraction of the whole that is done when the part begins.
         end: The same when it ends.
         what: Tells this part from others in which the same is done; follows the words.

@@ -1,4 +1,4 @@
-"""Choose a backend by name. Each room keeps its own menu; nothing is imported until chosen."""
+"""Lazy registries of backends, chosen by name."""
 
 from collections.abc import Mapping
 from importlib import import_module
@@ -22,13 +22,26 @@ def load_backend(kind: str, name: str, menu: Mapping[str, str]) -> Any:
     """
     if name not in menu:
         raise UnknownChoiceError(kind, name, list(menu))
-    module, _, attribute = menu[name].partition(":")
+    return load_function(menu[name], f"The {kind} {name!r}")
+
+
+def load_function(place: str, user: str = "") -> Any:
+    """Return the class or function at ``"module:attribute"``.
+
+    Args:
+        place: Where it is.
+        user: What needs it, for the error message; empty: the place.
+
+    Raises:
+        UserError: It needs a package that is not installed.
+
+    """
+    module, _, attribute = place.partition(":")
     try:
         return getattr(import_module(module), attribute)
     except ModuleNotFoundError as missing:
         if missing.name is None or missing.name.startswith("corporeal"):
             raise  # our own mistake, not a missing extra
         raise UserError(
-            f"The {kind} {name!r} needs {missing.name!r}. "
-            f"Install it with: pip install {missing.name}."
+            f"{user or place} needs {missing.name!r}. Install it with: pip install {missing.name}."
         ) from missing

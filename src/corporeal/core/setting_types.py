@@ -1,4 +1,4 @@
-"""Markers that declare which settings name files, by the type of the field.
+"""Markers that declare which settings name files, by the type of the field, and which are options.
 
 A field of type ``Path`` or ``Path | None`` names a file or folder that is read. A field of type
 ``str`` names one only if its annotation carries ``ReadsPath``; a path that is written carries
@@ -32,6 +32,11 @@ class ReadsPath:
 @dataclass(frozen=True)
 class WritesPath:
     """Marks a path that is written and not read."""
+
+
+@dataclass(frozen=True)
+class NoOption:
+    """Marks a dataclass within settings that is set in Python only: no verb offers it."""
 
 
 def paths_read(config: Any) -> list[Path]:

@@ -1,4 +1,4 @@
-"""Save and load anything that flows, and keep a run's folders honest.
+"""Storage of stage results with freshness keys.
 
 A stage's folder holds ``data.npz`` (the result), and ``meta.json`` with its freshness key, its
 configuration and its seconds. ``meta.json`` is written last, by an atomic rename: a folder without
@@ -73,7 +73,7 @@ def disk_errors(path: Path) -> Iterator[None]:
 
 
 def require_disk_space(folder: Path, needed: int) -> None:
-    """Refuse to begin what the disk cannot hold.
+    """Reject to begin what the disk cannot hold.
 
     Args:
         folder: Where it would be written.
@@ -351,7 +351,7 @@ def path_digest(path: Path) -> str:
 
 
 def cache_folder(kind: str) -> Path:
-    """Return where things of a kind are kept for all runs: as ``CACHE_VARIABLE`` says, or the system's."""
+    """Return where objects of a kind are kept for all runs: as ``CACHE_VARIABLE`` says, or the system's."""
     chosen = os.environ.get(CACHE_VARIABLE)
     if chosen:
         return Path(chosen).expanduser() / kind
@@ -390,7 +390,7 @@ def read_meta(folder: Path) -> ResultMeta:
     data = read_json(folder / META_FILE)
     if not isinstance(data, dict):
         raise BadFileError(
-            folder / META_FILE, "is no description of a result.", "Remove the folder."
+            folder / META_FILE, "is not the description of a result.", "Remove the folder."
         )
     return from_plain(ResultMeta, data)
 

@@ -1,4 +1,4 @@
-"""What a person sees while verbs work: bars with the time left or lines of a log, and tables."""
+"""Terminal output: progress bars, log lines and tables."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,17 +14,18 @@ from rich.table import Table
 console = Console(stderr=True)
 
 ProgressOfStage = Callable[[str], Callable[[float, str], None]]
-"""Given a verb, returns whom to tell the fraction done and what is being done."""
+"""Returns the progress callback of a stage."""
 
 LOG_INTERVAL_S = 30.0
-"""Seconds between two lines of a log on one verb [s]."""
+"""Seconds between two lines of a log on one stage [s]."""
 LOG_START_DELAY_S = 2.0
-"""Seconds after which a log says that a verb began: what is over before then is not worth a line,
-and an error stands alone [s]."""
+"""Seconds after which a log says that a stage began: what is over before then is not worth a line,
+and an error stands alone [s].
+"""
 MIN_FRACTION_FOR_ESTIMATE = 0.05
-"""Share of a verb that has to be done while somebody looks before its time left is told [-]."""
+"""Share of a stage after which the remaining time is shown [-]."""
 MINUTE_S, HOUR_S, SHORT_DURATION_S = 60.0, 3600.0, 90.0
-"""[s]; what is brief is told in seconds."""
+"""[s]; short times are shown in seconds."""
 
 
 def show_table(
@@ -54,7 +55,7 @@ def print_line(line: str, where: Console = console) -> None:
 
 @contextmanager
 def progress_bars() -> Iterator[ProgressOfStage]:
-    """Draw one bar per verb, with the time left; where nobody watches, say it in lines of a log."""
+    """Draw one bar per stage, with the time left; without a terminal, in lines of a log."""
     with _bars() if console.is_terminal else log_lines(console) as tell:
         yield tell
 
@@ -87,7 +88,7 @@ def _bars() -> Iterator[ProgressOfStage]:
 
 @dataclass
 class StageProgress:
-    """How far a verb is."""
+    """How far a stage is."""
 
     verb: str
     begun: float
@@ -95,16 +96,17 @@ class StageProgress:
     fraction: float = 0.0
     words: str = ""
     first: tuple[float, float] | None = None
-    """When something was told first [s], and the fraction that was done then: what an interrupted
-    run left counts for no speed."""
+    """Time of the first report [s], and the fraction that was done then: what an interrupted run
+    left counts for no speed.
+    """
 
     def told(self, fraction: float, words: str, now: float) -> None:
-        """Take note of what was told."""
+        """Update by a report."""
         self.fraction, self.words = fraction, words
         self.first = self.first or (now, fraction)
 
     def line(self, now: float) -> str:
-        """Say how far it is, and how long it will last if it goes on as it did."""
+        """Return how far it is, and how long it will last if it goes on as it did."""
         left = f", about {duration_words(self._left(now))} left" if self._speed(now) > 0 else ""
         words = f": {self.words}" if self.words else ""
         return (
@@ -112,7 +114,7 @@ class StageProgress:
         )
 
     def _speed(self, now: float) -> float:
-        """Return the share that is done in a second; 0: nobody knows yet [1/s]."""
+        """Return the share that is done in a second; 0: unknown yet [1/s]."""
         since, begun = self.first or (now, 0.0)
         done = self.fraction - begun
         return done / (now - since) if done >= MIN_FRACTION_FOR_ESTIMATE and now > since else 0.0
@@ -122,7 +124,7 @@ class StageProgress:
 
 
 def duration_words(seconds: float) -> str:
-    """Say how long something lasts, as people do."""
+    """Return how long something lasts, as people do."""
     if seconds < SHORT_DURATION_S:
         return f"{seconds:.0f} s"
     if seconds < SHORT_DURATION_S * MINUTE_S:
@@ -137,13 +139,13 @@ def log_lines(
     now: Callable[[], float] = time.monotonic,
     soon: float = LOG_START_DELAY_S,
 ) -> Iterator[ProgressOfStage]:
-    """Say when a verb that lasts begins and ends, and every so often how far it is.
+    """Say when a stage that lasts begins and ends, and every so often how far it is.
 
     Args:
         where: Gets the lines.
-        every: Seconds between two lines on one verb [s].
+        every: Seconds between two lines on one stage [s].
         now: The clock [s].
-        soon: Seconds that it takes for a verb to be said to begin [s].
+        soon: Seconds that it takes for a stage to be said to begin [s].
 
     """
     watched: list[_LoggedStage] = []  # the one that goes on
@@ -171,7 +173,7 @@ def log_lines(
 
 
 class _LoggedStage:
-    """A verb of which something is said every so often, whether or not it tells anything."""
+    """A stage of which something is said every so often, whether or not it tells anything."""
 
     def __init__(
         self,

@@ -1,3 +1,3 @@
-"""Which version this is; part of the name of everything that is kept on disk."""
+"""The version, which is part of the keys of stored results."""
 
 __version__ = "0.1.0"

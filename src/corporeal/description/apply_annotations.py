@@ -1,4 +1,4 @@
-"""A person's annotations, before which every other answer gives way."""
+"""Annotations by the user, which override every other answer."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
@@ -26,7 +26,7 @@ from corporeal.vlm.interpret_answers import (
 
 GEOMETRIC_SHARE_FIELDS = ("volume_share", "surface_share")
 OPEN_WARE_FIELDS = ("structure", "built_by", "wall_unseen")
-"""Kept of open ware, which is no solid whatever it is made of."""
+"""Fields that annotations of open ware keep: it is never solid."""
 
 
 def load_annotations(
@@ -36,10 +36,10 @@ def load_annotations(
     library: str,
     from_pictures: Collection[int],
 ) -> dict[tuple[str, str], PartAnnotation]:
-    """Return what the annotation file says, by object and part; names as the library spells them.
+    """Read the annotation file, by object and part, with the library's spelling of names.
 
     Raises:
-        UserError: The file cannot be read, or names what the scene or the library has not.
+        UserError: The file cannot be read, or a name is not in the scene or the library.
 
     """
     if config.annotations is None:
@@ -69,7 +69,7 @@ def apply_annotations(
     config: DescribeConfig,
     extent: float,
 ) -> list[PartDescription]:
-    """Return one object's parts as a person says they are; pieces of one mesh are gathered."""
+    """Apply the annotations of one object's parts; pieces of one mesh are gathered."""
     path, called = config.annotations, NamedObject([name_tokens(obj)], extent)
     own = [_apply_annotation(annotations.get((obj, w.name)), w, path, called) for w in words]
     pieces = annotated_pieces(annotations, obj, [w.name for w in own])
@@ -85,12 +85,12 @@ def _apply_annotation(
     path: Path | None,
     called: NamedObject,
 ) -> PartDescription:
-    """Let an annotation replace what was found; what it leaves open stays.
+    """Override a description by an annotation; fields that it leaves open stay.
 
     Args:
-        annotation: None: nobody says anything.
-        words: What was found.
-        path: Of the file that says it.
+        annotation: None: no annotation.
+        words: The description so far.
+        path: The annotation file.
         called: The object.
 
     """

@@ -1,4 +1,4 @@
-"""Who is asked what is in a scene, and how."""
+"""Settings of the stage describe."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,12 +8,12 @@ from corporeal.core.errors import check_range
 from corporeal.core.setting_types import ReadsPath, WritesPath
 
 MAX_ANSWERS = 40
-"""To one question: Wang et al. (2022) sampled so many."""
+"""Maximum number of answers to one question: that of Wang et al. (2022)."""
 
 
 @dataclass(frozen=True)
 class DescribeConfig:
-    """What recognises parts and materials."""
+    """Recognition of parts and materials."""
 
     annotations: Path | None = None
     """YAML file with materials of parts; it takes precedence over every other answer."""
@@ -29,28 +29,30 @@ class DescribeConfig:
     sampling: Literal["fraction", "value"] = "fraction"
     """Ask a model for fractions of the measured ranges, or for values, which are then checked."""
     views: int = 4
-    """Pictures of each object, out of 8 around it; one more shows its parts in colours."""
+    """Number of views of each object, of 8 around it; one more shows its parts in colours."""
     view_size: int = 512
-    """Their height and width [px]."""
+    """Height and width of the views [px]."""
     view_seed: int = 0
-    """Chooses the views."""
+    """Seed of the choice of views."""
     direct: bool = True
     """Also ask a model, without the library, what is printed on each object and what it weighs.
-    This reweights the ways it may be, and sets no value."""
+    This reweights hypotheses, and sets no value.
+    """
     answers: int = 1
-    """Number of answers to each question about materials, values and mass (self-consistency). What
-    an object may weigh is pooled over them, each with the same weight; parts are asked for once."""
+    """Number of answers to each question about materials, values and mass (self-consistency).
+    Masses are pooled over them with equal weights; parts are asked for once.
+    """
     parallel: int = 4
-    """Number of objects that a model is asked about at the same time."""
+    """Number of concurrent questions, in objects."""
 
 
 DEFAULT_DESCRIBE_CONFIG = DescribeConfig()
 
 
 def validate(config: DescribeConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
+    """Raise UserError where a setting is invalid for any scene."""
     from corporeal.render.object_portrait import (
-        DIRECTION_COUNT,  # with all that draws, which help needs not
+        DIRECTION_COUNT,  # imports the renderer, which the help does not need
     )
 
     for name, value, low, high in (

@@ -1,4 +1,4 @@
-"""What names and statements in the file say of each part."""
+"""Descriptions of parts from names and metadata in the file."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -44,7 +44,7 @@ from corporeal.recognition.stated_properties import (
 from corporeal.recognition.wet_materials import wet_material_values
 
 OPEN_WARE_MARK = ("sheet", "metadata")
-"""What an open vessel is by its name, and who says so."""
+"""Open vessels by name, and the source."""
 
 
 def parts_from_file(
@@ -54,14 +54,14 @@ def parts_from_file(
     from_pictures: Collection[int],
     unasked: bool,
 ) -> list[list[PartDescription]]:
-    """Return what the file says of each part of each object: stated, or recognised by its names.
+    """Describe each part of each object by the file: stated, or recognised from names.
 
     Args:
         scene: What was assembled.
         identity: Its parts.
         library: Where materials are looked up.
-        from_pictures: Objects, by number, whose surfaces need not show how deep a vessel is.
-        unasked: No model looks: that a name says wet counts, and what is too thick for a block.
+        from_pictures: Objects, by number, whose surfaces need not show the inside of vessels.
+        unasked: No model is asked: wetness in names and implausible thickness count.
 
     Raises:
         UserError: A number in the file can be no material's.
@@ -99,20 +99,20 @@ def parts_from_file(
 
 
 def open_ware_notes(objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
-    """Say of which objects from pictures the name decided that they are no solids."""
+    """Return notes on objects from pictures that are open ware by name."""
     made = [
         (o.name, p) for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN_WARE_MARK
     ]
     return tuple(
-        f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
-        f"ware, with a wall along its outside {_wall_text(part)}, and empty "
-        "inside of that; annotate structure and thickness_mm if that is wrong."
+        f"{name}: pictures may not show its inside. By its name it is open ware, with a wall along "
+        f"its outside {_wall_text(part)}, and empty; annotate structure and thickness_mm if that "
+        "is wrong."
         for name, part in made
     )
 
 
 def _wall_text(part: PartDescription) -> str:
-    """Say how thick the wall of open ware is taken to be, and why."""
+    """Return how thick the wall of open ware is taken to be, and why."""
     if part.thickness is None or not part.wall_usual:
         return "as thick as such walls usually are"
     why = f" ({part.wall_why})" if part.wall_why else ""
@@ -120,7 +120,7 @@ def _wall_text(part: PartDescription) -> str:
 
 
 def has_wall_thickness(library: str, name: str) -> bool:
-    """Whether a library has a wall thickness for a material; where it has neither, nobody knows."""
+    """Whether a library has a wall thickness for a material."""
     try:
         return "shell_thickness" in library_entry(name, library).ranges
     except UserError:
@@ -136,10 +136,10 @@ def _density(material: str | None, library: str) -> MeasuredRange | None:
 
 
 def _checked_values(surfaces: Sequence[Surface]) -> dict[str, Provenance]:
-    """Return the numbers that the file states, of quantities that there are.
+    """Return the values that the file states of known quantities.
 
     Raises:
-        UserError: One of them can be no material's.
+        UserError: A value is impossible for any material.
 
     """
     found = {n: g for n, g in stated_values(surfaces).items() if n in QUANTITIES}
@@ -156,7 +156,7 @@ def _checked_values(surfaces: Sequence[Surface]) -> dict[str, Provenance]:
 
 
 def stated_material(surfaces: list[Surface], library: str) -> PartDescription | None:
-    """Return the material that the file states outright; None: none that the library has."""
+    """Return the material that the file states; None: none of the library."""
     substance = stated_substance(surfaces)
     if substance is None:
         return None

@@ -1,4 +1,4 @@
-"""Each part in all its ways, offered to a model with the ranges of its open values."""
+"""Questions for a model on values in measured ranges, for all hypotheses of each part."""
 
 from collections.abc import Mapping
 
@@ -22,11 +22,11 @@ from corporeal.vlm.interview import PlacementOffer
 
 PlacementAnswer = FractionAnswer | ValueAnswer
 OfferedChoices = Mapping[str, Mapping[str, QuantityChoice]]
-"""Part → quantity → what it can be."""
+"""Part → quantity → its range."""
 
 
 def hypotheses_by_name(words: PartDescription) -> dict[str, PartDescription]:
-    """Return the part in each of its ways under the name it is asked about; the first is itself."""
+    """Return the hypotheses of a part by the names used in questions; the first is the part."""
     others = enumerate(words.hypotheses[1:], 1)
     return {words.name: words} | {
         hypothesis_name(words.name, k): apply_hypothesis(words, w) for k, w in others
@@ -36,7 +36,7 @@ def hypotheses_by_name(words: PartDescription) -> dict[str, PartDescription]:
 def make_placement_offer(
     name: str, words: PartDescription, look: str, offered: Mapping[str, QuantityChoice]
 ) -> PlacementOffer:
-    """Return what a model is told of one part before it places its values."""
+    """Return the facts on one part that precede the question on its values."""
     made = [str(words.material), *([words.structure] if words.structure else [])]
     if words.contents is not None:
         made.append(f"{words.fill or 1.0:.0%} full of {words.contents}")

@@ -1,10 +1,10 @@
-"""Several answers to the same questions about one object, pooled: each counts the same.
+"""Pooling of several answers on one object with equal weights.
 
 Wang, Wei, Schuurmans, Le, Chi, Narang, Chowdhery and Zhou (2022), *Self-consistency improves chain
-of thought reasoning in language models*, arXiv:2203.11171, ask a model several times and let the
-answers vote. Ours are distributions, so they are mixed instead of counted: a linear opinion pool
-(Stone 1961) with equal weights. Draws take one answer whole, with its own values; what is pooled
-here is the description that is shown, and that the scene is computed with.
+of thought reasoning in language models*, arXiv:2203.11171, sample several answers and take a vote.
+Answers here are distributions, so they are mixed instead: a linear opinion pool (Stone 1961) with
+equal weights. Draws take one answer whole, with its own values; what is pooled here is the
+description that is shown, and that the scene is computed with.
 """
 
 from collections import Counter
@@ -30,13 +30,13 @@ from corporeal.vlm.interpret_answers import merge_pieces
 
 LOOKING_SOURCES = ("model", "recording")
 FIELDS_NOT_ANSWERED = ("stated", "values", "inflation", "rebound")
-"""What no answer says of a part: its file or a person does."""
+"""Fields of a part that come from the file or an annotation, not from answers."""
 SHARE_FIELDS = ("volume_share", "surface_share", "inner_share")
 
 
 @dataclass(frozen=True)
 class JudgedInterval:
-    """What one answer says of a positive quantity: 90 % of what it may be, and the likeliest."""
+    """Estimate of a positive quantity in one answer: 90 % interval and mode."""
 
     low: float
     likely: float
@@ -67,7 +67,7 @@ def _in_piece_order(
 
 
 def _pool_part(same: Sequence[PartDescription]) -> PartDescription:
-    """Pool one part as every answer has it, or the pieces that share its mesh."""
+    """Pool one part over the answers, or the pieces that share its mesh."""
     if not same[0].pieces:
         return _pool_leaf(same)
     layouts = [tuple((p.inside, p.missing) for p in one.pieces) for one in same]
@@ -94,11 +94,11 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def _pool_leaf(same: Sequence[PartDescription]) -> PartDescription:
-    """Pool the ways of one part, or of one piece of a mesh, over all answers."""
+    """Pool the hypotheses of one part, or of one piece of a mesh, over all answers."""
     first = same[0]
     said = [one.swelling for one in same if one.swelling]
     first = replace(first, swelling=_pool_swelling(said) if said else None)
-    if not all(one.hypotheses for one in same):  # a person said what it is: values differ alone
+    if not all(one.hypotheses for one in same):  # annotated: only values differ
         places = [one.placements for one in same]
         return replace(first, placements=_pool_placements(places, [1.0] * len(same)))
     ways = _merge_hypotheses([way for one in same for way in one.hypotheses], len(same))
@@ -114,12 +114,12 @@ def _pool_leaf(same: Sequence[PartDescription]) -> PartDescription:
 
 
 def _hypothesis_key(way: Hypothesis) -> tuple[str | None, ...]:
-    """Name a way: two of one name are the same, and only their values differ."""
+    """Return the key of a hypothesis: equal keys differ in values only."""
     return way.material, way.structure, way.contents
 
 
 def _merge_hypotheses(ways: Sequence[Hypothesis], count: int) -> tuple[Hypothesis, ...]:
-    """Merge what is the same way; each of ``count`` answers counts the same. Likeliest first."""
+    """Merge equal hypotheses; each of ``count`` answers has equal weight. Likeliest first."""
     groups: dict[tuple, list[Hypothesis]] = {}
     for way in ways:
         groups.setdefault(_hypothesis_key(way), []).append(way)
@@ -143,7 +143,7 @@ def _merge_group(group: Sequence[Hypothesis], count: int) -> Hypothesis:
 def _weighted_mean(
     group: Sequence[Hypothesis], share: Callable[[Hypothesis], float | None]
 ) -> float | None:
-    """Return the mean of what some of the ways state, by their probabilities."""
+    """Return the mean of a field over the hypotheses that state it, weighted by probability."""
     known = [(value, way.probability) for way in group if (value := share(way)) is not None]
     if not known:
         return None
@@ -153,7 +153,7 @@ def _weighted_mean(
 def _pool_placements(
     said: Sequence[Mapping[str, RangePlacement]], weights: Sequence[float]
 ) -> dict[str, RangePlacement]:
-    """Put every quantity where the answers do on average, on its range's own scale."""
+    """Average the placements of every quantity on its range's scale."""
     found = {}
     for name in dict.fromkeys(name for places in said for name in places):
         own = [k for k, places in enumerate(said) if name in places]
@@ -168,7 +168,7 @@ def _pool_placements(
 
 
 def _pool_evidence(said: Sequence[MassEvidence]) -> MassEvidence:
-    """Pool judgements of one mass, and keep the print that at least half of the answers read."""
+    """Pool judgements of one mass, and keep printed facts that at least half of the answers read."""
     whole = _pool_intervals([JudgedInterval(e.low, e.likely, e.high) for e in said])
     nearest = min(said, key=lambda e: abs(log(e.likely / whole.likely)))
     printed: tuple[PrintedFact, ...] = tuple(
@@ -181,7 +181,7 @@ def _pool_evidence(said: Sequence[MassEvidence]) -> MassEvidence:
 
 
 def _pool_swelling(said: Sequence[ScanThickening]) -> ScanThickening:
-    """Pool judgements of how much of what a scan draws is real."""
+    """Pool judgements of the ratio of real to scanned volume."""
     whole = _pool_intervals([JudgedInterval(s.low, s.likely, s.high) for s in said])
     nearest = min(said, key=lambda s: abs(log(s.likely / whole.likely)))
     return replace(nearest, low=whole.low, likely=whole.likely, high=whole.high)
@@ -190,9 +190,9 @@ def _pool_swelling(said: Sequence[ScanThickening]) -> ScanThickening:
 def _pool_intervals(said: Sequence[JudgedInterval]) -> JudgedInterval:
     """Pool N judgements, each log-normal, by the first two moments of their mixture.
 
-    ln m = mean(ln m_k)  and, by the law of total variance,  σ² = mean(σ_k²) + var(ln m_k):
-    the geometric mean, as wide as the answers say themselves and as they lie apart. It does not
-    shrink with N, since answers of one model (or of people who know the same things) share errors.
+    ln m = mean(ln m_k)  and, by the law of total variance,  σ² = mean(σ_k²) + var(ln m_k): the
+    geometric mean, with the variance within and between answers. It does not shrink with N, since
+    the answers of one model share errors.
     """
     logs = np.log([s.likely for s in said])
     widths = [log(s.high / s.low) / NORMAL_90_PERCENT_WIDTH_SIGMAS for s in said]

@@ -1,4 +1,4 @@
-"""One scene asked about: every object by an interview of a model that looks."""
+"""Questions to a vision-language model on every object of a scene."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -70,7 +70,7 @@ ProgressCallback = Callable[[float, str], None]
 
 
 class SceneQuery:
-    """One scene being asked about."""
+    """Questions on one scene."""
 
     def __init__(
         self,
@@ -127,7 +127,7 @@ class SceneQuery:
         return Inventory(tuple(objects), rows, sum_usage(rows), (*warnings, *doubts))
 
     def _contradicted(self, number: int, words: ObjectDescription) -> str:
-        """Say where a model was believed before what the file states of an object outright."""
+        """Return warnings where a model's answer overrides what the file states of an object."""
         believed, clauses = {w.name: w for w in words.parts}, []
         for k, entry in enumerate(self.identity.catalogue):
             if entry.object == number:
@@ -142,7 +142,7 @@ class SceneQuery:
         if not against_file:
             return ""
         return Note(
-            f"{words.name}: {against_file}. The latter was believed; --annotations decides.",
+            f"{words.name}: {against_file}. The latter was used; --annotations decides.",
             NoteKind.ASSUMED,
         )
 
@@ -184,7 +184,7 @@ class SceneQuery:
     def _object(
         self, number: int, interview: Interview, file: list[PartDescription], annotations: Mapping
     ) -> ObjectDescription:
-        """Ask everything about one object."""
+        """Ask all questions on one object."""
         obj, names = self.scene.objects[number], self._names(number)
         stated = {part: a.material for (name, part), a in annotations.items() if name == obj.name}
         asks = not (all(stated.get(name) for name in names) or stated.keys() - set(names))
@@ -204,7 +204,7 @@ class SceneQuery:
         return pool_answers(thing, answers) if others else thing
 
     def _pieces(self, interview: Interview, names: list[str]) -> list[str]:
-        """Name the parts to ask about: the file's, or what a single mesh is taken apart into."""
+        """Return the parts to ask about: the file's, or the decomposition of a single mesh."""
         taken = interview.parts() if len(names) == 1 else None
         pieces = [p.name for p in taken[0].parts] if taken else names
         if len(pieces) > 1:
@@ -233,14 +233,14 @@ class SceneQuery:
             replace(complete_from_file(answered[name], own, self.names.walled), stated=own.stated)
             for name, own in known
         ]
-        # How hard it is inflated no picture shows: its name says it.
+        # Pictures do not show the pressure: the name does.
         return [
             replace(apply_inflation(w, own.inflation, None), rebound=own.rebound)
             for w, (_, own) in zip(found, known, strict=True)
         ]
 
     def _swollen(self, interview: Interview, words: list[PartDescription]) -> list[PartDescription]:
-        """Ask how much of a thin scan is real, of what fills it; a scan is one mesh."""
+        """Ask for the ratio of real to scanned volume of a thin scan, which is one mesh."""
         thin, filling = interview.subject.drawn.thin, parts_filling_scan(words)
         if thin is None or len(words) > 1 or not filling:
             return words
@@ -248,7 +248,7 @@ class SceneQuery:
         return [apply_real_shares(w, *asked) for w in words] if asked else words
 
     def _placed(self, interview: Interview, words: list[PartDescription]) -> list[PartDescription]:
-        """Ask where in its measured range each open value of each part lies, in all its ways."""
+        """Ask for the place of each open value in its measured range, for all hypotheses."""
         parts = {
             name: way
             for leaf in leaf_parts(words)
@@ -277,7 +277,7 @@ class SceneQuery:
         shape = ValueAnswer if self.config.sampling == "value" else FractionAnswer
         asked = interview.placement(offers, shape, problems)
         if asked is None:
-            why = "The model gave no usable answer: the usual value."
+            why = "The model gave no usable answer: typical value."
             places = {name: usual_placements(found, why) for name, found in offered.items()}
         else:
             places = placements_from_answer(*asked, offered)

@@ -1,7 +1,6 @@
-"""One object's questions, asked for several answers: each answer is a chain of its own.
+"""Repeated interviews on one object; each answer is a complete interview.
 
-What is asked about values hangs on what was answered about materials, so that an answer is taken
-from its first question to its last before answers are pooled.
+Questions on values depend on the answers on materials, so complete interviews are pooled.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,10 +16,10 @@ from corporeal.vlm.interview import Interview
 def repeat_interview(
     interview: Interview, count: int, described: Callable[[], list[PartDescription]], direct: bool
 ) -> list[ObjectAnswer]:
-    """Return what each of ``count`` answers says of one object.
+    """Return the descriptions of one object by ``count`` answers.
 
-    An answer of which a question got nothing usable is left out, and that is said; where all are,
-    the first stands, with what the file says in place of what is missing.
+    Answers with an unusable reply are left out with a warning; if all are, the first is used,
+    completed from the file.
 
     Args:
         interview: Of the object.
@@ -52,7 +51,7 @@ def repeat_interview(
 
 
 def _ask_unless_pending(ask: Callable, waiting: list[PendingQuestionsError]):
-    """Ask; where a person has yet to answer, go on with what else can be asked."""
+    """Ask; if a person has yet to answer, continue with other questions."""
     try:
         return ask()
     except PendingQuestionsError as error:
@@ -61,7 +60,7 @@ def _ask_unless_pending(ask: Callable, waiting: list[PendingQuestionsError]):
 
 
 def _is_complete(rows: Sequence[Mapping]) -> bool:
-    """Tell whether every question was answered, if only one of the times that it was put."""
+    """Return whether every question was answered at least once."""
     answered = {row["task"] for row in rows if row["answer"] is not None}
     return all(row["task"] in answered for row in rows)
 
@@ -74,7 +73,7 @@ def _judge_mass(interview: Interview, direct: bool) -> MassEvidence | None:
 def _warn_of_left_out_answers(
     interview: Interview, whole: Sequence[ObjectAnswer], count: int
 ) -> None:
-    """Warn of answers that are left out, and say nothing twice."""
+    """Warn of answers that are left out, without repetition."""
     warnings = list(dict.fromkeys(interview.warnings))
     if len(whole) < count:
         kept = f"{len(whole)} of {count} answers count" if whole else "the first answer counts"

@@ -1,4 +1,4 @@
-"""Pose the problem: turn a scene filled with particles into what an engine is given."""
+"""Build the simulation problem from a scene filled with particles."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -41,8 +41,8 @@ from corporeal.mpm.problem import (
 ZERO_VELOCITY = (0.0, 0.0, 0.0)
 GRAVITY_RAMP_S = 0.1
 """Time over which gravity grows where everything starts at rest in contact [s]."""
-SAME_FRAME_DISTANCE_CELLS = 1.5
-"""Rigid matter of one object nearer than this [cells] belongs to one frame."""
+SAME_INCLUSION_DISTANCE_CELLS = 1.5
+"""Rigid material of one object nearer than this [cells] belongs to one frame."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ def build_model(
 ) -> ModelMapping:
     """Build the problem that an engine solves.
 
-    One body per object, in the scene's order; an object with rigid frames gives its soft body and
-    then each frame.
+    One body per object, in the scene's order; an object with rigid inclusions gives its soft body and
+    then each inclusion.
     """
     pieces = divide_into_pieces(particles, len(scene.objects))
     bodies = tuple(build_body(scene, particles, field, piece) for piece in pieces)
@@ -83,15 +83,17 @@ def build_model(
         cell=particles.cell,
         friction=averaged(field.friction),
         restitution=averaged(bounces.restitution),
-        blows=np.stack([averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1),
+        restitution_law=np.stack(
+            [averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1
+        ),
         planes=(FLOOR, *(plane_of_wall(w) for w in scene.walls)),
         gravity=scene.gravity,
         gravity_ramp=GRAVITY_RAMP_S if starts_settled(scene, particles) else 0.0,
         contact=contact,
         bonds=tuple((k, p.soft) for k, p in enumerate(pieces) if p.soft >= 0),
         joints=plant_joints(particles, pieces),
-        apart=never_touching_pieces(pieces),
-        rolling=rolling_resistance_lengths(
+        excluded_pairs=never_touching_pieces(pieces),
+        rolling_resistance=rolling_resistance_lengths(
             bodies,
             [field.materials[int(share.argmax())] for share in weights],
             field.floor,
@@ -111,7 +113,7 @@ def build_model(
 
 @dataclass(frozen=True)
 class BodyPiece:
-    """What becomes one body: an object, or of a mixed object what is soft or one rigid frame."""
+    """What becomes one body: an object, or of a mixed object what is soft or one rigid inclusion."""
 
     object: int
     rigid: bool
@@ -126,7 +128,7 @@ class BodyPiece:
 
 
 def divide_into_pieces(particles: Particles, objects: int) -> list[BodyPiece]:
-    """Take mixed objects apart into what is soft and its rigid frames."""
+    """Take mixed objects apart into what is soft and its rigid inclusions."""
     stiff = np.array([t.kind == "rigid" for t in particles.treatments])[particles.part]
     pieces: list[BodyPiece] = []
     leafy = np.array([t.kind == "foliage" for t in particles.treatments])[particles.part]
@@ -139,33 +141,33 @@ def divide_into_pieces(particles: Particles, objects: int) -> list[BodyPiece]:
         if stiff[mine].all() or not stiff[mine].any():
             pieces.append(BodyPiece(k, bool(stiff[mine[0]]), mine, points))
             continue
-        soft, frame = len(pieces), mine[stiff[mine]]
+        soft, inclusion = len(pieces), mine[stiff[mine]]
         pieces.append(BodyPiece(k, False, mine[~stiff[mine]], points[:0]))
-        found = label_rigid_frames(
-            particles.position[frame],
+        found = label_rigid_inclusions(
+            particles.position[inclusion],
             particles.surface[points],
-            SAME_FRAME_DISTANCE_CELLS * particles.cell,
+            SAME_INCLUSION_DISTANCE_CELLS * particles.cell,
         )
         pieces += [
-            BodyPiece(k, True, frame[found.of_particle == c], points[found.of_point == c], soft)
+            BodyPiece(k, True, inclusion[found.of_particle == c], points[found.of_point == c], soft)
             for c in range(found.of_particle.max() + 1)
         ]
     return pieces
 
 
 @dataclass(frozen=True)
-class RigidFrameLabels:
-    """Which rigid frame what belongs to."""
+class RigidInclusionLabels:
+    """Which rigid inclusion what belongs to."""
 
     of_particle: Int[np.ndarray, " N"]
     of_point: Int[np.ndarray, " S"]
     """Of the surface."""
 
 
-def label_rigid_frames(
+def label_rigid_inclusions(
     position: Float[np.ndarray, "N 3"], surface: Float[np.ndarray, "S 3"], reach: float
-) -> RigidFrameLabels:
-    """Say which frame each rigid particle and each surface point belongs to.
+) -> RigidInclusionLabels:
+    """Return which frame each rigid particle and each surface point belongs to.
 
     Surfaces join too: a wire has few particles, far apart, on a coarse grid.
 
@@ -182,7 +184,7 @@ def label_rigid_frames(
     )
     known = np.isin(label[len(position) :], filled)
     owner[known] = np.searchsorted(filled, label[len(position) :][known])
-    return RigidFrameLabels(joined, owner)
+    return RigidInclusionLabels(joined, owner)
 
 
 def divide_plant(
@@ -260,8 +262,8 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
         law=column.pop("law").astype(np.int64),
         rigid=piece.rigid,
         surface=particles.surface[piece.surface].astype(float),
-        rounding=piece_curvature(particles, piece),
-        wetted=piece_wetted_surface(particles, piece),
+        curvature=piece_curvature(particles, piece),
+        wetted_surface=piece_wetted_surface(particles, piece),
         push=obj.push,
         wind=obj.wind,
         faces=exposed_piece_faces(particles, mine) if obj.wind is not None else NO_WIND_FACES,
@@ -273,18 +275,18 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
 
 
 def piece_curvature(particles: Particles, piece: BodyPiece) -> Float[np.ndarray, "S2 Columns"]:
-    """Give how its surface curves at a piece's surface points; none: it is not known."""
-    known = len(particles.rounding) == len(particles.surface)
-    return particles.rounding[piece.surface if known else []].astype(float)
+    """Return how its surface curves at a piece's surface points; none: it is not known."""
+    known = len(particles.curvature) == len(particles.surface)
+    return particles.curvature[piece.surface if known else []].astype(float)
 
 
 def piece_wetted_surface(particles: Particles, piece: BodyPiece) -> WettedSurface | None:
-    """Give where liquids touch an object that is rigid all through; None: there are none."""
+    """Return where liquids touch an object that is rigid all through; None: there are none."""
     own = particles.object_of_wetted == piece.object
     if not piece.rigid or not own.any():
         return None
     return WettedSurface(
-        particles.wetted[own].astype(float), particles.wetted_normal[own].astype(float)
+        particles.wetted_point[own].astype(float), particles.wetted_normal[own].astype(float)
     )
 
 
@@ -311,10 +313,10 @@ def constitutive_numbers(
     The hardening modulus is a stiffness and follows E; cohesion is a strength and follows
     √(E_sim/E), as the yield stress does.
     """
-    softer, leafy = treatment.young / treatment.young_real, treatment.kind == "foliage"
+    softer, leafy = treatment.simulated_young_pa / treatment.young_pa, treatment.kind == "foliage"
     return {
         "law": float(Law.COROTATED.value if leafy else material.law.value),
-        "young": treatment.young,
+        "young": treatment.simulated_young_pa,
         "poisson": treatment.poisson,
         "yield_stress": treatment.yield_stress or 0.0,
         "hardening": material.hardening * softer,
@@ -329,7 +331,7 @@ def constitutive_numbers(
 
 def slowest_vibration_rad_s(treatment: Discretization, extent: float) -> float:
     """ω₀ = π √(μ/ρ)/L [rad/s]: the fundamental of a free bar of the object's length in shear."""
-    shear = treatment.young / (2 * (1 + treatment.poisson))
+    shear = treatment.simulated_young_pa / (2 * (1 + treatment.poisson))
     return pi * sqrt(shear / treatment.density) / extent
 
 
@@ -392,7 +394,7 @@ def starts_settled(scene: Scene, particles: Particles) -> bool:
     Then gravity grows over a tenth of a second: switched on at once it would set off vibrations
     in which bodies hop by less than a grid cell.
     """
-    # What follows a path moves when it says.
+    # prescribed paths set the time of motion
     moving = np.abs(particles.velocity).max(initial=0.0) > 0.0
     if moving or any(o.push or o.wind for o in scene.objects):
         return False

@@ -1,4 +1,4 @@
-"""How far a body bends under its own weight."""
+"""Deflection of a body under its own weight."""
 
 MAX_INVISIBLE_STRAIN = 5e-3
 """Half a percent, of strain or of a shift over a length, is not seen."""

@@ -1,4 +1,4 @@
-"""The room behind a wall: how much goes in, and where contents lie that do not fill it."""
+"""Cavities: volume inside a wall, and level of contents that fill a part of it."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,8 @@ VESSEL_SAMPLES_COUNT = 20_000
 """Points thrown into a vessel's box to measure how much goes in."""
 MIN_OPEN_HOLLOW_RATIO = 0.5
 """A hollow that is open up to the rim is what a vessel fills if it is more than this share of the
-matter [-]: less, as over a can's lid or a candle's wax, is the empty end of what is full."""
+material [-]: less, as over a can's lid or a candle's wax, is the empty end of what is full.
+"""
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Cavity:
 
 
 def is_vessel(member: MeasuredPart) -> bool:
-    """Whether the room lies between the faces of the mesh instead of behind all of them.
+    """Whether the cavity lies between the faces of the mesh instead of behind all of them.
 
     A bowl too wide to be told from a body by what is blocked around its hollow is told by how much
     goes into that.
@@ -45,7 +46,7 @@ def is_vessel(member: MeasuredPart) -> bool:
 def measure_cavity(
     anatomy: MeasuredObject, member: MeasuredPart, thickness: float, rng: np.random.Generator
 ) -> Cavity:
-    """Measure the room behind a wall.
+    """Measure the cavity inside a wall.
 
     Behind a closed outer surface it is all that lies deeper than the wall; a vessel's reaches up to
     its rim.
@@ -97,7 +98,7 @@ def keep_below_rim(
 ) -> Float[np.ndarray, "N 3"]:
     """Keep the points that a level liquid could reach without running over the rim.
 
-    Those outside the matter with the part's faces below and, but for one crack, all around.
+    Those outside the material with the part's faces below and, but for one crack, all around.
     """
     return points[is_reachable_by_liquid(anatomy, member, points)]
 

@@ -1,4 +1,4 @@
-"""Grid spacing and treatments, from how every part of a scene is made and what awaits it."""
+"""Choice of grid spacing and discretization from the construction of parts and expected loads."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

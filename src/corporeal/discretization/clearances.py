@@ -1,4 +1,4 @@
-"""How far objects can move towards each other, along a direction, before they touch."""
+"""Clearances between objects along a direction."""
 
 from dataclasses import dataclass
 
@@ -45,7 +45,7 @@ class SampledObject:
         return 0.5 * (self.corners.min(axis=0) + self.corners.max(axis=0))
 
     def points(self, along: Float[np.ndarray, "3"]) -> Float[np.ndarray, "P 3"]:
-        """Give points that look along a unit vector, all of an open mesh: corners the foremost."""
+        """Return points that look along a unit vector, all of an open mesh: corners the foremost."""
         corners, spread = self.corners, self.spread
         if self.shape.closed:
             corners, spread = corners[self.looks @ along > 0.0], spread[self.faces @ along > 0.0]
@@ -63,7 +63,7 @@ class SampledObject:
 
 @dataclass(frozen=True)
 class PlacedObject:
-    """A thing that has moved: a point x of it is at place + rotation (x - origin)."""
+    """An object that has moved: a point x of it is at place + rotation (x - origin)."""
 
     thing: SampledObject
     place: Float[np.ndarray, "3"]
@@ -76,29 +76,29 @@ class PlacedObject:
         return cls(thing, np.zeros(3), np.eye(3), np.zeros(3))
 
     def out(self, points: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
-        """Take points of the thing at the start to where they are."""
+        """Take points of the object at the start to where they are."""
         return self.place + (points - self.origin) @ self.rotation.T
 
     def back(self, points: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
-        """Take points of space to where they were on the thing at the start."""
+        """Take points of space to where they were on the object at the start."""
         return self.origin + (points - self.place) @ self.rotation
 
     def reach(
         self, points: Float[np.ndarray, "P 3"], along: Float[np.ndarray, "3"]
     ) -> Float[np.ndarray, " P"]:
-        """Distance to the thing from points along a unit vector [m]; inf: they miss it."""
+        """Distance to the object from points along a unit vector [m]; inf: they miss it."""
         ahead = np.tile(along @ self.rotation, (len(points), 1))
         return self.thing.shape.reach(self.back(points), ahead)
 
     def points(self, along: Float[np.ndarray, "3"]) -> Float[np.ndarray, "P 3"]:
-        """Give points of it where they are, of its corners the foremost along a unit vector."""
+        """Return points of it where they are, of its corners the foremost along a unit vector."""
         return self.out(self.thing.points(along @ self.rotation))
 
 
 def place_along_path(
     thing: SampledObject, path: Keyframes, pivot: Vector, times: np.ndarray
 ) -> list[PlacedObject]:
-    """Say where a thing with a path is at some times [s].
+    """Return where an object with a path is at some times [s].
 
     Args:
         thing: Which.
@@ -146,12 +146,12 @@ def one_way_distances(
     way: Float[np.ndarray, "3"],
     inward: float,
 ) -> Float[np.ndarray, " P"]:
-    """Distance from points to another thing [m], asked from a little inside."""
+    """Distance from points to another object [m], asked from a little inside."""
     return other.reach(points - inward * way, way) - inward
 
 
 def overlap_along(upper: PlacedObject, lower: PlacedObject, along: Float[np.ndarray, "3"]) -> bool:
-    """Tell whether a line along a unit vector goes through both things."""
+    """Return whether a line along a unit vector goes through both objects."""
     points = lower.points(along)
     apart = np.linalg.norm(upper.out(upper.thing.middle) - lower.out(lower.thing.middle))
     away = float(apart) + lower.thing.shape.mesh.extent + upper.thing.shape.mesh.extent

@@ -1,9 +1,9 @@
-"""Which parts that prescribed motion presses are too stiff to be simulated so, and what is said.
+"""Limits on the stiffness of parts that prescribed motion compresses, with warnings.
 
 What a displacement is forced on has its shape at any stiffness, and only the force is as wrong as
 its stiffness. So a part that the step budget softens stays deformable, and the factor is said. What
-would be softened out of all proportion is hard: in life it would stop, or break, what presses it,
-which prescribed motion cannot do. It is rigid, at the cost of a rigid one, and that is said.
+would be softened out of all proportion is hard: in reality it would stop, or break, what presses
+it, which prescribed motion cannot do. It is rigid, at the cost of a rigid one, and that is said.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ def too_stiff_to_compress(
     unslowed: Sequence[Discretization],
     slowed: Sequence[Discretization],
 ) -> dict[int, str]:
-    """Say which part that is deformable only since it is pressed is too stiff for that, and why.
+    """Return which part that is deformable only since it is pressed is too stiff for that, and why.
 
     Only the stiffest: without it, the step budget may leave the others as they are.
 
@@ -42,19 +42,19 @@ def too_stiff_to_compress(
         )
         if _only_soft_by_compression(verdict)
         and part.pressed
-        and made.young < MIN_STIFFNESS_RATIO * true.young
+        and made.simulated_young_pa < MIN_STIFFNESS_RATIO * true.simulated_young_pa
     }
     if not hard:
         return {}
     k = max(hard, key=lambda number: hard[number])
     return {
-        k: f"prescribed motion presses it by about {parts[k].pressed:.2g} of its thickness, and it "
-        "is too stiff to be simulated so"
+        k: f"prescribed motion presses it by about {parts[k].pressed:.2g} of its thickness, "
+        "and it is too stiff for that"
     }
 
 
 def _only_soft_by_compression(verdict: RigidityVerdict) -> bool:
-    """Tell whether a part would be rigid if nothing pressed it."""
+    """Return whether a part would be rigid if nothing pressed it."""
     return not verdict.rigid and verdict.pressed >= MAX_INVISIBLE_STRAIN > max(
         verdict.weight, verdict.impact
     )
@@ -78,17 +78,21 @@ def warn_of_wrong_compression(
         if part.pressed < MAX_INVISIBLE_STRAIN:
             continue
         name = f"Object {part.object + 1} of the scene"
-        share = treatment.young / true.young if true.young > 0.0 else 1.0
+        share = (
+            treatment.simulated_young_pa / true.simulated_young_pa
+            if true.simulated_young_pa > 0.0
+            else 1.0
+        )
         if treatment.kind == "rigid":
             told.append(
-                f"{name} is pressed by about {part.pressed:.2g} of its thickness by what moves as "
-                "told, and is rigid, so no force on what presses it can be right. Let the path end "
-                "where it touches, or say a softer material."
+                f"{name} is pressed by about {part.pressed:.2g} of its thickness by prescribed "
+                "motion, and is rigid, so the contact force cannot be right. End the path at the "
+                "contact, or choose a softer material."
             )
         elif share < MIN_RIGHT_FORCE_STIFFNESS_RATIO:
             told.append(
-                f"{name} is pressed by what moves as told and simulated {1 / share:.2g} times "
-                "softer than it is: the force that it presses back with is about so much too "
-                "small. A finer detail has a larger step budget."
+                f"{name} is compressed by prescribed motion and simulated {1 / share:.2g} times "
+                "softer than it is: its reaction force is too small by about that factor. A finer "
+                "detail has a larger step budget."
             )
     return list(dict.fromkeys(told))

@@ -1,4 +1,4 @@
-"""Points on the outside of a rigid object, through which it touches planes exactly."""
+"""Contact points on the outside of rigid objects, for exact contact with planes."""
 
 import numpy as np
 from jaxtyping import Float
@@ -45,10 +45,10 @@ def sample_contact_points(
     points = np.concatenate(samples) if samples else np.zeros((0, 3))
     points = points[rng.permutation(len(points))]
     points = points[poisson_disk_subset(points, distance, corners)]
-    points, rounding = curve_points(
+    points, curvature = curve_points(
         join_meshes(faces), np.concatenate([corners, points])[:MAX_CONTACT_POINTS]
     )
-    return points[:MAX_CONTACT_POINTS], rounding[:MAX_CONTACT_POINTS]
+    return points[:MAX_CONTACT_POINTS], curvature[:MAX_CONTACT_POINTS]
 
 
 def extreme_corners(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "E 3"]:

@@ -1,10 +1,10 @@
-"""How each part enters the simulation: rigid, deformable or shell, and with which numbers.
+"""Discretization of each part: rigid, deformable or shell, with its parameters.
 
 One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
-is rigid, by itself or as the frame of softer parts; everything else keeps its true stiffness; thin
+is rigid, by itself or as the inclusion of softer parts; everything else keeps its true stiffness; thin
 walls are thickened with the stiffness that counts and the areal mass kept; only a step budget may
-compress wave speeds, in their order. What would sag far more than in life, as soft as thick walls
-and the step budget make it, is rigid after all.
+compress wave speeds, in their order. What would sag far more than in reality, as soft as thick
+walls and the step budget make it, is rigid after all.
 """
 
 from collections.abc import Sequence
@@ -79,7 +79,7 @@ class QualityPreset:
     """Grid spacing of a scene that runs, for what joins it [m]; None: it is chosen."""
 
     def steps(self, particles: float, pressed: bool = False) -> float:
-        """Say how many steps per simulated second a scene of so many particles may take.
+        """Return how many steps per simulated second a scene of so many particles may take.
 
         Where prescribed motion presses something soft, its stiffness is the force that is asked
         for: then only the work counts, where it is counted.
@@ -155,9 +155,9 @@ def _plan_with_verdicts(
     detail: DetailLevel | QualityPreset,
     stiffness: StiffnessMode,
 ) -> _PlanDraft:
-    """Choose for given verdicts and crowns."""
+    """Choose for given verdicts and foliage."""
     quality = detail if isinstance(detail, QualityPreset) else QUALITY_PRESETS[detail]
-    verdicts, crowns = judged.verdicts, judged.crowns
+    verdicts, foliage_parts = judged.verdicts, judged.foliage_parts
     # The grid resolves what deforms.
     capped = stiffness == "capped"
     yields = [
@@ -165,11 +165,11 @@ def _plan_with_verdicts(
     ]
     soft = [p for p, deforms in zip(parts, yields, strict=True) if deforms]
     cell = quality.cell or choose_cell(parts, soft, quality)
-    # What deforms decides whether what does not is a body of its own or a frame within one.
-    leafy = {parts[k].object for k in crowns}
+    # What deforms decides whether what does not is a body of its own or an inclusion in one.
+    leafy = {parts[k].object for k in foliage_parts}
     mixed = {p.object for p in soft} - leafy
     roles: list[PartRole] = [
-        "crown" if k in crowns else choose_role(p, deforms, mixed, cell)
+        "foliage" if k in foliage_parts else choose_role(p, deforms, mixed, cell)
         for k, (p, deforms) in enumerate(zip(parts, yields, strict=True))
     ]
     across = {k: object_side_range(soft, k)[0] / cell for k in {p.object for p in soft}}
@@ -201,7 +201,7 @@ def _plan_with_verdicts(
 
 
 def choose_role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float) -> PartRole:
-    """Say how a part takes part in its object.
+    """Return how a part takes part in its object.
 
     Args:
         part: Which.
@@ -214,7 +214,7 @@ def choose_role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float)
         return "soft"
     if part.object not in mixed:
         return "rigid"
-    return "trinket" if is_grain_on_grid(part, cell) else "frame"
+    return "subgrid" if is_grain_on_grid(part, cell) else "inclusion"
 
 
 # ------------------------------------------------------------------ resolution
@@ -231,7 +231,7 @@ def choose_cell(
 ) -> float:
     """Grid spacing dx [m]: the smallest deformable object resolved, the largest affordable.
 
-    Of an object with a rigid frame its soft parts count. Where nothing deforms, all objects do.
+    Of an object with a rigid inclusion its soft parts count. Where nothing deforms, all objects do.
     What is rigid and may be touched is at least a cell wide, as far as that is affordable.
     """
     seen = soft or parts

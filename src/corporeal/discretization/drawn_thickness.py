@@ -1,4 +1,4 @@
-"""What a mesh draws of an object: holes, and how thick; who is asked about it has to know."""
+"""Thickness and holes of an object as drawn by its mesh, for questions to a model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ THICKNESS_PERCENTILES = (10, 25, 50)
 
 @dataclass(frozen=True)
 class ThinScan:
-    """A scan of something thin: how coarse it is, and how thick it draws the thing."""
+    """A scan of something thin: how coarse it is, and how thick it draws the object."""
 
     edge: float
     """Median edge [m]."""
@@ -59,7 +59,7 @@ class DrawnShape:
 
 
 NO_DRAWN_SHAPE = DrawnShape()
-"""Of what nobody measured, or what is not closed."""
+"""Of parts that were not measured or are not closed."""
 
 
 def measure_drawn_shape(surfaces: Sequence[TriangleSurface], scale: float = 1.0) -> DrawnShape:
@@ -92,7 +92,7 @@ def mean_drawn_thickness(surfaces: Sequence[TriangleSurface], scale: float = 1.0
 
 
 def is_drawn_as_lump(surfaces: Sequence[TriangleSurface], wall: float, scale: float = 1.0) -> bool:
-    """Tell whether a vessel is drawn as a lump: far thicker than its wall, and with no room.
+    """Return whether a vessel is drawn as a lump: far thicker than its wall, and with no room.
 
     Args:
         surfaces: All of the object's, upright.

@@ -1,4 +1,4 @@
-"""The treatment of one part: rigid, deformable or shell, with which numbers and why."""
+"""Simulated parameters of one part: rigid, deformable or shell, with reasons."""
 
 from dataclasses import dataclass
 from math import hypot, inf, sqrt
@@ -38,9 +38,9 @@ from corporeal.mpm.physics.time_step_limits import (
     stable_step,
 )
 
-PartRole = Literal["soft", "rigid", "frame", "trinket", "crown"]
-"""A frame is a rigid inclusion: it holds the softer parts of its object. A trinket is too small to
-be one and goes with them. A crown is leaves on springs."""
+PartRole = Literal["soft", "rigid", "inclusion", "subgrid", "foliage"]
+"""An inclusion is rigid and holds the softer parts of its object. A subgrid part is too small to
+be one and goes with them. Foliage is leaves on springs."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,11 @@ class GridResolution:
 
 
 def remaining_loss_factor(part: PartGeometry, motion: ExpectedMotion, across: float) -> float:
-    """Loss factor that is left to the matter of what is struck, beside the grid's own share [-].
+    """Loss factor that is left to the material of what is struck, beside the grid's own share [-].
 
-    Contact at nodes and transfers take a share of a blow themselves. It counts on what the material
-    has to take, so that both together are what was measured. A solid loses for what is rigid and
-    meets it, too; a wall is dented so much more easily that it does not matter.
+    Contact at nodes and transfers take a share of an impact themselves. It counts on what the
+    material has to take, so that both together are what was measured. A solid loses for what is
+    rigid and meets it, too; a wall is dented so much more easily that it does not matter.
 
     Args:
         part: What is struck, as its contents where those are simulated.
@@ -76,7 +76,7 @@ def remaining_loss_factor(part: PartGeometry, motion: ExpectedMotion, across: fl
 
 
 def is_dented_as_hertz(part: PartGeometry) -> bool:
-    """Tell whether a blow dents a part as Hertz has it: no wall but a flat one."""
+    """Return whether an impact dents a part as Hertz has it: no wall but a flat one."""
     return part.structure.kind == "solid" or is_flat_wall(part)
 
 
@@ -89,9 +89,9 @@ def effective_parameters(
 ) -> Discretization:
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
     cell = resolved.cell
-    if role == "crown":
+    if role == "foliage":
         return foliage_parameters(part, verdict, motion)
-    soft = role in ("soft", "trinket")
+    soft = role in ("soft", "subgrid")
     part = part_as_contents(part, motion.impact_speed) if soft else part
     material, structure = part.material, part.structure
     thicker = choose_thickening(part, role, 2 * cell, motion.impact_speed)
@@ -105,11 +105,11 @@ def effective_parameters(
     # What the grid does not dissipate by itself, and the waves that limit the step.
     shell = structure.kind == "shell" and structure.thickness is not None
     loss = remaining_loss_factor(part, motion, resolved.across) if soft else 0.0
-    wave = wave_speed(young * thicker.young, poisson, density, loss) if soft else 0.0
+    wave = wave_speed(young * thicker.young_factor, poisson, density, loss) if soft else 0.0
     return Discretization(
         kind=("shell" if shell else "deformable") if soft else "rigid",
-        young_real=real,
-        young=young * thicker.young if soft else material.young,
+        young_pa=real,
+        simulated_young_pa=young * thicker.young_factor if soft else material.young,
         poisson=poisson,
         density=density,
         yield_stress=strong * thicker.strength if soft and strong is not None else strong,
@@ -119,7 +119,7 @@ def effective_parameters(
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
-        why="".join(
+        reason="".join(
             (
                 treatment_reason(verdict, role),
                 wall_reason(part, thicker.wall, motion.impact_speed) if soft else "",
@@ -140,7 +140,7 @@ class ThickeningFactors:
     """Thickness of its wall over the simulated one [-]; 1: as it is."""
     rod: float
     """Diameter of a rod over the simulated one [-]; 1: as it is."""
-    young: float
+    young_factor: float
     """Factor on E [-]."""
     strength: float
     """Factor on the yield stress [-]."""
@@ -177,8 +177,8 @@ def foliage_parameters(
     """Give foliage no stress of its own."""
     return Discretization(
         kind="foliage",
-        young_real=part.material.young,
-        young=0.0,
+        young_pa=part.material.young,
+        simulated_young_pa=0.0,
         poisson=0.0,
         density=part.material.density,
         yield_stress=None,
@@ -187,7 +187,7 @@ def foliage_parameters(
         impact_speed=motion.impact_speed,
         wave_speed=0.0,
         step=inf,
-        why=f"{FOLIAGE_REASON}, because {verdict.reason} and the wood stays rigid.",
+        reason=f"{FOLIAGE_REASON}, because {verdict.reason} and the wood stays rigid.",
     )
 
 
@@ -195,14 +195,14 @@ def treatment_reason(verdict: RigidityVerdict, role: PartRole) -> str:
     """Say in one sentence why a part is treated as it is."""
     return {
         "rigid": f"Rigid, because {verdict.reason}.",
-        "frame": f"A rigid frame that holds what is soft around it, because {verdict.reason}.",
-        "trinket": "Deformable with the rest of its object; by itself it would be rigid.",
+        "inclusion": f"A rigid inclusion that holds the soft parts around it, because {verdict.reason}.",
+        "subgrid": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
 
 
 def scale_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
-    """Say where the real object, struck as fast, would be judged otherwise; "" where it would not.
+    """Return where the real object, struck as fast, would be judged otherwise; "" where it would not.
 
     Stiffness against stress waves does not depend on size; against its own weight it does.
     """
@@ -218,18 +218,18 @@ def scale_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
 
 
 def rod_reason(ratio: float) -> str:
-    """Say what a thickened rod keeps."""
+    """Describe what a thickened rod keeps."""
     if ratio >= 1:
         return ""
     return (
         f" It is simulated {1 / ratio:.3g} times as thick, with its bending stiffness (up to 10 % "
         "less where it runs askew to the grid), its strength in bending and its mass kept; "
-        "stretched it is softer than in life."
+        "stretched it is softer than in reality."
     )
 
 
 def bar_reason(part: PartGeometry, simulated: float) -> str:
-    """Say what was assumed of a long thin part that is no known rod or tube; "" of all others.
+    """Describe what was assumed of a long thin part that is no known rod or tube; "" of all others.
 
     Args:
         part: Which.
@@ -250,20 +250,20 @@ def bar_reason(part: PartGeometry, simulated: float) -> str:
 
 
 def partner_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
-    """Say what else a part loses for; "" where it is nothing."""
+    """Describe what else a part loses for; "" where it is nothing."""
     names = sorted(
         {p.material.name for p in motion.partners if takes_part_in_impact(part.material, p)}
     )
     if not names or not is_dented_as_hertz(part) or CONSTITUTIVE_LAWS[part.material.law].loose:
         return ""
     return (
-        f" What meets it is rigid here ({', '.join(names)}) and would give way beside it in life: "
-        "its loss factor is that of both, of each by its share of the compliance."
+        f" What meets it is rigid here ({', '.join(names)}) but deforms in reality: the loss "
+        "factor is that of both, weighted by compliance."
     )
 
 
 def wall_reason(part: PartGeometry, ratio: float, speed: float) -> str:
-    """Say what a thickened wall keeps."""
+    """Describe what a thickened wall keeps."""
     if ratio >= 1:
         return ""
     factors = wall_factors(part, ratio, speed)
@@ -275,5 +275,5 @@ def wall_reason(part: PartGeometry, ratio: float, speed: float) -> str:
         lost = "in its plane it is softer"
     return (
         f" Its wall is simulated {1 / ratio:.3g} times as thick, with {kept} and its mass kept; "
-        f"{lost} than in life."
+        f"{lost} than in reality."
     )

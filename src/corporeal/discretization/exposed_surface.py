@@ -1,7 +1,6 @@
-"""What of an object the air reaches: its outer skin, and both sides of its open sheets.
+"""Surface of an object exposed to air: its outer skin, and both sides of open sheets.
 
-Only what is buried where parts overlap is left out: the air reaches the inside of a vessel, and
-one part gives no shelter to another.
+Only surfaces inside other parts are left out; there is no sheltering.
 """
 
 import numpy as np

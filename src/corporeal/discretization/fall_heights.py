@@ -1,4 +1,4 @@
-"""How far objects are from what they may hit."""
+"""Fall heights of objects."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The shape of what lies loose in a vessel: its hollow up to the level of what is in it."""
+"""Shape of loose contents: the hollow of a vessel up to the fill level."""
 
 from dataclasses import dataclass
 
@@ -37,7 +37,7 @@ def fill_to_volume(
 ) -> PouredBody | None:
     """Fill a vessel's hollow from its bottom; None: it has no room for so much.
 
-    The hollow is sampled as a signed distance from the vessel's matter, cut off at the level, and
+    The hollow is sampled as a signed distance from the vessel's material, cut off at the level, and
     meshed where it changes its sign (marching cubes: Lorensen and Cline 1987). What lies nearer to
     the wall than the last sample is outside.
 

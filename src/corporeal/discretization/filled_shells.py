@@ -1,9 +1,7 @@
-"""What a wall with something behind it does when it is struck.
+"""Treatment of filled shells under impact.
 
-There is no law of flow here. Liquids and grains therefore move with the wall as one rigid mass: in
-a container that is full and closed they hardly could do otherwise, since neither gives way without
-the other. What keeps its own shape (stuffing, foam, jelly) is simulated by its own law, with the
-wall's mass around it.
+Liquids and grains in a full, closed container move with the wall as one rigid mass. What keeps its
+own shape (stuffing, foam, jelly) is simulated by its own law, with the wall's mass around it.
 """
 
 from collections.abc import Callable
@@ -46,7 +44,7 @@ def part_as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
             part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2
         )
         loss = inner.loss if part.structure.rebound is not None else blow.loss
-        spread = replace(spread, young=blow.young, loss=loss)
+        spread = replace(spread, young=blow.young_pa, loss=loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
 
 
@@ -89,7 +87,7 @@ def judge_filled_shell(
     motion: ExpectedMotion,
     judge: Callable[[PartGeometry, ExpectedMotion], RigidityVerdict],
 ) -> RigidityVerdict:
-    """Say whether wall and contents move as one rigid body, and why."""
+    """Return whether wall and contents move as one rigid body, and why."""
     structure, inner = part.structure, part.structure.contents
     assert inner is not None
     if structure.inflated:
@@ -109,11 +107,11 @@ def judge_filled_shell(
         reason = f"{inside.reason}; it is simulated as its {inner.name}, the wall's mass around it"
         return replace(inside, reason=reason)
     reason = (
-        f"it is filled with {inner.name}, which no law here lets flow: wall and contents move as "
-        "one rigid mass"
+        f"it is filled with {inner.name}, which does not flow in this model: wall and contents "
+        "move as one rigid mass"
     )
     if structure.fill < NEARLY_FULL_FRACTION:
-        reason += f", and dents that its empty {1 - structure.fill:.0%} would allow are not seen"
+        reason += f", and dents into its empty {1 - structure.fill:.0%} are not modelled"
     return replace(wall, rigid=True, reason=reason)
 
 

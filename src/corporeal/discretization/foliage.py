@@ -1,4 +1,4 @@
-"""Leaves and roots: how many leaves there are, how fast they swing, where wood meets its soil."""
+"""Foliage and roots: leaf area, natural frequency of leaves, anchorage in the soil."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -101,7 +101,7 @@ def weigh_bulk_foliage(
         anatomy: The plant.
         member: The part.
         field: What it is made of.
-        tissue: What leaves are made of, as thick as in life.
+        tissue: What leaves are made of, as thick as in reality.
         scale: Scene size over real size.
 
     """
@@ -199,8 +199,8 @@ class RootedWood:
         """What is guessed where the foot was not seen, in words."""
         deep = self.top - self.foot
         return (
-            f"how deep it is rooted in its soil was not seen and is taken as {deep:.2g} m, halfway "
-            "down; how far it sways depends on that."
+            f"its root depth was not seen and is assumed as {deep:.2g} m, halfway down; how far it "
+            "sways depends on that."
         )
 
 

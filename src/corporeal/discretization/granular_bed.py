@@ -1,8 +1,7 @@
-"""What lies below the drawn surface of loose matter: it fills what holds it down to the wall.
+"""Granular beds: material below a drawn surface, down to the walls of its container.
 
-Whoever models a plant or a cup of coffee draws the top of what is in it, and pictures show no
-more. Grains and liquids do not lie over air, so that all between that surface and the inside of
-what holds it is theirs.
+Models and pictures show only the top surface of contents. Grains and liquids do not rest on air, so
+they fill the space between that surface and the container.
 """
 
 from collections.abc import Sequence
@@ -43,7 +42,7 @@ MAX_HOLDER_REACH_WIDTHS = 1.5
 
 @dataclass(frozen=True)
 class GranularBed:
-    """Loose matter from its drawn surface down to what holds it."""
+    """Granular material from its drawn surface down to what holds it."""
 
     mesh: Mesh
     """Closed; normals outward."""
@@ -76,7 +75,7 @@ class HoldingWall:
     def room(
         self, points: Float[np.ndarray, "N 3"], inside: Bool[np.ndarray, " N"]
     ) -> Float[np.ndarray, " N"]:
-        """Distance from its matter [m].
+        """Distance from its material [m].
 
         Args:
             points: [m]
@@ -92,14 +91,14 @@ class HoldingWall:
 
 
 def holding_wall_of(member: MeasuredPart, field: MaterialField, top: QueryMesh) -> HoldingWall:
-    """Say where a part's matter is.
+    """Return where a part's material is.
 
-    A hollow body that is drawn by its outside has no lid where loose matter lies on it.
+    A hollow body that is drawn by its outside has no lid where granular material lies on it.
 
     Args:
         member: The part.
         field: What it is made of.
-        top: What is drawn of the loose matter.
+        top: What is drawn of the granular material.
 
     """
     made = infer_structure(member, part_specification(member.part, field))
@@ -115,9 +114,9 @@ def holding_wall_of(member: MeasuredPart, field: MaterialField, top: QueryMesh) 
 def find_granular_bed(
     anatomy: MeasuredObject, member: MeasuredPart, field: MaterialField
 ) -> GranularBed | None:
-    """Find what a part of loose matter fills; None: it is drawn whole, or nothing holds it.
+    """Find what a part of granular material fills; None: it is drawn whole, or nothing holds it.
 
-    That is what is free of other parts' matter, hangs together below the drawn surface, and has
+    That is what is free of other parts' material, hangs together below the drawn surface, and has
     their faces below and, but for one crack, all around. Beside the surface its nearest height
     counts.
     """
@@ -180,7 +179,7 @@ class _BedSearch:
     anatomy: MeasuredObject
     member: MeasuredPart
     top: QueryMesh
-    """All that is drawn of the loose matter."""
+    """All that is drawn of the granular material."""
     walls: Sequence[HoldingWall]
 
     @cached_property
@@ -243,7 +242,7 @@ class _BedSearch:
         return np.where(np.isfinite(found), found, -np.inf).reshape(len(x), len(y))
 
     def room(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
-        """Distance from other parts' matter [m]; negative in it."""
+        """Distance from other parts' material [m]; negative in it."""
         shape = self.anatomy.shape
         inside = np.zeros(len(points), bool) if shape is None else shape.inside(points)
         found = np.min([w.room(points, inside) for w in self.walls], axis=0)

@@ -1,4 +1,4 @@
-"""Objects whose loose matter fills what holds it, although only its surface is drawn."""
+"""Granular beds of objects of which only the surface is drawn."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ def loose_matter_parts(field: MaterialField) -> set[int]:
 def fill_all_beds(
     anatomies: Sequence[MeasuredObject], field: MaterialField
 ) -> list[MeasuredObject]:
-    """Let the loose matter of every object fill what holds it.
+    """Let the granular material of every object fill what holds it.
 
     Args:
         anatomies: One per object.
@@ -41,7 +41,7 @@ def fill_all_beds(
 def find_beds(
     anatomy: MeasuredObject, field: MaterialField, loose: Collection[int]
 ) -> dict[int, GranularBed]:
-    """Find the bed of each part of loose matter that has one."""
+    """Find the bed of each part of granular material that has one."""
     found = {
         m.part: find_granular_bed(anatomy, m, field) for m in anatomy.members if m.part in loose
     }
@@ -106,7 +106,7 @@ def _part_as_bed(member: MeasuredPart, holder: int, body: Mesh, shape: QueryMesh
 
 
 def describe_beds(member: MeasuredPart, parts: Parts) -> str:
-    """Say in words what loose matter fills; "" where it is as it is drawn."""
+    """Describe in words what granular material fills; "" where it is as it is drawn."""
     if member.drawn is None:
         return ""
     return f": it fills {parts.catalogue[member.holder].name} below its surface"
@@ -115,12 +115,12 @@ def describe_beds(member: MeasuredPart, parts: Parts) -> str:
 def warn_of_loose_sheets(
     scene: Scene, parts: Parts, anatomies: Sequence[MeasuredObject], field: MaterialField
 ) -> tuple[str, ...]:
-    """Warn of loose matter of which only a surface is drawn, and that nothing holds."""
+    """Warn of granular material of which only a surface is drawn, and that nothing holds."""
     loose = loose_matter_parts(field)
     found = [m for a in anatomies for m in a.members if m.part in loose and m.volume == 0]
     return tuple(
         f"{scene.objects[parts.catalogue[m.part].object].name}: {parts.catalogue[m.part].name} of "
         f"{field.materials[m.part].name} is drawn as an open sheet, and nothing of the same object "
-        "holds it: how deep it is, and so its mass, is a guess. Model its body, or what it lies in."
+        "holds it: its depth and mass are a guess. Model its volume or its container."
         for m in found
     )

@@ -1,4 +1,4 @@
-"""How deep a blow dents a ball that strikes a rigid plane, by what resists it."""
+"""Depth of indentation of a ball that strikes a rigid plane."""
 
 from math import pi, sqrt
 

@@ -1,4 +1,4 @@
-"""What is far thicker than any wall of its substance, and called by no known name, is no block."""
+"""Prior for hollow objects: implausibly thick objects without a known name are hollow."""
 
 from dataclasses import replace
 
@@ -16,15 +16,16 @@ from corporeal.recognition.lexicon import (
 from corporeal.recognition.metadata_recognition import FileEvidence
 
 MAX_SOLID_THICKNESS_RATIO = 5.0
-"""A mean thickness over the greatest measured wall of its substance, from which a thing is drawn as
-it looks from outside [-]: of things of which a name tells the substance alone, solid ones reach 3
-(beams, a gun barrel), and those that turned out hollow begin at 9 (decision 110)."""
+"""A mean thickness over the greatest measured wall of its substance, from which an object is drawn
+as it looks from outside [-]: of objects of which a name tells the substance alone, solid ones reach
+3 (beams, a gun barrel), and those that turned out hollow begin at 9 (decision 110).
+"""
 
 
 def hollow_if_too_thick(
     words: PartDescription, seen: FileEvidence, library: str
 ) -> PartDescription:
-    """Let a thing of one part have a wall where only its substance is known and it is too thick.
+    """Give a one-part object a wall if only its substance is known and it is too thick.
 
     Metal, glass, plastic and ceramics come as sheets, castings and mouldings: a "brass samovar" of
     17 kg is none. Open ware that is drawn full, as it looks from outside, is no block either.
@@ -53,8 +54,9 @@ def hollow_if_too_thick(
     if not 0 < thickest < thickness:
         return words
     told = (
-        f"A block {1e3 * thickness:.0f} mm thick would be more than {MAX_SOLID_THICKNESS_RATIO:g} times as thick as "
-        f"any wall of {words.material} was measured: it is taken for hollow."
+        f"A block {1e3 * thickness:.0f} mm thick would be more than {MAX_SOLID_THICKNESS_RATIO:g} "
+        "times as thick as "
+        f"any wall of {words.material} was measured: it is assumed hollow."
     )
     return replace(words, structure="shell", reason=f"{words.reason} {told}")
 

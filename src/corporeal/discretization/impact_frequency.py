@@ -1,8 +1,8 @@
-"""At which frequency a mat loses: that of the blows that it takes.
+"""Frequency of damping of soft mats, set by the impacts on them.
 
 Branches keep a loss factor over one decade (``mpm.physics.branches``). A ball that strikes touches
 for two to three half periods of its own slowest vibration, which lie in it. A mat is struck in one
-place: the blow lasts as long as what strikes it takes to dent it, whatever the mat's length, and
+place: the impact lasts as long as what strikes it takes to dent it, whatever the mat's length, and
 its slowest vibration, slower the longer it is, would leave that outside.
 """
 
@@ -56,7 +56,7 @@ def tune_loss_to_impacts(
     motions: Sequence[ExpectedMotion],
     treatments: Sequence[Discretization],
 ) -> tuple[Discretization, ...]:
-    """Centre the loss of soft mats on the first blows of what falls on them, where those are known.
+    """Centre the loss of soft mats on the first impacts of what falls on them, where those are known.
 
     Of several the mean of the logarithms counts, by their energies. What falls harder itself keeps
     its slowest vibration, and so does what is as high as it is wide.
@@ -84,7 +84,7 @@ def tune_loss_to_impacts(
 
 
 def is_lossy_mat(part: PartGeometry, treatment: Discretization) -> bool:
-    """Tell whether a part is soft and has a loss factor, and is a slab or a flat sheet."""
+    """Return whether a part is soft and has a loss factor, and is a slab or a flat sheet."""
     slab = treatment.kind == "deformable" and not is_dented_by_impact(part)
     return treatment.loss > 0.0 and (slab or (treatment.kind == "shell" and is_flat_wall(part)))
 
@@ -110,5 +110,5 @@ def impacts_on_objects(
 
 def impact_compliance(treatment: Discretization) -> float:
     """(1 - ν²)/E as simulated [1/Pa]; 0: nothing dents it."""
-    soft = treatment.kind in ("deformable", "shell") and treatment.young > 0.0
-    return (1.0 - treatment.poisson**2) / treatment.young if soft else 0.0
+    soft = treatment.kind in ("deformable", "shell") and treatment.simulated_young_pa > 0.0
+    return (1.0 - treatment.poisson**2) / treatment.simulated_young_pa if soft else 0.0

@@ -1,4 +1,4 @@
-"""Restitution of rigid parts at the speeds of their blows."""
+"""Restitution of rigid parts at their impact speeds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from corporeal.materials import ImpactBody, RestitutionLaw
 from corporeal.materials.restitution_speed import NOMINAL_IMPACT_SPEED_M_S
 
 CONSTANT_RESTITUTION_LAW = (NOMINAL_IMPACT_SPEED_M_S, 0.0, 0.0, 0.0, 1.0)
-"""The law of what does not change: see ``Problem.blows``."""
+"""The law of what does not change: see ``Problem.restitution_law``."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class PairRestitutions:
     """Restitution of all pairs of K parts and the floor."""
 
     restitution: Float[np.ndarray, "K1 K1"]
-    """At the speeds of their first blows [-]."""
+    """At the speeds of their first impacts [-]."""
     laws: Float[np.ndarray, "K1 K1 5"]
-    """How it changes with speed: see ``Problem.blows``."""
+    """How it changes with speed: see ``Problem.restitution_law``."""
 
 
 def restitutions_at_impact(
@@ -31,10 +31,10 @@ def restitutions_at_impact(
     treatments: Sequence[Discretization],
     shapes: Mapping[int, PartProportions] | None = None,
 ) -> PairRestitutions:
-    """Carry the restitution of all pairs of parts and the floor to the speeds of their blows.
+    """Carry the restitution of all pairs of parts and the floor to the speeds of their impacts.
 
     The ratio to what the same pair has at ``NOMINAL_IMPACT_SPEED_M_S`` is applied, so that what
-    was drawn from a measured range stays drawn, and so do the laws by which later, slower blows
+    was drawn from a measured range stays drawn, and so do the laws by which later, slower impacts
     lose less. What strikes a sheet that is laid on the floor rebounds as from the floor.
 
     Args:
@@ -64,7 +64,7 @@ def restitutions_at_impact(
             law = layered_restitution_law(field, shapes or {}, (i, j), speed, law.value) or law
             table[i, j] = table[j, i] = law.value
             laws[i, j] = laws[j, i] = law.speed, law.slope, law.exponent, law.least, law.most
-    for k in (k for k, treatment in enumerate(treatments) if treatment.laid):
+    for k in (k for k, treatment in enumerate(treatments) if treatment.is_floor_covering):
         table[k, :-1] = table[:-1, k] = table[-1, :-1]
         laws[k, :-1] = laws[:-1, k] = laws[-1, :-1]
     return PairRestitutions(table, laws)
@@ -73,7 +73,7 @@ def restitutions_at_impact(
 def _restitution_of_pair(
     one: ImpactBody, other: ImpactBody, speed: float, drawn: float
 ) -> RestitutionLaw:
-    """Carry the restitution that two bodies have at ``NOMINAL_IMPACT_SPEED_M_S`` to the speed of their blow."""
+    """Carry the restitution that two bodies have at ``NOMINAL_IMPACT_SPEED_M_S`` to the speed of their impact."""
     nominal = materials.pair_restitution(one, other, NOMINAL_IMPACT_SPEED_M_S).value
     law = materials.pair_restitution_law(one, other, speed)
     ratio, value = 1.0, drawn

@@ -1,9 +1,9 @@
-"""Slabs and sheets on the floor that would be dented much too deeply.
+"""Slabs and sheets on the floor that would be indented much too deeply.
 
-A ball that is dented more than twice as deep as in life is rigid instead (``step_budget``). So is a
-slab that lies on the floor and is softened by the step budget, and a flat sheet that the grid makes
-thicker, where what falls on it is rigid: what it loses then depends on the grid, and rounds of
-impacts know that the floor holds it, so that both rebound by their coefficient of restitution. A
+A ball that is dented more than twice as deep as in reality is rigid instead (``step_budget``). So
+is a slab that lies on the floor and is softened by the step budget, and a flat sheet that the grid
+makes thicker, where what falls on it is rigid: what it loses then depends on the grid, and rounds
+of impacts know that the floor holds it, so that both rebound by their coefficient of restitution. A
 sheet thinner than half a cell, as of paper, is so whatever falls on it: it would be a mattress of
 two cells between a ball and the floor.
 """
@@ -38,7 +38,7 @@ def slabs_nearer_to_rigid(
     motions: Sequence[ExpectedMotion],
     treatments: Sequence[Discretization],
 ) -> dict[int, str]:
-    """Say which slabs and sheets on the floor are nearer to life as rigid ones.
+    """Return which slabs and sheets on the floor are nearer to life as rigid ones.
 
     Args:
         parts: All of the scene's.
@@ -88,8 +88,8 @@ def mark_thin_floor_sheets(
 ) -> tuple[Discretization, ...]:
     """Mark rigid flat sheets on the floor that are thinner than half a cell.
 
-    A tenth of a millimetre of paper stores nothing of a blow, and the next step may lead through it
-    to the floor: what it is made of says nothing of the rebound.
+    A tenth of a millimetre of paper stores nothing of an impact, and the next step may lead through
+    it to the floor: what it is made of says nothing of the rebound.
 
     Args:
         parts: All of the scene's.
@@ -98,7 +98,7 @@ def mark_thin_floor_sheets(
 
     """
     return tuple(
-        replace(treatment, laid=True)
+        replace(treatment, is_floor_covering=True)
         if treatment.kind == "rigid"
         and is_flat_wall(part)
         and _rests_on_floor(motions[part.object])
@@ -109,7 +109,7 @@ def mark_thin_floor_sheets(
 
 
 def _real_thickness(part: PartGeometry) -> float:
-    """Thickness in life [m]."""
+    """Thickness in reality [m]."""
     wall = part.structure.thickness if is_flat_wall(part) else None
     return wall or part.size[0]
 
@@ -130,14 +130,14 @@ def _lies_flat(part: PartGeometry, motion: ExpectedMotion, treatment: Discretiza
 
 
 def _rests_on_floor(motion: ExpectedMotion) -> bool:
-    """Tell whether an object lies on the floor, and nothing but gravity acts on it."""
+    """Return whether an object lies on the floor, and nothing but gravity acts on it."""
     lands = motion.landing
     lies = lands is not None and lands.onto == FLOOR_NUMBER and lands.speed == 0.0
     return lies and motion.driven == 0.0
 
 
 def _is_simulated_mat(part: PartGeometry, treatment: Discretization) -> bool:
-    """Tell whether a part is a sheet that is at least half a cell thick."""
+    """Return whether a part is a sheet that is at least half a cell thick."""
     resolved = (treatment.thickness or 0.0) <= MAX_MAT_THICKNESS_RATIO * _real_thickness(part)
     return is_flat_wall(part) and resolved
 
@@ -148,7 +148,8 @@ def _slab_dent(ball: PartGeometry, lands: ObjectLanding, plane: float, thick: fl
 
 def _dent_reason(speed: float, dents: _SlabDents) -> str:
     return (
-        f"a blow at {speed:.2g} m/s would press it in by {1e3 * dents.life:.2g} mm, and as soft as "
+        f"an impact at {speed:.2g} m/s would press it in by {1e3 * dents.life:.2g} mm, and as soft "
+        "as "
         f"the grid and the step budget would make it, by {1e3 * dents.simulated:.2g}; the floor "
         "holds it, and what strikes it rebounds by the coefficient of restitution of both"
     )

@@ -1,4 +1,4 @@
-"""Expected impact speed and acceleration of every object, before anything is simulated."""
+"""Expected impact speed and acceleration of every object, before the simulation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,12 +1,13 @@
-"""A ball that is struck hard vibrates: what that takes of a blow, its matter has not to lose.
+"""Energy lost to vibration in hard impacts of balls, subtracted from the material's loss.
 
-Loss factors and rebounds are one thing by hereditary Hertz contact (``materials.rebound``), which
-holds where a blow is slow against the waves in the ball. A blow of ρ v²/E = 0.1 dents it by two
-thirds of its radius and leaves it vibrating, and it comes back as if its loss factor were larger by
-0.09. A solid ball does that in life, too, and there is nothing to mend where it is as stiff here.
-It is too much
+Loss factor and restitution are equivalent in hereditary Hertz contact (``materials.rebound``),
+which holds where an impact is slow against the waves in the ball. An impact of ρ v²/E = 0.1 dents
+it by two thirds of its radius and leaves it vibrating, and it comes back as if its loss factor were
+larger by 0.09. A solid ball does that in reality, too, and there is nothing to mend where it is as
+stiff here. It is too much
 
-- where the step budget has softened it: what it loses here beyond what it does in life is taken off
+- where the step budget has softened it: what it loses here beyond what it does in reality is taken
+off
   its loss factor;
 - where it stands for a wall with air behind it, whose loss factor was made from its rebound, or is
   that of the wall: the solid rings instead of them.
@@ -23,8 +24,9 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.mpm.physics.time_step_limits import stable_step
 
 VIBRATION_LOSS_COEFFICIENT = 0.87
-"""Loss factor that vibrations take of a blow, over ρ v²/E [-]: measured on balls of 8 to 20 cells,
-ρ v²/E of 0.001 to 0.1, ν of 0.2 and 0.41, loss factors from 0.05 to 0.4 (decision 103)."""
+"""Loss factor that vibrations take of an impact, over ρ v²/E [-]: measured on balls of 8 to 20
+cells, ρ v²/E of 0.001 to 0.1, ν of 0.2 and 0.41, loss factors from 0.05 to 0.4 (decision 103).
+"""
 MAX_IMPACT_NUMBER = 0.1
 """ρ v²/E up to which it was measured [-]; what is struck harder counts as struck so."""
 MIN_NOTABLE_LOSS_FACTOR = 0.005
@@ -50,10 +52,10 @@ def compensate_vibration_loss(
     slowed: Sequence[Discretization],
     cell: float,
 ) -> list[Discretization]:
-    """Take off the loss factors of balls what they lose here, and not in life, by vibrating.
+    """Take off the loss factors of balls what they lose here, and not in reality, by vibrating.
 
     Those are compact, elastic and fall on the floor or on something rigid; with what is soft
-    itself a blow is slower, and what yields does not vibrate. No loss factor is below 0.
+    itself an impact is slower, and what yields does not vibrate. No loss factor is below 0.
 
     Args:
         parts: All of the scene's.
@@ -77,7 +79,7 @@ def compensate_vibration_loss(
 
 
 def _is_elastic_ball(part: PartGeometry, made: Discretization) -> bool:
-    """Tell whether a part is a soft compact solid, or is simulated as one, and is elastic."""
+    """Return whether a part is a soft compact solid, or is simulated as one, and is elastic."""
     law = CONSTITUTIVE_LAWS[part_as_contents(part).material.law]
     elastic = not law.loose and not made.yield_stress
     return made.kind == "deformable" and elastic and is_dented_by_impact(part) and made.loss > 0.0
@@ -87,10 +89,10 @@ def _excess_vibration_loss(
     part: PartGeometry, true: Discretization, made: Discretization, speed: float
 ) -> float:
     """Loss factor [-] that vibrations take beyond those of life."""
-    here = vibration_loss(made.density, speed, made.young)
+    here = vibration_loss(made.density, speed, made.simulated_young_pa)
     if part.structure.inflated:
         return here
-    return here - vibration_loss(true.density, speed, true.young)
+    return here - vibration_loss(true.density, speed, true.simulated_young_pa)
 
 
 def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Discretization:
@@ -99,12 +101,13 @@ def _lower_loss_factor(made: Discretization, excess: float, cell: float) -> Disc
     if taken < MIN_NOTABLE_LOSS_FACTOR:
         return made
     loss = made.loss - taken
-    wave = wave_speed(made.young, made.poisson, made.density, loss)
+    wave = wave_speed(made.simulated_young_pa, made.poisson, made.density, loss)
     return replace(
         made,
         loss=loss,
         wave_speed=wave,
         step=stable_step(wave, made.impact_speed, cell),
-        why=f"{made.why} It is struck so hard that vibrations of its own take what a loss factor "
-        f"of {taken:.2g} would, beyond those of the real thing: its matter loses so much less.",
+        reason=f"{made.reason} Its simulated vibrations in a hard impact dissipate as much as a loss "
+        f"factor of {taken:.2g}, beyond those of the real object: its loss factor is reduced by "
+        "that.",
     )

@@ -1,4 +1,4 @@
-"""Which bodies are sheets that a blow presses across their layers, and which are balls to them."""
+"""Layered sheets under impact, and the balls that strike them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -79,13 +79,13 @@ def layered_restitution_law(
     speed: float,
     packed: float,
 ) -> RestitutionLaw | None:
-    """Say how a ball rebounds from a sheet of layers that it strikes; None: they are none.
+    """Return how a ball rebounds from a sheet of layers that it strikes; None: they are none.
 
     Args:
         field: What parts are made of.
         shapes: By their numbers.
         pair: Numbers of two parts.
-        speed: Of their blow [m/s].
+        speed: Of their impact [m/s].
         packed: Restitution of both without their layers [-].
 
     """
@@ -127,7 +127,7 @@ def _ball_of(shape: PartProportions, material: Material) -> ImpactingBall:
 
 
 def _layered_sheet(shape: PartProportions, material: Material) -> LayeredSheet | None:
-    """Return what is weak across its layers; None: it is not, or a person says how it rebounds."""
+    """Return the weak direction's data of a layered sheet; None: none, or the restitution is annotated."""
     weak = (
         shape.is_sheet
         and material.name in layered_materials()

@@ -1,4 +1,4 @@
-"""What a simulation that runs while somebody watches can afford."""
+"""Resolution of interactive simulations."""
 
 from dataclasses import dataclass, replace
 

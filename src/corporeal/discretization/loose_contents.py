@@ -1,4 +1,4 @@
-"""Vessels with something loose in them: what it becomes, and where liquids touch what is rigid."""
+"""Vessels with loose contents, and wetted surfaces."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ def add_wetted_points(particles: Particles, bodies: MeasuredScene, seed: int) ->
         owner.append(np.full(len(found), number))
     return replace(
         particles,
-        wetted=np.concatenate(points),
+        wetted_point=np.concatenate(points),
         wetted_normal=np.concatenate(normals),
         object_of_wetted=np.concatenate(owner),
     )

@@ -1,4 +1,4 @@
-"""What a mesh models: bodies, walls with both faces or open sheets; and which faces are outer."""
+"""Classification of meshes: bodies, walls with both faces or open sheets; outer faces."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -157,7 +157,7 @@ def inner_face_fraction(
 def openness_of_faces(
     shape: QueryMesh, points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, " N"]:
-    """Tell how much of the open faces see: the sum of cosines over free directions."""
+    """Return how much of the open faces see: the sum of cosines over free directions."""
     seen = np.zeros(len(points))
     for direction in sphere_directions(48):
         facing = normals @ direction

@@ -1,4 +1,4 @@
-"""One object taken apart: which triangles enclose which part, how large everything is."""
+"""Measures of one object's mesh: the triangles, volumes and areas of its parts."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
@@ -62,7 +62,9 @@ class MeasuredPart:
     whole: QueryMesh | None = None
     """All that encloses something, of the object."""
     drawn: Mesh | None = None
-    """The surface of loose matter that fills what holds it (``bed``); None: ``body`` is drawn."""
+    """The surface of granular material that fills what holds it (``bed``); None: ``body`` is
+    drawn.
+    """
     holder: int = -1
     """The part that it fills; -1: none."""
     measured: float = 0.0

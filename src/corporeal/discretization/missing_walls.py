@@ -1,8 +1,8 @@
-"""Walls below soft matter that lies on them, where one surface is drawn of both.
+"""Missing walls below soft material, where one surface is drawn of both.
 
-Pictures show no border inside a thing: of a couch's base they show sides and underside, of its seat
-the top. What is soft bridges no hollow, so that the base has a top below its seat. What is stiff
-does, as a slab on a cabinet and the cork of a jar.
+Pictures show no border inside an object: of a couch's base they show sides and underside, of its
+seat the top. What is soft bridges no hollow, so that the base has a top below its seat. What is
+stiff does, as a slab on a cabinet and the cork of a jar.
 """
 
 from collections.abc import Mapping, Sequence
@@ -51,12 +51,12 @@ class MissingWall:
     """Of what lies on it, up to the object's face [m]."""
 
     def sags(self, material: Material) -> bool:
-        """Tell whether matter on it does not hold itself over it: the policy's test of flexing."""
+        """Return whether material on it does not hold itself over it: the policy's test of flexing."""
         return _is_limp_over_span(material, self.span, self.depth)
 
 
 def _is_limp_over_span(material: Material, span: float, depth: float) -> bool:
-    """Tell whether a bar of some matter would visibly bend by its own weight, held at one end."""
+    """Return whether a bar of some material would visibly bend by its own weight, held at one end."""
     load = material.density * GRAVITY_M_S2
     return (
         cantilever_tip_deflection_ratio(load, material.young, span, depth) >= MAX_INVISIBLE_STRAIN
@@ -226,8 +226,8 @@ def _level_directions(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 
 
 
 def describe_missing_wall(member: MeasuredPart) -> str:
-    """Say in words what of a wall is drawn nowhere; "" where all is."""
+    """Describe in words what of a wall is drawn nowhere; "" where all is."""
     if member.lid is None:
         return ""
     area = float(member.lid.areas.sum())
-    return f": closed, though not shown, below what is soft and lies on it ({area:.2g} m²)"
+    return f": closed below the soft part on it, though not drawn ({area:.2g} m²)"

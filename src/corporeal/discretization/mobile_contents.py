@@ -1,4 +1,4 @@
-"""Which contents of vessels move by themselves, and the objects that they become (decision 34)."""
+"""Movable contents of vessels, as objects of their own (decision 34)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -133,5 +133,5 @@ def _contents_words(name: str, wall: PartDescription) -> PartDescription:
         structure="solid",
         answered_by=wall.built_by,
         margin=wall.margin,
-        reason=f"What lies in {wall.name}: {wall.reason}" if wall.reason else "",
+        reason=f"Contents of {wall.name}: {wall.reason}" if wall.reason else "",
     )

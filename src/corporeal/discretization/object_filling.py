@@ -1,4 +1,4 @@
-"""All points of one object, part by part, from a recipe for each part."""
+"""Material points of one object, part by part."""
 
 from dataclasses import dataclass
 
@@ -20,10 +20,10 @@ FULL_FILL_DEPTH_SPACINGS = 4
 
 @dataclass(frozen=True)
 class FillRecipe:
-    """Where one part's matter lies."""
+    """Where one part's material lies."""
 
     depth: float
-    """How far below the surface there is matter [m]; inf: all through; 0: see ``wall``."""
+    """How far below the surface there is material [m]; inf: all through; 0: see ``wall``."""
     wall: float
     """Thickness of layers below the outer face of a wall that is modelled thinner [m]."""
     sheet: float
@@ -33,9 +33,9 @@ class FillRecipe:
     thick: float = 0.0
     """Diameter that these stand for [m]."""
     level: float = np.inf
-    """Above this height [m] there is matter in the wall only."""
+    """Above this height [m] there is material in the wall only."""
     vessel: bool = False
-    """Whether there is matter between the faces of the mesh too, up to its rim."""
+    """Whether there is material between the faces of the mesh too, up to its rim."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,7 @@ def reference_points(
     rng: np.random.Generator,
     count: int = 20_000,
 ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "M 3"]]:
-    """Points spread as a part's matter truly is, for its centre and inertia.
+    """Points spread as a part's material truly is, for its centre and inertia.
 
     Args:
         anatomy: The object.

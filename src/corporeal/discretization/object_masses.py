@@ -1,4 +1,4 @@
-"""Masses of whole objects: those that a file states, and those that are implausible."""
+"""Masses of objects: those stated in files, and warnings of implausible ones."""
 
 from collections.abc import Mapping, Sequence
 
@@ -75,7 +75,7 @@ def scale_to_stated_masses(
 def warn_of_implausible_masses(
     scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
 ) -> list[str]:
-    """Say which objects are too heavy or too light for the room that they take.
+    """Return which objects are too heavy or too light for the room that they take.
 
     Args:
         scene: The objects, with what they are.
@@ -98,7 +98,7 @@ def warn_of_implausible_masses(
 def warn_of_masses_not_as_named(
     scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
 ) -> list[str]:
-    """Say which objects do not weigh what their names say ("dumbbell_5kg").
+    """Return which objects do not weigh what their names say ("dumbbell_5kg").
 
     Args:
         scene: The objects, with what they are called.
@@ -119,7 +119,7 @@ def warn_of_masses_not_as_named(
 
 
 def _real_lengths(sides: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
-    """Return lengths in the scene as they are in life [m]."""
+    """Return lengths in the scene as they are in reality [m]."""
     a, b, c = sides
     return a / scale, b / scale, c / scale
 
@@ -130,10 +130,10 @@ def warn_of_thick_walls(
     makes: Mapping[int, PartModel],
     field: MaterialField,
 ) -> list[str]:
-    """Say which walls weigh too much, because nobody but the mesh said how thick they are.
+    """Return warnings of walls that weigh too much, since their thickness is the mesh's.
 
-    Artists draw walls as thick as looks well: a bin of polypropylene had 9 mm. What comes in sheets
-    and is a block, because nobody said that it covers something, is said, too.
+    Meshes often draw walls too thick: a bin of polypropylene had 9 mm. Sheet materials that fill a
+    block are reported, too.
 
     Args:
         scene: The objects.
@@ -153,7 +153,7 @@ def warn_of_thick_walls(
 def _thick_wall_text(
     obj: SceneObject, made: PartModel, words: PartDescription, material: Material
 ) -> str:
-    """Say that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
+    """Describe an implausibly thick wall whose thickness is the mesh's; "": plausible."""
     ground = material.grounds.get("shell_thickness")
     if ground is None or words.answered_by not in UNSEEN_MATERIAL_SOURCES:
         return ""
@@ -168,7 +168,7 @@ def _thick_wall_text(
     return Note(
         f"{obj.name}: the mesh of {words.name} draws a wall {1e3 * drawn:.2g} mm thick, and such "
         f"walls of {material.name} have {low} to {high} mm, usually {typical}: it may be "
-        f"{drawn / usual.typical:.2g} times too heavy. Say how thick it is with --annotations.",
+        f"{drawn / usual.typical:.2g} times too heavy. State its thickness with --annotations.",
         NoteKind.ASSUMED,
     )
 
@@ -176,13 +176,13 @@ def _thick_wall_text(
 def _thick_block_text(
     obj: SceneObject, made: PartModel, words: PartDescription, thickest: float
 ) -> str:
-    """Say that what comes in sheets is a block; "": it may be some sheets on one another."""
+    """State that what comes in sheets is a block; "": it may be some sheets on one another."""
     through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
     if through <= MAX_PLAUSIBLE_SHEET_LAYERS * thickest:
         return ""
     return Note(
         f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, "
         f"and that comes in sheets of up to {1e3 * thickest:.2g} mm: it may be many times too "
-        "heavy. Say what is behind the sheet with --annotations.",
+        "heavy. State what is behind the sheet with --annotations.",
         NoteKind.ASSUMED,
     )

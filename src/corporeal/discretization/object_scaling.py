@@ -1,8 +1,8 @@
-"""How large objects stand in a scene together, and what that makes of their walls.
+"""Relative scaling of objects in a scene, walls included.
 
 A duck beside a couch is a dot. A power law between 0 (all of one size) and 1 (true relative sizes)
 brings objects nearer to each other and keeps their order. An object that is not life-size is the
-real one with all its lengths scaled, walls included: made of the same matter, it weighs scale³
+real one with all its lengths scaled, walls included: made of the same material, it weighs scale³
 times as much.
 """
 
@@ -84,11 +84,11 @@ def parse_extent(text: str, only: str = "") -> tuple[str, float]:
     """Return name and metres of "duck=0.1", or of "0.1" where there is only one object.
 
     Args:
-        text: What a person typed after --extent.
+        text: Value of --extent.
         only: Name of the only object there is; "": there are several.
 
     Raises:
-        UserError: It says something else.
+        UserError: The format is invalid.
 
     """
     name, _, number = text.rpartition("=")
@@ -111,7 +111,7 @@ def part_scales(scene: Scene, parts: Parts) -> tuple[float, ...]:
 
 
 def is_not_life_size(scale: float) -> bool:
-    """Tell whether an object is noticeably not life-size."""
+    """Return whether an object is noticeably not life-size."""
     return abs(scale - 1) > LIFE_SIZE_TOLERANCE
 
 
@@ -134,7 +134,9 @@ def describe_scales(objects: Sequence[SceneObject]) -> str:
 def describe_mass(mass: float, scale: float) -> str:
     """Write a mass in the scene [kg], and in brackets that of the real object where it differs."""
     return (
-        f"{mass:.3g} ({mass / scale**3:.3g} in life)" if is_not_life_size(scale) else f"{mass:.3g}"
+        f"{mass:.3g} ({mass / scale**3:.3g} in reality)"
+        if is_not_life_size(scale)
+        else f"{mass:.3g}"
     )
 
 

@@ -1,4 +1,4 @@
-"""What a level liquid could fill of an open shape, up to its rim."""
+"""Volume of open cavities up to the rim."""
 
 from collections.abc import Sequence
 
@@ -19,7 +19,7 @@ def is_below_rim(
 ) -> Bool[np.ndarray, " N"]:
     """Whether a level liquid could reach each point without running over the rim.
 
-    That is outside the matter with faces below and, but for one crack, all around.
+    That is outside the material with faces below and, but for one crack, all around.
 
     Args:
         matter: What no liquid is in; None: only sheets.

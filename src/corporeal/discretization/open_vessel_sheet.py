@@ -1,7 +1,6 @@
-"""How large the sheet is that open ware is formed from, whatever lies in its hollow.
+"""Area of the sheet that open ware is formed from, independent of its hollow.
 
-Pictures show the outside of a bowl well, and its plain inside hardly: between the two a surface
-from pictures holds anything from a wall to a lump with a roof over the rim. So only its outside is
+Reconstructions show the outside of a bowl well, and its plain inside hardly, so only the outside is
 measured.
 """
 
@@ -66,7 +65,7 @@ def find_vessel_outside(shape: QueryMesh, part: Mesh, rng: np.random.Generator) 
     normals = part.normals[triangle]
     below, seen = _openness(shape, points, normals)
     counts = np.minimum(1.0, 2.0 * below)
-    # Half of what there is below, so that the outer side of a mouth is told from its inner one.
+    # half of the depth below, to separate the outer and the inner side of a mouth
     beside = below > 0.25 * (1.0 - normals[:, 2])
     counts[beside & _is_beside_mouth(points, seen > 0.1)] = 1.0
     reach = NORMAL_AVERAGING_RADIUS_FRACTION * float(np.sort(np.ptp(points, axis=0))[1])
@@ -76,7 +75,7 @@ def find_vessel_outside(shape: QueryMesh, part: Mesh, rng: np.random.Generator) 
 def _openness(
     shape: QueryMesh, points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-    """Say how much of the open places see below their own height, and in all, of half a sphere."""
+    """Return how much of the open places see below their own height, and in all, of half a sphere."""
     start = points + 1e-5 * shape.mesh.extent * normals
     below, seen = np.zeros(len(points)), np.zeros(len(points))
     for direction in sphere_directions(LOOK_DIRECTIONS_COUNT):
@@ -111,7 +110,7 @@ def _normal_evenness(
 def _is_beside_mouth(
     points: Float[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places lie outside of a mouth at the top, in plan; none if none is wide enough.
+    """Return which places lie outside of a mouth at the top, in plan; none if none is wide enough.
 
     What is wider at its foot than at its top is a cover: its top is no mouth.
     """

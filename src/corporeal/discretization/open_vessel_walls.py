@@ -1,4 +1,4 @@
-"""Open ware: how thick such a wall usually is, and what of it is drawn full."""
+"""Open ware: usual wall thickness, and vessels that are modelled as solids."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from corporeal.recognition.parts_by_name import name_words as written
 
 @dataclass(frozen=True)
 class NamedObject:
-    """What a thing is called, and how large it is."""
+    """What an object is called, and how large it is."""
 
     names: Sequence[tuple[str, ...]]
     """Words of each."""
@@ -38,15 +38,15 @@ class OpenVesselWall:
     thickness: float
     """[m]"""
     why: str
-    """What says so."""
+    """Source."""
 
 
 def with_usual_vessel_wall(words: PartDescription, called: NamedObject) -> PartDescription:
-    """Give open ware the wall that such pieces have, where nobody states one.
+    """Set the usual wall thickness of open ware, if none is stated.
 
     Args:
         words: Of a part.
-        called: The thing.
+        called: The object.
 
     """
     if words.thickness is not None and not words.wall_usual:
@@ -65,7 +65,7 @@ def usual_vessel_wall(material: str | None, called: NamedObject) -> OpenVesselWa
 
     Args:
         material: What it is of.
-        called: The thing.
+        called: The object.
 
     """
     if material is None:
@@ -84,7 +84,7 @@ def usual_vessel_wall(material: str | None, called: NamedObject) -> OpenVesselWa
 def sheet_if_drawn_full(
     words: PartDescription, seen: FileEvidence, library: str
 ) -> PartDescription:
-    """Let open ware whose mesh fills its hollow be a sheet along its outside, as from pictures.
+    """Replace open ware whose mesh fills its hollow by a sheet along its outside.
 
     A wall with both faces is as it is drawn, and so are a stack, what is a closed wall whatever it
     is called, and what need not be hollow: a bowl of wood, a steel plate.
@@ -111,12 +111,12 @@ def sheet_if_drawn_full(
         wall = usual_wall_thickness(words.material, library)
     if not wall or not is_drawn_as_lump(seen.surfaces, wall, seen.thing.scale):
         return words
-    told = "Its mesh fills its hollow: it is taken for a wall along its outside."
+    told = "Its mesh fills its hollow: it is assumed to be a wall along its outside."
     return replace(words, structure="sheet", wall_unseen=True, reason=f"{words.reason} {told}")
 
 
 def _is_no_single_vessel(name: TokenisedName) -> bool:
-    """Tell whether a name is not that of one piece of ware that is open by what it is."""
+    """Return whether a name is not that of one piece of ware that is open by what it is."""
     tokens = name.words
     return (
         not names_open_vessel(tokens)

@@ -1,4 +1,4 @@
-"""How large an object is, whichever way it lies."""
+"""Extent of an object in its own orientation."""
 
 import numpy as np
 from jaxtyping import Float

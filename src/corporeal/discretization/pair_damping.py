@@ -1,12 +1,12 @@
-"""What is rigid loses nothing on what is soft, so that what is soft loses for both.
+"""Damping of contact pairs: the deformable side takes the loss of the rigid side, too.
 
 One force presses both sides of a contact and their dents add up, so that each stores energy in
 proportion to its compliance (1 - ν²)/E, and loses of that what its own loss factor says. A rigid
 body and a plane store none here. Their part of the loss, by the real moduli of both, is given to
-the matter that does deform: the loss factor of two in series is the mean of theirs, weighted by
+the material that does deform: the loss factor of two in series is the mean of theirs, weighted by
 their compliance.
 
-A part has one loss factor for all that it meets. That of its first blows is taken, straight down,
+A part has one loss factor for all that it meets. That of its first impacts is taken, straight down,
 by their energies; what strikes it otherwise finds the same.
 """
 
@@ -31,7 +31,7 @@ def find_impact_partners(
     rigid: Sequence[bool],
     floor: Material | None,
 ) -> list[ExpectedMotion]:
-    """Tell every object what meets it in the first blows and is rigid all through.
+    """Tell every object what meets it in the first impacts and is rigid all through.
 
     Args:
         parts: All of the scene's.
@@ -63,7 +63,7 @@ def largest_part_of(parts: Sequence[PartGeometry], number: int) -> PartGeometry:
 
 
 def takes_part_in_impact(material: Material, partner: ImpactPartner) -> bool:
-    """Tell whether a partner would, in life, take more than a negligible share of a blow."""
+    """Return whether a partner would, in reality, take more than a negligible share of an impact."""
     return (
         partner.loss is not None
         or compliance_share(partner.material, material) >= MIN_COMPLIANCE_FRACTION
@@ -71,7 +71,7 @@ def takes_part_in_impact(material: Material, partner: ImpactPartner) -> bool:
 
 
 def pair_loss_factor_of_parts(struck: Material, motion: ExpectedMotion) -> float:
-    """Loss factor [-] of a solid and of what meets it, of each at the speed of the blow.
+    """Loss factor [-] of a solid and of what meets it, of each at the speed of the impact.
 
     Args:
         struck: What deforms, as it is at that speed.

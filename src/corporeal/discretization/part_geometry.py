@@ -1,6 +1,6 @@
-"""What the treatment policy needs to know of a part: its shape, its matter, what will happen to it.
+"""Inputs of the discretization policy for one part: shape, material, expected loads.
 
-A part's wall may be simulated thicker than it is; here is what that does to its numbers.
+Includes the effective parameters of thickened walls.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from corporeal.mpm.physics.time_step_limits import (
 )
 
 MAX_SUBGRID_CELLS_COUNT, MAX_SUBGRID_LENGTH_CELLS = 8.0, 5.0
-"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
+"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a subgrid part:
 its own stiffness cannot be seen."""
 
 MIN_COMPACT_SIDE_RATIO = 0.5
@@ -77,11 +77,11 @@ class ObjectLanding:
 
 @dataclass(frozen=True)
 class ImpactPartner:
-    """What is rigid, or a plane, and meets something soft in a blow."""
+    """What is rigid, or a plane, and meets something soft in an impact."""
 
     material: Material
     energy: float
-    """Of the blow [J]."""
+    """Of the impact [J]."""
     loss: float | None = None
     """Loss factor of the whole contact, where layers are crushed in it [-]; None: none are."""
 
@@ -99,7 +99,7 @@ class ExpectedMotion:
     landing: ObjectLanding | None = None
     """None: it is not known."""
     partners: tuple[ImpactPartner, ...] = ()
-    """What cannot be dented in its blows, and loses its share of them in life."""
+    """What cannot be dented in its impacts, and loses its share of them in reality."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def part_at_life_size(part: PartGeometry) -> PartGeometry:
 
 
 def is_grain_on_grid(part: PartGeometry, cell: float) -> bool:
-    """Whether the part has too little matter on the grid to hold what is around it."""
+    """Whether the part has too little material on the grid to hold what is around it."""
     return part.volume < cell**3 and part.size[2] < MAX_SUBGRID_LENGTH_CELLS * cell
 
 
@@ -149,7 +149,7 @@ def is_subgrid_part(part: PartGeometry, cell: float) -> bool:
 
 
 def part_width(part: PartGeometry) -> float:
-    """How wide the part is across [m]: its shortest side, or less where it is bent or branched.
+    """Width of the part [m]: its shortest side, or less where it is bent or branched.
 
     6 V/A is the side of the cube (the diameter of the sphere) with the part's volume per area; it
     says nothing when the mesh models the wall itself, inside and outside.
@@ -192,7 +192,7 @@ def tube_diameter(part: PartGeometry) -> float:
 
 
 def is_flat_wall(part: PartGeometry) -> bool:
-    """Tell whether a wall is one flat sheet, as of a carpet: struck, it is dented across itself."""
+    """Return whether a wall is one flat sheet, as of a carpet: struck, it is dented across itself."""
     thickness = part.structure.thickness or 0.0
     return part.structure.kind == "shell" and part.size[0] < 2 * thickness
 
@@ -222,7 +222,7 @@ def wall_factors(part: PartGeometry, ratio: float, speed: float) -> tuple[float,
 
 
 def is_folding_wall(part: PartGeometry, speed: float) -> bool:
-    """Tell whether a closed wall that yields crumples: dented deeply, or pressed at rest."""
+    """Return whether a closed wall that yields crumples: dented deeply, or pressed at rest."""
     material, thickness = part.material, part.structure.thickness
     if not CONSTITUTIVE_LAWS[material.law].flows or not thickness or part.size[0] <= 0.0:
         return CONSTITUTIVE_LAWS[material.law].flows
@@ -233,7 +233,7 @@ def is_folding_wall(part: PartGeometry, speed: float) -> bool:
 
 
 def is_limp_wall(part: PartGeometry, ratio: float) -> bool:
-    """Tell whether a wall hangs down as cloth does, even as stiff in bending as it becomes.
+    """Return whether a wall hangs down as cloth does, even as stiff in bending as it becomes.
 
     With its stiffness in the plane kept, a wall t/r thick bends r² times less than the real one:
     the end of a strip would sink by 3 ρ g L⁴/(2 E t²) r², which must be more than its length.

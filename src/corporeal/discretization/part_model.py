@@ -1,4 +1,4 @@
-"""How a part is made: solid, wall or sheet, how thick, how heavy, and where its matter lies."""
+"""Construction of a part: solid, wall or sheet, with thickness, mass and filling."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,9 +25,9 @@ from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.object_filling import FillRecipe
 
 GUESSED_SHEET_THICKNESS_FRACTION = 0.01
-"""Thickness of an open sheet, of its middle extent, where nobody states it."""
+"""Default thickness of an open sheet, relative to its middle extent."""
 THICKNESS_FROM_MESH = "as its mesh shows"
-THICKNESS_FROM_NAME = "as things of its name usually have"
+THICKNESS_FROM_NAME = "as objects of its name usually have"
 THICKNESS_FROM_JUDGE = {
     "annotation": "as your annotation says",
     "recording": "as a recorded answer says",
@@ -58,11 +58,11 @@ class VolumeLeeway:
     """
 
     larger: float = 1.0
-    """Factor of the volume that the surface encloses, where nobody said how swollen it is [-]."""
+    """Default factor of the volume enclosed by the surface of a scan [-]."""
     about: float = 1.0
-    """The same about what somebody said: without its mean [-]."""
+    """The same for a stated ratio: without its mean [-]."""
     deviate: float = 0.0
-    """By how many of its widths what somebody said is off."""
+    """Deviation of the stated ratio in its standard deviations."""
 
     def of(self, words: PartDescription) -> float:
         """Return the factor of what is described [-], whose likely share counts already."""
@@ -75,7 +75,7 @@ NO_VOLUME_LEEWAY = VolumeLeeway()
 
 
 def swelling_log_sigma(said: ScanThickening) -> float:
-    """Return the standard deviation of the logarithm of a share that somebody judged [-]."""
+    """Return the standard deviation of the logarithm of a judged share [-]."""
     return max(log(said.high / said.low) / NORMAL_90_PERCENT_WIDTH_SIGMAS, MIN_EYE_LOG_SIGMA)
 
 
@@ -135,7 +135,7 @@ class PartModel:
     whose: str = ""
     """Where its wall's thickness comes from, in a clause."""
     outside: bool = False
-    """Whether its wall is taken to lie along its outside, as nobody saw how deep it is inside."""
+    """Whether its wall is assumed along its outside, since its inside was not seen."""
     leaves: float = 0.0
     """Of a crown in bulk: area of one side of its leaves [m²], by which it is weighed; else 0."""
 
@@ -164,7 +164,7 @@ def scale_part_mass(made: PartModel, factor: float) -> PartModel:
 def infer_part_model(
     anatomy: MeasuredObject, member: MeasuredPart, field: MaterialField, rng: np.random.Generator
 ) -> PartModel:
-    """Say how a part is made, with what is behind its wall and all that shares its mesh.
+    """Return how a part is made, with what is behind its wall and all that shares its mesh.
 
     Pieces share the mesh by their stated shares of its volume and surface; the part then weighs
     what they weigh together, and is otherwise as the piece that matters most.
@@ -252,7 +252,7 @@ def infer_held_contents(
     piece: PieceSpecification,
     rng: np.random.Generator,
 ) -> HeldContents | None:
-    """Say what is behind a wall; None: nothing but air.
+    """Describe what is behind a wall; None: nothing but air.
 
     m = ρ f (V - V_wall), with the share f of the room that the contents take up.
     """
@@ -270,7 +270,7 @@ def infer_held_contents(
 def volume_behind_wall(
     member: MeasuredPart, made: PartModel, piece: PieceSpecification, room: float
 ) -> float:
-    """Volume of the room behind a wall [m³]: all that its outer surface encloses, less the wall.
+    """Volume of the cavity inside a wall [m³]: all that its outer surface encloses, less the wall.
 
     Args:
         member: The part.
@@ -287,14 +287,14 @@ def volume_behind_wall(
 
 
 def infer_structure(member: MeasuredPart, piece: PieceSpecification) -> PartModel:
-    """Say how thick a part's walls are and what they weigh.
+    """Return how thick a part's walls are and what they weigh.
 
     Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ V (1 - (1 - A t / (n V))^n) with the
     area A of one face: not of the inside of a shade, whose outside counts; about ρ A t where it is
     thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
-    is 2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
-    scans as in models; of open ware from pictures, whose inside may be plain, only where nobody
-    knows how thick such walls usually are. Such ware weighs ρ A t with the area of its outside
+    is 2 V / A thick unless stated or judged otherwise: thin walls are drawn too thick, in scans as
+    in models; of open ware from pictures, whose inside may be plain, only if the usual thickness of
+    such walls is unknown. Such ware weighs ρ A t with the area of its outside
     (``open_ware.sheet_area``), whatever is drawn in its hollow. Open sheets weigh ρ A t. Of a
     piece, its shares of V and A count, less the volume of what lies inside it; a piece that the
     mesh lacks is not bounded by the mesh. Of what is packed of parts and air, the share that is
@@ -408,7 +408,7 @@ def plate_as_wall(made: PartModel, thickness: float) -> PartModel:
 
 
 def _draws_both_faces(words: PartDescription, volume: float, wall: float) -> bool:
-    """Tell whether the mesh draws both faces of an open sheet, whose wall along all would be so."""
+    """Return whether the mesh draws both faces of an open sheet, whose wall along all would be so."""
     return (
         _is_open_sheet(words)
         and not words.wall_unseen
@@ -417,26 +417,26 @@ def _draws_both_faces(words: PartDescription, volume: float, wall: float) -> boo
 
 
 def is_unseen_open_vessel(member: MeasuredPart, words: PartDescription) -> bool:
-    """Tell whether a part is open ware whose hollow is not known: pictures showed its outside."""
+    """Return whether a part is open ware whose hollow is not known: pictures showed its outside."""
     return words.wall_unseen and _is_open_sheet(words) and member.volume > 0
 
 
 def _is_open_sheet(words: PartDescription) -> bool:
-    """Tell whether a part is said to be an open sheet that covers nothing."""
+    """Return whether a part is said to be an open sheet that covers nothing."""
     return words.structure == "sheet" and not (words.inner_share > 0 or words.missing)
 
 
 def choose_wall_thickness(
     structure: Structure, words: PartDescription, shown: float, usual: float, guess: float
 ) -> tuple[float, str]:
-    """Return a wall's thickness [m], and its source: the first that knows.
+    """Return a wall's thickness [m], and the first source that has it.
 
     Args:
         structure: How it is built.
         words: Its description.
         shown: What its mesh draws [m]; 0: nothing.
-        usual: Of such walls [m]; 0: not known.
-        guess: What is taken where nobody knows [m].
+        usual: Usual thickness [m]; 0: unknown.
+        guess: Default [m].
 
     """
     if words.thickness:
@@ -447,11 +447,11 @@ def choose_wall_thickness(
         return structure.thickness, THICKNESS_FROM_JUDGE[by]
     if shown:
         return shown, THICKNESS_FROM_MESH
-    return (usual, "as such walls usually are") if usual else (guess, "as is guessed from its size")
+    return (usual, "as such walls usually are") if usual else (guess, "as guessed from its size")
 
 
 def thickness_judge(words: PartDescription) -> str:
-    """Return who stated the thickness having seen the object; "" for nobody."""
+    """Return the source that stated the thickness after seeing the object, or ""."""
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")
@@ -463,7 +463,7 @@ def thickness_judge(words: PartDescription) -> str:
 def fill_recipe(
     member: MeasuredPart, made: PartModel, treatment: Discretization, cell: float
 ) -> FillRecipe:
-    """Say where a part's matter lies on this grid; leaves are one layer."""
+    """Return where a part's material lies on this grid; leaves are one layer."""
     if treatment.kind == "foliage":
         return FillRecipe(0.0, 0.0, 0.0)
     simulated = treatment.thickness or max(made.thickness, 2 * cell)
@@ -490,7 +490,7 @@ def is_porous_shell(member: MeasuredPart, cell: float) -> bool:
 
 
 def describe_held_contents(made: PartModel) -> str:
-    """Say in words what is behind the wall."""
+    """Describe in words what is behind the wall."""
     structure = made.structure
     if made.held is None or structure.contents is None:
         return ""
@@ -502,7 +502,7 @@ def describe_held_contents(made: PartModel) -> str:
 
 
 def describe_wall(made: PartModel) -> str:
-    """Say in words how thick the wall is, by what source, and whether the mesh draws another."""
+    """Describe in words how thick the wall is, by what source, and whether the mesh draws another."""
     if not made.thickness:
         return f"a wall {made.sheet * 1e3:.3g} mm thick"
     wall = f"a wall {made.thickness * 1e3:.3g} mm thick {made.whose}"
@@ -516,11 +516,11 @@ def describe_wall(made: PartModel) -> str:
 def describe_fill(
     member: MeasuredPart, made: PartModel, treatment: Discretization, cell: float
 ) -> str:
-    """Say in words what the fill is."""
+    """Describe in words what the fill is."""
     springs = "leaves on springs" if treatment.kind == "foliage" else ""
     if made.leaves:
         shown = f"about {made.leaves:.2g} m² of leaves {made.sheet * 1e3:.3g} mm thick"
-        return f"{springs or 'a crown'}, {shown}: its surface does not show one from another"
+        return f"{springs or 'a crown'}, {shown}: its surface does not resolve single leaves"
     if springs:
         return springs
     if made.held:
@@ -532,7 +532,7 @@ def describe_fill(
         return f"solid, {member.volume * 1e6:.4g} cm³ by winding number{open_too}"
     wall = describe_wall(made)
     if not made.modelled and is_porous_shell(member, cell):
-        return f"{wall}, filled through because it is narrow, with the wall's mass{open_too}"
+        return f"{wall}, filled as a solid because it is narrow, with the wall's mass{open_too}"
     if treatment.kind == "shell" and treatment.thickness and treatment.thickness > made.thickness:
         return f"{wall}, simulated {treatment.thickness * 1e3:.3g} mm thick{open_too}"
     return f"{wall}{open_too}"

@@ -1,4 +1,4 @@
-"""Plants: which parts are a crown of leaves, and what of the rest does not visibly bend.
+"""Plants: crowns of leaves, and parts that do not visibly bend.
 
 With true wood a plant hardly flexes: what sways is its root ball in soft potting soil and its
 leaves on their stalks. So where everything but the leaves stays rigid, the crown is a body of its
@@ -14,9 +14,7 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 MIN_FOLIAGE_LEAVES = 20
 """A part of fewer separate leaves is no crown."""
-POTTED_SOIL_REASON = (
-    "a rigid pot holds it, and what it gives way is in the spring at the plant's root"
-)
+POTTED_SOIL_REASON = "a rigid pot holds it, and its compliance is in the spring at the plant's root"
 FOLIAGE_REASON = "A crown of leaves without stress of its own, each on a damped spring to the wood"
 
 
@@ -26,7 +24,7 @@ class PartVerdicts:
 
     verdicts: Sequence[RigidityVerdict]
     """One per part."""
-    crowns: frozenset[int] = frozenset()
+    foliage_parts: frozenset[int] = frozenset()
     """Numbers of parts."""
 
 
@@ -41,7 +39,7 @@ def judge_plants(
 
     """
     judged = list(verdicts)
-    crowns: set[int] = set()
+    foliage_parts: set[int] = set()
     leafy = {k for k, p in enumerate(parts) if p.leaves >= MIN_FOLIAGE_LEAVES and not p.prescribed}
     for number in sorted({parts[k].object for k in leafy}):
         mine = [k for k, p in enumerate(parts) if p.object == number]
@@ -51,5 +49,5 @@ def judge_plants(
         if firm and all(judged[k].rigid for k in firm):
             for k in soil:
                 judged[k] = replace(judged[k], rigid=True, reason=POTTED_SOIL_REASON)
-            crowns |= leafy & set(mine)
-    return PartVerdicts(judged, frozenset(crowns))
+            foliage_parts |= leafy & set(mine)
+    return PartVerdicts(judged, frozenset(foliage_parts))

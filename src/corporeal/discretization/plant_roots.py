@@ -1,4 +1,4 @@
-"""Plants that grow from another object, a heap of sand: what of their foot nobody sees.
+"""Plants that grow from another object: their buried foot.
 
 Photographs end where the ground begins. A sapling that ended there, too, would fall over.
 """
@@ -15,7 +15,7 @@ from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 GUESSED_BURIED_DEPTH_RATIO = 0.2
-"""Depth of a plant's foot in the ground over its height above it, where nobody sees it: a guess."""
+"""Assumed depth of a plant's foot in the ground over its height above it."""
 DRAWN_FOOT_HEIGHT_FRACTION = 0.05
 """Height of what is drawn out downwards, over the plant's."""
 MAX_FOOT_DEPTH_FRACTION = 0.9
@@ -48,7 +48,7 @@ def extend_plants_into_ground(
             scene = _extended_scene(scene, plant, depth)
             warnings.append(
                 f"{scene.objects[plant.number].name} grows from what it stands on, but ends there: "
-                f"its foot is taken to reach {depth:.2g} m deeper than is seen."
+                f"its foot is assumed to reach {depth:.2g} m below the visible end."
             )
     return scene, tuple(warnings)
 

@@ -1,4 +1,4 @@
-"""Material points for bodies, walls and sheets: where they lie and how much each stands for."""
+"""Sampling of material points in bodies, walls and sheets, with their volumes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ def fill_body(
     """Fill a body, or the wall below its surface.
 
     Where it is thinner than ``spacing``, one layer of points in its middle replaces the fill, so
-    that stalks and slats have no gaps. What has matter all through is divided among its points.
+    that stalks and slats have no gaps. What has material all through is divided among its points.
 
     Args:
         shape: The body.
@@ -101,7 +101,7 @@ def _subset_filling(which: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray,
 def _mean_volumes_by_thickness(
     volumes: Float[np.ndarray, " N"], through: Float[np.ndarray, " N"]
 ) -> Float[np.ndarray, " N"]:
-    """Give points the mean volume [m³] of those where the body is about as thick [m].
+    """Return points the mean volume [m³] of those where the body is about as thick [m].
 
     Of what is this thin, one point has few samples. All of them together would say that a twig
     weighs as much as the same length of the trunk.

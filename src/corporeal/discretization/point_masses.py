@@ -1,4 +1,4 @@
-"""Every point's share of its part's mass, and no point of one object among another's."""
+"""Masses of material points, and removal of overlaps between objects."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -89,7 +89,7 @@ def weigh_points(
 def _simulated_volume(
     member: MeasuredPart, made: PartModel, treatment: Discretization, mass: float, cell: float
 ) -> float:
-    """Volume of a part as simulated [m³]: what is thickened takes up more than in life."""
+    """Volume of a part as simulated [m³]: what is thickened takes up more than in reality."""
     thickened = treatment.kind == "shell" and not (
         made.thickness > 0 and not made.modelled and is_porous_shell(member, cell)
     )
@@ -100,7 +100,7 @@ def _simulated_volume(
 def _true_mass_points(
     anatomy: MeasuredObject, member: MeasuredPart, made: PartModel, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "M 3"], Float[np.ndarray, " M"]]:
-    """Points spread as a part's matter truly is, and their masses [kg]."""
+    """Points spread as a part's material truly is, and their masses [kg]."""
     one_face = made.thickness if not made.modelled else 0.0
     body, sheets = reference_points(anatomy, member, one_face, rng)
     groups = [(body, made.body_mass), (sheets, made.sheet_mass)]

@@ -1,12 +1,12 @@
-"""What prescribed motion presses: how hard, before anything is simulated.
+"""Compression by prescribed motion, estimated before the simulation.
 
-What moves as told forces a displacement on what lies in its way and cannot go away: between a path
-and the floor, a wall or another path. Along the direction in which those two come closer to each
-other, all free objects between them are pushed together as rigid bodies, one up to the next, as far
-as they go: the least sum of gaps from one to the other is how far they may come. What they come
-farther, s, is taken up by what lies in between as by springs in series: it bears
-p = s / Σ (L_k/E_k), and strains by p/E, so that a block of steel under a ball of rubber stays what
-it is. What can go away (a block before a pusher) is pressed by nothing.
+A prescribed path forces a displacement on objects that cannot give way: between a path and the
+floor, a wall or another path. Along the direction in which those two come closer to each other, all
+free objects between them are pushed together as rigid bodies, one up to the next, as far as they
+go: the least sum of gaps from one to the other is how far they may come. What they come farther, s,
+is taken up by what lies in between as by springs in series: it bears p = s / Σ (L_k/E_k), and
+strains by p/E, so that a block of steel under a ball of rubber stays what it is. What can go away
+(a block before a pusher) is pressed by nothing.
 
 Objects are pushed together from where they start, and are not turned: what is first brought
 elsewhere, or tips off its support, is judged as if it had stayed.
@@ -51,7 +51,7 @@ class CompressionPlane:
     """Of the plane from the origin [m]."""
 
     def gap(self, thing: PlacedObject) -> Clearance:
-        """Measure how far a thing can go towards it."""
+        """Measure how far an object can go towards it."""
         heights = thing.out(thing.thing.corners) @ self.normal - self.offset
         return Clearance(float(heights.min()), np.zeros(3))
 
@@ -94,7 +94,7 @@ def compression_pressures(
 
 
 def look_times(scene: Scene) -> Float[np.ndarray, " T"]:
-    """When to look [s]: evenly as long as anything moves as told, and at all rows of paths."""
+    """When to look [s]: evenly as long as anything follows a prescribed path, and at all rows of paths."""
     rows = np.concatenate([obj.path.time for obj in scene.objects if obj.path is not None])
     last = min(scene.duration, float(rows.max()))
     even = np.linspace(0.0, last, LOOK_TIMES_COUNT)
@@ -116,15 +116,15 @@ def compression_planes(scene: Scene) -> list[CompressionPlane]:
 class FreeObjects:
     """The objects that are free to move."""
 
-    things: list[PlacedObject]
+    objects: list[PlacedObject]
     compliances: list[float]
     """1/E [1/Pa]"""
 
     def pressed(
         self, pressers: list[PresserPath], planes: list[CompressionPlane]
     ) -> Float[np.ndarray, " F"]:
-        """Give the greatest pressure on each [Pa]."""
-        greatest = np.zeros(len(self.things))
+        """Return the greatest pressure on each [Pa]."""
+        greatest = np.zeros(len(self.objects))
         for plane in planes:
             for presser in pressers:
                 if comes_closer(presser, plane.normal):
@@ -138,7 +138,7 @@ class FreeObjects:
     def _closing(self, lower: PresserPath, upper: PresserPath) -> list[Float[np.ndarray, "3"]]:
         """Find unit vectors from one to the other along which they close, where objects are."""
         ways = []
-        for thing in self.things:
+        for thing in self.objects:
             middle = thing.thing.middle
             there = [
                 np.array([p.out(presser[0].back(middle)) for p in presser])
@@ -161,13 +161,13 @@ class FreeObjects:
         upper: PresserPath,
         along: Float[np.ndarray, "3"],
     ) -> Float[np.ndarray, " F"]:
-        """Give the greatest pressure on each free object between two [Pa].
+        """Return the greatest pressure on each free object between two [Pa].
 
         From each instant on, as long as both stay over an object, they are followed as if they did
         not meet anything.
         """
         stacked = self._stacked(along)
-        greatest = np.zeros(len(self.things))
+        greatest = np.zeros(len(self.objects))
         below = [self._side(lower, t, along, upper=False) for t in range(len(upper))]
         above = [self._side(upper, t, along, upper=True) for t in range(len(upper))]
         for start in range(len(upper) - 1):
@@ -197,32 +197,32 @@ class FreeObjects:
     ) -> "CompressionSide":
         """Measure how far one of the two is from every free object."""
         if isinstance(side, CompressionPlane):
-            gaps = [side.gap(thing) for thing in self.things]
+            gaps = [side.gap(thing) for thing in self.objects]
             return CompressionSide(None, gaps, [True] * len(gaps), 1.0)
         there = side[t]
         gaps = [
             measure_clearance(thing, there, along)
             if upper
             else measure_clearance(there, thing, along)
-            for thing in self.things
+            for thing in self.objects
         ]
-        shadows = [overlap_along(there, thing, along) for thing in self.things]
+        shadows = [overlap_along(there, thing, along) for thing in self.objects]
         return CompressionSide(there, gaps, shadows, 1.0 if upper else -1.0)
 
     def _stacked(self, along: Float[np.ndarray, "3"]) -> "StackedGaps":
         """Push all free objects together along a direction: shortest ways of all pairs."""
-        count = len(self.things)
+        count = len(self.objects)
         gaps = np.full((count, count), inf)
         soft = np.array(
             [
                 max(thing.thing.length(along), MIN_MOVING_DISTANCE_M) * compliance
-                for thing, compliance in zip(self.things, self.compliances, strict=True)
+                for thing, compliance in zip(self.objects, self.compliances, strict=True)
             ]
         )
         for i in range(count):
             for j in range(count):
                 if i != j:
-                    gaps[i, j] = measure_clearance(self.things[i], self.things[j], along).gap
+                    gaps[i, j] = measure_clearance(self.objects[i], self.objects[j], along).gap
         # Above oneself there is nothing to go; its own compliance is counted once, at the end.
         np.fill_diagonal(gaps, 0.0)
         beyond = np.tile(soft, (count, 1))
@@ -291,7 +291,7 @@ class StackedGaps:
     """L/E of each [m/Pa]."""
 
     def room(self, low: Float[np.ndarray, " F"], high: Float[np.ndarray, " F"]) -> CompressionGap:
-        """Give what is left, for each object, from one side through it to the other.
+        """Return what is left, for each object, from one side through it to the other.
 
         Args:
             low: Gaps from the lower side [m].
@@ -309,7 +309,7 @@ class StackedGaps:
 
 
 def comes_closer(presser: PresserPath, normal: Float[np.ndarray, "3"]) -> bool:
-    """Tell whether any point of a body comes closer to a plane than it was."""
+    """Return whether any point of a body comes closer to a plane than it was."""
     corners = presser[0].thing.corners
     few = corners[:: max(1, len(corners) // 50)]
     heights = np.array([p.out(few) @ normal for p in presser])

@@ -1,4 +1,4 @@
-"""Whether a part, by itself, would be seen to change its shape."""
+"""Test whether a part visibly deforms."""
 
 from math import inf, sqrt
 
@@ -22,7 +22,7 @@ from corporeal.mpm.physics.time_step_limits import bounded_poisson, p_wave_speed
 
 
 def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdict:
-    """Say whether a part would yield or visibly flex.
+    """Return whether a part would yield or visibly flex.
 
     ε = max(v/c, ρ a L/E, tip shift of a cantilever / L, what prescribed motion presses it by) and
     v_y = σ_y/(ρ c); rigid when ε is below half a percent and v below v_y. A thin wall is judged by
@@ -35,7 +35,7 @@ def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdic
             0.0, inf, True, "the motion of its object is prescribed, as one rigid body"
         )
     if part.structure.holds:
-        reason = f"what lies in it, {part.structure.holds}, moves by itself and its wall holds it"
+        reason = f"its contents, {part.structure.holds}, move by themselves and its wall holds them"
         return RigidityVerdict(0.0, inf, True, reason)
     if CONSTITUTIVE_LAWS[part.material.law].liquid:
         return RigidityVerdict(1.0, 0.0, False, "it flows", 1.0, 1.0)
@@ -65,7 +65,7 @@ def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdic
 
 
 def explain_rigidity(strain: float, speed: float, yields_at: float) -> str:
-    """Give the verdict in words."""
+    """Return the verdict in words."""
     if strain >= MAX_INVISIBLE_STRAIN:
         return f"it would visibly flex: a strain of about {strain:.2g} is expected"
     if speed >= yields_at:

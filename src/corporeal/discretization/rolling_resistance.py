@@ -1,4 +1,4 @@
-"""How far the force on what rolls lies ahead of its middle: c of every pair [m], from their loss.
+"""Rolling resistance: offset c of the contact force of every pair [m], from their loss factors.
 
 What rolls presses in before it and is pushed back behind it by less, by what its material and the
 other one lose. The moment of that is c N, with c = 3/16 α a under a ball and 2/(3π) α a under a
@@ -43,7 +43,7 @@ class RollingBody:
         Weight is that under usual gravity: it is how hard the body lies on what it rolls on.
         """
         mass = float(body.density @ body.volume)
-        rows = body.rounding
+        rows = body.curvature
         curved = rows[rows[:, 6:8].sum(axis=1) > 0.0]
         if not body.rigid or len(curved) == 0:
             return cls(0.0, 0.0)
@@ -61,7 +61,7 @@ def rolling_resistance_lengths(
 
     Args:
         bodies: As simulated.
-        materials: What each is made of where it rolls, as in life.
+        materials: What each is made of where it rolls, as in reality.
         floor: Of all planes; None: it is not known.
         planes: How many there are.
 
@@ -88,8 +88,8 @@ def rolling_resistance_length(roller: RollingBody, own: Material, other: Materia
     """Give c [m] of what rolls under its own weight.
 
     Each of the two stores energy in proportion to its compliance (1 - ν²)/E, and loses 1 - e² of it
-    with e what a ball of it keeps in a blow (``materials.rebound``). Hertz: a³ = 3 N R/(4 E*) of a
-    ball, a² = 4 N R/(π L E*) of a cylinder.
+    with e what a ball of it keeps in an impact (``materials.rebound``). Hertz: a³ = 3 N R/(4 E*) of
+    a ball, a² = 4 N R/(π L E*) of a cylinder.
     """
     soft = [plane_strain_compliance(m) if m.young > 0 else 0.0 for m in (own, other)]
     taken = [1.0 - restitution_of_loss(min(m.loss, 2.0)) ** 2 for m in (own, other)]

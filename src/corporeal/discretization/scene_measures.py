@@ -1,4 +1,4 @@
-"""All objects of a scene measured, and scenes refused that no material points can fill."""
+"""Measures of all objects of a scene, with errors for scenes that cannot be filled."""
 
 import numpy as np
 
@@ -81,5 +81,5 @@ def refuse_buried_objects(scene: Scene, anatomies: list[MeasuredObject], cell: f
             if depth > cell:
                 raise UserError(
                     f"Object {obj.name!r} reaches {depth:.3g} m into wall {k + 1}. "
-                    "Move one of them, or turn the wall's normal round."
+                    "Move one of them, or flip the wall's normal."
                 )

@@ -1,7 +1,7 @@
-"""Where the steps that a scene may take do not suffice: waves are slowed, in their order.
+"""Step budget: reduction of wave speeds if the allowed number of time steps does not suffice.
 
-First the bulk of what is nearly incompressible gives way, which hardly shows; then Young's modulus.
-What would then be dented or squashed much more than in life is rigid instead.
+First the bulk modulus of nearly incompressible materials is reduced, which is hardly visible; then
+Young's modulus. Parts that would then be deformed much more than in reality become rigid.
 
 Also the published rule, a cap that does not keep the order: a control only.
 """
@@ -48,13 +48,13 @@ def slow_subgrid_parts(
     """
     small = [is_subgrid_part(p, cell) for p in parts]
     fastest = dict.fromkeys((p.object for p in parts), 0.0)
-    for part, treatment, trinket in zip(parts, treatments, small, strict=True):
-        if not trinket:
+    for part, treatment, subgrid in zip(parts, treatments, small, strict=True):
+        if not subgrid:
             fastest[part.object] = max(fastest[part.object], treatment.wave_speed)
-    because = "Too small for the grid to show its own stiffness, it is slowed to what it sits on"
+    because = "Too small for the grid to resolve its stiffness, it is softened to its surroundings"
     return [
-        slow_waves(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
-        for p, t, trinket in zip(parts, treatments, small, strict=True)
+        slow_waves(t, fastest[p.object], cell, because) if subgrid and fastest[p.object] > 0 else t
+        for p, t, subgrid in zip(parts, treatments, small, strict=True)
     ]
 
 
@@ -67,7 +67,9 @@ class BudgetedTreatments:
 
 
 MAX_LOSS_STEP_FACTOR = 1.6
-"""How many times more steps than without loss lossy matter may take [-], before stiffness pays."""
+"""How many times more steps than without loss lossy material may take [-], before stiffness
+pays.
+"""
 
 
 MIN_WAVE_SPEED_RATIO = 10.0
@@ -101,24 +103,31 @@ def fit_step_budget(
     # A part whose bulk gave way runs at the limit, but for rounding.
     if fastest <= limit * (1 + 1e-9):
         return BudgetedTreatments(treatments)
-    because = "The step budget slows its waves"
-    bends = [(t.young, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
+    because = "The step budget reduces its wave speed"
+    bends = [(t.simulated_young_pa, counted_wave_speed(t)) for t in treatments if t.wave_speed > 0]
     knee, power = fit_young_compression(bends, limit)
     fitted = [
         slow_waves(
-            t, t.wave_speed * sqrt(compress_young(t.young, knee, power) / t.young), cell, because
+            t,
+            t.wave_speed
+            * sqrt(compress_young(t.simulated_young_pa, knee, power) / t.simulated_young_pa),
+            cell,
+            because,
         )
         if t.wave_speed > 0
         else t
         for t in treatments
     ]
-    changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
+    changed = sum(
+        a.simulated_young_pa != b.simulated_young_pa
+        for a, b in zip(treatments, fitted, strict=True)
+    )
     softer = (
         "is simulated softer than it is" if changed == 1 else "are simulated softer than they are"
     )
     warning = (
         f"{changed} of {len(fitted)} parts {softer}, to stay within {steps:,.0f} steps per second; "
-        "what is stiffer stays stiffer. A finer --detail has a larger budget."
+        "the order of stiffness is kept. A finer --detail has a larger budget."
     )
     return BudgetedTreatments(fitted, (warning,))
 
@@ -139,7 +148,7 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         return treatment
 
     def at(poisson: float) -> Discretization:
-        wave = wave_speed(treatment.young, poisson, treatment.density, treatment.loss)
+        wave = wave_speed(treatment.simulated_young_pa, poisson, treatment.density, treatment.loss)
         step = stable_step(wave, treatment.impact_speed, cell)
         return replace(treatment, poisson=poisson, wave_speed=wave, step=step)
 
@@ -152,7 +161,7 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         lower = float(brentq(excess, MIN_REDUCED_POISSON_RATIO, treatment.poisson))  # pyright: ignore[reportArgumentType]
     return replace(
         at(lower),
-        why=f"{treatment.why} The step budget lowers its Poisson's ratio from "
+        reason=f"{treatment.reason} The step budget lowers its Poisson's ratio from "
         f"{treatment.poisson:.3g} to {lower:.3g}.",
     )
 
@@ -180,12 +189,12 @@ def parts_nearer_to_rigid(
     unslowed: Sequence[Discretization],
     slowed: Sequence[Discretization],
 ) -> dict[int, str]:
-    """Say which parts would be simulated so much too soft that rigid is nearer to the truth.
+    """Return which parts would be simulated so much too soft that rigid is nearer to the truth.
 
-    Rigid is nearer where the strain is off by more than all that there is of it in life. No strain
-    counts as more than 1, at which all shape is lost. Of a solid that yields the lasting dent
-    counts. What flows has to do so at any stiffness; sheets, rods and hollow things keep bending
-    when struck.
+    Rigid is nearer where the strain is off by more than all that there is of it in reality. No
+    strain counts as more than 1, at which all shape is lost. Of a solid that yields the lasting
+    dent counts. What flows has to do so at any stiffness; sheets, rods and hollow objects keep
+    bending when struck.
 
     Returns:
         Number of the part → why, in a clause.
@@ -210,7 +219,7 @@ def _too_soft_reason(
     true: Discretization,
     soft: Discretization,
 ) -> str:
-    """Say why rigid is nearer to the truth than as soft as a part would be simulated; "": no."""
+    """Return why rigid is nearer to the truth than as soft as a part would be simulated; "": no."""
     if true.impact_speed >= verdict.yield_speed:
         dents = _yield_marks(part, true, soft)
     elif verdict.impact < MAX_INVISIBLE_STRAIN:
@@ -229,9 +238,10 @@ def _too_soft_reason(
 
 
 def _dented_reason(speed: float, dents: "_BallDents") -> str:
-    """Say why a part that would be dented too deeply is rigid."""
+    """Return why a part that would be dented too deeply is rigid."""
     return (
-        f"a blow at {speed:.2g} m/s would dent it by {dents.life:.2g} of its radius, and as soft "
+        f"an impact at {speed:.2g} m/s would dent it by {dents.life:.2g} of its radius, and as "
+        "soft "
         f"as the grid and the step budget would make it, by {dents.simulated:.2g}; it rebounds "
         "by its coefficient of restitution"
     )
@@ -239,7 +249,7 @@ def _dented_reason(speed: float, dents: "_BallDents") -> str:
 
 @dataclass(frozen=True)
 class _BallDents:
-    """Greatest dents of a ball in a blow, over its radius [-]."""
+    """Greatest dents of a ball in an impact, over its radius [-]."""
 
     life: float
     simulated: float
@@ -248,7 +258,7 @@ class _BallDents:
 def _ball_dents(
     part: PartGeometry, true: Discretization, soft: Discretization
 ) -> _BallDents | None:
-    """Give how deep a blow dents a solid or a sealed wall; None: it bends in another way.
+    """Return how deep an impact dents a solid or a sealed wall; None: it bends in another way.
 
     Other walls are open, or their restitution is that of solids: they stay soft.
     """
@@ -256,21 +266,21 @@ def _ball_dents(
         return _BallDents(
             *(
                 hertz_dent_of_ball(young, true.poisson, true.density, true.impact_speed)
-                for young in (true.young, soft.young)
+                for young in (true.simulated_young_pa, soft.simulated_young_pa)
             )
         )
     if soft.kind != "shell" or not part.structure.sealed or not soft.thickness:
         return None
     speed, radius, made = true.impact_speed, 0.5 * part.size[0], part.material
     real = (made.young, made.poisson, made.density, part.structure.thickness or soft.thickness)
-    slow = (soft.young, soft.poisson, soft.density, soft.thickness)
+    slow = (soft.simulated_young_pa, soft.poisson, soft.density, soft.thickness)
     return _BallDents(*(dent_of_hollow_ball(*wall, radius, speed) for wall in (real, slow)))
 
 
 def _yield_marks(
     part: PartGeometry, true: Discretization, soft: Discretization
 ) -> _BallDents | None:
-    """Give how deep a blow marks a compact solid that yields; None: it bends in another way."""
+    """Return how deep an impact marks a compact solid that yields; None: it bends in another way."""
     solid = soft.kind == "deformable" and part.structure.kind == "solid"
     if not (solid and is_dented_by_impact(part) and true.yield_stress and soft.yield_stress):
         return None
@@ -285,27 +295,30 @@ def _sags_too_far(
     true: Discretization,
     soft: Discretization,
 ) -> bool:
-    """Tell whether a part sags by more than twice as much as in life.
+    """Return whether a part sags by more than twice as much as in reality.
 
     In life it strains by ε_w for good under its own weight; softened f times by the step budget,
     by ε_w f; and thickened, which keeps its bending stiffness only, by ρ a L/E of the simulated
     numbers.
     """
     pull = motion.driven if part.burden else motion.acceleration
-    squashed = soft.density * pull * part.size[2] / soft.young
-    sags = min(1.0, max(squashed, verdict.weight * true.young / soft.young))
+    squashed = soft.density * pull * part.size[2] / soft.simulated_young_pa
+    sags = min(
+        1.0, max(squashed, verdict.weight * true.simulated_young_pa / soft.simulated_young_pa)
+    )
     return sags - min(1.0, verdict.weight) > max(verdict.weight, MAX_INVISIBLE_STRAIN)
 
 
 def is_dented_by_impact(part: PartGeometry) -> bool:
-    """Tell whether a blow dents a part rather than bends it: no rod, no sheet, no plant."""
+    """Return whether an impact dents a part rather than bends it: no rod, no sheet, no plant."""
     lumpy = part.size[0] >= MIN_COMPACT_SIDE_RATIO * part.size[2]
     return lumpy and part.leaves == 0 and part.diameter == 0
 
 
 MIN_WALL_HOLD_FRACTION = 0.25
-"""A flat wall that holds less than this share of what it holds in life when stretched is nearer to
-life as a rigid one: its dent, as √(1/hold), would be more than twice as deep as in life."""
+"""A flat wall that holds less than this share of what it holds in reality when stretched is nearer
+to life as a rigid one: its dent, as √(1/hold), would be more than twice as deep as in reality.
+"""
 
 
 def walls_that_tear(
@@ -313,7 +326,7 @@ def walls_that_tear(
     verdicts: Sequence[RigidityVerdict],
     treatments: Sequence[Discretization],
 ) -> dict[int, str]:
-    """Say which flat ductile walls would tear as they are simulated, and why they are rigid.
+    """Return which flat ductile walls would tear as they are simulated, and why they are rigid.
 
     A plate that is struck stops what strikes it by being stretched: the energy of a dent of depth w
     is π σ_y t w² (a membrane in the shape of a cone). A thickened wall keeps its bending strength,
@@ -344,11 +357,11 @@ def slow_waves(
     strong = treatment.yield_stress
     return replace(
         treatment,
-        young=treatment.young * factor**2,
+        simulated_young_pa=treatment.simulated_young_pa * factor**2,
         yield_stress=None if strong is None else strong * factor,
         wave_speed=speed,
         step=stable_step(speed, treatment.impact_speed, cell),
-        why=f"{treatment.why} {because}: {1 / factor:.3g} times.",
+        reason=f"{treatment.reason} {because}: {1 / factor:.3g} times.",
     )
 
 
@@ -361,10 +374,10 @@ def cap_stiffness(part: PartGeometry, treatment: Discretization, cell: float) ->
     strong = material.yield_stress
     return replace(
         treatment,
-        young=young,
+        simulated_young_pa=young,
         poisson=poisson,
         yield_stress=None if strong is None else strong * young / material.young,
         wave_speed=wave,
         step=stable_step(wave, treatment.impact_speed, cell),
-        why="Deformable with the published cap on Young's modulus.",
+        reason="Deformable with the published cap on Young's modulus.",
     )

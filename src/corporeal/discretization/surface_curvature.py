@@ -1,4 +1,4 @@
-"""How a surface curves at points on it, where its triangles stand for something round.
+"""Curvature of surfaces at points where triangles approximate a round shape.
 
 A ball of triangles rolls on corners, and loses speed at each as a wheel without a rim does (McGeer
 1990, "Passive dynamic walking"): a fifth in a second. So every point gets the radii of curvature
@@ -46,7 +46,7 @@ def curve_points(
         points: On it [m].
 
     Returns:
-        The points [m], and the rounding at each, see ``types.ROUNDING``.
+        The points [m], and the curvature at each, see ``types.CURVATURE_COLUMNS``.
 
     """
     if len(points) <= SURROUND_NEIGHBOURS_COUNT or not len(mesh.triangles):
@@ -63,9 +63,9 @@ def curve_points(
     ]
     # Corners first, as they were given: the lowest make the object rest exactly.
     place = np.concatenate([p for p, _ in (*found[1:], found[0])])
-    rounding = np.concatenate([r for _, r in (*found[1:], found[0])])
-    rounding[:, 9] = is_surrounded(rounding, place)
-    return place, rounding
+    curvature = np.concatenate([r for _, r in (*found[1:], found[0])])
+    curvature[:, 9] = is_surrounded(curvature, place)
+    return place, curvature
 
 
 def point_reach(points: Float[np.ndarray, "S 3"]) -> Float[np.ndarray, " S"]:
@@ -75,16 +75,16 @@ def point_reach(points: Float[np.ndarray, "S 3"]) -> Float[np.ndarray, " S"]:
 
 
 def is_surrounded(
-    rounding: Float[np.ndarray, "S 12"], points: Float[np.ndarray, "S 3"]
+    curvature: Float[np.ndarray, "S 12"], points: Float[np.ndarray, "S 3"]
 ) -> Bool[np.ndarray, " S"]:
     """Whether what is round around a point goes on on all sides, by where its neighbours look.
 
     Along an arc they look both ways, on a dome all around.
     """
     other = np.asarray(KDTree(points).query(points, SURROUND_NEIGHBOURS_COUNT + 1)[1])[:, 1:]
-    normal, along = rounding[:, :3], rounding[:, 3:6]
+    normal, along = curvature[:, :3], curvature[:, 3:6]
     across = _unit_normals(np.cross(normal, along))
-    near = is_round(rounding)[other] & (np.einsum("ski,si->sk", normal[other], normal) > 0.5)
+    near = is_round(curvature)[other] & (np.einsum("ski,si->sk", normal[other], normal) > 0.5)
     x = np.einsum("ski,si->sk", normal[other], along)
     y = np.einsum("ski,si->sk", normal[other], across)
     both = np.any(near & (x > 0.0), axis=1) & np.any(near & (x < 0.0), axis=1)
@@ -92,8 +92,8 @@ def is_surrounded(
     angle = np.where(near, np.arctan2(y, x), np.nan)
     order = np.sort(np.where(near, angle, np.nanmin(angle, axis=1, initial=9.0)[:, None]), axis=1)
     turn = np.diff(order, axis=1, append=order[:, :1] + 2 * np.pi).max(axis=1)
-    dome = rounding[:, 6] > 0.0
-    return is_round(rounding) & np.where(
+    dome = curvature[:, 6] > 0.0
+    return is_round(curvature) & np.where(
         dome, near.any(axis=1) & (turn < MAX_SURROUND_GAP_RAD), both
     )
 
@@ -175,7 +175,7 @@ class MeshCurvature:
 
 
 def _next_corners(corner: Int[np.ndarray, " C"]) -> Int[np.ndarray, " C"]:
-    """Give the next corners of the same triangles."""
+    """Return the next corners of the same triangles."""
     return corner - corner % 3 + (corner + 1) % 3
 
 
@@ -205,8 +205,8 @@ def _curvature_on_faces(
     lifted = points + 0.5 * np.einsum("nk,nk,nkj->nj", share, rise, n)
     normal = _unit_normals(np.einsum("nk,nkj->nj", share, n))
     large, small, along = curved.principal(triangle)
-    rounding = _curvature_row(normal, along, large, small, reach)
-    return np.where(is_curved(rounding)[:, None], lifted, points), rounding
+    curvature = _curvature_row(normal, along, large, small, reach)
+    return np.where(is_curved(curvature)[:, None], lifted, points), curvature
 
 
 def _curvature_at_corner(
@@ -228,20 +228,20 @@ def _curvature_at_corner(
     return np.tile(point, (len(rows), 1)), rows
 
 
-def is_round(rounding: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
+def is_round(curvature: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
     """Whether the surface curves at each point."""
-    return rounding[:, 6] + rounding[:, 7] > 0.0
+    return curvature[:, 6] + curvature[:, 7] > 0.0
 
 
-def is_curved(rounding: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
+def is_curved(curvature: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
     """Whether the surface curves at each point, outwards or, where it is hollow, inwards."""
-    return np.any(rounding[:, 10:] != 0.0, axis=1)
+    return np.any(curvature[:, 10:] != 0.0, axis=1)
 
 
 def _curvature_row(
     normal: np.ndarray, along: np.ndarray, large: np.ndarray, small: np.ndarray, reach: np.ndarray
 ) -> Float[np.ndarray, "N 12"]:
-    """Put a point's rounding together from its two curvatures [1/m]; hollows have no radii."""
+    """Put a point's curvature together from its two curvatures [1/m]; hollows have no radii."""
     bent = large * reach > MIN_CURVED_ANGLE_RAD
     dome = bent & (small * reach > MIN_CURVED_ANGLE_RAD)
     tight = np.where(bent, 1.0 / np.where(bent, large, 1.0), 0.0)

@@ -1,7 +1,6 @@
-"""Open ware from pictures as the vessel that it is: matter along its outside, as thick as its wall.
+"""Open ware from pictures as a shell along its outside, with the thickness of its wall.
 
-What pictures did not see of a hollow is drawn as a lump, or as a roof over the rim. Such ware would
-hold nothing, and what falls into it would lie on its mouth.
+Unseen hollows are reconstructed as a lump or as a roof over the rim; such ware would hold nothing.
 """
 
 from collections.abc import Sequence
@@ -82,7 +81,7 @@ def _hollow_vessel(anatomy: MeasuredObject, field: MaterialField) -> MeasuredObj
 def vessel_shell_surface(shape: QueryMesh, part: Mesh, thickness: float) -> Mesh:
     """Return the surface of what lies no deeper than a wall [m] below the outside of open ware.
 
-    Places of a grid are asked how deep they lie in the matter and how far they are from the
+    Places of a grid are asked how deep they lie in the material and how far they are from the
     outside; where the lesser of depth and what is left of the wall changes its sign it is meshed
     (``pouring.meshed``). Bubbles that nothing leads into are filled, crumbs are left out.
     """
@@ -127,12 +126,12 @@ def _outside_triangles(shape: QueryMesh, part: Mesh) -> Mesh:
 
 
 def _enclosed_voids(empty: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "X Y Z"]:
-    """Tell which empty places are shut off from the corner of the grid."""
+    """Return which empty places are shut off from the corner of the grid."""
     number = np.asarray(label(empty, connectivity=1))
     return empty & (number != number[0, 0, 0])
 
 
 def _loose_crumbs(matter: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "X Y Z"]:
-    """Tell which places of matter are none of its largest piece."""
+    """Return which places of material are none of its largest piece."""
     number = np.asarray(label(matter, connectivity=1))
     return matter & (number != 1 + np.argmax(np.bincount(number.ravel())[1:]))

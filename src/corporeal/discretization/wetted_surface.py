@@ -22,7 +22,7 @@ MAX_SAMPLED_WETTED_POINTS = 60_000
 def sample_wetted_points(
     anatomy: MeasuredObject, makes: Mapping[int, PartModel], cell: float, rng: np.random.Generator
 ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"]]:
-    """Cover all faces of an object's matter, the inside of a wall that is drawn by its outside too.
+    """Cover all faces of an object's material, the inside of a wall that is drawn by its outside too.
 
     Args:
         anatomy: The object.
@@ -31,7 +31,7 @@ def sample_wetted_points(
         rng: Source of the samples.
 
     Returns:
-        Points [m] and unit normals out of the matter.
+        Points [m] and unit normals out of the material.
 
     """
     faces = [f for m in anatomy.members for f in part_wetted_faces(m, makes[m.part])]

@@ -1,7 +1,7 @@
-"""A scene as Alembic: the vertices of every surface at every frame, for film and effects tools.
+"""A scene as Alembic: the vertices of every surface at every frame, for video and effects tools.
 
-Alembic says nothing of axes or sides; what everybody does is +Y up and faces clockwise seen from
-outside. Written with alembic3d, an unofficial build of PyAlembic under a name of its own.
+Alembic does not define axes or orientation; the convention is +Y up and clockwise faces. Written
+with alembic3d, an unofficial build of PyAlembic under a name of its own.
 """
 
 # The library is optional.
@@ -19,14 +19,14 @@ from corporeal.core.version import __version__
 from corporeal.export.export_target import ExportRequest, NothingToWriteError, WrittenTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
 
-ALEMBIC_FILE_NAME = "film.abc"
+ALEMBIC_FILE_NAME = "video.abc"
 Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """Rows: Alembic's x, y and z of ours."""
 PROVENANCE_PROPERTY = "corporeal"
 
 
 def write_alembic(asked: ExportRequest, folder: Path) -> WrittenTarget:
-    """Write ``film.abc``.
+    """Write ``video.abc``.
 
     Raises:
         NothingToWriteError: Nothing moves.
@@ -34,7 +34,7 @@ def write_alembic(asked: ExportRequest, folder: Path) -> WrittenTarget:
 
     """
     if not asked.motion.moves:
-        raise NothingToWriteError("Nothing was simulated, and Alembic is for what moves.")
+        raise NothingToWriteError("Nothing was simulated, and Alembic needs motion.")
     try:
         from alembic3d import Abc, AbcCoreAbstract, AbcGeom
     except ImportError as error:
@@ -60,7 +60,7 @@ def write_alembic(asked: ExportRequest, folder: Path) -> WrittenTarget:
             schema = mesh.getSchema()
             schema.setTimeSampling(clock)
             _fill_mesh(schema, surface, *shapes.of(number))
-    return WrittenTarget(("Looks are left out: Alembic has none.",))
+    return WrittenTarget(("Appearance is left out: Alembic has none.",))
 
 
 def _provenance(scene: PhysicalScene, solid: ExportedSolid) -> str:

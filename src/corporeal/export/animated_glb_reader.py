@@ -1,4 +1,4 @@
-"""Pose an animated GLB at its keyframes, as a viewer does: nodes, then morph targets."""
+"""Reader of animated GLB, evaluated at keyframes: nodes, then morph targets."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -72,17 +72,17 @@ class AnimatedGlb:
 
 
 def read_animated_glb(path: Path) -> AnimatedGlb:
-    """Open a film.
+    """Open a video.
 
     Raises:
         BadFileError: It cannot be read.
 
     """
-    film = AnimatedGlb(GltfDocument(path))
-    for animation in film.document.entries("animations"):
+    video = AnimatedGlb(GltfDocument(path))
+    for animation in video.document.entries("animations"):
         samplers = animation.value["samplers"]
         for channel in animation.value["channels"]:
             target = channel["target"]
-            values = film._values(samplers[channel["sampler"]]["output"])
-            film.tracks[target["node"], target["path"]] = values
-    return film
+            values = video._values(samplers[channel["sampler"]]["output"])
+            video.tracks[target["node"], target["path"]] = values
+    return video

@@ -1,7 +1,7 @@
-"""A scene as one animated GLB: rigid things move as nodes, soft ones by a few morph targets.
+"""A scene as one animated GLB: rigid objects move as nodes, soft ones by a few morph targets.
 
 Morph targets are modes of the shapes (``geometry/shape_modes.py``), kept as normalised 16 and 8 bit
-integers (KHR_mesh_quantization): a film takes a sixth of what keyframes of all vertices would.
+integers (KHR_mesh_quantization): a video takes a sixth of what keyframes of all vertices would.
 """
 
 from dataclasses import replace
@@ -18,7 +18,7 @@ from corporeal.export.scene_motion import PosedSurfaces
 from corporeal.geometry.shape_modes import ShapeModes, fit_shape_modes, refit_shape_modes
 from corporeal.io.gltf.glb_writer import ACCESSOR_TYPE_OF_WIDTH, FLOAT, VERTEX_BUFFER, GlbDocument
 
-GLB_FILE_NAME = "film.glb"
+GLB_FILE_NAME = "video.glb"
 MAX_MORPH_TARGETS = 64
 """Modes of one surface: with more a sequence of shapes is the better format."""
 QUANTIZATION_EXTENSION = "KHR_mesh_quantization"
@@ -28,7 +28,7 @@ TOLERANCE_RANGE = (1e-6, 1.0)
 
 
 def write_animated_glb(asked: ExportRequest, folder: Path) -> WrittenTarget:
-    """Write ``film.glb``.
+    """Write ``video.glb``.
 
     Raises:
         UserError: The tolerance makes no sense.
@@ -39,9 +39,9 @@ def write_animated_glb(asked: ExportRequest, folder: Path) -> WrittenTarget:
         raise UserError(
             f"--tolerance is {asked.config.tolerance:g} m. Give a length from {low:g} to {high:g}."
         )
-    film = _AnimatedGlbDocument(asked)
-    write_bytes(folder / GLB_FILE_NAME, film.whole())
-    return WrittenTarget(tuple(film.unsaid), film.measured)
+    video = _AnimatedGlbDocument(asked)
+    write_bytes(folder / GLB_FILE_NAME, video.whole())
+    return WrittenTarget(tuple(video.unsaid), video.measured)
 
 
 class _AnimatedGlbDocument(GlbDocument):

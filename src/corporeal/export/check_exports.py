@@ -1,4 +1,4 @@
-"""Open exported files with real readers and measure what they hold.
+"""Checks of exported files with independent readers.
 
 A reader that is not installed is named, and nothing is measured then.
 """
@@ -6,7 +6,7 @@ A reader that is not installed is named, and nothing is measured then.
 # The readers are optional, and compiled modules without stubs.
 # pyright: reportAttributeAccessIssue=false, reportMissingImports=false, reportIndexIssue=false
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -14,9 +14,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from corporeal.core.registry import load_function
 from corporeal.export.alembic_writer import Z_UP_TO_Y_UP
 from corporeal.export.animated_glb_reader import read_animated_glb
-from corporeal.export.export_target import ExportRequest, ExportTarget
+from corporeal.export.export_target import EXPORT_WRITERS, ExportRequest, ExportTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
 from corporeal.export.mjcf_writer import write_mjcf
 from corporeal.io.splat.load_splat import load_splat
@@ -43,15 +44,13 @@ def check_target(target: ExportTarget, folder: Path, asked: ExportRequest) -> Re
         asked: What they should hold.
 
     """
-    reader, judge = TARGET_CHECKS[target]
-    if reader is None:
-        return judge(folder, asked)
+    writer = EXPORT_WRITERS[target]
     try:
-        import_module(reader)
+        import_module(writer.check_package or "corporeal")
     except ImportError:
-        doubt = f"Not checked: {reader} is not installed (pip install 'corporeal[export]')."
-        return ReaderFindings(doubts=(doubt,))
-    return judge(folder, asked)
+        what = f"Not checked: {writer.check_package} is not installed"
+        return ReaderFindings(doubts=(f"{what} (pip install 'corporeal[export]').",))
+    return load_function(writer.check)(folder, asked)
 
 
 # ---------------------------------------------------------------- USD
@@ -65,7 +64,7 @@ def check_usd(folder: Path, asked: ExportRequest) -> ReaderFindings:
     context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     complaints: list[str] = []
     stages = sorted(folder.glob("*.usda"))
-    for path in (p for p in stages if p.stem in ("sim", "film")):
+    for path in (p for p in stages if p.stem in ("sim", "video")):
         errors = context.Validate(Usd.Stage.Open(str(path)))
         complaints += [f"{path.name}: {e.GetErrorAsString()}" for e in errors]
     stage = Usd.Stage.Open(str(folder / "sim.usda"))
@@ -158,21 +157,21 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
     if not soft:
         return ()
     names = ", ".join(soft)
-    return (f"Drift is measured without {names}, which can deform: what lies on it falls.",)
+    return (f"Drift is measured without {names}, which can deform: objects on it fall.",)
 
 
 # ---------------------------------------------------------------- motion and data
 
 
 def check_glb(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Open the film as a viewer does, and pose it at every frame."""
-    motion, film = asked.motion, read_animated_glb(folder / "film.glb")
+    """Open the video as a viewer does, and pose it at every frame."""
+    motion, video = asked.motion, read_animated_glb(folder / "video.glb")
     if not motion.moves:
         return ReaderFindings()
     shapes = motion.shapes(asked.scene.solids)
     numbers = [n for s in asked.scene.solids for n in s.surface_numbers]
     wanted = np.concatenate([shapes.of(n)[0] for n in numbers], axis=1)
-    off = [np.linalg.norm(film.vertices(k) - wanted[k], axis=1).max() for k in range(len(wanted))]
+    off = [np.linalg.norm(video.vertices(k) - wanted[k], axis=1).max() for k in range(len(wanted))]
     return ReaderFindings({"vertex_off_m": float(max(off))})
 
 
@@ -194,7 +193,7 @@ def check_alembic(folder: Path, asked: ExportRequest) -> ReaderFindings:
     """Open the archive and compare every surface at the last frame."""
     from alembic3d import Abc, AbcGeom
 
-    top = Abc.IArchive(str(folder / "film.abc")).getTop()
+    top = Abc.IArchive(str(folder / "video.abc")).getTop()
     shapes = asked.motion.shapes(asked.scene.solids)
     last, off = len(asked.motion.time) - 1, [0.0]
     for solid in asked.scene.solids:
@@ -216,20 +215,5 @@ def check_splats(folder: Path, asked: ExportRequest) -> ReaderFindings:
 
 
 def check_without_reader(folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Say that there is no reader to ask."""
-    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is no package.",))
-
-
-TARGET_CHECKS: dict[
-    ExportTarget, tuple[str | None, Callable[[Path, ExportRequest], ReaderFindings]]
-] = {
-    "usd": ("pxr", check_usd),
-    "mjcf": (None, check_mjcf),
-    "urdf": (None, check_urdf),
-    "glb": (None, check_glb),
-    "splats": (None, check_splats),
-    "h5": ("h5py", check_h5),
-    "npz": (None, check_without_reader),
-    "abc": ("alembic3d", check_alembic),
-}
-"""Target → the module that its reader needs beyond corporeal's own, and what asks it."""
+    """State that there is no reader to ask."""
+    return ReaderFindings(doubts=("Not checked: the loader of geoelements/gns is not a package.",))

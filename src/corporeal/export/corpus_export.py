@@ -1,24 +1,24 @@
-"""A corpus that was run, for other tools: one data set to learn from, all else scene by scene."""
+"""Export of a corpus: one data set for learning, other targets scene by scene."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
+from corporeal.core.registry import load_function
 from corporeal.export.export_record import ExportRecord, TargetRecord, write_record
-from corporeal.export.export_target import ExportConfig, ExportRequest, ExportTarget, WrittenTarget
-from corporeal.export.particle_h5_npz_writer import save_h5, save_npz
+from corporeal.export.export_target import (
+    EXPORT_WRITERS,
+    ExportConfig,
+    ExportRequest,
+    ExportTarget,
+    WrittenTarget,
+)
 from corporeal.export.physical_scene import physical_scene
 from corporeal.export.scene_motion import motion_of_run
 from corporeal.lab.corpus.corpus_plan import PLAN_FILE
 from corporeal.lab.corpus.run_corpus import RUNS_FOLDER
 from corporeal.pipeline.run_pipeline import RUN_FILE, STAGE_FOLDERS, read_run
-
-DATASET_WRITERS: dict[ExportTarget, Callable[[Path, Iterator[ExportRequest]], WrittenTarget]] = {
-    "h5": save_h5,
-    "npz": save_npz,
-}
-"""Targets that hold many runs in one file."""
 
 
 def is_corpus(folder: Path) -> bool:
@@ -36,18 +36,18 @@ def finished_runs(corpus: Path) -> list[Path]:
     folders = sorted(p.parent for p in (corpus / RUNS_FOLDER).glob(f"*/{RUN_FILE}"))
     found = [f for f in folders if (f / STAGE_FOLDERS["simulate"] / store.META_FILE).exists()]
     if not found:
-        raise UserError(f"{corpus} has no finished run. Go on with: corporeal corpus run {corpus}")
+        raise UserError(f"{corpus} has no finished run. Next: corporeal corpus run {corpus}")
     return found
 
 
 def export_dataset(
     corpus: Path, targets: Sequence[ExportTarget], out: Path, config: ExportConfig
 ) -> ExportRecord:
-    """Write one data set of all finished runs of a corpus for each of ``DATASET_WRITERS``.
+    """Write one data set of all finished runs of a corpus for each target.
 
     Args:
         corpus: Its folder.
-        targets: Names from ``DATASET_WRITERS``.
+        targets: Those of ``EXPORT_WRITERS`` that have ``write_dataset``.
         out: Where the targets' folders and ``export.json`` go.
         config: The instant and what can deform.
 
@@ -59,7 +59,8 @@ def export_dataset(
     with store.lock_folder(out), store.disk_errors(out):
         for target in targets:
             with store.whole_folder(out / target) as folder:
-                written = DATASET_WRITERS[target](folder, _export_requests(runs, config))
+                write = load_function(EXPORT_WRITERS[target].write_dataset)
+                written: WrittenTarget = write(folder, _export_requests(runs, config))
             files = sorted(str(p.relative_to(out)) for p in (out / target).iterdir())
             names = f"Runs in this order: {', '.join(r.name for r in runs)}."
             rows[target] = TargetRecord(

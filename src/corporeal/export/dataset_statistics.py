@@ -1,4 +1,4 @@
-"""What loaders of data sets ask of all runs together, added up run by run."""
+"""Statistics of data sets over all runs, accumulated run by run."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""``export.json``: which files were written, what they could not say, how far they are off."""
+"""``export.json``: written files, unsupported features, errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -67,4 +67,6 @@ def read_record(path: Path) -> ExportRecord:
     try:
         return from_plain(ExportRecord, found)
     except (ValueError, TypeError, AttributeError) as error:
-        raise BadFileError(path, f"is no record of an export ({error}).", "Delete it.") from error
+        raise BadFileError(
+            path, f"is not a record of an export ({error}).", "Delete it."
+        ) from error

@@ -1,4 +1,4 @@
-"""Export: a run, or a scene before any simulation, into the formats of other tools.
+"""Export of a run, or of a scene before simulation, to other formats.
 
 Every target has a folder of its own that appears whole or not at all; the run is only read.
 """
@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
-from corporeal.core import registry, store
+from corporeal.core import store
 from corporeal.core.errors import UnknownChoiceError, UserError
+from corporeal.core.registry import load_function
 from corporeal.export.check_exports import check_target
-from corporeal.export.corpus_export import DATASET_WRITERS, export_dataset, finished_runs, is_corpus
+from corporeal.export.corpus_export import export_dataset, finished_runs, is_corpus
 from corporeal.export.export_record import ExportRecord, TargetRecord, write_record
 from corporeal.export.export_target import (
     DEFAULT_EXPORT,
@@ -20,7 +21,7 @@ from corporeal.export.export_target import (
     ExportRequest,
     ExportTarget,
     NothingToWriteError,
-    Writer,
+    TargetWriter,
     WrittenTarget,
 )
 from corporeal.export.physical_scene import physical_scene
@@ -37,7 +38,7 @@ ExportProgress = Callable[[float, str], None]
 
 
 def ignore_progress(fraction: float, words: str) -> None:
-    """Tell nobody about progress."""
+    """Ignore progress."""
 
 
 def export_scene(
@@ -57,7 +58,7 @@ def export_scene(
         out: Where the targets' folders and ``export.json`` go; None: SOURCE/export of a run or a
             corpus, NAME-export of a scene called NAME.
         config: The instant, what can deform, tolerances.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Returns:
         What was written, also kept in ``export.json``; of a corpus, of its data set.
@@ -105,14 +106,14 @@ def _export_corpus(
     config: ExportConfig,
     progress: ExportProgress,
 ) -> ExportRecord:
-    each: list[ExportTarget] = [t for t in targets if t not in DATASET_WRITERS]
+    each: list[ExportTarget] = [t for t in targets if not EXPORT_WRITERS[t].write_dataset]
     runs = finished_runs(corpus)
     for k, run in enumerate(runs if each else ()):
         progress(k / (len(runs) + 1), run.name)
         asked, name = _export_request(run, config)
         _export_targets(asked, name, each, out / run.name, ignore_progress)
     progress(len(runs) / (len(runs) + 1), "data set")
-    return export_dataset(corpus, [t for t in targets if t in DATASET_WRITERS], out, config)
+    return export_dataset(corpus, [t for t in targets if t not in each], out, config)
 
 
 def _export_request(
@@ -127,7 +128,7 @@ def _export_request(
         return _request_of_scene(prepare_scene(load_scene(path)), config), str(path)
     made = read_run(path)
     if made.fill is None:
-        raise UserError(f"{path} has no matter yet. Go on with: corporeal fill {quote(str(path))}")
+        raise UserError(f"{path} has no particles yet. Next: corporeal fill {quote(str(path))}")
     if made.simulate is None:
         return _request_of_scene(made.prepared, config), str(path)
     return _request_of_run(made.played, config), str(path)
@@ -157,7 +158,7 @@ def _default_folder(source: str | Path | SimulationResult | PreparedScene, name:
 
 
 def _write_target(asked: ExportRequest, target: ExportTarget, out: Path) -> TargetRecord:
-    writer: Writer = registry.load_backend("target", target, EXPORT_WRITERS)
+    writer: TargetWriter = load_function(EXPORT_WRITERS[target].write, f"The target {target!r}")
     try:
         with store.whole_folder(out / target) as folder:
             written = writer(asked, folder)

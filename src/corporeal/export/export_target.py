@@ -1,4 +1,4 @@
-"""What a writer is asked for, what it returns, and the menu of writers."""
+"""Interface and registry of writers."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,23 +7,42 @@ from typing import Literal, Protocol
 from corporeal.core.errors import UserError
 from corporeal.export.exported_solids import PhysicalScene
 from corporeal.export.scene_motion import SceneMotion
+from corporeal.io.registry import Writer
 from corporeal.simulation.simulation_result import SimulationResult
 
 ExportTarget = Literal["usd", "mjcf", "urdf", "glb", "splats", "h5", "npz", "abc"]
 SoftRepresentation = Literal["particles", "tetrahedra", "none"]
 TargetEngine = Literal["physx", "newton-vbd", "newton-xpbd", "mujoco"]
 
-EXPORT_WRITERS: dict[str, str] = {
-    "usd": "corporeal.export.usd_writer:write_usd",
-    "mjcf": "corporeal.export.mjcf_writer:write_mjcf",
-    "urdf": "corporeal.export.urdf_writer:write_urdf",
-    "glb": "corporeal.export.animated_glb_writer:write_animated_glb",
-    "splats": "corporeal.export.splat_sequence_writer:write_splat_sequence",
-    "h5": "corporeal.export.particle_h5_npz_writer:write_h5",
-    "npz": "corporeal.export.particle_h5_npz_writer:write_npz",
-    "abc": "corporeal.export.alembic_writer:write_alembic",
-}
-"""Target → its writer."""
+_CHECKS, _ARRAYS = "corporeal.export.check_exports", "corporeal.export.particle_h5_npz_writer"
+_WRITERS = (
+    Writer("usd", "corporeal.export.usd_writer:write_usd", f"{_CHECKS}:check_usd", "pxr"),
+    Writer("mjcf", "corporeal.export.mjcf_writer:write_mjcf", f"{_CHECKS}:check_mjcf"),
+    Writer("urdf", "corporeal.export.urdf_writer:write_urdf", f"{_CHECKS}:check_urdf"),
+    Writer(
+        "glb", "corporeal.export.animated_glb_writer:write_animated_glb", f"{_CHECKS}:check_glb"
+    ),
+    Writer(
+        "splats",
+        "corporeal.export.splat_sequence_writer:write_splat_sequence",
+        f"{_CHECKS}:check_splats",
+    ),
+    Writer("h5", f"{_ARRAYS}:write_h5", f"{_CHECKS}:check_h5", "h5py", f"{_ARRAYS}:save_h5"),
+    Writer(
+        "npz",
+        f"{_ARRAYS}:write_npz",
+        f"{_CHECKS}:check_without_reader",
+        write_dataset=f"{_ARRAYS}:save_npz",
+    ),
+    Writer(
+        "abc",
+        "corporeal.export.alembic_writer:write_alembic",
+        f"{_CHECKS}:check_alembic",
+        "alembic3d",
+    ),
+)
+EXPORT_WRITERS: dict[str, Writer] = {writer.name: writer for writer in _WRITERS}
+"""Target → its writer, which is a ``TargetWriter``."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +55,13 @@ class ExportConfig:
     """How simulators get what can deform: material points (USD), tetrahedra (USD, MJCF), or not at
     all. MJCF knows no material points and takes tetrahedra for them."""
     tolerance: float = 1e-3
-    """Largest error of a vertex in the GLB film [m]."""
+    """Largest error of a vertex in the GLB video [m]."""
     friction_for: TargetEngine = "physx"
     """Whose rule makes one friction of two where a format has no pairs."""
     hull_vertices: int = 0
-    """Largest number of corners of a convex collider in USD, 64 for PhysX on a card: hulls of more
-    are enclosed in coarser ones. 0: hulls stay as they are, so that what is settled stays put."""
+    """Largest number of corners of a convex collider in USD, 64 for PhysX on a GPU: hulls of more
+    are enclosed in coarser ones. 0: hulls stay as they are, so that what is settled stays put.
+    """
     check: bool = False
     """Open the files again with real readers and measure what they hold."""
 
@@ -74,7 +94,7 @@ class NothingToWriteError(UserError):
     """The scene holds nothing that a format is for; other targets are written all the same."""
 
 
-class Writer(Protocol):
+class TargetWriter(Protocol):
     """Writes one target into a folder that is there and empty."""
 
     def __call__(self, asked: ExportRequest, folder: Path) -> WrittenTarget:

@@ -1,4 +1,4 @@
-"""What a writer of any format is given: every object ready to leave, and what acts between them.
+"""Format-independent input of writers: solids and their interactions.
 
 The frame of a ``ExportedSolid`` has its origin in the centre of mass at the exported instant and
 the axes of the world, so that no writer has an offset or a rotation to get wrong.
@@ -23,7 +23,7 @@ class PartMaterial:
     object: int
     """Index into ``PhysicalScene.solids``."""
     material: Material
-    """As in life."""
+    """As in reality."""
     treatment: Discretization
     """As simulated."""
     provenance: dict[str, Any]
@@ -97,7 +97,7 @@ class ExportedSolid:
     surface_numbers: tuple[int, ...]
     """Of these surfaces in the scene."""
     pieces: tuple[ConvexCollider, ...] = ()
-    """Convex pieces of a rigid solid, which meet other things."""
+    """Convex pieces of a rigid solid, which meet other objects."""
     hull: ConvexCollider | None = None
     """Convex hull of a rigid solid, which meets floor and walls."""
     grains: MaterialPoints | None = None

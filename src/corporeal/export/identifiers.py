@@ -1,4 +1,4 @@
-"""Names that every format and file system takes, one for each name in any alphabet."""
+"""Portable identifiers of names."""
 
 import re
 import unicodedata
@@ -14,7 +14,7 @@ def identifiers(titles: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     becomes ``thing``.
 
     Args:
-        titles: As people call things.
+        titles: As people call objects.
         taken: Identifiers that stand for something else.
 
     """

@@ -1,7 +1,7 @@
 """A scene as MJCF for MuJoCo: ``scene.xml`` with meshes beside it.
 
 Every two shapes that may meet are an explicit contact pair with the friction of the two materials;
-MuJoCo itself would take the larger of two coefficients. The floor meets convex hulls, things meet
+MuJoCo itself would take the larger of two coefficients. The floor meets convex hulls, objects meet
 one another with their convex pieces. Restitution e is a damping ratio: a linear spring of damping
 ratio ζ returns e = exp(-π ζ / √(1 - ζ²)) of a speed. What can deform is a flex of tetrahedra.
 """
@@ -26,7 +26,8 @@ from corporeal.recognition.readable_names import single_line_text
 MJCF_FILE_NAME = "scene.xml"
 CONTACT_TIME_S = 4e-3
 """1/ω of a contact's spring [s]: what meets at a speed v sinks in by about v/ω; the step must be a
-quarter of it. At twice the stiffness piles of light things come apart."""
+quarter of it. At twice the stiffness piles of light objects come apart.
+"""
 TIME_STEP_S = CONTACT_TIME_S / 4
 FLEX_CONTACT_TIME_S = 8e-3
 """Time constant of the contacts of what can deform [s]."""
@@ -168,7 +169,7 @@ def _rigid_body(
     shapes += [(f"{solid.name}_hull", solid.hull, "ground")] if solid.hull else []
     for name, collider, meets in shapes:
         write_collider(name, collider.shape, folder)
-        # Rigid things meet only in pairs; the hull meets what can deform.
+        # Rigid objects meet only in pairs; the hull meets what can deform.
         affinity = FLEX_CONTACT_BIT if meets == "ground" else "0"
         own = {"group": COLLISION_GROUP, "contype": "0", "conaffinity": affinity}
         _mesh(assets, body, name, "convex", own)
@@ -202,7 +203,10 @@ def _flex(solid: ExportedSolid, scene: PhysicalScene, world: ET.Element) -> None
         element=" ".join(map(str, mesh.corners.ravel().tolist())),
     )
     poisson = min(matter.treatment.poisson, MAX_FLEX_POISSON_RATIO)
-    elastic = {"young": xml_numbers([matter.treatment.young]), "poisson": xml_numbers([poisson])}
+    elastic = {
+        "young": xml_numbers([matter.treatment.simulated_young_pa]),
+        "poisson": xml_numbers([poisson]),
+    }
     ET.SubElement(item, "elasticity", elastic | {"damping": xml_numbers([FLEX_DAMPING_S])})
     ET.SubElement(
         item,
@@ -266,5 +270,5 @@ def _not_written(asked: ExportRequest) -> list[str]:
                 f"Poisson's ratio of {matter.name} is {MAX_FLEX_POISSON_RATIO} in MuJoCo, not {ratio}."
             )
     if scene.settled:
-        sentences.append("Nothing bounces: in MuJoCo what lies at rest would creep.")
+        sentences.append("No restitution: in MuJoCo resting objects would creep.")
     return sentences

@@ -1,4 +1,4 @@
-"""A run as arrays of particles, numbered as data sets for learning do.
+"""A run as arrays of particles with the type numbers of learning data sets.
 
 Kinds are those of DeepMind's data sets (Sanchez-Gonzalez et al. 2020): 0 rigid, 6 sand, 7 goop; 8
 is ours, for metal. 3 is an obstacle to both loaders, and never used.
@@ -79,8 +79,8 @@ def read_particle_table(asked: ExportRequest) -> ParticleTable:
 def _part_values(treatments: list[Discretization]) -> dict[str, np.ndarray]:
     """Values of every part as simulated; what does not yield has an infinite yield stress."""
     return {
-        "young": np.array([t.young for t in treatments]),
-        "young_real": np.array([t.young_real for t in treatments]),
+        "simulated_young_pa": np.array([t.simulated_young_pa for t in treatments]),
+        "young_pa": np.array([t.young_pa for t in treatments]),
         "poisson": np.array([t.poisson for t in treatments]),
         "yield_stress": np.array([t.yield_stress or np.inf for t in treatments]),
     }

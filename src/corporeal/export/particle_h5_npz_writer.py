@@ -1,4 +1,4 @@
-"""Material points over time for learning: HDF5 as LagrangeBench has it, NPZ as geoelements/gns.
+"""Particle trajectories for learning: HDF5 of LagrangeBench, NPZ of geoelements/gns.
 
 Both loaders take positions and the kind of each particle. HDF5 has beside them what no other data
 set does: mass, volume, moduli, law, object, part, deformation gradients, and where every number
@@ -79,7 +79,7 @@ def save_npz(folder: Path, runs: Iterable[ExportRequest]) -> WrittenTarget:
     rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for asked in runs:
         table = read_particle_table(asked)
-        rows.append((table.position, table.kind, np.log10(table.columns["young"])))
+        rows.append((table.position, table.kind, np.log10(table.columns["simulated_young_pa"])))
         provenance.append(table.provenance)
         statistics.add(table)
     items = np.empty(len(rows), dtype=object)

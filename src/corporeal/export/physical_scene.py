@@ -1,4 +1,4 @@
-"""From what the verbs of a run made to solids at one instant."""
+"""Conversion of the results of a run to solids at one instant."""
 
 from dataclasses import replace
 from functools import partial
@@ -31,7 +31,7 @@ from corporeal.mpm.physics.rigid import mass_and_inertia
 from corporeal.simulation.simulation_result import PreparedScene
 
 FLAT_HULL_THICKNESS_FRACTION = 1e-4
-"""Of the extent: thickness that the hull of a flat thing is given."""
+"""Of the extent: thickness that the hull of a flat object is given."""
 STRUCTURE_FIELDS = ("structure", "thickness", "contents", "fill")
 """Fields of ``PartDescription`` that say how a part is built."""
 RESERVED_NAMES = (
@@ -45,7 +45,7 @@ RESERVED_NAMES = (
     "Pieces",
     "floor",
 )
-"""Names that our files use for other things."""
+"""Names that our files use for other objects."""
 
 
 def physical_scene(prepared: PreparedScene, motion: SceneMotion) -> PhysicalScene:

@@ -1,4 +1,4 @@
-"""How a scene moved, and where everything is at the instant that is exported."""
+"""Motion of a scene, and its pose at the exported instant."""
 
 import os
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ SAME_INSTANT_S = 1e-9
 
 @dataclass(frozen=True)
 class SolidPoses:
-    """Where a solid's frame is at every frame of the film; F frames."""
+    """Where a solid's frame is at every frame of the video; F frames."""
 
     position: Float[np.ndarray, "F 3"]
     """[m]"""
@@ -202,7 +202,7 @@ def motion_of_run(played: SimulationResult, at: str) -> SceneMotion:
 
 
 def frame_at(at: str, time: Float[np.ndarray, " F"]) -> int:
-    """Return the number of the frame that somebody asks for.
+    """Return the number of the frame for --at.
 
     Raises:
         UserError: There is no such instant.
@@ -287,7 +287,7 @@ def _scene_skin(prepared: PreparedScene) -> SkinBinding:
 
 
 def motion_of_scene(prepared: PreparedScene) -> SceneMotion:
-    """Take a scene that nobody has simulated: one instant."""
+    """Return the motion of a scene without simulation: one instant."""
     particles, scene = prepared.particles, prepared.scene
     posed = build_model(scene, particles, prepared.field)
     count = len(scene.objects)

@@ -1,4 +1,4 @@
-"""Convex colliders of few corners, for engines that take no more."""
+"""Simplification of convex colliders."""
 
 from dataclasses import replace
 
@@ -9,8 +9,9 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 
 PHYSX_GPU_MAX_CORNERS, PHYSX_CPU_MAX_CORNERS = 64, 255
-"""Corners of a convex mesh that PhysX simulates on a graphics card, and on a processor; it cooks
-others anew."""
+"""Corners of a convex mesh that PhysX simulates on a GPU, and on a processor; it cooks
+others anew.
+"""
 ENCLOSING_BOX_CORNERS = 8
 """Corners of the box that every hull is cut from."""
 

@@ -9,11 +9,11 @@ from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.simulation.moving_gaussians import moving_gaussians
 
 FRAME_FILE_PATTERN = "frame_{:04d}.ply"
-MATERIALS_FILE_NAME = "film.json"
+MATERIALS_FILE_NAME = "video.json"
 
 
 def write_splat_sequence(asked: ExportRequest, folder: Path) -> WrittenTarget:
-    """Write ``frame_0000.ply`` and so on, ``splats.usda``, and ``film.json`` with the materials.
+    """Write ``frame_0000.ply`` and so on, ``splats.usda``, and ``video.json`` with the materials.
 
     Raises:
         NothingToWriteError: The scene was made of surfaces, or nothing moves.

@@ -1,4 +1,4 @@
-"""One friction per surface instead of one per pair, for engines that know no pairs."""
+"""Fit of friction per surface to friction per pair."""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,6 +1,6 @@
 """Rigid solids as URDF, one file each: one link with mass, inertia, looks and convex pieces.
 
-URDF says neither where a body stands nor how it moves: ``placements.json`` beside the files does.
+URDF has neither poses nor motion of bodies: they are in ``placements.json``.
 """
 
 import json
@@ -28,7 +28,9 @@ def write_urdf(asked: ExportRequest, folder: Path) -> WrittenTarget:
     scene = asked.scene
     rigid = [s for s in scene.solids if s.rigid]
     if not rigid:
-        raise NothingToWriteError(f"Nothing of {scene.title} is rigid, and URDF knows no other.")
+        raise NothingToWriteError(
+            f"Nothing of {scene.title} is rigid, and URDF has rigid bodies only."
+        )
     for solid in rigid:
         write_xml(folder / f"{solid.name}.urdf", _robot(solid, scene, folder))
     write_json(folder / PLACEMENTS_FILE_NAME, {s.name: _placement(s) for s in rigid})

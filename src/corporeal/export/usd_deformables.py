@@ -1,4 +1,4 @@
-"""What can deform in USD: material points for MPM, and tetrahedra for finite elements.
+"""Deformable bodies in USD: material points for MPM, and tetrahedra for finite elements.
 
 Schemas: Newton's ``newton-usd-schemas`` (points, per-part subsets with MPM materials); the AOUSD
 proposal for deformables under both names that readers look for, ``physics:`` (Newton) and
@@ -67,7 +67,7 @@ def material_points_prim(solid: ExportedSolid) -> UsdPrim:
 
 
 def tetrahedra_prim(solid: ExportedSolid, scene: PhysicalScene) -> UsdPrim:
-    """Return the same matter as a volume mesh."""
+    """Return the same material as a volume mesh."""
     mesh = tetrahedra_of(solid, scene.cell)
     prim = UsdPrim("TetMesh", "tetrahedra")
     prim.set("float3[]", "extent", usda_vectors(_box(mesh.points, 0.0)))
@@ -140,7 +140,9 @@ def set_deformable_material(prim: UsdPrim, matter: PartMaterial) -> None:
     """Say E and ν as simulated in every dialect that is read today, and how it yields."""
     prim.schemas += DEFORMABLE_MATERIAL_APIS
     for space in USD_DIALECTS:
-        prim.set("float", f"{space}:youngsModulus", usda_number(matter.treatment.young))
+        prim.set(
+            "float", f"{space}:youngsModulus", usda_number(matter.treatment.simulated_young_pa)
+        )
         prim.set("float", f"{space}:poissonsRatio", usda_number(matter.treatment.poisson))
     for name, value in newton_yield_parameters(matter).items():
         prim.set("float", f"newton:mpm:{name}", usda_number(value))

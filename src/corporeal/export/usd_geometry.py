@@ -1,4 +1,4 @@
-"""The layer ``geometry.usda``: shapes and looks, numbers without physics.
+"""The layer ``geometry.usda``: shapes and appearance without physics.
 
 Schemas: UsdGeom, UsdShade, UsdPreviewSurface 2.6. Subdivision is ``none``, else a viewer would
 round every mesh (Catmull–Clark is the default); st runs up where glTF's v runs down.

@@ -1,4 +1,4 @@
-"""The layer ``motion.usda``: time samples only; one time code is one frame of the film."""
+"""The layer ``motion.usda``: time samples only; one time code is one frame of the video."""
 
 from functools import partial
 
@@ -14,7 +14,7 @@ write_normals = partial(usda_vectors, digits=3)
 
 
 def motion_prims(scene: PhysicalScene, motion: SceneMotion) -> UsdPrim:
-    """Return where rigid things are, and the shapes of soft ones, at every frame."""
+    """Return where rigid objects are, and the shapes of soft ones, at every frame."""
     world = UsdPrim("", WORLD_PRIM)
     shapes = motion.shapes([s for s in scene.solids if not s.rigid])
     for solid in scene.solids:

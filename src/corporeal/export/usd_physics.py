@@ -1,7 +1,7 @@
-"""The layer ``physics.usda``: what simulates, over the shapes of another layer; made to be read.
+"""The layer ``physics.usda``: physics as overrides of the geometry layer.
 
 Schemas: UsdPhysics. Readers take one friction a surface: ours, which belong to pairs, are fitted
-(``friction.py``). The floor meets convex hulls and things meet one another with their convex
+(``friction.py``). The floor meets convex hulls and objects meet one another with their convex
 pieces, so that nothing is carried by a hollow's cover.
 """
 
@@ -53,7 +53,8 @@ ALL_HULL_CORNERS = -1
 """Newton: all corners of a hull."""
 CONTACT_GAP_M = 2e-3
 """What is farther apart than two of these is no contact yet [m]. By default Newton takes 0.1 m: a
-scene then has more contacts than its solvers keep, and things fall through the floor."""
+scene then has more contacts than its solvers keep, and objects fall through the floor.
+"""
 CONTACT_DIRECTIONS = 6
 """Directions in which a contact resists: also against turning and rolling."""
 
@@ -179,13 +180,13 @@ def _plane(name: str) -> UsdPrim:
 
 
 def _set_contact_search(shape: UsdPrim) -> None:
-    """Say how Newton finds a shape's contacts, and in which directions they resist."""
+    """Return how Newton finds a shape's contacts, and in which directions they resist."""
     shape.set("float", "newton:contactGap", usda_number(CONTACT_GAP_M))
     shape.set("uniform int", "mjc:condim", str(CONTACT_DIRECTIONS))
 
 
 def _keep_hull_corners(shape: UsdPrim, corners: int) -> None:
-    """Let readers take a hull as it is: things stand on the corners that settling saw."""
+    """Let readers take a hull as it is: objects stand on the corners that settling saw."""
     shape.set("uniform int", "newton:maxHullVertices", str(ALL_HULL_CORNERS))
     kept = int(np.clip(corners, PHYSX_GPU_MAX_CORNERS, PHYSX_CPU_MAX_CORNERS))
     shape.set("int", "physxConvexHullCollision:hullVertexLimit", str(kept))

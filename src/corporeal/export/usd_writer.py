@@ -1,4 +1,4 @@
-"""A scene as OpenUSD in text: ``sim.usda`` to simulate, ``film.usda`` to show.
+"""A scene as OpenUSD in text: ``sim.usda`` to simulate, ``video.usda`` to show.
 
 ``geometry.usda`` has the shapes, ``physics.usda`` what simulates, ``motion.usda`` the samples.
 Never samples and physics in one stage: a simulated body with samples contradicts itself, and
@@ -25,7 +25,7 @@ GEOMETRY_FILE_NAME, PHYSICS_FILE_NAME, MOTION_FILE_NAME = (
     "physics.usda",
     "motion.usda",
 )
-SIMULATION_FILE_NAME, VIDEO_FILE_NAME = "sim.usda", "film.usda"
+SIMULATION_FILE_NAME, VIDEO_FILE_NAME = "sim.usda", "video.usda"
 
 
 def write_usd(asked: ExportRequest, folder: Path) -> WrittenTarget:
@@ -63,12 +63,13 @@ def _not_written(asked: ExportRequest, corners: int) -> list[str]:
         sentences.append(f"{', '.join(soft)} can deform and is not simulated.")
     elif soft:
         sentences.append(
-            f"{', '.join(soft)} can deform: Newton reads it; PhysX on the processor and MuJoCo do "
-            "not, and what lies on it falls through."
+            f"{', '.join(soft)} can deform: Newton reads it; PhysX on the CPU and MuJoCo do not, "
+            "and objects on it fall through."
         )
     if corners > PHYSX_GPU_MAX_CORNERS:
         sentences.append(
-            f"A convex collider has {corners} corners; PhysX on a card takes {PHYSX_GPU_MAX_CORNERS}: "
+            f"A convex collider has {corners} corners; PhysX on a GPU takes "
+            f"{PHYSX_GPU_MAX_CORNERS}: "
             f"--hull-vertices {PHYSX_GPU_MAX_CORNERS}."
         )
     return sentences

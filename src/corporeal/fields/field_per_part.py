@@ -1,4 +1,4 @@
-"""Sum a registered field up per part: medians, spreads, and whether it tells the part at all."""
+"""Statistics of a registered field per part: medians, spreads, coverage."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

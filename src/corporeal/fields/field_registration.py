@@ -1,7 +1,7 @@
-"""Bring points in an unknown frame and unit onto a surface: an axis turn, one scale, a shift.
+"""Registration of points of unknown frame and unit to a surface: axis rotation, scale, shift.
 
 Of the 24 rotations that take axes to axes the first whose misfit is within a tenth of the best is
-taken, the usual ones first; scale and shift follow from the bounding boxes. Things that look alike
+taken, the usual ones first; scale and shift follow from the bounding boxes. Objects that look alike
 under such a turn (a cube, a ball) may be registered wrongly, and nothing here notices.
 """
 

@@ -1,4 +1,4 @@
-"""Which field is asked for, in the words of the command line.
+"""Parsing of --field.
 
 one | one:E=2e6,nu=.4,rho=200    one material for everything, all of it solid
 omniphysgs                       one E, nu and density for every law
@@ -28,7 +28,7 @@ PHYSGAUSSIAN_UNIFORM = {"young": 2e6, "poisson": 0.4, "density": 200.0}
 OMNIPHYSGS_UNIFORM = {"young": 2e6, "poisson": 0.4, "density": 1000.0}
 """OmniPhysGS: buffers of elasticity.py, which its training does not change [SI]."""
 FIELD_SPECIFICATION_HELP = (
-    "Say one, one:E=2e6,nu=.4,rho=200, omniphysgs, vomp:PATH, pixie:PATH or table:PATH.csv."
+    "Use one, one:E=2e6,nu=.4,rho=200, omniphysgs, vomp:PATH, pixie:PATH or table:PATH.csv."
 )
 
 
@@ -40,7 +40,7 @@ class UniformField:
     value: Mapping[str, float]
     """Field of ``types.Material`` → value, SI."""
     keeps_laws: bool
-    """Whether parts keep their laws and builds; else all is solid fixed-corotated matter."""
+    """Whether parts keep their laws and builds; else all is solid fixed-corotated material."""
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def parse_field_specification(spec: str) -> UniformField | FieldFiles | None:
     if spec == "omniphysgs":
         return UniformField("OmniPhysGS", OMNIPHYSGS_UNIFORM, True)
     if kind not in FIELD_READERS or not rest:
-        raise UserError(f"--field {spec} is no field. {FIELD_SPECIFICATION_HELP}")
+        raise UserError(f"--field {spec} is not a field. {FIELD_SPECIFICATION_HELP}")
     path = Path(rest).expanduser()
     if not path.exists():
         raise UserError(f"No such file: {path}. Check the path after {kind}:.")
@@ -113,7 +113,7 @@ def _parse_field_numbers(spec: str, text: str) -> dict[str, float]:
         low, high = FIELD_VALUE_BOUNDS.get(name or "", (0.0, 0.0))
         if name is None or not low < value < high:
             raise UserError(
-                f"--field {spec}: {pair!r} is no sound number. {FIELD_SPECIFICATION_HELP}"
+                f"--field {spec}: {pair!r} is not a valid number. {FIELD_SPECIFICATION_HELP}"
             )
         found[name] = value
     return found

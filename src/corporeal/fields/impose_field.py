@@ -1,4 +1,4 @@
-"""Let another method's field decide what parts are made of: its medians, in our parts and laws.
+"""Imposing another method's field: its medians per part.
 
 What the other method does not tell (yield stress, friction, walls, contents) is borrowed from ours
 and marked so. A part that the field does not resolve keeps our numbers altogether.
@@ -30,7 +30,9 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 CHOSEN_BY_FIELD, CHOSEN_BY_LIBRARY = "field", "borrowed"
 """Who chose a value: the other method, or we, where it tells none."""
-BORROWED_NUMBERS_NOTE = f"What the other method does not tell is ours, marked {CHOSEN_BY_LIBRARY}."
+BORROWED_NUMBERS_NOTE = (
+    f"Values that the other method does not give are ours, marked {CHOSEN_BY_LIBRARY}."
+)
 POINTS_PER_PART = 400
 """Points on a part's surface that its numbers are summed up over."""
 REGISTRATION_SURFACE_POINTS = 4000
@@ -188,7 +190,8 @@ def _imposed_material(
     made = _replaced_value(ours, dict(numbers.value), reasons)
     if numbers.kind == "fluid":
         raise UserError(
-            f"{method} takes {part} for a fluid: no solid can be simulated as one. Leave its "
+            f"{method} predicts a fluid for {part}, which cannot be simulated as a solid. Leave "
+            "its "
             "points out of the file, and our numbers are kept."
         )
     law, stand_in = LAW_OF_PIXIE_KIND.get(numbers.kind or "", (None, ""))

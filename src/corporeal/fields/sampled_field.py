@@ -1,4 +1,4 @@
-"""A material field as other methods write it: numbers at points of space."""
+"""A material field sampled at points."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What lies inside a mesh along parallel columns: exact wherever the mesh is closed.
+"""Inside test of a mesh along parallel columns: exact where the mesh is closed.
 
 A ray that is shot at triangles one after the other passes between two of them, and misses the
 second of two faces in one plane, as where a cushion lies on its frame. Here triangles are drawn

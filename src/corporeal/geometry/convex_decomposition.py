@@ -1,4 +1,4 @@
-"""Convex pieces of any mesh: what a rigid-body engine collides with.
+"""Convex decomposition of meshes for rigid-body engines.
 
 Cells of a grid that the mesh fills, by the generalised winding number, or passes through, say where
 the body is. The box around them is cut by planes: always the part whose convex hull holds most that

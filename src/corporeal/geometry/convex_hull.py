@@ -1,4 +1,4 @@
-"""Convex hulls: of anything that has a surface, and how they stand."""
+"""Convex hulls and their resting poses."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Convex hulls of few corners that hold all of the original: some engines take no more than 64."""
+"""Enclosing convex hulls of few corners: some engines take no more than 64."""
 
 import numpy as np
 from jaxtyping import Float

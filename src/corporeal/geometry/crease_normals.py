@@ -1,4 +1,4 @@
-"""Shading normals of meshes that come without: smooth across edges that are not sharp."""
+"""Shading normals by crease angle."""
 
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Lattices of cubes in a random frame, and where a mesh's holes leave their columns unclear."""
+"""Cube lattices in a random frame, and columns made ambiguous by holes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Where Gaussians stand: turned, scaled and moved as one; made sound."""
+"""Similarity transforms and validation of Gaussians."""
 
 from dataclasses import replace
 from typing import Literal
@@ -13,7 +13,7 @@ from corporeal.geometry.spherical_harmonics import rotate_sh
 UpAxis = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 """Which of a file's axes points up."""
 UpAxisChoice = Literal["auto", "x", "-x", "y", "-y", "z", "-z"]
-"""What a person says of that."""
+"""Transform given by the user."""
 MAX_COORDINATE_UNITS = 1e6
 """Nothing is as far away or as large as this, in the file's unit."""
 MIN_GAUSSIAN_SCALE_UNITS = 1e-9

@@ -1,4 +1,4 @@
-"""Between the places of a regular grid: a value there is a weighted sum of those around it."""
+"""Interpolation on regular grids."""
 
 import numpy as np
 from jaxtyping import Float

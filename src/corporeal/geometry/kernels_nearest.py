@@ -1,4 +1,4 @@
-"""The nearest of points by cells. Loops compiled by numba."""
+"""Nearest neighbours by cells. Loops compiled by numba."""
 
 import numba
 import numpy as np

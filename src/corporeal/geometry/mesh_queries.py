@@ -1,4 +1,4 @@
-"""Questions about points near a mesh: inside or outside, how far, what can be seen."""
+"""Queries of points near a mesh: inside, distance, visibility."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -54,7 +54,7 @@ class QueryMesh:
         return unbalanced_edges(self.mesh)
 
     def moved(self, vertices: Float[np.ndarray, "V 3"]) -> "QueryMesh":
-        """Give the same triangles with their vertices elsewhere, which have the same open edges."""
+        """Return the same triangles with their vertices elsewhere, which have the same open edges."""
         other = QueryMesh(Mesh(vertices, self.mesh.triangles))
         other.__dict__["open_edges"] = self.open_edges
         return other

@@ -1,4 +1,4 @@
-"""The nearest of points that lie about evenly: by cells, and by a tree only for what is far off.
+"""Nearest neighbours of evenly spaced points: by cells, and by a tree for distant queries.
 
 Cells one spacing wide hold about one point each: some thirty distances settle which is nearest, in
 a fifth of the time that a tree of points takes. The answer is the same.

@@ -1,4 +1,4 @@
-"""Points inside a shape that lie evenly and follow its surface."""
+"""Relaxation of points to an even distribution inside a shape."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Points spread evenly and without a lattice: jittered starts, dart throwing, repulsion."""
+"""Blue-noise sampling: jittered starts, dart throwing, repulsion."""
 
 from collections.abc import Iterator
 
@@ -34,7 +34,7 @@ def scatter_points(
 def scatter_points_by_slab(
     shape: QueryMesh, spacing: float, rng: np.random.Generator
 ) -> Iterator[Float[np.ndarray, "N 3"]]:
-    """Give points as ``scatter_points`` does, slab by slab: of many points, not all need room at once.
+    """Return points as ``scatter_points`` does, slab by slab: of many points, not all need room at once.
 
     Where a mesh has small holes they are other points than those of ``scatter_points``, found
     faster.

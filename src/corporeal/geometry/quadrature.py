@@ -1,4 +1,4 @@
-"""Points that stand for the space around them, as the nodes of a quadrature do.
+"""Quadrature weights of points.
 
 Points spread evenly stand for unequal shares of a body all the same. If all weigh alike, a ball
 of some thousand points has its mass beside its middle and is softer here than there: dropped

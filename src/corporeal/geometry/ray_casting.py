@@ -1,4 +1,4 @@
-"""Where rays meet a mesh: Embree finds the triangle, in single precision; places are worked out.
+"""Ray casting with Embree; hits are refined in double precision.
 
 What Embree finds is met again in double precision, in the plane of its triangle. The mesh is blown
 up to a diagonal of 100 first, so that its size in metres does not matter. The rules are those of
@@ -48,12 +48,12 @@ class RayCaster:
             TriangleMesh(self._scene, seen, mesh.triangles.astype(np.uint32))
 
     def first(self, origins: RayPoints, directions: RayPoints) -> Int[np.ndarray, " N"]:
-        """Give the first triangle along each ray; -1: none. Origins are in single precision."""
+        """Return the first triangle along each ray; -1: none. Origins are in single precision."""
         begin, way = origins.astype(np.float32), directions.astype(np.float32)
         return self._cast(begin.astype(np.float64), _unit_or_same(way))
 
     def hits(self, origins: RayPoints, directions: RayPoints) -> RayHits:
-        """Give the places where rays meet the mesh first."""
+        """Return the places where rays meet the mesh first."""
         origin, way = np.array(origins, dtype=np.float64), _unit_or_same(directions)
         triangle = self._cast(origin, way)
         ray = np.flatnonzero(triangle >= 0)

@@ -1,4 +1,4 @@
-"""How an object would come to rest on a level floor, were it put down some way up."""
+"""Resting poses of an object on a level floor."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The objects of a scene as bodies in space: their boxes, moved, resized, looked at for overlap."""
+"""Boxes, transforms and overlaps of the objects of a scene."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -112,20 +112,20 @@ def overlapping_objects(scene: Scene) -> list[tuple[int, int]]:
 
 
 def is_object_inside(scene: Scene, a: int, b: int) -> bool:
-    """Tell whether vertices of ``a`` lie within ``b``, deeper than what merely touches."""
+    """Return whether vertices of ``a`` lie within ``b``, deeper than what merely touches."""
     points = np.concatenate([s.vertices for s in _surfaces_of_object(scene, a)])
     return _points_within(points[:: max(1, len(points) // OVERLAP_SAMPLES_COUNT)], scene, a, b)
 
 
 def _surface_reaches_into(scene: Scene, a: int, b: int) -> bool:
-    """Tell whether vertices of ``a``, or places on its triangles, lie within ``b``."""
+    """Return whether vertices of ``a``, or places on its triangles, lie within ``b``."""
     return is_object_inside(scene, a, b) or _points_within(
         _points_on_triangles(_surfaces_of_object(scene, a)), scene, a, b
     )
 
 
 def _points_within(points: Float[np.ndarray, "N 3"], scene: Scene, a: int, b: int) -> bool:
-    """Tell whether some of the points of ``a`` lie within ``b``, whichever way its faces look."""
+    """Return whether some of the points of ``a`` lie within ``b``, whichever way its faces look."""
     winding, depth = np.zeros(len(points)), np.full(len(points), np.inf)
     for s in _surfaces_of_object(scene, b):
         winding += np.asarray(igl.fast_winding_number(s.vertices, s.triangles, points), float)

@@ -1,4 +1,4 @@
-"""A moving surface as few fixed shapes that are added up with weights that change."""
+"""Low-rank modes of a moving surface."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ def fit_shape_modes(shapes: Float[np.ndarray, "F V 3"], tolerance: float, most: 
 
     The singular value decomposition gives the r shapes with the least sum of squares (Eckart and
     Young 1936); r grows until the largest error is small enough. It is taken of the F × F products
-    of shapes, block by block, so that long films of large meshes fit into memory.
+    of shapes, block by block, so that long videos of large meshes fit into memory.
 
     Args:
         shapes: Vertices at every frame [m]; may lie on the disk.

@@ -1,4 +1,4 @@
-"""Real spherical harmonics as 3D Gaussian splatting has them, and how they turn.
+"""Real spherical harmonics of 3D Gaussian splatting, and their rotation.
 
 Band l has 2l + 1 functions; they follow each other by band and within it by order -l … l. Signs
 include the Condon–Shortley phase: Y_1 = 0.4886 (-y, z, -x).

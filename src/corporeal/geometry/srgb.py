@@ -1,4 +1,4 @@
-"""Between sRGB, in which pictures are kept, and linear light (IEC 61966-2-1)."""
+"""Conversion between sRGB and linear light (IEC 61966-2-1)."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Pieces of a closed surface: Voronoi cells of points that lie closer together near a blow."""
+"""Voronoi fragments of a closed surface, smaller near an impact."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,11 +11,11 @@ from scipy.spatial import KDTree
 from corporeal.core.types import Surface
 
 MAX_FRAGMENTS = 14
-"""Pieces that a thing breaks into at most."""
+"""Pieces that an object breaks into at most."""
 MIN_PARTICLES_PER_FRAGMENT = 3
 """Particles of a piece at least: fewer have no extent."""
 NEAR_IMPACT_DISTANCE_FRACTION = 0.1
-"""Pieces are smallest within this share of the thing's longest side from the blow [-]."""
+"""Pieces are smallest within this share of the object's longest side from the impact [-]."""
 FRAGMENT_CREASE_ANGLE_DEG = 30.0
 """Edges sharper than this [degrees] are seen as edges."""
 
@@ -25,13 +25,13 @@ FragmentPoints = Float[np.ndarray, "N 3"]
 def fragment_seeds(
     points: FragmentPoints, blow: Float[np.ndarray, "3"], rng: np.random.Generator
 ) -> FragmentPoints:
-    """Choose points of a thing whose cells are its pieces, densely near the blow.
+    """Choose points of an object whose cells are its pieces, densely near the impact.
 
-    The chance of a point falls with its squared distance from the blow. Cells of fewer than
+    The chance of a point falls with its squared distance from the impact. Cells of fewer than
     ``MIN_PARTICLES_PER_FRAGMENT`` points are given to their neighbours.
 
     Args:
-        points: Of all of the thing [m].
+        points: Of all of the object [m].
         blow: Where it is struck [m].
         rng: Makes the choice.
 
@@ -62,7 +62,7 @@ def cut_fragments(
 
     Args:
         surface: Closed.
-        wall: Thickness of a hollow thing whose outside alone is modelled [m]; 0: it is solid.
+        wall: Thickness of a hollow object whose outside alone is modelled [m]; 0: it is solid.
         seed: One per piece [m].
 
     """

@@ -1,4 +1,4 @@
-"""A volume mesh of what points fill: cells of a grid, each cut into six tetrahedra (Kuhn 1960).
+"""Tetrahedral mesh of the volume filled by points: grid cells cut into six tetrahedra (Kuhn 1960).
 
 All cells are cut alike, along the diagonal from (0, 0, 0) to (1, 1, 1), so that neighbours share
 whole faces.

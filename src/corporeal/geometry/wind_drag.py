@@ -1,8 +1,8 @@
-"""What wind does to objects at rest: the rule by which the simulation lets air press on faces.
+"""Wind pressure on objects at rest.
 
 With u the velocity of the air and θ the angle between u and a face's inward normal, the pressure is
 ½ ρ_air C u² cos³θ where cos θ > 0, and nothing in the lee (Hoerner 1965; see ``mpm/wind.py``, which
-does the same for faces in motion and leaves the house alone: a test holds the two equal).
+does the same for faces in motion and imports nothing of the project: a test holds the two equal).
 """
 
 import numpy as np

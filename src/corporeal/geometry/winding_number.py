@@ -1,4 +1,4 @@
-"""The generalised winding number by a plumb line and the edges that are walked more one way.
+"""Generalised winding number by a vertical ray and boundary edges.
 
 Dropped from a point, a line meets faces: into the shape or out of it. That sum is the winding
 number where no edge is open. From there on it counts what a curtain, hung from every open edge down

@@ -1,4 +1,4 @@
-"""Pictures from untrusted bytes."""
+"""Decoding of untrusted images."""
 
 import io
 import warnings

@@ -1,14 +1,13 @@
-"""Which files a scene is made of: a result is stale when any of them changes."""
+"""Input files of a scene, whose content is part of the freshness keys."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
 from corporeal.core.errors import UserError
+from corporeal.core.registry import load_function
 from corporeal.core.types import Note, NoteKind
-from corporeal.io.gltf.gltf_document import GltfDocument
-from corporeal.io.mesh.mesh_loader import mesh_companions
-from corporeal.io.mesh.mesh_suffixes import is_mesh_file, kind_of_ply
+from corporeal.io.mesh.mesh_loader import companions_in_child
 from corporeal.io.photos.photo_file_names import (
     HEIC_SUFFIXES,
     IMAGE_FOLDERS,
@@ -17,20 +16,16 @@ from corporeal.io.photos.photo_file_names import (
     READABLE_IMAGE_SUFFIXES,
     UNREAD_IMAGE_SUFFIXES,
 )
-from corporeal.io.referenced_files import path_beside
-from corporeal.io.scene_toml import read_scene_file
+from corporeal.io.registry import ReaderKind, reader_of, readers_of, suffixes_of
+from corporeal.io.scene_toml import SceneFile
 from corporeal.recognition.readable_names import safe_name, single_line_text
 
-GLTF_SUFFIXES = (".glb", ".gltf")
-SPLAT_SUFFIXES = (".ply", ".spz", ".sog", ".splat", ".ksplat")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
-UNPACKED_SOG_FILE = "meta.json"
-"""Of an unpacked SOG."""
 InputKind = Literal["model", "photographs", "splat"]
 
 
 def input_kind(inputs: Sequence[Path]) -> InputKind:
-    """Say what the inputs are, by their names; what is nothing else is taken for a model.
+    """Describe what the inputs are, by their names; what is nothing else is taken for a model.
 
     Raises:
         UserError: Photographs or a splat are named beside something else.
@@ -60,36 +55,56 @@ def photographed_input(inputs: Sequence[Path]) -> Path | None:
     """
     if input_kind(inputs) == "model":
         return None
-    return _model_of_scene_file(inputs[0]) if inputs[0].suffix.lower() == ".toml" else inputs[0]
+    return _model_of_scene_file(inputs[0]) if is_scene_file(inputs[0]) else inputs[0]
+
+
+def is_scene_file(path: Path) -> bool:
+    """Whether a file says of other files what happens with them, as ``scene.toml`` does."""
+    return reader_of(path, "scene") is not None
+
+
+def is_model_file(path: Path) -> bool:
+    """Whether a file is a model: glTF or a mesh."""
+    reader = reader_of(path)
+    return reader is not None and reader.kind in ("model", "mesh")
+
+
+def read_scene(path: Path) -> SceneFile:
+    """Read a scene file of any format.
+
+    Raises:
+        UserError: It cannot be used.
+
+    """
+    reader = reader_of(path, "scene")
+    assert reader is not None, "only scene files are read"
+    return load_function(reader.read)(path)
 
 
 def _model_of_scene_file(scene: Path) -> Path | None:
     """Return what a scene file names as its file; None where it cannot be read."""
     try:
-        return read_scene_file(scene).file
+        return read_scene(scene).file
     except UserError:
         return None  # whoever assembles it says why
 
 
 def _path_kind(path: Path) -> InputKind:
-    if path.suffix.lower() == ".toml":
+    if is_scene_file(path):
         file = _model_of_scene_file(path) if path.is_file() else None
-        if file is None or file.suffix.lower() == ".toml":
-            return "model"
-        return _path_kind(file)
+        return "model" if file is None or is_scene_file(file) else _path_kind(file)
     if path.is_dir():
         return _folder_kind(path)
-    if path.suffix.lower() == ".ply":
-        return "splat" if kind_of_ply(path) == "splat" else "model"
-    if path.suffix.lower() in SPLAT_SUFFIXES or path.name == UNPACKED_SOG_FILE:
-        return "splat"
+    reader = reader_of(path)
+    if reader is not None:
+        return "splat" if reader.kind == "splat" else "model"
     return "photographs" if path.suffix.lower() in (".json", *VIDEO_SUFFIXES) else "model"
 
 
 def _folder_kind(folder: Path) -> InputKind:
-    if _gltf_in(folder):
+    if _files_of_kind(folder, "model"):
         return "model"
-    if _is_sog(folder):
+    if _is_unpacked_splat(folder):
         return "splat"
     if _has_poses(folder):
         return "photographs"
@@ -103,8 +118,12 @@ def _has_poses(folder: Path) -> bool:
     return has_posed_photos(folder)
 
 
-def _is_sog(folder: Path) -> bool:
-    return (folder / UNPACKED_SOG_FILE).is_file() and any(folder.glob("means*"))
+def _is_unpacked_splat(folder: Path) -> bool:
+    return any(
+        all(any(folder.glob(pattern)) for pattern in reader.folder_files)
+        for reader in readers_of("splat")
+        if reader.folder_files
+    )
 
 
 def list_input_files(inputs: Iterable[Path]) -> list[Path]:
@@ -124,11 +143,11 @@ def scene_name(path: Path) -> str:
 
 def model_files_in(folder: Path) -> list[Path]:
     """Return the models that lie in a folder, by name: glTF, or where there is none, meshes."""
-    return _gltf_in(folder) or sorted(p for p in folder.iterdir() if is_mesh_file(p))
+    return _files_of_kind(folder, "model") or _files_of_kind(folder, "mesh")
 
 
-def _gltf_in(folder: Path) -> list[Path]:
-    return sorted(p for p in folder.iterdir() if p.suffix.lower() in GLTF_SUFFIXES)
+def _files_of_kind(folder: Path, kind: ReaderKind) -> list[Path]:
+    return sorted(p for p in folder.iterdir() if (r := reader_of(p)) and r.kind == kind)
 
 
 def images_in_folder(folder: Path) -> list[Path]:
@@ -143,7 +162,7 @@ def images_in_folder(folder: Path) -> list[Path]:
 
 
 def videos_in_folder(folder: Path) -> list[Path]:
-    """Return the films that lie in a folder, by name."""
+    """Return the videos that lie in a folder, by name."""
     return sorted(p for p in folder.iterdir() if _has_suffix(p, VIDEO_SUFFIXES))
 
 
@@ -162,7 +181,7 @@ def photos_in_folder(folder: Path) -> list[Path]:
 
 
 def unread_images_note(photographs: Sequence[Path]) -> list[str]:
-    """Say which pictures of a kind that is not read lie beside photographs, if they are no copies.
+    """Return which pictures of a kind that is not read lie beside photographs, if they are no copies.
 
     Args:
         photographs: Of one folder; what has the name of one but for its suffix is its raw picture.
@@ -207,7 +226,7 @@ def _is_excluded_folder(name: str) -> bool:
 
 
 def unused_nested_images_note(folder: Path, photographs: Sequence[Path]) -> list[str]:
-    """Say which pictures lie in folders below photographs and are not used, if they are no copies.
+    """Return which pictures lie in folders below photographs and are not used, if they are no copies.
 
     Args:
         folder: Of the photographs.
@@ -226,7 +245,7 @@ def unused_nested_images_note(folder: Path, photographs: Sequence[Path]) -> list
     return [
         Note(
             f"{count} in folders below and {left} left out, such as {where}: what shows the same "
-            "thing belongs beside the others.",
+            "object belongs beside the others.",
             NoteKind.LEFT_OUT,
         )
     ]
@@ -245,28 +264,31 @@ def lacks_poses(path: Path) -> bool:
 def _files_named_in(path: Path) -> list[Path]:
     if not path.exists():
         return []  # whoever reads it says so
-    if path.suffix.lower() != ".toml" and _path_kind(path) != "model":
-        alone = path.is_dir() or path.suffix.lower() in (*SPLAT_SUFFIXES, *VIDEO_SUFFIXES)
+    if not is_scene_file(path) and _path_kind(path) != "model":
+        alone = path.is_dir() or path.suffix.lower() in (*suffixes_of("splat"), *VIDEO_SUFFIXES)
         return [path if alone else path.parent]
     if path.is_dir():
         return [f for model in model_files_in(path) for f in _files_named_in(model)]
     try:
-        if path.suffix.lower() == ".toml":
-            scene = read_scene_file(path)
+        if is_scene_file(path):
+            scene = read_scene(path)
             files = [scene.file, *(o.file for o in scene.objects)]
             return [path, *(f for model in files if model for f in _files_named_in(model))]
-        return [path, *_companions(path)]
+        return [path, *list_companions(path)]
     except UserError:
         return [path]
 
 
-def _companions(path: Path) -> list[Path]:
-    if is_mesh_file(path):
-        return mesh_companions(path)
-    if path.suffix.lower() != ".gltf":
+def list_companions(path: Path) -> list[Path]:
+    """Return the files beside it that a model file is made of, or that these name in turn.
+
+    Raises:
+        UserError: The file cannot be read.
+
+    """
+    reader = reader_of(path)
+    if reader is None or not reader.companions:
         return []
-    document = GltfDocument(path)
-    entries = document.entries("buffers") + document.entries("images")
-    uris = [e.text("uri") for e in entries]
-    files = [path_beside(path.parent, u) for u in uris if u and u[:5].lower() != "data:"]
-    return [f for f in files if f is not None]
+    if reader.companions_in_child:
+        return companions_in_child(path, reader)
+    return list(dict.fromkeys(load_function(reader.companions)(path)))

@@ -1,4 +1,4 @@
-"""Prescribed motion as people write it: rows of time, place and, if it turns, orientation.
+"""Keyframes of prescribed motion: rows of time, position and optionally orientation.
 
 A row is ``t, x, y, z`` [s, m]; with three more numbers a rotation vector since the first row
 [degrees] (for a turn about one axis: the angle about it, as many times around as wanted), with four
@@ -41,7 +41,7 @@ def keyframes_from_rows(
     """Return where a path begins [m], and how it goes on from there.
 
     Args:
-        rows: What somebody wrote.
+        rows: Rows of the file.
         fail: Told what is wrong and what to do.
 
     """
@@ -93,7 +93,7 @@ def read_keyframe_file(file: Path, fail: FailCallback) -> tuple[Vector, Keyframe
 
 
 def _numbers(file: Path, number: int, line: list[str]) -> Iterator[list[object]]:
-    """Give the numbers of one line; none for a heading."""
+    """Return the numbers of one line; none for a heading."""
     try:
         yield [float(cell) for cell in line]
     except ValueError:

@@ -1,4 +1,4 @@
-"""Units of length that a person may say a mesh file is in."""
+"""Units of length for --unit."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Read a model of any kind: glTF, or a mesh file in a child process."""
+"""Loading of models: glTF, or mesh files in a child process."""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -7,24 +7,24 @@ from pathlib import Path
 from PIL import Image
 
 from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.registry import load_function
 from corporeal.core.types import ObjectGrouping
 from corporeal.geometry.gaussian_transforms import UpAxis
 from corporeal.geometry.scene_transforms import convert_scene_unit
-from corporeal.io.gltf import gltf_reader
+from corporeal.io.gltf.gltf_container import read_file_bytes
 from corporeal.io.gltf.gltf_reader import LoadedModel
 from corporeal.io.image_decoder import IMAGE_FORMATS
-from corporeal.io.input_files import GLTF_SUFFIXES, input_kind, separate_input_error
+from corporeal.io.input_files import input_kind, separate_input_error
 from corporeal.io.length_units import METRES_OF_LENGTH_UNIT, LengthUnit
 from corporeal.io.mesh.mesh_loader import load_mesh
-from corporeal.io.mesh.mesh_suffixes import is_mesh_file, kind_of_ply
 from corporeal.io.object_grouping import group_pieces_into_objects
 from corporeal.io.photos.photo_file_names import (
     HEIC_SUFFIXES,
     READABLE_IMAGE_SUFFIXES,
     UNREAD_IMAGE_SUFFIXES,
 )
+from corporeal.io.registry import reader_of, suffixes_of
 
-READABLE_MODEL_FORMATS = ".glb, .gltf, .obj, .ply, .stl, .off, .3mf, .dae, .usd"
 BLENDER_CONVERT_SCRIPTS = {
     ".fbx": "import bpy; bpy.ops.wm.read_factory_settings(use_empty=True); "
     "bpy.ops.import_scene.fbx(filepath={0!r}); bpy.ops.export_scene.gltf(filepath={1!r})",
@@ -36,7 +36,7 @@ BLENDER_CONVERT_SCRIPTS = {
 
 @dataclass(frozen=True)
 class MeshFrame:
-    """What a person says of the axes and the unit of a mesh file."""
+    """Axes and unit of a mesh file as given by the user."""
 
     up: UpAxis | None = None
     """Axis of the file that points up; None: as the file states, or as its kind usually has it."""
@@ -74,13 +74,16 @@ def load_model(
 
 
 def _read_by_suffix(path: Path, objects: ObjectGrouping, frame: MeshFrame) -> LoadedModel:
-    if path.suffix.lower() in GLTF_SUFFIXES or not path.exists():
-        if frame != FRAME_AS_STATED:
-            step = "Leave --up and --unit out; --extent gives things another size."
-            raise BadFileError(path, "glTF has +Y up and is in metres.", step)
-        return gltf_reader.read_gltf_model(path, objects)
-    if not is_mesh_file(path):
+    if not path.exists():
+        read_file_bytes(path)  # says so
+    reader = reader_of(path)
+    if reader is None or reader.kind not in ("model", "mesh"):
         raise _not_read_error(path)
+    if reader.kind == "model":
+        if frame != FRAME_AS_STATED:
+            step = "Leave --up and --unit out; --extent gives objects another size."
+            raise BadFileError(path, f"the axes and the unit of {reader.name} are fixed.", step)
+        return load_function(reader.read)(path, objects)
     mesh = load_mesh(path, objects, frame.up)
     if frame.unit == "auto":
         return LoadedModel(mesh.scene, mesh.ours, mesh.metric, mesh.stated)
@@ -95,7 +98,7 @@ def _not_read_error(path: Path) -> UserError:
     if path.is_dir() and input_kind([path]) != "model":
         return separate_input_error(path)
     if kind == ".ply":
-        held = "a Gaussian splat" if kind_of_ply(path) == "splat" else "points without triangles"
+        held = "a Gaussian splat" if reader_of(path) else "points without triangles"
         return BadFileError(path, f"holds {held}, not a mesh.", "Name a mesh.")
     if kind in BLENDER_CONVERT_SCRIPTS:
         made = path.with_suffix(".glb")
@@ -119,8 +122,13 @@ def _not_read_error(path: Path) -> UserError:
     if kind in (*READABLE_IMAGE_SUFFIXES, *HEIC_SUFFIXES, *UNREAD_IMAGE_SUFFIXES):
         return BadFileError(path, "is a single picture, which shows no depth.", PHOTOGRAPH_ADVICE)
     return BadFileError(
-        path, f"is no model ({READABLE_MODEL_FORMATS} are read).", "Convert it to .glb."
+        path, f"is not a model ({readable_model_formats()} are read).", "Convert it to .glb."
     )
+
+
+def readable_model_formats() -> str:
+    """Return the suffixes of all models, for error messages."""
+    return ", ".join(suffixes_of("model", "mesh"))
 
 
 def _is_readable_image(path: Path) -> bool:

@@ -1,7 +1,7 @@
-"""Which pieces of a file are objects of their own, where the file itself does not say.
+"""Grouping of a file's pieces into objects.
 
 Pieces that touch are one object, as the legs and the seat of a chair are, unless their names say
-that each is a thing by itself, as a cup and its saucer are. Why so: decision 62.
+that each is an object by itself, as a cup and its saucer are. Why so: decision 62.
 """
 
 import re
@@ -29,7 +29,8 @@ from corporeal.recognition.typical_extents import class_name_words, typical_exte
 
 TOUCH_GAP_FRACTION = 0.05
 """Pieces closer than this touch, over the longest side of the smaller: models have gaps where
-things are glued, and pieces that hang in the air are farther apart than that [-]."""
+objects are glued, and pieces that hang in the air are farther apart than that [-].
+"""
 SURFACE_SAMPLES_PER_PIECE = 1500
 """Points on a piece, beside its vertices, whose distances to another are measured."""
 USUAL_PART_CLASSES = frozenset({"wheel", "tire", "drawer", "mirror", "key", "light bulb", "foam"})
@@ -73,7 +74,7 @@ def _group_of_piece(scene: Scene) -> np.ndarray:
 
 
 def _are_touching(a: Mesh, b: Mesh, margin: float) -> bool:
-    """Tell whether two pieces come closer than a margin [m] to each other."""
+    """Return whether two pieces come closer than a margin [m] to each other."""
     return bool(_surface_gap(a, b) < margin or _surface_gap(b, a) < margin)
 
 
@@ -91,9 +92,9 @@ def _surface_gap(a: Mesh, b: Mesh) -> float:
 
 
 def _are_named_as_objects(scene: Scene) -> list[bool]:
-    """Tell of each piece whether its name says that it is a thing by itself.
+    """Tell of each piece whether its name says that it is an object by itself.
 
-    It does where its noun is a known thing and not that of the whole: "cup" in tea_set.glb, but
+    It does where its noun is a known object and not that of the whole: "cup" in tea_set.glb, but
     not "lamp glass" in a file called lamp, nor where all others are of a lamp, too.
     """
     whole = _whole_words(scene)
@@ -108,9 +109,9 @@ def _is_named_as_object(name: str, whole: frozenset[str]) -> bool:
 
 
 def _whole_words(scene: Scene) -> frozenset[str]:
-    """Return the known things that the file's name or all its pieces' names speak of.
+    """Return the known objects that the file's name or all its pieces' names speak of.
 
-    A file called "bricks", or pieces that differ by their numbers alone, speak of several things
+    A file called "bricks", or pieces that differ by their numbers alone, speak of several objects
     of one kind and not of a whole.
     """
     stem = everyday_words(Path(scene.source).stem)
@@ -141,6 +142,6 @@ def _merge_groups(scene: Scene, group: np.ndarray) -> Scene:
 def _grouping_note(names: Sequence[str], file: str) -> str:
     shown = ", ".join(names[:4]) + (", …" if len(names) > 4 else "")
     return (
-        f"{file} was taken for {len(names)} objects ({shown}), because they do not touch or are "
-        "named as different things. --objects one keeps the file together."
+        f"{file} was split into {len(names)} objects ({shown}), because they do not touch or are "
+        "named as different objects. --objects one keeps the file together."
     )

@@ -9,7 +9,7 @@ import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NoReturn
+from typing import Literal, NoReturn
 
 import numpy as np
 
@@ -39,13 +39,16 @@ DTYPE_OF_PLY_TYPE = {
 BYTE_ORDER_OF_PLY_FORMAT = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 MAX_PLY_HEADER_BYTES = 2**16
 """[bytes]"""
+PlyKind = Literal["splat", "mesh", "points"]
+SPLAT_PLY_PROPERTIES = frozenset((b"f_dc_0", b"opacity", b"scale_0", b"rot_0"))
+"""Properties of a vertex that make it a Gaussian (INRIA's layout)."""
 COPY_AGAIN_ADVICE = "Copy or download it again."
 PLY_EXPORT_ADVICE = "Export it again."
 
 
 @dataclass(frozen=True)
 class PlyElement:
-    """What the header says of one element."""
+    """Header of one element."""
 
     name: str
     count: int
@@ -73,6 +76,31 @@ def read_ply_elements(path: Path, data: memoryview) -> dict[str, PlyColumns]:
             break
         found[element.name] = body.take(element)
     return found
+
+
+def kind_of_ply(data: bytes | memoryview) -> PlyKind:
+    """Tell by its header what a PLY file holds; one that cannot be read is taken for a splat."""
+    head, complete, _ = bytes(data[:MAX_PLY_HEADER_BYTES]).partition(b"end_header")
+    if not complete:
+        return "splat"
+    rows = [line.split() for line in head.splitlines()]
+    counts = {r[1]: r[2] for r in rows if len(r) == 3 and r[0] == b"element"}
+    if b"chunk" in counts or SPLAT_PLY_PROPERTIES <= {
+        r[-1] for r in rows if r[:1] == [b"property"]
+    }:
+        return "splat"
+    filled = any(counts.get(name, b"0") != b"0" for name in (b"face", b"tristrips"))
+    return "mesh" if filled else "points"
+
+
+def is_mesh_ply(data: bytes | memoryview) -> bool:
+    """Whether a PLY file holds faces."""
+    return kind_of_ply(data) == "mesh"
+
+
+def is_splat_ply(data: bytes | memoryview) -> bool:
+    """Whether a PLY file holds Gaussians, or has no complete header."""
+    return kind_of_ply(data) == "splat"
 
 
 def format_ply_header(properties: list[str], count: int, comment: str) -> bytes:

@@ -1,4 +1,4 @@
-"""Bytes that a file refers to: within itself or beside itself, never elsewhere."""
+"""Data that a file refers to: in itself or beside itself, never elsewhere."""
 
 import base64
 import binascii

@@ -1,6 +1,6 @@
-"""Read and write ``scene.toml``: what is where, how it starts, what acts on it. [m], [s].
+"""Reading and writing of ``scene.toml``: objects, initial states, forces [m, s].
 
-There is nothing numerical to tune in it: quality is one word on the command line (``--detail``).
+It has no numerical parameters: quality is set by ``--detail``.
 
 ::
 
@@ -48,7 +48,7 @@ OBJECT_KEYS = (
     *("path", "follows"),
 )
 KEYS_STATED_BY_PATH = ("position", "velocity", "push", "wind")
-"""What nobody says of an object whose path says it."""
+"""Fields that an object with a path must not have."""
 PUSH_KEYS = ("acceleration", "from", "to")
 WIND_KEYS = ("velocity", "gust", "from", "to")
 MAX_SCENE_DURATION_S = 60.0
@@ -254,7 +254,7 @@ def _wall(table: "_TomlTable") -> Wall:
         table.fail("it needs a point and a normal.", "Give both as [x, y, z].")
     size = math.hypot(*normal)
     if size < 1e-6:
-        table.fail("'normal' is zero.", "Give the direction out of the wall into the room.")
+        table.fail("'normal' is zero.", "Give the direction out of the wall.")
     return Wall((normal[0] / size, normal[1] / size, normal[2] / size), point)
 
 

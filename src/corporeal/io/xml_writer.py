@@ -1,4 +1,4 @@
-"""Numbers and whole documents as XML text."""
+"""Writing of XML."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Carry jobs out: workers are kept busy, and no failure stops the others."""
+"""Execution of jobs on workers; failures don't stop other jobs."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ class Executor:
     hire: WorkerPoolFactory
     """Opens the workers."""
     progress: ProgressCallback
-    """Told the fraction done."""
+    """Called with the fraction done."""
     say: EventCallback
     """Told what happens."""
 

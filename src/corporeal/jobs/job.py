@@ -1,4 +1,4 @@
-"""A job: one scene's worth of work, done in a process of its own, here or on another machine.
+"""A job: work on one scene in its own process, here or on another machine.
 
 A job's folder is finished when it holds ``meta.json`` with the job's key, written last. A job that
 can be resumed works in its folder; any other works beside it and the finished folder is put in
@@ -18,7 +18,7 @@ from typing import Any, Literal, Protocol
 from corporeal.core import store
 
 ProgressCallback = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 PARTIAL_FOLDER_SUFFIX = ".part"
 
 

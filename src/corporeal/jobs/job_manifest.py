@@ -1,4 +1,4 @@
-"""What became of every scene: ``manifest.json``, and ``corpus.log`` with a line for each event.
+"""State of all jobs: ``manifest.json``, and ``corpus.log`` with events.
 
 The manifest says nothing that the folders do not: which results are finished is read from them, so
 that a process killed between the two loses nothing.
@@ -22,7 +22,7 @@ JobStatus = Literal["waiting", "running", "finished", "failed", "interrupted"]
 
 @dataclass(frozen=True)
 class ManifestRow:
-    """One scene under one verb."""
+    """One scene under one stage."""
 
     status: JobStatus
     seconds: float | None = None
@@ -35,7 +35,7 @@ class ManifestRow:
 
 
 class JobManifest:
-    """The rows of one verb; every change is on the disk before the next."""
+    """The rows of one stage; every change is on the disk before the next."""
 
     def __init__(self, folder: Path, verb: CorpusVerb, jobs: Sequence[Job]) -> None:
         """Take up what folders and an earlier manifest say of these jobs."""
@@ -82,7 +82,7 @@ class JobManifest:
 
 
 def read_manifest_rows(folder: Path, verb: CorpusVerb) -> dict[str, ManifestRow]:
-    """Read what became of every scene under a verb; empty where nothing was begun."""
+    """Read what became of every scene under a stage; empty where nothing was begun."""
     path = folder / CORPUS_MANIFEST_FILE
     if not path.exists():
         return {}
@@ -90,7 +90,7 @@ def read_manifest_rows(folder: Path, verb: CorpusVerb) -> dict[str, ManifestRow]
 
 
 def _current_row(job: Job, known: ManifestRow) -> ManifestRow:
-    """Say what holds: a finished folder outranks the manifest."""
+    """Describe what holds: a finished folder outranks the manifest."""
     if job.done:
         return replace(known, status="finished", seconds=job.seconds, error="")
     if known.status in ("running", "finished"):

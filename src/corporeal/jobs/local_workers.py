@@ -1,6 +1,6 @@
 """Jobs on this machine: one process each, started afresh, so that no scene inherits memory.
 
-A process that is killed takes nobody with it, and a killed parent leaves none behind.
+A killed process does not affect others, and a killed parent leaves no processes behind.
 """
 
 import json
@@ -94,7 +94,7 @@ class LocalWorkerPool:
         with suppress(BrokenPipeError):
             process.stdin.close()
         died = JobEvent(
-            job, "died", words=f"{exit_reason(code)} Its words are in {LOG_FOLDER}/{name}.log."
+            job, "died", words=f"{exit_reason(code)} Its log is in {LOG_FOLDER}/{name}.log."
         )
         return self.last.pop(name, died)
 
@@ -111,9 +111,9 @@ class LocalWorkerPool:
 
 
 def exit_reason(code: int) -> str:
-    """Say how a process ended that gave no reason itself."""
+    """Return how a process ended that gave no reason itself."""
     if code >= 0:
-        return f"Its process ended with code {code} without a word."
+        return f"Its process ended with code {code} without output."
     try:
         name = signal.Signals(-code).name
     except ValueError:
@@ -153,7 +153,7 @@ def local_executor(
         folder: The corpus's; what the processes print goes to ``logs`` in it.
         slots: Scenes at the same time; 0: one per core and ``threads``.
         threads: Of each scene.
-        progress: Told the fraction done.
+        progress: Called with the fraction done.
         say: Told each event in a sentence.
 
     """

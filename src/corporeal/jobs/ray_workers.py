@@ -1,4 +1,4 @@
-"""Jobs on a Ray cluster, or on a small one of this machine alone that ends with us.
+"""Jobs on a Ray cluster, or on a temporary local one.
 
 Each job is a task in a process of its own, as on this machine. The corpus must lie where every
 machine sees it under the same path. Ray's own retries are off: what a dead worker means is decided
@@ -52,7 +52,7 @@ class RayWorkerPool:
         try:
             wrong = self.ray.get(ref)
         except self.ray.exceptions.RayError as error:
-            return JobEvent(job, "died", words=f"Its process is gone: {_first_line(error)}")
+            return JobEvent(job, "died", words=f"Its process died: {_first_line(error)}")
         return (
             JobEvent(job, "finished", 1.0)
             if wrong is None
@@ -81,7 +81,7 @@ def _first_line(error: Exception) -> str:
 
 
 def _check_address(address: str) -> None:
-    """Refuse an address where nobody answers: Ray itself would try for minutes."""
+    """Reject an address without a server: Ray itself would retry for minutes."""
     host, _, port = address.rpartition("/")[2].partition(":")
     if not host or not port.isdecimal():
         return  # "auto", or none
@@ -100,7 +100,7 @@ def ray_worker_pool(slots: int, threads: int, gpus: float, address: str) -> Iter
     Args:
         slots: How many jobs at the same time.
         threads: Processors of each.
-        gpus: Share of a graphics card that each takes.
+        gpus: Share of a GPU that each takes.
         address: Of a running cluster; empty: start one here, and end it again.
 
     Raises:

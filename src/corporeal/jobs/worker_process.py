@@ -1,8 +1,8 @@
 """The process of one job: ``python -m corporeal.jobs.worker_process``, started by ``local``.
 
 The job comes pickled on the standard input, which stays open as long as the one who started it
-lives: when it closes, nobody waits for the job any more, and the process ends at once. What there
-is to tell goes out as lines of JSON. A first interrupt lets the job keep what it has.
+lives: when it closes, the parent is gone, and the process ends at once. What there is to tell goes
+out as lines of JSON. A first interrupt lets the job keep what it has.
 """
 
 import json
@@ -30,7 +30,7 @@ def main() -> int:
     # What a script starts in the background ignores interrupts, and so would what that starts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what anybody prints goes to the log, not among the lines of JSON
+    os.dup2(2, 1)  # prints go to the log, not into the protocol of JSON
 
     def send(message: WorkerMessage) -> None:
         out.write(json.dumps(asdict(message)) + "\n")
@@ -84,7 +84,7 @@ def attempt_job(packed: PackedJob, progress: ProgressCallback) -> str | None:
         return "Out of memory. Use fewer --workers, or --detail draft."
     except Exception as error:
         traceback.print_exc()
-        return f"A mistake of ours ({type(error).__name__}: {error})."
+        return f"Internal error ({type(error).__name__}: {error})."
     return None
 
 

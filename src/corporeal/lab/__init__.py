@@ -1,1 +1,1 @@
-"""Evaluation and corpora: what measures the product; only the command line imports it."""
+"""Evaluation and corpora."""

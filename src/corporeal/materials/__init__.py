@@ -1,4 +1,4 @@
-"""The measured library: what a material is like, in which range, and who measured it."""
+"""The material library: measured ranges of properties, with sources."""
 
 from corporeal.materials.contact_pairs import (
     Friction,

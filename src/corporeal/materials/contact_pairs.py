@@ -1,4 +1,4 @@
-"""What happens between two surfaces: measured pairs first, then a stated rule."""
+"""Friction and restitution of pairs of materials: measured pairs first, then combination rules."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -66,7 +66,7 @@ class Restitution:
     value: float
     """[-]"""
     measured: MeasuredRange | None
-    """Of the pair; None: nobody measured it, and ``value`` is the rule's."""
+    """Range of the pair; None: not measured, and ``value`` is the rule's."""
 
 
 VITREOUS_MATERIALS = frozenset(("glass", "ceramic", "porcelain"))
@@ -83,12 +83,12 @@ def pair_restitution(
     What was measured are solid balls on solid bodies, so it holds for what is solid. A value that
     a person stated for one of the materials outranks it. Of solid metals, glass and ceramics no
     value "on a hard floor" is needed: their bulk loses what its loss factor says, and metals yield;
-    those of measured pairs, too, at faster blows than they were measured in.
+    those of measured pairs, too, at faster impacts than they were measured in.
 
     Args:
         a: One body.
         b: The other.
-        speed: Of the blow [m/s].
+        speed: Of the impact [m/s].
 
     """
     solid = a.solid and b.solid
@@ -111,7 +111,7 @@ def pair_restitution(
 
 @dataclass(frozen=True)
 class RestitutionLaw:
-    """How the restitution of two bodies changes with the speed v of a blow.
+    """How the restitution of two bodies changes with the speed v of an impact.
 
     e = value (v/speed)^(-exponent) - slope (v - speed), between ``least`` and ``most``.
     """
@@ -139,7 +139,7 @@ FULL_YIELD_SPEED_M_S = 1e4
 def pair_restitution_law(
     a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT_SPEED_M_S
 ) -> RestitutionLaw:
-    """Say how restitution changes about the speed of a blow, as ``pair_restitution`` gives it.
+    """Return how restitution changes about the speed of an impact, as ``pair_restitution`` gives it.
 
     Metals are as elastic as their bulk up to the speed at which they yield. The line of a rated
     ball, which is exact for it alone, is the chord from this speed to a quarter of it.
@@ -147,7 +147,7 @@ def pair_restitution_law(
     Args:
         a: One body.
         b: The other.
-        speed: Of the blow [m/s].
+        speed: Of the impact [m/s].
 
     """
     now, slow, fast = (pair_restitution(a, b, v).value for v in (speed, 0.0, FULL_YIELD_SPEED_M_S))

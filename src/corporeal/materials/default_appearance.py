@@ -1,4 +1,4 @@
-"""What materials look like where nobody drew them."""
+"""Default appearance of materials without textures."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
-"""What a sheet of layers gives back when it is pressed across them.
+"""Restitution of layered sheets under flat crush.
 
 Corrugated board is stiff in its plane and weak across its flutes, which fold at a pressure that
-hardly changes until they lie flat (flat crush). A blow that presses harder than that is work
+hardly changes until they lie flat (flat crush). An impact that presses harder than that is work
 against this pressure, on the volume that is crushed, and lost; what is stored meanwhile in the ball
 and in the sheet comes back.
 """
@@ -132,13 +132,13 @@ def crush_restitution(
 ) -> float:
     """Restitution of a ball on a sheet that lies on something hard [-].
 
-    Where the sheet is not thick enough to take all of a blow, the rest of it rebounds from what is
-    packed.
+    Where the sheet is not thick enough to take all of an impact, the rest of it rebounds from what
+    is packed.
 
     Args:
         ball: What strikes.
         sheet: What is struck.
-        speed: Of the blow [m/s].
+        speed: Of the impact [m/s].
         packed: Restitution of the ball and the packed sheet [-].
 
     """
@@ -164,14 +164,14 @@ def crush_restitution(
 def crush_restitution_law(
     ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float
 ) -> RestitutionLaw:
-    """Say how the restitution of a ball on a sheet changes about the speed of a blow.
+    """Return how the restitution of a ball on a sheet changes about the speed of an impact.
 
     The power of the speed is that between this speed and a quarter of it.
 
     Args:
         ball: What strikes.
         sheet: What is struck.
-        speed: Of the blow [m/s].
+        speed: Of the impact [m/s].
         packed: As in ``crush_restitution``.
 
     """

@@ -1,4 +1,4 @@
-"""Look materials up: in what is shipped, or in a library of the user's own.
+"""Lookup of materials in the default library or a user's.
 
 A user's file replaces the default library; one that starts with ``extends = "default"`` is merged
 into it. Merging is by material: a table of the file replaces its namesake whole.
@@ -40,12 +40,12 @@ def library(name: str = "default") -> dict[str, MaterialEntry]:
 
 
 def part_materials(library_name: str = "default") -> list[str]:
-    """Names of what a part itself may be made of: all but liquids and loose goods."""
+    """Names of materials of parts: all but liquids and granular materials."""
     return [e.name for e in library(library_name).values() if e.group not in CONTENT_ONLY_GROUPS]
 
 
 def content_materials(library_name: str = "default") -> list[str]:
-    """Names of what an object may be filled with: liquids, loose matter and soft stuffing."""
+    """Names of what an object may be filled with: liquids, granular material and soft stuffing."""
     return [e.name for e in library(library_name).values() if e.group in CONTENT_GROUPS]
 
 
@@ -142,7 +142,7 @@ def _text(path: Path) -> str:
 def _read(where: Path, path: Path, changed: int, size: int) -> dict[str, MaterialEntry]:
     problems = check_library(path)
     if problems:
-        more = f"All {len(problems)} mistakes: corporeal materials check {path}."
+        more = f"All {len(problems)} errors: corporeal materials check {path}."
         raise BadFileError(path, str(problems[0]), more if len(problems) > 1 else "")
     tables = tomllib.loads(_text(path))
     base = tables.get("extends")

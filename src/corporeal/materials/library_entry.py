@@ -1,4 +1,4 @@
-"""One material of a library: its law, and for every number the measured range."""
+"""One material of a library: constitutive law, and a measured range for every property."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

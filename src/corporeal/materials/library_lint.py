@@ -1,6 +1,6 @@
-"""Is a library sound? What is wrong in its file, where, and what to do about it.
+"""Validation of material libraries: errors with lines and advice.
 
-Works on the text of the file, so that every mistake is found at once and has a line.
+Works on the text of the file, so that all errors are found at once, with lines.
 """
 
 import difflib
@@ -43,7 +43,7 @@ MATERIAL_GROUPS = (
 )
 MATERIAL_GROUPS += ("food", "liquid", "bulk")
 LOSS_CHECKED_GROUPS = ("soft", "fibrous", "polymer", "elastomer", "foam", "food")
-"""Groups whose blows are lost in the bulk: loss and restitution tell of the same."""
+"""Groups whose impacts are lost in the bulk: loss and restitution tell of the same."""
 RESERVED_KEYS = ("extends", "sources")
 """Keys at the top of a user's library that are no materials."""
 RANGE_KEYS = ("low", "typical", "high", "source", "unusual", "note")
@@ -83,9 +83,7 @@ def lint_library(
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        return [
-            LibraryProblem(0, "", "", f"This is not TOML: {error}.", "Mend the syntax there first.")
-        ]
+        return [LibraryProblem(0, "", "", f"This is not TOML: {error}.", "Fix the syntax first.")]
     found = _ProblemFinder(_line_of_key(text))
     _check_top(found, tables, bases)
     own = tables.get("sources", {})
@@ -159,14 +157,14 @@ def _line_of_key(text: str) -> dict[tuple[str, str], int]:
 def _check_top(found: _ProblemFinder, tables: dict, bases: tuple[str, ...]) -> None:
     base = tables.get("extends")
     if base is not None and base not in bases:
-        found.tell("", "extends", f"{base!r} is no library.", f"Write one of: {_list(bases)}.")
+        found.tell("", "extends", f"{base!r} is not a library.", f"Write one of: {_list(bases)}.")
     own = tables.get("sources", {})
     if not isinstance(own, dict):
         found.tell("", "sources", "must be a table.", "Write [sources.mine] with cite = '...'.")
         return
     for name, row in own.items():
         if not (isinstance(row, dict) and isinstance(row.get("cite"), str) and row["cite"]):
-            what = "says nothing that could be looked up."
+            what = "has no citation."
             found.tell(f"sources.{name}", "", what, "Give it cite = 'author, title, table'.")
     if not set(tables) - set(RESERVED_KEYS):
         found.tell("", "", "There is no material in the file.", "Write one as [name].")
@@ -180,7 +178,7 @@ def _check_names(found: _ProblemFinder, rows: dict[str, dict]) -> None:
             first = owner.setdefault(str(word).lower(), name)
             if first != name:
                 what = f"{word!r} also names {first}."
-                found.tell(name, "aliases", what, "Let it name one of the two only.")
+                found.tell(name, "aliases", what, "Use it for one of the two only.")
 
 
 # ---------------------------------------------------------------- one material
@@ -210,7 +208,12 @@ def _law(found: _ProblemFinder, name: str, row: dict) -> Law | None:
     if "law" not in row:
         found.tell(name, "", "has no law.", f"Add law = one of: {_list(laws)}.")
     elif row["law"] not in laws:
-        found.tell(name, "law", f"{row['law']!r} is no law.", f"Write one of: {_list(laws)}.")
+        found.tell(
+            name,
+            "law",
+            f"{row['law']!r} is not a constitutive law.",
+            f"Write one of: {_list(laws)}.",
+        )
     else:
         return Law[row["law"].upper()]
     return None
@@ -222,11 +225,11 @@ def _check_words(found: _ProblemFinder, name: str, row: dict) -> None:
             found.tell(name, key, f"is {row[key]!r}.", f"It must be of type {kind.__name__}.")
     group = row.get("group", "")
     if group == "" and default_namesake(name) is None:
-        what = "has no group, so its numbers cannot be compared with those of its like."
+        what = "has no group, so its values cannot be compared with those of similar materials."
         found.tell(name, "", what, f"Add group = one of: {_list(MATERIAL_GROUPS)}.")
     elif isinstance(group, str) and group and group not in MATERIAL_GROUPS:
         found.tell(
-            name, "group", f"{group!r} is no group.", f"Write one of: {_list(MATERIAL_GROUPS)}."
+            name, "group", f"{group!r} is not a group.", f"Write one of: {_list(MATERIAL_GROUPS)}."
         )
 
 
@@ -273,14 +276,14 @@ def _check_needs(found: _ProblemFinder, name: str, law: Law | None, fields: set[
         if law and field in fields and law not in laws:
             right = _list(sorted(one.name.lower() for one in laws))
             what = f"{law.name.lower()} never reads {QUANTITIES[field].words.lower()}."
-            found.tell(name, "", what, f"Take it out, or use law = {right}.")
+            found.tell(name, "", what, f"Remove it, or use law = {right}.")
 
 
 # ---------------------------------------------------------------- one number
 
 
 def _check_cell(found: _ProblemFinder, at: _NumberPlace, cell: Any, known: set[str]) -> bool:
-    """Tell what is wrong with the form of a cell; return whether its numbers can be read."""
+    """Return what is wrong with the form of a cell; return whether its numbers can be read."""
     form = "Write { low = 1, typical = 2, high = 3, source = 'key' }."
     if not isinstance(cell, dict):
         found.tell(at.table, at.key, f"is {cell!r}, not a range.", form)
@@ -294,19 +297,19 @@ def _check_cell(found: _ProblemFinder, at: _NumberPlace, cell: Any, known: set[s
         found.tell(at.table, at.key, f"has the note {cell['note']!r}.", "Write it in words.")
     missing = [k for k in RANGE_KEYS[:3] if not _is_number(cell.get(k))]
     if missing:
-        found.tell(at.table, at.key, f"{missing[0]!r} is missing or no number.", form)
+        found.tell(at.table, at.key, f"{missing[0]!r} is missing or not a number.", form)
     return not missing
 
 
 def _check_source(found: _ProblemFinder, at: _NumberPlace, source: Any, known: set[str]) -> None:
     if not isinstance(source, str) or not source.strip():
-        advice = "Say who measured it: source = 'key', and [sources.key] with cite = '...'."
+        advice = "Cite its source: source = 'key', and [sources.key] with cite = '...'."
         found.tell(at.table, at.key, "has no source.", advice)
         return
     for key in source.split("+"):
         if key not in known:
-            advice = f"Add [sources.{key}] with cite = '...', or use a key of ours."
-            found.tell(at.table, at.key, f"cites {key!r}, which nothing explains.", advice)
+            advice = f"Add [sources.{key}] with cite = '...', or use an existing key."
+            found.tell(at.table, at.key, f"cites {key!r}, which is not defined.", advice)
 
 
 def _check_sizes(found: _ProblemFinder, row: _MaterialRow, fields: dict[str, _RangeCell]) -> None:
@@ -317,9 +320,9 @@ def _check_sizes(found: _ProblemFinder, row: _MaterialRow, fields: dict[str, _Ra
             what = f"is out of order: {low:g}, {typical:g}, {high:g}."
             found.tell(row.name, cell.key, what, advice)
         elif field == "poisson" and high >= POISSON_LIMIT:
-            what = f"reaches {high:g}: at 0.5 no volume can change at all."
+            what = f"reaches {high:g}: 0.5 is incompressible."
             found.tell(
-                row.name, cell.key, what, "For what hardly changes its volume write 0.49 to 0.499."
+                row.name, cell.key, what, "For nearly incompressible materials use 0.49 to 0.499."
             )
         elif not cell.unusual:
             doubted = range_doubt(cell.key, (low, high), row.name, row.group, row.law)
@@ -349,7 +352,7 @@ def _check_rebound(found: _ProblemFinder, row: _MaterialRow, fields: dict[str, _
         f"{restitution['low']:g} to {restitution['high']:g} contradicts the loss factor: with "
         f"{loss['low']:g} to {loss['high']:g} a ball keeps {low:.2f} to {high:.2f} of its speed."
     )
-    advice = "Correct one of the two, or say with note = '...' what else takes the energy."
+    advice = "Correct one of the two, or explain with note = '...' what else dissipates the energy."
     found.tell(row.name, "restitution", what, advice)
 
 

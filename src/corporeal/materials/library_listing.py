@@ -1,4 +1,4 @@
-"""The library as text for the terminal, and what a scene is made of as data."""
+"""The library as text for the terminal, and materials.json of a scene."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -64,7 +64,7 @@ def describe_material(name: str, library_name: str = "default") -> str:
 
 
 def _uses(entry: MaterialEntry) -> list[str]:
-    """Say how use or treatment narrows the ranges, as a model is offered them."""
+    """Return how use or treatment narrows the ranges, as a model is offered them."""
     rows = []
     for use in range_modifiers(entry.name):
         bands = [
@@ -84,7 +84,7 @@ def _unit(field: str, value: float) -> str:
 def _measured_pairs_text(
     title: str, key: str, known: Mapping[frozenset[str], dict], entry: MaterialEntry
 ) -> list[str]:
-    """Tell the measured pairs that this material is named in, itself or as one of its kind."""
+    """List the measured pairs of this material or its group."""
     rows = []
     for names, row in known.items():
         own = [n for n in entry.kin if n in names]
@@ -109,7 +109,7 @@ def _seen(key: str) -> str:
 def materials_json(
     field: MaterialField, parts: Parts, masses: Sequence[float] = (), scales: Sequence[float] = ()
 ) -> dict:
-    """Return what every part is made of as plain data, with the grounds of every value [SI].
+    """Return the materials of all parts as plain data, with the grounds of every value [SI].
 
     A part whose mesh several objects share has ``pieces``; its own values, with which it moves, are
     those of the piece that matters most, and it weighs what its pieces weigh together. Lengths are
@@ -141,7 +141,7 @@ def materials_json(
 
 
 def _mass_json(mixture: MassPosterior) -> dict:
-    """Say what an object may weigh, by each of several answers too where several were given."""
+    """Describe what an object may weigh, by each of several answers too where several were given."""
     row = asdict(mixture)
     return row if mixture.answers else {n: value for n, value in row.items() if n != "answers"}
 
@@ -181,7 +181,7 @@ def _made_json(material: Material, made: Structure, words: PartDescription) -> d
 
 
 def _swelling_json(said: ScanThickening | None) -> dict:
-    """How much of what a scan draws is real, where somebody said."""
+    """Stated ratio of real to scanned volume."""
     return {"real_share": asdict(said)} if said else {}
 
 

@@ -72,7 +72,7 @@ Without friction or restitution of its own a material gets 0.5.
 """
 LOSS_TEXT = """## Loss and rebound
 
-The loss factor is that of a blow: what a ball of the material loses in its bulk when it meets
+The loss factor is that of an impact: what a ball of the material loses in its bulk when it meets
 something hard, at 10 to 1000 Hz and the strains of an impact. It ties down the restitution,
 e = exp(-1.385 η + 0.133 η²): hereditary Hertz contact (Lee and Radok 1960) with a loss factor that
 is flat around the impact. Where the two disagree something else takes energy, and a note says what:
@@ -92,7 +92,7 @@ Measured pairs come first here too, most particular one first, where both bodies
 measured are balls, and walls ring. A restitution that a person states for a material outranks it.
 Solid metals, glass and ceramics return what their loss factors leave; a metal that yields returns
 3.8 (Y/E*)^½ (⅔ π ρ v²/Y)^(-⅛) at most (Johnson, Contact Mechanics, eq. 11.43), here at 1 m/s, in a
-simulation at the speed of the first blow.
+simulation at the speed of the first impact.
 For all other pairs e² = (E_b e_a² + E_a e_b²)/(E_a + E_b) of the materials' own values with the
 plane-strain moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025); where both are
 soft and lossy (elastomer, foam, food, soft) their loss factors add up by the same shares instead.
@@ -100,7 +100,7 @@ soft and lossy (elastomer, foam, food, soft) their loss factors add up by the sa
 LAYERED_TEXT = """These are weak across their layers: what strikes a sheet of them on its face crushes it
 at this pressure (`materials/flat_crush.py`).
 """
-RATED_TEXT = """These were rated at a speed, and return less of a faster blow; their loss factor follows.
+RATED_TEXT = """These were rated at a speed, and return less of a faster impact; their loss factor follows.
 """
 SOURCES_TEXT = """## Sources
 
@@ -153,7 +153,7 @@ def library_markdown() -> str:
 
 
 def _needs() -> str:
-    """Say what some laws cannot do without."""
+    """Describe what some laws cannot do without."""
     asked = {
         law.name.lower(): CONSTITUTIVE_LAWS[law].needs
         for law in Law
@@ -166,7 +166,7 @@ def _needs() -> str:
 
 
 def _counts() -> str:
-    """Say how well founded the numbers are."""
+    """Return how well founded the numbers are."""
     counts = {"read": 0, "recalled": 0, "ours": 0}
     for entry in library().values():
         for field in ("young", "poisson", "density", "yield_stress"):
@@ -209,7 +209,7 @@ def _cells(entry: MaterialEntry, fields: Sequence[str]) -> list[str]:
 
 
 def _notes() -> list[str]:
-    """Collect what else takes the energy of a blow, and of which materials."""
+    """Collect what else takes the energy of an impact, and of which materials."""
     names_of: dict[str, list[str]] = {}
     for entry in library().values():
         if "restitution" in entry.notes:

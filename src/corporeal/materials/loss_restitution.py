@@ -1,4 +1,4 @@
-"""How a ball of a lossy material rebounds: its loss factor and its restitution are one thing.
+"""Relation of loss factor and restitution of balls.
 
 A ball that meets a rigid plane loses in its bulk what its loss factor says. Hereditary Hertz
 contact (Lee and Radok 1960, "The contact problem for viscoelastic bodies"; Ting 1966 for the way

@@ -1,4 +1,4 @@
-"""What somebody is offered to choose from, in words: materials, contents, ranges and uses."""
+"""Candidates for questions to a model: materials, contents, ranges and uses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

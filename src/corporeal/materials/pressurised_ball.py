@@ -8,7 +8,7 @@ it would stretch, or dent by itself as stiffly as the air does.
 
 Where the skin dents less easily than the air behind it is pressed (Reissner's k = 4 E t²/(R √(3 (1
 - ν²))) against 2π R p) but is elastic, a racquetball, both are springs side by side, and air bears
-the more of a blow the harder it is: ``equivalent_solid``. What flows when it is dented, a table
+the more of an impact the harder it is: ``equivalent_solid``. What flows when it is dented, a table
 tennis ball, and what leaks, a rubber duck, stays a wall.
 """
 
@@ -80,7 +80,7 @@ def wall_stiffness(skin: Material, thickness: float, radius: float) -> float:
 
 
 def is_carried_by_air(gauge: float, skin: Material, thickness: float, radius: float) -> bool:
-    """Tell whether a ball is carried by its air rather than by its skin when it is dented.
+    """Return whether a ball is carried by its air rather than by its skin when it is dented.
 
     Args:
         gauge: Of the air [Pa].
@@ -122,7 +122,7 @@ class InflatedBall:
         return volume * (inside / (HEAT_RATIO - 1.0) - ATMOSPHERIC_PRESSURE_PA * lost)
 
     def squeeze(self, energy: float) -> float:
-        """Depth over radius at which a blow of so much energy [J] is stored."""
+        """Depth over radius at which an impact of so much energy [J] is stored."""
 
         def excess(squeeze: float) -> float:
             return self.wall_energy(squeeze) + self.air_energy(squeeze) - energy
@@ -134,24 +134,24 @@ class InflatedBall:
 
 @dataclass(frozen=True)
 class EquivalentSolid:
-    """The soft solid that a sealed ball is in one blow."""
+    """The soft solid that a sealed ball is in one impact."""
 
-    young: float
+    young_pa: float
     """[Pa]"""
     loss: float
     """[-]"""
 
 
 def equivalent_solid(ball: InflatedBall, energy: float) -> EquivalentSolid:
-    """Young's modulus and loss factor of the solid that resists a blow as wall and air do.
+    """Young's modulus and loss factor of the solid that resists an impact as wall and air do.
 
     Hertz's force 4/3 E* √R x^(3/2) is that of wall and air, k x + p A, at the depth at which both
-    have stored the blow (of a light one: at ``REFERENCE_SQUEEZE_RATIO``). Air loses nothing; the
+    have stored the impact (of a light one: at ``REFERENCE_SQUEEZE_RATIO``). Air loses nothing; the
     wall loses of what it stores.
 
     Args:
         ball: What is struck.
-        energy: Of the blow [J].
+        energy: Of the impact [J].
 
     """
     depth = max(ball.squeeze(energy), REFERENCE_SQUEEZE_RATIO)
@@ -167,17 +167,17 @@ def equivalent_solid(ball: InflatedBall, energy: float) -> EquivalentSolid:
 def inflated_ball_material(ball: InflatedBall) -> Material:
     """Return the soft solid that a sealed ball with an elastic wall is, struck lightly.
 
-    How hard a blow changes it says ``equivalent_solid``.
+    How hard an impact changes it says ``equivalent_solid``.
     """
     light, skin = equivalent_solid(ball, 0.0), ball.skin
     density = AIR_DENSITY * (1.0 + ball.gauge / ATMOSPHERIC_PRESSURE_PA)
     bounces = restitution_of_loss(light.loss)
-    why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa press side by side"
+    why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa act in parallel"
     values = {
-        "young": _ground(0.5 * light.young, light.young, 1.5 * light.young, why),
+        "young": _ground(0.5 * light.young_pa, light.young_pa, 1.5 * light.young_pa, why),
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "as of a ball full of air"),
         "density": _ground(density, density, density, "air at this pressure"),
-        "restitution": _ground(0.0, bounces, 1.0, "what the wall loses of what it stores"),
+        "restitution": _ground(0.0, bounces, 1.0, "the wall's share of the loss"),
         "loss": _ground(
             0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"
         ),

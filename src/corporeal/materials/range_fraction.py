@@ -9,7 +9,7 @@ LOG_SCALE_MIN_RATIO = 10.0
 
 
 def is_logarithmic(r: MeasuredRange) -> bool:
-    """Tell whether places in a range are counted in factors, not in differences."""
+    """Return whether places in a range are counted in factors, not in differences."""
     return r.low > 0 and r.high / r.low > LOG_SCALE_MIN_RATIO
 
 

@@ -48,7 +48,7 @@ def range_modifier_problems(ranges: Mapping[str, Mapping[str, MeasuredRange]]) -
 
 
 def is_within_range(low: float, high: float, whole: MeasuredRange) -> bool:
-    """Tell whether a band lies within a measured range."""
+    """Return whether a band lies within a measured range."""
     slack = 1e-9 * abs(whole.high)
     return whole.low - slack <= low < high <= whole.high + slack
 

@@ -44,7 +44,7 @@ def contents_entry(name: str, library_name: str = "default") -> MaterialEntry:
 
 
 def library_spelling(name: str, library_name: str, offered: list[str]) -> str | None:
-    """Return how a library spells a name that somebody gave, None where it is not offered."""
+    """Return the library's spelling of a name; None: not offered."""
     try:
         found = find_material(name, library_name).name
     except UnknownChoiceError:
@@ -55,7 +55,7 @@ def library_spelling(name: str, library_name: str, offered: list[str]) -> str | 
 def quantity_choices(
     words: PartDescription, library_name: str = "default", weighing: bool = False
 ) -> dict[str, QuantityChoice]:
-    """Offer the quantities of a part that somebody may place; nothing where none is open.
+    """Return the open quantities of a part, which a model may place.
 
     Args:
         words: The description of the part.
@@ -82,7 +82,7 @@ def quantity_choices(
 
 @dataclass(frozen=True)
 class QuantityJudgement:
-    """Where somebody puts a quantity, and why."""
+    """Placement of a quantity, with a reason."""
 
     number: float
     """A fraction of the range, or a value in the unit that was offered."""
@@ -113,7 +113,7 @@ def placements_from_values(
 
 
 def usual_placements(offered: Mapping[str, QuantityChoice], why: str) -> dict[str, RangePlacement]:
-    """Place everything where it usually lies, because nobody could be asked."""
+    """Place everything where it usually lies, because no model could be asked."""
     return {
         f: RangePlacement(fraction_of(c.range, c.range.typical), "fallback", why)
         for f, c in offered.items()
@@ -133,10 +133,10 @@ def placed_wall_thickness(words: PartDescription, library_name: str = "default")
 def placement_contradictions(
     words: PartDescription, placements: Mapping[str, RangePlacement], library_name: str = "default"
 ) -> dict[str, str]:
-    """Say which of a part's values do not fit each other: field → why, in a clause.
+    """Return which of a part's values do not fit each other: field → why, in a clause.
 
-    Only what somebody placed or stated can be put right: what was not asked of a way, as the
-    stiffness of all but the likeliest, contradicts nothing.
+    Only placed or stated values can be corrected: what was not asked of a way, as the stiffness of
+    all but the likeliest, contradicts nothing.
     """
     if words.material is None:
         return {}

@@ -1,6 +1,6 @@
-"""How restitution falls with the speed of a blow.
+"""How restitution falls with the speed of an impact.
 
-Two laws, by what takes the energy. A wound, foamed or rubber ball loses more of a harder blow, in
+Two laws, by what takes the energy. A wound, foamed or rubber ball loses more of a harder impact, in
 proportion to its speed: e(v) = e_r - s (v - v_r), with the speed v_r at which its restitution was
 rated. A metal yields where it is struck: e ∝ v^(-1/4) (Johnson, Contact Mechanics, 1985, §11.5).
 """
@@ -47,13 +47,13 @@ def rated_restitutions() -> dict[str, RatedRestitution]:
 
 
 def material_at_speed(material: Material, speed: float) -> Material:
-    """Return a material as it rebounds from a blow at this speed; what a person stated stays.
+    """Return a material as it rebounds from an impact at this speed; what a person stated stays.
 
     Its loss factor changes so that its rebound does by as much.
 
     Args:
         material: With its values at the speed at which it was rated.
-        speed: Of the blow [m/s].
+        speed: Of the impact [m/s].
 
     """
     rating = rated_restitutions().get(material.name)
@@ -84,7 +84,7 @@ def yield_restitution(a: Material, b: Material, speed: float) -> float:
     Args:
         a: One material.
         b: The other; the denser is taken for the ball's.
-        speed: Of the blow [m/s].
+        speed: Of the impact [m/s].
 
     """
     weak = [m.yield_stress for m in (a, b) if m.law is Law.VON_MISES and m.yield_stress]
@@ -97,7 +97,7 @@ def yield_restitution(a: Material, b: Material, speed: float) -> float:
 
 
 def is_stated_by_person(material: Material, field: str) -> bool:
-    """Tell whether a person stated this number of a material."""
+    """Return whether a person stated this number of a material."""
     ground = material.grounds.get(field)
     return ground is not None and ground.chosen_by == "annotation"
 

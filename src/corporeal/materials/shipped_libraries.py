@@ -31,7 +31,7 @@ def citation(key: str) -> str:
 
 
 def is_estimate(key: str) -> bool:
-    """Tell whether a source, or one of two, is our own estimate and nobody's measurement."""
+    """Return whether a source, or one of two, is an estimate, not a measurement."""
     return any(source_table().get(k, {}).get("check") == "ours" for k in key.split("+"))
 
 

@@ -2,7 +2,7 @@
 
 Within one material the stiffer grade is also the stronger and the denser one. So the yield strain
 σ_y/E must lie between what the weak, the usual and the strong grade have, and so must, in foams
-and fibrous matter, E/ρ² (Gibson and Ashby 1997: E ∝ ρ² in open cells).
+and fibrous material, E/ρ² (Gibson and Ashby 1997: E ∝ ρ² in open cells).
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ QUANTITY_BONDS = (
 def value_contradictions(
     group: str, ranges: Mapping[str, MeasuredRange], values: Mapping[str, float]
 ) -> dict[str, str]:
-    """Say which chosen values do not fit each other.
+    """Return which chosen values do not fit each other.
 
     Args:
         group: The material's.

@@ -27,7 +27,7 @@ class ValueDoubt:
 def range_doubt(
     key: str, span: tuple[float, float], name: str, group: str, law: Law | None
 ) -> ValueDoubt | None:
-    """Say what is implausible about a range and what to do, or None.
+    """Describe what is implausible about a range and what to do, or None.
 
     Args:
         key: Its key in the file, unit included.
@@ -54,7 +54,7 @@ def range_doubt(
 
 
 def yield_strain_doubt(values: Mapping[str, float]) -> ValueDoubt | None:
-    """Say that ``yield_stress`` and ``young`` [Pa] do not go together, or None."""
+    """State that ``yield_stress`` and ``young`` [Pa] do not go together, or None."""
     if "yield_stress" not in values or not values.get("young"):
         return None
     strain = values["yield_stress"] / values["young"]

@@ -1,9 +1,9 @@
-"""Consistent sets of values drawn from the measured ranges: what is not known, as samples.
+"""Sampling of consistent material values from the measured ranges.
 
 A value is drawn from a triangle on its range's own scale, whose peak is the chosen value. It spans
-the whole range where nobody chose, half of the way to either end where a model did, and nothing
+the whole range if none was chosen, half of the way to either end where a model did, and nothing
 where a person stated it. Within one material the stiffer grade is also the stronger, and in porous
-and loose matter the denser; what is of one material in one object is of one grade.
+and granular material the denser; what is of one material in one object is of one grade.
 """
 
 from collections.abc import Mapping, Sequence
@@ -59,9 +59,10 @@ SHARE_LOG_STD = 0.2
 MAX_MOUTH_INFLATION_PA = 10_000.0
 """What a person can blow up without a pump, above the air around [Pa]: lungs press no harder."""
 NAMED_WALL_LOG_STD = 0.45
-"""Standard deviation of the logarithm of a wall that is only usual of things of that name: half the
-interquartile range of what 62 named things weigh in life over what they weighed with such walls, in
-deviations (.46); the median distance of 11 of published mass gives .43 (decision 104)."""
+"""Standard deviation of the logarithm of a wall that is only usual of objects of that name: half
+the interquartile range of what 62 named objects weigh in reality over what they weighed with such
+walls, in deviations (.46); the median distance of 11 of published mass gives .43 (decision 104).
+"""
 MAX_INNER_VOLUME_FRACTION = 0.99
 """Of what encloses them, all that lies inside takes up at most [-]."""
 
@@ -76,10 +77,10 @@ def triangular_quantile(quantile: float, low: float, peak: float, high: float) -
 
 
 def draw_hypotheses(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
-    """Draw for every part one of the ways it may be, as a whole, by their probabilities.
+    """Sample a hypothesis for every part by their probabilities.
 
-    Ways that share a reading of the object ("imitation") are drawn together. What nobody recognised
-    may be of any of the library's materials. Where several answers were given, one of them is drawn
+    Ways that share a reading of the object ("imitation") are drawn together. Unrecognised parts may
+    be of any of the library's materials. Where several answers were given, one of them is drawn
     first, since its ways and its values fit each other.
     """
     return replace(
@@ -138,7 +139,7 @@ def _hypothesis_at_quantile(ways: Sequence[Hypothesis], at: float) -> Hypothesis
 
 
 def _is_available(way: Hypothesis, library: str) -> bool:
-    """Tell whether the library in use has the material, with walls where it is to have some."""
+    """Return whether the library in use has the material, with walls where it is to have some."""
     if way.material is None:
         return True
     try:
@@ -314,7 +315,7 @@ def _draw_piece(
 
 
 def _draw_wall(words: PartDescription, owner: int, grades: GradeDraws) -> PartDescription:
-    """Draw a wall that is only usual of such things; rules fix what inflated balls weigh.
+    """Draw a wall that is only usual of such objects; rules fix what inflated balls weigh.
 
     Nobody rules what is blown up by mouth: an air bed, a beach ball.
     """

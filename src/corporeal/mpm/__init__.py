@@ -1,1 +1,1 @@
-"""Material point method with one velocity field per object; it could leave and be a package."""
+"""Material point method with one velocity field per object."""

@@ -1,4 +1,4 @@
-"""Bodies join a problem that runs: nothing changes for those that are there, books stay open."""
+"""Adding bodies to a running problem; state and ledgers of the others are unchanged."""
 
 from dataclasses import dataclass, replace
 

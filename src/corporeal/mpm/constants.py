@@ -1,8 +1,8 @@
-"""Every number of the method, once.
+"""Numerical constants of the method.
 
-NumPy code imports them, kernels on cards take them as they compile, and C++ text finds them in
-``namespace mpm``: ``cpp_constants`` writes it. What is chosen here is chosen for all engines. Numbers of one
-constitutive law stand with the law, coefficients of a formula in the formula. A cell is dx long.
+NumPy code imports them, GPU kernels compile them in, and C++ code finds them in ``namespace mpm``:
+``cpp_constants`` writes it. They apply to all engines. Numbers of one constitutive law stand with
+the law, coefficients of a formula in the formula. A cell is dx long.
 """
 
 from collections.abc import Mapping
@@ -33,8 +33,9 @@ MAX_WALL_DEPTH_DX = 8.0
 MAX_DISTANCE_FROM_ORIGIN_DX = 1e5
 """A particle farther than this from the origin [cells] has left the domain."""
 MAX_TRAVEL_PER_STEP_DX = 1e4
-"""A particle that goes farther than this in one step [cells] is lost; checked on cards, where a
-larger number of cells would not fit the integer that counts them."""
+"""A particle that goes farther than this in one step [cells] is lost; checked on GPUs, where a
+larger number of cells would not fit the integer that counts them.
+"""
 MAX_FINITE_VALUE = 1e9
 """A larger velocity [m/s], velocity gradient or strain is as good as infinite where a lost particle
 is looked for."""
@@ -67,13 +68,15 @@ RANK_CUTOFF = 1e-12
 FLIP_DAMPING_FRACTION = 0.1
 """κ [-]: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
 GRANULAR_DAMPING_FRACTION = 0.5
-"""How often granular matter forgets while it falls half a cell, in √(dx/g) [-] (decision 6)."""
+"""How often granular material forgets while it falls half a cell, in √(dx/g) [-] (decision 6)."""
 LOCAL_BULK_RATIO = 4.0
-"""λ/μ [-], at ν = 0.4: of nearly incompressible matter what λ exceeds it by acts on the mean
-dilatation of a cluster of particles, not on each one's own volume (decision 23)."""
+"""λ/μ [-], at ν = 0.4: of nearly incompressible material what λ exceeds it by acts on the mean
+dilatation of a cluster of particles, not on each one's own volume (decision 23).
+"""
 BULK_ROUNDING_FRACTION = 1e-6
-"""Share by which λ must exceed that for matter to be so at all: ν of 0.4 in single precision is
-not [-]."""
+"""Share by which λ must exceed that for material to be so at all: ν of 0.4 in single precision is
+not [-].
+"""
 MIN_VOLUME_RATIO = 1e-3
 """J of what is pressed flat or turned inside out, where pressure is a mean [-]."""
 MAX_POISSON_RATIO = 0.49
@@ -126,12 +129,14 @@ FACET_REPLACES_NODES_DX = 2.0
 [cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes
 misjudge, as they take it for a plane within the 3 cells that each sees …"""
 FACET_NORMAL_COSINE = 0.95
-"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN_BODY_DX``
-normals of nodes lean, since mass lies around them on both sides: there ``CURVED_NORMAL_COSINE``
-counts."""
+"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is
+``THIN_BODY_DX`` normals of nodes lean, since mass lies around them on both sides: there
+``CURVED_NORMAL_COSINE`` counts.
+"""
 OPPOSED_FACES_COSINE = 0.5
-"""Where normals of nodes lean farther than ``FACET_NORMAL_COSINE`` from all faces, around edges of both
-bodies, they are of two that look at one another so nearly and lean no farther than that [-]."""
+"""Where normals of nodes lean farther than ``FACET_NORMAL_COSINE`` from all faces, around edges of
+both bodies, they are of two that look at one another so nearly and lean no farther than that [-].
+"""
 FACE_SCATTER_DX = 0.03
 """What a node sees aside of a face is no edge, but the scatter of particles [cells]."""
 VALLEY_ITERATIONS = 6
@@ -189,7 +194,7 @@ FACE_TABLE_INTERVALS = 4096
 FIRST_BIAS, OTHER_BIAS = 0.10, 0.05
 """Head start of the candidate normals g_a - g_c, and g_a or -g_c [cells]."""
 FIELDS_AT_NODE = 6
-"""Fields that may meet at one node on a card."""
+"""Fields that may meet at one node on a GPU."""
 DENSE_CONTACT_REACH_DX, LOOSE_CONTACT_REACH_DX = 1.25, 1.5
 """Particles of two bodies farther apart than this along an axis [cells] are not in contact. Those
 of a solid are less than a cell from one another and touch from 1.14 on, lone grains from 1.5 on."""
@@ -209,9 +214,10 @@ SWEEP_STRIDE_FRACTION = 0.6180339887498949
 in which they lie next to one another the first would carry more, and what rests would tilt."""
 SUPPORT_FREQUENCY_RATIO2 = 3.0
 """A body between what strikes it and what it rests on is squeezed at once where the square of its
-own frequency between the two is more than this times that of the blow [-] (decision 89) …"""
+own frequency between the two is more than this times that of the impact [-] (decision 89) …
+"""
 SUPPORT_NORMAL_COSINE = 0.5
-"""… and what it rests on lies behind it: least cosine of the normal with the blow's [-] …"""
+"""… and what it rests on lies behind it: least cosine of the normal with the impact's [-] …"""
 SUPPORT_MASS_RATIO = 0.9
 """… and is no lighter than this share of it [-]."""
 LAYER_STIFFNESS_FACTOR = 1.5707963267948966
@@ -221,7 +227,9 @@ SUPPORTED_IMPACT_SWEEPS = 1000
 """Gauss–Seidel sweeps of such a round: what is heavy presses on what is light."""
 SIMULTANEOUS_SWEEPS = 30
 """Sweeps of all contacts at once, where those in order do not come to rest and a rigid body meets
-one that moves as told: two that close leave it no room, and the last would have its way."""
+one that follows a prescribed path: two that close leave it no room, and the last would have its
+way.
+"""
 MAX_RESTING_SPEED = 1e-3
 """Contacts that open faster than this [m/s] rest on nothing."""
 MAX_IMPACTS_PER_STEP = 50
@@ -232,22 +240,23 @@ SWEEP_TOLERANCE_DX, IMPACT_SWEEP_TOLERANCE_DX = 2e-3, 2e-5
 """Sweeps end when no contact changes its velocity by more than this [cells/s]: stacks that creep
 slower stand. An impact is one event, whose error stays in the motion."""
 JACOBI_SWEEPS, JACOBI_IMPACT_SWEEPS, JACOBI_SUPPORTED_IMPACT_SWEEPS = 100, 400, 2000
-"""The same of Jacobi sweeps on cards, which converge more slowly …"""
+"""The same of Jacobi sweeps on GPUs, which converge more slowly …"""
 JACOBI_TOLERANCE_DX = 1e-4
 """… and end where they change less [cells/s]."""
 
-# ---------------------------------------------------------------- what is lost inside of matter
+# ---------------------------------------------------------------- what is lost inside of material
 
 BRANCHES = 2
-"""Maxwell branches of lossy matter."""
+"""Maxwell branches of lossy material."""
 LOSS_BAND_LOW_RATIO, LOSS_BAND_HIGH_RATIO = 0.2, 2.0
 """Frequencies between which their loss factor is flat, over that of the slowest vibration [-]: an
 impact lasts two to three of its half periods."""
 MIN_LOSS_FACTOR = 0.02
 """A smaller loss factor takes less than the grid does, and gets no branches [-]."""
 GRID_LOSS_FACTOR = 3.2
-"""Loss factor of contact and transfers themselves in a blow, times the square of the number of
-cells across what is struck [-]; measured on balls of 8 to 12 cells (decision 26)."""
+"""Loss factor of contact and transfers themselves in an impact, times the square of the number of
+cells across what is struck [-]; measured on balls of 8 to 12 cells (decision 26).
+"""
 MIN_CELLS_FOR_GRID_LOSS = 8.0
 """Where there are fewer cells across, it is taken as with so many [-]."""
 
@@ -292,11 +301,11 @@ MIN_FRAME_VOLUME_FRACTION = 0.15
 """A node of a soft field is a rigid frame's where the frame has this share of the volume [-]. Never
 a half: a face on a grid plane would be a tie."""
 FRAME_LAYER_DX = 2.0
-"""Soft matter this near to a frame [cells] says how dense what it holds is."""
+"""Soft material this near to a frame [cells] says how dense what it holds is."""
 FRAME_REACH_DX = 6.0
 """Particles of a frame farther than this from what it holds [cells] never share a node with it."""
 PARTICLES_PER_CELL = 8
-"""Of matter at rest."""
+"""Of material at rest."""
 JOINT_GAP_FRACTION_PER_STEP = 0.2
 """Share of a joint's gap that is closed in a step [-]."""
 GRIP_RADIUS_DX = 2.0
@@ -343,7 +352,7 @@ OVERLAP_DEPTH_PARTICLES = 8
 OUT_OF_BLOCK_FRACTION = 0.1
 """Share of a field's particles outside of their blocks from which it is sorted with others [-]."""
 POLL_INTERVAL_S = 0.2
-"""Computing time after which Python looks whether somebody wants to stop [s]."""
+"""Computing time after which Python checks for interrupts [s]."""
 
 
 def constants_by_name() -> dict[str, int | float]:
@@ -363,5 +372,5 @@ def cpp_definitions(given: Mapping[str, int | float]) -> str:
 
 
 def cpp_type(value: int | float) -> str:
-    """Give the C++ type of a number."""
+    """Return the C++ type of a number."""
     return "int" if isinstance(value, int) else "double"

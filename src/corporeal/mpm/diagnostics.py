@@ -1,4 +1,4 @@
-"""What every engine shows of itself: each particle now, and what the ledger adds up to.
+"""Diagnostics of all engines: current particles, and sums of the ledger.
 
 An engine gives its particles and their sums, as it keeps them. What is the same in all of them is
 here: rigid bodies, which are known better than their particles, the energy in springs, and the
@@ -170,4 +170,4 @@ class EngineReadout(ABC):
 
     @abstractmethod
     def _booked(self) -> EngineLedger:
-        """Give the ledger, with everything entered that has happened."""
+        """Return the ledger, with everything entered that has happened."""

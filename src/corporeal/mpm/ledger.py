@@ -1,4 +1,4 @@
-"""What a run has done so far: impulses, work, losses and contacts, for the reference engine."""
+"""Ledger of impulses, work, losses and contacts of the reference engine."""
 
 from dataclasses import dataclass, fields
 
@@ -96,7 +96,7 @@ class EngineLedger:
             else:
                 self.pair_impulse[a, c] += size[mine].sum()
                 self.pair_impulse[c, a] = self.pair_impulse[a, c]
-            if not np.any(size[mine] > 0.0):  # a wall that only drags on a liquid is no blow
+            if not np.any(size[mine] > 0.0):  # a wall that only drags on a liquid is no impact
                 continue
             if np.isnan(self.first_contact[a, c]):
                 place = np.average(point[mine], axis=0, weights=size[mine])

@@ -1,7 +1,7 @@
-"""Substances: the one table of what bodies are made of, which every engine reads.
+"""Table of substances, shared by all engines.
 
 What a problem says of each particle (E, ν, σ_y, φ, c …) becomes here, once, the numbers that laws
-and loops read (μ, λ, the cone, the rate of forgetting …). Particles carry the number of a row.
+and loops read (μ, λ, the cone, the FLIP damping rate …). Particles carry the number of a row.
 """
 
 from dataclasses import dataclass, fields
@@ -56,13 +56,13 @@ class MaterialTable:
     """T of the slower one [s]"""
     fast_time: Float[np.ndarray, " M"]
     """T of the faster one [s]"""
-    forgetting: Float[np.ndarray, " M"]
+    flip_damping_rate: Float[np.ndarray, " M"]
     """Rate at which what the grid cannot see is forgotten [1/s]: one for all that share the
     particle's field, or momentum would not be kept; ``VAST`` where APIC is kept."""
     density: Float[np.ndarray, " M"]
     """ρ [kg/m³]"""
     rigid: Bool[np.ndarray, " M"]
-    swells: Bool[np.ndarray, " M"]
+    uses_mean_dilatation: Bool[np.ndarray, " M"]
     """Whether pressure comes from a mean dilatation: in fields all stiff in bulk."""
 
     @classmethod
@@ -83,7 +83,7 @@ class MaterialTable:
             rows[mine, _DAMPING_COLUMN] = rows[mine, _DAMPING_COLUMN].max()
             rows[mine, _MEAN_DILATATION_COLUMN] = bulky[mine].all()
         table, row_of_particle = _unique_rows(rows)
-        kinds = {"body": np.int64, "law": np.int64, "rigid": bool, "swells": bool}
+        kinds = {"body": np.int64, "law": np.int64, "rigid": bool, "uses_mean_dilatation": bool}
         named = zip(_COLUMNS, table.T, strict=True)
         return cls(**{n: c.astype(kinds.get(n, np.float64)) for n, c in named}), row_of_particle
 
@@ -120,7 +120,7 @@ class MaterialTable:
     @property
     def mean_bulk(self) -> Float[np.ndarray, " M"]:
         """Part of λ that acts on the mean dilatation [Pa]; 0 where none does."""
-        return np.where(self.swells, self.lam - LOCAL_BULK_RATIO * self.mu, 0.0)
+        return np.where(self.uses_mean_dilatation, self.lam - LOCAL_BULK_RATIO * self.mu, 0.0)
 
     @property
     def wave_speed(self) -> Float[np.ndarray, " M"]:
@@ -133,7 +133,7 @@ class MaterialTable:
         return np.isin(self.law, laws.PLASTIC_LAWS)
 
     def numbers(self, row: Int[np.ndarray, " P"], dt: float) -> YieldParameters:
-        """Give what return maps read of the material of some particles, by their rows.
+        """Return what return maps read of the material of some particles, by their rows.
 
         Args:
             row: Of each particle.
@@ -145,14 +145,14 @@ class MaterialTable:
         return YieldParameters(drag=drag, **{name: getattr(self, name)[row] for name in given})
 
     def of_bodies(self, bodies: list[int]) -> "MaterialTable":
-        """Give the rows of some bodies."""
+        """Return the rows of some bodies."""
         mine = np.isin(self.body, bodies)
         return MaterialTable(*(getattr(self, name)[mine] for name in _COLUMNS))
 
 
 _COLUMNS = tuple(f.name for f in fields(MaterialTable))
 _DAMPING_COLUMN, _RIGID_COLUMN, _MEAN_DILATATION_COLUMN = map(
-    _COLUMNS.index, ("forgetting", "rigid", "swells")
+    _COLUMNS.index, ("flip_damping_rate", "rigid", "uses_mean_dilatation")
 )
 
 
@@ -162,7 +162,7 @@ def _body_rows(problem: Problem, number: int) -> Float[np.ndarray, "P C"]:
     _refuse_unknown(body)
     count, none = len(body.position), np.zeros(len(body.position))
     if body.rigid:
-        row = {"forgetting": none + VAST, "rigid": none + 1.0}
+        row = {"flip_damping_rate": none + VAST, "rigid": none + 1.0}
     else:
         mu, lam = (np.asarray(value) for value in lame_parameters(body.young, body.poisson))
         sand = np.isin(body.law, laws.GRANULAR_LAWS)
@@ -181,7 +181,7 @@ def _body_rows(problem: Problem, number: int) -> Float[np.ndarray, "P C"]:
             "apex": np.where(sand, apex, 0.0),
             "consistency": none if body.consistency is None else body.consistency,
             "flow_index": none + 1.0 if body.flow_index is None else body.flow_index,
-            "forgetting": np.where(affine, VAST, rate),
+            "flip_damping_rate": np.where(affine, VAST, rate),
             **_branch_columns(body, mu, lam),
         }
     row |= {"body": np.full(count, number), "density": body.density}
@@ -211,8 +211,7 @@ def _refuse_unknown(body: Body) -> None:
     if unknown:
         menu = ", ".join(f"{law.value} ({law.name.lower()})" for law in Law)
         raise SimulationError(
-            f"{body.name!r} follows a law of number {unknown[0]}, which there is not. Give one of: "
-            f"{menu}."
+            f"{body.name!r} has the unknown law {unknown[0]}. Give one of: {menu}."
         )
 
 

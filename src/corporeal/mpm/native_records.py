@@ -1,4 +1,4 @@
-"""Records: structs that Python lays out and C++ text works in, each declared once.
+"""Structs shared by Python and C++, each declared once.
 
     TETHER = Record("Tether", ("double *", "anchor rate"), ("double[3]", "arm"), ("int", "count"))
     rows = np.zeros(4, TETHER.dtype)

@@ -1,4 +1,4 @@
-"""What an engine is given and what it gives back: the contract that every engine keeps."""
+"""Interface of engines: the problem, and the results."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ class WettedSurface:
     point: Float[np.ndarray, "N 3"]
     """[m]"""
     normal: Float[np.ndarray, "N 3"]
-    """Unit, out of the matter."""
+    """Unit, out of the material."""
 
 
 NO_WIND_FACES = WindFaces(np.zeros((0, 3)), np.zeros(0, np.int64))
@@ -102,11 +102,11 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
-    rounding: Float[np.ndarray, "S2 Columns"] = field(
+    curvature: Float[np.ndarray, "S2 Columns"] = field(
         default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
-    """How the surface curves at those points, see ``types.ROUNDING``; none: they are corners."""
-    wetted: WettedSurface | None = None
+    """How the surface curves at those points, see ``types.CURVATURE_COLUMNS``; none: they are corners."""
+    wetted_surface: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None
     wind: Wind | None = None
@@ -158,37 +158,42 @@ class Problem:
     courant: float = COURANT
     """Largest fraction of a cell that a wave may cross in one step."""
     bonds: tuple[tuple[int, int], ...] = ()
-    """Rigid inclusions: (frame, soft), a rigid and a deformable body of one object. The frame holds
+    """Rigid inclusions: (inclusion, soft), a rigid and a deformable body of one object. The first holds
     what of the soft body lies inside it, and the two are never in contact."""
     joints: tuple[Joint, ...] = ()
     """Between rigid bodies."""
-    apart: tuple[tuple[int, int], ...] = ()
+    excluded_pairs: tuple[tuple[int, int], ...] = ()
     """Bodies of one object that are never in contact with each other."""
-    rolling: Float[np.ndarray, "BW BW"] | None = None
+    rolling_resistance: Float[np.ndarray, "BW BW"] | None = None
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
-    blows: Float[np.ndarray, "BW BW 5"] | None = None
-    """How e of every pair changes with the speed of a blow: at which it is ``restitution``
-    [m/s], slope [s/m], exponent [-], least and most: see ``physics.backing.bounce_at``. None: it is
-    the same at all speeds."""
+    restitution_law: Float[np.ndarray, "BW BW 5"] | None = None
+    """How e of every pair changes with the speed of an impact: at which it is ``restitution``
+    [m/s], slope [s/m], exponent [-], least and most: see ``physics.impact_support.restitution_at_speed``. None: it is
+    the same at all speeds.
+    """
 
     @property
-    def never_touch(self) -> tuple[tuple[int, int], ...]:
+    def all_excluded_pairs(self) -> tuple[tuple[int, int], ...]:
         """Pairs without contact: what is bonded or apart, and two prescribed motions."""
         prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
-        return (*self.bonds, *self.apart, *combinations(prescribed, 2))
+        return (*self.bonds, *self.excluded_pairs, *combinations(prescribed, 2))
 
     @property
-    def blow_laws(self) -> Float[np.ndarray, "BW BW 5"]:
-        """``blows``, or that no restitution changes."""
-        if self.blows is not None:
-            return np.asarray(self.blows, float)
+    def restitution_law_of_pair(self) -> Float[np.ndarray, "BW BW 5"]:
+        """``restitution_law``, or that no restitution changes."""
+        if self.restitution_law is not None:
+            return np.asarray(self.restitution_law, float)
         return np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (*np.shape(self.restitution), 1))
 
     @property
-    def brakes(self) -> bool:
+    def has_rolling_resistance(self) -> bool:
         """Whether anything brakes what rolls."""
-        return self.contact == "multi" and self.rolling is not None and bool(self.rolling.any())
+        return (
+            self.contact == "multi"
+            and self.rolling_resistance is not None
+            and bool(self.rolling_resistance.any())
+        )
 
 
 @dataclass(frozen=True)
@@ -271,10 +276,40 @@ class StepStatistics:
     """[s]"""
 
 
+@dataclass(frozen=True)
+class BodySplit:
+    """Which body becomes several, and how."""
+
+    body: int
+    """Its first piece keeps its number, the others come after all bodies there are."""
+    piece: Int[np.ndarray, " P"]
+    """Which piece each of its particles belongs to."""
+    position: Float[np.ndarray, "P 3"]
+    """Of its particles now [m]."""
+    velocity: Float[np.ndarray, "P 3"]
+    """[m/s]"""
+    surfaces: tuple[Float[np.ndarray, "_ 3"], ...]
+    """Points on the surface of each piece, now [m]."""
+
+    @property
+    def count(self) -> int:
+        """Number of pieces."""
+        return len(self.surfaces)
+
+
 @runtime_checkable
 class Engine(Protocol):
-    """A solver of one problem."""
+    """What every solver of one problem does.
 
+    Its class is called with the problem and with ``threads``, how many threads it may use on the
+    CPU (None: as it likes), and stands in ``ENGINES``. What only some engines can do follows as
+    protocols of methods alone; ``engines.require`` asks for them.
+    """
+
+    name: str
+    """Its key in ``ENGINES``."""
+    problem: Problem
+    """What it solves now."""
     steps: StepStatistics
 
     @property
@@ -290,6 +325,14 @@ class Engine(Protocol):
                 body, when, and what to do. The state is that of the last good check.
 
         """
+        ...
+
+    def stable_step(self) -> float:
+        """Largest stable step now [s]."""
+        ...
+
+    def step(self, dt: float) -> None:
+        """Take one step of dt [s]."""
         ...
 
     def snapshot(self) -> Snapshot:
@@ -322,7 +365,7 @@ class Engine(Protocol):
 
 
 @runtime_checkable
-class InteractiveEngine(Engine, Protocol):
+class InteractiveEngine(Protocol):
     """An engine whose bodies can be touched from outside between two advances.
 
     A touch reaches the particles within two cells of a point, less with the distance; of a rigid
@@ -339,7 +382,9 @@ class InteractiveEngine(Engine, Protocol):
         """
         ...
 
-    def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+    def attach_spring(
+        self, body: int, point: Vector | None, target: Vector, stiffness: float
+    ) -> None:
         """Pull on a body by a damped spring until released.
 
         Args:
@@ -354,22 +399,72 @@ class InteractiveEngine(Engine, Protocol):
         """
         ...
 
-    def weigh(self, gravity: Vector) -> None:
-        """Let gravity be another from now on [m/s²]; what that adds to the potential is work.
+    def grip_point(
+        self, body: int, position: Float[np.ndarray, "P 3"]
+    ) -> Float[np.ndarray, "3"] | None:
+        """Where a body is held now [m]; None: it is not held.
 
-        Raises:
-            UserError: It is not finite, or the engine cannot change it.
+        Args:
+            body: Which.
+            position: Of all particles, as ``snapshot`` gives it now [m].
 
         """
         ...
 
-    def blow(self, body: int, wind: Vector) -> None:
+
+@runtime_checkable
+class VariableLoadEngine(Protocol):
+    """An engine whose gravity and winds can be changed between two advances."""
+
+    def set_gravity(self, gravity: Vector) -> None:
+        """Let gravity be another from now on [m/s²]; what that adds to the potential is work.
+
+        Raises:
+            UserError: It is not finite.
+
+        """
+        ...
+
+    def set_wind(self, body: int, wind: Vector) -> None:
         """Let the air about a body move with a velocity from now on [m/s].
 
         Raises:
-            UserError: There is no such body, it was given no faces for the wind, the velocity is
-                not finite, or the engine cannot change it.
+            UserError: There is no such body, it was given no faces for the wind, or the velocity
+                is not finite.
 
+        """
+        ...
+
+
+@runtime_checkable
+class BodyAddingEngine(Protocol):
+    """An engine whose problem can get more bodies between two advances."""
+
+    def with_added_bodies(self, problem: Problem) -> Engine:
+        """Return an engine that goes on from here with more bodies; nothing changes for the others.
+
+        Gravity, winds and what is held stay as they are. The potential energy of the new bodies is
+        booked as work from outside.
+
+        Args:
+            problem: With the new bodies, as they start, after all others.
+
+        """
+        ...
+
+
+@runtime_checkable
+class BodySplittingEngine(Protocol):
+    """An engine whose rigid bodies can break into rigid pieces between two advances.
+
+    When and into what is decided outside, from ``snapshot`` and the first contacts of ``measure``.
+    """
+
+    def with_split_body(self, split: BodySplit) -> Engine:
+        """Return an engine that goes on from here with a body in pieces.
+
+        Mass, momentum and the books are shared out among them (``splitting``). What held the body
+        lets go.
         """
         ...
 

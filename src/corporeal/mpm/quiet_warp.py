@@ -1,4 +1,4 @@
-"""Warp, started without its word on stderr that there is no graphics card."""
+"""Start of Warp without its warning on stderr if there is no GPU."""
 
 import os
 

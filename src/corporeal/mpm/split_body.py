@@ -1,4 +1,4 @@
-"""A rigid body becomes several: mass, momentum and the books are shared out, nothing is added."""
+"""Splitting of a rigid body; mass, momentum and ledgers are conserved."""
 
 from dataclasses import dataclass, replace
 
@@ -6,28 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.types import CURVATURE_COLUMNS
-from corporeal.mpm.problem import Body, Problem
-
-
-@dataclass(frozen=True)
-class BodySplit:
-    """Which body, and how."""
-
-    body: int
-    """Its first piece keeps its number, the others come after all bodies there are."""
-    piece: Int[np.ndarray, " P"]
-    """Which piece each of its particles belongs to."""
-    position: Float[np.ndarray, "P 3"]
-    """Of its particles now [m]."""
-    velocity: Float[np.ndarray, "P 3"]
-    """[m/s]"""
-    surfaces: tuple[Float[np.ndarray, "_ 3"], ...]
-    """Points on the surface of each piece, now [m]."""
-
-    @property
-    def count(self) -> int:
-        """Number of pieces."""
-        return len(self.surfaces)
+from corporeal.mpm.problem import Body, BodySplit, Problem
 
 
 @dataclass(frozen=True)
@@ -41,7 +20,7 @@ class ParentMap:
 
     @classmethod
     def of(cls, problem: Problem, split: BodySplit) -> "ParentMap":
-        """Say who comes of whom."""
+        """Return who comes of whom."""
         body, more = problem.bodies[split.body], split.count - 1
         mass = np.bincount(split.piece, body.volume * body.density, split.count)
         share = np.ones(len(problem.bodies) + more)
@@ -91,8 +70,12 @@ def split_problem(problem: Problem, split: BodySplit) -> Problem:
         bodies=(*bodies, *pieces[1:]),
         friction=problem.friction[np.ix_(rows, rows)],
         restitution=problem.restitution[np.ix_(rows, rows)],
-        blows=None if problem.blows is None else problem.blows[np.ix_(rows, rows)],
-        rolling=None if problem.rolling is None else problem.rolling[np.ix_(rows, rows)],
+        restitution_law=None
+        if problem.restitution_law is None
+        else problem.restitution_law[np.ix_(rows, rows)],
+        rolling_resistance=None
+        if problem.rolling_resistance is None
+        else problem.rolling_resistance[np.ix_(rows, rows)],
     )
 
 
@@ -106,8 +89,8 @@ def _piece_body(body: Body, split: BodySplit, k: int) -> Body:
         position=split.position[mine],
         velocity=split.velocity[mine],
         surface=split.surfaces[k],
-        rounding=np.zeros((0, CURVATURE_COLUMNS)),
-        wetted=None,
+        curvature=np.zeros((0, CURVATURE_COLUMNS)),
+        wetted_surface=None,
         **{name: None if value is None else value[mine] for name, value in held.items()},
     )
 
@@ -115,7 +98,7 @@ def _piece_body(body: Body, split: BodySplit, k: int) -> Body:
 def can_split(problem: Problem, body: int) -> bool:
     """Whether a body is rigid and by itself: nothing holds it, hangs on it or blows at it."""
     one = problem.bodies[body]
-    tied = {b for pair in (*problem.bonds, *problem.apart) for b in pair}
+    tied = {b for pair in (*problem.bonds, *problem.excluded_pairs) for b in pair}
     tied |= {b for joint in problem.joints for b in (joint.first, joint.second)}
     alone = one.wind is None and one.path is None and one.tether is None
     return one.rigid and alone and body not in tied and problem.contact == "multi"

@@ -1,4 +1,4 @@
-"""All particles of a problem in one list: what never changes of them, and what does."""
+"""Particles of a problem: constant properties and state."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
@@ -21,8 +21,8 @@ from corporeal.mpm.problem import Body, Problem
 def surface_curvature(body: Body) -> Float[np.ndarray, "S 12"]:
     """How a body's surface curves at its points; zeros where it was not told."""
     rows = np.zeros((len(body.surface), CURVATURE_COLUMNS))
-    if len(body.rounding) == len(body.surface):
-        rows[:, : body.rounding.shape[1]] = body.rounding
+    if len(body.curvature) == len(body.surface):
+        rows[:, : body.curvature.shape[1]] = body.curvature
     return rows
 
 
@@ -47,8 +47,8 @@ class ParticleConstants:
     """Position at the start, from the body's centre [m]."""
     surface: tuple[Float[np.ndarray, "S 3"], ...]
     """Surface points of each body at the start, from its centre [m]."""
-    rounding: tuple[Float[np.ndarray, "S 12"], ...]
-    """How the surface curves there at the start: see ``types.ROUNDING``; zero where it does not."""
+    curvature: tuple[Float[np.ndarray, "S 12"], ...]
+    """How the surface curves there at the start: see ``types.CURVATURE_COLUMNS``; zero where it does not."""
 
     @classmethod
     def of(cls, problem: Problem) -> "ParticleConstants":
@@ -73,7 +73,7 @@ class ParticleConstants:
                 [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
             ),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
-            rounding=tuple(surface_curvature(b) for b in bodies),
+            curvature=tuple(surface_curvature(b) for b in bodies),
         )
 
     @cached_property
@@ -85,7 +85,7 @@ class ParticleConstants:
     @cached_property
     def facets(self) -> tuple[BodyFacets, ...]:
         """Flat faces of each body at the start, from its centre."""
-        both = zip(self.surface, self.rounding, strict=True)
+        both = zip(self.surface, self.curvature, strict=True)
         return tuple(facets_of(points, rows) for points, rows in both)
 
     @cached_property
@@ -96,7 +96,7 @@ class ParticleConstants:
     @cached_property
     def edged(self) -> tuple[bool, ...]:
         """Whether each body is known to have edges."""
-        return tuple(map(has_edges, self.rounding))
+        return tuple(map(has_edges, self.curvature))
 
     @cached_property
     def spacing(self) -> Float[np.ndarray, " B"]:
@@ -106,14 +106,14 @@ class ParticleConstants:
     def thinness(self, cell: float) -> tuple[int, ...]:
         """How thin each body is against a cell [m], were it rigid: see ``rigid.thinness``."""
         if cell not in self._thin:
-            both = zip(self.surface, self.rounding, strict=True)
+            both = zip(self.surface, self.curvature, strict=True)
             self._thin[cell] = tuple(rigid.thinness(p, rows[:, :3], cell) for p, rows in both)
         return self._thin[cell]
 
     def thin_places(self, cell: float) -> tuple[Bool[np.ndarray, " S"], ...]:
         """Surface points of each body where it is thin and not as a whole, were it rigid."""
         if cell not in self._places:
-            both = zip(self.surface, self.rounding, strict=True)
+            both = zip(self.surface, self.curvature, strict=True)
             self._places[cell] = tuple(rigid.thin_places(p, r[:, :3], cell) for p, r in both)
         return self._places[cell]
 
@@ -167,14 +167,14 @@ class ParticleConstants:
         return self.substances.wave_speed[self.kind]
 
     @cached_property
-    def forgetting(self) -> Float[np.ndarray, " P"]:
+    def flip_damping_rate(self) -> Float[np.ndarray, " P"]:
         """Rate at which what the grid cannot see is forgotten [1/s]: see ``MaterialTable``."""
-        return self.substances.forgetting[self.kind]
+        return self.substances.flip_damping_rate[self.kind]
 
     @cached_property
-    def swells(self) -> Bool[np.ndarray, " P"]:
+    def uses_mean_dilatation(self) -> Bool[np.ndarray, " P"]:
         """Whether pressure comes from a mean dilatation."""
-        return self.substances.swells[self.kind]
+        return self.substances.uses_mean_dilatation[self.kind]
 
     @cached_property
     def mean_bulk(self) -> Float[np.ndarray, " P"]:
@@ -262,10 +262,10 @@ class State:
     motion: Float[np.ndarray, "P 3 3"]
     plastic: Float[np.ndarray, " P"]
     volume: Float[np.ndarray, " P"]
-    """v_c of granular matter."""
-    relief: Float[np.ndarray, " P"]
+    """v_c of granular material."""
+    log_volume_ratio: Float[np.ndarray, " P"]
     """ln of the mean volume J̄ that a particle's pressure follows over its own J; see
-    ``Matter.swells``."""
+    ``Matter.uses_mean_dilatation``."""
     branch_strain: Float[np.ndarray, "K 2 3 3"]
     """What Maxwell branches remember, of the particles that have any (``Matter.relaxing``) …"""
     branch_volume: Float[np.ndarray, "K 2"]
@@ -296,7 +296,7 @@ class State:
             motion=identity,
             plastic=np.zeros(count),
             volume=np.zeros(count),
-            relief=np.zeros(count),
+            log_volume_ratio=np.zeros(count),
             branch_strain=np.zeros((len(matter.relaxing), 2, 3, 3)),
             branch_volume=np.zeros((len(matter.relaxing), 2)),
             centre=matter.centre,
@@ -358,7 +358,10 @@ class State:
         Whatever they were strained by there was long ago: their branches have forgotten it.
         """
         mine, body = self._of(matter, bodies)
-        taken = {name: mine for name in ("position", "F", "motion", "plastic", "volume", "relief")}
+        taken = {
+            name: mine
+            for name in ("position", "F", "motion", "plastic", "volume", "log_volume_ratio")
+        }
         taken |= {name: body for name in ("centre", "rotation")}
         found = {}
         for name, chosen in taken.items():
@@ -369,6 +372,34 @@ class State:
         found["branch_strain"] = np.where(fresh[:, None, None, None], 0.0, self.branch_strain)
         found["branch_volume"] = np.where(fresh[:, None], 0.0, self.branch_volume)
         return replace(self, **found).follow_rigid(matter)
+
+    def continuing(
+        self,
+        before: tuple[ParticleConstants, "State"],
+        matter: ParticleConstants,
+        whole: Collection[int],
+    ) -> "State":
+        """Return this state with whole bodies, and the time, as they were in another problem.
+
+        Args:
+            before: The other problem's matter and state, in which these bodies have their numbers.
+            matter: Of this one.
+            whole: Bodies that are the same in both.
+
+        """
+        then, there = before
+        mine, body = self._of(matter, whole)
+        theirs, their_body = there._of(then, whole)
+        found = {"time": there.time}
+        for name in vars(self).keys() - found.keys():
+            here, chosen, taken = np.array(getattr(self, name)), mine, theirs
+            if name in ("centre", "speed", "spin_momentum", "rotation"):
+                chosen, taken = body, their_body
+            elif name in ("branch_strain", "branch_volume"):
+                chosen, taken = mine[matter.relaxing], theirs[then.relaxing]
+            here[chosen] = getattr(there, name)[taken]
+            found[name] = here
+        return replace(self, **found)
 
     def _of(
         self, matter: ParticleConstants, bodies: Collection[int]
@@ -385,7 +416,7 @@ class State:
 def elastic_stress(matter: ParticleConstants, state: State) -> Float[np.ndarray, "P 3 3"]:
     """Kirchhoff stress τ of each particle's own strain [Pa]; none in rigid bodies.
 
-    Without what ``mean_pressure`` adds where matter is nearly incompressible.
+    Without what ``mean_pressure`` adds where material is nearly incompressible.
     """
     m, s = matter, state
     out = np.zeros_like(s.F)
@@ -410,27 +441,29 @@ def branch_energy(matter: ParticleConstants, memory: BranchMemory) -> Float[np.n
 
 def mean_pressure(matter: ParticleConstants, state: State) -> Float[np.ndarray, " P"]:
     """Kirchhoff pressure of the mean dilatation [Pa]; 0 where pressure is one's own."""
-    m, k, out = matter, matter.swells, np.zeros(len(state.F))
-    mean = np.maximum(mean_volume(state.F[k], state.relief[k]), MIN_VOLUME_RATIO)
+    m, k, out = matter, matter.uses_mean_dilatation, np.zeros(len(state.F))
+    mean = np.maximum(mean_volume(state.F[k], state.log_volume_ratio[k]), MIN_VOLUME_RATIO)
     out[k] = laws.mean_pressure(m.law[k], mean, m.mean_bulk[k])
     return out
 
 
 def mean_volume(
-    F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+    F: Float[np.ndarray, "P 3 3"], log_volume_ratio: Float[np.ndarray, " P"]
 ) -> Float[np.ndarray, " P"]:
-    """J̄ = J exp(relief) [-]."""
-    return determinant(F) * np.exp(relief)
+    """J̄ = J exp(log_volume_ratio) [-]."""
+    return determinant(F) * np.exp(log_volume_ratio)
 
 
 def strain_energy(
-    matter: ParticleConstants, F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+    matter: ParticleConstants,
+    F: Float[np.ndarray, "P 3 3"],
+    log_volume_ratio: Float[np.ndarray, " P"],
 ) -> Float[np.ndarray, " P"]:
-    """Elastic energy of each particle [J] at F and the relief of its mean dilatation."""
+    """Elastic energy of each particle [J] at F and the log_volume_ratio of its mean dilatation."""
     m, out = matter, np.zeros(len(F))
-    soft, k = ~m.rigid, m.swells
+    soft, k = ~m.rigid, m.uses_mean_dilatation
     out[soft] = laws.psi(m.law[soft], F[soft], m.mu[soft], m.own_lam[soft])
-    out[k] += laws.psi_mean(m.law[k], mean_volume(F[k], relief[k]), m.mean_bulk[k])
+    out[k] += laws.psi_mean(m.law[k], mean_volume(F[k], log_volume_ratio[k]), m.mean_bulk[k])
     return m.volume * out
 
 

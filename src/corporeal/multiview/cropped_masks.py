@@ -1,4 +1,4 @@
-"""Which pictures end before what masks show does."""
+"""Pictures whose masks are cut off at the border."""
 
 import numpy as np
 from jaxtyping import Bool

@@ -1,4 +1,4 @@
-"""What two cameras must agree on: epipolar geometry.
+"""Epipolar geometry of two cameras.
 
 Hartley & Zisserman, "Multiple View Geometry", 2nd ed., chapters 9, 11, 12 and 14.
 """

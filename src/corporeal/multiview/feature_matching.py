@@ -1,4 +1,4 @@
-"""Points that two pictures share, found without knowing how the cameras stood (ORB features).
+"""Feature matching of two pictures without poses (ORB).
 
 Rublee et al., "ORB: an efficient alternative to SIFT or SURF" (ICCV 2011).
 """

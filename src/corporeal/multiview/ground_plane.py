@@ -1,4 +1,4 @@
-"""The plane that objects stand on, found among points of which half may be anywhere.
+"""Robust estimation of the ground plane from points.
 
 RANSAC (Fischler & Bolles 1981) with the truncated loss of MSAC (Torr & Zisserman 2000), refined by
 reweighted least squares. Points below a plane speak against it: nothing is under a floor.
@@ -156,7 +156,7 @@ def _is_ground_plane(points: np.ndarray, plane: GroundPlane, search: GroundSearc
 
 
 def _stands_out(points: np.ndarray, plane: GroundPlane, search: GroundSearch) -> bool:
-    """Tell whether many more points are on it than just above it."""
+    """Return whether many more points are on it than just above it."""
     heights = points @ plane.normal - plane.offset
     half = max(3 * plane.thickness, FINAL_TOLERANCE_RADII * search.radius)
     on = (np.abs(heights) < half).sum()
@@ -165,7 +165,7 @@ def _stands_out(points: np.ndarray, plane: GroundPlane, search: GroundSearch) ->
 
 
 def _carries(points: np.ndarray, plane: GroundPlane, search: GroundSearch) -> bool:
-    """Tell whether objects are above it, and most of them above the patch that was seen of it."""
+    """Return whether objects are above it, and most of them above the patch that was seen of it."""
     heights = points @ plane.normal - plane.offset
     half = max(3 * plane.thickness, FINAL_TOLERANCE_RADII * search.radius)
     flat = points @ np.linalg.svd(plane.normal[None])[2][1:].T

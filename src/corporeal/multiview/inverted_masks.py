@@ -1,7 +1,7 @@
-"""Masks that are black where they should be white.
+"""Detection of inverted masks.
 
 Programs differ in what white means. Inverted masks contradict neither the pictures nor one another:
-together they show the room, from all sides, without the thing.
+together they show the surroundings without the object.
 """
 
 import numpy as np
@@ -11,18 +11,19 @@ from corporeal.core.types import Camera
 from corporeal.multiview.viewed_region import find_viewed_region
 
 MIN_INVERTED_BORDER_FRACTION = 0.5
-"""Share of a picture's border, and of what all cameras look at, in the median picture: a thing that
-pictures cut off on most of their sides is still where they look, and what has a hole there is not
-cut off on most."""
+"""Share of a picture's border, and of what all cameras look at, in the median picture: an object
+that pictures cut off on most of their sides is still where they look, and what has a hole there is
+not cut off on most.
+"""
 CENTRE_HALF_SIDE_WIDTHS = 0.05
 """Half the side of the square about what all cameras look at, in widths of the picture."""
 
 
 def are_masks_inverted(masks: Bool[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> bool:
-    """Tell whether most masks hold most of the borders, and not what all cameras look at.
+    """Return whether most masks hold most of the borders, and not what all cameras look at.
 
     Args:
-        masks: Which pixels are said to be on things.
+        masks: Which pixels are said to be on objects.
         cameras: Of the pictures.
 
     """

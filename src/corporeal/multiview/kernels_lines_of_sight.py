@@ -1,4 +1,4 @@
-"""Compiled: which cells lines of sight pass through."""
+"""Traversal of grid cells by lines of sight. Compiled by numba."""
 
 import numba
 import numpy as np

@@ -1,4 +1,4 @@
-"""Lenses that bend straight lines, and pictures straightened.
+"""Lens distortion, and undistortion of pictures.
 
 Brown's model as OpenCV and COLMAP have it: at x, y = the direction over its depth, r² = x² + y²,
 
@@ -130,7 +130,7 @@ def _intrinsics_without_border(lens: Lens) -> np.ndarray:
 
 
 def _is_covered(lens: Lens, K: np.ndarray, edge: np.ndarray) -> bool:
-    """Tell whether the edge of the picture, and so all of it, lies within the photograph."""
+    """Return whether the edge of the picture, and so all of it, lies within the photograph."""
     with np.errstate(over="ignore", invalid="ignore"):
         xy = _pixel_directions(K, edge)
         r = np.linspace(0, np.sqrt((xy**2).sum(axis=1).max()), 64)

@@ -1,9 +1,9 @@
-"""Lines of sight from cameras to points that they saw: what lies on the way is empty.
+"""Free space along lines of sight from cameras to observed points.
 
 Structure from motion says of each of its points which pictures show it. Labatut, Pons and Keriven,
 "Efficient multi-view reconstruction of large-scale scenes using interest points, Delaunay
 triangulation and graph cuts" (ICCV 2007), carve space by that; here it empties what silhouettes
-cannot: the mouth of a vessel that nobody photographed from the side.
+cannot: the mouth of a vessel seen from above.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,8 @@ MIN_EMPTYING_VIEWS = 2
 """Views whose lines must pass through a cell for it to be empty."""
 SAME_FACE_DISTANCE_CELLS = 8.0
 """Points that are nearer together [cells], and neighbours in a picture, are taken to be on one
-face: what is before it is empty, too. Things that stand on a face show points of their own."""
+face: what is before it is empty, too. Objects that stand on a face show points of their own.
+"""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class LinesOfSight:
         side: float,
         shape: tuple[int, ...],
     ) -> Bool[np.ndarray, "X Y Z"]:
-        """Tell which cubic cells lines of several views pass through, or next to.
+        """Return which cubic cells lines of several views pass through, or next to.
 
         Args:
             cameras: Of the views.

@@ -1,4 +1,4 @@
-"""How large a reconstruction is in metres, and who said so."""
+"""Metric scale of a reconstruction, with its source."""
 
 import math
 from collections.abc import Sequence
@@ -11,13 +11,13 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Note, NoteKind, Vector
 
 SCALE_DOUBT_FACTOR = 2.0
-"""Factor between two scales from which on somebody must be told."""
+"""Ratio of two scales that is reported."""
 MIN_METRES_PER_UNIT = 1e-6
 """Metres that one unit of a file may be, and the inverse of the most."""
 PLAUSIBLE_SCENE_EXTENTS_M = (2e-3, 50.0)
 """Extents of whole scenes [m]."""
 NEUTRAL_SCENE_SIZE_M = 0.5
-"""Stands in for the size of a scene of which nobody knows it [m]."""
+"""Assumed size of a scene of unknown scale [m]."""
 
 
 MeasuredDistance = tuple[float, float, float, float, float, float, float]
@@ -32,11 +32,12 @@ class MetricScale:
     """[m]"""
     source: Literal["file", "distance", "extent", "nobody"]
     """The file's kind is in metres; two points whose distance is known; how large such an object is
-    as a rule, which somebody or a model said; a neutral stand-in."""
+    as a rule, stated or by a model; a default size.
+    """
     reason: str
     """In one sentence."""
     warnings: tuple[str, ...] = ()
-    """What speaks against it, in sentences."""
+    """Contradictions, in sentences."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ def choose_metric_scale(
 ) -> MetricScale:
     """Return the scale that the best witness names, and what the others say against it.
 
-    In this order: a distance that somebody measured, sizes of objects that somebody stated, a file
-    in metres, how large such objects usually are, and for want of all a neutral stand-in.
+    In this order: a measured distance, stated sizes of objects, a file in metres, how large such
+    objects usually are, and for want of all a neutral stand-in.
 
     Args:
         distance: Of two points, or of cameras.
@@ -111,7 +112,7 @@ def scale_from_extents(extents: Sequence[ObjectExtent]) -> MetricScale | None:
 
 def _stand_in_scale(size: float) -> MetricScale:
     scale = _scale_ratio(NEUTRAL_SCENE_SIZE_M, size, "The whole")
-    words = f"Nobody knows how large it is: the whole was taken as {NEUTRAL_SCENE_SIZE_M:g} m."
+    words = f"Its scale is unknown: the whole was assumed to be {NEUTRAL_SCENE_SIZE_M:g} m."
     warning = Note(
         f"{words} State the size of one object with --extent NAME=METRES.", NoteKind.ASSUMED
     )
@@ -123,8 +124,8 @@ def _contradiction_text(believed: MetricScale, other: MetricScale) -> str:
         return ""
     ratio = other.metres_per_unit / believed.metres_per_unit
     return Note(
-        f"The scale may be wrong. Otherwise told: {other.reason} By that everything would be "
-        f"{ratio:.3g} times as large. Say which is right with --metres-per-unit, or with --extent "
+        f"The scale may be wrong. Contradicting: {other.reason} By that everything would be "
+        f"{ratio:.3g} times as large. Set it with --metres-per-unit, or with --extent "
         "NAME=METRES.",
         NoteKind.GRAVE,
     )
@@ -139,7 +140,7 @@ def scale_from_file(kind: str) -> MetricScale:
 
     Poses from pictures alone (COLMAP, and most splats trained on them) have no such unit.
     """
-    return MetricScale(1.0, "file", f"{kind}: its unit was taken for one metre.")
+    return MetricScale(1.0, "file", f"{kind}: its unit was assumed to be one metre.")
 
 
 def scale_from_distance(a: Vector, b: Vector, metres: float) -> MetricScale:
@@ -158,7 +159,7 @@ def scale_from_distance(a: Vector, b: Vector, metres: float) -> MetricScale:
 def stated_metric_scale(
     per_unit: float | None, points: MeasuredDistance | None, who: str
 ) -> MetricScale | None:
-    """Return what somebody measured of a file's unit; None: nobody did.
+    """Return the measured unit of a file; None: not measured.
 
     Args:
         per_unit: What one unit is [m].
@@ -170,7 +171,9 @@ def stated_metric_scale(
 
     """
     if per_unit is not None and points is not None:
-        raise UserError("--metres-per-unit and --known-distance say the same. Give one of them.")
+        raise UserError(
+            "--metres-per-unit and --known-distance exclude each other. Give one of them."
+        )
     if points is not None:
         found = scale_from_distance(points[:3], points[3:6], points[6])
         per_unit, reason = found.metres_per_unit, f"{found.reason[:-1]}, {who} said."
@@ -187,7 +190,7 @@ def stated_metric_scale(
 
 
 def implausible_scene_extent(extent: float) -> str | None:
-    """Say that a whole scene is too large or too small to be one that people stand objects in.
+    """State that a whole scene is too large or too small to be one that people stand objects in.
 
     Args:
         extent: Of the whole [m].
@@ -197,7 +200,7 @@ def implausible_scene_extent(extent: float) -> str | None:
     if low <= extent <= high:
         return None
     return Note(
-        f"The whole would be {extent:.3g} m large, which is hardly meant. State the size of one "
+        f"The whole would be {extent:.3g} m large, which is implausible. State the size of one "
         "object with --extent NAME=METRES, or what one unit is with --metres-per-unit.",
         NoteKind.ASSUMED,
     )

@@ -1,4 +1,4 @@
-"""The shape of a surface known by points alone: which way it faces, and how thick objects are."""
+"""Normals and thickness of surfaces given as points."""
 
 import numpy as np
 from jaxtyping import Float, Int

@@ -65,7 +65,7 @@ CameraChange = Callable[[Camera], Camera]
 
 @dataclass(frozen=True)
 class PoseConsistency:
-    """What the pictures say of the poses."""
+    """Agreement of poses with the pictures."""
 
     by: str
     """What was compared: "matches", "silhouettes" or "nothing"."""
@@ -104,7 +104,7 @@ def check_pose_consistency(
     """Compare poses with pictures: some seconds at most, whatever their number and size."""
     eyes = np.array([c.world_from_camera[:3, 3] for c in views.cameras])
     if np.ptp(eyes, axis=0).max(initial=0) == 0:
-        words = "All cameras stand at one place: turning a camera shows no depth."
+        words = "All cameras are at one place: rotation alone gives no depth."
         return PoseConsistency("nothing", 0, 0.0, float("nan"), words, hopeless=True)
     if words := _image_size_doubt(views.cameras):
         return PoseConsistency("nothing", 0, 0.0, float("nan"), words, hopeless=True)
@@ -164,8 +164,8 @@ def _points_behind_doubt(pairs: list[_MatchedPair], cameras: tuple[Camera, ...])
     if ahead >= 0.5:
         return None
     return (
-        f"The poses put {1 - ahead:.0%} of what the pictures share behind the cameras. Look along "
-        "which axis the cameras look in the file's convention, and at the signs of their places."
+        f"The poses put {1 - ahead:.0%} of what the pictures share behind the cameras. Check the "
+        "viewing axis of the file's convention, and the signs of the positions."
     )
 
 
@@ -298,8 +298,8 @@ def _lens_doubt(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> str |
     else:
         return None
     return (
-        f"What the pictures share would meet more closely if {found}. Correct the file, or take "
-        "shapes and sizes for distorted."
+        f"What the pictures share would meet more closely if {found}. Correct the file, or expect "
+        "distorted shapes and sizes."
     )
 
 
@@ -324,13 +324,13 @@ def _with_other_lens(
 
 
 def _masks_doubt(masks: np.ndarray, cameras: tuple[Camera, ...]) -> str | None:
-    """Say where masks do not belong to pictures that agree with their poses."""
+    """Return where masks do not belong to pictures that agree with their poses."""
     share = silhouette_coherence(masks, cameras)
     if share >= INCOHERENT_HULL_FRACTION:
         return None
     return (
-        f"The poses agree with the pictures, but only {share:.0%} of the masks fit together. Look "
-        "whether they belong to these pictures, and are white where the objects are."
+        f"The poses agree with the pictures, but only {share:.0%} of the masks fit together. Check "
+        "that they belong to these pictures, and are white where the objects are."
     )
 
 
@@ -358,5 +358,5 @@ def _doubt_text(found: str, error: float, change: str | None) -> str:
             f"{first}They would if {change}: is the file in the wrong convention?", NoteKind.GRAVE
         )
     return Note(
-        f"{first}Look at the order of the pictures, the focal length and the poses.", NoteKind.GRAVE
+        f"{first}Check the order of the pictures, the focal length and the poses.", NoteKind.GRAVE
     )

@@ -1,4 +1,4 @@
-"""Statistics that a few wrong values do not move."""
+"""Robust statistics."""
 
 SIGMA_PER_MEDIAN_DEVIATION = 1.4826
 """Standard deviation over the median distance from the median, where errors are normal:

@@ -1,4 +1,4 @@
-"""Whether silhouettes can be those of one object: the coherence of their visual hull.
+"""Silhouette coherence of the visual hull.
 
 Under the right poses the part of space that all silhouettes allow fills each of them. After
 Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration under circular motion"
@@ -57,7 +57,7 @@ def is_outside_silhouettes(
     beside: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
     looking: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places are outside, by how many views look there and see them beside masks."""
+    """Return which places are outside, by how many views look there and see them beside masks."""
     return (beside >= MIN_OUTSIDE_VIEWS) & (beside >= MIN_OUTSIDE_VIEWS_FRACTION * looking)
 
 

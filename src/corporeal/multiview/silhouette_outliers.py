@@ -30,7 +30,7 @@ MAX_DENYING_VIEWS_FRACTION = 0.1
 MIN_VIEWS_FOR_OUTLIERS = 8
 """Views from which on a hull tells one that is wrong from those that are right."""
 MAX_OUTLIER_VIEWS_FRACTION = 0.34
-"""Share of the views from which on nobody can say which ones are right."""
+"""Share of the views from which on the right ones are ambiguous."""
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,14 @@ class OutlierBounds:
 
 
 GIVEN_MASK_BOUNDS = OutlierBounds(0.75, 0.95)
-"""Of masks that somebody gave. Measured on real sets: overlaps of right views 0.9 and more, of
-wrong ones 0.7 and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
+"""Of given masks. Measured on real sets: overlaps of right views 0.9 and more, of wrong ones 0.7
+and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
 """
 GROWN_MASK_BOUNDS = OutlierBounds(0.85, 0.8)
-"""Of grown masks that are believed, which vary more: of 17 sets of one thing every right view is
-filled by 0.91 and more; views that show another thing on the same floor by 0.68 and less, at
-overlaps of 0.8 and less."""
+"""Of grown masks that are accepted, which vary more: of 17 sets of one object every right view is
+filled by 0.91 and more; views that show another object on the same floor by 0.68 and less, at
+overlaps of 0.8 and less.
+"""
 
 
 def outlier_views(

@@ -1,4 +1,4 @@
-"""How well the silhouettes of closed surfaces agree with masks."""
+"""Overlap of rendered silhouettes and masks."""
 
 from collections.abc import Sequence
 

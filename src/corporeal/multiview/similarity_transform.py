@@ -1,4 +1,4 @@
-"""A whole scene turned, scaled and moved as one: points, cameras and Gaussians alike.
+"""Similarity transforms of a scene: points, cameras and Gaussians.
 
 A similarity is a matrix (4, 4) that takes x to s R x + t: its upper left is s R, its last column t.
 Pictures before and after are the same, but that depths are multiplied by s.
@@ -46,14 +46,14 @@ def decompose_similarity(matrix: SimilarityMatrix) -> SimilarityTransform:
 
     """
     if not np.isfinite(matrix).all():
-        raise ValueError("A matrix with numbers that are not finite is no similarity.")
+        raise ValueError("A matrix with numbers that are not finite is not a similarity.")
     scale = float(np.cbrt(np.linalg.det(matrix[:3, :3])))
     if not scale > 0:
-        raise ValueError(f"A matrix of determinant {scale**3:.3g} is no similarity.")
+        raise ValueError(f"A matrix of determinant {scale**3:.3g} is not a similarity.")
     rotation = matrix[:3, :3] / scale
     off = np.abs(rotation @ rotation.T - np.eye(3)).max()
     if not off < SIMILARITY_TOLERANCE or not np.allclose(matrix[3], [0, 0, 0, 1]):
-        raise ValueError(f"A matrix that shears by {off:.3g} is no similarity.")
+        raise ValueError(f"A matrix that shears by {off:.3g} is not a similarity.")
     x, y, z = matrix[:3, 3].tolist()
     return SimilarityTransform(rotation, scale, (x, y, z))
 

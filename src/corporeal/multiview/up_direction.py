@@ -1,4 +1,4 @@
-"""Which way is up, as cameras tell: people hold them level, or upright, turned by a quarter.
+"""Up direction from cameras, which people hold level or upright.
 
 One axis of a camera that is held level is horizontal, however far it looks up or down: its x-axis,
 or its y-axis where it is held upright. Up is the direction to which of every camera one of the two
@@ -65,18 +65,15 @@ def estimate_up_direction(cameras: tuple[Camera, ...]) -> UpDirection:
     flat = np.where(rolled[:, None], above, right)
     up, weight = _perpendicular_to_most(flat, start)
     share, more = np.linalg.eigvalsh(_axis_spread(flat, weight))[1:]
-    # Of parallel x-axes on less than half a circle nobody knows whether they are all level or all
-    # upright: an arm that swings up is a ring of cameras on their sides.
+    # Of parallel x-axes on less than half a circle it is ambiguous whether they are all level or
+    # all upright: an arm that swings up is a ring of cameras on their sides.
     parallel = np.linalg.eigvalsh(right.T @ right / len(right))[1] < MIN_SPANNED_FRACTION
     alike = parallel and np.linalg.norm(back.mean(axis=0)) > HALF_RING_MEAN_AXIS_LENGTH
     warnings = []
     if share < MIN_SPANNED_FRACTION or alike or len(cameras) < MIN_CAMERAS_FOR_AGREEMENT:
         up = _mean_image_up(above.mean(axis=0), right, np.ones(len(right)))
         rolled = np.zeros(len(right), bool)
-        warnings.append(
-            "The cameras stand side by side and look the same way: how far they look up or down "
-            "is not known from them."
-        )
+        warnings.append("The cameras are side by side and parallel: their pitch is unknown.")
         error, sure = np.inf, 0.2
     else:
         tilt = float(np.sqrt(weight @ np.square(flat @ up) / weight.sum()))
@@ -161,5 +158,5 @@ def _choose_up_sign(
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     stand = float(np.mean((eyes - centre) @ up))
     why = "look straight up or down" if steep >= 0.5 else "were held upright"
-    words = [f"The cameras {why}: they were taken to be above what they look at."]
+    words = [f"The cameras {why}: they were assumed to be above what they look at."]
     return np.copysign(1.0, stand) * up, words

@@ -1,4 +1,4 @@
-"""From which side of what cameras look at there is no photograph."""
+"""Coverage of the views, and gaps around the object."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,11 +16,13 @@ UNSEEN_HALF_GAP_DEG = 180.0
 """Such an angle from which on a flat face that looks to its middle is in no photograph [deg]."""
 
 MIN_COVERED_ANGLE_DEG = 90.0
-"""Angle of the circle around a thing, below which outlines leave its depth open [deg]: between two
-tangent cones that are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is."""
+"""Angle of the circle around an object, below which outlines leave its depth open [deg]: between
+two tangent cones that are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is.
+"""
 STEEP_VIEW_ELEVATION_DEG = 45.0
-"""Height of a camera over the floor's horizon from which on a thing that stands there seems no
-deeper than it is by its height [deg]."""
+"""Height of a camera over the floor's horizon from which on an object that stands there seems no
+deeper than it is by its height [deg].
+"""
 
 
 @dataclass(frozen=True)
@@ -47,14 +49,14 @@ def unseen_side_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
     if not MIN_UNSEEN_GAP_DEG <= gap.angle < UNSEEN_HALF_GAP_DEG:
         return None
     return Note(
-        f"Between {gap.ends} lie {gap.angle:.0f}° from which nobody looked: what "
-        "faces there is made up. Photograph that side next time.",
+        f"Between {gap.ends} lie {gap.angle:.0f}° without photographs: surfaces facing there are "
+        "invented. Photograph that side next time.",
         NoteKind.GRAVE,
     )
 
 
 def unseen_half_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
-    """Say that half of the circle around it was not photographed, if so.
+    """State that half of the circle around it was not photographed, if so.
 
     Args:
         cameras: Of the photographs.
@@ -66,7 +68,7 @@ def unseen_half_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
         return None
     return Note(
         f"Its shape is known from one side only: between {gap.ends} lie {gap.angle:.0f}° of the "
-        "circle around it, from which nobody looked, and all that faces there is made up. "
+        "circle around it, without photographs, and all surfaces facing there are invented. "
         "Photograph it from there, too.",
         NoteKind.GRAVE,
     )
@@ -78,7 +80,7 @@ def widest_unseen_angle(cameras: Sequence[Camera]) -> float:
 
 
 def depth_doubt_text(cameras: Sequence[Camera]) -> str | None:
-    """Say in a clause that photographs leave open how deep things are; None: they do not.
+    """Return in a clause that photographs leave open how deep objects are; None: they do not.
 
     Args:
         cameras: Of the photographs.
@@ -92,7 +94,7 @@ def depth_doubt_text(cameras: Sequence[Camera]) -> str | None:
         return None
     return (
         f"all photographs were taken from {seen:.0f}° of the circle around it, and none from "
-        "steeply above, so that nothing says how deep it is"
+        "steeply above, so that its depth is unknown"
     )
 
 

@@ -1,4 +1,4 @@
-"""What a set of cameras looks at."""
+"""Region viewed by a set of cameras."""
 
 from dataclasses import dataclass
 
@@ -64,7 +64,7 @@ def _centre_ray(camera: Camera) -> tuple[Float[np.ndarray, "3"], float]:
 
 
 def _is_in_image(camera: Camera, points: np.ndarray) -> Bool[np.ndarray, " N"]:
-    """Tell which points are within a camera's picture."""
+    """Return which points are within a camera's picture."""
     turn, eye = camera.world_from_camera[:3, :3], camera.world_from_camera[:3, 3]
     x, y, depth = camera.K @ ((points - eye) @ turn).T
     inside = (x >= 0) & (x < camera.width * depth) & (y >= 0) & (y < camera.height * depth)

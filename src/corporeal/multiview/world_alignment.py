@@ -1,4 +1,4 @@
-"""The frame of a reconstruction: +z up, the floor at z = 0, what the cameras look at above it.
+"""World alignment of a reconstruction: +z up, floor at z = 0.
 
 Poses from pictures have no up, and trained splats neither. It is taken from what the file says,
 else from the cameras, which people hold level, else from what programs usually write and how
@@ -18,7 +18,7 @@ from corporeal.multiview.up_direction import UpDirection, estimate_up_direction
 from corporeal.multiview.viewed_region import ViewedRegion, find_viewed_region
 
 MIN_STRONG_CONFIDENCE = 0.6
-"""From here on a direction is believed unless something stronger speaks."""
+"""From here on a direction is accepted unless something stronger speaks."""
 MAX_FLOOR_TILTS_RAD = {True: np.radians(12), False: np.radians(35)}
 """How far a floor's normal may be from an up that is strong, or not."""
 FILE_UP_CONFLICT_RAD = np.radians(20)
@@ -34,14 +34,14 @@ MAX_POINT_DISTANCE_RADII = 2.0
 UNDERSIDE_PERCENTILE = 0.5
 """Percentile of heights that is the underside of objects, where no point is astray."""
 UNUSUAL_AXIS_EXTRA_ROLL_RAD = np.radians(10)
-"""How much farther objects may roll from the usual axis than from another to be believed there."""
+"""How much farther objects may roll from the usual axis than from another to be accepted there."""
 MAX_STANDING_ROLL_RAD = np.radians(12)
 """Objects that roll less were, and their frame was a little tilted."""
 MIN_UP_CONFIDENCE = 0.3
 """An up less sure than this says nothing of where a floor is, if there are cameras above it."""
 UNIT_Z: Vector = (0.0, 0.0, 1.0)
 USUAL_UP_AXIS_WORDS = "the axis that programs usually write as up"
-UNKNOWN_UP_NOTE = "No camera and no file says what is up: look at the result, and say it with --up."
+UNKNOWN_UP_NOTE = "The up direction is unknown: check the result, and set it with --up."
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,9 @@ class WorldAlignment:
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str
-    """"plane": it is in the pictures; "person": somebody said it; "objects": their lowest points;
-    "nothing": there are none."""
+    """"plane": it is in the pictures; "person": stated by the user; "objects": their lowest points;
+    "nothing": there are none.
+    """
     radius: float
     """Of the scene, in the file's unit."""
     reason: str
@@ -66,7 +67,7 @@ class WorldAlignment:
 
 @dataclass(frozen=True)
 class StatedFrame:
-    """What somebody says of the frame; it goes before all else."""
+    """The frame stated by the user, which has priority."""
 
     up: Vector | None = None
     floor: float | None = None
@@ -103,7 +104,7 @@ def align_world(
         z_up: Whether the file says that its +z is up.
         of_objects: Points that are on objects for sure, as masks tell; None: unknown.
         usual: What is up in such files as a rule; for want of cameras.
-        stated: What somebody says.
+        stated: Stated by the user.
 
     """
     points, of_objects = (
@@ -161,10 +162,10 @@ def _up_from_file_or_cameras(cameras: tuple[Camera, ...], z_up: bool) -> _UpEvid
         return _up_by_file(seen)
     many = f"{len(cameras)} cameras"
     reason = (
-        f"Up is what {many} agree on, which people hold level (to {_degrees_text(seen.error)})."
+        f"Up is the consensus of {many}, which people hold level (to {_degrees_text(seen.error)})."
     )
     if not np.isfinite(seen.error):
-        reason = "Up is the mean of what is up in the pictures."
+        reason = "Up is the mean of the pictures' up directions."
     return _UpEvidence(seen.up, "cameras", seen.sure, seen.error, reason, seen.warnings)
 
 
@@ -186,14 +187,12 @@ def _up_from_resting(told: _UpEvidence, points: np.ndarray) -> _UpEvidence:
     fell = (
         "" if axis is usual else f" Up is not {USUAL_UP_AXIS_WORDS}: the objects would fall over."
     )
-    reason = (
-        f"Up is as the objects would rest on a floor, {_degrees_text(stood.tilt)} from an axis."
-    )
+    reason = f"Up is by the resting pose of the objects, {_degrees_text(stood.tilt)} from an axis."
     return _UpEvidence(stood.up, "rest", 0.5, np.inf, reason + fell, (_unknown_up_note(fell),))
 
 
 def _unknown_up_note(more: str) -> Note:
-    """Say that nobody said what is up, and more of it."""
+    """Note that the up direction is unknown."""
     return Note(UNKNOWN_UP_NOTE + more, NoteKind.ASSUMED)
 
 
@@ -205,7 +204,7 @@ def _other_axes(up: np.ndarray) -> list[np.ndarray]:
 
 def _up_by_file(seen: UpDirection | None) -> _UpEvidence:
     z = _unit_vector(UNIT_Z)
-    said = _UpEvidence(z, "file", 0.9, 0.0, "Up is +z, as such files have it.", ())
+    said = _UpEvidence(z, "file", 0.9, 0.0, "Up is +z, as usual for such files.", ())
     if seen is None or seen.sure < 0.8:
         return said
     angle = _angle_between(seen.up, z)
@@ -213,9 +212,9 @@ def _up_by_file(seen: UpDirection | None) -> _UpEvidence:
         return said
     words = (
         f"Such files have +z up, but the cameras, which agree with each other, were held level "
-        f"about a direction {np.degrees(angle):.0f}° from it. The cameras were believed."
+        f"about a direction {np.degrees(angle):.0f}° from it. The cameras were used."
     )
-    reason = f"Up is what the cameras agree on (to {_degrees_text(seen.error)})."
+    reason = f"Up is the consensus of the cameras (to {_degrees_text(seen.error)})."
     return _UpEvidence(
         seen.up, "cameras", seen.sure * 0.8, seen.error, reason, (*seen.warnings, words)
     )
@@ -288,13 +287,13 @@ def _world_alignment(
             :, 2
         ]
         height, by = float(np.percentile(heights, UNDERSIDE_PERCENTILE)), "objects"
-        reason = "No floor was found: it is put below the lowest points."
-        warnings.append(f"{reason} Things that float above it will fall.")
+        reason = "No floor was found: it was placed below the lowest points."
+        warnings.append(f"{reason} Objects that float above it will fall.")
     else:
         height, by, reason = (
             float(centre[2]),
             "nothing",
-            "There are no points to put a floor below.",
+            "There are no points to place a floor below.",
         )
     shift = -np.array([centre[0], centre[1], height])
     return WorldAlignment(

@@ -1,6 +1,6 @@
-"""A scene in memory: load it, prepare it, pose it for an engine, or play it; no run's folder.
+"""In-memory pipeline: load, prepare and simulate a scene without a run's folder.
 
-``pipeline.run`` does the same verbs in a folder and keeps what each one made.
+``pipeline.run`` runs the same stages in a folder and stores their results.
 """
 
 import shutil
@@ -9,30 +9,28 @@ import weakref
 from collections.abc import Callable
 from pathlib import Path
 
-from corporeal.core import registry
 from corporeal.core.errors import UserError
 from corporeal.core.types import Scene
 from corporeal.discretization.build_model import build_model
 from corporeal.geometry.gaussian_transforms import UpAxisChoice, chosen_up_axis
 from corporeal.io.input_files import input_kind
-from corporeal.mpm.problem import ENGINES, Engine, Problem
+from corporeal.mpm.problem import Problem
 from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.segment import segment
-from corporeal.pipeline.stages.simulate import SimulateConfig, simulate
+from corporeal.pipeline.stages.simulate import simulate
 from corporeal.scene.vessel_contents import add_vessel_contents
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
 Progress = Callable[[float, str], None]
 DEFAULT_SETTINGS = Settings()
-DEFAULT_ENGINE = SimulateConfig().engine
 
 
 def no_progress(fraction: float, words: str) -> None:
-    """Tell nobody about progress."""
+    """Ignore progress."""
 
 
 def load_scene(
@@ -42,14 +40,14 @@ def load_scene(
 
     Args:
         path: The file or the folder.
-        config: What counts as one object, sizes, duration.
+        config: Grouping into objects, sizes, duration.
         up: Which axis of a mesh points up; auto: as its file states, or as its kind usually has it.
 
     Returns:
         The scene in metres, +Z up, nothing below the floor at z = 0.
 
     Raises:
-        UserError: There is no such file, or it cannot be used; photographs and splats hold no
+        UserError: The file does not exist or cannot be used; photographs and splats hold no
             objects before they are reconstructed.
 
     """
@@ -60,7 +58,7 @@ def load_scene(
     if kind != "model":
         raise UserError(
             f"{path} holds a {'splat' if kind == 'splat' else 'set of photographs'}, which must be "
-            "reconstructed first: corporeal.run([path], folder) does everything."
+            "reconstructed first: use corporeal.run([path], folder)."
         )
     return assemble([path], config, chosen_up_axis(up))
 
@@ -70,15 +68,15 @@ def prepare_scene(
 ) -> PreparedScene:
     """Find the parts of a scene, give them materials, and fill them with material points.
 
-    The verbs describe, segment, ground and fill, in this order.
+    The stages describe, segment, ground and fill, in this order.
 
     Args:
         scene: From ``load_scene`` or ``build_scene``.
-        settings: Of the four verbs.
-        progress: Told the fraction done and what is being done.
+        settings: Of the four stages.
+        progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: A setting makes no sense, or the scene cannot be filled.
+        UserError: A setting is invalid, or the scene cannot be filled.
 
     """
     progress(0.0, "recognising")
@@ -94,9 +92,9 @@ def prepare_scene(
 
 
 def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS) -> Problem:
-    """Return what an engine solves: bodies in the order of the scene's objects, and the floor.
+    """Return the problem for an engine: bodies in the order of the scene's objects, and the floor.
 
-    An object that is partly rigid gives a soft body and then each rigid frame.
+    A partly rigid object gives a soft body, followed by its rigid frames.
 
     Args:
         prepared: The scene.
@@ -105,21 +103,6 @@ def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS)
     """
     contact = settings.simulate.contact
     return build_model(prepared.scene, prepared.particles, prepared.field, contact).problem
-
-
-def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE) -> Engine:
-    """Return an engine at time 0 of a problem.
-
-    Args:
-        problem: From ``pose_problem``, or built by hand.
-        engine: A name from ``corporeal.ENGINES``.
-
-    Raises:
-        UnknownChoiceError: There is no such engine.
-        UserError: The engine does not work on this machine, or cannot solve the problem.
-
-    """
-    return registry.load_backend("engine", engine, ENGINES)(problem)
 
 
 def simulate_scene(
@@ -132,13 +115,13 @@ def simulate_scene(
 
     Args:
         scene: As built or loaded, or prepared already.
-        settings: Of the verbs from describe to simulate.
-        folder: Where the frames go; None: a temporary folder that goes with the result.
-        progress: Told the fraction done and what is being done.
+        settings: Of the stages from describe to simulate.
+        folder: Folder of the frames; None: a temporary folder that is deleted with the result.
+        progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: A setting makes no sense, or the scene cannot be filled.
-        SimulationError: The state became impossible.
+        UserError: A setting is invalid, or the scene cannot be filled.
+        SimulationError: The simulation diverged.
 
     """
     ready = scene if isinstance(scene, PreparedScene) else prepare_scene(scene, settings, progress)

@@ -1,8 +1,8 @@
-"""What objects may weigh: over all ways they may be, all ranges, and what their meshes leave open.
+"""Posterior of objects' masses over hypotheses, ranges and the uncertainty of their meshes.
 
-Draws of the whole scene are weighed; an estimate of an object's mass made without the library
-(``MassEvidence``) gives each draw a weight, and sets no value: whatever is chosen was drawn, lies
-inside measured ranges, and its parts fit each other.
+Importance sampling: samples of the whole scene are weighted by an estimate of each object's mass
+made without the library (``MassEvidence``). The estimate sets no value: the chosen values were
+sampled together inside measured ranges.
 """
 
 from collections import Counter
@@ -50,21 +50,22 @@ from corporeal.vlm.interpret_answers import leaf_parts
 from corporeal.vlm.mass_evidence import mass_contradiction, mass_likelihood
 
 SAMPLES_PER_SCENE = 400
-"""Of the whole scene, where nobody says how many."""
+"""Default number of samples of the whole scene."""
 INTERVAL_LOW_QUANTILE, INTERVAL_HIGH_QUANTILE = 0.05, 0.95
-"""Quantiles of the draws that bound an interval."""
+"""Quantiles of the samples that bound an interval."""
 MAX_VOLUME_LOG_STD = log(2.0)
 MAX_DRAWS_PER_OBJECT = 200
-"""Draws of an object, until one is as likely as outside evidence leaves it."""
+"""Maximum samples of an object when rejection sampling by its mass evidence."""
 OPEN_MESH_VOLUME_LOG_STD = 0.3
-"""Standard deviation of the logarithm of the volume of what is not closed [-]."""
+"""Standard deviation of the logarithm of the volume of a mesh that is not closed [-]."""
 MODELLED_SHAPE_VOLUME_LOG_STD = 0.12
-"""Standard deviation of the logarithm of what a modelled shape encloses, over what things of its
-name do [-], of a part that only its name describes: the distance that half of 18 solid things of
+"""Standard deviation of the logarithm of what a modelled shape encloses, over what objects of its
+name do [-], of a part that only its name describes: the distance that half of 18 solid objects of
 published mass and known material exceed, in deviations, beside what their densities have (decision
-110)."""
+110).
+"""
 NAME_ONLY_SOURCES = ("metadata", "unknown")
-"""Who tells of a part that nobody looked at."""
+"""Sources of a part that was not seen in pictures."""
 NESTED_SHARE_FIELDS = ("volume_share", "surface_share", "inside", "inner_share", "missing")
 """What pieces of one mesh take up of it: it fits only what the same answer says of the others."""
 FITTED_DRAW_REASON = "This draw from the range fits the estimate of the object's mass best."
@@ -72,17 +73,17 @@ FITTED_DRAW_REASON = "This draw from the range fits the estimate of the object's
 
 @dataclass(frozen=True)
 class WeighedInventory:
-    """What is believed of a scene once its masses have been weighed."""
+    """Description of a scene, updated by the posterior of its masses."""
 
     inventory: Inventory
-    """With the way that each part is taken to be."""
+    """With the chosen hypothesis of each part."""
     mixtures: tuple[MassPosterior, ...]
     """One per object."""
 
 
 @dataclass(frozen=True)
 class SceneSample:
-    """One consistent set of ways and values."""
+    """One consistent set of hypotheses and values."""
 
     inventory: Inventory
     field: MaterialField
@@ -91,7 +92,7 @@ class SceneSample:
 
 
 class MassSampler:
-    """Weighs one scene as it is described; measures its meshes once."""
+    """Computes masses of a described scene; measures its meshes once."""
 
     def __init__(self, scene: Scene, parts: Parts, grounding: GroundConfig, seed: int) -> None:
         self.scene, self.parts, self.grounding, self.seed = scene, parts, grounding, seed
@@ -106,7 +107,7 @@ class MassSampler:
         ]
         self.owner = [p.object for p in parts.catalogue]
         self.doubts = [volume_log_std(m) for m in self.members]
-        # What is called by no word for a thing differs from no others of its name.
+        # no scatter among objects of its name if no name is known
         called = [bool(head_terms(name_tokens(o.class_name))) for o in scene.objects]
         self.forms = [shape_log_std(m) if called[self.owner[m.part]] else 0.0 for m in self.members]
         self.volume = sum(m.volume for m in self.members)
@@ -116,7 +117,7 @@ class MassSampler:
         self._built: dict[Hashable, dict[int, MeasuredPart]] = {}
 
     def mass(self, inventory: Inventory) -> float:
-        """Return the mass of the whole scene, described so [kg]."""
+        """Return the mass of the described scene [kg]."""
         return float(self.of(ground(self.scene, self.parts, inventory, self.grounding)).sum())
 
     def of(
@@ -138,7 +139,7 @@ class MassSampler:
         return found
 
     def _as_built(self, field: MaterialField) -> dict[int, MeasuredPart]:
-        """Return parts that are not as they are drawn, once for each set of these.
+        """Return the parts that differ from their meshes, for each set of hypotheses.
 
         What is loose fills what holds it; walls are as thick then as in the first field in which
         just these parts are loose. What is hollow is closed below what is soft.
@@ -159,9 +160,9 @@ class MassSampler:
         return self._built[loose, closed]
 
     def draw(self, inventory: Inventory, number: int) -> SceneSample:
-        """Draw a way for each part, values from their ranges, and what the meshes leave open.
+        """Sample a hypothesis for each part, values from their ranges, and the errors of the meshes.
 
-        Where several answers were given, draws are of each in turn.
+        Where several answers were given, samples cycle through them.
         """
         rng = np.random.default_rng([self.seed, number])
         library, floor = self.grounding.library, self.grounding.floor
@@ -169,8 +170,10 @@ class MassSampler:
         field = ground(self.scene, self.parts, words, self.grounding)
         field = sample_material_field(field, self.owner, rng, library, floor)
         away = [float(rng.normal(-d / 2, d)) if d else 0.0 for d in self.doubts]
-        judged = rng.normal(size=len(away))  # whoever takes one part for too thin takes all so
-        hands = rng.normal(size=len(self.scene.objects))  # who draws one part plump draws all so
+        judged = rng.normal(size=len(away))  # the error of thickness is common to all parts
+        hands = rng.normal(
+            size=len(self.scene.objects)
+        )  # the error of shape is common to all parts
         shaped = [
             float(f * hands[self.owner[m.part]])
             if field.words[m.part].answered_by in NAME_ONLY_SOURCES
@@ -187,11 +190,10 @@ class MassSampler:
 def volume_log_std(member: MeasuredPart) -> float:
     """Return how far the mesh leaves the enclosed volume open: deviation of its logarithm [-].
 
-    Of a scan h / (√3 τ) (``scan_volume_log_deviation``). It is more often too large than too
-    small, by half of that, .29 h / τ: fusing views thickens what is thin (boards of 16 mm that
-    were reconstructed on cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ
-    both). Where somebody who looked says how much too thick it is, that stands instead of this
-    mean.
+    Of a scan h / (√3 τ) (``scan_volume_log_deviation``). It is more often too large than too small,
+    by half of that, .29 h / τ: fusing views thickens what is thin (boards of 16 mm that were
+    reconstructed on cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ both).
+    A stated ratio of thickness replaces this mean.
     """
     found = 0.0 if member.closed else OPEN_MESH_VOLUME_LOG_STD
     edge = scan_edge_length(member.body)
@@ -203,9 +205,9 @@ def volume_log_std(member: MeasuredPart) -> float:
 
 
 def shape_log_std(member: MeasuredPart) -> float:
-    """Return how far a modelled shape is from the thing's: deviation of its logarithm [-].
+    """Return how far a modelled shape is from the object's: deviation of its logarithm [-].
 
-    A scan's shape is the thing's; what its edges leave open is its ``volume_log_std``.
+    A scan's shape is the object's; what its edges leave open is its ``volume_log_std``.
     """
     return 0.0 if scan_edge_length(member.body) > 0 else MODELLED_SHAPE_VOLUME_LOG_STD
 
@@ -213,17 +215,19 @@ def shape_log_std(member: MeasuredPart) -> float:
 def ground_with_mass_posterior(
     scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig
 ) -> MaterialField:
-    """Choose every value, as ``ground`` does; where a model was asked, weigh its answers first.
+    """Choose every value as ``ground`` does; where a model was asked, update by its mass estimates first.
 
-    Where none was, a mass that the name of a weight states chooses how it is made.
+    Otherwise the mass in the name of a weight chooses its construction.
 
     Raises:
         UserError: As ``ground``.
 
     """
-    if not inventory.transcript:  # nothing but ranges is open
+    if not inventory.transcript:  # only ranges are uncertain
         return ground(scene, parts, _with_named_mass(scene, parts, inventory, grounding), grounding)
-    ours = replace(grounding, field="")  # draws are of our ranges, whoever decides in the end
+    ours = replace(
+        grounding, field=""
+    )  # samples use the library's ranges, whoever chooses the values
     believed = sample_masses(
         MassSampler(scale_to_life_size(scene), parts, ours, 0), inventory, SAMPLES_PER_SCENE
     )
@@ -234,7 +238,7 @@ def ground_with_mass_posterior(
 def _with_named_mass(
     scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig
 ) -> Inventory:
-    """Let weights be made in the way that fits the mass which their name states best."""
+    """Choose the construction of weights that fits the mass in their name best."""
     found = [construction_hypotheses(scene, k, words) for k, words in enumerate(inventory.objects)]
     if not any(found):
         return inventory
@@ -258,7 +262,7 @@ def _with_description(inventory: Inventory, number: int, words: PartDescription)
 
 
 def sample_masses(scale: MassSampler, inventory: Inventory, samples: int) -> WeighedInventory:
-    """Draw what each object may be and weigh, and choose among the ways by outside evidence."""
+    """Sample hypotheses and masses of each object, and choose among them by mass evidence."""
     draws = [scale.draw(inventory, number) for number in range(samples)]
     placed = scale.of(ground(scale.scene, scale.parts, inventory, scale.grounding))
     objects, mixtures = [], []
@@ -277,10 +281,10 @@ def sample_masses(scale: MassSampler, inventory: Inventory, samples: int) -> Wei
 
 
 def total_mass_posterior(mixtures: Sequence[MassPosterior]) -> MassPosterior:
-    """Return what several objects weigh together; of one, what it weighs.
+    """Return the total mass of one or more objects.
 
-    The interval of a sum is at most the sum of the intervals. There is outside evidence of the sum
-    where there is some of every object.
+    The interval of a sum is at most the sum of the intervals. The sum has mass evidence if every
+    object has.
     """
     if len(mixtures) == 1:
         return mixtures[0]
@@ -302,7 +306,7 @@ def total_mass_posterior(mixtures: Sequence[MassPosterior]) -> MassPosterior:
 
 
 def _total(said: Sequence[MassEvidence], count: int) -> MassEvidence | None:
-    """Add up what was said of ``count`` objects, where something was said of each."""
+    """Add up the evidence of ``count`` objects, if there is some of each."""
     if not said or len(said) < count:
         return None
     low, likely, high = (
@@ -317,11 +321,11 @@ def sample_hypotheses(
     rng: np.random.Generator,
     library: str,
 ) -> Inventory:
-    """Draw a way for every part, as often as outside evidence leaves it likely.
+    """Sample a hypothesis for every part from the posterior.
 
     Args:
         inventory: What was described.
-        mixtures: What its objects may weigh, in their order; empty: nobody was asked.
+        mixtures: Masses of its objects, in their order; empty: no evidence.
         rng: Source of the draw.
         library: Where materials are looked up.
 
@@ -343,7 +347,7 @@ def sample_hypotheses(
 
 
 class _ObjectSamples:
-    """One object's share of all draws."""
+    """The samples of one object."""
 
     def __init__(self, words: ObjectDescription, number: int, draws: Sequence[SceneSample]) -> None:
         self.words, self.number, self.draws = words, number, draws
@@ -376,7 +380,7 @@ class _ObjectSamples:
         )
 
     def _answers(self) -> tuple[AnsweredMass, ...]:
-        """Say what each of several answers comes to by itself; its draws are every N-th."""
+        """Return the mass by each of N answers; its samples are every N-th."""
         found, count = [], len(self.words.answers)
         for k, answer in enumerate(self.words.answers):
             masses = self.masses[k::count]
@@ -403,7 +407,7 @@ class _ObjectSamples:
         return tuple(sorted(rows, key=lambda row: -row.probability))
 
     def chosen(self, mixture: MassPosterior, scale: MassSampler) -> ObjectDescription:
-        """Take the likeliest way, and of its draws the one that weighs most nearly the median."""
+        """Choose the likeliest hypothesis, and its sample nearest to the median mass."""
         best = mixture.hypotheses[0].words
         far = np.abs(np.log(self.masses / mixture.mass))
         far[[name != best for name in self.labels]] = np.inf
@@ -439,7 +443,7 @@ class _ObjectSamples:
 def _fix_draw(
     words: PartDescription, drawn: PartDescription, made: Material, built: Structure
 ) -> PartDescription:
-    """Let a part be as it was drawn; what its mass hangs on stands where it was drawn."""
+    """Fix a part to a sample; values that determine its mass are placed as sampled."""
     if not words.hypotheses or drawn.material is None or words.material is None:
         return replace(words, **{name: getattr(drawn, name) for name in NESTED_SHARE_FIELDS})
     places = dict(drawn.placements)
@@ -468,7 +472,7 @@ def _fix_draw(
 
 
 def hypothesis_label(words: ObjectDescription, drawn: ObjectDescription) -> str:
-    """Say in words which of its ways each part in doubt was drawn in."""
+    """Describe the sampled hypothesis of each uncertain part."""
     in_doubt = [
         f"{p.name}: {q.material}, {q.structure}{f' of {q.contents}' if q.contents else ''}"
         for p, q in zip(leaf_parts(words.parts), leaf_parts(drawn.parts), strict=True)

@@ -1,4 +1,4 @@
-"""What the verbs of a run made, one typed field a verb."""
+"""Results of the stages of a run, one typed field per stage."""
 
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
@@ -22,19 +22,19 @@ from corporeal.simulation.simulation_result import PreparedScene, SimulationResu
 T = TypeVar("T")
 
 RUN_FILES = (
-    *("film.mp4", "report.html", "materials.json", AUDIT_FILE, "fields.png", "strip.png"),
+    *("video.mp4", "report.html", "materials.json", AUDIT_FILE, "fields.png", "strip.png"),
     "close-up.png",
     *("ensemble.json", "ensemble.png"),
 )
-"""All that may lie in a run's folder beside the folders of its verbs."""
+"""File names in a run's folder, besides the folders of its stages."""
 
 
 @dataclass(frozen=True)
 class StageResults:
-    """What each verb made; None: it has not been done, or need not be.
+    """Results of the stages; None: not run, or not needed.
 
-    The fields carry the names of the verbs. Read the properties, which carry the names of objects:
-    they raise LookupError where a verb has not been done.
+    The fields carry the names of the stages. The properties raise LookupError if the stage has not
+    been run.
     """
 
     reconstruct: Reconstruction | None = None
@@ -44,21 +44,21 @@ class StageResults:
     ground: MaterialField | None = None
     fill: Particles | None = None
     simulate: Trajectory | None = None
-    film: Video | None = None
+    video: Video | None = None
     report: None = None
 
     def having(self, verb: str, made: Any) -> "StageResults":
-        """Return the results with what one more verb made."""
+        """Return the results with those of one more stage."""
         return replace(self, **{verb: made})
 
     @property
     def scene(self) -> Scene:
-        """From assemble; later with what moves in its vessels, and the pieces of what broke."""
+        """From assemble; later with movable contents and fragments as objects."""
         return self._filled.whole.scene if self._changes else _made(self.assemble, "assemble")
 
     @property
     def assembled(self) -> SceneWithMaterials:
-        """Scene, parts and materials as fill is given them: contents still in their vessels."""
+        """Scene, parts and materials before fill: contents are still part of their vessels."""
         scene, parts = _made(self.assemble, "assemble"), _made(self.segment, "segment")
         return SceneWithMaterials(scene, parts, _made(self.ground, "ground"))
 
@@ -69,7 +69,7 @@ class StageResults:
 
     @property
     def _filled(self) -> FilledScene:
-        """With what moves in vessels, and the pieces of what broke."""
+        """With movable contents and fragments as objects."""
         particles = _made(self.fill, "fill")
         whole = add_vessel_contents(*self.assembled.all, particles.contents)
         breaks = () if self.simulate is None else self.simulate.breaks
@@ -92,7 +92,7 @@ class StageResults:
 
     @property
     def particles(self) -> Particles:
-        """From fill, and once it is simulated with the pieces of what broke."""
+        """From fill; after the simulation with fragments."""
         return self._filled.particles if self._changes else _made(self.fill, "fill")
 
     @property
@@ -101,13 +101,13 @@ class StageResults:
         return _made(self.simulate, "simulate")
 
     @property
-    def movie(self) -> Video:
-        """From film."""
-        return _made(self.film, "film")
+    def rendered_video(self) -> Video:
+        """From video."""
+        return _made(self.video, "video")
 
     @property
     def reconstruction(self) -> Reconstruction | None:
-        """What was reconstructed, where the scene's objects stand now; None: nothing was."""
+        """The reconstruction, moved to the objects' current places; None: the scene was not reconstructed."""
         return (
             None
             if self.reconstruct is None
@@ -115,8 +115,8 @@ class StageResults:
         )
 
     @property
-    def filmed(self) -> Reconstruction | None:
-        """The same, to be filmed: None where others stand beside it, which have no Gaussians."""
+    def rendered_reconstruction(self) -> Reconstruction | None:
+        """The reconstruction for rendering; None if some objects have no Gaussians."""
         found = self.reconstruction
         whole = found is not None and len(found.names) == len(
             _made(self.assemble, "assemble").objects
@@ -125,16 +125,16 @@ class StageResults:
 
     @property
     def prepared(self) -> PreparedScene:
-        """All up to fill."""
+        """Results up to fill."""
         return PreparedScene(self.scene, self.inventory, self.parts, self.field, self.particles)
 
     @property
     def played(self) -> SimulationResult:
-        """All up to simulate."""
-        return SimulationResult(self.prepared, self.trajectory, self.filmed)
+        """Results up to simulate."""
+        return SimulationResult(self.prepared, self.trajectory, self.rendered_reconstruction)
 
 
 def _made(value: T | None, verb: str) -> T:
     if value is None:
-        raise LookupError(f"{verb} has not been done")
+        raise LookupError(f"{verb} has not been run")
     return value

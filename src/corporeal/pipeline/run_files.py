@@ -1,4 +1,4 @@
-"""What a run leaves in its folder for people and programs: film, report, tables, figures."""
+"""Output files of a run: video, report, tables, figures."""
 
 import resource
 import shutil
@@ -28,21 +28,21 @@ from corporeal.simulation.run_hints import run_hints
 Progress = Callable[[float, str], None]
 
 MAX_VIEW_BYTES = 4_000_000
-"""Of the 3D view in the report [bytes]."""
+"""Maximum size of the 3D view in the report [bytes]."""
 FRAME_STRIDES = (1, 2, 4)
-"""One of so many pictures is kept, until it fits."""
+"""Temporal decimation factors, tried until the view fits."""
 
 
 @dataclass(frozen=True)
 class RunCost:
-    """What a run was asked for, and what it took."""
+    """Settings of a run, and its cost."""
 
     settings: Mapping[str, str]
-    """What the report says of them."""
+    """Settings shown in the report."""
     seconds: dict[str, float]
-    """Verb → what it took [s]; the report's own are added before they are written down."""
+    """Stage → duration [s]."""
     divided: bool = False
-    """Whether it was asked for which nodes of a file are objects."""
+    """Whether the grouping into objects was set by the user."""
 
 
 def write_run_files(
@@ -53,35 +53,35 @@ def write_run_files(
     progress: Progress,
     more: Mapping[str, Path] | None = None,
 ) -> None:
-    """Write everything that a run leaves.
+    """Write the output files of a run.
 
     Args:
         folder: The run's.
-        made: What each verb made.
+        made: What each stage made.
         audit: The simulation's.
-        spent: What was asked for, and what it took.
-        progress: Told the fraction done and what is being done.
-        more: Figures that verbs drew, by caption.
+        spent: Settings and cost.
+        progress: Called with the fraction done and a description.
+        more: Figures that stages drew, by caption.
 
     """
     started = time.perf_counter()
     # Figures.
     figures = {
-        "The film as a row of frames": folder / "strip.png",
-        **_close_up(made.movie, folder / "close-up.png"),
+        "The video as a row of frames": folder / "strip.png",
+        **_close_up(made.rendered_video, folder / "close-up.png"),
         "Materials, laws and values of every part": folder / "fields.png",
         **(more or {}),
     }
     fields_figure(made.scene, made.parts, made.field, folder / "fields.png")
     progress(0.5, "drawing the figures")
-    write_filmstrip(made.movie, folder / "strip.png")
+    write_filmstrip(made.rendered_video, folder / "strip.png")
     # What happened, and what it took.
     happened = made.played.outcome
     seen = tuple(compare_with_expectations(made.scene.name, happened))
     spent.seconds["report"] = time.perf_counter() - started
     whole = run_audit(made, audit, happened, seen, spent)
     # Files.
-    shutil.copyfile(made.movie.path, folder / "film.mp4")
+    shutil.copyfile(made.rendered_video.path, folder / "video.mp4")
     write_audit(folder, whole)
     heavy = made.particles.mass_real, part_scales(made.scene, made.parts)
     listed = materials.materials_json(made.field, made.parts, *heavy)
@@ -91,7 +91,7 @@ def write_run_files(
         parts=made.parts,
         field=made.field,
         particles=made.particles,
-        film=made.movie,
+        video=made.rendered_video,
         audit=whole,
         figures=figures,
         sources=materials.cited_sources(),
@@ -101,27 +101,27 @@ def write_run_files(
     report(story, folder / "report.html")
 
 
-def _close_up(movie: Video, path: Path) -> dict[str, Path]:
-    """Copy the film's close-up beside the other files, where it has one."""
-    drawn = movie.path.parent / CLOSE_UP_FILE
+def _close_up(video: Video, path: Path) -> dict[str, Path]:
+    """Copy the video's close-up beside the other files, where it has one."""
+    drawn = video.path.parent / CLOSE_UP_FILE
     if not drawn.exists():
         return {}
     shutil.copyfile(drawn, path)
     return {"The first contact from close by": path}
 
 
-def _view(made: StageResults, audit: RunAudit) -> str:
-    """Return the 3D view for the report, with as many pictures a second as it has room for."""
+def _view(made: StageResults, audit: RunAudit, max_bytes: int = MAX_VIEW_BYTES) -> str:
+    """Return the 3D view for the report, decimated in time to fit its size."""
     cast = bind_scene(made.prepared)
     recording = record_trajectory(cast, made.trajectory)
     for step in FRAME_STRIDES:
         taken = viewer_recording(made.prepared, cast, audit.outcome, recording.every(step), audit)
         view = inline_view(taken)
-        if len(view) <= MAX_VIEW_BYTES:
+        if len(view) <= max_bytes:
             return view
     return (
-        f'<p class="lead">The 3D view of this run would take more than {MAX_VIEW_BYTES / 1e6:.0f} MB and '
-        "is left out. Look at it with: corporeal view RUN</p>"
+        f'<p class="lead">The 3D view of this run is larger than {max_bytes / 1e6:.0f} MB and is '
+        "left out. Open it with: corporeal view RUN</p>"
     )
 
 
@@ -132,7 +132,7 @@ def run_audit(
     seen: tuple[Expectation, ...],
     spent: RunCost,
 ) -> RunAudit:
-    """Put beside a simulation's audit what happened and what the whole run took."""
+    """Add outcomes and the cost of the run to a simulation's audit."""
     audit = audit.noting(_warnings(made, audit))
     return RunAudit(
         **{f.name: getattr(audit, f.name) for f in fields(Audit)},
@@ -149,9 +149,9 @@ def run_audit(
 
 
 def _warnings(made: StageResults, audit: Audit) -> tuple[str, ...]:
-    """Return what every verb warns of, in the order of the verbs.
+    """Return the warnings of all stages, in their order.
 
-    What was noticed of photographs comes last: it is most, and the terminal shows the first.
+    Those of photographs come last: they are many, and the terminal shows the first.
     """
     groups = (
         remaining_warnings(made.scene, made.inventory),
@@ -167,13 +167,13 @@ def _warnings(made: StageResults, audit: Audit) -> tuple[str, ...]:
 
 
 def sort_warnings(found: Reconstruction | None, warnings: Iterable[str]) -> tuple[str, ...]:
-    """Return each warning once, before all others where shapes are not to be believed."""
+    """Return each warning once, those on unreliable shapes first."""
     doubted = () if found is None else found.doubts
     return tuple(dict.fromkeys((*doubted, *warnings)))
 
 
 def remaining_warnings(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
-    """Return a scene's warnings, less doubts about sizes that a model has judged since."""
+    """Return a scene's warnings without doubts about sizes that a model has answered."""
     judged = {o.name for o in inventory.objects if o.usual_extent}
     return tuple(w for w in scene.warnings if not (isinstance(w, Note) and w.size_of in judged))
 

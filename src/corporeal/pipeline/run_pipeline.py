@@ -1,10 +1,11 @@
-"""The order of the verbs: the only file that knows it.
+"""The stages of a run in order, with caching of their results.
 
-A run is a folder. Each verb leaves its result in a numbered folder inside, named by a key that
-covers everything it depends on: what is fresh is read back, what is stale is done again, what was
-interrupted goes on. ``run.json`` says how far the run came.
+A run is a folder. Each stage stores its result in a numbered folder, under a key that covers all
+its inputs: fresh results are read, stale ones recomputed, interrupted ones resumed. ``run.json``
+holds the state of the run.
 
-What does a verb is imported when it is done: a run that is read back, or not begun, waits for none.
+What does a stage is imported when it is done: a run that is read back, or not begun, waits for
+none.
 """
 
 import shutil
@@ -32,17 +33,24 @@ from corporeal.core.types import (
 )
 from corporeal.geometry.gaussian_transforms import chosen_up_axis
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.io.input_files import input_kind, list_input_files, photographed_input, scene_name
-from corporeal.io.scene_toml import read_scene_file, write_scene_file
+from corporeal.io.input_files import (
+    input_kind,
+    is_scene_file,
+    list_input_files,
+    photographed_input,
+    read_scene,
+    scene_name,
+)
+from corporeal.io.scene_toml import write_scene_file
 from corporeal.pipeline.results import RUN_FILES, StageResults
 from corporeal.pipeline.settings.ground_config import GroundConfig
 from corporeal.pipeline.settings.settings import Settings
 from corporeal.recognition.readable_names import safe_name
 
 Progress = Callable[[float, str], None]
-"""Told the fraction done and what is being done."""
+"""Called with the fraction done and a description."""
 ProgressOfStage = Callable[[str], Progress]
-"""Given a verb, returns whom to tell about its progress."""
+"""Returns the progress callback of a stage."""
 
 STAGE_FOLDERS = {
     "reconstruct": "0-reconstruct",
@@ -52,7 +60,7 @@ STAGE_FOLDERS = {
     "ground": "6-ground",
     "fill": "7-fill",
     "simulate": "8-simulate",
-    "film": "9-film",
+    "video": "9-video",
     "report": "10-report",
 }
 STAGES = tuple(STAGE_FOLDERS)
@@ -64,7 +72,7 @@ DEFAULT_SETTINGS = Settings()
 
 
 def no_progress_of_stage(verb: str) -> Progress:
-    """Tell nobody about progress."""
+    """Ignore progress."""
     return lambda fraction, words: None
 
 
@@ -75,14 +83,14 @@ def run(
     tell: ProgressOfStage = no_progress_of_stage,
     until: str = "report",
 ) -> Path:
-    """Do every verb up to ``until``; return the run's folder.
+    """Run every stage up to ``until``; return the run's folder.
 
     Args:
-        inputs: What a person typed: scene files, a folder of photographs, or a splat.
+        inputs: Scene files, a folder of photographs, or a splat.
         folder: The run's folder; made when absent.
-        settings: Configuration of every verb.
-        tell: Whom to tell about progress.
-        until: The last verb to do.
+        settings: Configuration of every stage.
+        tell: Progress callback of each stage.
+        until: The last stage to run.
 
     Raises:
         UserError: An input cannot be used, the disk is full, another process works in the folder,
@@ -96,21 +104,21 @@ def run(
 
 @dataclass(frozen=True)
 class OpenRun:
-    """A run whose verbs are done."""
+    """A run whose stages are finished."""
 
     made: StageResults
     key: str
-    """Of the last verb's result: names all that it depends on."""
+    """Key of the last stage's result."""
 
 
 @contextmanager
 def open_run(
     inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage, until: str
 ) -> Iterator[OpenRun]:
-    """Do every verb up to ``until`` and keep the run's folder from others meanwhile.
+    """Run every stage up to ``until``, with the run's folder locked.
 
     Yields:
-        What each verb made, under which key.
+        The results and their key.
 
     """
     with store.lock_folder(folder), store.disk_errors(folder):
@@ -121,14 +129,14 @@ def open_run(
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What a run was asked to do."""
+    """Inputs and settings of a run."""
 
     inputs: list[Path]
     settings: Settings
 
 
 def read_run_request(folder: Path) -> RunRequest:
-    """Read back what a run was asked to do.
+    """Read the inputs and settings of a run.
 
     Raises:
         UserError: The folder is not a run.
@@ -144,7 +152,7 @@ def read_run_request(folder: Path) -> RunRequest:
 
 
 def read_run(folder: Path) -> StageResults:
-    """Read what the finished verbs of a run made; nothing is done, and nothing in it changes.
+    """Read the results of the finished stages of a run.
 
     Raises:
         UserError: The folder is not a run.
@@ -166,28 +174,28 @@ def _read_stage_result(verb: str, folder: Path) -> Any:
     if verb == "report":
         return None
     found = store.load(folder / store.DATA_FILE)
-    # A run may have been moved, or is named from elsewhere: its film lies beside what says so.
-    return replace(found, path=folder / found.path.name) if verb == "film" else found
+    # paths in the results may be stale: the run may have been moved
+    return replace(found, path=folder / found.path.name) if verb == "video" else found
 
 
 def digests_of_named_files(config: Any) -> list[str]:
-    """Name the content of every file that a configuration declares to be read."""
+    """Return digests of the files that a configuration declares as inputs."""
     paths = paths_read(config) if config else []
     return [store.path_digest(path) for path in paths if path.exists()]
 
 
 @dataclass(frozen=True)
 class StageState:
-    """How far a run came with one verb."""
+    """State of one stage of a run."""
 
     verb: str
     state: Literal["finished", "unfinished", "not yet"]
     seconds: float | None = None
-    """What it took [s]; None: it is not finished."""
+    """Duration [s]; None: not finished."""
 
 
 def stage_states(folder: Path) -> list[StageState]:
-    """Return the state of every verb of a run, in their order.
+    """Return the states of all stages of a run.
 
     Raises:
         UserError: The folder is not a run.
@@ -206,29 +214,29 @@ def stage_states(folder: Path) -> list[StageState]:
 
 
 def stages_for(inputs: list[Path]) -> tuple[str, ...]:
-    """Return what is to be done with an input: models need no reconstruction.
+    """Return the stages for an input: models need no reconstruction.
 
     Raises:
-        UserError: The inputs don't go together.
+        UserError: The inputs cannot be combined.
 
     """
     return STAGES[1:] if input_kind(inputs) == "model" else STAGES
 
 
 def invalidate_stage(folder: Path, verb: str) -> None:
-    """Declare one verb's result stale, so that it is done again even with the same settings."""
+    """Mark one stage's result as stale."""
     with store.lock_folder(folder):
         (folder / STAGE_FOLDERS[verb] / store.META_FILE).unlink(missing_ok=True)
 
 
 def delete_simulation(folder: Path) -> None:
-    """Drop a simulation, finished or not, so that the next run starts it again."""
+    """Delete a simulation, finished or not."""
     with store.lock_folder(folder):
         shutil.rmtree(folder / STAGE_FOLDERS["simulate"], ignore_errors=True)
 
 
 def write_showcase(name: str, folder: Path) -> Path:
-    """Write one of our own scenes as a GLB; return its path.
+    """Write a showcase scene as a GLB; return its path.
 
     Raises:
         UnknownChoiceError: There is no such scene.
@@ -251,14 +259,13 @@ SHOWCASE_PACKAGES = (
     "fast-simplification",
     "pillow",
 )
-"""Packages whose versions decide what one of our own scenes is, beside this one's code."""
+"""Packages whose versions are part of the cache key of a showcase scene."""
 
 
 def write_cached_showcase(name: str, folder: Path) -> Path:
-    """Write one of our own scenes as ``write_showcase`` does, from what an earlier call built.
+    """Write a showcase scene as ``write_showcase`` does, from a cache.
 
-    It is kept with the caches of the system (``store.cache_folder``), named by all it depends on;
-    what cannot be kept there is built each time.
+    The cache is in ``store.cache_folder``; if it is not writable, the scene is built each time.
 
     Raises:
         UnknownChoiceError: There is no such scene.
@@ -283,7 +290,7 @@ def write_cached_showcase(name: str, folder: Path) -> Path:
 
 
 class _Run:
-    """One pass over the verbs; holds what earlier verbs made for later ones."""
+    """One pass over the stages; holds their results."""
 
     def __init__(
         self, inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage
@@ -294,13 +301,13 @@ class _Run:
         self.made = StageResults()
 
     def through(self, until: str) -> None:
-        """Do all verbs up to ``until`` and say in ``run.json`` how it went."""
+        """Run all stages up to ``until`` and write the state to ``run.json``."""
         self.folder.mkdir(parents=True, exist_ok=True)
         self._declare("running")
         try:
             todo = stages_for(self.inputs)
             if until not in todo:
-                raise UserError("A model needs no reconstruction: run the other verbs.")
+                raise UserError("A model needs no reconstruction: run the other stages.")
             for verb in todo[: todo.index(until) + 1]:
                 self._do(verb)
         except KeyboardInterrupt:
@@ -337,11 +344,11 @@ class _Run:
         store.finish_result(folder, self.key, config, self.seconds[verb])
 
     def _borrowed(self, verb: str) -> list[str]:
-        """Name what a verb takes from another verb's settings."""
+        """Name what a stage takes from another stage's settings."""
         if verb == "reconstruct":
             from corporeal.io.photos.mask_files import edited_masks
 
-            asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
+            asked = [] if self.settings.reconstruct.object_names else [self.settings.describe.vlm]
             by_hand = sorted(edited_masks(self.folder / STAGE_FOLDERS[verb]).items())
             return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
         if verb == "assemble":
@@ -378,7 +385,7 @@ class _Run:
         store.save(folder / store.DATA_FILE, value)
         return value
 
-    # ------------------------------------------------------------ the verbs
+    # ------------------------------------------------------------ the stages
 
     def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
         from corporeal.io.splat.splat_ply import write_splat_ply
@@ -389,7 +396,9 @@ class _Run:
         assert source is not None, "models need no reconstruction"
         config, extents = self.settings.reconstruct, self.settings.assemble.extent
         if self.settings.assemble.objects != "auto":
-            raise UserError("--objects is for models. Say what tells objects apart with --apart.")
+            raise UserError(
+                "--objects is for models. Choose how objects are separated with --apart."
+            )
         viewer = PhotoInterview(safe_name(scene_name(source)), asked.vlm, asked.record)
         result = reconstruct(source, config, extents, viewer, folder, progress)
         made, scene = result.found, result.scene
@@ -408,9 +417,9 @@ class _Run:
             inputs = [
                 _reconstructed_model(self.inputs[0], self.folder / STAGE_FOLDERS["reconstruct"])
             ]
-            config = replace(config, extent=())  # the reconstruction has its size from them
+            config = replace(config, extent=())  # they determine the scale of the reconstruction
             scene = assemble(inputs, config)
-            if self.inputs[0].suffix.lower() == ".toml":
+            if is_scene_file(self.inputs[0]):
                 scene = replace(scene, name=scene_title(self.inputs[0]))
             return self._keep(folder, scene)
         return self._keep(
@@ -441,7 +450,7 @@ class _Run:
     def _ground(self, folder: Path, progress: Progress) -> MaterialField:
         from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
 
-        progress(0.0, "looking numbers up")
+        progress(0.0, "choosing material values")
         made = self.made
         found = ground_with_mass_posterior(
             made.scene, made.parts, made.inventory, self.settings.ground
@@ -461,11 +470,11 @@ class _Run:
         made, config = self.made, self.settings.simulate
         return simulate(made.scene, made.particles, made.field, config, folder, progress)
 
-    def _film(self, folder: Path, progress: Progress) -> Video:
+    def _video(self, folder: Path, progress: Progress) -> Video:
         from corporeal.pipeline.stages.video import render_video
 
         return self._keep(
-            folder, render_video(self.made.played, self.settings.film, folder, progress)
+            folder, render_video(self.made.played, self.settings.video, folder, progress)
         )
 
     def _report(self, folder: Path, progress: Progress) -> None:
@@ -487,9 +496,9 @@ class _Run:
 def _reconstructed_model(asked: Path, folder: Path) -> Path:
     """Return the model that was reconstructed, with all that a scene file says beside it."""
     model = next(folder.glob("*.glb"))
-    if asked.suffix.lower() != ".toml":
+    if not is_scene_file(asked):
         return model
-    write_scene_file(folder / "scene.toml", replace(read_scene_file(asked), file=model))
+    write_scene_file(folder / "scene.toml", replace(read_scene(asked), file=model))
     return folder / "scene.toml"
 
 

@@ -1,4 +1,4 @@
-"""What the viewer shows of a run: how its objects move, and what is known of them."""
+"""Data of a run for the viewer: motion, parts and audit."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -20,11 +20,11 @@ from corporeal.simulation.moving_gaussians import fluid_parts, granular_parts
 from corporeal.simulation.simulation_result import PreparedScene
 
 RAMP_COLOURS = 17
-"""Colours that the page mixes all others of a scale from."""
+"""Colours that the page interpolates scales from."""
 UNSOFTENED_MODULUS_RATIO = 0.999
-"""Above this share of its modulus a part is as stiff as it is."""
+"""Above this share of its modulus a part counts as not softened."""
 MAX_RECORDING_FPS = 30.0
-"""Most pictures a second that a recording needs."""
+"""Maximum frame rate of a recording [1/s]."""
 
 
 def bind_scene(prepared: PreparedScene) -> SceneBinding:
@@ -39,7 +39,7 @@ def bind_scene(prepared: PreparedScene) -> SceneBinding:
 def record_trajectory(
     cast: SceneBinding, trajectory: Trajectory, fps: float = MAX_RECORDING_FPS
 ) -> Recording:
-    """Take down a trajectory with at most ``fps`` pictures a second, its first and last included.
+    """Record a trajectory with at most ``fps`` pictures a second, including the first and the last.
 
     Args:
         cast: From ``bind_scene``.
@@ -62,15 +62,15 @@ def viewer_recording(
     audit: RunAudit | None = None,
     found: Reconstruction | None = None,
 ) -> bytes:
-    """Return all that a page needs to play a run: see ``render.take``.
+    """Return all data that a page needs to play a run.
 
     Args:
         prepared: The scene.
         cast: From ``bind_scene``.
-        happened: What happened in it; None: it has not been simulated.
+        happened: Its outcome; None: not simulated.
         recording: From ``record_trajectory``; None: as for ``happened``.
         audit: Warnings and numbers, where the run has been reported on.
-        found: Gaussians that the scene was made of, to be looked at; None: its surfaces alone.
+        found: Gaussians of the reconstruction, to be shown; None: surfaces only.
 
     """
     summary = scene_summary(prepared)
@@ -83,7 +83,7 @@ def viewer_recording(
 
 
 def scene_summary(prepared: PreparedScene) -> dict[str, Any]:
-    """Return what is known of a scene before it moves: parts, colours, credits."""
+    """Return the static data of a scene: parts, colours, credits."""
     scene, parts, field = prepared.scene, prepared.parts, prepared.field
     credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)
     return {
@@ -105,27 +105,28 @@ def part_cards(prepared: PreparedScene) -> list[dict]:
     heavy = particles.mass_real, part_scales(scene, parts)
     listed = materials.materials_json(prepared.field, parts, *heavy)["parts"]
     for k, (card, treatment) in enumerate(zip(listed, particles.treatments, strict=True)):
-        numbers = ("kind", "young", "young_real", "density", "why")
+        numbers = ("kind", "simulated_young_pa", "young_pa", "density", "reason")
         card["simulated"] = {name: getattr(treatment, name) for name in numbers}
         card["fill"] = particles.fills[k] if k < len(particles.fills) else ""
     return listed
 
 
 def resolution_statement(prepared: PreparedScene) -> str:
-    """Say in one line how fine a scene is simulated, and what of it softer than it is."""
+    """Describe the resolution of a scene in one line, and what is softened."""
     particles = prepared.particles
     softer = sorted(
-        (t.young / t.young_real, prepared.scene.objects[part.object].name, part.name)
+        (t.simulated_young_pa / t.young_pa, prepared.scene.objects[part.object].name, part.name)
         for part, t in zip(prepared.parts.catalogue, particles.treatments, strict=True)
-        if t.kind not in ("rigid", "foliage") and t.young < UNSOFTENED_MODULUS_RATIO * t.young_real
+        if t.kind not in ("rigid", "foliage")
+        and t.simulated_young_pa < UNSOFTENED_MODULUS_RATIO * t.young_pa
     )
     size = f"{particles.count:,} particles, cells of {1e3 * particles.cell:.3g} mm"
     if not softer:
-        return f"{size}; nothing is simulated softer than it is"
+        return f"{size}; no part is softened"
     (share, owner, name), count = softer[0], len(softer)
     who = owner if owner == name else f"{owner}/{name}"
     number = f"{count} part{'s' * (count > 1)}"
-    return f"{size}; {number} softer than in reality, most of all {who}: {share:.2g} × its E"
+    return f"{size}; {number} softened, most of all {who}: {share:.2g} × its E"
 
 
 def contact_times(happened: Outcome) -> list[dict]:

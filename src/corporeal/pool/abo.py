@@ -1,4 +1,4 @@
-"""Amazon Berkeley Objects as candidates: 7,953 product models, in metres.
+"""Candidates from Amazon Berkeley Objects: 7,953 product models, in metres.
 
 Layout, as the archives abo-3dmodels.tar and abo-listings.tar unpack side by side::
 

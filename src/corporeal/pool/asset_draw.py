@@ -1,4 +1,4 @@
-"""Draw what goes into a scene so that, over many scenes, no class and no asset is favoured."""
+"""Balanced sampling of classes and assets."""
 
 from collections.abc import Mapping, Sequence
 
@@ -46,7 +46,7 @@ def parse_count_range(asked: str) -> tuple[int, int]:
     """
     low, _, high = asked.partition("-")
     if not low.strip().isdigit() or not (high or low).strip().isdigit():
-        raise UserError(f"--count {asked!r}: write a number or a range, for example 1-4.")
+        raise UserError(f"--count {asked!r}: give a number or a range, for example 1-4.")
     least, most = int(low), int(high or low)
     if not 1 <= least <= most <= 16:
         raise UserError(f"--count {asked!r}: give numbers from 1 to 16, the smaller first.")

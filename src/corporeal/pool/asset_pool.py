@@ -1,4 +1,4 @@
-"""What a pool holds: models that passed the gate, and the reasons why others did not."""
+"""Pools of models: accepted models, and reasons of rejection."""
 
 from dataclasses import dataclass
 from pathlib import Path

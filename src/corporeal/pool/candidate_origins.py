@@ -1,4 +1,4 @@
-"""Where candidates come from: plain folders, or collections with a layout of their own."""
+"""Sources of candidates: plain folders and known collections."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from corporeal.core.errors import UserError
+from corporeal.io.load_model import readable_model_formats
 from corporeal.pool import abo, objaverse
 from corporeal.pool.pool_candidates import PoolCandidate, candidates_in
 
@@ -41,7 +42,7 @@ def find_candidates(
         found = _of_objaverse(folders, config.wanted)
     if not found:
         named = ", ".join(map(str, folders)) or str(objaverse.OBJAVERSE_CACHE)
-        raise UserError(f"{named}: no model (.glb, .gltf, .obj) lies there or below.")
+        raise UserError(f"{named}: no model ({readable_model_formats()}) lies there or below.")
     return found
 
 

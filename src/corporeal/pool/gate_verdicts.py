@@ -1,4 +1,4 @@
-"""What the gate says of a file's content: whatever the file is called and whoever owns it."""
+"""Verdicts of the quality gate on the content of files."""
 
 import hashlib
 import json
@@ -13,8 +13,9 @@ from corporeal.core.types import Scene
 from corporeal.io.gltf.glb_writer import encode_glb
 from corporeal.io.gltf.gltf_credits import Credit, credit_of_document
 from corporeal.io.gltf.gltf_document import GltfDocument
-from corporeal.io.input_files import GLTF_SUFFIXES, list_input_files
+from corporeal.io.input_files import list_input_files
 from corporeal.io.load_model import load_model
+from corporeal.io.registry import GLTF_READER, reader_of
 from corporeal.pool.quality_gate import GateConfig, GatedModel, ModelRejectedError, inspect_model
 from corporeal.recognition.readable_names import everyday_words, single_line_text
 
@@ -148,9 +149,9 @@ def _scene_of_file(file: Path) -> Scene:
 
 
 def _credit_of_file(file: Path) -> Credit:
-    return (
-        credit_of_document(GltfDocument(file)) if file.suffix.lower() in GLTF_SUFFIXES else Credit()
-    )
+    if reader_of(file) is not GLTF_READER:
+        return Credit()
+    return credit_of_document(GltfDocument(file))
 
 
 def _file_digest(path: Path) -> str:

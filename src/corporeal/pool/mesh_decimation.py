@@ -1,4 +1,4 @@
-"""Fewer triangles for the same shape and the same look.
+"""Mesh decimation that keeps shape and appearance.
 
 Shape: quadric error metrics (Garland & Heckbert, SIGGRAPH 1997) on welded vertices, so that
 texture seams do not tear open. Look: each new corner takes texture coordinates, normal and colour

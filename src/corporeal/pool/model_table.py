@@ -1,4 +1,4 @@
-"""A table of models (CSV): the class of each file and, where known, licence, credit and size."""
+"""CSV tables of models: class, licence, credit and size."""
 
 import csv
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Objaverse 1.0 as candidates: what lies in the package's cache, and what it downloads for us.
+"""Candidates from Objaverse 1.0: cached or downloaded by its package.
 
 Layout of the cache, ``~/.objaverse/hf-objaverse-v1``, as the package ``objaverse`` writes it::
 
@@ -164,5 +164,5 @@ def _read_gzip_json(path: Path) -> dict[str, Any]:
         step = "Delete it; it is downloaded again."
         raise BadFileError(path, f"cannot be read ({problem}).", step) from problem
     if not isinstance(value, dict):
-        raise BadFileError(path, "is not what Objaverse keeps there.", "Delete it.")
+        raise BadFileError(path, "is not an Objaverse file.", "Delete it.")
     return value

@@ -1,4 +1,4 @@
-"""From verdicts to members: classes, credits and units; no shape twice, no name twice."""
+"""Admission of models to a pool: classes, credits, units, duplicates."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -109,10 +109,10 @@ def _class_in_words(class_name: str) -> str:
 
 
 def is_in_metres(candidate: PoolCandidate, extent: float, words: str) -> bool:
-    """Tell whether lengths are metres: as declared, unless the mesh has another extent.
+    """Return whether lengths are metres: as declared, unless the mesh has another extent.
 
-    Where nobody says, they are if the object is then as large as such objects are: glTF is in
-    metres by its specification, and most files are not.
+    If not stated, they are if the object is then as large as such objects are: glTF is in metres by
+    its specification, and most files are not.
     """
     declared = candidate.declared
     if (

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from corporeal.core.errors import UserError
-from corporeal.io.input_files import GLTF_SUFFIXES
-from corporeal.io.mesh.mesh_suffixes import is_mesh_file
+from corporeal.io.input_files import is_model_file
 from corporeal.pool.model_table import ModelRow, read_model_table
 from corporeal.recognition.readable_names import everyday_words
 
@@ -21,7 +20,7 @@ CONTAINER_FOLDER_NAMES = frozenset(
 
 @dataclass(frozen=True)
 class PoolCandidate:
-    """A model file, with what somebody says about it; empty or None: nothing."""
+    """A model file with declared metadata; empty or None: nothing."""
 
     file: Path
     declared: ModelRow = field(default_factory=ModelRow)
@@ -38,8 +37,8 @@ def candidates_in(
 
     Args:
         folders: Searched with all their folders below.
-        table: CSV of classes; what it says goes before a manifest. What it names and is not there
-            is a candidate too, so that somebody hears of it.
+        table: CSV of classes; what it says goes before a manifest. What it names and is missing is
+            a candidate too, so that it is reported.
         pool: A folder whose own copies are no candidates.
 
     Raises:
@@ -72,7 +71,7 @@ def model_files_below(folder: Path, pool: Path | None = None) -> list[Path]:
     return [
         path
         for path in sorted(folder.rglob("*"))
-        if (path.suffix.lower() in GLTF_SUFFIXES or is_mesh_file(path))
+        if is_model_file(path)
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
         and (own is None or not path.resolve().is_relative_to(own))

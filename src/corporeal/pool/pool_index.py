@@ -47,10 +47,10 @@ def index_pool(
     judged before, with the same gate, is not judged again; an interrupted run goes on where it was.
 
     Args:
-        folders: Hold .glb, .gltf and .obj files, at any depth, or a collection.
+        folders: Hold models (glTF or meshes), at any depth, or a collection.
         pool_folder: Made where it is absent.
         config: What the folders are, who says the classes, how good a model must be.
-        progress: Told the fraction done and the file.
+        progress: Called with the fraction done and the file.
 
     Raises:
         UserError: A folder is absent, a table cannot be used, or another process works here.

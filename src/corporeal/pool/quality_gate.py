@@ -79,17 +79,26 @@ class ModelRejectedError(Exception):
     """The model stays outside; the message says why."""
 
 
-def inspect_model(scene: Scene, config: GateConfig = DEFAULT_GATE_CONFIG) -> GatedModel:
+def inspect_model(
+    scene: Scene,
+    config: GateConfig = DEFAULT_GATE_CONFIG,
+    max_read_triangles: int = MAX_READ_TRIANGLES,
+) -> GatedModel:
     """Clean and decimate a model where it needs it, and measure it.
+
+    Args:
+        scene: The model.
+        config: What is good enough.
+        max_read_triangles: Models with more are not decimated but rejected.
 
     Raises:
         Rejected: It is not good enough.
 
     """
     count = sum(len(s.triangles) for s in scene.surfaces)
-    if count > MAX_READ_TRIANGLES:
+    if count > max_read_triangles:
         raise ModelRejectedError(
-            f"has {count:,} triangles; at most {MAX_READ_TRIANGLES:,} are decimated"
+            f"has {count:,} triangles; at most {max_read_triangles:,} are decimated"
         )
     extent = _scene_extent(scene)
     mesh_name, look = shape_fingerprint(scene), look_fingerprint(scene)

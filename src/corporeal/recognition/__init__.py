@@ -1,1 +1,1 @@
-"""What the names in files and of objects say, in any language."""
+"""Recognition of materials and constructions from names, in any language."""

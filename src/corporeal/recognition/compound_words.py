@@ -1,4 +1,4 @@
-"""Words that a name writes together, apart, or with a letter too few."""
+"""Splitting and joining of compound words in names."""
 
 import re
 from collections.abc import Callable, Container, Mapping, Sequence

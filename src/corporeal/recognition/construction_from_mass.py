@@ -1,4 +1,4 @@
-"""Ways that things are made which are there for their mass, where their name states it."""
+"""Construction of weights whose name states the mass."""
 
 import tomllib
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ from corporeal.recognition.mass_from_name import MASS_AGREEMENT_RATIO, mass_from
 GOOD_MASS_FIT_RATIO = 1.2
 """Factor of a mass within which the commoner way is taken."""
 SOURCES_WITHOUT_LOOKING = frozenset(("metadata", "unknown"))
-"""Who decides where nobody looked and no person said anything."""
+"""Sources that the mass in a name overrides."""
 EXTRAS_STATING_CONSTRUCTION = (SUBSTANCE_KEY, STATED_MATTER_KEY, "shell_thickness_m")
 """In a surface's extras: its file says how it is made."""
 
 
 @dataclass(frozen=True)
 class ConstructionHypotheses:
-    """Of one part that is a whole thing."""
+    """Of one part that is a whole object."""
 
     mass: float
     """That its name states [kg]."""
@@ -38,9 +38,9 @@ class ConstructionHypotheses:
 def construction_hypotheses(
     scene: Scene, number: int, described: ObjectDescription
 ) -> ConstructionHypotheses | None:
-    """Return the ways that a thing may be made, among which the mass in its name chooses.
+    """Return the hypotheses of construction, among which the mass in the name chooses.
 
-    None: its name states no mass, it is not there for its mass, or somebody said how it is made.
+    None: its name states no mass, it is no weight, or its construction is stated.
     """
     thing = scene.objects[number]
     names = (thing.name, thing.stem)
@@ -70,7 +70,7 @@ def best_mass_fit(masses: Sequence[float], said: float) -> int:
     Where none does, the first, as it was recognised.
 
     Args:
-        masses: Of the thing, made in each way [kg].
+        masses: Of the object, made in each way [kg].
         said: That its name states [kg].
 
     """
@@ -90,7 +90,7 @@ def _constructed_part(part: PartDescription, way: dict, mass: float) -> PartDesc
         thickness=wall * 1e-3 if wall else None,
         answered_by="metadata",
         margin=part.margin or 0.35,
-        reason=f"Its name says {mass:.3g} kg, and made so it weighs that most nearly.",
+        reason=f"Its name says {mass:.3g} kg, which this construction fits best.",
         contents=contents,
         fill=way.get("fill", 1.0) if contents else None,
         solidity=solidity,

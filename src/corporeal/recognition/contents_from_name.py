@@ -1,4 +1,4 @@
-"""What a name says of a vessel's contents: how full it is, and of what."""
+"""Contents of vessels from names: fill level and material."""
 
 import re
 from collections.abc import Collection, Iterator, Sequence
@@ -39,9 +39,9 @@ class NamedContents:
     """What a name says of what is in a vessel."""
 
     share: float | None
-    """Of the room behind the wall [-]; None: it says only of what."""
+    """Of the cavity inside the wall [-]; None: it says only of what."""
     contents: str | None
-    """A name from the library; None: it does not say of what, or nobody knows that word."""
+    """Material of the library; None: not named or unknown."""
     vessel: WordPhrase
     """The vessel's name; (): none is known."""
     drinks: bool
@@ -94,7 +94,7 @@ def _is_level(said: Sequence[str], k: int, n: int) -> bool:
 
 
 def _find_contents(said: Sequence[str], vessel: WordPhrase, end: int, levelled: bool) -> str | None:
-    """Return what is in a vessel: "bottle of milk", and where its level is told "milk bottle"."""
+    """Return a vessel's contents: "bottle of milk", and with a fill level "milk bottle"."""
     if not vessel:
         return None
     known = {p: name for name in contents_table()["contents"] for p in _phrases("contents", name)}
@@ -148,19 +148,19 @@ def apply_named_contents(
         else GOODS_FILL_FRACTION
     )
     fill = usual if said.share is None else said.share
-    taken = "" if said.contents or found.contents else f", of what is not said: of {inner}"
+    taken = "" if said.contents or found.contents else f", contents not named: {inner}"
     reason = f"{found.reason} By its name it is {fill:.0%} full of {inner}{taken}."
     return replace(found, structure="filled", contents=inner, fill=fill, reason=reason)
 
 
 def unused_contents_notes(scene: Scene, objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
-    """Say of which objects it was not used how full their names say they are."""
+    """Return notes on fill levels in names that were not used."""
     said = [(o, contents_from_name(thing)) for o, thing in zip(objects, scene.objects, strict=True)]
     return tuple(
         Note(
-            f"{o.name}: its name says how full it is ({_contents_text(filling)}), and that was not used"
-            f": {_unused_reason(o, filling)}. Say it with --annotations: structure filled, contents and "
-            "fill.",
+            f"{o.name}: the fill level in its name ({_contents_text(filling)}) was not used: "
+            f"{_unused_reason(o, filling)}. State it with --annotations: structure filled, contents "
+            "and fill.",
             NoteKind.ASSUMED,
         )
         for o, filling in said
@@ -175,17 +175,17 @@ def _contents_text(said: NamedContents) -> str:
 
 def _unused_reason(thing: ObjectDescription, said: NamedContents) -> str:
     if not said.vessel:
-        return "it names no vessel that is known"
+        return "it names no known vessel"
     if len(thing.parts) > 1:
-        return "which of its parts holds it is not known"
+        return "the part that holds it is unknown"
     if not (said.contents or said.drinks):
-        return "it does not say of what"
+        return "its contents are not named"
     material = next((p.material for p in thing.parts if p.material), "it")
-    return f"{material} has no wall that is known"
+    return f"no wall thickness of {material} is known"
 
 
 def _is_accounted_for(thing: ObjectDescription, said: NamedContents) -> bool:
-    """Tell whether something is in it, a part of it is that, or a person decided."""
+    """Return whether something is in it, a part of it is that, or a person decided."""
     if said.share and said.share == MAX_FILL_FRACTION and not said.vessel:
         return True  # "full" by itself says little of what is no vessel
     inside = _phrases("contents", said.contents) if said.contents else frozenset()

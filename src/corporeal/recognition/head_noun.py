@@ -1,4 +1,4 @@
-"""Which word of a name is the thing: read as English has it, whatever order the file has."""
+"""Head nouns of names, by English word order."""
 
 import tomllib
 from collections.abc import Collection, Sequence
@@ -9,7 +9,7 @@ from pathlib import Path
 from corporeal.recognition.compound_words import KnownWords
 
 PhraseSet = Collection[tuple[str, ...]]
-"""Names of things in several words."""
+"""Names of objects in several words."""
 
 
 def move_head_noun_last(words: Sequence[str], known: KnownWords, phrases: PhraseSet) -> list[str]:
@@ -20,8 +20,8 @@ def move_head_noun_last(words: Sequence[str], known: KnownWords, phrases: Phrase
 
     Args:
         words: In English, in the singular.
-        known: Words for substances and things.
-        phrases: Names of things that are more than one word.
+        known: Words for substances and objects.
+        phrases: Names of objects that are more than one word.
 
     """
     bare = _remove_phrases(words, (*_phrases("wrapping"), *_phrases("measures")), phrases)
@@ -29,7 +29,7 @@ def move_head_noun_last(words: Sequence[str], known: KnownWords, phrases: Phrase
 
 
 def strip_whole_from_part_name(words: Sequence[str], phrases: PhraseSet) -> tuple[str, ...]:
-    """Return the words of a part's name without the thing that it is of.
+    """Return the words of a part's name without the object that it is of.
 
     ``lid jar metal`` and ``jar lid metal`` give ``lid metal``; ``door handle`` is a word of its own
     where the vocabulary has it.
@@ -46,13 +46,13 @@ def strip_whole_from_part_name(words: Sequence[str], phrases: PhraseSet) -> tupl
 
 
 def names_several_objects(words: Sequence[str]) -> bool:
-    """Tell whether a name is that of several things: "pile of bricks"."""
+    """Return whether a name is that of several things: "pile of bricks"."""
     several = {phrase[0] for phrase in _phrases("several")}
     return any(a in several and b in ("of", "de", "von") for a, b in pairwise(words))
 
 
 def _move_complement_first(words: list[str], known: KnownWords, phrases: PhraseSet) -> list[str]:
-    """Put what stands behind a preposition before the thing, or leave it out.
+    """Put what stands behind a preposition before the object, or leave it out.
 
     What only describes stays in front: a full bottle of wine is a full wine bottle.
     """
@@ -75,13 +75,13 @@ def _move_complement_first(words: list[str], known: KnownWords, phrases: PhraseS
 
 
 def _names_object(words: Sequence[str], known: KnownWords, phrases: PhraseSet) -> bool:
-    """Tell whether words name a thing: a clip-on lamp is no clip."""
+    """Return whether words name a thing: a clip-on lamp is no clip."""
     named = any(word in known.last for word in words)
     return named or any(_is_in_phrase(words, k, phrases) for k in range(len(words)))
 
 
 def _is_followed_by_substance(word: str, behind: Sequence[str], known: KnownWords) -> bool:
-    """Tell whether a preposition is followed by what something is made of, and by no thing."""
+    """Return whether a preposition is followed by a substance, and by no object."""
     return (word,) in _phrases("made") and behind[0] in known.first and len(behind) == 1
 
 
@@ -97,7 +97,7 @@ def _swap_reversed_phrases(words: list[str], phrases: PhraseSet) -> list[str]:
 
 
 def _is_in_phrase(words: Sequence[str], k: int, phrases: PhraseSet) -> bool:
-    """Tell whether a word is one of a phrase where it stands."""
+    """Return whether a word is one of a phrase where it stands."""
     pairs = [tuple(words[j : j + n]) for n in (2, 3) for j in range(max(0, k - n + 1), k + 1)]
     return any(len(pair) > 1 and pair in phrases for pair in pairs)
 
@@ -116,7 +116,7 @@ def _remove_phrases(words: Sequence[str], phrases: PhraseSet, kept: PhraseSet) -
 
 
 def part_nouns() -> frozenset[str]:
-    """Return the words for parts of things."""
+    """Return the words for parts of objects."""
     return frozenset(_wholes_of_part())
 
 

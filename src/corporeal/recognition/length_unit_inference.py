@@ -1,4 +1,4 @@
-"""What the lengths of mesh files that state no unit are in, judged by how large such things are."""
+"""Inference of the length unit of mesh files from usual sizes of objects."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ METRES_OF_MODELLING_UNIT = {
 PRINT_UNIT_ORDER = ("millimetres", "metres", "centimetres", "inches")
 """In which order they are likely in files that are made for printing."""
 IMPLAUSIBLE_SIZE_RATIO = 10.0
-"""No mesh is so many times smaller or larger than the smallest or largest of such things."""
-UNIT_ADVICE = "--unit or --extent says otherwise."
+"""No mesh is so many times smaller or larger than the smallest or largest of such objects."""
+UNIT_ADVICE = "Override with --unit or --extent."
 MAX_NAMED_FILES = 3
 """Files that are named in one sentence."""
 
@@ -38,18 +38,18 @@ class InferredUnit:
     metres: float
     """Length of one unit [m]."""
     unit: str
-    """Its name; "": none is likely, and the thing is as large as such things usually are."""
+    """Its name; "": none is likely, and the object is as large as such objects usually are."""
     usual: str = ""
-    """What such things are called, where they got their usual size."""
+    """What such objects are called, where they got their usual size."""
     shared: bool = False
     """It is the unit of the scene file's other meshes."""
 
 
 def infer_length_unit(file: Path, class_name: str, extent: float) -> InferredUnit | None:
-    """Return the first usual unit in which a thing is as large as such things are.
+    """Return the first usual unit in which an object is as large as such objects are.
 
     One in which it is within the table's own range comes before one in which it is but nearly so.
-    Where there is none, a thing of the table gets its usual size; else None.
+    Where there is none, an object of the table gets its usual size; else None.
 
     Args:
         file: Its suffix tells whether it is of a kind that is made for printing.
@@ -77,8 +77,8 @@ def infer_shared_unit(
 ) -> InferredUnit | None:
     """Return the unit that a scene file's other meshes are in, where a mesh fits none by its size.
 
-    Who places meshes by hand in metres has modelled them in one unit. A thing of the table that
-    would be ten times smaller or larger in it than any such thing is as large as they usually are.
+    Who places meshes manually in metres has modelled them in one unit. An object of the table that
+    would be ten times smaller or larger in it than any such object is as large as they usually are.
 
     Args:
         found: What the mesh by itself was taken for; None: nothing.
@@ -102,7 +102,7 @@ def infer_shared_unit(
 
 
 def unit_notes(found: Sequence[InferredUnit]) -> list[str]:
-    """Say what files that state no unit were taken for, those in one unit in one sentence."""
+    """Describe what files that state no unit were taken for, those in one unit in one sentence."""
     groups: dict[tuple[str, bool], list[InferredUnit]] = {}
     for row in dict.fromkeys(found):
         groups.setdefault((row.unit, row.shared), []).append(row)
@@ -114,8 +114,9 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
     if not unit:
         return [
             Note(
-                f"{row.file.name} states no unit: it was made as large as "
-                f"{with_article(row.usual, 'usually is', 'usually are')}, {length_text(row.extent)}. {UNIT_ADVICE}",
+                f"{row.file.name} states no unit: it was scaled to the size that "
+                f"{with_article(row.usual, 'usually is', 'usually are')}, "
+                f"{length_text(row.extent)}. {UNIT_ADVICE}",
                 NoteKind.ASSUMED,
             )
             for row in rows
@@ -125,7 +126,7 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
         size = length_text(rows[0].extent)
         return [
             Note(
-                f"{names[0]} states no unit: it was taken to be in {unit}{also}, so that it is "
+                f"{names[0]} states no unit: it was read in {unit}{also}, so that it is "
                 f"{size} large. {UNIT_ADVICE}",
                 NoteKind.ASSUMED,
             )
@@ -136,8 +137,8 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
     sizes = [row.extent for row in rows]
     return [
         Note(
-            f"{', '.join(first)} and {last} state no unit: they were taken to be in {unit}{also}, "
-            f"so that they are {length_text(min(sizes))} to {length_text(max(sizes))} large. {UNIT_ADVICE}",
+            f"{', '.join(first)} and {last} state no unit: they were read in {unit}{also}, so that "
+            f"they are {length_text(min(sizes))} to {length_text(max(sizes))} large. {UNIT_ADVICE}",
             NoteKind.ASSUMED,
         )
     ]

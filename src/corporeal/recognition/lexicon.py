@@ -1,4 +1,4 @@
-"""The lexicon: what words, and plain colours, tell about matter."""
+"""Lexicon of materials: words and plain colours."""
 
 import colorsys
 import tomllib
@@ -24,7 +24,7 @@ from corporeal.recognition.translation import OF_PREPOSITIONS, translate_words
 from corporeal.recognition.typical_extents import sized_classes
 
 LOOSE_MATERIALS = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
-"""What no container is made of: a compost bin has some in it."""
+"""Materials of contents, never of containers: a compost bin."""
 NOUNS_SHAPED_OF_LOOSE = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
 """Things that are made of it: a snow shoe is not."""
 NOUNS_WHOLLY_OF_MATERIAL = frozenset(("block", "ring", "bag"))
@@ -66,9 +66,9 @@ class LexiconTerm:
     blown: bool = False
     """It is hollow only where it is of one of the ``mouldable_materials`` materials."""
     extents: tuple[float, float] = (0.0, inf)
-    """It tells of things only whose longest side is at least and below that [m]."""
+    """It tells of objects only whose longest side is at least and below that [m]."""
     lone: bool = False
-    """It counts only where it is all that a thing is called."""
+    """It counts only where it is all that an object is called."""
     before: int = 0
     """Words of the object that a substance stands right before."""
     narrowed: bool = False
@@ -97,7 +97,7 @@ class TokenisedName:
     words: tuple[str, ...]
 
     def says(self, phrase: tuple[str, ...]) -> bool:
-        """Tell whether these words follow one another in it."""
+        """Return whether these words follow one another in it."""
         n = len(phrase)
         return any(self.words[k : k + n] == phrase for k in range(len(self.words) - n + 1))
 
@@ -128,15 +128,15 @@ def head_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
 
 
 def _head_noun_index(tokens: tuple[str, ...]) -> int | None:
-    """Return where the last noun of a name stands, which is the thing; None: no noun is known."""
+    """Return where the last noun of a name stands, which is the object; None: no noun is known."""
     nouns = _noun_words() - _describing_words()
     return next((k for k in range(len(tokens) - 1, -1, -1) if tokens[k] in nouns), None)
 
 
 def _is_material_of_following(term: LexiconTerm, following: str) -> bool:
-    """Tell whether what follows a word may be of what it names: a steel bin, but no sand bin.
+    """Return whether what follows a word may be of what it names: a steel bin, but no sand bin.
 
-    What burns is no stove's matter: a coal stove, but a wooden oven.
+    What burns is no stove's material: a coal stove, but a wooden oven.
     """
     if (
         term.material in FUEL_MATERIALS
@@ -167,7 +167,7 @@ def _terms_with_position(tokens: tuple[str, ...]) -> Iterator[tuple[int, Lexicon
 
 
 def _silent_spans(tokens: tuple[str, ...]) -> list[set[int]]:
-    """Return which words say nothing of matter where they stand: there is no ice in ice cream.
+    """Return which words say nothing of material where they stand: there is no ice in ice cream.
 
     What is known of the whole phrase, or of a longer one, counts: a wood stove is of iron.
     """
@@ -204,7 +204,7 @@ def name_tokens(name: str) -> tuple[str, ...]:
 
 @cache
 def multiword_names() -> frozenset[tuple[str, ...]]:
-    """Return every name of a thing that is more than one word."""
+    """Return every name of an object that is more than one word."""
     listed = (phrase for table in ("hollow", "open", "cast") for phrase in _table_phrases(table))
     sizes = (tuple(strip_plural_s(w) for w in name.split()) for name in sized_classes())
     named = (*(term.phrase for term in lexicon_terms()), *listed, *sizes)
@@ -249,7 +249,7 @@ def _single_words(kind: str) -> frozenset[str]:
 
 
 def names_hollow_object(tokens: tuple[str, ...]) -> bool:
-    """Tell whether a name is that of something hollow: its last noun is what it names."""
+    """Return whether a name is that of something hollow: its last noun is what it names."""
     return _head_noun_in_table(tokens, "hollow")
 
 
@@ -260,7 +260,7 @@ def hollow_wall_thickness(tokens: tuple[str, ...], material: str) -> float | Non
 
     Args:
         tokens: Of a name.
-        material: What the thing is of.
+        material: What the object is of.
 
     """
     row = wall_table_row(tokens, material, "walls")
@@ -268,7 +268,7 @@ def hollow_wall_thickness(tokens: tuple[str, ...], material: str) -> float | Non
 
 
 def wall_table_row(tokens: tuple[str, ...], material: str | None, table: str) -> dict | None:
-    """Return what a table says of the walls of things of such a material; None: nothing."""
+    """Return what a table says of the walls of objects of such a material; None: nothing."""
     for row in _table()[table]:
         if material in row["of"] and _head_noun_among(tokens, _singular_phrases(row["words"])):
             other = _head_noun_among(tokens, _singular_phrases(row.get("but", ())))
@@ -277,27 +277,27 @@ def wall_table_row(tokens: tuple[str, ...], material: str | None, table: str) ->
 
 
 def names_open_vessel(tokens: tuple[str, ...]) -> bool:
-    """Tell whether a name is that of an open vessel: its last noun is what it names."""
+    """Return whether a name is that of an open vessel: its last noun is what it names."""
     return _head_noun_in_table(tokens, "open")
 
 
 def names_hollow_casting(tokens: tuple[str, ...]) -> bool:
-    """Tell whether a name is that of what is cast hollow where it is large and of metal."""
+    """Return whether a name is that of what is cast hollow where it is large and of metal."""
     return _head_noun_in_table(tokens, "cast")
 
 
 def _head_noun_in_table(tokens: tuple[str, ...], table: str) -> bool:
-    """Tell whether a name's last noun stands in a table: "bin" in "bin old green"."""
+    """Return whether a name's last noun stands in a table: "bin" in "bin old green"."""
     return _head_noun_among(tokens, _table_phrases(table))
 
 
 def head_noun_in(tokens: tuple[str, ...], named: Sequence[str]) -> bool:
-    """Tell whether a name's last noun is one of these names of things."""
+    """Return whether a name's last noun is one of these names of objects."""
     return _head_noun_among(tokens, _singular_phrases(named))
 
 
 def _head_noun_among(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]]) -> bool:
-    """Tell whether a name's last noun is one of these, whatever describes it behind."""
+    """Return whether a name's last noun is one of these, whatever describes it behind."""
     first = _head_noun_index(tokens) or 0
     ends = range(len(tokens), first, -1)
     return any(tokens[:end][-len(phrase) :] == phrase for end in ends for phrase in named)
@@ -339,7 +339,7 @@ def strip_plural_s(word: str) -> str:
 
 
 def matches_colour_rule(look: ColourRule, finish: Finish) -> bool:
-    """Tell whether a finish's colour factor, as an eye sees it, lies within a look."""
+    """Return whether a finish's colour factor, as an eye sees it, lies within a look."""
     red, green, blue = (_srgb_of_linear(c) for c in finish.colour[:3])
     hue, saturation, value = colorsys.rgb_to_hsv(red, green, blue)
     seen = (360.0 * hue, saturation, value)
@@ -354,49 +354,49 @@ def _srgb_of_linear(light: float) -> float:
 
 
 def have_same_walls(one: str, other: str) -> bool:
-    """Tell whether things of either of two materials have walls of the same thickness."""
+    """Return whether objects of either of two materials have walls of the same thickness."""
     return one == other or any({one, other} <= set(alike) for alike in _table()["kin"])
 
 
 @cache
 def mouldable_materials() -> frozenset[str]:
-    """Materials of which blown and moulded things are hollow: blown, moulded or sewn."""
+    """Materials of which blown and moulded objects are hollow: blown, moulded or sewn."""
     return frozenset(_table()["mouldable"])
 
 
 @cache
 def fired_materials() -> frozenset[str]:
-    """Materials of which moulded things are hollow, and balls are not: slip-cast."""
+    """Materials of which moulded objects are hollow, and balls are not: slip-cast."""
     return frozenset(_table()["fired"])
 
 
 @cache
 def formed_materials() -> frozenset[str]:
-    """Return materials that things of any kind are sheets, castings or mouldings of."""
+    """Return materials that objects of any kind are sheets, castings or mouldings of."""
     return (metal_materials() | mouldable_materials() | fired_materials() | {"glass"}) - frozenset(
         _table()["solid"]
     )
 
 
 def names_unknown_object(tokens: tuple[str, ...]) -> bool:
-    """Tell whether a name has a word for a thing, of whose matter no table knows anything."""
+    """Return whether a name has a word for an object without a known material."""
     standing = head_terms(tokens)
     known = {w for term in standing for w in term.phrase} | _describing_words() | OF_PREPOSITIONS
     return all(t.kind == "substance" for t in standing) and any(w not in known for w in tokens)
 
 
 def substance_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
-    """Return the words of a name that say what the thing is made of."""
+    """Return the words of a name that name the object's material."""
     return [t for t in head_terms(tokens) if t.kind == "substance"]
 
 
 def names_solid_object(tokens: tuple[str, ...]) -> bool:
-    """Tell whether a word of a name says that the thing is solid all through."""
+    """Return whether a word of a name says that the object is solid all through."""
     return bool(set(tokens) & frozenset(map(strip_plural_s, _table()["massive"])))
 
 
 def is_hollow_in_material(thing: LexiconTerm, material: str) -> bool:
-    """Tell whether a thing has its wall where it is of a material that somebody names."""
+    """Return whether an object is hollow in a named material."""
     if not (thing.moulded or thing.blown) or material in mouldable_materials():
         return True
     return thing.moulded and material in fired_materials()
@@ -445,7 +445,7 @@ def colour_rules() -> tuple[ColourRule, ...]:
 def _container_nouns() -> frozenset[str]:
     """Nouns that make the noun before them a mere purpose.
 
-    Beside those of the table every thing that has a usual size and no usual material: a bowl is a
+    Beside those of the table every object that has a usual size and no usual material: a bowl is a
     bowl, whatever is in it.
     """
     single = _single_sized_nouns()

@@ -1,4 +1,4 @@
-"""A mass that a name states: "dumbbell_5kg", "10lb bowling ball"; volumes and sizes are none."""
+"""Masses stated in names: "dumbbell_5kg", "10lb bowling ball"."""
 
 import re
 import tomllib
@@ -16,7 +16,7 @@ NETWORK_GENERATIONS = ("2g", "3g", "4g", "5g", "6g")
 
 
 def mass_from_name(*names: str) -> float | None:
-    """Return the mass [kg] that a thing's names state; None: none, or several different ones."""
+    """Return the mass [kg] that an object's names state; None: none, or several different ones."""
     found = {mass for name in names for mass in _of_name(name)}
     return found.pop() if len(found) == 1 else None
 
@@ -42,7 +42,7 @@ def _mass_of_match(name: str, match: re.Match[str]) -> float | None:
 
 
 def _has_table_word(name: str, table: str) -> bool:
-    """Tell whether words of a table stand in a name, whole."""
+    """Return whether words of a table stand in a name, whole."""
     return any(re.search(rf"\b{w}s?\b", name) for w in _table()[table])
 
 
@@ -64,7 +64,7 @@ def _table() -> dict:
 
 
 def mass_from_name_warning(name: str, mass: float, *names: str) -> str | None:
-    """Return a sentence for the user where a thing does not weigh what its names state.
+    """Return a sentence for the user where an object does not weigh what its names state.
 
     Args:
         name: Of the object, for the sentence.
@@ -80,8 +80,8 @@ def mass_from_name_warning(name: str, mass: float, *names: str) -> str | None:
     ):
         return None
     return Note(
-        f"{name}: its name says {said:.3g} kg, and it weighs {mass:.3g} kg. Check how large it is "
-        "(--extent), what it is made of and whether it is hollow or filled (--annotations); or the "
+        f"{name}: its name says {said:.3g} kg, and it weighs {mass:.3g} kg. Check its size "
+        "(--extent), its material and whether it is hollow or filled (--annotations); or the "
         "name means something else.",
         NoteKind.ASSUMED,
     )

@@ -1,4 +1,4 @@
-"""Recognition without a model: from the names and surface values in the file."""
+"""Recognition of materials from names and surface properties in the file, without a model."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -47,11 +47,11 @@ UNPAINTED_METALS = frozenset(
 )
 """Metals that are seldom painted: beside what is usually of them, a metal's name is no colour."""
 STUFFING_MATERIALS = frozenset(("seat_foam", "memory_foam", "fibre_fill"))
-"""What upholstered things are of, behind their covers."""
+"""What upholstered objects are of, behind their covers."""
 COVER_MATERIALS = frozenset("leather synthetic_leather cotton synthetic_textile felt".split())
 """What comes in sheets, and covers what is upholstered: a leather sofa is no block of leather."""
 MACHINERY_CONTENTS = "machinery"
-"""What a machine's case holds: no goods that somebody takes out."""
+"""Contents of a machine's case, which are no goods."""
 MAX_SOLID_CASTING_EXTENT_M = 0.2
 """Statues of metal that are larger are cast around a core [m]."""
 UNKNOWN_PART = PartDescription("", None, reason="No name in the file says what this is made of.")
@@ -105,7 +105,7 @@ class FileEvidence:
 
     @property
     def _heard(self) -> set[tuple[str, ...]]:
-        """Names of the object that are believed: a "rubber_ball" of steel_ball.ply is no steel."""
+        """Names of the object that are accepted: a "rubber_ball" of steel_ball.ply is no steel."""
         thing, heard = self.thing, set()
         by_file = thing.class_name == everyday_words(thing.stem)
         first = [thing.name, thing.class_name] if by_file else [thing.class_name, thing.name]
@@ -190,12 +190,12 @@ def infer_hollow_structure(
     walled: Callable[[str], bool],
     from_pictures: bool = False,
 ) -> PartDescription:
-    """Let what is hollow by what it is have a wall, where it is not stated how it is built.
+    """Give parts of hollow classes a wall, if their structure is not stated.
 
     Args:
         words: What was recognised of a part.
         evidence: All that the file says about it.
-        walled: Tells whether walls of a material were ever measured.
+        walled: Whether wall thicknesses of a material were measured.
         from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
 
     """
@@ -232,7 +232,7 @@ def infer_hollow_structure(
 
 
 def _moulded_wall(words: PartDescription, evidence: FileEvidence) -> float | None:
-    """Return the wall [m] of a part that is hollow because of what it is and is made of."""
+    """Return the wall thickness [m] of a part that is hollow by its class and material."""
     if words.material is None or not evidence.alone:
         return None
     walls = (hollow_wall_thickness(name.words, words.material) for name in evidence.general)
@@ -247,7 +247,7 @@ def substance_hint(surface: Surface, finish: Finish) -> str:
 
 
 def recognise_part(evidence: FileEvidence) -> PartDescription:
-    """Say what a part is made of, how sure, and why; unknown is a normal answer."""
+    """Return a part's material with confidence and reason; unknown is a valid result."""
     for ask in (_by_own_names, _by_object_names, _by_colour, _by_surface_values):
         answer = ask(evidence)
         if answer is not None:
@@ -352,7 +352,7 @@ def _as_solid_if_named(answer: PartDescription, evidence: FileEvidence) -> PartD
 
 
 def _as_metal_if_metallic(terms: list[LexiconTerm], evidence: FileEvidence) -> list[LexiconTerm]:
-    """Let an object that looks metallic be of the metal that such objects are made of."""
+    """Choose the usual metal of an object that looks metallic."""
     if not _is_metallic(evidence):
         return terms
     return [replace(s, material=s.metallic or s.material) for s in terms]
@@ -433,8 +433,9 @@ def _strongest_terms(
 def _terms_in_context(name: TokenisedName) -> list[LexiconTerm]:
     """Find what stands in a name; a substance right beside an object is that of such an object.
 
-    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no thing's matter: a
-    snow shoe, a snow globe. A general word means what such things are of: a plastic duck is of PVC.
+    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no object's material:
+    a snow shoe, a snow globe. A general word means what such objects are of: a plastic duck is of
+    PVC.
     """
     standing = head_terms(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
@@ -462,7 +463,7 @@ def _is_loose_material(term: LexiconTerm) -> bool:
 
 
 def _is_purpose(term: LexiconTerm, name: TokenisedName, things: Sequence[LexiconTerm]) -> bool:
-    """Tell whether what lies loose stands beside a thing that is for it, and not made of it."""
+    """Return whether a granular material is an object's purpose, not its material."""
     return _is_loose_material(term) and any(
         t.phrase[-1] not in NOUNS_SHAPED_OF_LOOSE | NOUNS_WHOLLY_OF_MATERIAL
         or not (name.says(term.phrase + t.phrase) or name.says(t.phrase + term.phrase))
@@ -471,7 +472,7 @@ def _is_purpose(term: LexiconTerm, name: TokenisedName, things: Sequence[Lexicon
 
 
 def _structured_as_object(substance: LexiconTerm, thing: LexiconTerm) -> LexiconTerm:
-    """Return a substance built as an object is; how thick depends on what it is usually made of.
+    """Return a substance with the structure of an object of its class.
 
     A ball of rubber is blown up, and one of steel is solid. A sofa of leather is covered with it,
     as thick as that usually is. What is blown up is a skin, whatever it is.

@@ -1,4 +1,4 @@
-"""What all things of a name have: the air in a ball, the rebound that its rules ask for."""
+"""Priors by name: pressure of balls, and restitution by the rules of their sport."""
 
 from collections.abc import Callable
 
@@ -25,7 +25,7 @@ def usual_rebound(evidence: FileEvidence) -> float | None:
 def _common_value(
     evidence: FileEvidence, of: Callable[[LexiconTerm], float | None]
 ) -> float | None:
-    """Return what all things with the longest of an object's names have; None: they differ."""
+    """Return what all objects with the longest of an object's names have; None: they differ."""
     terms = [t for name in evidence.general for t in head_terms(name.words) if t.kind == "thing"]
     longest = max((len(t.phrase) for t in terms), default=0)
     usual = {of(t) for t in terms if len(t.phrase) == longest}

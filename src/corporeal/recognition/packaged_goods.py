@@ -1,4 +1,4 @@
-"""Goods as they are sold: what is in a vessel, and what it is filled into."""
+"""Packaged goods: contents and vessels."""
 
 import tomllib
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Which surfaces make one part: what the file itself says, by node, mesh and material."""
+"""Grouping of surfaces into parts by node, mesh and material of the file."""
 
 import re
 import unicodedata
@@ -77,10 +77,10 @@ def strip_accents(text: str) -> str:
 
 
 def identify_parts(scene: Scene, hint: GroupHint = lambda surface, finish: "") -> PartsByName:
-    """Tell the parts of every object apart.
+    """Identify the parts of every object.
 
     A node whose extras state a substance is a part. Other surfaces of an object form one part when
-    they wear the same finish, unless ``hint`` (what the names say of the matter) differs.
+    they wear the same finish, unless ``hint`` (what the names say of the material) differs.
     """
     looks = [_finish_key(finish) for finish in scene.finishes]
     members = _object_surfaces(scene)

@@ -1,4 +1,4 @@
-"""Everyday words out of file, node and mesh names."""
+"""Everyday words from file, node and mesh names."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ FILLER_WORDS = frozenset(
 def everyday_words(name: str) -> str:
     """Return the words of a name that say what an object is: "soda can coke"; may be empty.
 
-    Of any alphabet: what no table of ours knows still tells objects apart for its reader.
+    Words of any alphabet are kept.
     """
     name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
@@ -65,7 +65,7 @@ def numbered_names(classes: Sequence[str], titles: Sequence[str] = ()) -> list[s
     """Return a node name ``<class>_<k>`` for each class.
 
     Args:
-        classes: What each thing is, in words.
+        classes: What each object is, in words.
         titles: What each is called in its file. Where all of a class end in numbers of their own
             ("block_10", "block_11"), these are kept: a scene file that names them means them.
             Otherwise k counts from 0.

@@ -1,4 +1,4 @@
-"""What a file states outright of a part: substance, wall, air, how it is built, values."""
+"""Properties of parts stated in files: substance, wall, pressure, structure, values."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Names in other languages, as far as they name everyday things and what these are made of."""
+"""Translation of names of everyday objects and materials to English."""
 
 import tomllib
 import unicodedata
@@ -9,11 +9,13 @@ from pathlib import Path
 from corporeal.recognition.parts_by_name import strip_accents
 
 OF_PREPOSITIONS = frozenset("de del di du des da do della dello en au aux".split())
-"""What stands between a thing and what belongs to it: "caja de carton" is a box of cardboard,
-"pot au lait" a milk pot."""
+"""What stands between an object and what belongs to it: "caja de carton" is a box of cardboard,
+"pot au lait" a milk pot.
+"""
 TRAILING_ADJECTIVES = frozenset("empty full old small large red blue green white black".split())
-"""What stands behind a thing and what belongs to it, and is of the thing: "botella de vino vacía"
-is an empty bottle."""
+"""What stands behind an object and what belongs to it, and is of the thing: "botella de vino vacía"
+is an empty bottle.
+"""
 UMLAUT_TRANSCRIPTION = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 UNSPACED_SCRIPTS = ("CJK ", "HIRAGANA ", "KATAKANA ")
 """Letters of languages that are written without gaps."""
@@ -25,7 +27,7 @@ MIN_COMPOUND_LETTERS = 3
 
 
 def translate_words(words: Sequence[str]) -> list[str]:
-    """Return the words of a name with those of other languages in English, the thing last.
+    """Return the words of a name with those of other languages in English, the object last.
 
     ``["seau", "de", "plage"]`` gives ``["plage", "bucket"]``, ``["holzstuhl"]`` ``["wood",
     "chair"]``; what is not known stays as it is.
@@ -87,7 +89,7 @@ def _translate_word(word: str) -> tuple[str, ...]:
 def _translate_unspaced(word: str) -> tuple[str, ...]:
     """Return the English of known words that stand together without a gap; (): the last is unknown.
 
-    Chinese and Japanese are written so, the thing last: 木箱 is a box of wood, 木の箱 too. What is
+    Chinese and Japanese are written so, the object last: 木箱 is a box of wood, 木の箱 too. What is
     not known before it is left out there, and nowhere else.
     """
     gapless = all(unicodedata.name(c, "").startswith(UNSPACED_SCRIPTS) for c in word)

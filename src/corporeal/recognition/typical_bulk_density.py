@@ -1,4 +1,4 @@
-"""How heavy everyday objects are for the room that they take, to notice what cannot be."""
+"""Typical bulk density of everyday objects, for plausibility checks."""
 
 import tomllib
 from dataclasses import dataclass
@@ -18,17 +18,19 @@ from corporeal.recognition.typical_extents import (
 BULK_DENSITY_MARGIN_RATIO = 2.0
 """How far beyond the table an object may be before it is reported, as a factor."""
 MAX_LARGE_OBJECT_KG_M3, LARGE_OBJECT_SIDE_M = 2000.0, 0.5
-"""What no thing exceeds [kg/m³ of its box] whose longest side is that long [m], if its class is not
-in the table: stone and metal fill a part of theirs."""
+"""What no object exceeds [kg/m³ of its box] whose longest side is that long [m], if its class is
+not in the table: stone and metal fill a part of theirs.
+"""
 MAX_THICK_OBJECT_KG_M3, THICK_OBJECT_SIDE_M = 3500.0, 0.15
 """What none exceeds that is so thick [m], its middle side: more than stone is metal through and
 through. What is thinner may be a bar or a plate."""
 
 
 BulkMeasure = Literal["box", "large", "face"]
-"""Mass is held against the volume of the smallest box around a thing, or against that box's
+"""Mass is held against the volume of the smallest box around an object, or against that box's
 largest side where it goes with that: of what is flat, whose depth is a stand's, and of what is
-inflated. "large" is the box of things from some length on, where small ones are denser."""
+inflated. "large" is the box of objects from some length on, where small ones are denser.
+"""
 BULK_MEASURES: tuple[BulkMeasure, ...] = ("box", "large", "face")
 PER_BOX_VOLUME_TEXT, PER_FACE_AREA_TEXT = (
     "kg per cubic metre of its box",
@@ -51,14 +53,14 @@ class TypicalBulkDensity:
     high: float
     measure: BulkMeasure = "box"
     longer: float = 0.0
-    """For things whose longest side is longer than this [m]."""
+    """For objects whose longest side is longer than this [m]."""
 
 
 def typical_bulk_density(class_name: str, longest: float) -> TypicalBulkDensity | None:
     """Return the entry of the name's last known noun, the one with the most words that fit.
 
     Args:
-        class_name: What somebody calls a thing.
+        class_name: Class of the object.
         longest: Its longest side [m].
 
     """
@@ -90,7 +92,7 @@ def mass_warning(
             across >= THICK_OBJECT_SIDE_M and bulk > MAX_THICK_OBJECT_KG_M3
         )
         found = _mass_text(name, mass, bulk, "box")
-        told = Note(f"{found}, more than nearly all things. {MASS_ADVICE}", NoteKind.ASSUMED)
+        told = Note(f"{found}, more than nearly all objects. {MASS_ADVICE}", NoteKind.ASSUMED)
         return told if heavy else None
     found = mass / face if known.measure == "face" else bulk
     if known.low / BULK_DENSITY_MARGIN_RATIO <= found <= known.high * BULK_DENSITY_MARGIN_RATIO:
@@ -104,7 +106,7 @@ def mass_warning(
     )
 
 
-MASS_ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."
+MASS_ADVICE = "Check its size (--extent), its material and whether it is hollow."
 
 
 def _mass_text(name: str, mass: float, found: float, measure: BulkMeasure) -> str:

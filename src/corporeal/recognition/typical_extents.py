@@ -1,4 +1,4 @@
-"""How large everyday objects are, to notice a file that is not in metres."""
+"""Typical extents of everyday objects, for plausibility checks of units."""
 
 import re
 import tomllib
@@ -50,7 +50,7 @@ class TypicalExtent:
     usual: float
     high: float
     part: bool = False
-    """Usually found as a part of something else, such as what somebody wears."""
+    """Usually found as a part of something else, such as clothing."""
 
 
 def typical_extent(class_name: str) -> TypicalExtent | None:
@@ -79,7 +79,7 @@ def normalised_words(class_name: str, compounds: Mapping[str, tuple[str, ...]]) 
     """Return a name's words, in English and the singular; a known compound counts as its words.
 
     Args:
-        class_name: What somebody calls a thing: "golfball", "Kühlschrank".
+        class_name: Class of an object: "golfball", "Kühlschrank".
         compounds: A known compound → the words that it is made of.
 
     """
@@ -152,7 +152,7 @@ def extent_warning(name: str, class_name: str, extent: float) -> str | None:
 
 
 def _is_normalised(extent: float, known: TypicalExtent | None) -> bool:
-    """Tell whether a program seems to have fitted the model into a box of 1 or 2 units."""
+    """Return whether the model seems normalised to a box of 1 or 2 units."""
     exact = min(abs(extent - 1), abs(extent - 2)) < 1e-5
     return (
         exact
@@ -205,10 +205,10 @@ def _rank_entry(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:
 
 
 def rank_class_match(phrase: str, words: list[str]) -> tuple[int, int, int]:
-    """Tell how well a class fits a name that has all its words, best last.
+    """Rank how well a class fits a name that has all its words, best last.
 
-    What may be matter as well ("table glass", "lego brick") comes after what cannot; then the last
-    in the name, and the one of most words.
+    Classes that may be materials as well ("table glass", "lego brick") come later; then the last in
+    the name, and the one of most words.
     """
     own = singular_words(phrase)
     matter = (

@@ -1,4 +1,4 @@
-"""Letters of every alphabet, as they stand in names that people give to things."""
+"""Letters of every alphabet, for tokenizing names."""
 
 import unicodedata
 from itertools import groupby
@@ -10,12 +10,12 @@ def compose_accents(name: str) -> str:
 
 
 def is_letter(character: str) -> bool:
-    """Tell whether a character is a letter, or a mark that belongs to one (a vowel sign)."""
+    """Return whether a character is a letter, or a mark that belongs to one (a vowel sign)."""
     return unicodedata.category(character)[0] in "LM"
 
 
 def is_ideograph(character: str) -> bool:
-    """Tell whether a character is a word by itself, as in Chinese and Japanese."""
+    """Return whether a character is a word by itself, as in Chinese and Japanese."""
     return unicodedata.name(character, "").startswith("CJK ")
 
 
@@ -25,5 +25,5 @@ def letter_runs(name: str) -> list[str]:
 
 
 def has_meaning(word: str) -> bool:
-    """Tell whether a word has two letters or more, or is an ideograph."""
+    """Return whether a word has two letters or more, or is an ideograph."""
     return len(word) > 1 or (word != "" and is_ideograph(word))

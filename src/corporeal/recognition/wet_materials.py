@@ -1,4 +1,4 @@
-"""What is wet by its name holds water: sponges and cloths weigh more, and sponges fall dead."""
+"""Wet materials by name: sponges and cloths weigh more, and sponges don't rebound."""
 
 import tomllib
 from collections.abc import Sequence
@@ -13,13 +13,13 @@ from corporeal.recognition.lexicon import TokenisedName
 def wet_material_values(
     names: Sequence[TokenisedName], material: str | None, dry: MeasuredRange | None
 ) -> dict[str, Provenance]:
-    """Return density, loss and rebound of what a name says is wet; nothing where it holds no water.
+    """Return density, loss and restitution of a wet material; empty if it holds no water.
 
     A foam that is pressed pumps the water through its pores, which takes about the energy that its
-    cells store: it falls dead where a dry one bounces.
+    cells store: it doesn't rebound as a dry one does.
 
     Args:
-        names: Of the thing and of its part.
+        names: Of the object and of its part.
         material: What it is made of.
         dry: Density of that [kg/m³].
 

@@ -1,4 +1,4 @@
-"""Objects that were found in pictures or in a splat, and which of those that were named each is."""
+"""Objects found in pictures or in a splat, matched to given names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -63,8 +63,8 @@ def named_objects(
     config: ReconstructConfig, viewer: PhotoInterview, taken: GaussianScene
 ) -> list[SeenObject]:
     """Return what objects there are, from the command line or a model; or nothing."""
-    if config.things:
-        return [object_of_usual_size(name) for name in config.things]
+    if config.object_names:
+        return [object_of_usual_size(name) for name in config.object_names]
     return viewer.objects([*taken.some().values()])
 
 
@@ -80,7 +80,7 @@ def recognise_objects(
     there is one, else by whoever sees the objects painted.
     """
     count = found.count
-    if config.things or not wanted:
+    if config.object_names or not wanted:
         number: Sequence[int | None] = range(len(wanted))
     elif config.semantic.startswith("clip"):
         number = _match_by_words(wanted, found, config.semantic)

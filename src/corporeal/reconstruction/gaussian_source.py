@@ -1,4 +1,4 @@
-"""What pictures or a splat give: poses and masks where nobody gave them, and Gaussians."""
+"""Gaussians of pictures or a splat, with poses and masks if not given."""
 
 import shutil
 import tempfile
@@ -55,15 +55,15 @@ ALIKE_POSES_FOLDER, ALIKE_SEEN_POSES_FOLDER = "poses-alike", "poses-alike-seen"
 """
 STAND_STILL_HINT = (
     "Photograph it while neither it nor what is around it moves, give masks (a folder 'masks' with "
-    "the names of the pictures), or go on all the same with --force."
+    "the names of the pictures), or continue with --force."
 )
 PATTERNED_GROUND_HINT = (
     "Put it on something with a pattern that does not repeat, such as a newspaper, and photograph "
     "it in steps of at most 15°. "
 )
 """What helps where pictures may have been put in wrong places."""
-LOOK_AT_MASKS_HINT = "Look at the masks, too. --force goes on all the same."
-"""What else helps, where somebody gave masks."""
+LOOK_AT_MASKS_HINT = "Check the masks, too. --force continues anyway."
+"""Advice if masks were given."""
 GIVE_MASKS_HINT = (
     "Give masks (a folder 'masks' with the names of the pictures), or grow them with 'corporeal "
     "masks' and correct them; or photograph it on a ground of another colour, from more sides. "
@@ -86,7 +86,12 @@ def gaussians_from_source(
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="corporeal-") as name:
             return gaussians_from_source(source, config, Path(name), progress)
-    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
+    training = TrainConfig(
+        config.training,
+        seed=config.training_seed,
+        rasteriser=config.rasteriser,
+        hull=config.resolution.hull,
+    )
     kept = folder / "training.npz"
     instances = config.apart == "masks"
     if input_kind([source]) == "splat":
@@ -106,7 +111,7 @@ def gaussians_from_source(
         later = subprogress(progress, begun + MASKED_PROGRESS, 1.0)
         (folder / MASKS_FIGURE_FILE).unlink(missing_ok=True)
         masks_figure(posed.folder, found.folder, folder / MASKS_FIGURE_FILE)
-        # What somebody corrected is to be believed.
+        # corrected masks are reliable
         grown = found.grown and found.folder is not None and not edited_masks(found.folder)
         masked = MaskSource(found.folder, grown)
         taken = load_or_train_gaussians(posed.folder, training, kept, later, instances, masked)
@@ -131,7 +136,7 @@ class _MasksFound:
     grown: bool = False
     """Whether nobody, and no model, said what an object is."""
     doubted: Path | None = None
-    """Where masks are that are not to be believed."""
+    """Where masks are that are unreliable."""
     incomplete: str = ""
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
@@ -248,14 +253,14 @@ def _test_poses_by_masks(
 def _drop_doubted_pictures(
     posed: FoundPoses, grown: GrownMasks, doubted: Path, place: Path, progress: Progress
 ) -> tuple[FoundPoses, GrownMasks]:
-    """Leave out pictures that doubted masks speak against, if masks of the others are believed.
+    """Leave out pictures that doubted masks speak against, if masks of the others are accepted.
 
     Args:
         posed: Where pictures were taken from.
         grown: What is returned otherwise, with the poses.
         doubted: The masks, whose outlines contradict each other.
         place: Gets the other poses and masks.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
     other = replace(posed, folder=place / ALIKE_POSES_FOLDER)
@@ -275,7 +280,7 @@ def _drop_doubted_pictures(
 def _refuse_doubted_poses(
     source: Path, posed: FoundPoses, force: bool, step: str = STAND_STILL_HINT
 ) -> FoundPoses:
-    """Refuse poses in which neighbours share too little, or say so in a warning.
+    """Reject poses in which neighbours share too little, or say so in a warning.
 
     Args:
         source: The photographs.

@@ -1,4 +1,4 @@
-"""Masks over some of the photographs: whether the thing is what somebody meant is seen at once."""
+"""Figure of masks over photographs."""
 
 from collections.abc import Sequence
 from pathlib import Path

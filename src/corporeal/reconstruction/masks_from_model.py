@@ -1,8 +1,8 @@
-"""Masks by a model that finds objects in one picture, and whether they are of one thing at all.
+"""Masks by a learned segmentation model, and their consistency.
 
 A model sees one picture at a time and may take something else for the object in each. What it
 found is asked what grown masks are asked: whether pictures hold it, and whether its outlines are
-those of one thing. Nobody asks that of what a person drew.
+those of one object. Nobody asks that of what a person drew.
 """
 
 from pathlib import Path
@@ -34,23 +34,23 @@ CORRECT_MASKS_HINT = (
 def masks_from_model(
     config: ReconstructConfig, source: Path, place: Path, progress: Progress
 ) -> tuple[Path, tuple[str, ...], tuple[str, ...]]:
-    """Ask a model for masks, and ask of them whether they are of one thing.
+    """Ask a model for masks, and ask of them whether they are of one object.
 
     Args:
         config: Names model and words.
         source: A folder of photographs with poses.
         place: Gets the masks.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Returns:
         A folder that holds them, how they came about, and what is to be doubted.
 
     Raises:
-        UserError: There is no such model, or what it found is no thing.
+        UserError: There is no such model, or what it found is no object.
 
     """
     masker = connect_mask_model(config.masks)
-    learned = learned_masks(source, place, masker, config.things, progress)
+    learned = learned_masks(source, place, masker, config.object_names, progress)
     said = (*learned.said, CORRECT_MASKS_HINT)
     shown = read_posed_photos(source, FEATURE_IMAGE_SIDE_PX, learned.folder)
     assert shown.masks is not None, "they were written"
@@ -59,8 +59,8 @@ def masks_from_model(
         if why is not None and not config.force:
             what = f"masks by {masker.name()} are of no one thing: {why}."
             advice = (
-                f"Look at {learned.folder / MASK_FOLDERS[0]} and correct them, take other weights or "
-                "words, or leave --masks out, and masks are grown. --force goes on all the same."
+                f"Check and correct {learned.folder / MASK_FOLDERS[0]}, use other weights or "
+                "words, or omit --masks to grow masks. --force continues anyway."
             )
             raise BadFileError(source, what, advice)
     doubts = [] if why is None else [Note(f"Masks are of no one thing: {why}.", NoteKind.GRAVE)]
@@ -76,7 +76,7 @@ def masks_from_model(
 def several_objects_reason(
     masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]
 ) -> tuple[str | None, float]:
-    """Say in a clause why masks are not of one thing; None: they may be.
+    """Return in a clause why masks are not of one object; None: they may be.
 
     Returns:
         The clause, and which share of a mask the hull of all fills.

@@ -1,4 +1,4 @@
-"""Points on objects, and what their pictures look like."""
+"""Points on objects, with their features."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -109,7 +109,9 @@ def _points_of_field(
     progress: Progress,
 ) -> PlacedPoints:
     """Learn a radiance field of the objects, and take points from where it is dense."""
-    how = RadianceFieldConfig(config.training, seed=config.training_seed)
+    how = RadianceFieldConfig(
+        config.training, seed=config.training_seed, hull=config.resolution.hull
+    )
     kept = None if folder is None else folder / "radiance.npz"
     learned, found = radiance_field_points(
         taken, on_objects, MAX_OBJECT_POINTS, how, kept, progress

@@ -1,4 +1,4 @@
-"""How photographs or a splat are made objects, and which settings cannot be right."""
+"""Settings of the stage reconstruct, with validation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,27 +6,59 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from corporeal.core.errors import UserError, check_range
-from corporeal.core.setting_types import ReadsPath
+from corporeal.core.setting_types import NoOption, ReadsPath
 from corporeal.geometry.gaussian_transforms import MAX_COORDINATE_UNITS, UpAxisChoice
 from corporeal.multiview.metric_scale import MeasuredDistance, MetricScale, stated_metric_scale
 from corporeal.reconstruction.features import ENCODER_REGISTRY as ENCODERS
 from corporeal.reconstruction.features import connect_encoder
 from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
 from corporeal.reconstruction.features.mask_models import connect_mask_model, split_model_spec
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
+from corporeal.reconstruction.surface.surface_config import (
+    DEFAULT_CLOSED_SURFACE,
+    ClosedSurfaceConfig,
+)
 
 MASKS_AUTO, MASKS_NONE = "auto", "none"
 EncoderSpec = Annotated[str, ReadsPath(prefixes=tuple(ENCODERS))]
 
 
 @dataclass(frozen=True)
+class ReconstructionResolution:
+    """How finely a reconstruction looks and carves."""
+
+    rendered_views: int = 48
+    """Pictures of a splat that comes without cameras [1]."""
+    rendered_size_px: tuple[int, int] = (384, 384)
+    """Width and height of these [px]."""
+    hull_grid_cells: int = DEFAULT_HULL.grid_cells
+    """Cells of the grid that visual hulls are carved from [1]."""
+    object_grid_cells: int = DEFAULT_CLOSED_SURFACE.object_grid_cells
+    """Cells of the grid about each object that its surface is carved from, about [1]."""
+
+    @property
+    def hull(self) -> HullConfig:
+        """How visual hulls are carved."""
+        return HullConfig(grid_cells=self.hull_grid_cells)
+
+    @property
+    def surface(self) -> ClosedSurfaceConfig:
+        """How finely closed surfaces are carved."""
+        return ClosedSurfaceConfig(object_grid_cells=self.object_grid_cells, hull=self.hull)
+
+
+DEFAULT_RESOLUTION = ReconstructionResolution()
+
+
+@dataclass(frozen=True)
 class ReconstructConfig:
     """Reconstruction from photographs or a splat; of a model only ``up`` is used."""
 
-    things: tuple[str, ...] = ()
+    object_names: tuple[str, ...] = ()
     """Names of the objects, the largest first, such as "armchair" "soda can"."""
     count: int | None = None
-    """Number of objects; by default as many as --things names, else it is estimated."""
+    """Number of objects; by default as many as --object-names names, else it is estimated."""
     apart: SegmentationRule = "auto"
     """What objects are segmented by; auto: instance masks where there are any, else appearance
     features and concavity (look)."""
@@ -48,7 +80,7 @@ class ReconstructConfig:
     training: Literal["preview", "draft", "normal"] = "normal"
     """Length of training on photographs: seconds, about one minute, or four, on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
-    """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
+    """Rasteriser for training: numba on the processor, or gsplat on a CUDA GPU."""
     semantic: EncoderSpec = "descriptor"
     """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
     needs no weights."""
@@ -61,6 +93,8 @@ class ReconstructConfig:
     """Continue where objects are as large as the room, or photographs are reproduced badly."""
     training_seed: int = 0
     """Seed of all random numbers."""
+    resolution: Annotated[ReconstructionResolution, NoOption()] = DEFAULT_RESOLUTION
+    """Sizes of pictures and grids."""
 
 
 DEFAULT_RECONSTRUCT = ReconstructConfig()
@@ -85,14 +119,14 @@ def validate_reconstruct(
     check_range("--count", config.count, 1, 1000)
     check_range("--training-seed", config.training_seed, 0, 2**63)
     check_range("--floor-at", config.floor_at, -MAX_COORDINATE_UNITS, MAX_COORDINATE_UNITS)
-    if config.count and config.things and config.count != len(config.things):
+    if config.count and config.object_names and config.count != len(config.object_names):
         raise UserError(
-            f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
-            "--count out, or name all of them."
+            f"--count is {config.count}, but --object-names names {len(config.object_names)} objects. Omit "
+            "--count, or name all of them."
         )
-    if config.things or not asked:
+    if config.object_names or not asked:
         check_stated_extents(
-            extents, [object_of_usual_size(name) for name in config.things], source
+            extents, [object_of_usual_size(name) for name in config.object_names], source
         )
     for spec in (config.semantic, config.structural):
         connect_encoder(spec)  # who is to look must be there before anything is learned
@@ -110,8 +144,8 @@ def _check_masks(config: ReconstructConfig) -> None:
                 f"There is no folder {config.masks} for --masks. Name a folder of masks, or "
                 f"{', '.join(f'{kind}:FOLDER' for kind in MASKERS)}."
             )
-    elif connect_mask_model(config.masks).needs_words and not config.things:
-        raise UserError("These masks are found by words: name the objects with --things.")
+    elif connect_mask_model(config.masks).needs_words and not config.object_names:
+        raise UserError("These masks are found by words: name the objects with --object-names.")
 
 
 def metric_scale(config: ReconstructConfig) -> MetricScale | None:

@@ -1,4 +1,4 @@
-"""Figures that a reconstruction from photographs leaves, for the report."""
+"""Figures of a reconstruction for the report."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from corporeal.reconstruction.sfm.find_poses import POSES_FOLDER
 def figures_of_reconstruction(folder: Path) -> dict[str, Path]:
     """Name what was drawn in a reconstruction's folder, by what it shows."""
     drawn = {
-        "What was taken for objects, in some of the photographs": folder / OBJECTS,
+        "Masks of objects in some of the photographs": folder / OBJECTS,
         "Where the photographs were taken from": folder / POSES_FOLDER / CAMERAS,
     }
     return {caption: path for caption, path in drawn.items() if path.exists()}

@@ -1,4 +1,4 @@
-"""Where the picture is taken from: automatic placement above the floor."""
+"""Automatic placement of cameras above the floor."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

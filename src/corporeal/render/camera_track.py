@@ -1,4 +1,4 @@
-"""Where a film's camera stands: far enough to see everything, close to a contact, or alongside.
+"""Camera of a video: wide, close or following.
 
 Boxes are those of objects over time, nan where an object is absent or went far away.
 """

@@ -1,4 +1,4 @@
-"""Colours that mean the same in every scene: of materials, laws and objects; turbo for numbers."""
+"""Colour scales of materials, laws, objects and numbers, equal in all scenes."""
 
 import hashlib
 from collections.abc import Sequence

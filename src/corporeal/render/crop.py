@@ -1,4 +1,4 @@
-"""The part of a picture that is worth a closer look, so that the rest takes no memory."""
+"""Cropping of pictures to their content."""
 
 import numpy as np
 from jaxtyping import Bool

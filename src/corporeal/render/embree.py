@@ -141,7 +141,7 @@ class PixelBlock:
     left: int = 0
 
     def places(self, index: np.ndarray) -> "PixelPlaces":
-        """Say where in the picture some samples are."""
+        """Return where in the picture some samples are."""
         return PixelPlaces(index // self.columns + self.first, index % self.columns + self.left)
 
 

@@ -1,4 +1,4 @@
-"""Keys below the panels of a figure: which colour means what, in names or along a scale.
+"""Legends of figures.
 
 The letters are those of DejaVu Sans, the font that comes with Matplotlib; Matplotlib itself would
 take longer to import than a whole figure to draw.

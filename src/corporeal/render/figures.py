@@ -1,4 +1,4 @@
-"""Figures as papers show them: the scene coloured by what it is made of, and a film as a strip."""
+"""Figures: the scene coloured by materials, and a video as a strip of frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,15 +83,23 @@ class NumericPanel:
     log: bool = False
 
 
-def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) -> None:
+def fields_figure(
+    scene: Scene,
+    parts: Parts,
+    field: MaterialField,
+    path: Path,
+    picture_px: tuple[int, int] = PANEL_SIZE_PX,
+) -> None:
     """Draw six panels: material, law, stiffness, Poisson's ratio, density and object.
+
+    picture_px: width and height of what is rendered for each panel; it is scaled to the panel.
 
     Raises:
         UserError: The file cannot be written.
 
     """
     stage = RayScene(scene)
-    camera = fit_camera(_boxes(scene), PANEL_SIZE_PX, fill=0.93)
+    camera = fit_camera(_boxes(scene), picture_px, fill=0.93)
     seen, _ = identify_triangles(stage, camera)
     share = _visible_pixels(seen, parts)
     sheet = Image.new("RGB", SHEET_SIZE_PX, "white")
@@ -132,23 +140,23 @@ def panel_legend(
     return PanelLegend((title, *made.lines), made.swatches)
 
 
-def write_filmstrip(film: Video, path: Path, count: int = 6, width: int = 340) -> None:
-    """Set evenly chosen frames of a film in a row with thin white gaps, each with its time.
+def write_filmstrip(video: Video, path: Path, count: int = 6, width: int = 340) -> None:
+    """Set evenly chosen frames of a video in a row with thin white gaps, each with its time.
 
     Raises:
-        UserError: The film cannot be read, or the file cannot be written.
+        UserError: The video cannot be read, or the file cannot be written.
 
     """
-    last = max((len(film.times) or video_file.count_frames(film.path)) - 1, 0)
+    last = max((len(video.times) or video_file.count_frames(video.path)) - 1, 0)
     numbers = [int(k) for k in np.unique(np.linspace(0, last, count).round())]
-    pictures = video_file.read_frames(film.path, numbers)
+    pictures = video_file.read_frames(video.path, numbers)
     if not pictures:
-        raise UserError(f"{film.path}: has no frames. Make it again.")
-    small = (width, round(width * film.height / film.width))
+        raise UserError(f"{video.path}: has no frames. Make it again.")
+    small = (width, round(width * video.height / video.width))
     shown = [
         np.asarray(Image.fromarray(p).resize(small, Image.Resampling.LANCZOS)) for p in pictures
     ]
-    times = [film.times[k] if film.times else k / film.fps for k in numbers]
+    times = [video.times[k] if video.times else k / video.fps for k in numbers]
     write_image_row(shown, [f"{t:.2f} s" for t in times], path)
 
 
@@ -262,7 +270,7 @@ def _shorten(name: str) -> str:
 
 
 def _scale(panel: NumericPanel) -> tuple[list[ScaleTick], np.ndarray]:
-    """Give the lowest value, the highest and what lies between, and the colours along them."""
+    """Return the lowest value, the highest and what lies between, and the colours along them."""
     _, low, high = colours.turbo(panel.value or [0.0], panel.log)
     ramp = colours.ramp_colours(np.linspace(0, 1, 256))
     if high - low <= 1e-9 * max(abs(high), 1e-30):

@@ -1,4 +1,4 @@
-"""Whether a film's next picture would show what the last one shows."""
+"""Reuse of frames without visible change."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What the font of our figures can write."""
+"""Glyphs of the font of figures."""
 
 from functools import cache
 
@@ -25,7 +25,7 @@ def drawable_name(name: str, instead: str) -> str:
 
 @cache
 def _has_glyph(letter: str) -> bool:
-    """Tell whether the font draws a letter otherwise than what is no letter at all."""
+    """Return whether the font draws a letter otherwise than what is no letter at all."""
     return _glyph_pixels(letter) != _glyph_pixels(NONCHARACTER)
 
 

@@ -1,4 +1,4 @@
-"""Pages of HTML that hold all they show: one look, templates, and pictures inside the text."""
+"""Self-contained HTML pages: style, templates and embedded pictures."""
 
 import base64
 import html
@@ -34,7 +34,7 @@ def escape_html(text: object) -> str:
 
 
 def data_url_of_file(path: Path) -> str:
-    """Return a picture or film as an address that holds it."""
+    """Return a picture or video as an address that holds it."""
     return data_url(path.read_bytes(), MIME_TYPES[path.suffix])
 
 

@@ -1,4 +1,4 @@
-"""Where light that pixels share is not to be trusted, and what their own rays say there.
+"""Adaptive sampling where shared light is inaccurate.
 
 Light is smoothed over 12 × 12 pixels. Beside contacts, at the edges of shadows and on leaves and
 bars that is too wide: there every pixel asks for itself, along one of 16 sets of directions of
@@ -29,11 +29,13 @@ COMPARED_OFFSET_PX = 6
 COMPARED_STRIDE_PX = 2
 """Every so manieth pixel of every so manieth row is compared; what it says holds about it."""
 MAX_BEND_GREY_LEVELS = 12.0
-"""Grey levels (of 255) by which light may bend over twice ``COMPARED_OFFSET_PX`` pixels: what smoothing takes
-off a slope that ends there is half of it."""
+"""Grey levels (of 255) by which light may bend over twice ``COMPARED_OFFSET_PX`` pixels: what
+smoothing takes off a slope that ends there is half of it.
+"""
 MAX_STEP_GREY_LEVELS = 8.0
-"""Grey levels by which light may differ over ``COMPARED_OFFSET_PX`` pixels where its surface ends: smoothing
-looks to one side there, and is off by more than what it still shows."""
+"""Grey levels by which light may differ over ``COMPARED_OFFSET_PX`` pixels where its surface ends:
+smoothing looks to one side there, and is off by more than what it still shows.
+"""
 IGNORED_LIGHT_DIFFERENCE = np.float32(0.04)
 """Share of light that may differ without a closer look."""
 SET_SIDE_PX = 4

@@ -1,6 +1,6 @@
-"""The floor of a film's pictures: which of it objects darken, and how, where they do so softly.
+"""Shading of the floor: tiles in hard and soft shadow.
 
-Tiles of 8 × 8 pixels are told apart. Near objects and in their shadow pixels ask for light
+Tiles of 8 × 8 pixels are separated. Near objects and in their shadow pixels ask for light
 themselves; farther away objects only hide a little of the sky, which is asked at the corners of
 tiles and changes evenly between. Loops compiled by numba, over a band of pixels.
 """

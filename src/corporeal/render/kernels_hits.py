@@ -1,4 +1,4 @@
-"""What a ray meets: position, normals and colour at the hit. Loops compiled by numba.
+"""Position, normals and colour at ray hits. Loops compiled by numba.
 
 Arrays of G samples; ``index`` names the samples that a call is about, ray for ray.
 """

@@ -1,9 +1,9 @@
-"""Light at the hits: where to ask for it, sharing it among neighbours, and what the eye gets.
+"""Light at ray hits: sampling, sharing among neighbours, and shading.
 
 Neighbours share what their rays found, so that a pixel gathers dozens of directions: the samples
 of each 4 × 4 tile look along different directions, then a filter over tiles shares them (after
 Keller & Heidrich 2001, "Interleaved sampling"). Directions depend on the place in the picture
-only: a film does not flicker.
+only: a video does not flicker.
 """
 
 from typing import NamedTuple
@@ -154,7 +154,7 @@ def sun_direction(i, pixel, lamps, e, h, w):
 
 @numba.njit(**INNER)
 def begin_sun_ray(s, g, lamps, o):
-    """Say whether the sun may reach a sample, and write where its ray begins.
+    """Return whether the sun may reach a sample, and write where its ray begins.
 
     Leaves look through, too.
     """

@@ -1,4 +1,4 @@
-"""Light at the hits of a film's pixels: where to ask for it, with which rays, and how it is shared.
+"""Light at the hits of a video's pixels: sparse sampling and sharing.
 
 One pixel asks in each row and column of 4 × 4; the others take their neighbours' light. The 36 that
 ask in 12 × 12 pixels look along as many different directions, and it is 12 × 12 pixels that light

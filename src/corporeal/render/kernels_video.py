@@ -1,4 +1,4 @@
-"""What a film's pictures need besides: what no object can darken, where edges are, shared light.
+"""Kernels of videos: unshadowed pixels, edges, shared light.
 
 Loops compiled by numba, over the P pixels of a band.
 """

@@ -1,4 +1,4 @@
-"""The surface of a liquid from its particles, made anew for every picture.
+"""Surface reconstruction of liquids from particles, per frame.
 
 Its particles part and join, so no mesh follows them. The surface is where the distance from the
 weighted mean of the particles around a point is their radius (Zhu and Bridson 2005, "Animating sand

@@ -1,4 +1,4 @@
-"""What objects may weigh, as tables of a page: in all ways, and by each of several answers."""
+"""HTML tables of mass posteriors: over hypotheses, and by answer."""
 
 from collections.abc import Sequence
 
@@ -54,7 +54,7 @@ def _mixture_row(m: MassPosterior) -> str:
 
 
 def _hypothesis_cell(h: WeighedHypothesis, estimated: bool) -> str:
-    """Say how likely a way is, and what the estimates of mass changed of that."""
+    """Return how likely a way is, and what the estimates of mass changed of that."""
     before = f" ({h.prior:.0%})" if estimated else ""
     return f"{escape_html(h.words)}: {h.mass:.3g} kg, {h.probability:.0%}{before}"
 

@@ -1,4 +1,4 @@
-"""Pictures of one object for somebody who is to recognise it and say what it is made of."""
+"""Pictures of one object for recognition of its materials."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ class PortraitOptions:
 
     @property
     def words(self) -> str:
-        """Say in words how the pictures are taken."""
+        """Describe in words how the pictures are taken."""
         return f"{self.count} of {DIRECTION_COUNT} views, {self.size} px, seed {self.seed}"
 
 

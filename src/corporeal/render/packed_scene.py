@@ -10,7 +10,7 @@ from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.srgb import linear_to_srgb, srgb_to_linear
 
 MAX_TEXTURE_PX = 2048
-"""Larger pictures are halved: a film of 1280 pixels cannot show more."""
+"""Larger pictures are halved: a video of 1280 pixels cannot show more."""
 ALPHA_MODES = {"OPAQUE": 0.0, "MASK": 1.0, "BLEND": 2.0}
 RED, GREEN, BLUE, ALPHA, METAL, ROUGH, TRANSMIT, TRANSLUCENT, GLOW, MODE, CUT, TEXTURE = range(12)
 """Columns of ``Look.finish``."""

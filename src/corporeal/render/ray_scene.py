@@ -1,4 +1,4 @@
-"""A scene before rays: what they hit, what stops them, and the light of the studio around it."""
+"""A scene for ray casting: hits, occlusion, and studio lighting."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -122,7 +122,7 @@ class RayScene:
         return there
 
     def shadows(self) -> "RayScene":
-        """Return the stage with surfaces that nobody sees, but for their shadows on the floor."""
+        """Return the scene with surfaces that are only visible by their shadows on the floor."""
         there = copy(self)
         there.shown = False
         return there

@@ -1,4 +1,4 @@
-"""Arrays of a recording made small: normals in two bytes, differences in time that deflate well."""
+"""Compression of recordings: normals in two bytes, differences in time."""
 
 import numpy as np
 from jaxtyping import Float, Int8, UInt8

@@ -1,11 +1,11 @@
-"""A take: all that a page needs to show one run, as one block of bytes.
+"""Format of recordings: all data of a run for the viewer, as one block of bytes.
 
     length of the header (uint32) | header (JSON) | arrays, each on a multiple of 4 bytes
 
-The header names every array as [offset, count, kind]. Every object moves by a rigid pose per
-frame. One that deforms has, per vertex, what is left after that motion (3 × int16,
-``RESIDUAL_STEP_M`` each) and a normal (2 bytes, octahedral), both in the pose's frame: 8 bytes where float32 takes 24. Frames
-are kept as differences in time (``deltas.in_time``).
+The header names every array as [offset, count, kind]. Every object moves by a rigid pose per frame.
+One that deforms has, per vertex, what is left after that motion (3 × int16, ``RESIDUAL_STEP_M``
+each) and a normal (2 bytes, octahedral), both in the pose's frame: 8 bytes where float32 takes 24.
+Frames are kept as differences in time (``deltas.in_time``).
 """
 
 import io
@@ -254,7 +254,7 @@ def pack_recording(
         ],
         "surfaces": _surfaces(scene, parts, cast, block),
         "finishes": [_finish(f) for f in scene.finishes],
-        "film": None if recording is None else _frames_block(recording, block),
+        "video": None if recording is None else _frames_block(recording, block),
         "splats": None if splats is None else _splats(splats, block),
     }
     return block.under({**header, **summary})

@@ -1,8 +1,8 @@
-"""Gaussians of a scene that was made of them, for the page: where they are at rest, and with whom.
+"""Gaussians of recordings: pose at rest, and binding to objects.
 
 In the page a mean moves like the nearest vertex of its object, and the ellipsoid turns with the
-object's pose; only the film stretches it with the matter. Colours are those of degree 0: the same
-from all sides.
+object's pose; only the video stretches it with the material. Colours are those of degree 0: the
+same from all sides.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Rays from what a film's pixels met to sky and sun, and along what it mirrors."""
+"""Secondary rays: shadow, occlusion and reflection."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What no object can change, so that no ray need be cast for it."""
+"""Culling of shadow rays that cannot hit an object."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32

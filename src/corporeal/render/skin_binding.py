@@ -1,4 +1,4 @@
-"""Points follow the matter: vertices and Gaussians are bound at the start to particles near them.
+"""Skinning: vertices and Gaussians are bound to nearby particles at the start.
 
 Weights depend on position and part only, so vertices doubled along a texture seam stay together,
 and a rigid object, whose particles all share one rotation, moves exactly.
@@ -20,7 +20,7 @@ NEIGHBOUR_PARTICLES = 12
 STRETCH_LIMITS = (0.3, 3.0)
 """A picture shows no more than this principal stretch of a particle's surroundings [-]."""
 GRANULAR_STRETCH_LIMITS = (0.7, 1.4)
-"""The same for granular matter, whose neighbours part and whose F says little of a surface."""
+"""The same for granular material, whose neighbours part and whose F says little of a surface."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Which instant every picture of a film shows: in real time, or slower about one instant."""
+"""Time remapping: real time, or slow motion about one instant."""
 
 import numpy as np
 from jaxtyping import Float
@@ -16,7 +16,7 @@ def frame_positions(
 
     Args:
         time: Of the frames [s].
-        slow: How many times slower the film is about the instant.
+        slow: How many times slower the video is about the instant.
         about: The instant [s]; None: all of it is slow.
 
     """
@@ -30,7 +30,7 @@ def frame_positions(
 
 
 def is_slow(time: float, about: float | None) -> bool:
-    """Whether the film is slow at a time [s]."""
+    """Whether the video is slow at a time [s]."""
     return about is None or about - SLOW_BEFORE_S <= time <= about + SLOW_AFTER_S
 
 

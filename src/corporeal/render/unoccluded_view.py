@@ -1,4 +1,4 @@
-"""From where a film shows what happens: rays from the camera to every object, against surfaces.
+"""View directions without occlusion, tested by rays to every object.
 
 Boxes cannot tell a bowl from a block. Where the usual direction leaves an object behind or inside
 of another one for most of the time, others are tried, also from higher up.
@@ -34,7 +34,7 @@ def unoccluded_view(
     boxes: Float[np.ndarray, "F B 2 3"],
     size: tuple[int, int],
 ) -> Vector | None:
-    """Return a direction to film from in place of the usual one; None: that one is good.
+    """Return a direction to look from in place of the usual one; None: that one is good.
 
     Args:
         stages: The scene at a few instants.

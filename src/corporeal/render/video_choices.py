@@ -1,4 +1,4 @@
-"""What a person may ask to see of a scene."""
+"""Choices of video settings."""
 
 from typing import Literal
 

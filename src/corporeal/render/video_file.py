@@ -1,4 +1,4 @@
-"""A film file: pictures go to a separate ffmpeg program one by one; memory stays flat."""
+"""A video file: pictures go to a separate ffmpeg program one by one; memory stays flat."""
 
 import subprocess
 import tempfile
@@ -19,13 +19,13 @@ X264_PRESET, X264_CRF = "veryfast", 14
 makes files as large, and errors as large, in twice the time."""
 
 MIN_SIDE_PX, MAX_SIDE_PX = 16, 4096
-"""Sides of a film [px]."""
+"""Sides of a video [px]."""
 MAX_CREDIT_CHARACTERS = 20_000
-"""Of a film [characters]: a command line takes no more than 128 KiB at a time."""
+"""Of a video [characters]: a command line takes no more than 128 KiB at a time."""
 
 
 class VideoWriter:
-    """A film being written; ``add`` takes the next picture."""
+    """A video being written; ``add`` takes the next picture."""
 
     def __init__(self, program: "subprocess.Popen[bytes]", log: IO[Any], path: Path) -> None:
         self.program, self.log, self.path = program, log, path
@@ -49,7 +49,7 @@ class VideoWriter:
             raise self.failure()
 
     def failure(self) -> UserError:
-        """Say what went wrong, in the encoder's words."""
+        """Describe what went wrong, in the encoder's words."""
         self.program.kill()
         self.program.wait()
         self.log.seek(0)
@@ -68,7 +68,7 @@ class VideoWriter:
 
 
 def check_size(width: int, height: int) -> None:
-    """Raise UserError where a film cannot have such a size."""
+    """Raise UserError where a video cannot have such a size."""
     if (
         width % 2
         or height % 2
@@ -76,7 +76,8 @@ def check_size(width: int, height: int) -> None:
         or max(width, height) > MAX_SIDE_PX
     ):
         raise UserError(
-            f"A film cannot be {width} × {height} pixels. Both must be even, from {MIN_SIDE_PX} to "
+            f"A video cannot be {width} × {height} pixels. Both must be even, from {MIN_SIDE_PX} "
+            "to "
             f"{MAX_SIDE_PX}."
         )
 
@@ -88,10 +89,10 @@ def open_video(
     """Write H.264 that any browser plays to ``path``, which appears only when it is finished.
 
     Args:
-        path: Of the film.
+        path: Of the video.
         fps: Pictures per second.
         size: Width and height [px].
-        credit: Whose objects are to be seen, and under which licences; the film carries it.
+        credit: Whose objects are to be seen, and under which licences; the video carries it.
 
     Raises:
         UserError: The size is odd, the disk is full, or the encoder is missing or fails.
@@ -104,13 +105,13 @@ def open_video(
         log = tempfile.TemporaryFile()
     try:
         options = [*_picture_options(fps, size), *_credit_options(credit)]
-        film = VideoWriter(_encoder(partial, options, log), log, path)
+        video = VideoWriter(_encoder(partial, options, log), log, path)
         try:
-            yield film
-            film.close()
+            yield video
+            video.close()
         except BaseException:
-            film.program.kill()
-            film.program.wait()
+            video.program.kill()
+            video.program.wait()
             raise
         with disk_errors(path):
             partial.replace(path)
@@ -151,18 +152,18 @@ def _credit_options(credit: str) -> list[str]:
 
 
 def _unreadable(path: Path, error: Exception) -> UserError:
-    """Say that a film cannot be read, by the last line of all that the program says."""
+    """State that a video cannot be read, by the last line of all that the program says."""
     if not path.exists():
-        return UserError(f"{path}: there is no such film. Make it again.")
+        return UserError(f"{path}: there is no such video. Make it again.")
     last = (str(error).strip().splitlines() or ["it is empty"])[-1].strip(" .)")
-    return UserError(f"{path}: cannot be read as a film ({last}). Make it again.")
+    return UserError(f"{path}: cannot be read as a video ({last}). Make it again.")
 
 
 def count_frames(path: Path) -> int:
-    """Count the frames of a film.
+    """Count the frames of a video.
 
     Raises:
-        UserError: The film cannot be read.
+        UserError: The video cannot be read.
 
     """
     try:
@@ -173,10 +174,10 @@ def count_frames(path: Path) -> int:
 
 
 def read_frames(path: Path, wanted: list[int]) -> list[np.ndarray]:
-    """Read some frames (height, width, 3) uint8 of a film, by number, in order.
+    """Read some frames (height, width, 3) uint8 of a video, by number, in order.
 
     Raises:
-        UserError: The film cannot be read.
+        UserError: The video cannot be read.
 
     """
     numbers = sorted(set(wanted))

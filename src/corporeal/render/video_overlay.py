@@ -1,4 +1,4 @@
-"""What colours mean, and when it is, written into the corners of a film's pictures."""
+"""Overlays of videos: colour bar and time."""
 
 from collections.abc import Sequence
 

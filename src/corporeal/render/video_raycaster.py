@@ -1,7 +1,7 @@
-"""Pictures of a film: one ray a pixel, more at edges, and none where nothing stands.
+"""Pictures of a video: one ray a pixel, more at edges, and none where nothing stands.
 
-Most of a film is floor and backdrop: where no ray to sky or sun could meet a box about an object, a
-pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
+Most of a video is floor and backdrop: where no ray to sky or sun could meet a box about an object,
+a pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
 still. Where objects are far and hide only some sky, the sky is asked at the corners of tiles. What
 is left is seen by one ray a pixel; every fourth pixel asks for light, and neighbours on one surface
 share what they found. Where that is not theirs, each pixel asks for itself. Pixels beside which
@@ -70,7 +70,7 @@ TEXTURE_FILTER_PX = 0.65
 
 @dataclass(frozen=True)
 class _SkySampling:
-    """How finely a film is cast."""
+    """How finely a video is cast."""
 
     sky: int
     """Rays to the sky where light is asked for."""
@@ -99,12 +99,13 @@ class _EmptyStudio:
 
 
 class VideoRaycaster:
-    """Takes a film's pictures one after the other; keeps the empty studio of the last camera.
+    """Takes a video's pictures one after the other; keeps the empty studio of the last camera.
 
     A stage that is given twice, to the same camera, is cast once.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, empty_band_tiles: int = EMPTY_BAND_TILES) -> None:
+        self._empty_band_tiles = empty_band_tiles
         self._empty: _EmptyStudio | None = None
         self._last: tuple[RayScene, CameraAim, Quality, np.ndarray] | None = None
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
@@ -112,7 +113,7 @@ class VideoRaycaster:
     def picture(
         self, stage: RayScene, camera: CameraAim, quality: Quality, threads: int | None = None
     ) -> UInt8[np.ndarray, "H W 3"]:
-        """Cast one picture of a film.
+        """Cast one picture of a video.
 
         Args:
             stage: Surfaces in one pose; all pictures of a caster are of one scene in one light.
@@ -145,7 +146,9 @@ class VideoRaycaster:
         pool = self._workers(threads)
         known = self._empty
         if known is None or (known.aim, known.place) != (camera, _scene_and_floor_key(stage)):
-            known = self._empty = _cast_empty_studio(stage, camera, SKY_SAMPLING[quality], pool)
+            known = self._empty = _cast_empty_studio(
+                stage, camera, SKY_SAMPLING[quality], pool, self._empty_band_tiles
+            )
         out = known.printed.copy()
         job = _FrameRender(stage, camera, SKY_SAMPLING[quality], known)
         for _ in pool.map(lambda r: job.band(r, out), rows):
@@ -162,9 +165,10 @@ def _cast_empty_studio(
     camera: CameraAim,
     plan: _SkySampling,
     pool: ThreadPoolExecutor,
+    band_tiles: int,
 ) -> _EmptyStudio:
-    """Cast the studio without objects."""
-    band = EMPTY_BAND_TILES * TILE_PX
+    """Cast the studio without objects, so many rows of tiles at once."""
+    band = band_tiles * TILE_PX
     rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
     pixels, cleared = camera.width * camera.height, stage.cleared()
     rays = RenderJob(cleared, camera, RaySampling(1, 1, 1)).rays((0, camera.height))
@@ -247,7 +251,7 @@ class _FrameRender(RenderJob):
         rays = self.rays_of(here)
         block = PixelBlock(wide[0], wide[1] - wide[0], width)
         shape = block.rows, width
-        # What is seen, and where light differs: on things, and where they may be in its way.
+        # What is seen, and where light differs: on objects, and where they may be in its way.
         hit = self.seen(rays, block)
         tiles = self.tiles(rays, hit[0], block)
         kind = shadow_culling.tiles_to_pixels(tiles, shape)
@@ -342,7 +346,7 @@ class _FrameRender(RenderJob):
         return np.where(near, TILE_CAST, np.where(far, TILE_SOFT, TILE_UNTOUCHED)).astype(np.uint8)
 
     def soften(self, tiles: np.ndarray, block: PixelBlock, here: slice, toned: np.ndarray) -> None:
-        """Shade the tiles of floor from which things hide a little of the sky."""
+        """Shade the tiles of floor from which objects hide a little of the sky."""
         height, width = tiles.shape
         size = self.camera.width, self.camera.height
         view = self.eye, self.frame, self.tangent, size, block.first

@@ -1,4 +1,4 @@
-"""The viewer's page: its scripts, as files for a server, or all in one text for a report."""
+"""The viewer's page, as files for a server or inlined for a report."""
 
 import json
 import zlib
@@ -9,7 +9,7 @@ from corporeal.render.png_writer import ZLIB_LEVEL
 
 VIEW_SCRIPTS = ("three.min.js", "take.js", "splats.js", "stage.js", "cards.js", "page.js")
 """Of the view, each after those that it imports."""
-INLINE_VIEW_HTML = """<div id="view"><p class="unseen">The 3D view is drawn by scripts, and takes a moment. Where this sentence stays, this browser does not run them: the film below and all else on this page need none.</p></div>
+INLINE_VIEW_HTML = """<div id="view"><p class="unseen">The 3D view is drawn by scripts, and takes a moment. Where this sentence stays, this browser does not run them: the video below and all else on this page need none.</p></div>
 <script type="text/plain" id="view-modules">{modules}</script>
 <script type="text/plain" id="view-take">{take}</script>
 <style>
@@ -28,7 +28,7 @@ for (const [name, text] of JSON.parse(new TextDecoder().decode(await inflated('v
 const {{Take}} = await import(urls['take.js']), {{Viewer}} = await import(urls['page.js'])
 window.viewer = new Viewer(document.getElementById('view'), [new Take(await inflated('view-take'))], {{inside: true}})
 }} catch (error) {{
-  document.querySelector('#view').textContent = `This browser cannot show the 3D view (${{error.message}}). The film below and all else on this page work.`
+  document.querySelector('#view').textContent = `This browser cannot show the 3D view (${{error.message}}). The video below and all else on this page work.`
 }}
 </script>"""  # noqa: E501
 

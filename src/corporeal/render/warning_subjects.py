@@ -1,4 +1,4 @@
-"""What a sentence of warning is about: the part or the object that it names."""
+"""Parts and objects named in warnings."""
 
 import re
 

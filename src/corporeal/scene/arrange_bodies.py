@@ -1,4 +1,4 @@
-"""Where bodies start: near each other, upright where they can stand, and nowhere touching.
+"""Initial arrangement of bodies: close, upright where possible, without contact.
 
 A body comes from outside along a straight line and stops short of what is there. By conservative
 advancement (Mirtich 1996) it moves, again and again, as far as it is away from everything: no
@@ -153,7 +153,7 @@ def _stance_with_yaw(stance: StandingStance, rng: np.random.Generator) -> np.nda
 def _broadside(body: SettlingBody, stance: StandingStance, rng: np.random.Generator) -> np.ndarray:
     """With its narrowest width along x, turned about by chance: like a domino.
 
-    Flat sides then face each other, a blow goes through the middle, and what is tall topples on.
+    Flat sides then face each other, an impact goes through the middle, and what is tall topples on.
     """
     rotation = _rotation_to_down(stance.down)
     outline = (body.hull.vertices @ rotation.T)[:, :2]

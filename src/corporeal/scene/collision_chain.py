@@ -1,4 +1,4 @@
-"""How fast to send the first of a row, so that the blow reaches the last.
+"""Initial speed of a chain of collisions, so that the impact reaches the last object.
 
 Backwards along the row: what slides a way d arrives with v² = v₀² - 2 μ g d, and goes on together
 with what it strikes, M v/(M + m): impacts without a bounce. Where heavy objects come first that
@@ -44,7 +44,7 @@ class ChainStart:
 def find_collision_chain(
     still: SettledBodies, arrival: float, rng: np.random.Generator
 ) -> ChainStart | None:
-    """Find the end and the speed from which a blow reaches the last of a row.
+    """Find the end and the speed from which an impact reaches the last of a row.
 
     Args:
         still: Three objects or more, in a row.

@@ -1,4 +1,4 @@
-"""A scene in which the pieces of what broke are objects."""
+"""Scenes with fragments as objects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,12 +23,12 @@ def apply_breaks(
 ) -> FilledScene:
     """Return a scene in which every piece of what broke is an object with one part.
 
-    The first piece keeps the thing's number and name; the others come after all there are.
+    The first piece keeps the object's number and name; the others come after all there are.
 
     Args:
         whole: The scene with all that moves in it.
         particles: Its material points.
-        breaks: In the order in which things broke.
+        breaks: In the order in which objects broke.
 
     """
     for one in breaks:
@@ -49,7 +49,7 @@ def piece_mass_fractions(one: FractureEvent, particles: Particles) -> Float[np.n
 
 
 def fractured_scene(scene: Scene, one: FractureEvent, share: Float[np.ndarray, " N"]) -> Scene:
-    """Replace the broken thing's surfaces by those of its pieces."""
+    """Replace the broken object's surfaces by those of its pieces."""
     thing, count = scene.objects[one.object], len(scene.objects)
     objects = list(scene.objects)
     for k, part in enumerate(share.tolist()):
@@ -84,7 +84,7 @@ def _fractured_parts(whole: SceneWithMaterials, one: FractureEvent) -> Parts:
 
 
 def fractured_field(field: MaterialField, one: FractureEvent) -> MaterialField:
-    """Every piece is of the same matter."""
+    """Every piece is of the same material."""
     more, k = len(one.surfaces) - 1, one.part
     return replace(
         field,

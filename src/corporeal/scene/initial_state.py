@@ -1,4 +1,4 @@
-"""How objects begin: raised above where they stand, and with a velocity, as a person says."""
+"""Initial states of objects from the command line: lift and velocity."""
 
 import math
 from collections.abc import Sequence

@@ -1,10 +1,10 @@
-"""What happens in a settled scene: who falls, is thrown, is pushed along, or stands in the wind.
+"""Interactions of a settled scene: drop, throw, slide, wind.
 
 The settled poses are certified at rest; an interaction changes the start of as few objects as it
 can. Heights and speeds are drawn within ranges that scale with the scene, so that a scene of twice
-the size plays the same film more slowly (Froude scaling): a height is a share of an object's size,
+the size plays the same video more slowly (Froude scaling): a height is a share of an object's size,
 a speed a share of √(g L). What depends on masses and friction is found from them: how fast the
-first of a row must go for the blow to reach the last, and in which wind something moves.
+first of a row must go for the impact to reach the last, and in which wind something moves.
 """
 
 from collections.abc import Sequence
@@ -92,7 +92,7 @@ def begin_interaction(
 
     Returns:
         None: there are too few objects, something stands in every path, or nothing here can do
-        it: no storm moves anything, no blow reaches the last of the row.
+        it: no storm moves anything, no impact reaches the last of the row.
 
     """
     if len(bodies) < MIN_OBJECTS_OF_KIND[kind]:
@@ -225,12 +225,12 @@ def _ordered_pairs(still: SettledBodies, rng: np.random.Generator) -> list[tuple
 
 
 def _is_mover_larger(still: SettledBodies, pair: tuple[int, int]) -> bool:
-    """Tell whether the first is larger than the second."""
+    """Return whether the first is larger than the second."""
     return bool(still.sizes[pair[0]] > still.sizes[pair[1]])
 
 
 def _is_mover_too_light(still: SettledBodies, pair: tuple[int, int]) -> tuple[bool, bool]:
-    """Tell whether the first is too light to move the second, and whether it is larger."""
+    """Return whether the first is too light to move the second, and whether it is larger."""
     mover, target = (still.bodies[k].mass for k in pair)
     return mover < MIN_MOVER_MASS_RATIO * target, _is_mover_larger(still, pair)
 
@@ -249,5 +249,5 @@ def _horizontal_vector(across: np.ndarray) -> Vector:
 
 
 def _watch_duration(until: float) -> float:
-    """Return how long to film [s] when the last impact that counts comes after ``until``."""
+    """Return the duration of the video [s] when the last impact that counts comes after ``until``."""
     return round(min(max(until + WATCH_AFTER_IMPACT_S, 1.0), 3.0), 2)

@@ -1,4 +1,4 @@
-"""How the mass of a body lies, where more is known of it than its convex pieces say."""
+"""Mass properties of bodies with known construction."""
 
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,7 @@ class MassProperties:
     """Coulomb μ of its smoothest part on the floor: what holds it whichever part it stands on [-];
     None: unknown."""
     materials: tuple[str, ...] = ()
-    """Names of what its parts are made of."""
+    """Names of the materials of its parts."""
 
     def scaled(self, factor: float) -> "MassProperties":
         """Return that of a body of the same materials and another size, walls and all."""

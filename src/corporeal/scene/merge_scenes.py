@@ -1,4 +1,4 @@
-"""Two filled scenes as one: the objects of the second after those of the first."""
+"""Merging of two filled scenes."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def shift_filled_scene(filled: FilledScene, shift: Float[np.ndarray, "3"]) -> Fi
         particles,
         position=particles.position + shift,
         surface=particles.surface + shift,
-        wetted=particles.wetted + shift,
+        wetted_point=particles.wetted_point + shift,
         roots=tuple(_shifted_root(root, shift) for root in particles.roots),
     )
     return FilledScene(SceneWithMaterials(scene, whole.parts, whole.field), moved)
@@ -84,7 +84,7 @@ def _merged_parts(a: SceneWithMaterials, b: SceneWithMaterials) -> Parts:
 def _merged_field(
     a: MaterialField, b: MaterialField, friction: np.ndarray, restitution: np.ndarray
 ) -> MaterialField:
-    """Pairs that were there before keep what they had: somebody may have stated it."""
+    """Existing pairs keep their coefficients, which may be annotated."""
     friction, restitution = friction.copy(), restitution.copy()
     old = [*range(len(a.materials)), len(friction) - 1]
     friction[np.ix_(old, old)], restitution[np.ix_(old, old)] = a.friction, a.restitution
@@ -103,7 +103,7 @@ def _merged_field(
 def _merged_particles(here: FilledScene, b: Particles) -> Particles:
     a, whole = here.particles, here.whole
     objects, parts, count = len(whole.scene.objects), len(whole.parts.catalogue), a.count
-    rows = ("position", "velocity", "volume", "density", "surface", "rounding", "face")
+    rows = ("position", "velocity", "volume", "density", "surface", "curvature", "face")
     rows += ("wetted", "wetted_normal")
     both = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in rows}
     for name in ("object", "object_of_surface", "object_of_wetted"):

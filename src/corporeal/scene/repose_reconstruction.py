@@ -1,4 +1,4 @@
-"""A reconstruction that follows its objects to where a scene has put them."""
+"""Moving a reconstruction to the poses of its objects in a scene."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Proof that bodies are at rest: measured on the original meshes, not taken from the engine."""
+"""Certificates of rest, measured on the original meshes independent of the engine."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

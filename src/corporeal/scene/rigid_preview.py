@@ -1,7 +1,7 @@
-"""Play the start of an interaction with rigid bodies, to see who will meet whom, and when.
+"""Rigid-body preview of an interaction, to find contacts and their times.
 
 The engine's contacts are soft and take the bounce out of impacts, so that less momentum is passed
-on than in life: what arrives here arrives.
+on than in reality: so it is a lower bound.
 """
 
 # The engine's names come from compiled modules without stubs.
@@ -70,7 +70,7 @@ def preview_contacts(
 def impact_hops(
     met: Sequence[Sequence[ObjectKey]], sent: Sequence[ObjectKey]
 ) -> dict[ObjectKey, int]:
-    """Count how far a blow was passed on: 1 for what was struck, 2 for what that struck.
+    """Count how far an impact was passed on: 1 for what was struck, 2 for what that struck.
 
     Args:
         met: Pairs in the order in which they met.

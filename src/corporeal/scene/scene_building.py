@@ -1,4 +1,4 @@
-"""Build a scene from nouns: balls, boxes, cylinders and closed meshes, each of one material.
+"""Construction of scenes in Python: balls, boxes, cylinders and closed meshes, each of one material.
 
 The floor is always there, at z = 0; +Z is up. All lengths are in metres.
 """

@@ -1,4 +1,4 @@
-"""What a composed scene consists of and that it is at rest: both as written beside the scene.
+"""Files on a composed scene: its composition and the certificate of rest.
 
 ``composition.json`` and ``certificate.json`` are written and read here alone.
 """
@@ -82,7 +82,7 @@ def read_composition(folder: Path) -> SceneComposition:
         return from_plain(SceneComposition, {"settled_with": "mujoco", **data, "objects": rows})
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise BadFileError(
-            path, f"is no composition that this version can read ({error}).", ASSEMBLE_AGAIN
+            path, f"is not a composition of this version ({error}).", ASSEMBLE_AGAIN
         ) from error
 
 
@@ -113,5 +113,5 @@ def read_certificate(folder: Path) -> RestCertificate:
         return from_plain(RestCertificate, data)
     except (ValueError, TypeError, AttributeError) as error:
         raise BadFileError(
-            path, f"is no certificate that this version can read ({error}).", ASSEMBLE_AGAIN
+            path, f"is not a certificate of this version ({error}).", ASSEMBLE_AGAIN
         ) from error

@@ -1,4 +1,4 @@
-"""Let bodies come to rest in Blender, through BlenderProc, in a process of its own.
+"""Settling of bodies in Blender through BlenderProc, in a separate process.
 
 A job goes out as a file and a result comes back as one; both are data. Blender is GPL and is never
 imported. All is computed in a scene of one size, as in ``mujoco.py``, because Bullet's margins and
@@ -97,7 +97,7 @@ def drop_in_blender(
 def _blender_job(
     bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: BlenderConfig
 ) -> dict[str, Any]:
-    """Say what falls, about its centres of mass and in Blender's units."""
+    """Describe what falls, about its centres of mass and in Blender's units."""
     scale = BLENDER_SCENE_SIZE / scene_unit_of(bodies)
     lightest = min(b.mass for b in bodies)
     entries = []
@@ -179,7 +179,7 @@ def _kill_blender(process: "subprocess.Popen[bytes]") -> None:
 def _log_tail(log: Path) -> str:
     lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
     return (
-        f"Its last words: {' | '.join(lines[-LOG_TAIL_LINES:])}."
+        f"Its last output: {' | '.join(lines[-LOG_TAIL_LINES:])}."
         if lines
         else "It printed nothing."
     )
@@ -241,6 +241,6 @@ def _finite_numbers(values: Any, count: int) -> list[float] | None:
 
 def _nonsense_error(program: str, what: str) -> BlenderError:
     return BlenderError(
-        f"{program}: its result makes no sense: {what}. Install a BlenderProc of Blender 4.2, or "
+        f"{program}: its result is invalid: {what}. Install a BlenderProc of Blender 4.2, or "
         "settle with mujoco."
     )

@@ -1,4 +1,4 @@
-"""Arrange, settle, certify; again from another seed where it failed."""
+"""Arranging, settling and certifying of bodies, with retries."""
 
 import time
 from collections.abc import Sequence
@@ -108,7 +108,7 @@ def _drop_bodies(
 def _why_lost(
     bodies: Sequence[SettlingBody], start: Sequence[BodyPose], dropped: DroppedBodies
 ) -> str:
-    """Say why bodies are not worth examining; "": they are."""
+    """Return why bodies are not worth examining; "": they are."""
     if not dropped.quiet:
         return f"something still moved after {dropped.seconds:.0f} s"
     far = MAX_STRAY_UNITS * scene_unit_of(bodies)

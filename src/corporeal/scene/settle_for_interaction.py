@@ -1,4 +1,4 @@
-"""Settle objects until they rest so that what is to happen can happen."""
+"""Settling of objects until one of the wanted interactions is possible."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ def settle_for_interaction(
 ) -> SettledInteraction:
     """Settle until objects rest and one of some interactions is possible.
 
-    Where nobody asked for an arrangement, another one is tried when one finds no rest.
+    Without a given arrangement, another one is tried if no rest is found.
 
     Args:
         bodies: What there is.
@@ -115,6 +115,6 @@ def _fitting_kinds(
 def _why_impossible(kind: InteractionKind) -> str:
     reasons = {
         "wind": f"no wind of up to {MAX_WIND_SPEED_M_S:g} m/s moves anything",
-        "chain": "no blow reaches the last of the row",
+        "chain": "no impact reaches the last of the row",
     }
     return reasons.get(kind, f"no room for a {kind}")

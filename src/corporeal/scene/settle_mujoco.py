@@ -1,4 +1,4 @@
-"""Let bodies fall and come to rest in MuJoCo.
+"""Settling of bodies in MuJoCo.
 
 The floor meets the exact convex hull of each mesh; bodies meet each other with their convex
 pieces, every two bodies with the friction that is certain to hold them. All is computed for a scene
@@ -131,12 +131,18 @@ class MujocoScene:
     """One scene in MuJoCo, in lengths of the scene's unit."""
 
     def __init__(
-        self, bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], step: float
+        self,
+        bodies: Sequence[SettlingBody],
+        poses: Sequence[BodyPose],
+        step: float,
+        contact_memory_bytes: int = CONTACT_MEMORY_BYTES,
     ) -> None:
         self.unit, self.count = scene_unit_of(bodies), len(bodies)
         farthest = [np.linalg.norm(b.hull.vertices, axis=1).max() for b in bodies]
         self._radius = np.array(farthest) / self.unit
-        self.model = _scene_spec(bodies, poses, self.unit, step).compile()
+        spec = _scene_spec(bodies, poses, self.unit, step)
+        spec.memory = contact_memory_bytes
+        self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
 
     def step(self) -> None:
@@ -153,7 +159,7 @@ class MujocoScene:
             full = True
         if full:
             raise UserError(
-                f"Things touch in more places ({self.data.ncon}) than MuJoCo has room for. Take "
+                f"Objects touch in more places ({self.data.ncon}) than MuJoCo has room for. Take "
                 "fewer or simpler objects, or another arrangement."
             )
 
@@ -245,7 +251,6 @@ def _floor_spec(step: float) -> mujoco.MjSpec:
     spec.option.iterations = 100
     spec.option.noslip_iterations = 4
     spec.option.tolerance = 1e-10
-    spec.memory = CONTACT_MEMORY_BYTES
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[5, 5, 0.1],
@@ -320,7 +325,7 @@ def _add_contact_pairs(
 def _give_inertia(
     node: "mujoco.MjsBody", inertial: MassProperties, unit: float, lightest: float
 ) -> None:
-    """Say how a body's mass lies, in units of length and of the lightest mass."""
+    """Return how a body's mass lies, in units of length and of the lightest mass."""
     tensor = inertial.inertia / (lightest * unit**2)
     # The engine refuses what is thinner than any body can be.
     tensor = tensor + ADDED_INERTIA_FRACTION * np.trace(tensor) * np.eye(3)

@@ -1,4 +1,4 @@
-"""Objects at rest, and what stands in whose way; boxes stand for them."""
+"""Objects at rest, approximated by boxes, and obstacles between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ class SettledBodies:
         return np.array([*self.boxes[k].mean(axis=0)[:2], self.boxes[k][0, 2]])
 
     def free(self, k: int) -> bool:
-        """Tell whether nothing lies on an object, so that it may leave its place."""
+        """Return whether nothing lies on an object, so that it may leave its place."""
         box = self.boxes[k]
         above = np.array([[*box[0, :2], box[1, 2]], [*box[1, :2], np.inf]])
         touching = [
@@ -77,7 +77,7 @@ class SettledBodies:
         return max(0.0, *shares), heading
 
     def open_way(self, mover: int, target: int) -> bool:
-        """Tell whether one can go along the floor into another and meets nothing before."""
+        """Return whether one can go along the floor into another and meets nothing before."""
         if not _share_support(self.boxes[mover], self.boxes[target]):
             return False
         gap, heading = self.gap(mover, target)
@@ -99,12 +99,12 @@ def boxes_meet(
     b: Float[np.ndarray, "2 3"],
     margin: float = FALL_CLEARANCE_FRACTION,
 ) -> bool:
-    """Tell whether two boxes come closer than a share of the larger one's size."""
+    """Return whether two boxes come closer than a share of the larger one's size."""
     space = margin * max(largest_box_side(a), largest_box_side(b))
     return bool(((a[0] - space < b[1]) & (b[0] - space < a[1])).all())
 
 
 def _share_support(a: np.ndarray, b: np.ndarray) -> bool:
-    """Tell whether two objects stand on one support and one could run into the other."""
+    """Return whether two objects stand on one support and one could run into the other."""
     shared = min(a[1, 2], b[1, 2]) - max(a[0, 2], b[0, 2])
     return bool(shared > 0.3 * min(a[1, 2] - a[0, 2], b[1, 2] - b[0, 2]))

@@ -1,4 +1,4 @@
-"""What is settled: bodies with their convex pieces, and where they are."""
+"""Bodies for settling, with their convex pieces and poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -72,7 +72,7 @@ class SettlingBody:
     pieces: tuple[ConvexPiece, ...]
     """Convex; together about the body."""
     density: float = 500.0
-    """Of the pieces, where nothing is known of the matter [kg/m³]."""
+    """Of the pieces, where nothing is known of the material [kg/m³]."""
     inertial: MassProperties | None = None
     """How its mass lies, where that is known."""
     grips: Mapping[str, float] = field(default_factory=dict)

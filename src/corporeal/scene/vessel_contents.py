@@ -1,4 +1,4 @@
-"""A scene in which what lies loose in vessels is an object of its own."""
+"""Scenes with movable contents of vessels as objects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ LOOSE_CONTENTS_REASON = "It lies loose in a vessel that it does not fill."
 
 @dataclass(frozen=True)
 class SceneWithMaterials:
-    """A scene with all that moves in it: what it is made of, and where its parts are."""
+    """A scene including movable contents, with materials and parts."""
 
     scene: Scene
     parts: Parts
@@ -27,12 +27,12 @@ class SceneWithMaterials:
 def add_vessel_contents(
     scene: Scene, parts: Parts, field: MaterialField, contents: Sequence[VesselContents]
 ) -> SceneWithMaterials:
-    """Return a scene with the contents of its vessels after all else; their walls are empty.
+    """Return a scene with the contents of its vessels as last objects; their walls are empty.
 
     Args:
         scene: Without them.
         parts: Of that scene.
-        field: What its parts are made of, and filled with.
+        field: Materials and contents of its parts.
         contents: From ``Particles.contents``.
 
     """

@@ -1,4 +1,4 @@
-"""The slowest wind in which an object at rest begins to slide or to fall over."""
+"""Threshold wind speed at which an object at rest slides or topples."""
 
 from dataclasses import dataclass
 from math import inf, sqrt
@@ -39,7 +39,7 @@ def wind_threshold(body: SettlingBody, pose: BodyPose, heading: Float[np.ndarray
     leans on something, its centre of mass not above its foot, can only slide.
 
     Args:
-        body: What; its matter says how rough it is.
+        body: What; its material says how rough it is.
         pose: How it stands.
         heading: Where the wind goes, along the floor, unit.
 

@@ -1,4 +1,4 @@
-"""Mesh, Part, Model: what a prop is made of."""
+"""Meshes, parts and models of props."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -55,7 +55,7 @@ class PropPart:
     substance: str
     """A name from the material library."""
     shell: float = 0.0
-    """Wall of what is hollow in life but modelled by its outside [m]; 0: solid as modelled."""
+    """Wall of what is hollow in reality but modelled by its outside [m]; 0: solid as modelled."""
     contents: str = ""
     """What is in the vessel that it is, from the library; "": nothing."""
     fill: float = 0.0

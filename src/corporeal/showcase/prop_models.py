@@ -1,4 +1,4 @@
-"""The menu: name → function that builds the model."""
+"""Registry of props: name → function that builds the model."""
 
 from collections.abc import Callable
 

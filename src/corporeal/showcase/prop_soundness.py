@@ -1,4 +1,4 @@
-"""Is every part a solid body? Closedness, winding, volume, matter, overlap."""
+"""Validation of props: closedness, winding, volume, material, overlap."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What must be seen in each showcase scene, as numbers: data, and a function that compares.
+"""Expected outcomes of the showcase scenes, and their comparison.
 
 The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order.
 Each expectation bounds a measure from both sides where too much is as wrong as too little, and
@@ -140,7 +140,7 @@ def measure_between(first: str, second: str, measure: str) -> Callable[[Outcome]
 
 
 def separated_after_contact(first: str, second: str) -> Callable[[Outcome], bool]:
-    """Say whether two met, parted for 0.1 s, and are more than a cell apart at the end."""
+    """Return whether two met, parted for 0.1 s, and are more than a cell apart at the end."""
 
     def judge(outcome: Outcome) -> bool:
         pair = outcome.pair(f"{first}_0", f"{second}_0")
@@ -150,7 +150,7 @@ def separated_after_contact(first: str, second: str) -> Callable[[Outcome], bool
 
 
 def are_met_in_order(*things: str) -> Callable[[Outcome], bool]:
-    """Say whether neighbours in a row met one after the other, before any other pair."""
+    """Return whether neighbours in a row met one after the other, before any other pair."""
     pairs = [{f"{a}_0", f"{b}_0"} for a, b in pairwise(things)]
     return lambda outcome: [set(p) for p in outcome.order][: len(pairs)] == pairs
 
@@ -396,7 +396,7 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
         ),
     ),
     "water-knocked-over": (
-        # The blow has one and a half times what tips it over (``showcase.scenes``).
+        # The impact has one and a half times what tips it over (``showcase.scenes``).
         MeasureExpectation(
             "The glass falls over",
             measure_of_object("tumbler", "turned_deg"),
@@ -416,7 +416,7 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
         ),
         # A ball that came back as fast as it came would give 0.37 kg m/s to 0.38 kg.
         MeasureExpectation(
-            "The blow carries the water no farther than its momentum can (mean way)",
+            "The impact carries the water no farther than its momentum can (mean way)",
             measure_of_named("tumbler_0_water", "moved_level_m"),
             0.05,
             0.95,

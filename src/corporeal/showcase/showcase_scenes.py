@@ -1,7 +1,7 @@
-"""The ten showcase scenes: who stands where before the first step, and what is done to them.
+"""The ten showcase scenes: initial states and forces.
 
 Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
-has there: the film begins when something is about to happen. Nothing numerical is in a scene.
+has there: the video begins when something is about to happen. Nothing numerical is in a scene.
 """
 
 import math
@@ -58,7 +58,7 @@ class ShowcaseComposition:
 
     story: str
     """What should be seen, in one sentence."""
-    things: tuple[PlacedModel, ...]
+    models: tuple[PlacedModel, ...]
     view: PropPoint
     """Direction from the scene to the camera."""
     duration: float
@@ -97,15 +97,14 @@ def duck_on_mud() -> ShowcaseComposition:
 def duck_on_can() -> ShowcaseComposition:
     """Throw the duck down onto an empty can that lies on its side.
 
-    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic
-    dent of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and
-    Suh 1988). With 285 MPa and t = 0.1 mm that is 73 N at 1 mm and 230 N at 10 mm, which costs
-    (2/3) P δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with
-    k ≈ 2.3 E h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J,
-    50 N) it only bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with
-    75 N, which in life leaves a dent of a millimetre or two. The simulated dent is far deeper:
-    a wall that the grid must thicken is softer in its plane. Its place and that it stays are
-    to be believed, its depth is not.
+    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic dent
+    of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and Suh
+    1988). With 285 MPa and t = 0.1 mm that is 73 N at 1 mm and 230 N at 10 mm, which costs (2/3) P
+    δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with k ≈ 2.3 E
+    h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J, 50 N) it only
+    bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with 75 N, which in
+    reality leaves a dent of a millimetre or two. The simulated dent is far deeper: a wall that the
+    grid must thicken is softer in its plane. Its place and its rest are reliable, its depth is not.
     """
     can = PlacedModel("soda_can", (-0.0575, 0, 0.0331), (0, 90, 0))
     duck = PlacedModel("rubber_duck", (-0.005, 0.0, 0.24), (0, 0, -15), (0.0, 0.0, -6.0))
@@ -196,7 +195,7 @@ def water_knocked_over() -> ShowcaseComposition:
     """Knock a glass of water over with a wooden ball that strikes it just under its rim.
 
     The ball, 46 g at 4 m/s, brings 0.18 kg m/s; the glass with 170 g of water weighs 0.38 kg. About
-    the edge of its foot the blow gives 0.18 × 0.085 = 16 g m²/s; to tip over it has to lift its
+    the edge of its foot the impact gives 0.18 × 0.085 = 16 g m²/s; to tip over it has to lift its
     centre from 4.5 cm over the floor to 5.5 cm from that edge, √(2 I m g 0.01) = 10 g m²/s with
     I ≈ 1.5 g m². A glass that lies on its side holds what is below its lower rim: at three fifths
     full hardly anything.
@@ -264,7 +263,7 @@ def build_showcase_scene(name: str) -> Scene:
     """
     composition = _composition_of(name)
     return scene_of_models(
-        name, place_models(composition), composition.things, composition.duration
+        name, place_models(composition), composition.models, composition.duration
     )
 
 
@@ -321,7 +320,7 @@ def place_models(composition: ShowcaseComposition) -> list[PropModel]:
     """Build the models and put them where they stand."""
     models = [
         _without_parts_of_model(PROP_BUILDERS[t.model](), t.without).moved(t.at, t.turn)
-        for t in composition.things
+        for t in composition.models
     ]
     for inner, outer in composition.planted.items():
         models[outer] = _cut_room_in_heap(models[outer], models[inner])

@@ -1,4 +1,4 @@
-"""What liquids are held by, and liquids: a tumbler, honey, ketchup; and a wooden ball."""
+"""Liquids and their vessels: a tumbler, honey, ketchup; and a wooden ball."""
 
 from dataclasses import replace
 

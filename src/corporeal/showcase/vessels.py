@@ -18,7 +18,7 @@ from corporeal.showcase.prop_mesh import (
 
 
 def soda_can() -> PropModel:
-    """Model a 330 ml can, 66 × 115 mm, by its outside; wall 0.1 mm and lid 0.25 mm in life."""
+    """Model a 330 ml can, 66 × 115 mm, by its outside; wall 0.1 mm and lid 0.25 mm in reality."""
     body, lid = _can_body(), _can_lid()
     # Ink on aluminium is half mirror, half paint: one partly metallic finish does for both.
     printed = textured_finish("printed aluminium", label_textures.can_label(), 0.30, metallic=0.45)

@@ -1,6 +1,6 @@
-"""The audit of a finished simulation: whether it can be trusted, a sentence for every breach.
+"""Conservation audit of a finished simulation, with a sentence for every violation.
 
-Everything is computed from what lies on disk: the frames and the ledger.
+It is computed from the frames and the ledger on the disk.
 """
 
 from collections.abc import Iterable
@@ -37,7 +37,7 @@ def audit(
     trajectory: Trajectory,
     settling: SettlingOutcome | None = None,
 ) -> Audit:
-    """Check a run against the laws it must obey.
+    """Check a run against conservation laws.
 
     Args:
         scene: What was simulated.
@@ -96,11 +96,11 @@ LEDGER_QUANTITIES = (
     *("external_impulse", "plane_impulse", "pair_impulse", "push_work"),
     *("friction_loss", "impact_loss", "plastic_loss", "viscous_loss"),
 )
-"""What the ledger adds up: each is a number at any time."""
+"""Quantities of the ledger that must be finite."""
 
 
 def count_not_finite(ledger: Ledger) -> int:
-    """Count the booked numbers that are none: no law can be checked by them."""
+    """Count values of the ledger that are not finite."""
     return sum(
         int(np.count_nonzero(~np.isfinite(getattr(ledger, name)))) for name in LEDGER_QUANTITIES
     )
@@ -139,7 +139,7 @@ def dissipated_energy(ledger: Ledger) -> Float[np.ndarray, " F"]:
 
 
 def available_energy(ledger: Ledger, scene: Scene, cell: float) -> float:
-    """Energy that there was in all [J]: at the start, and what gravity and pushes gave.
+    """Available energy [J]: initial energy plus the work of gravity and forces.
 
     At least that of a fall through one cell.
     """
@@ -150,9 +150,9 @@ def available_energy(ledger: Ledger, scene: Scene, cell: float) -> float:
 
 
 def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
-    """Energy that neither moves, is stored nor is booked as lost, over all that there was [-].
+    """Energy missing from the balance, over the available energy [-].
 
-    Transfers between particles and the grid took it, and nothing in nature.
+    It is lost numerically, in transfers between particles and grid.
     """
     balance = energy_balance(ledger, scene, cell)[0] + dissipated_energy(ledger)
     balance = balance + ledger.impact_loss
@@ -161,7 +161,7 @@ def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
 
 
 def impact_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
-    """Loss by normal contact over all the energy that there was [-].
+    """Loss by normal contact over the available energy [-].
 
     Pairs that gained hide nothing of it, where it is known what each pair took.
     """
@@ -184,7 +184,7 @@ def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float | None:
 def energy_balance(
     ledger: Ledger, scene: Scene, cell: float
 ) -> tuple[Float[np.ndarray, " F"], float]:
-    """Energy of motion and strain less what gravity and pushes gave, and what to compare it to [J].
+    """Kinetic and elastic energy minus external work, and the reference energy [J].
 
     See ``energy_growth``.
     """
@@ -196,16 +196,16 @@ def energy_balance(
 
 
 def object_gaining_energy(ledger: Ledger, scene: Scene, cell: float) -> EnergyGain | None:
-    """Say which object gained energy from nowhere, if any did beyond what is allowed."""
+    """Return the object with an energy gain beyond the tolerance, if any."""
     balance, scale = energy_balance(ledger, scene, cell)
     names = [thing.name for thing in scene.objects]
     return energy_gain(ledger, names, balance, ALLOWED_BREACHES["mechanical_growth"] * scale)
 
 
 def reject_expectations(seen: Iterable[Expectation], found: Audit) -> tuple[Expectation, ...]:
-    """Let no expectation be met by a run that is not physics.
+    """Mark expectations as not met in an unphysical run.
 
-    That is one that gained energy, or in which an object passed through another.
+    That is a run with an energy gain, or with an object that passed through another.
     """
     through = [pair for pair in found.surfaces if pair.passed]
     if through:
@@ -236,7 +236,7 @@ def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> tuple
 def part_row(
     k: int, owner: SceneObject | None, particles: Particles, field: MaterialField
 ) -> PartAudit:
-    """Put the numbers of one part side by side; owner: None where it has no particles."""
+    """Real and simulated values of one part; owner: None where it has no particles."""
     material, structure, mass = field.materials[k], field.structures[k], particles.mass_real[k]
     treatment = particles.treatments[k]
     acts = acting_material(material, structure, treatment)
@@ -247,8 +247,8 @@ def part_row(
         law=acts.law.name.lower(),
         treatment=treatment.kind,
         structure=structure.kind,
-        E=treatment.young_real,
-        E_sim=treatment.young,
+        young_pa=treatment.young_pa,
+        simulated_young_pa=treatment.simulated_young_pa,
         nu=acts.poisson,
         density=material.density,
         density_sim=treatment.density,
@@ -260,5 +260,5 @@ def part_row(
         thickness_sim_m=treatment.thickness,
         mass_kg=mass,
         real_mass_kg=None if owner is None else mass / owner.scale**3,
-        why=treatment.why,
+        reason=treatment.reason,
     )

@@ -1,4 +1,4 @@
-"""``audit.json``: the one place where it is written and read back."""
+"""Reading and writing of ``audit.json``."""
 
 from pathlib import Path
 from typing import TypeVar
@@ -17,7 +17,7 @@ def write_audit(folder: Path, audit: Audit) -> None:
     """Write an audit into a folder.
 
     Raises:
-        DiskError: The disk refuses it.
+        DiskError: It cannot be written.
 
     """
     store.write_json(folder / AUDIT_FILE, audit)

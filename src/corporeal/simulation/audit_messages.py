@@ -1,4 +1,4 @@
-"""What the audit of a simulation says in sentences: for every breach, what it means."""
+"""Messages of the audit: what every violation means for the result."""
 
 from collections.abc import Iterable
 
@@ -20,15 +20,15 @@ ALLOWED_BREACHES = {
     "max_penetration_dx": 1.0,
     "mass_error": 0.01,
 }
-"""Beyond these, a sentence in the report says what it means for the result."""
+"""Tolerances, beyond which a violation is reported."""
 
 
 GRAVE_BREACHES = ("nan_count", "momentum_residual", "mass_error")
-"""Those by which what is seen is wrong by as much."""
+"""Violations that are visible errors of the same size."""
 
 
 def breach_messages(found: Audit) -> list[str]:
-    """Say what every violation means for the result."""
+    """Describe what every violation means for the result."""
     depth = max(found.floor_penetration_m, found.pair_penetration_m)
     gain = found.energy_gain
     whose = f" Most of it is in {gain.object}, from {gain.time:.2f} s on." if gain else ""
@@ -38,7 +38,7 @@ def breach_messages(found: Audit) -> list[str]:
         into == "each other"
         and depth - begun <= ALLOWED_BREACHES["max_penetration_dx"] * found.cell_m < begun
     ):
-        reason = "they stand in each other at the start. Move them apart in the scene."
+        reason = "they overlap at the start. Move them apart in the scene."
     else:
         reason = "contact is softer than in reality. A finer --detail reduces it."
     sentences = {
@@ -69,13 +69,13 @@ def breach_messages(found: Audit) -> list[str]:
 
 
 def passage_message(pair: SurfacePairCheck) -> str:
-    """Say who passed through whom, and when."""
+    """Describe which object passed through which, and when."""
     other = pair.second if pair.passed == pair.first else pair.first
     return f"{pair.passed} passed through {other} before {pair.passed_s:.2f} s"
 
 
 def surface_warnings(pairs: Iterable[SurfacePairCheck]) -> list[str]:
-    """Say which objects passed through each other, overlap or hover, by their meshes."""
+    """Return which objects passed through each other, overlap or hover, by their meshes."""
     found = []
     for pair in pairs:
         if pair.passed:
@@ -96,10 +96,10 @@ def surface_warnings(pairs: Iterable[SurfacePairCheck]) -> list[str]:
 
 
 def breakage_message(found: PredictedBreakage) -> str:
-    """Say in a sentence what a blow does to a brittle part."""
+    """Return in a sentence what an impact does to a brittle part."""
     blow = (
         f"{found.by} strikes it at {found.speed:.2g} m/s, with {found.ratio:.2g} times the energy "
-        "that half of such parts bear"
+        "that breaks half of such parts"
     )
     if found.pieces:
         return f"{found.object}: {found.part} breaks into {found.pieces} pieces: {blow}."
@@ -107,11 +107,11 @@ def breakage_message(found: PredictedBreakage) -> str:
 
 
 SAG_WARNING_DX, SAG_MENTION_DX = 1.0, 0.1
-"""Worth a warning, and worth telling at all [cells]."""
+"""Displacements for a warning, and for a note [cells]."""
 
 
 def equilibrium_warnings(settling: SettlingOutcome | None) -> list[str]:
-    """Say which objects moved visibly towards equilibrium, and whether it was not reached."""
+    """Return which objects moved visibly towards equilibrium, and whether it was not reached."""
     if settling is None:
         return []
     sentences = [
@@ -129,7 +129,7 @@ def equilibrium_warnings(settling: SettlingOutcome | None) -> list[str]:
 
 
 def equilibrium_message(settling: SettlingOutcome | None) -> str:
-    """Say in a sentence how long objects settled and how far each sank; "" where they did not."""
+    """Return in a sentence how long objects settled and how far each sank; "" where they did not."""
     if settling is None:
         return ""
     moved = [

@@ -1,4 +1,4 @@
-"""Checkpoints: what a simulation that was cut off goes on from, exactly as if nothing had happened.
+"""Checkpoints, from which an interrupted simulation resumes bit for bit.
 
 ``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the
 problem it belongs to; ``checkpoint-before.npz`` is the one before it, for when the last cannot be
@@ -20,9 +20,9 @@ from corporeal.simulation.trajectory_files import frame_path, read_arrays, write
 
 CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE = "checkpoint.npz", "checkpoint-before.npz"
 MIN_INTERVAL_S = 10.0
-"""Least seconds of computing between two checkpoints."""
+"""Minimum computing time between two checkpoints [s]."""
 MAX_WRITE_TIME_FRACTION = 0.05
-"""Largest share of the time that may be spent on writing them."""
+"""Maximum share of the time spent on writing them."""
 STATE_PREFIX = "engine."
 
 log = logging.getLogger(__name__)
@@ -30,32 +30,48 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class CheckpointState:
-    """What a checkpoint holds."""
+    """Content of a checkpoint."""
 
     done: int = 0
     """Frames before it."""
     state: dict[str, np.ndarray] = field(default_factory=dict)
-    """As the engine saved it; empty where nothing is done."""
+    """State of the engine; empty at the start."""
+
+
+@dataclass(frozen=True)
+class CheckpointConfig:
+    """How often checkpoints are written."""
+
+    min_interval_s: float = 10.0
+    """Least time of computing between two of them [s]."""
+    max_write_time_fraction: float = 0.05
+    """Largest fraction of the time that may be spent on writing them [1]."""
+
+
+DEFAULT_CHECKPOINTS = CheckpointConfig()
 
 
 class Checkpoints:
     """The last two states of one simulation in one folder."""
 
-    def __init__(self, folder: Path, name: str) -> None:
-        """Look after the checkpoints in a folder.
+    def __init__(
+        self, folder: Path, name: str, config: CheckpointConfig = DEFAULT_CHECKPOINTS
+    ) -> None:
+        """Manage the checkpoints in a folder.
 
         Args:
             folder: Where they are, beside the frames.
-            name: What is simulated; a checkpoint with another name is never used.
+            name: Fingerprint of the problem; checkpoints with another one are ignored.
+            config: How often they are written.
 
         """
-        self.folder, self.name = folder, name
+        self.folder, self.name, self.config = folder, name, config
         self.written, self.seconds = time.monotonic(), 0.0
 
     @property
     def due(self) -> bool:
-        """Whether enough was computed since the last one to write another."""
-        pause = max(MIN_INTERVAL_S, self.seconds / MAX_WRITE_TIME_FRACTION)
+        """Whether the next checkpoint is due."""
+        pause = max(self.config.min_interval_s, self.seconds / self.config.max_write_time_fraction)
         return time.monotonic() - self.written >= pause
 
     def keep(self, saved: dict[str, np.ndarray], done: int) -> None:
@@ -72,7 +88,7 @@ class Checkpoints:
         self.seconds = self.written - start
 
     def newest(self) -> CheckpointState:
-        """Return the newest usable checkpoint; one of nothing where there is none."""
+        """Return the newest usable checkpoint; an empty one if there is none."""
         for path in (self.folder / CHECKPOINT_FILE, self.folder / PREVIOUS_CHECKPOINT_FILE):
             if not path.exists():
                 continue
@@ -108,7 +124,7 @@ class Checkpoints:
 
 
 def fingerprint(*objects: Any) -> str:
-    """Name anything made of dataclasses, containers, arrays and numbers by its content."""
+    """Return a digest of dataclasses, containers, arrays and numbers."""
     total = hashlib.sha256()
     for obj in objects:
         _feed(total, obj)

@@ -1,4 +1,4 @@
-"""Energy that nothing gave: whose, and from which frame on."""
+"""Detection of unphysical energy gain, per object and frame."""
 
 from collections.abc import Sequence
 
@@ -51,7 +51,7 @@ class EnergyWatch:
         """Look at the next frame.
 
         Raises:
-            SimulationError: An object gained energy that nothing gave it.
+            SimulationError: An object gained energy without external work.
 
         """
         moving = row.kinetic + row.elastic
@@ -67,8 +67,8 @@ class EnergyWatch:
             raise SimulationError(
                 f"At t = {self.time:.4g} s {self.names[worst]!r} had gained {share[worst]:.1%} of "
                 "its energy although it touched nothing and nothing pushed it: its motion from "
-                "there on would not be true. What was computed before is kept. Use more detail, "
-                "and report this."
+                "there on is not physical. Earlier frames are kept. Use more detail, and report "
+                "this."
             )
 
     def _left_alone(self, row: Ledger) -> Bool[np.ndarray, " B"]:

@@ -1,4 +1,4 @@
-"""Von Mises stress of every particle: what colours in the viewer show."""
+"""Von Mises stress of every particle."""
 
 import numpy as np
 from jaxtyping import Float
@@ -17,7 +17,7 @@ def equivalent_stress(tau: Float[np.ndarray, "P 3 3"]) -> Float[np.ndarray, " P"
 
 
 def equivalent_of_principal(tau: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:
-    """Give the same of principal stresses [Pa]."""
+    """Return the same of principal stresses [Pa]."""
     return np.sqrt(1.5 * np.sum((tau - tau.mean(axis=1, keepdims=True)) ** 2, axis=1))
 
 
@@ -25,7 +25,7 @@ class VonMises:
     """Von Mises stress of every particle of a problem, in its order."""
 
     def __init__(self, problem: Problem) -> None:
-        """Look up what every particle is made of."""
+        """Look up the constitutive laws of the particles."""
         substances, row = MaterialTable.of(problem)
         self.soft = np.flatnonzero(~substances.rigid[row])
         mine = row[self.soft]

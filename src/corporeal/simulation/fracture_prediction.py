@@ -1,9 +1,8 @@
-"""What would break: every brittle rigid part at its first blow from each other body.
+"""Prediction of brittle fracture at the first impact of each other body.
 
-The simulation keeps such parts whole, unless it is told to break them (``breaking``). Here the
-energy of the blow is compared with what half of such parts bear (``fracture``). Blows after the
-first of a pair are not looked at: a vase that falls over where it stood, and what bounces, are
-judged by their first touch.
+The simulation keeps such parts whole, unless ``breaking`` is set. Here the energy of the impact is
+compared with what half of such parts bear (``fracture``). Impacts after the first of a pair are not
+looked at: a vase that falls over where it stood, and what bounces, are judged by their first touch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,7 +25,7 @@ from corporeal.simulation.impact_fracture import (
 )
 
 FLOOR_MATERIAL = "concrete"
-"""What the floor and walls count as."""
+"""Name of the floor and the walls."""
 SHEET_ASPECT_RATIO = 8.0
 """A solid whose second side is so many times its first is a sheet [-]."""
 ROUND_ASPECT_RATIO = 1.5
@@ -42,7 +41,7 @@ FREE_FLIGHT_FRAMES = 1.5
 
 @dataclass(frozen=True)
 class _ImpactMotion:
-    """How an object moves and resists as a blow comes."""
+    """Motion and inertia of an object just before an impact."""
 
     velocity: Float[np.ndarray, "3"]
     """Where it is struck [m/s]."""
@@ -60,7 +59,7 @@ class _ImpactMotion:
 
 @dataclass(frozen=True)
 class BrittleImpact:
-    """The first blow of another body, or of a plane, on a brittle part."""
+    """The first impact of another body, or of a plane, on a brittle part."""
 
     object: int
     part: int
@@ -79,7 +78,7 @@ FIXED_MOTION = _ImpactMotion(np.zeros(3), 0.0, np.zeros((3, 3)), np.zeros(3))
 def predict_breakage(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> tuple[PredictedBreakage, ...]:
-    """Judge every brittle rigid part by the hardest of its first blows; of what broke, by that.
+    """Predict breakage of every brittle rigid part by its hardest first impact; of fractured ones, by that.
 
     Args:
         scene: What was simulated.
@@ -98,14 +97,14 @@ def predict_breakage(
 
 
 def fracture_event_of(one: FractureEvent, scene: Scene, field: MaterialField) -> PredictedBreakage:
-    """Say what broke."""
+    """Describe a fracture."""
     return PredictedBreakage(
         object=scene.objects[one.object].name,
         part=field.words[one.part].name,
         by=one.by,
         time=one.time,
         speed=one.speed,
-        energy=one.blow,
+        energy=one.impact_energy,
         ratio=one.ratio,
         word=breakage_word(one.ratio),
         pieces=len(one.surfaces),
@@ -113,7 +112,7 @@ def fracture_event_of(one: FractureEvent, scene: Scene, field: MaterialField) ->
 
 
 def piece_objects(breaks: Sequence[FractureEvent], objects: int) -> set[int]:
-    """Return the objects that are pieces of what broke, which break no more."""
+    """Return the objects that are fragments, which don't break again."""
     more = sum(len(one.surfaces) - 1 for one in breaks)
     return {one.object for one in breaks} | set(range(objects - more, objects))
 
@@ -121,14 +120,14 @@ def piece_objects(breaks: Sequence[FractureEvent], objects: int) -> set[int]:
 def first_impacts(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> tuple[BrittleImpact, ...]:
-    """Find every first blow on a brittle rigid part."""
+    """Find every first impact on a brittle rigid part."""
     if not _brittle(particles, field).any():
         return ()
     return tuple(_FirstImpacts(scene, particles, field, trajectory).all())
 
 
 def _brittle(particles: Particles, field: MaterialField) -> np.ndarray:
-    """Which parts are rigid and of brittle matter."""
+    """Which parts are rigid and of brittle material."""
     return np.array(
         [
             t.kind == "rigid" and m.strength_local is not None
@@ -138,7 +137,7 @@ def _brittle(particles: Particles, field: MaterialField) -> np.ndarray:
 
 
 class _FirstImpacts:
-    """The first blows of a run."""
+    """The first impacts of a run."""
 
     def __init__(
         self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
@@ -150,7 +149,7 @@ class _FirstImpacts:
         self.floor = ElasticSolid(hard["young"].typical, hard["poisson"].typical)
 
     def all(self) -> Iterator[BrittleImpact]:
-        """Every first blow on a brittle part."""
+        """Every first impact on a brittle part."""
         first = self.ledger.first_contact[-1]
         objects = len(self.scene.objects)
         for a in range(objects):
@@ -195,7 +194,7 @@ class _FirstImpacts:
         away = -normal if closing > 0.0 else normal
         return BrittleImpact(a, part, c if c < objects else None, point, away, said)
 
-    # ------------------------------------------------------------ how they met
+    # ------------------------------------------------------------ motion before the impact
 
     def _struck(self, frame: Frame, number: int, point: Float[np.ndarray, "3"]) -> int:
         """Part of an object that is nearest to a point."""
@@ -240,7 +239,7 @@ class _FirstImpacts:
         return rotation_vector(left @ right) / float(self.ledger.time[k] - self.ledger.time[k - 1])
 
     def _normal(self, a: int, c: int, k: int) -> Float[np.ndarray, "3"]:
-        """Direction of a blow: a plane's normal, else that of the momentum it gave."""
+        """Direction of an impact: a plane's normal, else that of the momentum it gave."""
         objects = len(self.scene.objects)
         if c >= objects:
             normals = [(0.0, 0.0, 1.0), *(wall.normal for wall in self.scene.walls)]
@@ -254,7 +253,7 @@ class _FirstImpacts:
         away = ledger.centre[k, c] - ledger.centre[k, a]
         return away / np.linalg.norm(away)
 
-    # ------------------------------------------------------------ what is struck
+    # ------------------------------------------------------------ geometry of the struck part
 
     def _roundness(self, c: int, point: Float[np.ndarray, "3"], frame: Frame) -> float:
         """Radius of what strikes [m]: half the shortest side of the part; inf of a plane."""
@@ -263,7 +262,7 @@ class _FirstImpacts:
         return self._sides(self._struck(frame, c, point))[0] / 2.0
 
     def _form(self, k: int, other_radius: float) -> BrittlePart:
-        """How a part is built, as ``fracture`` knows it."""
+        """Geometry class of a part for ``fracture``."""
         material, structure = self.field.materials[k], self.field.structures[k]
         owner = int(self.particles.object[np.flatnonzero(self.particles.part == k)[0]])
         short, middle, long = self._sides(k)
@@ -313,7 +312,7 @@ class _FirstImpacts:
 
 
 def encloses_cavity(scene: Scene, number: int) -> bool:
-    """Whether an object's surface closes about a room, as an egg's and a duck's do."""
+    """Whether an object's surface encloses a cavity."""
     mesh = join_meshes([s for s in scene.surfaces if s.object == number])
     fine = WELD_EXTENT_RATIO * float(np.ptp(mesh.vertices, axis=0).max())
     _, one = np.unique(np.round(mesh.vertices / fine), axis=0, return_inverse=True)

@@ -1,8 +1,8 @@
-"""Breaking, simulated: what is struck with ten times the energy that it bears becomes pieces.
+"""Simulated fracture: objects struck with ten times the energy they withstand become fragments.
 
 The run is taken back to just before the two touch, what the wall bears until it breaks is taken
-from the blow, and the thing becomes rigid pieces that move on as it did (decision 39). The momentum
-of the pieces is that of the whole.
+from the impact, and the object becomes rigid pieces that move on as it did (decision 39). The
+momentum of the pieces is that of the whole.
 """
 
 from collections.abc import Sequence
@@ -15,9 +15,15 @@ from corporeal.core.types import FractureEvent, Surface
 from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import Snapshot
-from corporeal.mpm.split_body import BodySplit, ParentMap, can_split, split_problem
+from corporeal.mpm.engines import require
+from corporeal.mpm.problem import (
+    BodySplit,
+    BodySplittingEngine,
+    Engine,
+    InteractiveEngine,
+    Snapshot,
+)
+from corporeal.mpm.split_body import can_split
 from corporeal.simulation.fracture_prediction import (
     BrittleImpact,
     encloses_cavity,
@@ -36,12 +42,11 @@ PIECE_CONTACT_POINTS = 1200
 
 @dataclass(frozen=True)
 class FracturedRun:
-    """A thing that has just broken."""
+    """A run with one more fractured object."""
 
     stage: FractureState
-    engine: CpuEngine
+    engine: Engine
     breaks: tuple[FractureEvent, ...]
-    heirs: ParentMap
 
 
 def next_breaking_impact(
@@ -52,11 +57,11 @@ def next_breaking_impact(
     number: int,
     since: float,
 ) -> BrittleImpact | None:
-    """Return the first blow since a time [s] under which something breaks; None: there is none.
+    """Return the first fracturing impact since a time [s], if any.
 
     Args:
         stage: What is simulated.
-        breaks: What has broken, which breaks no more.
+        breaks: Earlier fractures; fragments don't break again.
         whole: Objects that cannot be cut.
         folder: Where the frames are.
         number: Of the last one.
@@ -79,15 +84,18 @@ def next_breaking_impact(
 
 
 def fracture_body(
-    stage: FractureState, engine: CpuEngine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
+    stage: FractureState, engine: Engine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
 ) -> FracturedRun | None:
-    """Make pieces of what a blow is about to strike; None: it cannot be cut, and stays whole.
+    """Replace the struck object by fragments just before the impact; None: it cannot be cut.
 
     Args:
         stage: What is simulated.
-        engine: At an instant before the blow; goes on to just before it.
-        blow: Which.
-        breaks: What broke before.
+        engine: At an instant before the impact; goes on to just before it.
+        blow: The impact.
+        breaks: Earlier fractures.
+
+    Raises:
+        UserError: The engine cannot break bodies.
 
     """
     owner = stage.posed.object_of_body
@@ -106,10 +114,8 @@ def fracture_body(
     _take_energy(engine, stage, blow)
     one = _break(blow, pieces)
     split = _split(stage, engine, body, one)
-    heirs, problem = ParentMap.of(engine.problem, split), split_problem(engine.problem, split)
-    after = CpuEngine(problem, engine.threads)
-    after.inherit(engine.save(), heirs)
-    return FracturedRun(stage.with_pieces(one, split, problem, now), after, (*breaks, one), heirs)
+    after = require(engine, BodySplittingEngine).with_split_body(split)
+    return FracturedRun(stage.with_pieces(one, split, after.problem, now), after, (*breaks, one))
 
 
 # ---------------------------------------------------------------- the pieces
@@ -117,7 +123,7 @@ def fracture_body(
 
 @dataclass(frozen=True)
 class _CutPieces:
-    """Pieces of a thing, where it was at the start."""
+    """Pieces of an object, where it was at the start."""
 
     of_particle: np.ndarray
     surfaces: tuple[Surface, ...]
@@ -126,7 +132,7 @@ class _CutPieces:
 def _pieces(
     stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot
 ) -> _CutPieces | None:
-    """Cut a thing into cells around the blow; None: its surface is not closed."""
+    """Cut an object into Voronoi cells around the impact; None: its surface is not closed."""
     scene, particles = stage.scene, stage.particles
     own = [s for s in scene.surfaces if s.object == blow.object]
     if len({s.finish for s in own}) != 1:
@@ -160,14 +166,14 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
         ratio=said.ratio,
         by=said.by,
         speed=said.speed,
-        blow=said.energy,
+        impact_energy=said.energy,
         piece=pieces.of_particle,
         surfaces=pieces.surfaces,
     )
 
 
-def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -> None:
-    """Slow the blow down by what the wall bears until it breaks; a body it strikes is pushed back.
+def _take_energy(engine: Engine, stage: FractureState, blow: BrittleImpact) -> None:
+    """Subtract the fracture energy from the impact; the struck body recoils.
 
     J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
     """
@@ -179,11 +185,11 @@ def _take_energy(engine: CpuEngine, stage: FractureState, blow: BrittleImpact) -
         if number is not None and stage.scene.objects[number].path is None:
             body = int(np.flatnonzero(stage.posed.object_of_body == number)[0])
             a, b, c = (sign * impulse).tolist()
-            engine.apply_impulse(body, (x, y, z), (a, b, c))
+            require(engine, InteractiveEngine).apply_impulse(body, (x, y, z), (a, b, c))
 
 
-def _split(stage: FractureState, engine: CpuEngine, body: int, one: FractureEvent) -> BodySplit:
-    """Say where the pieces are and how they move."""
+def _split(stage: FractureState, engine: Engine, body: int, one: FractureEvent) -> BodySplit:
+    """Return positions and motions of the fragments."""
     now, mine = engine.snapshot(), stage.rows(body)
     start = stage.particles.position[stage.particles.object == one.object].astype(float)
     turn, place = now.motion[mine][0], now.position[mine].mean(axis=0)

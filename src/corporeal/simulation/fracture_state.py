@@ -1,4 +1,4 @@
-"""What is simulated at an instant of a run in which things break."""
+"""State of a run with fracture."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,7 @@ from jaxtyping import Float
 
 from corporeal.core.types import FractureEvent, MaterialField, Particles, Scene
 from corporeal.discretization.build_model import ModelMapping
-from corporeal.mpm.problem import Problem, Snapshot
-from corporeal.mpm.split_body import BodySplit
+from corporeal.mpm.problem import BodySplit, Problem, Snapshot
 from corporeal.scene.fractured_scene import (
     fractured_field,
     fractured_particles,
@@ -19,7 +18,7 @@ from corporeal.scene.fractured_scene import (
 
 @dataclass(frozen=True)
 class FractureState:
-    """What is simulated now, with the pieces of what has broken."""
+    """Scene and problem including the fragments."""
 
     scene: Scene
     particles: Particles
@@ -32,7 +31,7 @@ class FractureState:
     def at_start(
         cls, scene: Scene, particles: Particles, field: MaterialField, posed: ModelMapping
     ) -> "FractureState":
-        """Return a stage on which nothing has broken."""
+        """Return the state without fractures."""
         turned = np.broadcast_to(np.eye(3), (len(posed.problem.bodies), 3, 3))
         return cls(scene, particles, field, posed, turned)
 
@@ -45,10 +44,10 @@ class FractureState:
     def with_pieces(
         self, one: FractureEvent, split: BodySplit, problem: Problem, now: Snapshot
     ) -> "FractureState":
-        """Return the stage with the pieces of a body as objects.
+        """Return the state with the fragments of a body as objects.
 
         Args:
-            one: What broke.
+            one: The fracture.
             split: The same of the problem before.
             problem: In which the pieces are bodies.
             now: Where particles were just before.

@@ -1,6 +1,6 @@
-"""What a blow does to brittle matter: the peak force of its energy, and the tension under it.
+"""Brittle fracture under impact: peak force from the energy, and tensile stress under it.
 
-A blow's energy goes into a dent where the two touch (Hertz) and into bending the wall:
+An impact's energy goes into a dent where the two touch (Hertz) and into bending the wall:
 E = F²/2k + ⅖ F^(5/3)/k_h^(2/3). Under the force a wall is in tension as under a load on a small
 circle, and a lump splits between two points. A square millimetre is stressed, not a whole bar: what
 counts is the local strength, two to five times that of a bar.
@@ -33,14 +33,14 @@ BrittleForm = Literal["closed", "tube", "plate", "lump"]
 """Of a wall that goes all around, an open vessel or bottle, a flat sheet, and what has no wall."""
 BreakageWord = Literal["holds", "may break", "would break"]
 CERTAIN_BREAK_ENERGY_RATIO = 10.0
-"""Times the energy that half of such parts bear, from which there is no doubt [-]."""
+"""Ratio to the energy that breaks half of such parts, from which breakage is certain [-]."""
 
 
 @dataclass(frozen=True)
 class ElasticSolid:
-    """How an isotropic solid gives."""
+    """Elastic constants of an isotropic solid."""
 
-    young: float
+    young_pa: float
     """E [Pa]."""
     poisson: float
     """ν [-]"""
@@ -48,7 +48,7 @@ class ElasticSolid:
     @property
     def compliance(self) -> float:
         """(1 - ν²)/E [1/Pa]."""
-        return (1.0 - self.poisson**2) / self.young
+        return (1.0 - self.poisson**2) / self.young_pa
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class BrittlePart:
     def shell_stiffness(self) -> float:
         """Of a closed round wall under a point load, 4 E t²/(R √(3 (1 - ν²))) [N/m] (Reissner)."""
         poisson = self.solid.poisson
-        plain = 4.0 * self.solid.young * self.thickness**2
+        plain = 4.0 * self.solid.young_pa * self.thickness**2
         return plain / (self.radius * sqrt(3.0 * (1.0 - poisson**2)))
 
     @property
@@ -101,12 +101,12 @@ class BrittlePart:
         return 1.0 / (1.0 / self.radius + 1.0 / self.other_radius)
 
     def energy(self, force: float, other: ElasticSolid) -> float:
-        """Of the blow that makes a peak force [J]."""
+        """Of the impact that makes a peak force [J]."""
         dent = 0.4 * force ** (5.0 / 3.0) / self.hertz(other) ** (2.0 / 3.0)
         return 0.5 * force**2 / self.stiffness + dent
 
     def force(self, energy: float, other: ElasticSolid) -> float:
-        """Peak force of a blow [N]."""
+        """Peak force of an impact [N]."""
         return _root(lambda f: self.energy(f, other) - energy)
 
     def tension(self, force: float, other: ElasticSolid) -> float:
@@ -130,7 +130,7 @@ class BrittlePart:
         return force / t**2 * (1.5 / pi * local + oval)
 
     def breaking_energy(self, other: ElasticSolid) -> float:
-        """E₅₀ [J]: of a blow under which the tension is the strength."""
+        """E₅₀ [J]: of an impact under which the tension is the strength."""
         bears = self.strength * (LUMP_STRENGTH_RATIO if self.form == "lump" else 1.0)
         return self.energy(_root(lambda f: self.tension(f, other) - bears), other)
 
@@ -141,7 +141,7 @@ def _root(missing: Callable[[float], float]) -> float:
 
 
 def breakage_word(ratio: float) -> BreakageWord:
-    """Say in a word what a blow of so many times E₅₀ does."""
+    """Return the word for the outcome of an impact of so many times E₅₀."""
     if ratio < 1.0:
         return "holds"
     return "may break" if ratio <= CERTAIN_BREAK_ENERGY_RATIO else "would break"

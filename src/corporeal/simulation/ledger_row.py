@@ -1,4 +1,4 @@
-"""One frame's row of the ledger: what the engine measured, and distances taken from positions."""
+"""One frame's row of the ledger: measurements of the engine, and distances of positions."""
 
 from dataclasses import fields
 
@@ -12,9 +12,9 @@ from corporeal.mpm.problem import Diagnostics, Problem, Snapshot, StepStatistics
 def ledger_row(
     problem: Problem, now: Snapshot, measure: Diagnostics, steps: StepStatistics
 ) -> Ledger:
-    """Everything the audit needs of one instant.
+    """Return the ledger's row of one instant.
 
-    The bodies of one object, its soft matter and the frames bonded to it, are added up.
+    The bodies of one object, its soft material and the frames bonded to it, are added up.
     """
     # What is known of each body: what the engine measured, speeds, depths in planes.
     ends = np.cumsum([len(b.position) for b in problem.bodies])[:-1]
@@ -35,7 +35,7 @@ def ledger_row(
     # The bodies of one object become one.
     group = object_of_body(problem)
     squeezed = np.split(volume_shares(now), ends)
-    if problem.bonds or problem.apart:
+    if problem.bonds or problem.excluded_pairs:
         found |= sum_by_object(found, group)
         one = [np.flatnonzero(group == k) for k in range(group.max() + 1)]
         position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
@@ -60,14 +60,14 @@ def ledger_row(
 def volume_shares(now: Snapshot) -> np.ndarray:
     """Volume of every particle over its volume at rest (P,), at most 1.
 
-    What is lost or turned inside out has 1, so that a failure hides no overlap.
+    Lost or inverted particles have 1, so that failures don't hide overlaps.
     """
     share = np.linalg.det(now.motion)
     return np.where(share > 0.0, np.minimum(share, 1.0), 1.0)
 
 
 def plane_depths(problem: Problem, now: Snapshot) -> np.ndarray:
-    """How deep each body reaches into each plane (W, B) [m]; rigid ones by their surfaces."""
+    """Penetration of each body into each plane (W, B) [m]; rigid ones by their surfaces."""
     depths = np.zeros((len(problem.planes), len(problem.bodies)))
     start = 0
     for b, body in enumerate(problem.bodies):
@@ -96,8 +96,8 @@ def rotate_with_body(
 
 
 def object_of_body(problem: Problem) -> np.ndarray:
-    """Say which object each body is of (B,): bodies held together or kept apart are of one."""
-    first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.apart)}
+    """Return which object each body is of (B,): bodies held together or kept apart are of one."""
+    first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.excluded_pairs)}
     group: list[int] = []
     for b in range(len(problem.bodies)):
         group.append(group[first[b]] if b in first else max(group, default=-1) + 1)

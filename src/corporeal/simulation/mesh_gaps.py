@@ -1,7 +1,7 @@
-"""Gaps, overlaps and crossings of objects, measured between their surfaces as a picture shows them.
+"""Gaps, overlaps and crossings of objects, measured between their rendered surfaces.
 
-The ledger measures between particles, which know a surface to a fraction of a cell. Here the meshes
-of the scene follow the matter, as in the film, and are asked for distances themselves.
+The ledger measures between particles, which resolve a surface to a fraction of a cell. Here the
+meshes of the scene follow the material, as in the video, and are asked for distances themselves.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from corporeal.geometry.rigid_fit import RigidFit, fit_rigid_motion, rotation_an
 from corporeal.render.skin_binding import SkinBinding, bind_points
 
 NEAR_DX = 2.0
-"""Objects whose particles never come nearer than this [cells] are not looked at."""
+"""Objects whose particles never come nearer than this [cells] are skipped."""
 OVERLAP_FRAMES = 12
 """Frames in which overlaps are measured, beside the last …"""
 SURFACE_SAMPLES = 400
@@ -30,7 +30,7 @@ TRACKED_PARTICLES = 60
 TRACK_STRIDE_DX = 0.25
 """Their ways are looked at where one has gone farther than this [cells]."""
 MAX_TURN_RAD = np.radians(60.0)
-"""Where the other turned farther from one look to the next, nobody knows their ways [rad]."""
+"""Where the other turned farther from one look to the next, their paths are unknown [rad]."""
 PASSED_FRACTION = 0.5
 """An object has passed through another when more than this share of them has [-]."""
 VISIBLE_GAP_RATIO = 0.15
@@ -60,11 +60,11 @@ class TrackedSurface:
     closed: bool
 
     def shape(self, frame: Frame) -> QueryMesh:
-        """Give the surface at one instant."""
+        """Return the surface at one instant."""
         return self.surface.moved(self.skin.carried(frame)[0])
 
     def points(self, shape: QueryMesh) -> Float[np.ndarray, "N 3"]:
-        """Give the points on it that are asked [m]."""
+        """Return the points on it that are asked [m]."""
         corners = shape.mesh.vertices[shape.mesh.triangles[self.sample]]
         return np.einsum("nk,nkd->nd", self.weight, corners)
 
@@ -259,12 +259,12 @@ def distance_within(
     return distance
 
 
-# ------------------------------------------------------------------ who passed through whom
+# ------------------------------------------------------------------ crossings
 
 
 @dataclass(frozen=True)
 class Passage:
-    """That one object passed through another."""
+    """One object passed through another."""
 
     who: int
     time: float
@@ -301,7 +301,7 @@ def _passages(
 
 
 class RelativePath:
-    """How particles of one object go in the frame of another: in straight lines.
+    """Piecewise linear paths of particles of one object in the frame of another.
 
     A line ends where something has moved by ``TRACK_STRIDE_DX``; what rests costs nothing. Of what
     spins so fast that it turns by more than ``MAX_TURN_RAD`` between frames (a shard), nothing is
@@ -339,13 +339,13 @@ class RelativePath:
         return bool(gone > TRACK_STRIDE_DX * self.cell)
 
     def _there(self, frame: Frame) -> tuple[RigidFit, np.ndarray]:
-        """Give the other's rigid motion, and the grains in its frame at the start [m]."""
+        """Return the other's rigid motion, and the particles in its frame at the start [m]."""
         mine, start = self.other.members, self.other.skin.start
         fit = fit_rigid_motion(start[mine], frame.position[mine].astype(float), np.ones(len(mine)))
         return fit, fit.undo(frame.position[self.walker.grains].astype(float))
 
     def go(self, frame: Frame, shape: QueryMesh) -> float:
-        """Take the step just asked for; give the share of the grains that have passed through."""
+        """Advance by the last step; return the share of particles that have passed through."""
         assert self.now is not None
         fit, there = self.now
         last = there if self.last is None else self.last
@@ -360,7 +360,7 @@ class RelativePath:
     def _through(
         self, fit: RigidFit, shape: QueryMesh, there: np.ndarray, last: np.ndarray
     ) -> Bool[np.ndarray, " N"]:
-        """Whether each way, in the other's frame at the start [m], leads through it.
+        """Whether each path, in the other's frame at the start [m], passes through it.
 
         It enters and leaves by faces that look opposite ways; what slides along a round body cuts
         its surface at faces that look nearly the same way.

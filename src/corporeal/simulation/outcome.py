@@ -37,7 +37,7 @@ known no better. What rests on something is within 0.45, what stands beside it f
 def measure_outcome(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> Outcome:
-    """Say what was seen.
+    """Describe what was seen.
 
     Args:
         scene: What was simulated.
@@ -98,7 +98,7 @@ class ObjectParticles:
                 self.last[b].append(now)
 
     def resting_frames(self) -> np.ndarray:
-        """Numbers of up to ``REST_FRAMES`` frames in the last 0.3 s."""
+        """Return the indices of up to ``REST_FRAMES`` frames in the last 0.3 s."""
         late = np.flatnonzero(self.time >= self.time[-1] - REST_DURATION_S - 1e-9)
         return np.unique(np.linspace(late[0], late[-1], REST_FRAMES).astype(int))
 
@@ -109,7 +109,7 @@ class ObjectParticles:
     def when(self, instant: float, body: int) -> Float[np.ndarray, "N 3"]:
         """One object's particles [m] at an instant of impact [s]: from the frame before, in flight.
 
-        The frame after would show what the impact has done already.
+        The frame after would already show its effect.
         """
         k = self.before(instant)
         flight = instant - self.time[k]
@@ -119,7 +119,7 @@ class ObjectParticles:
 
 
 def object_row(body: int, names: list[str], bodies: ObjectParticles) -> ObjectOutcome:
-    """Say what happened to one object."""
+    """Describe what happened to one object."""
     ledger, cell, start = bodies.ledger, bodies.cell, bodies.start[body]
     mark, rim = residual_mark(body, bodies)
     centre = ledger.centre[:, body]
@@ -156,7 +156,7 @@ def object_row(body: int, names: list[str], bodies: ObjectParticles) -> ObjectOu
 
 
 def residual_mark(body: int, bodies: ObjectParticles) -> tuple[ResidualDent, float | None]:
-    """Find what mark is left, and how high a rim rose about it [m]; None: it holds together.
+    """Measure the residual mark and its rim [m]; None: the object keeps cohesion.
 
     An object of whose particles most are grains or paste is measured at their surface.
     """
@@ -177,7 +177,7 @@ def level_reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
 def vertical_extent(
     points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float
 ) -> float:
-    """Extent of most matter along z [m]: of the points, and half a row above and below them.
+    """Extent of most material along z [m]: of the points, and half a row above and below them.
 
     A row is half a cell high at the start. What is squeezed flat has rows as much lower: a puddle
     that was a column would else be taken for half a cell higher than it is.
@@ -200,7 +200,7 @@ def _along_z(points: Float[np.ndarray, "N 3"]) -> float:
 
 
 def left_vessel(body: int, bodies: "ObjectParticles") -> float | None:
-    """Share of what lay in a vessel that is outside of the vessel's convex hull at the end [-]."""
+    """Share of a vessel's contents that is outside of the vessel's convex hull at the end [-]."""
     vessel = bodies.vessel_of.get(body)
     if vessel is None:
         return None
@@ -247,7 +247,7 @@ class Bounce:
 
 
 def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
-    """From how high a body came when it first touched anything, and how high it came back.
+    """Height of fall before the first contact, and of the rebound.
 
     The fall is the free fall from rest that ends at its speed, so that an object thrown down has
     fallen from far; the rebound is measured from where its centre of mass was. Both at that
@@ -280,7 +280,7 @@ def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
 
 
 def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str, PairOutcome]:
-    """Say what happened between every two objects, and between each object and the floor."""
+    """Describe what happened between every two objects, and between each object and the floor."""
     ledger, time = trajectory.ledger, trajectory.time
     rows = {}
     for a, c in combinations(range(len(names) + 1), 2):
@@ -310,7 +310,7 @@ def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str
 def stays_separated(
     gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell: float
 ) -> bool:
-    """Whether two bodies stay more than a cell apart for 0.1 s or longer."""
+    """Whether two bodies are more than a cell apart for at least 0.1 s."""
     apart = np.concatenate([[False], gap > cell, [False]]).astype(int)
     edges = np.flatnonzero(np.diff(apart)).reshape(-1, 2)
     return any(

@@ -1,4 +1,4 @@
-"""How a body's shape changed: what remains of its displacement once its rigid motion is removed."""
+"""Residual change of a body's shape: displacement without rigid motion."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ NEIGHBOUR_PARTICLES = 32
 
 
 def trusted_fit(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) -> RigidFit:
-    """Rigid motion of the part of a body that kept its shape: a dent does not tilt it."""
+    """Robust rigid fit to the undeformed part of a body."""
     weight = np.ones(len(start))
     fit = fit_rigid_motion(start, now, weight)
     for _ in range(FIT_ITERATIONS):
@@ -110,7 +110,7 @@ def place_at_start(
     now: Float[np.ndarray, "N 3"],
     start: Float[np.ndarray, "N 3"],
 ) -> Float[np.ndarray, " 3"]:
-    """Take a point on a body now back to where that bit of the body started [m]."""
+    """Map a point on a body now to its initial position [m]."""
     _, nearest = KDTree(now).query(point, k=min(NEIGHBOUR_PARTICLES, len(now)))
     nearest = np.atleast_1d(nearest)
     fit = fit_rigid_motion(start[nearest], now[nearest], np.ones(len(nearest)))

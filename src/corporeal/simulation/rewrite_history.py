@@ -1,4 +1,4 @@
-"""Frames and ledger before a thing broke, with its pieces as objects that move as one."""
+"""Frames and ledger before a fracture, with fragments as objects that move together."""
 
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -23,7 +23,7 @@ from corporeal.simulation.trajectory_files import (
 def rewrite_history(
     folder: Path, count: int, before: FractureState, after: FractureState, one: FractureEvent
 ) -> None:
-    """Write the first ``count`` frames again, with the pieces as objects that move as one."""
+    """Write the first ``count`` frames again, with the fragments as objects that move together."""
     old, new = FrameLayout.of(before.posed), FrameLayout.of(after.posed)
     for number in range(count):
         frame, row = read_frame(folder, number, old), read_ledger(folder, number)
@@ -32,7 +32,7 @@ def rewrite_history(
 
 
 def _ledger_shares(row: Ledger, frame: Frame, before: FractureState, one: FractureEvent) -> Ledger:
-    """Give each piece its share of what the ledger has of the whole, as it moved within it."""
+    """Distribute the ledger of the object to its fragments."""
     share, objects, k = piece_mass_fractions(one, before.particles), len(row.mass), one.object
     numbers = np.array([k, *range(objects, objects + len(share) - 1)])
     heirs = ParentMap(
@@ -68,7 +68,7 @@ def _ledger_shares(row: Ledger, frame: Frame, before: FractureState, one: Fractu
 def _piece_motions(
     row: Ledger, frame: Frame, before: FractureState, one: FractureEvent
 ) -> list["_PieceMotion"]:
-    """Say how each piece moves as long as the thing is whole."""
+    """Return the motion of each fragment while the object is whole."""
     particles, k = before.particles, one.object
     mine = np.flatnonzero(particles.object == k)
     weight, volume = particles.mass[mine], particles.volume[mine]
@@ -89,7 +89,7 @@ def _piece_motions(
 
 @dataclass(frozen=True)
 class _PieceMotion:
-    """How one piece moves."""
+    """Motion of one fragment."""
 
     centre: Float[np.ndarray, "3"]
     momentum: Float[np.ndarray, "3"]

@@ -1,6 +1,6 @@
-"""What may not be as expected though nothing is wrong, with the option that changes it.
+"""Hints on unexpected but valid results, with the option that changes them.
 
-Warnings say why a result may not be trusted; hints say what else could have been asked for.
+Warnings say why a result may not be trusted; hints name alternative settings.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,9 +16,9 @@ MIN_VISIBLE_MOTION_RATIO = 0.01
 MIN_VISIBLE_TURN_DEG = 1.0
 """The same of its turning [degrees]."""
 REPORTED_LOSS_FRACTION = 0.1
-"""Energy that no booked loss accounts for, as a share of what there was: more is told [-]."""
+"""Share of energy lost numerically that is reported [-]."""
 FLOWING_LAWS = frozenset(law.name.lower() for law in (Law.FLUID, Law.DRUCKER_PRAGER))
-"""Laws of what takes any shape, and stays as it comes to lie."""
+"""Laws of materials without shape memory."""
 START_HINT = "Let it fall (--drop 0.5), throw it (--velocity NAME=1,0,0) or push it (scene.toml)."
 
 
@@ -29,11 +29,11 @@ def run_hints(
     lost: float | None = None,
     parts: Sequence[PartAudit] = (),
 ) -> tuple[str, ...]:
-    """Return what a person may want to know before the next run, in sentences.
+    """Return hints for the next run, in sentences.
 
     Args:
         scene: What was simulated.
-        happened: What was seen.
+        happened: The outcome.
         divided: Whether it was asked for which nodes of a file are objects of their own.
         lost: Share of the energy that no booked loss accounts for [-]; None: it is not known.
         parts: How each part was simulated.
@@ -49,18 +49,18 @@ def run_hints(
 
 
 def _energy_loss_hint(share: float | None, parts: Sequence[PartAudit]) -> Iterator[str]:
-    """Say that coarse cells took energy that what is soft would have given back."""
+    """Hint at numerical energy loss of soft parts on coarse cells."""
     soft = dict.fromkeys(p.object for p in parts if p.object and _springs_back(p))
     if share is not None and share > REPORTED_LOSS_FRACTION and soft:
         yield (
-            f"{share:.0%} of the energy was lost between material points and grid, and to nothing "
-            f"in nature: what is soft and few cells across ({', '.join(soft)}) rebounds and swings "
-            "too little. A finer --detail loses less."
+            f"{share:.0%} of the energy was lost numerically in transfers between material points "
+            f"and grid: soft objects of few cells ({', '.join(soft)}) rebound and swing too "
+            "little. A finer --detail loses less."
         )
 
 
 def _springs_back(part: PartAudit) -> bool:
-    """Tell whether a part gives back what strains it: liquids and grains keep nothing to give."""
+    """Return whether a part is elastic: not liquid, not granular."""
     return part.treatment != "rigid" and part.law not in FLOWING_LAWS
 
 
@@ -77,15 +77,15 @@ def _one_object_hint(scene: Scene) -> Iterator[str]:
 
 
 def _motionless_hint(scene: Scene, happened: Outcome) -> Iterator[str]:
-    """Say that nothing moves, or that a push or a wind does not move what it acts on."""
+    """Hint at scenes without motion, and at forces that are too weak."""
     held = [o for o in scene.objects if _is_still(happened.objects.get(o.name))]
     pushed = [o.name for o in held if o.push is not None]
     blown = [o.name for o in held if o.wind is not None]
     if pushed:
         is_ = "is" if len(pushed) == 1 else "are"
         yield (
-            f"{', '.join(pushed)} {is_} pushed and yet not moved: friction, or what stands in the "
-            "way, holds as much. The acceleration of a push has to exceed friction coefficient "
+            f"{', '.join(pushed)} {is_} pushed and yet not moved: friction or an obstacle holds "
+            "it. The acceleration of a push has to exceed friction coefficient "
             "times gravity."
         )
     if blown:

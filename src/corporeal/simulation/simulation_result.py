@@ -1,4 +1,4 @@
-"""A scene made ready to simulate, and the same scene with how it moved."""
+"""A prepared scene, and its simulation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ class PreparedScene:
 
     scene: Scene
     inventory: Inventory
-    """What is in it, in words."""
+    """Description of its parts."""
     parts: Parts
     field: MaterialField
-    """What every part is made of, with ranges and sources."""
+    """Materials of all parts, with ranges and sources."""
     particles: Particles
 
     def broken(self, breaks: Sequence[FractureEvent]) -> "PreparedScene":
-        """Return it with the pieces of what broke as objects."""
+        """Return it with fragments as objects."""
         filled = apply_breaks(
             SceneWithMaterials(self.scene, self.parts, self.field), self.particles, breaks
         )
@@ -43,16 +43,16 @@ class PreparedScene:
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """A prepared scene, and how it moved."""
+    """A prepared scene, and its motion."""
 
     prepared: PreparedScene
     trajectory: Trajectory
     """Frames are read from disk when asked for."""
     reconstruction: Reconstruction | None = None
-    """What the scene was made of, where its objects stand now; None: it was made of surfaces."""
+    """The reconstruction, moved to the objects' places; None: the scene was not reconstructed."""
 
     @cached_property
     def outcome(self) -> Outcome:
-        """What happened to every object and pair: falls, rebounds, dents, distances."""
+        """Outcome of every object and pair: falls, rebounds, dents, distances."""
         made = self.prepared
         return measure_outcome(made.scene, made.particles, made.field, self.trajectory)

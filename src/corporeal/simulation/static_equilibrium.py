@@ -1,11 +1,11 @@
 """Static equilibrium under gravity before time 0, by dynamic relaxation.
 
-Poses at rest come from rigid bodies: what is soft was never asked. Here it sinks until it bears its
-weight, and with it what lies on it. Motion is taken out by kinetic damping (Cundall 1976; Barnes
-1999, "Form finding and analysis of tension structures by dynamic relaxation"): whenever the kinetic
-energy of an object passes a maximum it lies near its balance, and is stopped there. There is no
-coefficient to choose, and what falls over falls as fast as in life. In the end nothing is damped
-for a while; only what stays by itself has found its balance.
+Poses at rest come from rigid bodies. Here soft objects sink until they carry their weight and what
+lies on them. Motion is taken out by kinetic damping (Cundall 1976; Barnes 1999, "Form finding and
+analysis of tension structures by dynamic relaxation"): whenever the kinetic energy of an object
+passes a maximum it lies near its balance, and is stopped there. There is no coefficient to choose,
+and what falls over falls as fast as in reality. In the end nothing is damped for a while; only what
+stays by itself has found its balance.
 """
 
 from collections.abc import Callable
@@ -19,50 +19,50 @@ from corporeal.mpm.problem import Engine, Problem, Snapshot
 from corporeal.simulation.ledger_row import object_of_body
 
 ENERGY_CHECK_INTERVAL_RATIO = 0.1
-"""How often energies are looked at, over √(dx/g): what is let go falls 1/200 of a cell in it."""
+"""Interval of energy checks, over √(dx/g): a free fall of 1/200 of a cell."""
 CALM_WINDOW_S, CALM_DRIFT_DX = 0.05, 0.02
-"""Less than so many cells within so many seconds [s, dx]: it is tried whether it stays."""
+"""Less than so many cells within so many seconds [s, dx]: rest is tested."""
 WATCH_WINDOW_S, STILL_DRIFT_DX = 0.25, 0.1
 """It stays when, left alone so long, nothing drifts by so much [s, dx]: a fifth of what counts as
 motion (docs/rest.md)."""
 MAX_RELAXATION_S = 4.0
-"""Gives up after so long [s]."""
+"""Maximum relaxation time [s]."""
 CHECKS_BETWEEN_SAVE_POINTS = 10
-"""Looks between two chances to stop."""
+"""Checks between two stopping tests."""
 MAXWELL_RELAXATION_SPEEDUP = 1e6
 """How much faster Maxwell branches forget here [-]: what lies has had all the time it takes."""
 
 RESTING_PATH = Keyframes((0.0,), ((0.0, 0.0, 0.0),), ((0.0, 0.0, 0.0),))
-"""What follows a path is held where it starts."""
+"""Objects with a prescribed path are held at its start."""
 
 SaveCallback = Callable[[float], None]
 
 
 @dataclass(frozen=True)
 class StaticEquilibrium:
-    """What became of objects that were left to themselves; B objects."""
+    """Result of the relaxation; B objects."""
 
     seconds: float
-    """How long it took [s]."""
+    """Duration [s]."""
     found: bool
     """Whether they came to rest."""
     moved: Float[np.ndarray, "B 3"]
-    """By how much their centres of mass did [m]."""
+    """Displacement of their centres of mass [m]."""
     farthest: Float[np.ndarray, " B"]
-    """By how much the particle did that moved most [m]."""
+    """Largest displacement of a particle [m]."""
     state: dict[str, np.ndarray]
-    """Of the engine: where everything lies, at rest."""
+    """State of the engine at rest."""
 
 
 def settling_problem(problem: Problem, hung: set[int]) -> Problem:
-    """Pose the same problem before its time 0: without motion, wind, pushes and loss.
+    """Return the problem without motion, wind, forces and loss.
 
     Branches that forget at once neither bear nor lose anything: what remains is the slow modulus,
     which alone carries what has lain for long.
 
     Args:
-        problem: Of the film.
-        hung: Bodies that nothing carries: gravity does not pull them.
+        problem: Of the video.
+        hung: Unsupported bodies: gravity does not pull them.
 
     """
     x, y, z = problem.gravity
@@ -81,7 +81,7 @@ def settling_problem(problem: Problem, hung: set[int]) -> Problem:
 
 
 class DynamicRelaxation:
-    """One dynamic relaxation, from its start or from where it was left."""
+    """One dynamic relaxation, resumable."""
 
     def __init__(self, engine: Engine, problem: Problem, hung: set[int]) -> None:
         """Look at the start.
@@ -105,15 +105,16 @@ class DynamicRelaxation:
         self.energy[:] = 0.0
         self.anchor, self.since, self.count, self.watching = self.start.copy(), 0.0, 0, False
 
-    def run(self, pause: SaveCallback) -> StaticEquilibrium:
-        """Go on until everything has found its balance, or for ``MAX_RELAXATION_S``.
+    def run(self, pause: SaveCallback, max_seconds: float = MAX_RELAXATION_S) -> StaticEquilibrium:
+        """Run until equilibrium, or time is up.
 
         Args:
-            pause: Told the time [s] now and then, when the state is good to go on from.
+            pause: Called with the time [s] whenever the state can be saved.
+            max_seconds: Gives up after so long [s].
 
         """
         found = False
-        while not found and self.engine.time < MAX_RELAXATION_S:
+        while not found and self.engine.time < max_seconds:
             if self.count % CHECKS_BETWEEN_SAVE_POINTS == 0:
                 pause(self.engine.time)
             self.count += 1
@@ -123,7 +124,7 @@ class DynamicRelaxation:
         return self._balance(found)
 
     def _judge(self) -> bool:
-        """Stop what is to be stopped; tell whether everything stays."""
+        """Apply kinetic damping; return whether everything is at rest."""
         centre, energy = self._look()
         self.engine.stop(self.hung)
         drift = float(np.linalg.norm(centre - self.anchor, axis=1).max()) / self.cell
@@ -164,16 +165,16 @@ class DynamicRelaxation:
             state=self.engine.save(),
         )
 
-    # ------------------------------------------------------------ going on later
+    # ------------------------------------------------------------ saving and restoring
 
     def saved(self) -> dict[str, np.ndarray]:
-        """Everything needed to go on exactly as if nothing had happened."""
+        """State to resume bit for bit."""
         own = {"settling.anchor": self.anchor, "settling.energy": self.energy}
         own["settling.clock"] = np.array([self.since, self.count, self.watching], float)
         return self.engine.save() | own
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
-        """Go on from what ``saved`` returned."""
+        """Restore the state returned by ``saved``."""
         self.engine.restore(saved)
         self.anchor, self.energy = saved["settling.anchor"], saved["settling.energy"]
         since, count, watching = saved["settling.clock"].tolist()

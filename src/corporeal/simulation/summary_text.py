@@ -1,7 +1,7 @@
-"""What a finished run says last, by weight: what may be wrong, what was assumed, what was left out.
+"""Summary of a run's notes by severity: possible errors, assumptions, omissions.
 
-Sentences get their kind where something is noticed (``types.notes``); here they are only put in
-order, for the report and for the terminal.
+Notes get their kind where they are made (``types.notes``); here they are ordered for the report and
+the terminal.
 """
 
 import re
@@ -38,13 +38,13 @@ SECTIONS = (WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SECTION)
 
 
 def summary_sections(audit: RunAudit) -> dict[SummarySection, tuple[str, ...]]:
-    """Return what a run says last, each sentence once, sections and sentences by weight."""
+    """Return the sections of the summary, each sentence once, by severity."""
     told = (*audit.notes, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
     return {s: tuple(dict.fromkeys(_of(s, told))) for s in SECTIONS}
 
 
 def split_advice(sentences: str) -> tuple[str, str]:
-    """Part what is the matter, the first sentence, from what follows: why, and what to do."""
+    """Split a message into its first sentence and the rest: reason and advice."""
     first, *rest = re.split(r"(?<=[a-z0-9)%°][.:]) (?=[A-Z])", sentences, maxsplit=1)
     return first, " ".join(rest)
 

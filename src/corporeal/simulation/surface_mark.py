@@ -1,9 +1,8 @@
 """The mark in sand, mud, snow or paste: how deep its free surface fell, and how high a rim rose.
 
-What holds together is dented where its matter went (``residual_shape.dent``). Grains and pastes
-part: a splash takes a few of them far from where they lay, which says nothing of the hollow that
-is seen. Its depth is that of the surface, in columns along z of a width of ``COLUMN_WIDTH_DX``
-cells.
+Cohesive bodies are dented where their material went (``residual_shape.dent``). Grains and pastes
+separate: a splash carries a few far away, which says nothing of the depth of the hollow. Its depth
+is that of the surface, in columns along z of a width of ``COLUMN_WIDTH_DX`` cells.
 """
 
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ PARTICLES_ABOVE_SURFACE = 2
 
 @dataclass(frozen=True)
 class SurfaceMark:
-    """How the free surface of a body changed."""
+    """Change of the free surface of a body."""
 
     depth: float
     """By how much the surface fell in the column where it fell most [m]."""
@@ -37,7 +36,7 @@ class SurfaceMark:
 
 
 def keeps_surface_mark(material: Material) -> bool:
-    """Whether neighbours part in it and yet it keeps a mark: grains, and pastes that yield."""
+    """Whether a material loses cohesion but keeps a mark: grains and yielding pastes."""
     return CONSTITUTIVE_LAWS[material.law].granular or material.yield_shear > 0.0
 
 

@@ -1,4 +1,4 @@
-"""A trajectory on disk: one file per frame, written whole or not at all, read one by one.
+"""Trajectory files: one per frame, written atomically, read one by one.
 
 ``frames/00000.npz`` holds ``time``, every particle's ``position`` (float32 [m]); of the particles
 that can deform the total deformation gradient ``motion`` (float16) and the square root of the von
@@ -27,10 +27,10 @@ FRAMES_FOLDER = "frames"
 LAYOUT_FILE = "layout.npz"
 LEDGER_FILE = "ledger.npz"
 BREAKS_FILE = "breaks.npz"
-"""What broke, where something did."""
+"""File on fractures."""
 LEDGER_PREFIX = "ledger."
 NPZ_ERRORS = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile)
-"""What reading a damaged npz raises."""
+"""Exceptions of reading a damaged npz."""
 MAX_FLOAT16_STRETCH = 6e4
 """Largest stretch that float16 can hold [-]."""
 FRAME_CACHE_BYTES = 2**26
@@ -39,14 +39,14 @@ FRAME_CACHE_BYTES = 2**26
 
 @dataclass(frozen=True)
 class FrameLayout:
-    """What does not change from frame to frame; P particles, B objects."""
+    """Data common to all frames; P particles, B objects."""
 
     object: Int[np.ndarray, " P"]
     rigid: Bool[np.ndarray, " B"]
 
     @classmethod
     def of(cls, posed: ModelMapping) -> "FrameLayout":
-        """Say which particle belongs to which object of a problem."""
+        """Return which particle belongs to which object of a problem."""
         bodies, place = posed.problem.bodies, np.empty_like(posed.order)
         place[posed.order] = np.arange(len(posed.order))
         owner = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
@@ -64,7 +64,7 @@ def frame_path(folder: Path, number: int) -> Path:
 
 
 def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
-    """Write an npz that is either whole or absent."""
+    """Write an npz atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f".{path.stem}.{os.getpid()}.part")
     try:
@@ -95,14 +95,14 @@ def read_arrays(path: Path, start: str = "", without: str = "\0") -> dict[str, n
 
 
 def write_layout(folder: Path, layout: FrameLayout) -> None:
-    """Write what all frames share."""
+    """Write the data common to all frames."""
     write_arrays(
         folder / FRAMES_FOLDER / LAYOUT_FILE, {"object": layout.object, "rigid": layout.rigid}
     )
 
 
 def read_layout(folder: Path) -> FrameLayout:
-    """Read what all frames share."""
+    """Read the data common to all frames."""
     found = read_arrays(folder / FRAMES_FOLDER / LAYOUT_FILE)
     return FrameLayout(object=found["object"].astype(np.int64), rigid=found["rigid"].astype(bool))
 
@@ -182,15 +182,15 @@ def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
 class FrameSequence(Sequence[Frame]):
     """The frames of one trajectory, read from disk when asked for; the first ones only once.
 
-    Audit, film and report each read most of them. What is beyond ``FRAME_CACHE_BYTES`` is read
+    Audit, video and report each read most of them. What is beyond ``cache_bytes`` is read
     again.
     """
 
-    def __init__(self, folder: Path, count: int) -> None:
+    def __init__(self, folder: Path, count: int, cache_bytes: int = FRAME_CACHE_BYTES) -> None:
         self.folder, self.length = folder, count
         self.layout = read_layout(folder)
         self._kept: dict[int, dict[str, np.ndarray]] = {}
-        self._room = FRAME_CACHE_BYTES
+        self._room = cache_bytes
 
     def __len__(self) -> int:
         return self.length

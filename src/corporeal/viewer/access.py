@@ -1,4 +1,4 @@
-"""Who may talk to the server, and what its pages may load.
+"""Access control of the server, and content security policy of its pages.
 
 Programs on this machine and pages of other sites can reach a server on 127.0.0.1 as well as its
 user does. So: only known names in ``Host`` (a foreign name is DNS rebinding), only the page's own

@@ -1,4 +1,4 @@
-"""What a page is told of things that it can drop, and of a live scene that has grown by them."""
+"""Routes on droppable objects, and on live scenes with added objects."""
 
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
@@ -17,8 +17,8 @@ def asset_routes(things: LiveAssets, room: LiveSession) -> tuple[BaseRoute, ...]
     """Return the routes.
 
     Args:
-        things: What can be dropped.
-        room: Where it is dropped.
+        things: Droppable objects.
+        room: The live simulation.
 
     """
 

@@ -1,4 +1,4 @@
-"""What a page may ask of a live simulation: a closed table; every number finite and bounded."""
+"""Validated commands of a page to a live simulation."""
 
 import json
 import math
@@ -21,7 +21,7 @@ MAX_COMMAND_BYTES = 4096
 """Of one order [bytes]."""
 MAX_COMMANDS_PER_SECOND = 200
 MAX_NAME_CHARACTERS = 300
-"""Of a thing [letters]."""
+"""Of an object [letters]."""
 COMMAND_KINDS = (
     "grab",
     "pull",
@@ -47,10 +47,12 @@ class Command:
     object: int = 0
     point: Vector = (0.0, 0.0, 0.0)
     """Where an object is taken; what is pointed at, or in a record the middle of the underside of
-    a thing that is added [m]."""
+    an object that is added [m].
+    """
     to: Vector = (0.0, 0.0, 0.0)
     """Where it is pulled [m]; gravity [m/s²]; wind [m/s]; in its last place, how high above all
-    that is under it a thing that is added begins [m]."""
+    that is under it an object that is added begins [m].
+    """
     firm: float = 4.0
     """Natural frequency on the hand's spring [Hz]."""
     single: bool = False
@@ -100,20 +102,20 @@ def _number(value: Any) -> float:
 
 def _name(value: Any) -> str:
     if not isinstance(value, str) or len(value) > MAX_NAME_CHARACTERS:
-        raise UserError("The thing of an order is no name.")
+        raise UserError("The object of a command is not a name.")
     return value
 
 
 def _whole(asked: Mapping[str, Any], name: str) -> int:
     value = _number(asked.get(name, 0))
     if value != int(value) or not 0 <= value < 2**31:
-        raise UserError(f"{name} of an order is no number of anything.")
+        raise UserError(f"{name} of a command is not a valid number.")
     return int(value)
 
 
 def _vector(asked: Mapping[str, Any], name: str, limit: float) -> Vector:
     value = asked.get(name, (0, 0, 0))
     if not isinstance(value, list | tuple) or len(value) != 3:
-        raise UserError(f"{name} of an order is no three numbers.")
+        raise UserError(f"{name} of a command is not three numbers.")
     x, y, z = (min(max(_number(v), -limit), limit) for v in value)
     return x, y, z

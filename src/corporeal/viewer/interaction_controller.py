@@ -1,4 +1,4 @@
-"""An engine that obeys orders, and a record of them from which it does the same again."""
+"""Applies commands to an engine, and records them for replay."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,16 +8,16 @@ import numpy as np
 from corporeal.core.errors import UserError
 from corporeal.core.types import Vector
 from corporeal.discretization.build_model import ModelMapping
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import Problem
+from corporeal.mpm.engines import DEFAULT_ENGINE, build_engine, require
+from corporeal.mpm.problem import BodyAddingEngine, InteractiveEngine, Problem, VariableLoadEngine
 from corporeal.viewer.commands import Command
 from corporeal.viewer.live_edit import MAX_DROP_HEIGHT_M, AddedObject, LiveEditor
 
 RECORDED_GRAB = "hold"
-"""What a record has in place of a page's "grab": its point is that of matter at the start [m]."""
+"""What a record has in place of a page's "grab": its point is that of material at the start [m]."""
 
 RECORDED_ADD = "join"
-"""What a record has in place of a page's "add": its point is where the thing begins."""
+"""What a record has in place of a page's "add": its point is where the object begins."""
 MIN_CLEARANCE_DX = 2.0
 """Between what is added and what is under it, at least [cells]: no contact is felt so far away."""
 
@@ -54,7 +54,12 @@ class InteractionController:
     """Acts on one engine; all that is done goes into ``touches``."""
 
     def __init__(
-        self, posed: ModelMapping, problem: Problem, threads: int, growth: LiveEditor | None = None
+        self,
+        posed: ModelMapping,
+        problem: Problem,
+        threads: int,
+        growth: LiveEditor | None = None,
+        engine: str = DEFAULT_ENGINE,
     ) -> None:
         """Begin at time 0.
 
@@ -62,10 +67,14 @@ class InteractionController:
             posed: Which objects the bodies belong to.
             problem: Its own, or the control with one velocity field.
             threads: Of the engine.
-            growth: Gives the scene with things that are added; None: nothing can be.
+            growth: Gives the scene with objects that are added; None: nothing can be.
+            engine: Its name.
+
+        Raises:
+            UserError: The engine cannot solve the problem, or does not work on this machine.
 
         """
-        self.engine, self.growth = CpuEngine(problem, threads), growth
+        self.engine, self.growth = build_engine(problem, engine, threads), growth
         self.added: tuple[AddedObject, ...] = ()
         self._know(posed)
         self.held: SpringGrip | None = None
@@ -172,34 +181,39 @@ class InteractionController:
         mass = float(self.engine.measure().mass[spot.body])
         stiffness = mass * (2 * np.pi * order.firm) ** 2
         x, y, z = point.tolist()
-        self.engine.pull(spot.body, (x, y, z), order.to, stiffness)
+        require(self.engine, InteractiveEngine).attach_spring(
+            spot.body, (x, y, z), order.to, stiffness
+        )
         self.held = SpringGrip(spot.body, stiffness, order.to)
 
     def _pull(self, order: Command) -> None:
         if self.held is not None:
-            self.engine.pull(self.held.body, None, order.to, self.held.stiffness)
+            held, engine = self.held, require(self.engine, InteractiveEngine)
+            engine.attach_spring(held.body, None, order.to, held.stiffness)
             self.held = SpringGrip(self.held.body, self.held.stiffness, order.to)
 
     def _drop(self, order: Command) -> None:
         if self.held is not None:
-            self.engine.pull(self.held.body, None, self.held.to, 0.0)
+            engine = require(self.engine, InteractiveEngine)
+            engine.attach_spring(self.held.body, None, self.held.to, 0.0)
             self.held = None
 
     def _gravity(self, order: Command) -> None:
-        self.engine.weigh(order.to)
+        require(self.engine, VariableLoadEngine).set_gravity(order.to)
 
     def _wind(self, order: Command) -> None:
+        engine, known = require(self.engine, VariableLoadEngine), self.engine.problem.bodies
         for body in self._bodies(order.object):
-            if len(self.engine.problem.bodies[body].faces.area):
-                self.engine.blow(body, order.to)
+            if len(known[body].faces.area):
+                engine.set_wind(body, order.to)
 
-    # ---------------------------------------------------------------- things that are added
+    # ---------------------------------------------------------------- objects that are added
 
     def top(self, order: Command) -> float:
-        """Return how high matter reaches under a thing that is to be added [m].
+        """Return how high material reaches under an object that is to be added [m].
 
         Args:
-            order: Which thing; it points at the middle.
+            order: Which object; it points at the middle.
 
         """
         low, high = self._growing.reach(order.thing, drop_height(order))
@@ -209,7 +223,7 @@ class InteractionController:
         return max(order.point[2], float(place[under, 2].max(initial=0.0)))
 
     def above(self, order: Command, top: float) -> Command:
-        """Say where a thing that is to be added begins, over what reaches up to ``top`` [m]."""
+        """Return where an object that is to be added begins, over what reaches up to ``top`` [m]."""
         room = max(drop_height(order), MIN_CLEARANCE_DX * self.engine.problem.cell)
         x, y, _ = order.point
         return replace(
@@ -222,10 +236,10 @@ class InteractionController:
         away = self.engine.snapshot().position - np.array(one.foot)
         near = 0.5 * self.engine.problem.cell
         if ((away > low - near) & (away < high + near)).all(axis=1).any():
-            raise UserError(f"There is no room for {one.thing} there: something is in the way.")
+            raise UserError(f"There is no space for {one.thing} there: something is in the way.")
         added = (*self.added, one)
         posed = self._growing.at(added).posed
-        self.engine = self.engine.joined_by(posed.problem)
+        self.engine = require(self.engine, BodyAddingEngine).with_added_bodies(posed.problem)
         self.added = added
         self._know(posed)
 
@@ -246,12 +260,7 @@ class InteractionController:
         """
         if self.held is None:
             return None
-        hold = self.engine.grips[self.held.body].hold
-        state = self.engine._rigid_bodies().get(self.held.body)
-        if state is not None:  # its particles' mean is off by a share of a cell
-            return state.centre + state.rotation @ hold.arm
-        mine = position[self.first[self.held.body] : self.first[self.held.body + 1]]
-        return hold.share @ mine[hold.particle]
+        return require(self.engine, InteractiveEngine).grip_point(self.held.body, position)
 
     def force(self, position: np.ndarray) -> float:
         """How hard the hand pulls now [N]."""
@@ -262,7 +271,7 @@ class InteractionController:
 
 
 def drop_height(order: Command) -> float:
-    """Return how high above all that is under it a thing begins [m]."""
+    """Return how high above all that is under it an object begins [m]."""
     return min(max(order.to[2], 0.0), MAX_DROP_HEIGHT_M)
 
 

@@ -1,4 +1,4 @@
-"""What can be dropped into a live simulation: models of the showcase, and objects of the runs."""
+"""Objects for live simulations: models of the showcase, and objects of runs."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,7 +23,7 @@ DEFAULT_SETTINGS = Settings()
 
 @dataclass(frozen=True)
 class AssetKey:
-    """What a thing is called: ``corporeal/mug``, or ``RUN/OBJECT``."""
+    """What an object is called: ``corporeal/mug``, or ``RUN/OBJECT``."""
 
     place: str
     name: str
@@ -38,7 +38,7 @@ class AssetKey:
         """
         place, slash, name = text.partition("/")
         if not (place and slash and name):
-            raise UserError("Say what to drop: corporeal/MODEL or RUN/OBJECT.")
+            raise UserError("Name the object to drop: corporeal/MODEL or RUN/OBJECT.")
         return cls(place, name)
 
 
@@ -55,7 +55,7 @@ class LiveAssets:
         return {"models": [{"thing": name} for name in ours], "runs": runs}
 
     def find(self, text: str) -> SceneWithMaterials:
-        """Return a scene of one thing alone, at rest, and what it is made of.
+        """Return a scene of one object alone, at rest, and what it is made of.
 
         Raises:
             UserError: There is none of this name.
@@ -69,7 +69,9 @@ class LiveAssets:
             names = [o.name for o in whole.scene.objects]
             if key.name in names:
                 return isolate_object(whole, names.index(key.name))
-        raise UserError(f"There is no {text!r} to drop: no model of corporeal, no object of a run.")
+        raise UserError(
+            f"There is no {text!r} to drop: it is neither a model of corporeal nor an object of a run."
+        )
 
     def _filled(self) -> list[str]:
         return [row["name"] for row in self.shelf.listed() if row["shown"]]

@@ -1,4 +1,4 @@
-"""A filled scene to which things are added while it is simulated, at its own grid spacing."""
+"""Adding objects to a scene during the simulation, at its grid spacing."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -68,7 +68,7 @@ class LiveEditor:
         Args:
             prepared: The scene as it was filled.
             quality: With which; its grid spacing is what came of it.
-            find: Gives a thing by its name.
+            find: Gives an object by its name.
             config: From which the scene's materials came, for friction.
 
         """
@@ -81,7 +81,7 @@ class LiveEditor:
         """Return the scene with all of these.
 
         Raises:
-            UserError: There is no such thing, or it cannot be filled so coarsely.
+            UserError: There is no such object, or it cannot be filled so coarsely.
 
         """
         if added not in self.scenes:
@@ -94,17 +94,17 @@ class LiveEditor:
         self.scenes = {(): self.scenes[()]}
 
     def reach(self, thing: str, height: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return from and to where a thing reaches, about the middle of its underside [m]."""
+        """Return from and to where an object reaches, about the middle of its underside [m]."""
         scene = self.ready(thing, height).whole.scene
         low, high = surfaces_bounding_box(scene.surfaces)
         foot = _underside_point(scene)
         return low - foot, high - foot
 
     def ready(self, thing: str, height: float) -> FilledScene:
-        """Fill a thing by itself, standing on the floor.
+        """Fill an object by itself, standing on the floor.
 
         Raises:
-            UserError: There is no such thing, or it cannot be filled so coarsely.
+            UserError: There is no such object, or it cannot be filled so coarsely.
 
         """
         key = (thing, height)
@@ -141,7 +141,7 @@ class LiveEditor:
 
     def _with(self, before: PreparedScene, added: AddedObject, number: int) -> PreparedScene:
         if number > MAX_ADDED_OBJECTS:
-            raise UserError(f"{MAX_ADDED_OBJECTS} things have been dropped. Begin again.")
+            raise UserError(f"{MAX_ADDED_OBJECTS} objects have been dropped. Begin again.")
         here = FilledScene(
             SceneWithMaterials(before.scene, before.parts, before.field), before.particles
         )

@@ -1,4 +1,4 @@
-"""A simulation that runs while pages watch and touch it: of pictures, the newest only."""
+"""Live simulation with interaction; pages get the newest frame only."""
 
 import threading
 import time
@@ -13,8 +13,8 @@ from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
 from corporeal.discretization.build_model import build_model
 from corporeal.discretization.live_quality import LiveDemand, choose_live_quality, limit_live_steps
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import Snapshot
+from corporeal.mpm.engines import DEFAULT_ENGINE, build_engine
+from corporeal.mpm.problem import Problem, Snapshot
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.viewer_data import bind_scene, resolution_statement, viewer_recording
 from corporeal.render.recording_format import SceneBinding, stress_bytes
@@ -42,7 +42,9 @@ MAX_ENGINE_THREADS = 4
 REFILL_STEP_RATIO = 0.8
 """Share of the steps below which filling once more pays."""
 TIMED_STEPS = 20
-"""Steps by which the cost of one is measured."""
+"""Steps by which the cost of one is measured …"""
+MAX_TIMED_S = 2.0
+"""… or fewer, where they take more processor time than this [s]."""
 
 
 def engine_threads() -> int:
@@ -66,7 +68,7 @@ def live_editor_of(made: LiveInput, threads: int, find: AssetFinder = no_assets)
     """
     old, assembled = made.results, made.results.assembled
     scene = with_wind_faces(assembled.scene)
-    demand = LiveDemand.of(old.particles, made.detail, measure_step_cost(old.prepared))
+    demand = LiveDemand.of(old.particles, made.detail, measure_step_cost(old.prepared, made.engine))
     quality = choose_live_quality(demand, threads)
     # Contents of vessels are poured anew: fill is given the scene without them.
     particles = fill(scene, assembled.parts, assembled.field, quality=quality)
@@ -79,15 +81,16 @@ def live_editor_of(made: LiveInput, threads: int, find: AssetFinder = no_assets)
     return LiveEditor(prepared, quality, find, made.ground)
 
 
-def measure_step_cost(prepared: PreparedScene) -> float:
-    """Measure what a step of a scene costs as it is filled [CPU s of one thread]."""
+def measure_step_cost(prepared: PreparedScene, engine: str = DEFAULT_ENGINE) -> float:
+    """Measure what a step of a scene costs an engine as it is filled [CPU s of one thread]."""
     problem = build_model(prepared.scene, prepared.particles, prepared.field).problem
-    engine = CpuEngine(problem, 1)
-    engine.step(engine.stable_step())
-    begun = time.process_time()
-    for _ in range(TIMED_STEPS):
-        engine.step(engine.stable_step())
-    return (time.process_time() - begun) / TIMED_STEPS
+    timed = build_engine(problem, engine, 1)
+    timed.step(timed.stable_step())
+    begun, steps, spent = time.process_time(), 0, 0.0
+    while steps < TIMED_STEPS and spent < MAX_TIMED_S:
+        timed.step(timed.stable_step())
+        steps, spent = steps + 1, time.process_time() - begun
+    return spent / steps
 
 
 class SceneDisplay:
@@ -106,7 +109,7 @@ class SceneDisplay:
         self.moments = SnapshotFrames(grown.posed)
 
     def hello(self) -> dict:
-        """Say what pictures will hold, and how honest they are."""
+        """Describe what pictures will hold, and how honest they are."""
         return {
             "generation": self.generation,
             "honest": resolution_statement(self.prepared),
@@ -144,15 +147,19 @@ class LiveSimulation:
     One thread steps, another makes pictures of the newest instant: neither waits for the other.
     """
 
-    def __init__(self, growth: LiveEditor, threads: int) -> None:
+    def __init__(self, growth: LiveEditor, threads: int, engine: str = DEFAULT_ENGINE) -> None:
         """Begin at time 0, paused.
 
         Args:
             growth: From ``live_editor_of``.
             threads: Of the engine.
+            engine: Its name.
+
+        Raises:
+            UserError: The engine cannot solve the scene, or does not work on this machine.
 
         """
-        self.growth, self.threads = growth, threads
+        self.growth, self.threads, self.engine = growth, threads, engine
         self.prepared = growth.at(()).prepared
         self.posed = growth.at(()).posed
         self.face = self.bare = SceneDisplay(growth.at(()), 0)
@@ -175,11 +182,11 @@ class LiveSimulation:
         )
 
     def hello(self) -> dict:
-        """Say what pictures will hold, how honest they are, and how heavy things are."""
+        """Describe what pictures will hold, how honest they are, and how heavy objects are."""
         return self.face.hello() | {"gravity": list(self.prepared.scene.gravity)}
 
     def ask(self, order: Command) -> None:
-        """Let an order be obeyed; a thing that is to be added is filled first, beside the rest."""
+        """Let an order be obeyed; an object that is to be added is filled first, beside the rest."""
         if order.do != "add":
             self.orders.append(order)
             return
@@ -201,17 +208,18 @@ class LiveSimulation:
             twin: With that control beside, to which the same is done.
 
         """
-        self.single = single
         shared = replace(self.posed.problem, contact="single")
         problem = shared if single else self.posed.problem
+        # An engine may refuse a shared field: then what runs goes on.
+        hands, beside = self._hands(problem), self._hands(shared) if twin else None
         self.growth.forget()
+        self.single, self.hands, self.twin = single, hands, beside
         self.face = self.bare
-        self.hands = InteractionController(self.posed, problem, self.threads, self.growth)
-        self.twin = (
-            InteractionController(self.posed, shared, self.threads, self.growth) if twin else None
-        )
         self.pace, self.cost = MIN_FRAME_TIME_S, 3.0
         self.message, self.whole = "", True
+
+    def _hands(self, problem: Problem) -> InteractionController:
+        return InteractionController(self.posed, problem, self.threads, self.growth, self.engine)
 
     def start(self) -> None:
         """Let it run in its threads."""
@@ -230,7 +238,7 @@ class LiveSimulation:
     # ---------------------------------------------------------------- two threads
 
     def _run(self) -> None:
-        """Obey and step; what there is to see is handed over, and nobody waited for."""
+        """Obey and step; frames are handed over without waiting."""
         self._hand_over()
         while not self.closed:
             begun, worked = time.perf_counter(), time.thread_time()
@@ -300,7 +308,7 @@ class LiveSimulation:
                 self.twin.obey(done)
 
     def _add(self, order: Command) -> None:
-        """Drop a thing, into the control beside as well: over what is highest in either."""
+        """Drop an object, into the control beside as well: over what is highest in either."""
         every = [hands for hands in (self.hands, self.twin) if hands]
         self.message = ""
         begins = self.hands.above(order, max(hands.top(order) for hands in every))
@@ -390,7 +398,7 @@ class LiveSession:
         """Hold none yet.
 
         Args:
-            read: Gives by its name what a run's verbs made.
+            read: Gives by its name what a run's stages made.
             find: Gives by its name what may be dropped.
 
         """
@@ -410,10 +418,9 @@ class LiveSession:
         with self.lock:
             if self.live is None or self.name != name:
                 self._clear()
-                threads = engine_threads()
-                self.live = LiveSimulation(
-                    live_editor_of(self.read(name), threads, self.find), threads
-                )
+                made, threads = self.read(name), engine_threads()
+                scene = live_editor_of(made, threads, self.find)
+                self.live = LiveSimulation(scene, threads, made.engine)
                 self.name = name
                 self.live.start()
                 self.visitors = 0

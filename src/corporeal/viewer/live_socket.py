@@ -1,4 +1,4 @@
-"""The WebSocket of a live simulation: pictures go out, orders come in."""
+"""WebSocket of a live simulation: frames out, commands in."""
 
 import asyncio
 import time

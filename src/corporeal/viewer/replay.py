@@ -1,7 +1,7 @@
-"""A record of what was done to a live simulation, and the same once more, as finely as a draft.
+"""Records of live simulations, and their replay at higher resolution.
 
 The record holds every order and the instant of every advance. What was taken hold of is told by
-where its matter was at the start, so that a scene filled more finely obeys it as well.
+where its material was at the start, so that a scene filled more finely obeys it as well.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +17,7 @@ from corporeal.core.deserialize import from_plain
 from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Frame, Particles
 from corporeal.discretization.discretization_plan import QUALITY_PRESETS
+from corporeal.mpm.engines import DEFAULT_ENGINE
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import read_run, read_run_request
 from corporeal.pipeline.stages.fill import FillConfig, fill
@@ -74,7 +75,7 @@ def write_replays(
 
     Args:
         place: Folder to write to.
-        progress: Told the fraction done and what is done.
+        progress: Called with the fraction done and what is done.
         run: That was touched.
         kept: File of the record.
         beside: Runs whose objects were dropped.
@@ -90,7 +91,8 @@ def write_replays(
     cast = bind_scene(whole)
     for k, contact in enumerate(CONTACT_MODES):
         tell = partial(_tell, progress, k, contact)
-        recording = record_frames(cast, replay_frames(growth, contact, done, tell))
+        frames = replay_frames(growth, contact, done, tell, settings.simulate.engine)
+        recording = record_frames(cast, frames)
         recording = replace(recording, since=appearance_times(growth, done))
         take = viewer_recording(whole, cast, recording=recording)
         (place / f"{contact}.take").write_bytes(take)
@@ -129,24 +131,31 @@ def appearance_times(growth: LiveEditor, done: InteractionRecord) -> dict[int, f
 
 
 def replay_frames(
-    growth: LiveEditor, contact: Contact, done: InteractionRecord, tell: Callable[[float], None]
+    growth: LiveEditor,
+    contact: Contact,
+    done: InteractionRecord,
+    tell: Callable[[float], None],
+    engine: str = DEFAULT_ENGINE,
 ) -> Iterator[Frame]:
     """Do again what a record says; yield frames, its first and last instant among them.
 
-    All frames hold all that is there in the end: until it is dropped, a thing waits where it will
+    All frames hold all that is there in the end: until it is dropped, an object waits where it will
     begin, and a page hides it.
 
     Args:
         growth: The scene.
-        contact: As in life, or the control.
+        contact: As in reality, or the control.
         done: What to do.
-        tell: Told the fraction done.
+        tell: Called with the fraction done.
+        engine: The name of the engine.
 
     """
     posed = growth.at(()).posed
     whole = growth.at(tuple(one for _, one in drop_events(done))).prepared.particles
     problem = replace(posed.problem, contact=contact)
-    hands = InteractionController(posed, problem, min(MAX_REPLAY_THREADS, usable_cores()), growth)
+    hands = InteractionController(
+        posed, problem, min(MAX_REPLAY_THREADS, usable_cores()), growth, engine
+    )
     moments, shown = SnapshotFrames(posed), 0.0
     yield with_waiting_objects(moments.frame(hands.engine.snapshot()), whole)
     for touch in done.touches:

@@ -1,4 +1,4 @@
-"""Replays of what was touched, which a page asks for: one at a time, in a process of its own."""
+"""Replay jobs: one at a time, each in its own process."""
 
 import secrets
 import signal

@@ -1,4 +1,4 @@
-"""A run like another, with what a page changed: never in the old run's folder."""
+"""Edited copies of runs; the original is not changed."""
 
 import math
 import re
@@ -51,7 +51,7 @@ def prepare_changed_run(
 
     Args:
         run: The other one's folder; not changed.
-        made: What its verbs made.
+        made: What its stages made.
         asked: ``parts``: number of a part → ``material`` and ``values`` (field → SI); ``detail``;
             ``drop`` in sizes of the object; ``objects``: number of an object → ``lift`` [m] and
             ``velocity`` [m/s].
@@ -109,7 +109,7 @@ def _initial_state(
         if "velocity" in change:
             said = change["velocity"]
             if not isinstance(said, list) or len(said) != 3:
-                raise UserError("A velocity is no three numbers.")
+                raise UserError("A velocity is not three numbers.")
             x, y, z = (finite_number(x, "A velocity") for x in said)
             velocity[objects[k].name] = (x, y, z)
     return replace(

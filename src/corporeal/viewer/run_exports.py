@@ -1,4 +1,4 @@
-"""A run in the formats of other tools, for whoever asks for it in the page: a zip."""
+"""Export of a run as a zip for download."""
 
 import io
 import zipfile

@@ -1,4 +1,4 @@
-"""Runs that the page asked for: one after the other, each in its own process.
+"""Queue of runs started from the page, each in its own process.
 
 What was asked stands in ``.queue.json``. A job that is stopped, or whose server is killed, goes on
 in the same folder from where it was.
@@ -58,7 +58,7 @@ def run_in_process(
     settings: Settings,
     until: str,
 ) -> None:
-    """Do one run, in a process of its own; every word about progress begins with its verb."""
+    """Do one run, in a process of its own; every word about progress begins with its stage."""
 
     def tell(verb: str) -> ProgressCallback:
         return lambda fraction, words: progress(fraction, f"{verb}: {words}")
@@ -243,6 +243,6 @@ class RunQueue:
 
 
 def _stage_fractions(every: Sequence[str], told: Mapping[str, float]) -> dict[str, float]:
-    """Return how far every verb is; before one that is told of, all are done, maybe long ago."""
+    """Return how far every stage is; before one that is told of, all are done, maybe long ago."""
     last = max((every.index(verb) for verb in told if verb in every), default=0)
     return {v: 1.0 if k < last else told.get(v, 0.0) for k, v in enumerate(every)}

@@ -1,4 +1,4 @@
-"""What a page may start: runs of uploads, and runs like others with something changed."""
+"""Requests of a page for runs: of uploads, or of edited runs."""
 
 import secrets
 from dataclasses import replace
@@ -26,7 +26,7 @@ from corporeal.viewer.uploads import UploadInbox, upload_route
 from corporeal.viewer.web_app import json_route
 
 FIRST_LOOK_STAGE = "fill"
-"""The last verb of a first look: then every part's material can be seen and changed."""
+"""The last stage of a first look: then every part's material can be seen and changed."""
 
 
 class RunRequests:

@@ -1,4 +1,4 @@
-"""The runs that a server shows, and what of them has been read."""
+"""Runs shown by the server, with cached results."""
 
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -11,6 +11,7 @@ from corporeal.core.audit_data import RunAudit
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
 from corporeal.discretization.discretization_plan import DetailLevel
+from corporeal.mpm.engines import DEFAULT_ENGINE
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import RUN_FILE, STAGE_FOLDERS, read_run, read_run_request
 from corporeal.pipeline.stages.ground import DEFAULT_CONFIG, GroundConfig
@@ -24,7 +25,7 @@ UPLOADED_NAME = "uploaded"
 MAX_CACHED_RUNS = 4
 """Runs that are held in memory, the latest."""
 REQUIRED_STAGE = "fill"
-"""The verb without which there is nothing to look at."""
+"""The stage without which there is nothing to look at."""
 THUMBNAIL_FILE = "thumbnail.png"
 MAX_RECORDING_FPS = 60.0
 """Most pictures a second of a recording from a server [1/s]."""
@@ -48,6 +49,8 @@ class LiveInput:
     """With which it was filled."""
     ground: GroundConfig = DEFAULT_CONFIG
     """From which its materials came."""
+    engine: str = DEFAULT_ENGINE
+    """Which simulates it."""
 
 
 class RunStore:
@@ -100,17 +103,18 @@ class RunStore:
             return self.read[key]
 
     def made(self, name: str) -> LiveInput:
-        """Return what a run's verbs made, and with which detail it was filled.
+        """Return what a run's stages made, and with which detail it was filled.
 
         Raises:
             UserError: There is no such run, it cannot be read, or it is not filled yet.
 
         """
         settings = read_run_request(self.path(name)).settings
-        return LiveInput(self.open(name).made, settings.fill.detail, settings.ground)
+        made, engine = self.open(name).made, settings.simulate.engine
+        return LiveInput(made, settings.fill.detail, settings.ground, engine)
 
     def asked(self, name: str) -> dict[str, Any]:
-        """Say how a run was asked to begin: detail, drop; lift and velocity of every object."""
+        """Return how a run was asked to begin: detail, drop; lift and velocity of every object."""
         settings = read_run_request(self.path(name)).settings
         lift = dict(map(parse_lift, settings.assemble.lift))
         objects = self.open(name).made.assembled.scene.objects
@@ -134,12 +138,19 @@ def load_run(run: Path) -> LoadedRun:
         raise UserError(f"{run} has no {REQUIRED_STAGE} yet: nothing of it can be shown in 3D.")
     cast = bind_scene(made.prepared)
     if made.simulate is None:
-        return LoadedRun(made, viewer_recording(made.prepared, cast, found=made.filmed))
+        return LoadedRun(
+            made, viewer_recording(made.prepared, cast, found=made.rendered_reconstruction)
+        )
     audit = run / AUDIT_FILE
     whole = from_plain(RunAudit, store.read_json(audit)) if audit.exists() else None
     recording = record_trajectory(cast, made.trajectory, MAX_RECORDING_FPS)
     shown = viewer_recording(
-        made.prepared, cast, made.played.outcome, recording, whole, found=made.filmed
+        made.prepared,
+        cast,
+        made.played.outcome,
+        recording,
+        whole,
+        found=made.rendered_reconstruction,
     )
     return LoadedRun(made, shown)
 
@@ -156,17 +167,17 @@ def _row(name: str, run: Path) -> dict[str, Any]:
         "input": ", ".join(map(_input_name, asked.inputs)),
         "detail": asked.settings.fill.detail,
         "shown": (run / STAGE_FOLDERS[REQUIRED_STAGE] / store.META_FILE).exists(),
-        "picture": (run / STAGE_FOLDERS["film"] / THUMBNAIL_FILE).exists(),
+        "picture": (run / STAGE_FOLDERS["video"] / THUMBNAIL_FILE).exists(),
         "report": (run / "report.html").exists(),
     }
 
 
 def _input_name(path: Path) -> str:
-    """Return what to call an input; names of uploads are ours and tell nobody anything."""
+    """Return what to call an input; names of uploads are generated."""
     return UPLOADED_NAME if INBOX_FOLDER in path.parts else path.name
 
 
 def _changed(run: Path) -> float:
-    """When a verb of a run was last finished."""
+    """When a stage of a run was last finished."""
     metas = [run / folder / store.META_FILE for folder in STAGE_FOLDERS.values()]
     return max((meta.stat().st_mtime for meta in metas if meta.exists()), default=0.0)

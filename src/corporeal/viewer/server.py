@@ -63,7 +63,7 @@ def open_listener(address: ListenAddress) -> socket.socket:
 
 
 def address_words(address: ListenAddress, port: int, door: AccessPolicy) -> list[str]:
-    """Say how to open the page, here and from elsewhere."""
+    """Return how to open the page, here and from elsewhere."""
     if not door.token:
         return [
             f"http://{address.host}:{port}/",

@@ -1,4 +1,4 @@
-"""Frames of a filled scene from an engine's snapshots."""
+"""Frames from an engine's snapshots."""
 
 import numpy as np
 

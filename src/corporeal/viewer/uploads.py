@@ -1,4 +1,4 @@
-"""Files that come through the page: into a folder of their own, known by their first bytes."""
+"""Uploaded files, validated by their first bytes."""
 
 import asyncio
 import re
@@ -16,15 +16,24 @@ from corporeal.core.errors import UserError
 from corporeal.viewer.run_store import INBOX_FOLDER
 from corporeal.viewer.zip_unpack import unpack_zip
 
-MAX_FILE_BYTES = 1 << 30
-"""Of one file [bytes]."""
-MAX_INBOX_BYTES = 4 << 30
-"""Of all files in the inbox [bytes]."""
-MIN_FREE_DISK_BYTES = 5 << 30
-"""What stays free on the disk [bytes]."""
 FILE_SIGNATURES = ((b"glTF", "scene.glb"), (b"ply", "splat.ply"), (b"PK\x03\x04", "photos.zip"))
 """First bytes, and what such a file is called here."""
 TOKEN_PATTERN = re.compile(r"[0-9a-f]{16}")
+
+
+@dataclass(frozen=True)
+class UploadLimits:
+    """How much may come through the page."""
+
+    file_bytes: int = 1 << 30
+    """Most of one file [bytes]."""
+    inbox_bytes: int = 4 << 30
+    """Most of all files in the inbox [bytes]."""
+    free_disk_bytes: int = 5 << 30
+    """Least that stays free on the disk [bytes]."""
+
+
+DEFAULT_UPLOAD_LIMITS = UploadLimits()
 
 
 @dataclass(frozen=True)
@@ -42,8 +51,8 @@ class Upload:
 class UploadInbox:
     """Where uploads lie: one folder each, under names of ours."""
 
-    def __init__(self, runs: Path) -> None:
-        self.folder = runs / INBOX_FOLDER
+    def __init__(self, runs: Path, limits: UploadLimits = DEFAULT_UPLOAD_LIMITS) -> None:
+        self.folder, self.limits = runs / INBOX_FOLDER, limits
 
     def find(self, name: str) -> Path:
         """Return what an upload is made of.
@@ -64,18 +73,20 @@ class UploadInbox:
         self.folder.mkdir(parents=True, exist_ok=True)
         held = sum(p.stat().st_size for p in self.folder.rglob("*") if p.is_file())
         free = shutil.disk_usage(self.folder).free
-        spare, most = in_gib(MIN_FREE_DISK_BYTES), in_gib(MAX_INBOX_BYTES)
+        limits = self.limits
+        spare, most = in_gib(limits.free_disk_bytes), in_gib(limits.inbox_bytes)
         room, reason = min(
             (
-                MAX_FILE_BYTES,
-                f"More than {in_gib(MAX_FILE_BYTES)}, the most that a page takes: corporeal run FILE.",
+                limits.file_bytes,
+                f"More than {in_gib(limits.file_bytes)}, the most that a page takes: "
+                "corporeal run FILE.",
             ),
             (
-                MAX_INBOX_BYTES - held,
+                limits.inbox_bytes - held,
                 f"Uploads may have {most} together: delete what is not needed in {INBOX_FOLDER}.",
             ),
             (
-                free - MIN_FREE_DISK_BYTES,
+                free - limits.free_disk_bytes,
                 f"The disk is nearly full: {in_gib(free)} are free, and {spare} stay so.",
             ),
         )

@@ -115,7 +115,7 @@ class _Pages:
         return Response(opened.take, media_type="application/octet-stream")
 
     async def picture(self, request: Request) -> Response:
-        return self._file(request, Path(STAGE_FOLDERS["film"]) / THUMBNAIL_FILE)
+        return self._file(request, Path(STAGE_FOLDERS["video"]) / THUMBNAIL_FILE)
 
     async def report(self, request: Request) -> Response:
         answer = self._file(request, Path("report.html"))

@@ -1,4 +1,4 @@
-"""Faces for the air about all objects of a scene, so that any can be blown at."""
+"""Surface faces of all objects, for wind in live simulations."""
 
 from dataclasses import replace
 

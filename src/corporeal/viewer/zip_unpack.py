@@ -1,4 +1,4 @@
-"""Photographs out of a zip that a stranger may have made: counted while it is inflated."""
+"""Unpacking of untrusted zip files of photographs, with limits on the inflated size."""
 
 import re
 import stat

@@ -1,4 +1,4 @@
-"""Vision-language models: one question in, one validated answer out. And what to do without one."""
+"""Vision-language models: one question in, one validated answer out; and its replacements."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -37,17 +37,17 @@ VLM_WRAPPERS = {
     "cache": "corporeal.vlm.answer_cache:CachingClient",
     "record": "corporeal.vlm.recordings:RecordingClient",
 }
-"""What stands between a question and a model."""
+"""Wrappers around a client."""
 LIVE_CLIENTS = ("openai", "anthropic", "google", "ollama")
-"""Answered over a network, and so by a package that the core does without."""
+"""Providers on the network, which need an optional package."""
 DEFAULT_OPENAI_CRITIC = "openai:gpt-5-mini"
-"""Ranks where OpenAI answers and nobody else was asked for."""
+"""Default critic when OpenAI answers."""
 NO_MODEL = "metadata"
 """No model: names and materials in the file decide."""
 
 
 class OnDemandPictures(Sequence[np.ndarray]):
-    """Pictures that are taken, one album at a time, when somebody first looks at them."""
+    """Pictures that are rendered on first access."""
 
     _one = Lock()
 
@@ -83,25 +83,25 @@ SINGLE_ANSWER = AnswerNumber()
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked, about what, and what it was asked with."""
+    """A question with its subject, pictures and options."""
 
     task: str
-    """Which of the house's questions this is ("materials")."""
+    """Kind of the question ("materials")."""
     prompt: str
-    """The wording; {name} stands where one of ``lists`` goes."""
+    """The prompt; {name} is replaced by one of ``lists``."""
     scene: str
-    """What it is about: the scene's name and the object's."""
+    """Subject: the scene's name and the object's."""
     views: str = "none"
-    """How the pictures were taken, in words; pictures themselves are not compared on replay."""
+    """Description of the views; pixels are not compared on replay."""
     pictures: Sequence[np.ndarray] = ()
     """Each H x W x 3, uint8, sRGB."""
     lists: Mapping[str, str] = field(default_factory=dict)
-    """What the library in use offers, by name. A longer list does not make an answer stale."""
+    """Options of the library, by name. A longer list does not invalidate a recording."""
     turn: AnswerNumber = SINGLE_ANSWER
     prompt_version: str = ""
-    """Names the wording, such as "materials/1"; "": the wording is named by its text."""
+    """Names the wording, such as "materials/1"; "": identified by its text."""
     facts: Mapping[str, str] = field(default_factory=dict)
-    """What was put into the wording of a version: an answer to other facts is another answer."""
+    """Facts inserted into the prompt; part of the identity of a question."""
 
     @property
     def text(self) -> str:
@@ -114,7 +114,7 @@ class Question:
 
 @dataclass(frozen=True)
 class AnswerCost:
-    """What an answer took."""
+    """Cost of an answer."""
 
     calls: int = 0
     """Requests that were sent, those that failed included."""
@@ -125,42 +125,42 @@ class AnswerCost:
 
 @dataclass(frozen=True)
 class Reply(Generic[Answer]):
-    """A validated answer, and where it comes from."""
+    """A validated answer, and its source."""
 
     answer: Answer
     by: Literal["model", "recording"]
     model: str
-    """As a person types it: "openai:gpt-5.4"."""
+    """As in --vlm: "openai:gpt-5.4"."""
     spent: AnswerCost = AnswerCost()
 
 
 AnswerCheck = Callable[[Answer], list[str]]
-"""Returns what is wrong with an answer, one sentence each, as the model is to read it."""
+"""Returns the faults of an answer, one sentence each, to be sent to the model."""
 
 
 def no_complaints(answer: AnswerSchema) -> list[str]:
-    """Complain about nothing."""
+    """Return no faults."""
     return []
 
 
 class UnansweredError(UserError):
-    """A model was asked, corrected and asked again, and gave no usable answer."""
+    """A model gave no usable answer, even after corrections."""
 
 
 @runtime_checkable
 class VlmClient(Protocol):
-    """The whole contract."""
+    """Interface of all clients."""
 
     looks: bool
-    """Whether anybody looks at a question's pictures; without it they need not be taken."""
+    """Whether the client uses a question's pictures; else they need not be rendered."""
 
     def ask(
         self, question: Question, answer: type[Answer], check: AnswerCheck[Answer] = no_complaints
     ) -> Reply[Answer]:
-        """Answer ``question`` in the shape of ``answer``, with nothing left to complain about.
+        """Answer ``question`` in the schema ``answer``, without faults.
 
         Raises:
-            UnansweredError: There is no usable answer to this question; others may fare better.
+            UnansweredError: There is no usable answer to this question; others may be answered.
             UserError: No question will be answered; the message says what to do.
 
         """
@@ -168,11 +168,11 @@ class VlmClient(Protocol):
 
 
 def choose_critic(spec: str, asked: str) -> str:
-    """Say who ranks partitions of an object: who is ``asked`` to, a cheaper one, or the same.
+    """Return the critic that ranks partitions of an object: as ``asked``, a cheaper model, or the same.
 
     Args:
-        spec: Who answers, as a person types it.
-        asked: Who was asked for; "": nobody.
+        spec: The model, as in --vlm.
+        asked: The critic asked for; "": none.
 
     """
     theirs = spec.startswith("openai:") and "@" not in spec
@@ -180,12 +180,12 @@ def choose_critic(spec: str, asked: str) -> str:
 
 
 def connect_vlm(spec: str, record: Path | None = None) -> VlmClient | None:
-    """Connect to ``"openai:gpt-5.4"`` and the like; ``"metadata"`` asks nobody and gives None.
+    """Connect to ``"openai:gpt-5.4"`` and the like; ``"metadata"`` gives None.
 
-    What a live model answered once is not paid for again.
+    Answers of live models are cached.
 
     Args:
-        spec: Whom to ask, as a person types it.
+        spec: The model, as in --vlm.
         record: Folder where every answer is kept for ``"replay:FOLDER"``.
 
     Raises:

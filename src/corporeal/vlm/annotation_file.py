@@ -1,4 +1,4 @@
-"""A person's annotations of a scene's parts, in a YAML file; they override every other answer."""
+"""Annotations of a scene's parts in a YAML file; they override every other answer."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -30,7 +30,7 @@ ANNOTATION_EXAMPLE = (
 
 @dataclass(frozen=True)
 class PartAnnotation:
-    """A person's annotation of one part."""
+    """Annotation of one part."""
 
     material: str | None = None
     structure: str | None = None
@@ -38,13 +38,13 @@ class PartAnnotation:
     thickness: float | None = None
     """[m]"""
     contents: str | None = None
-    """What is behind the wall."""
+    """Contents behind the wall."""
     fill: float | None = None
-    """Share of the room there that it takes up, above 0 and up to 1."""
+    """Share of the cavity that the contents fill, above 0 and up to 1."""
     inflation: float | None = None
     """Gauge pressure of the air sealed behind the wall [Pa]."""
     solidity: float | None = None
-    """Of what is packed: share of its shape that is matter, above 0 and up to 1."""
+    """Of what is packed: share of its shape that is material, above 0 and up to 1."""
     values: dict[str, float] = field(default_factory=dict)
     """Spelt as in the library, unit in the key: ``{"young_MPa": 5}``."""
 
@@ -57,7 +57,7 @@ def read_annotations(
     Args:
         path: The YAML file.
         scene: Every object's name with its parts' names.
-        free: Objects whose parts nobody has segmented yet: the file may name them.
+        free: Objects whose parts are not segmented yet: the file may name them.
 
     Returns:
         (object, part) → its annotation. That of an object holds for all its parts that are not
@@ -87,10 +87,10 @@ def read_annotations(
 
 
 def read_annotation_mapping(path: Path) -> dict:
-    """Read the annotations of each object, as yet unchecked.
+    """Read the annotations of each object, without validation.
 
     Raises:
-        BadFileError: It cannot be read, or is no such mapping.
+        BadFileError: It cannot be read, or is not such a mapping.
 
     """
     try:
@@ -121,7 +121,7 @@ def _annotation(path: Path, where: str, given: Any) -> PartAnnotation:
         )
     structure = given.get("structure")
     if structure not in (None, *ANNOTATION_STRUCTURES):
-        options = f"Say one of: {', '.join(ANNOTATION_STRUCTURES)}."
+        options = f"Choose one of: {', '.join(ANNOTATION_STRUCTURES)}."
         raise BadFileError(path, f"{where}: structure is {structure!r}.", options)
     for key in ("material", "contents"):
         if given.get(key) is not None and not isinstance(given[key], str):
@@ -203,7 +203,7 @@ def _list(names: Any) -> str:
 def apply_structure_annotation(
     annotation: PartAnnotation, words: PartDescription
 ) -> PartDescription:
-    """Take over from a person's annotation how a part is built."""
+    """Apply the annotated structure of a part."""
     walled = annotation.thickness is not None or annotation.inflation is not None
     wall = "sheet" if words.structure == "sheet" and annotation.inflation is None else "shell"
     packed = "packed" if annotation.solidity else wall if walled else None
@@ -234,7 +234,7 @@ def apply_structure_annotation(
 def annotated_pieces(
     annotations: Mapping[tuple[str, str], PartAnnotation], thing: str, parts: Sequence[str]
 ) -> list[PartDescription]:
-    """Return what a person names of an object beside its parts: pieces not segmented yet.
+    """Return annotated pieces of an object that are not segmented yet.
 
     Until they are found on its surface each has an equal share.
     """

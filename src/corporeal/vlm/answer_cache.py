@@ -1,7 +1,7 @@
-"""Answers that were paid for once: asked again with nothing changed, they come from the disk.
+"""Cache of paid answers on the disk.
 
-One JSON file per validated answer, named by all that it depends on. It appears by an atomic rename:
-several processes may share the folder, and one that is killed leaves no half answer.
+One JSON file per validated answer, named by a digest of its inputs, and written atomically: several
+processes may share the folder.
 """
 
 import hashlib
@@ -28,12 +28,12 @@ ANSWER_CACHE_VERSION = 1
 
 
 def answer_cache_folder() -> Path:
-    """Return where answers are kept: as the environment says, else where the system has such."""
+    """Return the folder of the cache: as the environment says, else the system's."""
     return store.cache_folder("answers")
 
 
 class CachingClient:
-    """Ask a model only what it has not answered before."""
+    """Client that asks a model only what is not in the cache."""
 
     looks = True
 
@@ -48,7 +48,7 @@ class CachingClient:
     def ask(
         self, question: Question, answer: type[Answer], check: AnswerCheck[Answer] = no_complaints
     ) -> Reply[Answer]:
-        """Return the kept answer, or the model's, which is then kept.
+        """Return the cached answer, or the model's, which is then cached.
 
         Threads that ask the same at the same time wait for one answer.
         """
@@ -66,7 +66,7 @@ class CachingClient:
             return reply
 
     def key(self, question: Question, answer: type[AnswerSchema]) -> str:
-        """Name a question by task, model, text, pictures, shape of the answer, and settings."""
+        """Return the digest of a question: task, model, text, pictures, shape of the answer, and settings."""
         pictures = [
             hashlib.sha256(str(p.shape).encode() + p.tobytes()).hexdigest()
             for p in question.pictures
@@ -86,7 +86,7 @@ class CachingClient:
 
 
 def _read_cached(path: Path, answer: type[Answer], check: AnswerCheck[Answer]) -> Answer | None:
-    """Return a kept answer; a damaged file, or one that no longer fits, is as good as none."""
+    """Return a cached answer; damaged or invalid files are ignored."""
     try:
         kept = answer.model_validate(json.loads(path.read_text(encoding="utf-8"))["answer"])
     except (OSError, ValueError, KeyError, TypeError, ValidationError):

@@ -1,4 +1,4 @@
-"""What can be wrong with a model's answer: names and bounds, checked against what was asked."""
+"""Validation of a model's answers: names and bounds, checked against the question."""
 
 from collections.abc import Collection, Mapping, Sequence
 from math import isclose
@@ -179,7 +179,7 @@ def _nesting_problems(answer: MaterialsAnswer) -> list[str]:
 
 
 def weakness_notes(answer: MaterialsAnswer) -> list[str]:
-    """Say what was mended in an answer, or makes it weak, in clauses."""
+    """Describe corrections and weaknesses of an answer, in clauses."""
     found = []
     for part in answer.parts:
         total = sum(way.probability for way in part.ways)
@@ -241,7 +241,7 @@ def _printed_weight(fact: PrintedStatement) -> float | None:
 
 
 def _too_dense(mass: float | None, box: float, advice: str) -> str:
-    """Say that nothing of a mass [kg] fits a box [m³], or is so light; "": it may be."""
+    """Describe why a mass [kg] is implausible for a box [m³]; "": plausible."""
     low, high = BOX_DENSITY_RANGE_KG_M3
     mean = mass / box if mass is not None and box > 0 else low
     if low <= mean <= high:
@@ -287,7 +287,7 @@ def placement_complaints(
 
 
 def _within(value: float, low: float, high: float) -> bool:
-    """Tell whether a value lies inside, the last digit of a printed bound aside."""
+    """Return whether a value lies inside, the last digit of a printed bound aside."""
     slack = 1e-6 * max(abs(low), abs(high))
     return low - slack <= value <= high + slack
 
@@ -298,7 +298,7 @@ def extents_complaints(answer: ExtentsAnswer, classes: Sequence[str]) -> list[st
 
 
 def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
-    """Check that sizes are lengths of things, in order, and no slip of a unit."""
+    """Check that sizes are lengths of objects, in order, and no slip of a unit."""
     sizes = (answer.smallest, answer.usual, answer.largest)
     if not all(MIN_OBJECT_EXTENT_M <= size <= MAX_OBJECT_EXTENT_M for size in sizes):
         return [
@@ -316,14 +316,14 @@ def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
 
 
 def things_complaints(answer: ObjectsAnswer) -> list[str]:
-    """Check that there are things, and not more than can be told apart."""
+    """Check that there are objects, and not more than can be separated."""
     if 1 <= len(answer.things) <= MAX_OBJECTS_IN_SCENE:
         return []
     return [f"Name 1 to {MAX_OBJECTS_IN_SCENE} things; you named {len(answer.things)}."]
 
 
 def regions_complaints(answer: RegionsAnswer, colours: Collection[str], things: int) -> list[str]:
-    """Check that every colour is answered for once, with a thing that exists, each at most once."""
+    """Check that every colour is answered for once, with an object that exists, each at most once."""
     said = [r.colour for r in answer.regions]
     numbers = [r.thing for r in answer.regions if r.thing is not None]
     found = []

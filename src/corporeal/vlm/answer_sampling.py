@@ -1,4 +1,4 @@
-"""Several answers to one request: pictures are sent, and paid, once.
+"""Several answers to one request, which pays for the pictures once.
 
 OpenAI's chat format has ``n``; its client hands on the first choice only, so that the others are
 read off the response. A server that ignores ``n`` gives one, and is asked again.
@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from corporeal.vlm import Answer, AnswerCheck, AnswerSchema, Question
 
 SAMPLING_TEMPERATURE = 0.7
-"""At which several answers are sampled: Wang et al. (2022, arXiv:2203.11171) took .5 to .7."""
+"""Temperature of several answers: Wang et al. (2022, arXiv:2203.11171) took .5 to .7."""
 OTHER_CHOICES: ContextVar[list[list[str]] | None] = ContextVar("heard", default=None)
 """What was said beside the first choice, by response, of the question that this task asks."""
 
@@ -52,7 +52,7 @@ class ChatResponse(BaseModel):
 
 
 async def hear(response: Response) -> None:
-    """Keep what a response says beside its first choice, where several were asked for."""
+    """Keep further choices of a response, if several were asked for."""
     heard = OTHER_CHOICES.get()
     if heard is None or not response.is_success:
         return
@@ -71,7 +71,7 @@ def _answer_text(message: ChatMessage) -> str:
 
 
 class SpareAnswers:
-    """Answers that came beside the first, until they are asked for."""
+    """Further answers of a response, kept until they are asked for."""
 
     def __init__(self) -> None:
         self._kept: dict[str, list[str]] = {}
@@ -85,7 +85,7 @@ class SpareAnswers:
     def take(
         self, question: Question, answer: type[Answer], check: AnswerCheck[Answer]
     ) -> Answer | None:
-        """Return the next one that has nothing wrong with it; None: there is none left."""
+        """Return the next valid one; None: none is left."""
         if question.turn.number == 1 or not question.turn.alike:
             return None
         with self._one:

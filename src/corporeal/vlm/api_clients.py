@@ -1,4 +1,4 @@
-"""Live models through pydantic-ai: typed answers, corrections, retries, and clear words on failure.
+"""Clients of live models through pydantic-ai: typed answers, corrections, retries, error messages.
 
 A model is named PROVIDER:MODEL, or PROVIDER:MODEL@URL for another server that speaks the
 provider's format. Keys come from the environment alone. A provider's own key goes to the provider's
@@ -56,12 +56,12 @@ from corporeal.vlm.retry import RequestGate, RetryPolicy, retry_after_seconds
 
 GENERIC_KEY_VARIABLE = "CORPOREAL_API_KEY"
 VENDOR_KEY_VARIABLES = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
-"""Keys without which nobody answers."""
+"""Environment variables of required keys."""
 HTTP_TOO_MANY_REQUESTS = 429
 PLACEHOLDER_KEY = "none"
-"""Sent where a server wants no key: the clients insist on one."""
+"""Key for servers without one, since the clients require it."""
 OLLAMA_DEFAULT_URL = "http://localhost:11434/v1"
-"""Where Ollama listens unless its settings say otherwise."""
+"""Default address of Ollama."""
 SYSTEM_PROMPT = (
     "You help to compute how real objects move. Answer from what the pictures show and from what "
     "you know of such things; say plainly when you cannot tell."
@@ -75,12 +75,12 @@ TRANSIENT_ERRORS = (
     ModelConnectionError,
     ModelRequestTimeout,
 )
-"""What may be over when one asks again."""
+"""HTTP status codes that are retried."""
 
 
 @dataclass(frozen=True)
 class ModelAddress:
-    """Where a model is, taken from what a person typed."""
+    """Address of a model, parsed from the command line."""
 
     spec: str
     """All of it."""
@@ -90,7 +90,7 @@ class ModelAddress:
 
 @dataclass(frozen=True)
 class RequestForm:
-    """How a question is put to a server."""
+    """Form of a request."""
 
     mode: str
     """How the model is held to the shape of an answer: one of ``OUTPUT_MODES``."""
@@ -115,7 +115,7 @@ class ApiClient(ABC):
         model, _, url = rest.partition("@http")
         self.address = ModelAddress(f"{self.provider}:{rest}", model, f"http{url}" if url else None)
         if not model:
-            raise UserError(f"Say which model: --vlm {self.provider}:MODEL.")
+            raise UserError(f"Name the model: --vlm {self.provider}:MODEL.")
         self.patience = patience or RetryPolicy()
         self._gate = RequestGate(self.patience.at_once)
         self.model = self._model(self._secret(), ModelProfile())
@@ -132,7 +132,7 @@ class ApiClient(ABC):
         """Make the client's model with this key."""
 
     def _where(self) -> str:
-        """Say which server is asked."""
+        """Return which server is asked."""
         return self.address.url or self.provider
 
     def _variable(self) -> str:
@@ -254,7 +254,7 @@ class ApiClient(ABC):
         return asked.output
 
     def _form(self, turn: AnswerNumber) -> RequestForm:
-        """Say how a question is put, as far as the server is known to take it."""
+        """Return how a question is put, as far as the server is known to take it."""
         sampled = self._sampled and turn.of > 1
         count = turn.of - turn.number + 1 if sampled and turn.alike and self._several else 1
         return RequestForm(self.mode, sampled, count)
@@ -321,11 +321,11 @@ class ApiClient(ABC):
         unreachable = isinstance(error, ModelConnectionError) and error.phase == "connect"
         if unreachable and failures >= self.patience.tries:
             raise UserError(
-                f"Nobody answers at {where}. Check the network, and that the server runs."
+                f"There is no answer from {where}. Check the network, and that the server runs."
             ) from None
 
     def _plain(self, error: Exception) -> str:
-        """Say in one short line what went wrong, without the key."""
+        """Return an error in one line, without the key."""
         secret = self._secret()
         words = " ".join((_validation_failure_text(error) or str(error)).split())
         words = words if secret == PLACEHOLDER_KEY else words.replace(secret, "[key]")
@@ -333,7 +333,7 @@ class ApiClient(ABC):
 
 
 def _validation_failure_text(error: Exception) -> str:
-    """Say what did not fit in the last of several tries to answer; "": it failed otherwise."""
+    """Describe what did not fit in the last of several tries to answer; "": it failed otherwise."""
     last = error.__cause__
     if not isinstance(last, ToolRetryError):
         return ""
@@ -426,7 +426,7 @@ OUTPUT_MODES: dict[str, Callable[[Any], Any]] = {
 
 
 def encode_jpeg(picture: np.ndarray) -> bytes:
-    """Encode a picture for sending: what is lost nobody sees, and it is a fifth of a PNG."""
+    """Encode a picture for sending: the loss is invisible, at a fifth of a PNG."""
     file = io.BytesIO()
     Image.fromarray(picture).save(file, "JPEG", quality=92, subsampling=0)
     return file.getvalue()

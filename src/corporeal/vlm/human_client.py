@@ -1,7 +1,7 @@
-"""Answer by hand: every question becomes a page with its picture, and waits for its answer.
+"""Manual answers: every question is written to a page, and waits for its answer.
 
-For who has a chat window and no key, or wants to look for themselves. Answered questions are kept
-as recordings in the same folder, so ``--vlm replay:FOLDER`` needs nobody any more.
+For a chat window without an API key, or answers by a person. Answers are kept as recordings in the
+same folder, for ``--vlm replay:FOLDER``.
 """
 
 import re
@@ -38,7 +38,7 @@ Give the answer as JSON of this shape, and nothing else:
 
 
 class PendingQuestionsError(UserError):
-    """Questions wait for somebody to answer them."""
+    """Questions wait for answers."""
 
     def __init__(self, message: str, count: int = 1) -> None:
         super().__init__(message)
@@ -47,13 +47,13 @@ class PendingQuestionsError(UserError):
 
 
 class HumanClient:
-    """Write each question to a folder; read the answer that somebody put beside it."""
+    """Write each question to a folder; read the answer beside it."""
 
     looks = True
 
     def __init__(self, folder: str) -> None:
         if not folder:
-            raise UserError("Say where the questions go: --vlm ask:FOLDER.")
+            raise UserError("Name the folder of the questions: --vlm ask:FOLDER.")
         self.folder = Path(folder)
         self.pages = self.folder / QUESTIONS_FOLDER
         with store.disk_errors(self.pages):
@@ -67,7 +67,7 @@ class HumanClient:
         """Return the answer beside the question, or the one that was recorded earlier.
 
         Raises:
-            WaitingError: Nobody has answered yet, or the answer does not fit; the page says why.
+            WaitingError: There is no answer yet, or it is invalid; the page says why.
 
         """
         page = self.pages / self._name(question, answer)
@@ -93,7 +93,7 @@ def refuse_pending(results: list, spec: str) -> list:
 
     Args:
         results: Of independent jobs; ``PendingQuestionsError`` where questions wait.
-        spec: Who was asked: "ask:FOLDER".
+        spec: As in --vlm: "ask:FOLDER".
 
     Raises:
         WaitingError: Questions wait: the message says how many, where, and what to do.
@@ -112,7 +112,7 @@ def refuse_pending(results: list, spec: str) -> list:
 
 
 def is_not_pending(error: Exception) -> bool:
-    """Tell whether an error is more than a question that waits."""
+    """Return whether an error is not a waiting question."""
     return not isinstance(error, PendingQuestionsError)
 
 
@@ -169,7 +169,7 @@ def _limits(schema: Mapping) -> str:
 
 
 def tile_pictures(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Lay pictures of one size out in rows, (H, W, 3) uint8; the last row may be short."""
+    """Tile pictures of one size in rows, (H, W, 3) uint8; the last row may be short."""
     columns = int(np.ceil(np.sqrt(len(pictures))))
     blank = np.full_like(pictures[0], 255)
     filled = [*pictures, *[blank] * (-len(pictures) % columns)]

@@ -1,4 +1,4 @@
-"""From a model's answers to what flows on: words about parts, and places in ranges."""
+"""Conversion of a model's answers to descriptions of parts and placements in ranges."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -35,11 +35,11 @@ from corporeal.vlm.token_prices import price_usd, prices_date
 
 LookingSource = Literal["model", "recording"]
 LOOKING_SOURCE_NAMES = {"model": "the model", "recording": "a recorded answer"}
-"""Who looks at pictures."""
+"""Sources that use pictures."""
 WALL_AGREEMENT_RATIO = 1.25
 """By what factor a wall's thickness may differ from the stated one before it is reported."""
 STRANGE_SHARE_STD_COUNT = 3.0
-"""So many standard deviations are too many."""
+"""Number of standard deviations that is reported."""
 SIZE_DISAGREEMENT_RATIO = 2.5
 """By what factor a size may differ from the usual one before it is reported."""
 
@@ -47,7 +47,7 @@ SIZE_DISAGREEMENT_RATIO = 2.5
 def parts_from_answer(
     answer: MaterialsAnswer, by: LookingSource, names: AllowedNames
 ) -> list[PartDescription]:
-    """Turn an answer that was checked into words, one per part; unknown parts have no material."""
+    """Convert a validated answer to descriptions, one per part; unknown parts have no material."""
     outside = [p for p in answer.parts if p.inside is None and not p.missing]
     total = [
         sum(getattr(p, what) or 0.0 for p in outside) for what in ("volume_share", "surface_share")
@@ -74,7 +74,7 @@ def parts_from_answer(
 
 
 def part_hypotheses(answer: PartAnswer, names: AllowedNames) -> tuple[Hypothesis, ...]:
-    """Return the ways a part may be, likeliest first; probabilities add up to 1 at most."""
+    """Return the hypotheses of a part, likeliest first; probabilities sum to 1 at most."""
     total = max(sum(way.probability for way in answer.ways), 1.0)
     ways = [
         Hypothesis(
@@ -96,7 +96,7 @@ def part_hypotheses(answer: PartAnswer, names: AllowedNames) -> tuple[Hypothesis
 def with_likeliest_hypothesis(
     words: PartDescription, ways: tuple[Hypothesis, ...], by: LookingSource
 ) -> PartDescription:
-    """Describe a part by its likeliest way, and keep all of them."""
+    """Describe a part by its likeliest hypothesis, and keep all."""
     return replace(
         apply_hypothesis(words, ways[0]),
         answered_by=by if ways[0].material else "unknown",
@@ -136,12 +136,12 @@ def merge_pieces(name: str, pieces: Sequence[PartDescription]) -> PartDescriptio
 def complete_from_file(
     answered: PartDescription, file: PartDescription, walled: Callable[[str], bool]
 ) -> PartDescription:
-    """Let the file name the material that a model could not, and keep the rest of its answer.
+    """Take the material from the file if the model could not name it.
 
     Args:
         answered: What the model answered.
         file: What the file's metadata says of the same part.
-        walled: Tells whether walls of a material were ever measured.
+        walled: Whether wall thicknesses of a material were measured.
 
     """
     if answered.material is not None:
@@ -175,7 +175,7 @@ def complete_from_file(
 def _complete_hypotheses(
     ways: Sequence[Hypothesis], file: PartDescription
 ) -> tuple[Hypothesis, ...]:
-    """Let the file's material stand in the ways that name none."""
+    """Set the file's material in hypotheses without one."""
     return tuple(
         replace(
             way,
@@ -209,10 +209,10 @@ def _si_value(number: float | None, unit: str) -> float | None:
 def contradiction_with_file(
     words: PartDescription, material: str | None, wall: float | None, put: float | None
 ) -> str:
-    """Say in a clause where a model contradicts what the file states; "" where it does not.
+    """Describe in a clause where a model contradicts the file; "" if it does not.
 
     Args:
-        words: What is believed of a part.
+        words: The accepted description of a part.
         material: What the file states it is made of.
         wall: How thick the file states its wall is [m]; 0: stated solid; None: unknown.
         put: How thick the model put its wall [m].
@@ -239,14 +239,14 @@ def contradiction_with_file(
 
 
 def hypothesis_name(name: str, number: int) -> str:
-    """Name one of the ways of a part that placement is asked about; the first is the part."""
+    """Return the name of a hypothesis in questions; the first is the part."""
     return name if number == 0 else f"{name}, way {number + 1}"
 
 
 def apply_placements(
     words: PartDescription, placements: Mapping[str, Mapping[str, RangePlacement]]
 ) -> PartDescription:
-    """Give a part, its ways and its pieces the places that were chosen under their names."""
+    """Set the placements of a part, its hypotheses and its pieces by their names."""
     own = dict(placements.get(words.name, {}))
     ways = tuple(
         replace(way, placements=dict(placements.get(hypothesis_name(words.name, k), {})))
@@ -261,7 +261,7 @@ def apply_placements(
 
 
 def parts_filling_scan(words: Sequence[PartDescription]) -> list[PartDescription]:
-    """Parts whose matter fills what a scan draws, at its surface, in some way they may be."""
+    """Parts whose material fills the scan at its surface, in some hypothesis."""
     return [
         leaf
         for leaf in leaf_parts(words)
@@ -277,7 +277,7 @@ def _possible_structures(words: PartDescription) -> list[str | None]:
 def apply_real_shares(
     words: PartDescription, answer: ThicknessAnswer, by: LookingSource
 ) -> PartDescription:
-    """Give a part, or its pieces, what was said of how much of them is real."""
+    """Set the ratio of real to scanned volume of a part, or its pieces."""
     said = {p.part: ScanThickening(p.low, p.likely, p.high, p.reason, by) for p in answer.parts}
     pieces = tuple(replace(p, swelling=said.get(p.name)) for p in words.pieces)
     main = max(
@@ -302,7 +302,7 @@ def box_sides_text(lengths: Sequence[float]) -> str:
 
 
 def strange_share_notes(answer: ThicknessAnswer, doubt: float) -> list[str]:
-    """Say which parts are said to be far from what a scan draws, for how fine it is.
+    """Return warnings of parts whose real volume is judged far from the scan's.
 
     Args:
         answer: Of how much of what it draws is real.
@@ -316,9 +316,9 @@ def strange_share_notes(answer: ThicknessAnswer, doubt: float) -> list[str]:
         if away > STRANGE_SHARE_STD_COUNT:
             found.append(
                 Note(
-                    f"{part.part} is said to take up {part.likely:.0%} of what its scan draws, "
-                    f"which is fine enough for {exp(-doubt / 2):.0%} ± {doubt:.0%}. The former was "
-                    "believed; --annotations decides.",
+                    f"{part.part} was judged to have {part.likely:.0%} of its scan's volume, whose "
+                    f"resolution suggests {exp(-doubt / 2):.0%} ± {doubt:.0%}. The former was "
+                    "accepted; --annotations decides.",
                     NoteKind.ASSUMED,
                 )
             )
@@ -340,7 +340,7 @@ def extent_text(metres: float) -> str:
 def with_usual_extents(
     things: Sequence[SceneObject], objects: Sequence[ObjectDescription], usual: Mapping[str, float]
 ) -> tuple[list[ObjectDescription], list[str]]:
-    """Keep how large objects usually are [m], and say which of them are far from it."""
+    """Set usual extents of objects [m], and warn of objects far from them."""
     sized, doubts = [], []
     for thing, words in zip(things, objects, strict=True):
         kind = thing.class_name or thing.name
@@ -359,7 +359,7 @@ def with_usual_extents(
 
 
 def sum_usage(transcript: Sequence[Mapping]) -> ModelUsage:
-    """Add up what the questions took; no price is given where one model's price is not known."""
+    """Sum the cost of questions; no price is given if one model's price is unknown."""
     rows = [r for r in transcript if r.get("answer") is not None]
     if not rows:
         return NO_USAGE

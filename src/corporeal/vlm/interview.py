@@ -1,4 +1,4 @@
-"""The house's questions in their order: what is asked, of whom, and what is kept of the answers."""
+"""The questions to a vision-language model in order, with the transcript of answers."""
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -98,7 +98,7 @@ TASKS_WITH_FIXED_TEXT = ("materials", "mass")
 
 @dataclass(frozen=True)
 class InterviewSubject:
-    """What the questions are about."""
+    """Subject of the questions."""
 
     scene: str
     """The scene's name and the object's."""
@@ -130,7 +130,7 @@ class PlacementOffer:
 
 @dataclass
 class Interview:
-    """Puts questions about one subject; keeps the transcript and what went wrong."""
+    """Asks questions on one subject; keeps the transcript and warnings."""
 
     model: VlmClient
     critic: VlmClient
@@ -144,10 +144,10 @@ class Interview:
     transcript: list[dict] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     turn: AnswerNumber = SINGLE_ANSWER
-    """Which of several answers the questions are asked for."""
+    """Number of the answer, if several are sampled."""
 
     def parts(self) -> tuple[Decomposition, PartsAnswer] | None:
-        """Ask question 1, and the critic where there is a choice; None where nobody answers.
+        """Ask question 1, and the critic if there is a choice; None: no answer.
 
         Returns:
             The best decomposition, and the whole answer.
@@ -183,7 +183,7 @@ class Interview:
         lists: Mapping[str, str],
         shared: bool,
     ) -> tuple[MaterialsAnswer, LookingSource] | None:
-        """Ask question 2; None where nobody answers.
+        """Ask question 2; None: no answer.
 
         Args:
             parts: Name → how to tell it in the pictures, "" where nothing needs saying.
@@ -221,10 +221,10 @@ class Interview:
     def thickness(
         self, parts: Sequence[str], thin: ThinScan
     ) -> tuple[ThicknessAnswer, LookingSource] | None:
-        """Ask how much of what a scan draws of something thin is real; None: no answer.
+        """Ask for the ratio of real to scanned volume of a thin scan; None: no answer.
 
         Args:
-            parts: Those whose matter fills what is drawn.
+            parts: Those whose material fills what is drawn.
             thin: How coarse the scan is, and how thick it draws the object.
 
         """
@@ -252,7 +252,7 @@ class Interview:
         return reply.answer, reply.by
 
     def mass(self) -> tuple[MassAnswer, LookingSource] | None:
-        """Ask what is printed on it and what it weighs, no library in sight; None: no answer."""
+        """Ask for print and mass of the object, without the library; None: no answer."""
         box = self.subject.box
         asked = self._question("mass")
         reply = self._ask(self.model, asked, MassAnswer, lambda a: mass_complaints(a, box))
@@ -307,7 +307,7 @@ class Interview:
         )
 
     def extents(self, classes: Sequence[str]) -> dict[str, float]:
-        """Ask question 4: class → usual longest side [m]; empty where nobody answers."""
+        """Ask question 4: class → usual longest side [m]; empty: no answer."""
         asked = self._question("extents", classes="\n".join(f"- {c}" for c in classes))
         asked = replace(asked, views="none", pictures=())
         reply = self._ask(
@@ -316,18 +316,18 @@ class Interview:
         return {c.class_name: c.metres for c in reply.answer.classes} if reply else {}
 
     def size(self) -> Reply[SizeAnswer] | None:
-        """Ask how large the real object is, in words alone; None where nobody answers."""
+        """Ask how large the real object is, in words alone; None: no answer."""
         kind = self.subject.class_name
         asked = self._question("sizes")
         return self._ask(self.model, asked, SizeAnswer, lambda a: size_complaints(a, kind))
 
     def things(self) -> Reply[ObjectsAnswer] | None:
-        """Ask which objects stand in a scene; None where nobody answers."""
+        """Ask which objects stand in a scene; None: no answer."""
         asked = self._question("things", most=str(MAX_OBJECTS_IN_SCENE))
         return self._ask(self.model, asked, ObjectsAnswer, things_complaints)
 
     def regions(self, colours: Sequence[str], things: Sequence[str]) -> Reply[RegionsAnswer] | None:
-        """Ask which object each painted region is; None where nobody answers.
+        """Ask which object each painted region is; None: no answer.
 
         Args:
             colours: Names of the regions' colours.
@@ -384,7 +384,7 @@ class Interview:
 
 
 def _in_words(name: str, fact: str) -> str:
-    """Return what stands in a prompt for a fact."""
+    """Return a fact as it is written in a prompt."""
     if name == "seen":
         return f"It was found to be: {fact}." if fact else ""
     return SENTENCES[name][fact] if name in SENTENCES else fact
@@ -396,7 +396,7 @@ def _part_list(parts: Mapping[str, str]) -> str:
 
 
 def _look_text(part: SeenPart) -> str:
-    """Say how a part looks, and where it cannot be seen."""
+    """Return the look and the visibility of a part."""
     where = {"yes": "", "hidden": "; hidden", "missing": "; the model lacks it"}
     return f"{part.look}{where[part.seen]}"
 
@@ -410,7 +410,7 @@ def _range_list(offers: Mapping[str, PlacementOffer]) -> str:
 
 
 def _answer_number_text(turn: AnswerNumber) -> str:
-    """Say which of several answers is meant; "" where one only is wanted."""
+    """Return which of several answers is meant; "" where one only is wanted."""
     return f"{turn.number} of {turn.of} " if turn.of > 1 else ""
 
 

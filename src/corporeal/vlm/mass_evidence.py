@@ -1,6 +1,6 @@
-"""What is known of an object's mass without the library, and where that contradicts it.
+"""Evidence of an object's mass from outside the library, and contradictions to it.
 
-Printed facts and one direct judgement: they give draws of a mixture weights, and set no value.
+Printed facts and one direct estimate, used as importance weights of samples.
 """
 
 from math import log
@@ -13,22 +13,23 @@ from corporeal.discretization.part_model import NORMAL_90_PERCENT_WIDTH_SIGMAS
 from corporeal.vlm.interpret_answers import leaf_parts
 
 MIN_JUDGED_MASS_LOG_STD = 0.25
-"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on things that
-no data set publishes are off by a fifth (ALDE .20)."""
+"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on objects
+that no data set publishes are off by a fifth (ALDE .20).
+"""
 PACKAGING_MASS_RATIO = 1.12
 """Usual mass of packaged goods over their printed net weight [-]."""
 PRINTED_MASS_LOG_STD = 0.12
 """Standard deviation of the logarithm of a mass that follows from a printed weight [-]."""
 UNRELATED_EVIDENCE_PROBABILITY = 0.02
-"""How likely outside evidence is about something else altogether [-]."""
+"""Probability that the evidence is about another object [-]."""
 CONTRADICTION_STD_COUNT = 3.0
-"""Evidence that is further from every draw than this many of its widths contradicts them."""
+"""Evidence further than this many standard deviations from every sample contradicts them."""
 
 
 def mass_likelihood(
     masses: Float[np.ndarray, " N"], evidence: MassEvidence | None
 ) -> Float[np.ndarray, " N"]:
-    """Return how well each mass [kg] agrees with the evidence: log-normal above a floor."""
+    """Likelihood of each mass [kg] given the evidence: log-normal with a floor."""
     found = np.ones(len(masses))
     for centre, width in evidence_masses(evidence):
         away = np.log(masses / centre) / width
@@ -52,7 +53,7 @@ def evidence_masses(evidence: MassEvidence | None) -> list[tuple[float, float]]:
 
 
 def mass_contradiction(words: ObjectDescription, masses: Float[np.ndarray, " N"]) -> str:
-    """Say where evidence is far from every draw, and what would reconcile them; "": nowhere."""
+    """Describe evidence that is far from every sample, with reconciling changes; "": none."""
     clauses = []
     for centre, width in evidence_masses(words.evidence):
         away = np.log(masses / centre) / width
@@ -64,7 +65,7 @@ def mass_contradiction(words: ObjectDescription, masses: Float[np.ndarray, " N"]
     estimate, _ = max(clauses, key=lambda row: abs(row[1]))
     low, high = float(masses.min()), float(masses.max())
     return Note(
-        f"{words.name}: everything that it was taken for weighs {low:.3g} to {high:.3g} kg, but "
+        f"{words.name}: all its hypotheses weigh {low:.3g} to {high:.3g} kg, but "
         f"its mass was estimated at {estimate:.3g} kg. {_reconciliation_text(words, masses, estimate)} "
         "--annotations decides.",
         NoteKind.ASSUMED,
@@ -72,7 +73,7 @@ def mass_contradiction(words: ObjectDescription, masses: Float[np.ndarray, " N"]
 
 
 def _reconciliation_text(words: ObjectDescription, masses: np.ndarray, estimate: float) -> str:
-    """Name what would make the likeliest description weigh as estimated."""
+    """Name changes that would make the likeliest hypothesis weigh as estimated."""
     ratio = estimate / float(np.median(masses))
     main = max(leaf_parts(words.parts), key=lambda p: p.volume_share - p.inner_share)
     size = f"an object {ratio ** (1 / 3):.2f} times as large"
@@ -82,7 +83,7 @@ def _reconciliation_text(words: ObjectDescription, masses: np.ndarray, estimate:
         wanted = f"a wall of {main.name} {ratio:.2g} times as thick"
     elif ratio < 1:
         share = (main.solidity or 1.0) * ratio
-        wanted = f"{main.name} hollow, or {share:.0%} of its shape matter"
+        wanted = f"{main.name} hollow, or {share:.0%} of its volume material"
     else:
         wanted = f"a material of {main.name} {ratio:.2g} times as dense"
     return f"To reconcile them it would take {wanted}, or {size}."

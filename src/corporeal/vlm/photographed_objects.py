@@ -1,4 +1,4 @@
-"""Which objects stand in a photographed scene, and which found region each of them is."""
+"""Names of the objects in a photographed scene, matched to segmented regions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,16 +31,16 @@ from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.real_sizes import ANSWER_SOURCE_TEXT, EXTENT_TABLE_SOURCE
 
 COMMAND_LINE_SOURCE = "the command line"
-"""The source of what a person typed, in words for the report."""
+"""Source of names on the command line, for the report."""
 
 
 UNKNOWN_CLASS = "object"
-"""What nobody has a name for."""
+"""Name of unknown objects."""
 PHOTOGRAPHY_WORDS = frozenset(
     "camera card computer drone image laptop phone photo photograph picture snapshot tablet video "
     "webcam".split()
 )
-"""Words for what photographs are, are taken with or are kept on: folders are called so."""
+"""Words for photographs and their devices, which name folders, not objects."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class SeenObject:
 
     class_name: str
     look: str = ""
-    """In words that tell it from the others."""
+    """Description that distinguishes it from the others."""
     extent: float | None = None
     """Largest extent of the real object [m]; None: unknown."""
     sized_by: str = ""
@@ -58,7 +58,7 @@ class SeenObject:
 
 @dataclass(frozen=True)
 class QuestionLog:
-    """What was put to a model about one scene, as data, and what went wrong."""
+    """Questions to a model on one scene, with warnings."""
 
     transcript: tuple[dict, ...] = ()
     usage: ModelUsage = NO_USAGE
@@ -66,18 +66,18 @@ class QuestionLog:
 
 
 class PhotoInterview:
-    """Somebody who is shown pictures of one scene."""
+    """Interview on pictures of one scene."""
 
     def __init__(self, scene: str, vlm: str, record: Path | None = None) -> None:
-        """Connect to whoever answers; ``looks`` is False where nobody does.
+        """Connect to the model; ``looks`` is False without one.
 
         Args:
             scene: Its name.
-            vlm: Whom to ask, as a person types it; "metadata": nobody.
+            vlm: The model, as in --vlm; "metadata": none.
             record: Folder where every answer is kept for "replay:FOLDER".
 
         Raises:
-            UserError: Nobody can be asked.
+            UserError: The model is unavailable.
 
         """
         self.scene = scene
@@ -85,7 +85,7 @@ class PhotoInterview:
         self.interviews: list[Interview] = []
 
     def objects(self, pictures: Sequence[np.ndarray]) -> list[SeenObject]:
-        """Ask which objects there are; empty where nobody answers.
+        """Ask which objects there are; empty: no answer.
 
         Args:
             pictures: Of the scene, H x W x 3, uint8, sRGB.
@@ -109,8 +109,7 @@ class PhotoInterview:
             objects: What there is.
 
         Returns:
-            Per region the place of its object, or None where it is none of them; None where nobody
-            answers.
+            Per region the place of its object, or None where it is none of them; None: no answer.
 
         """
         if self.model is None:
@@ -150,7 +149,7 @@ class PhotoInterview:
 
 
 def object_of_usual_size(class_name: str) -> SeenObject:
-    """Return an object that somebody named, as large as such objects usually are."""
+    """Return a named object with the usual size of its class."""
     known = typical_extent(class_name)
     return (
         SeenObject(class_name, extent=known.usual, sized_by=EXTENT_TABLE_SOURCE)
@@ -160,9 +159,9 @@ def object_of_usual_size(class_name: str) -> SeenObject:
 
 
 def telling_words(source: str) -> str:
-    """Return the words of a folder's name, or a film's, that can be of what the pictures show.
+    """Return the words of a folder's name, or a video's, that can name an object in the pictures.
 
-    Not those for what they are or were taken with: "photos" are no paper, and "Camera" no camera.
+    Words for photographs and devices are excluded.
     """
     return " ".join(
         w
@@ -172,7 +171,7 @@ def telling_words(source: str) -> str:
 
 
 def object_from_name(source: str) -> SeenObject | None:
-    """Return what the name of a folder or a film says is in it, as large as it usually is.
+    """Return the object named by a folder or a video, with its usual size.
 
     None: it says nothing that has a usual size.
     """
@@ -183,11 +182,11 @@ def object_from_name(source: str) -> SeenObject | None:
 
 
 def named_object_note(source: str, seen: SeenObject, name: str) -> str:
-    """Say what was taken from the name of the pictures, and how to say it better.
+    """Note that the object was named after the pictures' folder, with advice.
 
     Args:
-        source: What the pictures are called.
-        seen: What it was taken for; with an extent where that was, too.
+        source: Name of the pictures.
+        seen: The assumed object, with its extent if assumed.
         name: What it is called in the scene.
 
     """
@@ -197,14 +196,14 @@ def named_object_note(source: str, seen: SeenObject, name: str) -> str:
         size = f", and made as large as {usually}, {length_text(seen.extent)}"
         more = f", and how large with --extent {name}=METRES"
     return Note(
-        f"Nobody said what it is: by the name {source!r} it was called {seen.class_name}{size}. "
-        f"Say what it is with --things{more}.",
+        f"The object was not named: from the name {source!r} it was called "
+        f"{seen.class_name}{size}. Name it with --object-names{more}.",
         NoteKind.ASSUMED,
     )
 
 
 def class_extent_note(objects: Sequence[SeenObject], names: Sequence[str]) -> str:
-    """Say that nobody stated a size, what was taken for it, and how to say it better.
+    """Note that a size was assumed, with advice.
 
     Args:
         objects: What there is, as far as it is known.
@@ -218,7 +217,7 @@ def class_extent_note(objects: Sequence[SeenObject], names: Sequence[str]) -> st
     )
     them = "it is" if len(objects) == 1 else "they are"
     return Note(
-        f"Nobody said how large {them}: made as large as {'; '.join(dict.fromkeys(large))}. "
+        f"How large {them} was not stated: assumed as large as {'; '.join(dict.fromkeys(large))}. "
         f"State a size with --extent {sized[0][1]}=METRES.",
         NoteKind.ASSUMED,
     )
@@ -232,11 +231,11 @@ def object_names(objects: Sequence[SeenObject]) -> list[str]:
 def check_stated_extents(
     stated: Sequence[str], objects: Sequence[SeenObject], source: str = ""
 ) -> None:
-    """Raise UserError where a size is stated of what no object can be called.
+    """Raise UserError where a size is stated of an unknown object.
 
     Args:
         stated: Sizes that a person gave for some, such as "duck=0.1" [m].
-        objects: What there is, as far as anybody will say; others are objects.
+        objects: Known objects; others are objects.
         source: What the pictures are called, by which a lone object may be called.
 
     """
@@ -245,7 +244,9 @@ def check_stated_extents(
     for text in stated:
         name, _ = parse_extent(text, (known or [UNKNOWN_CLASS])[0])
         if name not in known and not name.startswith(UNKNOWN_CLASS):
-            step = f"Choose one of: {', '.join(known)}." if known else "Name it with --things."
+            step = (
+                f"Choose one of: {', '.join(known)}." if known else "Name it with --object-names."
+            )
             raise UserError(f"--extent: no object {name!r}. {step}")
 
 
@@ -256,13 +257,13 @@ def decide_metric_scale(
     measured: MetricScale | None = None,
     z_up: bool = False,
 ) -> MetricScale:
-    """Decide what one unit of a reconstruction is in metres.
+    """Return the metric scale of a reconstruction.
 
     Args:
         sizes: Name → largest extent in the file [its unit].
         objects: What they are, in the same order.
         stated: Sizes that a person gave for some, such as "duck=0.1" [m].
-        measured: What a person measured of the unit.
+        measured: Measured lengths.
         z_up: Whether the file's kind has +z up, and metres.
 
     Raises:

@@ -1,7 +1,6 @@
-"""How large real objects are: asked of a model in words, or read in a table, never computed.
+"""Real sizes of objects: from a model, or from a table.
 
-Each class is a question of its own, so that its answer is recorded, replayed and paid for once,
-whatever else stands in a scene.
+Each class is a separate question, so that its answer can be reused in other scenes.
 """
 
 from collections.abc import Iterable, Mapping
@@ -21,7 +20,7 @@ from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.thread_map import thread_map
 
 UNKNOWN_EXTENT_M = 0.3
-"""Stands in for the size of what nobody knows [m]: between a mug and a chair."""
+"""Assumed size of unknown objects [m]: between a mug and a chair."""
 EXTENT_TABLE_SOURCE = "the table of typical extents"
 MAX_PARALLEL_SIZE_QUESTIONS = 4
 """Questions that are asked at the same time."""
@@ -49,45 +48,46 @@ class ClassSize:
 
 @dataclass(frozen=True)
 class ClassSizes:
-    """What was found out about the sizes of some classes."""
+    """Sizes of some classes, with the questions asked."""
 
     usual: Mapping[str, ClassSize]
-    """Class → its usual size; a class that nobody knows is not in it."""
+    """Class → its usual size; unknown classes are absent."""
     transcript: tuple[dict, ...] = ()
     """Every question put to a model with its answer, as data."""
     usage: ModelUsage = NO_USAGE
-    """What the questions took."""
+    """Cost of the questions."""
     warnings: tuple[str, ...] = ()
-    """What a reader of the report should know about the answers, in sentences."""
+    """Warnings about the answers."""
 
 
 @dataclass(frozen=True)
 class RealExtent:
-    """How large one real object is, and by whose estimate."""
+    """Real size of one object, with its source."""
 
     extent: float
     """Largest extent [m]."""
     said_by: SizeSource
     by: str
-    """Whose estimate it is, in a clause: "a model (openai:gpt-5.4)"."""
+    """Source in a clause: "a model (openai:gpt-5.4)"."""
     reason: str
     """Why, in one sentence."""
     warnings: tuple[str, ...] = ()
-    """What speaks against it, in sentences."""
+    """Contradictions, in sentences."""
 
 
 def find_class_sizes(
     classes: Iterable[str], vlm: str = "metadata", record: Path | None = None
 ) -> ClassSizes:
-    """Find out how large objects of each class usually are: a model first, then the table.
+    """Find the usual sizes of classes: from a model first, then the table.
 
     Args:
         classes: What objects are, in words; doubles are asked about once.
-        vlm: Whom to ask, as a person types it; "metadata": nobody.
+        vlm: The model, as in --vlm; "metadata": none.
         record: Folder where every answer is kept for "replay:FOLDER".
 
     Raises:
-        UserError: Nobody can be asked, a recording is missing, or questions wait for a person's
+        UserError: The model is unavailable, a recording is missing, or questions wait for a
+            person's
             answers.
 
     """
@@ -113,10 +113,10 @@ def find_class_sizes(
 def estimate_real_extent(
     name: str, class_name: str, extent: float, metric: bool, sizes: ClassSizes
 ) -> RealExtent:
-    """Say how large the real object is of which a file holds a model.
+    """Return the real size of the object in a file.
 
     A file in metres counts; the usual size of its class can only cast doubt on it. Otherwise the
-    usual size of its class counts, and where nobody knows that, a neutral stand-in.
+    usual size of its class, or a default.
 
     Args:
         name: Of the asset, for the sentences.
@@ -134,11 +134,12 @@ def estimate_real_extent(
     if known is not None:
         return RealExtent(known.usual, known.said_by, _size_source_text(known), known.reason)
     warning = Note(
-        f"Nobody knows how large {name} ({class_name}) is: its file is not in metres, and its "
-        f"class is not in {EXTENT_TABLE_SOURCE}. It is taken as {extent_text(UNKNOWN_EXTENT_M)}. Name a model with --vlm.",
+        f"The size of {name} ({class_name}) is unknown: its file is not in metres, and its "
+        f"class is not in {EXTENT_TABLE_SOURCE}. It is taken as {extent_text(UNKNOWN_EXTENT_M)}. "
+        "Name a model with --vlm.",
         NoteKind.ASSUMED,
     )
-    return RealExtent(UNKNOWN_EXTENT_M, "nobody", "nobody", "A neutral stand-in.", (warning,))
+    return RealExtent(UNKNOWN_EXTENT_M, "nobody", "nobody", "A default size.", (warning,))
 
 
 # ---------------------------------------------------------------- a model's answers
@@ -189,7 +190,7 @@ def _size_source_text(size: ClassSize) -> str:
 
 
 def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> str:
-    """Say where a model's size is beyond the table's; "" where it is not."""
+    """Describe where a model's size is outside the table's range; "" if it is not."""
     if (
         known is None
         or known.low / TYPICAL_EXTENT_MARGIN_RATIO
@@ -198,14 +199,16 @@ def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> st
     ):
         return ""
     return (
-        f"According to {_size_source_text(answered)}, {extent_text(answered.usual)} is usual for objects like "
-        f"this: {answered.class_name}; {EXTENT_TABLE_SOURCE} knows {extent_text(known.low)} to {extent_text(known.high)}. "
-        "The former was believed."
+        f"According to {_size_source_text(answered)}, {extent_text(answered.usual)} is usual for "
+        "objects like "
+        f"this: {answered.class_name}; {EXTENT_TABLE_SOURCE} knows {extent_text(known.low)} to "
+        f"{extent_text(known.high)}. "
+        "The former was used."
     )
 
 
 def _class_disagreement_text(name: str, extent: float, known: ClassSize | None) -> str:
-    """Say where a file's own size is beyond its class's; "" where it is not."""
+    """Describe where a file's size is outside its class's range; "" if it is not."""
     if (
         known is None
         or known.low / TYPICAL_EXTENT_MARGIN_RATIO
@@ -214,7 +217,9 @@ def _class_disagreement_text(name: str, extent: float, known: ClassSize | None) 
     ):
         return ""
     return (
-        f"{name} is {extent_text(extent)} large in its file, which is in metres; {_size_source_text(known)} knows "
-        f"such objects ({known.class_name}) from {extent_text(known.low)} to {extent_text(known.high)}. The "
-        "file was believed."
+        f"{name} is {extent_text(extent)} large in its file, which is in metres; "
+        f"{_size_source_text(known)} knows "
+        f"such objects ({known.class_name}) from {extent_text(known.low)} to "
+        f"{extent_text(known.high)}. The "
+        "file was used."
     )

@@ -1,4 +1,4 @@
-"""Answers recorded earlier: free, offline, repeatable.
+"""Recorded answers: free, offline, repeatable.
 
 A recording is one JSON file: task, scene, version of the prompt and facts put into it, schema,
 views, model, lists, prompt, answer. It is found by what was asked about what, not by pixels, by
@@ -42,8 +42,8 @@ class ReplayClient:
         self.folder = Path(folder)
         if not folder or not self.folder.is_dir():
             raise UserError(
-                f"No folder of recordings at {folder!r}. Say --vlm replay:FOLDER, or --vlm "
-                "metadata to go without."
+                f"No folder of recordings at {folder!r}. Use --vlm replay:FOLDER, or --vlm "
+                "metadata."
             )
         self.rows = [_read_recording(path) for path in sorted(self.folder.glob("*.json"))]
 
@@ -63,7 +63,7 @@ class ReplayClient:
         return Reply(_validated(row, answer, check), "recording", str(row.get("model", "")))
 
     def holds(self, question: Question, answer: type[AnswerSchema]) -> bool:
-        """Tell whether the question was answered."""
+        """Return whether the question was answered."""
         return self._row(recording_key_row(question, answer)) is not None
 
     def _row(self, wanted: dict[str, Any]) -> dict | None:
@@ -106,7 +106,7 @@ class ReplayClient:
 
 
 class RecordingClient:
-    """Ask somebody else, and keep every answer where ``ReplayClient`` finds it."""
+    """Record every answer of another client where ``ReplayClient`` finds it."""
 
     def __init__(self, model: VlmClient, folder: Path) -> None:
         self.model, self.folder, self._one = model, folder, Lock()
@@ -184,7 +184,7 @@ def _validated(row: dict, answer: type[Answer], check: AnswerCheck[Answer]) -> A
 
 
 def first_validation_problem(error: ValidationError) -> str:
-    """Say where an answer first leaves its shape, and how."""
+    """Return where an answer first leaves its shape, and how."""
     first = error.errors()[0]
     return f"{'.'.join(str(x) for x in first['loc'])}: {first['msg']}"
 

@@ -21,7 +21,7 @@ class RetryPolicy:
     first_wait: float = 1.0
     """After the first failure, where the server names no time; doubled each time [s]."""
     longest_wait: float = 60.0
-    """Nobody waits longer at once; a server that asks for more ends the run [s]."""
+    """Maximum wait; a server that asks for more ends the run [s]."""
     at_once: int = 8
     """Requests under way at the same time."""
 

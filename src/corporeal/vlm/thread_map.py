@@ -1,4 +1,4 @@
-"""Do several jobs at once that mostly wait for somebody else."""
+"""Concurrent execution of jobs that mostly wait for the network."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What tokens cost, where somebody wrote it down."""
+"""Prices of tokens."""
 
 import tomllib
 from functools import cache

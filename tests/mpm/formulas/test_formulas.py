@@ -110,8 +110,8 @@ def mean_at_eight_lanes(law: float, bulk: float, H: Floats, r: Floats, out: Floa
 
 
 @wp.func_native("""
-  const double *strain = (const double *)H.data + 9 * i, relief = ((const double *)r.data)[i];
-  ((double *)out.data)[i] = mpm::mean_energy(law, bulk, strain, relief);
+  const double *strain = (const double *)H.data + 9 * i, log_volume_ratio = ((const double *)r.data)[i];
+  ((double *)out.data)[i] = mpm::mean_energy(law, bulk, strain, log_volume_ratio);
 """)
 def stored_in_mean(law: int, bulk: wp.float64, H: Doubles, r: Doubles, i: int, out: Doubles): ...
 
@@ -291,18 +291,22 @@ def test_no_wave_along_a_principal_axis_is_faster_than_its_bound(law, width, wil
 @pytest.mark.parametrize("width", [1, 8])
 @pytest.mark.parametrize("law", BULKY)
 def test_the_mean_pressure_is_that_of_numpy(law, width, H):
-    relief = (0.1 * np.random.default_rng(4).normal(size=COUNT)).astype(np.float32)
+    log_volume_ratio = (0.1 * np.random.default_rng(4).normal(size=COUNT)).astype(np.float32)
     F, bulk = np.eye(3) + H.astype(np.float64), YOUNG
     out = on_processor(np.zeros(2 * COUNT, np.float32))
     if width == 1:
-        given = [on_processor(H, wp.mat33), on_processor(relief), out]
+        given = [on_processor(H, wp.mat33), on_processor(log_volume_ratio), out]
         wp.launch(mean_at_one_lane, COUNT, [law.value, bulk, *given], device="cpu")
         found = out.numpy().reshape(COUNT, 2)
     else:
-        given = [on_processor(in_lanes(H)), on_processor(relief), out]
+        given = [on_processor(in_lanes(H)), on_processor(log_volume_ratio), out]
         wp.launch(mean_at_eight_lanes, COUNT // 8, [law.value, bulk, *given], device="cpu")
         found = out.numpy().reshape(-1, 2, 8).transpose(0, 2, 1).reshape(COUNT, 2)
-    numbers, full, r = np.full(COUNT, law.value), np.full(COUNT, bulk), relief.astype(np.float64)
+    numbers, full, r = (
+        np.full(COUNT, law.value),
+        np.full(COUNT, bulk),
+        log_volume_ratio.astype(np.float64),
+    )
     J = determinant(F)
 
     def pressure(more):
@@ -312,7 +316,7 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
         return laws.psi_mean(numbers, J * np.exp(r + more), full)
 
     exact = pressure(0.0)
-    size = YOUNG * (np.linalg.norm(H.astype(np.float64), axis=(1, 2)) + np.abs(relief))
+    size = YOUNG * (np.linalg.norm(H.astype(np.float64), axis=(1, 2)) + np.abs(log_volume_ratio))
     assert (np.abs(found[:, 0] - exact) / size).max() < TOLERANCE
     # Its slope in ln J is what it adds to ρ c², or less where matter is squeezed.
     assert ((pressure(1e-6) - exact) / 1e-6 < found[:, 1] * (1.0 + 1e-5) + 1.0).all()
@@ -321,7 +325,9 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
     # And it is the slope of what is stored.
     assert (energy(1e-6) - energy(-1e-6)) / 2e-6 == pytest.approx(exact, rel=1e-5, abs=1e-4)
     stored = on_processor(np.zeros(COUNT), wp.float64)
-    doubles = [on_processor(a.astype(np.float64).ravel(), wp.float64) for a in (H, relief)]
+    doubles = [
+        on_processor(a.astype(np.float64).ravel(), wp.float64) for a in (H, log_volume_ratio)
+    ]
     wp.launch(mean_energies, COUNT, [law.value, bulk, *doubles, stored], device="cpu")
     assert stored.numpy() == pytest.approx(energy(0.0), rel=1e-9)
 

@@ -10,9 +10,8 @@ from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.pipeline.stages import reconstruct as stage
 from corporeal.pipeline.stages.reconstruct import reconstruct
 from corporeal.pipeline.stages.segment import segment
-from corporeal.reconstruction.gaussians import radiance_field, visual_hull
-from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.reconstruction.surface import closed_surface
+from corporeal.reconstruction.gaussians import radiance_field
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig, ReconstructionResolution
 from corporeal.vlm.photographed_objects import PhotoInterview, SeenObject
 
 pytestmark = [needs_models(), pytest.mark.slow]
@@ -30,12 +29,8 @@ def models(tmp_path_factory):
 @pytest.fixture
 def splat(tmp_path, monkeypatch):
     """Two boxes of flat Gaussians, z up; looked at coarsely."""
-    monkeypatch.setattr(stage, "RENDERED_VIEWS", 12)
-    monkeypatch.setattr(stage, "RENDERED_SIZE_PX", (96, 96))
-    monkeypatch.setattr(closed_surface, "OBJECT_GRID_CELLS", 60_000)
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 60_000)
-    monkeypatch.setattr(radiance_field, "RAYS_PER_STEP", 2048)
-    monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", radiance_field.FieldPreset(60, 96))
+    small = radiance_field.FieldPreset(60, 96, 2048)
+    monkeypatch.setitem(radiance_field.FIELD_PRESETS, "draft", small)
     position, normal, owner = on_faces(BOXES, 2500, np.random.default_rng(0))
     turn = np.column_stack([1 + normal[:, 2], -normal[:, 1], normal[:, 0], 0 * owner])
     turn[normal[:, 2] == -1] = [0, 1, 0, 0]
@@ -66,7 +61,10 @@ class Seer(PhotoInterview):
 def test_models_that_were_saved_here_see_things_and_name_parts(
     models, splat, tmp_path, monkeypatch
 ):
-    config = ReconstructConfig(up="z", training="draft", lifting="radiance", **models)
+    coarse = ReconstructionResolution(12, (96, 96), 60_000, 60_000)
+    config = ReconstructConfig(
+        up="z", training="draft", lifting="radiance", resolution=coarse, **models
+    )
     result = reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")
     found, scene = result.found, result.scene
     assert {o.class_name for o in scene.objects} == {"brick", "crate"}

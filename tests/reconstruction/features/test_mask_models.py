@@ -97,22 +97,22 @@ def test_sam2_is_asked_at_the_place_that_was_meant(sam2, monkeypatch):
 
 
 @needs_models()
-def test_sam3_finds_what_words_name(sam3, monkeypatch):
-    from corporeal.reconstruction.features import sam3 as module
+def test_sam3_finds_what_words_name(sam3):
+    from corporeal.reconstruction.features.sam3 import Sam3
 
-    monkeypatch.setattr(module, "MIN_SCORE", 0.0)
-    masker = connect_mask_model(f"sam3:{sam3}")
+    assert isinstance(connect_mask_model(f"sam3:{sam3}"), Sam3)
+    masker = Sam3(sam3, min_score=0.0)
     found = masker.instances(photograph(), ("duck", "can"), (0.0, 0.0))
     assert {one.word for one in found} == {"duck", "can"} and len(found) == 10
     assert all(one.mask.shape == (HIGH, WIDE) for one in found)
     assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
-    monkeypatch.setattr(module, "MIN_SCORE", 1.1)
-    assert not masker.instances(photograph(), ("duck",), (0.0, 0.0)), "none is that sure"
+    strict = Sam3(sam3, min_score=1.1)
+    assert not strict.instances(photograph(), ("duck",), (0.0, 0.0)), "none is that sure"
 
 
 @needs_models()
-def test_checkpoints_for_films_hold_the_same_model(sam2, tmp_path):
-    place = shutil.copytree(sam2, tmp_path / "film")
+def test_checkpoints_for_videos_hold_the_same_model(sam2, tmp_path):
+    place = shutil.copytree(sam2, tmp_path / "video")
     config = json.loads((place / "config.json").read_text()) | {"model_type": "sam2_video"}
     (place / "config.json").write_text(json.dumps(config))
     made = connect_mask_model(f"sam2:{place}").instances(photograph(), (), (24.0, 18.0))[0]
@@ -147,7 +147,7 @@ def test_a_folder_that_is_not_there_is_named_and_nothing_is_fetched(monkeypatch)
         "corporeal.reconstruction.features.mask_models.find_spec", lambda package: True
     )
     for spec in ("sam2:", "sam3:nowhere", "birefnet:facebook/sam2"):
-        with pytest.raises(UserError, match="none are fetched"):
+        with pytest.raises(UserError, match="none are downloaded"):
             connect_mask_model(spec)
     with pytest.raises(UnknownChoiceError, match="sam3"):
         split_model_spec("sam9:folder")
@@ -198,14 +198,14 @@ def test_corrected_masks_are_kept_and_not_asked_for_again(photographs, tmp_path)
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(mask)
     again = learned_masks(photographs, tmp_path / "made", masker, ("duck", "can"))
     assert len(masker.asked) == 5
-    assert "1 of the masks were corrected by hand." in again.said
+    assert "1 of the masks were corrected manually." in again.said
     assert np.asarray(Image.open(mask)).min() == 255
     learned_masks(photographs, tmp_path / "made", masker, ("duck", "other"))
     assert len(masker.asked) == 10, "other words are another question"
 
 
 def test_words_are_asked_for(photographs, tmp_path):
-    with pytest.raises(UserError, match="--things"):
+    with pytest.raises(UserError, match="--object-names"):
         learned_masks(photographs, tmp_path / "made", Found(), ())
 
 

@@ -7,12 +7,12 @@ from splat_scenes import around
 from corporeal.core.types import Views
 from corporeal.geometry.rotation import matrix_from_quaternion
 from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
-from corporeal.reconstruction.gaussians import visual_hull
 from corporeal.reconstruction.gaussians.floor_from_outlines import (
     LOWEST_PERCENTILE,
     _foot_height,
     floor_height_from_outlines,
 )
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 
 CAMERAS = around(30, (96, 80), focal=100.0, centre=(0, 0, 0.3))[:16]
 LOW, HIGH = np.array([-0.3, -0.2, 0.0]), np.array([0.3, 0.2, 0.6])
@@ -34,13 +34,9 @@ def masks_of_a_box(cameras):
     return np.stack(made)
 
 
-def pictures(cameras):
-    return Views(np.zeros((len(cameras), 80, 96, 3), np.uint8), cameras)
-
-
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch):
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 200_000)
+def floor_height(cameras, masks):
+    views = Views(np.zeros((len(cameras), 80, 96, 3), np.uint8), cameras)
+    return floor_height_from_outlines(views, masks, 1, HullConfig(grid_cells=200_000))
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.6])
@@ -49,7 +45,7 @@ def test_a_box_stands_where_its_outlines_meet_however_cameras_are_held(turn):
     held = apply_similarity_to_cameras(CAMERAS, similarity_matrix(shift=np.array([0.4, -0.2, 1.5])))
     held = tuple(type(c)(c.K, c.world_from_camera @ roll, c.width, c.height) for c in held)
     back = apply_similarity_to_cameras(held, similarity_matrix(shift=np.array([-0.4, 0.2, -1.5])))
-    found = floor_height_from_outlines(pictures(held), masks_of_a_box(back), threads=1)
+    found = floor_height(held, masks_of_a_box(back))
     assert found is not None
     assert abs(found - 1.5) < 0.01 * DIAMETER
 
@@ -58,7 +54,7 @@ def test_a_floor_is_where_most_outlines_meet_not_where_the_lowest_do():
     """Pixels are square, so that heights scatter: the lowest are wrong by twice as much."""
     every = around(48, (96, 80), focal=100.0, centre=(0, 0, 0.3))
     cameras = tuple(c for c in every if c.world_from_camera[2, 3] > 0.5)
-    found = floor_height_from_outlines(pictures(cameras), masks_of_a_box(cameras), threads=1)
+    found = floor_height(cameras, masks_of_a_box(cameras))
     assert found is not None
     assert abs(found) < 0.3 * PIXEL
 
@@ -78,6 +74,4 @@ def test_views_from_straight_above_do_not_tell():
         pose = pose.copy()
         pose[:3, 3] = 0.2 * k - 0.2, 0, 3.0
         above.append(type(CAMERAS[0])(CAMERAS[0].K, pose, 96, 80))
-    assert (
-        floor_height_from_outlines(pictures(tuple(above)), masks_of_a_box(above), threads=1) is None
-    )
+    assert floor_height(tuple(above), masks_of_a_box(above)) is None

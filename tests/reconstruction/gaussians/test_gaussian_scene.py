@@ -124,8 +124,8 @@ def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):
     ("quality", "said"),
     [
         (GOOD, ()),
-        (None, ("3 photographs are so few that none was held back",)),
-        (replace(GOOD, psnr=14.0), ("look otherwise (14.0 dB)",)),
+        (None, ("3 photographs are too few for a validation set",)),
+        (replace(GOOD, psnr=14.0), ("differ from their rendering (14.0 dB)",)),
     ],
 )
 def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):
@@ -198,7 +198,7 @@ def test_grown_masks_are_learned_from_again_without_what_no_other_photograph_sho
 
 
 def test_with_masks_no_floor_is_among_what_is_learned_though_sparse_points_show_one():
-    """Faint Gaussians on it would stay behind in the film when the object leaves."""
+    """Faint Gaussians on it would stay behind in the video when the object leaves."""
     rng, aims = np.random.default_rng(0), ring(np.arange(12) * 30, (64, 48))
     cameras = tuple(camera_from_aim(aim) for aim in aims)
     plane = np.concatenate([rng.uniform(-1, 1, (400, 2)), rng.normal(0, 1e-4, (400, 1))], axis=1)

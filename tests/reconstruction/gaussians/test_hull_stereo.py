@@ -5,14 +5,16 @@ import pytest
 import trimesh
 
 from corporeal.core.types import Camera, Views
-from corporeal.reconstruction.gaussians import visual_hull
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.hull_stereo import hull_cells_seen_past
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
+from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
 from corporeal.reconstruction.surface.refine_depth import fill_plain_depth, refine_depth
 
 HALF, WALL, HEIGHT, SIZE = 1.0, 0.25, 1.2, 96
 """A box without a lid: half its width, its walls and bottom, its height [m]; pictures [px]."""
+COARSE = HullConfig(grid_cells=60_000)
 INNER, WAVES = HALF - WALL, 6
 """Of the grain, in each colour."""
 
@@ -65,16 +67,15 @@ def photographed(solid, contrast):
     return Views(rgb, eyes), masks
 
 
-def emptied(solid, contrast, monkeypatch):
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 60_000)
+def emptied(solid, contrast):
     views, masks = photographed(solid, contrast)
     with ThreadPool(1) as pool:
-        found = visual_hull.carve_tight_hull(views, masks, pool)
+        found = carve_tight_hull(views, masks, pool, COARSE)
         return found, hull_cells_seen_past(views, masks, found, pool)
 
 
-def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls(monkeypatch):
-    found, empty = emptied(without_lid(), 0.25, monkeypatch)
+def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls():
+    found, empty = emptied(without_lid(), 0.25)
     x, y, z = np.moveaxis(found.cells, -1, 0)
     wide, cell = np.maximum(abs(x), abs(y)), found.side
     roof = found.inside & (z > HEIGHT + 2 * cell)
@@ -87,32 +88,29 @@ def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls(monkeypatch)
     assert not empty[~found.inside].any()
 
 
-def test_what_is_full_stays_full(monkeypatch):
+def test_what_is_full_stays_full():
     full = block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])
-    found, empty = emptied(full, 0.25, monkeypatch)
+    found, empty = emptied(full, 0.25)
     x, y, z = np.moveaxis(found.cells, -1, 0)
     inside = (np.maximum(abs(x), abs(y)) < HALF) & (z < HEIGHT - found.side) & found.inside
     assert inside.sum() > 5000
     assert empty[inside].mean() < 0.01
 
 
-def test_plain_pictures_empty_nothing(monkeypatch):
-    _, empty = emptied(without_lid(), 0.0, monkeypatch)
+def test_plain_pictures_empty_nothing():
+    _, empty = emptied(without_lid(), 0.0)
     assert not empty.any()
 
 
-def test_the_number_of_threads_changes_nothing(monkeypatch):
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 20_000)
+def test_the_number_of_threads_changes_nothing():
+    config = HullConfig(grid_cells=20_000)
     views, masks = photographed(without_lid(), 0.25)
     views, masks = Views(views.rgb[::2], views.cameras[::2]), masks[::2]
     results = []
     for count in (1, 3):
         with ThreadPool(count) as pool:
-            results.append(
-                hull_cells_seen_past(
-                    views, masks, visual_hull.carve_tight_hull(views, masks, pool), pool
-                )
-            )
+            hull = carve_tight_hull(views, masks, pool, config)
+            results.append(hull_cells_seen_past(views, masks, hull, pool))
     np.testing.assert_array_equal(*results)
 
 
@@ -130,9 +128,8 @@ def depths(solid):
 
 
 @pytest.fixture
-def lidless(monkeypatch):
+def lidless():
     """A box without a lid, of which Gaussians show one: its photographs, masks and both depths."""
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 60_000)
     shown, true = depths(block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])), depths(without_lid())
     return *photographed(without_lid(), 0.25), shown, true
 
@@ -140,9 +137,8 @@ def lidless(monkeypatch):
 def deeper(views, masks, shown, far):
     met, rows = np.zeros(shown.shape, np.int32), np.zeros((len(shown), 18))
     with ThreadPool(1) as pool:
-        return refine_depth(
-            DepthRendering(views.rgb, shown, far, met, rows), views, masks, pool
-        ).depth
+        rendering = DepthRendering(views.rgb, shown, far, met, rows)
+        return refine_depth(rendering, views, masks, pool, COARSE).depth
 
 
 def test_photographs_see_below_a_thin_lid_of_gaussians(lidless):

@@ -14,9 +14,7 @@ from corporeal.geometry.rotation import matrix_from_quaternion
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians import (
     gaussian_initialisation,
-    plane_sweep,
     scale_limits,
-    visual_hull,
 )
 from corporeal.reconstruction.gaussians.carved_volume import carve_volume
 from corporeal.reconstruction.gaussians.densification import (
@@ -38,10 +36,15 @@ from corporeal.reconstruction.gaussians.gaussian_parameters import (
     parameters_of_gaussians,
 )
 from corporeal.reconstruction.gaussians.heldout_quality import heldout_quality, psnr, ssim
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.image_loss import TargetImage, image_loss, target_image
 from corporeal.reconstruction.gaussians.kernels_plane_sweep import count_support
 from corporeal.reconstruction.gaussians.kernels_training import SSIM_WINDOW, adam_rows
-from corporeal.reconstruction.gaussians.plane_sweep import neighbouring_views, sweep_planes
+from corporeal.reconstruction.gaussians.plane_sweep import (
+    PlaneSweepConfig,
+    neighbouring_views,
+    sweep_planes,
+)
 from corporeal.reconstruction.gaussians.rasteriser_numba import draw, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import camera_rows
@@ -202,15 +205,16 @@ def test_parallel_cameras_have_a_region():
     assert np.isfinite(find_viewed_region(around(1) * 3).centre).all()
 
 
-def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 50_000)
+def test_the_hull_of_a_ball_is_a_ball():
+    coarse = HullConfig(grid_cells=50_000)
     cameras = around(40, (64, 64), focal=80.0)
     u, v = np.meshgrid(np.arange(64) + 0.5, np.arange(64) + 0.5)
     disc = np.hypot(u - 32, v - 32) < 80 * 0.5 / np.sqrt(9 - 0.25)
     masks = np.stack([disc] * 40)
     views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)  # plain: stereo sees nothing
     with ThreadPool(1) as pool:
-        points = points_on_hull(carve_volume(views, masks, None, pool), 3000, RNG(0), pool, 0.2)
+        carved = carve_volume(views, masks, None, pool, coarse)
+        points = points_on_hull(carved, 3000, RNG(0), pool, 0.2)
         distance, faint = (
             np.linalg.norm(points.position, axis=1),
             points.opacity < gaussian_initialisation.INITIAL_HULL_OPACITY,
@@ -221,7 +225,7 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
         # Evenly: the share within a radius grows as its cube.
         np.testing.assert_allclose(np.median(within), 0.5 * 0.5 ** (1 / 3), atol=0.02)
         with pytest.raises(UserError, match="inside all masks"):
-            carve_volume(views, np.zeros_like(masks), None, pool)
+            carve_volume(views, np.zeros_like(masks), None, pool, coarse)
 
 
 @pytest.fixture(scope="module")
@@ -241,10 +245,9 @@ def ball():
     return pictured(made, cameras, (0.5, 0.5, 0.5))[0]
 
 
-def test_a_sweep_finds_the_surface(ball, monkeypatch):
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 8_000)
+def test_a_sweep_finds_the_surface(ball):
     with ThreadPool(1) as pool:
-        points = sweep_planes(ball, 20_000, RNG(0), pool).points
+        points = sweep_planes(ball, 20_000, RNG(0), pool, PlaneSweepConfig(8_000)).points
     distance = np.linalg.norm(points.position - [0.5, 0, 0], axis=1)
     near = distance < 1
     assert near.sum() > 200
@@ -267,24 +270,23 @@ def test_a_view_that_knows_no_depth_neither_confirms_nor_denies():
     np.testing.assert_array_equal(votes, [[1, 1]])
 
 
-def test_the_number_of_threads_changes_no_sweep(ball, monkeypatch):
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 3_000)
-    found = []
+def test_the_number_of_threads_changes_no_sweep(ball):
+    config, found = PlaneSweepConfig(max_depths=3_000), []
     for threads in (1, 3):
         with ThreadPool(threads) as pool:
-            found.append(sweep_planes(ball, 500, RNG(0), pool).points.position)
+            found.append(sweep_planes(ball, 500, RNG(0), pool, config).points.position)
     np.testing.assert_array_equal(*found)
 
 
-def test_cameras_that_look_past_each_other_agree_nowhere(ball, monkeypatch):
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 1_000)
+def test_cameras_that_look_past_each_other_agree_nowhere(ball):
     away = []
     for k, camera in enumerate(ball.cameras[:6]):
         pose = camera.world_from_camera.copy()
         pose[:3, 3] += [100 * k, 0, 0]
         away.append(replace(camera, world_from_camera=pose))
     with ThreadPool(1) as pool, pytest.raises(UserError, match="agree on no place"):
-        sweep_planes(Views(ball.rgb[:6], tuple(away)), 500, RNG(0), pool)
+        views = Views(ball.rgb[:6], tuple(away))
+        sweep_planes(views, 500, RNG(0), pool, PlaneSweepConfig(max_depths=1_000))
 
 
 def test_neighbours_are_beside_but_not_on_the_spot():
@@ -314,5 +316,5 @@ def test_the_quality_of_the_truth_is_that_of_rounding():
     truth, cameras = blobs(), around(6)
     views, masks = pictured(truth, cameras, (0.5, 0.5, 0.5))
     same = heldout_quality(truth, views, range(6), background=(0.5, 0.5, 0.5))
-    assert same.psnr > 55 and same.ssim > 0.999 and same.psnr_things is None
-    assert heldout_quality(truth, views, [1, 3], masks, (0.5, 0.5, 0.5)).psnr_things > 50
+    assert same.psnr > 55 and same.ssim > 0.999 and same.psnr_on_objects is None
+    assert heldout_quality(truth, views, [1, 3], masks, (0.5, 0.5, 0.5)).psnr_on_objects > 50

@@ -9,7 +9,6 @@ from splat_scenes import around, blobs, pictured
 from corporeal.core.types import Gaussians
 from corporeal.geometry.gaussian_transforms import gaussian_subset
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
-from corporeal.reconstruction.gaussians import foreground, swept_floor_masks
 from corporeal.reconstruction.gaussians.swept_floor_masks import masks_above_floor
 
 CAMERAS = around(24, (96, 80), focal=100.0, centre=(0, 0, 0.3))[:14]
@@ -59,12 +58,10 @@ def test_a_shadow_is_none_of_the_thing_that_stands_on_a_floor_of_its_colour(scen
     assert (found & true).sum() / true.sum() > 0.95
 
 
-def test_what_is_lost_in_the_floors_layer_goes_on_as_above_it(scene, monkeypatch):
+def test_what_is_lost_in_the_floors_layer_goes_on_as_above_it(scene):
     whole, kind = scene
-    for module in (foreground, swept_floor_masks):
-        monkeypatch.setattr(module, "THICK", 0.05)
     _, true = pictured(gaussian_subset(whole, kind == POST), CAMERAS)
-    found = masks_above_floor(whole, CAMERAS, floor=True, threads=1)
+    found = masks_above_floor(whole, CAMERAS, floor=True, threads=1, layer_radii=0.05)
     low, least = ([np.flatnonzero(m.any(axis=1))[-1] for m in masks] for masks in (found, true))
     assert np.abs(np.subtract(low, least)).max() <= 1
 

@@ -9,22 +9,27 @@ from splat_scenes import around, blobs, pictured
 from corporeal.core.errors import UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface, Views
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
-from corporeal.reconstruction.gaussians import (
-    carved_volume,
-    plane_sweep,
-    scale_limits,
-    visual_hull,
-)
+from corporeal.reconstruction.gaussians import carved_volume, scale_limits
 from corporeal.reconstruction.gaussians import train_gaussians as module
 from corporeal.reconstruction.gaussians.depth_rendering import render_depth
 from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, points_on_hull
+from corporeal.reconstruction.gaussians.hull_config import HullConfig
+from corporeal.reconstruction.gaussians.plane_sweep import PlaneSweepConfig
 from corporeal.reconstruction.gaussians.scale_limits import equal_scale_limits
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
-from corporeal.reconstruction.gaussians.training_schedule import TrainConfig, shrink_picture
+from corporeal.reconstruction.gaussians.training_schedule import (
+    DensificationConfig,
+    TrainConfig,
+    shrink_picture,
+)
 from glb_maker import CUBE, CUBE_TRIANGLES
 
-SMALL = TrainConfig(preset="draft", gaussians=400, steps=160, threads=1)
+COARSE = TrainConfig(
+    "draft", threads=1, hull=HullConfig(grid_cells=30_000), sweep=PlaneSweepConfig(max_depths=4_000)
+)
+"""Begins from coarse hulls and few depths."""
+SMALL = replace(COARSE, gaussians=400, steps=160)
 
 
 @pytest.fixture(scope="module")
@@ -33,18 +38,12 @@ def scene():
     return pictured(blobs(40), around(16, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
 
 
-@pytest.fixture(autouse=True)
-def coarse_beginnings(monkeypatch):
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 30_000)
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 4_000)
-
-
 def test_things_are_learned_from_pictures_and_masks(scene):
     views, masks = scene
     told = []
     out = train_gaussians(views, masks, config=SMALL, progress=lambda f, w: told.append((f, w)))
     assert out.quality.views == (4, 12)
-    assert out.quality.psnr > 24 and out.quality.psnr_things > 22
+    assert out.quality.psnr > 24 and out.quality.psnr_on_objects > 22
     fractions = [f for f, _ in told]
     assert len(told) == 160 and fractions == sorted(fractions) and fractions[-1] == 1
     assert "dB" in told[80][1] and "s left" in told[80][1]
@@ -71,7 +70,8 @@ def plain(boxes):
     return views, views.object_of_pixel >= 0
 
 
-LEARNING = TrainConfig(gaussians=2000, steps=400, threads=1)
+LEARNING = replace(COARSE, preset="normal", gaussians=2000, steps=400)
+FINE = replace(LEARNING, hull=HullConfig(grid_cells=300_000))
 
 
 @pytest.mark.slow
@@ -81,14 +81,13 @@ def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
     A small training finds the seat where stereo says nothing, and stereo opens the hull.
     """
     views, masks = plain(BENCH)
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 300_000)
-    on_it = replace(LEARNING, begin="hull")
-    opened = train_gaussians(views, masks, config=on_it).quality.psnr_things
+    on_it = replace(FINE, begin="hull")
+    opened = train_gaussians(views, masks, config=on_it).quality.psnr_on_objects
     monkeypatch.setattr(
         carved_volume, "hull_cells_seen_past", lambda v, m, closed, p: closed.inside & False
     )
-    made = train_gaussians(views, masks, config=LEARNING).quality.psnr_things
-    control = train_gaussians(views, masks, config=on_it).quality.psnr_things
+    made = train_gaussians(views, masks, config=FINE).quality.psnr_on_objects
+    control = train_gaussians(views, masks, config=on_it).quality.psnr_on_objects
     assert made > control + 2 and made > 25
     assert opened > control + 2 and opened > 25
 
@@ -106,11 +105,10 @@ def test_nothing_begins_inside_a_box():
 @pytest.mark.slow
 def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_through(monkeypatch):
     views, masks = plain(BENCH)
-    monkeypatch.setattr(visual_hull, "HULL_GRID_CELLS", 300_000)
 
     def deep() -> float:
         """Return how far below the faces what is seen lies, in the mean [m]."""
-        made = train_gaussians(views, masks, config=replace(LEARNING, begin="inside")).gaussians
+        made = train_gaussians(views, masks, config=replace(FINE, begin="inside")).gaussians
         with ThreadPool(1) as pool:
             seen = render_depth(made, views.cameras, pool).depth
         shown = masks & np.isfinite(seen)
@@ -129,7 +127,7 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
 def test_a_scene_without_masks_starts_from_a_sweep(scene):
     views, _ = scene
     out = train_gaussians(views, config=SMALL)
-    assert out.quality.psnr > 20 and out.quality.psnr_things is None
+    assert out.quality.psnr > 20 and out.quality.psnr_on_objects is None
 
 
 def test_given_points_are_where_it_starts(scene):
@@ -146,11 +144,11 @@ def test_nobody_sees_the_held_out_views(scene):
     views, masks = scene
     spoilt = views.rgb.copy()
     spoilt[[4, 12]] = 0
-    config = TrainConfig(preset="draft", gaussians=200, steps=20, threads=1)
+    config = replace(COARSE, gaussians=200, steps=20)
     honest = train_gaussians(views, masks, config=config).gaussians
     blind = train_gaussians(Views(spoilt, views.cameras), masks, config=config).gaussians
     np.testing.assert_array_equal(honest.mean, blind.mean)
-    all_of_them = TrainConfig(preset="draft", gaussians=200, steps=20, held_out=0, threads=1)
+    all_of_them = replace(config, held_out=0)
     assert train_gaussians(views, masks, config=all_of_them).quality is None
 
 
@@ -158,13 +156,11 @@ class KilledError(Exception):
     pass
 
 
-def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "CHECKPOINT_INTERVAL_S", 0.0)
-    monkeypatch.setattr(module, "DENSIFICATION_SPAN", (10, 0.8))
-    monkeypatch.setattr(module, "STEPS_PER_DENSIFICATION", 7)
+def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_path):
     views, masks = scene
     path = tmp_path / "training.npz"
-    few = replace(SMALL, steps=60)
+    often = DensificationConfig(interval_steps=7, begin_step=10)
+    few = replace(SMALL, steps=60, densification=often, checkpoint_interval_s=0.0)
     whole = train_gaussians(views, masks, config=few).gaussians
 
     def kill(fraction, words):
@@ -189,12 +185,11 @@ def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_pa
     np.testing.assert_array_equal(last.gaussians.mean, whole.mean)
 
 
-@pytest.mark.parametrize("spoil", ["another", "torn"])
-def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, monkeypatch, spoil):
-    monkeypatch.setattr(module, "CHECKPOINT_INTERVAL_S", 0.0)
+@pytest.mark.parametrize("spoil", ["seed", "hull", "torn"])
+def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, spoil):
     views, masks = scene
     path, steps = tmp_path / "training.npz", []
-    config = TrainConfig(preset="draft", gaussians=200, steps=6, threads=1)
+    config = replace(COARSE, gaussians=200, steps=6, checkpoint_interval_s=0.0)
 
     def kill(fraction, words):
         if words.startswith("step 4 "):
@@ -204,8 +199,10 @@ def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, mon
         train_gaussians(views, masks, config=config, checkpoint=path, progress=kill)
     if spoil == "torn":
         path.write_bytes(path.read_bytes()[:1000])
+    elif spoil == "seed":
+        config = replace(config, seed=1)
     else:
-        config = TrainConfig(preset="draft", gaussians=200, steps=6, threads=1, seed=1)
+        config = replace(config, hull=HullConfig(grid_cells=40_000))
     train_gaussians(
         views, masks, config=config, checkpoint=path, progress=lambda f, w: steps.append(w)
     )
@@ -213,11 +210,10 @@ def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, mon
 
 
 @pytest.mark.parametrize("shade", [0, 255])
-def test_pictures_of_nothing_are_refused_and_with_masks_give_no_nan(shade, monkeypatch):
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 500)
+def test_pictures_of_nothing_are_refused_and_with_masks_give_no_nan(shade):
     cameras = around(4)
     views = Views(np.full((4, 40, 48, 3), shade, np.uint8), cameras)
-    config = TrainConfig(preset="draft", gaussians=100, steps=30, threads=1)
+    config = replace(COARSE, gaussians=100, steps=30, sweep=PlaneSweepConfig(max_depths=500))
     with pytest.raises(UserError, match="agree on no place"):
         train_gaussians(views, config=config)
     masks = np.zeros((4, 40, 48), bool)

@@ -6,7 +6,7 @@ from splat_scenes import around, blobs, pictured
 
 from corporeal.core.types import Gaussians, Views
 from corporeal.multiview.ground_plane import GroundPlane
-from corporeal.reconstruction.gaussians import exposure_gains, plane_sweep, scale_limits
+from corporeal.reconstruction.gaussians import exposure_gains, scale_limits
 from corporeal.reconstruction.gaussians.background_model import (
     BackgroundModel,
     background_model,
@@ -22,7 +22,7 @@ from corporeal.reconstruction.gaussians.gaussian_initialisation import (
 from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
 from corporeal.reconstruction.gaussians.heldout_quality import heldout_quality
 from corporeal.reconstruction.gaussians.kernels_training import adam_rows
-from corporeal.reconstruction.gaussians.plane_sweep import sweep_planes
+from corporeal.reconstruction.gaussians.plane_sweep import PlaneSweepConfig, sweep_planes
 from corporeal.reconstruction.gaussians.rasteriser_numba import draw, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
@@ -146,9 +146,8 @@ def test_what_is_out_of_the_picture_stays_or_fades():
     assert theta[0, 10] == before[0] and theta[1, 10] < before[1] - 0.05
 
 
-def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
+def test_smooth_pictures_are_laid_on_the_floor():
     """Of a floor only a spot about a ball has texture; all of it is found."""
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 6_000)
     rng, count = RNG(1), 12_000
     flat = rng.uniform(-3, 3, (count, 3)) * [1, 1, 0] - [0, 0, 0.5]
     near = np.linalg.norm(flat[:, :2], axis=1) < 0.5
@@ -165,7 +164,7 @@ def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
     )
     views, _ = pictured(made, above(16, size=(96, 96), focal=120.0), (0.5, 0.5, 0.5))
     with ThreadPool(1) as pool:
-        points = sweep_planes(views, 3000, RNG(0), pool).points
+        points = sweep_planes(views, 3000, RNG(0), pool, PlaneSweepConfig(6_000)).points
     on = np.abs(points.position[:, 2] + 0.49) < 0.04
     wide = np.linalg.norm(points.position[:, :2], axis=1)
     around_it = (wide > 0.7) & (wide < 2) & (points.position[:, 2] < 1)
@@ -173,12 +172,12 @@ def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
 
 
 @pytest.mark.slow
-def test_exposures_are_learned_and_held_against_nobody(monkeypatch):
-    monkeypatch.setattr(plane_sweep, "MAX_SWEEP_DEPTHS", 4_000)
+def test_exposures_are_learned_and_held_against_nobody():
     views, _ = pictured(blobs(40), around(16, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
     gains = np.exp(0.15 * RNG(0).normal(size=(16, 3)))
     rgb = np.clip(views.rgb * gains[:, None, None], 0, 255).astype(np.uint8)
-    config = TrainConfig(preset="draft", gaussians=400, steps=300, threads=1)
+    coarse = PlaneSweepConfig(max_depths=4_000)
+    config = TrainConfig(preset="draft", gaussians=400, steps=300, threads=1, sweep=coarse)
     out = train_gaussians(Views(rgb, views.cameras), config=config)
     learned = [k for k in range(16) if k % 8 != 4]
     true = np.log(gains[learned] / np.exp(np.log(gains[learned]).mean(axis=0)))

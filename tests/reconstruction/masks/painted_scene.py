@@ -25,24 +25,28 @@ MIDDLES = {"head": HEAD, "close": CLOSE}
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
-def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=None):
+def scene(
+    ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=None, finer=1, floor=FLOOR
+):
     """Photographs of a ball on a mottled floor, its true masks, and points on both.
 
     belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius
     of three discs of the ball's colour that lie on the floor around it; other: a blue "ball" beside
     it, or a blue "disc" that lies there, or a "head", the blue ball where it touches, or "close",
-    where it all but does, which is in the masks, too: both sides of all pictures are blue then.
+    where it all but does, which is in the masks, too: both sides of all pictures are blue then;
+    finer: how many times as many rows and columns pictures have; floor: its height [m].
     """
     random = np.random.default_rng(seed)
     mottled = random.uniform(-1, 1, (64, 64, 64))
+    wide, high = finer * WIDE, finer * HIGH
     turns = 2.4 * np.arange(count)
     eyes = np.stack([2.6 * np.cos(turns), 2.6 * np.sin(turns), np.linspace(0.5, 2.0, count)], -1)
     cameras = tuple(
-        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, WIDE, HIGH)) for e in eyes
+        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, wide, high)) for e in eyes
     )
     pictures, masks, seen = [], [], []
     for camera in cameras:
-        v, u = np.mgrid[:HIGH, :WIDE] + 0.5
+        v, u = np.mgrid[:high, :wide] + 0.5
         local = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(camera.K).T
         rays = local @ camera.world_from_camera[:3, :3].T
         rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
@@ -51,7 +55,7 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         inside = b * b - (eye @ eye - RADIUS**2)
         on = inside > 0
         with np.errstate(divide="ignore"):
-            down = np.where(rays[..., 2] < 0, (FLOOR - eye[2]) / rays[..., 2], 30.0)
+            down = np.where(rays[..., 2] < 0, (floor - eye[2]) / rays[..., 2], 30.0)
         far = np.where(on, -b - np.sqrt(np.maximum(inside, 0)), np.minimum(down, 30.0))
         blue, near = _met(rays, eye, far, MIDDLES[other] if other in MIDDLES else OTHER)
         if other in ("ball", *MIDDLES):
@@ -60,14 +64,14 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         if other == "disc":
             blue = ~on & (np.linalg.norm(place - OTHER, axis=-1) < 1.5 * OTHER_RADIUS)
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
-        tone = mottled[tuple(at)].reshape(HIGH, WIDE)
+        tone = mottled[tuple(at)].reshape(high, wide)
         colour = np.where((on | on_discs(place, flat))[..., None], ball, ground)
         if other in MIDDLES:
-            colour[np.abs(u - WIDE / 2) > ASIDE] = BLUE
+            colour[np.abs(u - wide / 2) > ASIDE] = BLUE
         if other is not None:
             colour[blue] = BLUE
         if belt is not None:
-            aside = np.abs(u - WIDE / 2) > ASIDE
+            aside = np.abs(u - wide / 2) > ASIDE
             colour[aside | (on & (np.abs(place[..., 2]) < BELT))] = belt
         colour = colour * (1 + 0.15 * tone[..., None])
         light = np.where(on, 0.75 + 0.25 * place[..., 2] / RADIUS, 1.0)

@@ -1,9 +1,11 @@
 """A shadow on a floor that has a colour is floor, not a part of what casts it."""
 
+from functools import partial
+
 import numpy as np
 import painted_scene
 import pytest
-from painted_scene import FLOOR, GREY, RED, agreement, scene
+from painted_scene import FLOOR, GREY, RED, agreement
 
 from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
@@ -14,18 +16,13 @@ from corporeal.reconstruction.masks.mask_quality import mask_doubt
 from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
 from corporeal.reconstruction.masks.region_growing import grow_masks
 
+scene = partial(painted_scene.scene, finer=2)
 GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
 OAK, SLATE = (0.62, 0.46, 0.32), (0.12, 0.12, 0.16)
 FAINT = 0.25
 """Share of the floor's pattern that is left: in shadow it drowns in noise."""
 LEFT = 0.25
 """Share of the light that reaches the floor in the shadow."""
-
-
-@pytest.fixture(autouse=True)
-def finer(monkeypatch):
-    monkeypatch.setattr(painted_scene, "WIDE", 2 * painted_scene.WIDE)
-    monkeypatch.setattr(painted_scene, "HIGH", 2 * painted_scene.HIGH)
 
 
 def in_shadow(place):

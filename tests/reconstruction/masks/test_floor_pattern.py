@@ -1,9 +1,10 @@
 """Where a pattern on the floor shows is no object, whatever its colours."""
 
+from functools import partial
+
 import numpy as np
 import painted_scene
-import pytest
-from painted_scene import FLOOR, scene
+from painted_scene import FLOOR
 
 from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
@@ -12,13 +13,8 @@ from corporeal.reconstruction.masks.floor_pattern import shows_floor_pattern
 
 FINER = 3
 """A patch of seven pixels must be smaller than the ball's foot."""
+scene = partial(painted_scene.scene, finer=FINER)
 GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
-
-
-@pytest.fixture(autouse=True)
-def finer(monkeypatch):
-    monkeypatch.setattr(painted_scene, "WIDE", FINER * painted_scene.WIDE)
-    monkeypatch.setattr(painted_scene, "HIGH", FINER * painted_scene.HIGH)
 
 
 def test_a_pattern_of_the_floor_is_told_from_what_stands_on_it():

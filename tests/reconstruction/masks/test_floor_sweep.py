@@ -1,14 +1,16 @@
 """Where no points show the floor, the level plane on which views see one pattern is it."""
 
+from functools import partial
+
 import numpy as np
 import painted_scene
 import pytest
-from painted_scene import FLOOR, scene
+from painted_scene import FLOOR
 
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.viewed_region import find_viewed_region
-from corporeal.reconstruction.masks import floor_sweep as module
 from corporeal.reconstruction.masks.floor_sweep import (
+    FloorSweepConfig,
     _pattern_fraction,
     level_plane,
     sweep_floor_plane,
@@ -16,12 +18,7 @@ from corporeal.reconstruction.masks.floor_sweep import (
 from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
 
 UP = np.array([0.0, 0.0, 1.0])
-
-
-@pytest.fixture(autouse=True)
-def finer(monkeypatch):
-    monkeypatch.setattr(painted_scene, "WIDE", 2 * painted_scene.WIDE)
-    monkeypatch.setattr(painted_scene, "HIGH", 2 * painted_scene.HIGH)
+scene = partial(painted_scene.scene, finer=2)
 
 
 def test_growing_begins_with_a_floor_that_no_points_show():
@@ -55,17 +52,16 @@ def test_cameras_that_lean_anyhow_know_no_level_plane():
     )
 
 
-def test_a_floor_between_two_heights_that_are_tried_is_found(monkeypatch):
+def test_a_floor_between_two_heights_that_are_tried_is_found():
     """Under a flash the share of the nearest of them was below what a floor needs."""
     views, _, _ = scene(count=20)
     around = find_viewed_region(views.cameras)
     off = 0.012
     true = (FLOOR - around.centre[2]) / around.radius
-    monkeypatch.setattr(module, "SWEPT_HEIGHTS_RADII", true + off + np.linspace(-0.4, 0.4, 9))
     shares = [
         _pattern_fraction(views, level_plane(UP, h, around), around) for h in (true, true + off)
     ]
-    monkeypatch.setattr(module, "MIN_PATTERN_FRACTION", sum(shares) / 2)
-    found = sweep_floor_plane(views, around)
+    config = FloorSweepConfig(true + off - 0.4, true + off + 0.4, 9, sum(shares) / 2)
+    found = sweep_floor_plane(views, around, config)
     assert found is not None
     assert found.offset == pytest.approx(FLOOR, abs=0.005 * around.radius)

@@ -1,9 +1,10 @@
 """A thing of the colours of a printed floor is told from it by what the floor has at each place."""
 
+from functools import partial
+
 import numpy as np
 import painted_scene
-import pytest
-from painted_scene import GREY, agreement, scene
+from painted_scene import GREY, agreement
 
 from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
@@ -26,14 +27,8 @@ from corporeal.reconstruction.masks.region_growing import grow_masks
 
 LOW = -0.51
 """Height of the floor: not between two cells of the paint."""
+scene = partial(painted_scene.scene, finer=2, floor=LOW)
 GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), LOW, 0.5, 0.001)
-
-
-@pytest.fixture(autouse=True)
-def finer(monkeypatch):
-    monkeypatch.setattr(painted_scene, "WIDE", 2 * painted_scene.WIDE)
-    monkeypatch.setattr(painted_scene, "HIGH", 2 * painted_scene.HIGH)
-    monkeypatch.setattr(painted_scene, "FLOOR", LOW)
 
 
 def printed(count=20):

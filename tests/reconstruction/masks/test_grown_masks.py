@@ -89,7 +89,7 @@ def test_what_was_corrected_is_kept_and_makes_results_stale(grown, tmp_path):
     assert list(edited_masks(made.folder)) == ["masks/0003.png"]
     assert run._borrowed("reconstruct") != before
     again = grown_masks(folder, tmp_path / "0-reconstruct")
-    assert again.said[-1] == "1 of the masks were corrected by hand."
+    assert again.said[-1] == "1 of the masks were corrected manually."
     assert np.asarray(Image.open(mask)).min() == 255
 
 

@@ -91,7 +91,7 @@ def test_of_what_hovers_less_needs_to_stand_under_it(grown):
 
 
 def test_masks_of_what_is_too_thin_end_the_run(grown, tmp_path, monkeypatch):
-    """Of a chain a pixel along its outline was a quarter; a film of a thicker one came out."""
+    """Of a chain a pixel along its outline was a quarter; a video of a thicker one came out."""
     write_views(tmp_path / "photos", scene()[0])
     thin = replace(grown, thinness=0.24)
     monkeypatch.setattr(module, "_grow_and_describe", lambda *_: (thin, []))

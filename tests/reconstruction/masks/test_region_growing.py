@@ -10,7 +10,6 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
 from corporeal.reconstruction.masks import region_growing as growing
-from corporeal.reconstruction.masks import voxel_volume
 from corporeal.reconstruction.masks.floor_grid import floor_intersections
 from corporeal.reconstruction.masks.mask_prompts import (
     PicturePrompt,
@@ -63,8 +62,7 @@ def test_flat_things_of_its_colour_beside_it_are_told():
     assert why is not None and "times as much with its colours" in why
 
 
-def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_a_thing(monkeypatch):
-    monkeypatch.setattr(voxel_volume, "MIN_PIECE_TO_LARGEST", 0.005)  # of a ball a disc is a crumb
+def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_a_thing():
     views, masks, points = scene(flat=0.2)
     plane = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 1.0, 0.01)
     places = np.stack(
@@ -75,7 +73,10 @@ def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_a_thing(monke
     )
     discs = on_discs(places, 0.2) & ~masks
     for flat, least, most in ((False, 0.0, 0.1), (True, 0.95, 1.0)):
-        grown = grow_masks(views, seeds_from_cameras(views, points), flat=flat)
+        seeds = replace(
+            seeds_from_cameras(views, points), piece=0.005
+        )  # a disc is a crumb of a ball
+        grown = grow_masks(views, seeds, flat=flat)
         assert grown is not None
         inside = grown.inside > 0.5
         assert least <= inside[discs].mean() <= most
@@ -131,7 +132,7 @@ def test_a_box_leaves_out_what_is_beside_it():
 def test_pointing_at_what_is_everywhere_is_refused():
     views = scene()[0]
     plain = Views(np.full_like(views.rgb, 90), views.cameras)
-    with pytest.raises(UserError, match="cannot be told from what is around it"):
+    with pytest.raises(UserError, match="cannot be separated from its surroundings"):
         seeds_from_prompt(plain, None, PicturePrompt(0, np.array([[40.0, 30.0], [50.0, 40.0]])))
 
 

@@ -135,4 +135,4 @@ def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count,
     if found > 1:
         assert same(split.object_of_point, owner) > 0.95
     else:
-        assert any("what touches was taken for one" in said for said in split.warnings)
+        assert any("touching objects count as one" in said for said in split.warnings)

@@ -213,10 +213,12 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([tmp_path / "DCIM"])
     with pytest.raises(UserError, match=r"is a single picture, which shows no depth\. Take 40"):
         assemble([lost / "a.jpg"])
-    (tmp_path / "films").mkdir()
-    (tmp_path / "films" / "a.MOV").touch()
-    with pytest.raises(UserError, match=r"holds 1 films and no model\. Name the film itself: .*a"):
-        assemble([tmp_path / "films"])
+    (tmp_path / "videos").mkdir()
+    (tmp_path / "videos" / "a.MOV").touch()
+    with pytest.raises(
+        UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"
+    ):
+        assemble([tmp_path / "videos"])
 
 
 @pytest.mark.parametrize(
@@ -236,11 +238,11 @@ def test_what_only_its_name_calls_a_picture_is_not_called_one(tmp_path, name, sa
 @pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
 def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
     saved(tmp_path, greys[:count], ".jpg", Image.fromarray)
-    with pytest.raises(BadFileError, match=f"photos: {said} too few to show a thing"):
+    with pytest.raises(BadFileError, match=f"photos: {said} too few to show an object"):
         gathered(tmp_path)
 
 
-def test_half_a_film_is_not_told_to_become_the_kind_it_is(tmp_path):
+def test_half_a_video_is_not_told_to_become_the_kind_it_is(tmp_path):
     (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
     with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
         write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)
@@ -271,7 +273,7 @@ def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
     names = tuple(f"{k}.jpg" for k in range(COUNT))
     cropped = PreparedImages(names, tuple((64, 40 + k) for k in range(COUNT)), ())
     whole = PreparedImages(names, ((64, 48),) * COUNT, ())
-    assert "as the camera took them" in _refusal(["why"], cropped, ()).what_to_do
+    assert "original photographs" in _refusal(["why"], cropped, ()).what_to_do
     assert "newspaper" in _refusal(["why"], whole, ()).what_to_do
 
 

@@ -146,7 +146,7 @@ def two_places(tmp_path_factory):
 @pytest.mark.slow
 def test_two_places_in_one_folder_are_refused_in_one_sentence(two_places, tmp_path):
     pytest.importorskip("pycolmap")
-    told = "show 2 things or places .* 14 like a_photo_000.jpg, 12 like b_photo_000.jpg"
+    told = "show 2 objects or places .* 14 like a_photo_000.jpg, 12 like b_photo_000.jpg"
     with pytest.raises(BadFileError, match=told) as error:
         find_poses(two_places, tmp_path / "poses", silent)
     assert "folder of their own" in str(error.value) and "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""Where photographs, or frames of a film, were taken from."""
+"""Where photographs, or frames of a video, were taken from."""
 
 import json
 import shutil
@@ -20,7 +20,6 @@ from corporeal.reconstruction import gaussian_source as reconstructing
 from corporeal.reconstruction.masks.grown_masks import GrownMasks
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.reconstruction.sfm import find_poses as posing
-from corporeal.reconstruction.sfm import video_frames
 from corporeal.reconstruction.sfm.find_poses import (
     CAMERAS_FIGURE_FILE,
     describe_moved_object,
@@ -278,7 +277,7 @@ def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
     assert tried == ["plain", "thorough"], "both attempts once"
     shutil.copytree(taken[0], tmp_path / "other")
     (tmp_path / "other" / "photo_000.jpg").unlink()
-    with pytest.raises(BadFileError, match="Put the thing on something with a pattern"):
+    with pytest.raises(BadFileError, match="Put the object on something with a pattern"):
         find_poses(tmp_path / "other", tmp_path / "poses", silent)
     assert len(tried) == 4, "other pictures are looked at anew"
 
@@ -365,7 +364,7 @@ RIGHT = {
     "a patterned slab": SfmRun("plain", 48, 48, 13_999, 0.21, (), 1.0, 0.01),
     "a plain floor": SfmRun("thorough", 48, 47, 2403, 0.98, (), 1.0, 0.05),
     "real": SfmRun("thorough", 13, 12, 2092, 0.43, (), 0.99, 0.1),
-    "a film": SfmRun("plain", 30, 30, 9705, 0.3, (), 1.0, 0.0),
+    "a video": SfmRun("plain", 30, 30, 9705, 0.3, (), 1.0, 0.0),
 }
 WRONG = {
     "nothing": (SfmRun("thorough", 20), "no two pictures"),
@@ -447,7 +446,7 @@ def test_eight_names_are_enough():
     assert some_names(tuple("abcdefghijk")) == "a, b, c, d, e, f, g, h and 3 more"
 
 
-# ---------------------------------------------------------------- films
+# ---------------------------------------------------------------- videos
 
 
 def test_frames_are_sharp_and_equally_far_apart():
@@ -466,7 +465,7 @@ def test_frames_are_sharp_and_equally_far_apart():
     assert not set(choose_frames(np.full(200, 1.0), sharp, 20)) & set(range(20, 30))
 
 
-def film(path, count, smeared=lambda k: False, size=(320, 240)):
+def video(path, count, smeared=lambda k: False, size=(320, 240)):
     """A camera that passes over a newspaper; some frames are smeared."""
     paper = np.kron(blots(0, 512), np.ones((2, 2, 1), np.uint8))
     with open_video(path, 30, size) as made:
@@ -480,8 +479,8 @@ def film(path, count, smeared=lambda k: False, size=(320, 240)):
     return path
 
 
-def test_a_film_gives_sharp_frames(tmp_path):
-    path = film(tmp_path / "a.mp4", 120, lambda k: k % 12 < 4)
+def test_a_video_gives_sharp_frames(tmp_path):
+    path = video(tmp_path / "a.mp4", 120, lambda k: k % 12 < 4)
     said = write_video_frames(path, tmp_path / "frames", silent)
     numbers = [int(p.stem[6:]) for p in sorted((tmp_path / "frames").iterdir())]
     assert 40 <= len(numbers) <= 60 and "120 that were looked at" in said[0]
@@ -493,8 +492,8 @@ def test_a_film_gives_sharp_frames(tmp_path):
     assert np.abs(shown - paper[y : y + 240, x : x + 320]).mean() < 12, "and not another frame"
 
 
-def test_a_film_that_was_held_upright_is_turned(tmp_path, caplog):
-    film(tmp_path / "a.mp4", 60)
+def test_a_video_that_was_held_upright_is_turned(tmp_path, caplog):
+    video(tmp_path / "a.mp4", 60)
     program = imageio_ffmpeg.get_ffmpeg_exe()
     command = [program, "-v", "error", "-display_rotation", "90", "-i", str(tmp_path / "a.mp4")]
     subprocess.run([*command, "-c", "copy", str(tmp_path / "b.mp4")], check=True)
@@ -505,24 +504,23 @@ def test_a_film_that_was_held_upright_is_turned(tmp_path, caplog):
 
 
 @pytest.mark.parametrize("kind", ["ten frames", "still", "noise", "empty", "text", "long"])
-def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monkeypatch):
-    path, said = tmp_path / "a.mp4", "cannot be read as a film"
+def test_videos_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind):
+    path, said, longest = tmp_path / "a.mp4", "cannot be read as a video", 600.0
     if kind == "ten frames":
         said = "holds 10 frames; at least 20"
-        film(path, 10)
+        video(path, 10)
     elif kind == "still":
         said = "none of 40 frames are sharp and differ"
         with open_video(path, 30, (320, 240)) as made:
             for _ in range(40):
                 made.add(np.full((240, 320, 3), 90, np.uint8))
     elif kind == "long":
-        said = "is 0 minutes long; at most"
-        monkeypatch.setattr(video_frames, "MAX_VIDEO_S", 0.5)
-        film(path, 30)
+        said, longest = "is 0 minutes long; at most", 0.5
+        video(path, 30)
     else:
-        path.write_bytes({"noise": bytes(range(256)) * 50, "empty": b"", "text": b"film"}[kind])
+        path.write_bytes({"noise": bytes(range(256)) * 50, "empty": b"", "text": b"video"}[kind])
     with pytest.raises(BadFileError, match=said) as error:
-        write_video_frames(path, tmp_path / "frames", silent)
+        write_video_frames(path, tmp_path / "frames", silent, longest)
     assert "\n" not in str(error.value)
 
 
@@ -537,7 +535,7 @@ def test_a_recording_of_a_screen_is_refused(tmp_path):
             made.add(shown)
     with pytest.raises(BadFileError, match="never moves: it is a recording of a screen") as error:
         write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", silent)
-    assert "\n" not in str(error.value) and "Do not turn the thing" in str(error.value)
+    assert "\n" not in str(error.value) and "Do not turn the object" in str(error.value)
 
 
 def test_what_stands_still_before_a_plain_wall_is_no_screen():
@@ -552,7 +550,7 @@ def test_what_stands_still_before_a_plain_wall_is_no_screen():
     assert moves.share < 0.01 and turns.share < 0.05
 
 
-def test_a_film_that_is_not_there_is_named(tmp_path):
+def test_a_video_that_is_not_there_is_named(tmp_path):
     """A scene file that named one ended as a mistake of ours."""
     with pytest.raises(BadFileError, match=r"none\.mp4: there is no such file"):
         find_poses(tmp_path / "none.mp4", tmp_path / "poses", lambda share, what: None)

@@ -56,12 +56,14 @@ def test_by_how_much_is_known(page):
     assert page_shift(page[:HIGH], page[:HIGH]) is None
 
 
-def test_a_film_of_it_is_refused_in_one_sentence(page, tmp_path):
-    film = tmp_path / "page.mp4"
-    writer = imageio_ffmpeg.write_frames(str(film), (WIDE, HIGH), fps=10, quality=8)
+def test_a_video_of_it_is_refused_in_one_sentence(page, tmp_path):
+    video = tmp_path / "page.mp4"
+    writer = imageio_ffmpeg.write_frames(str(video), (WIDE, HIGH), fps=10, quality=8)
     writer.send(None)
     for frame in windows(page):
         writer.send(np.ascontiguousarray(np.dstack([frame] * 3)))
     writer.close()
-    with pytest.raises(UserError, match=r"a recording of a page that is scrolled\. Film the thing"):
-        write_video_frames(film, tmp_path / "frames", lambda share, words: None)
+    with pytest.raises(
+        UserError, match=r"a recording of a page that is scrolled\. Record the object"
+    ):
+        write_video_frames(video, tmp_path / "frames", lambda share, words: None)

@@ -37,7 +37,7 @@ def stamped(tmp_path, rng):
 def test_what_is_stamped_on_pictures_joins_none(stamped):
     looked = match_small_copies(stamped.folder, stamped.gathered, lambda fraction: None)
     assert not (looked.shared >= MIN_SHARED_POINTS).any() and looked.stood_still is None
-    assert f"{COUNT} photographs have the same at the same place" in looked.said
+    assert f"{COUNT} photographs have a watermark" in looked.said
 
 
 def test_no_points_are_looked_for_on_it_and_all_others_are(stamped):

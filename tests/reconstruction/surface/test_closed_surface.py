@@ -13,16 +13,11 @@ from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.reconstruction.surface.closed_surface import _remove_specks, build_closed_surfaces
+from corporeal.reconstruction.surface.surface_config import ClosedSurfaceConfig
 
 PIXEL = 3.5 / 168
 """Of the pictures, at the things [m]."""
-CELLS = {"CELLS": 60_000, "ROUGH": 20_000}
-
-
-@pytest.fixture(autouse=True)
-def small(monkeypatch):
-    for name, value in CELLS.items():
-        monkeypatch.setattr(f"corporeal.reconstruction.surface.closed_surface.{name}", value)
+SMALL = ClosedSurfaceConfig(object_grid_cells=60_000, survey_grid_cells=20_000, threads=1)
 
 
 def shape(solid):
@@ -53,7 +48,7 @@ def box(low, high):
 def test_a_ball_on_the_floor_becomes_a_closed_ball():
     ball = trimesh.creation.icosphere(4, 0.5).apply_translation([0, 0, 0.5])
     gaussians, owner = together(clad(ball))
-    (solid,) = build_closed_surfaces(gaussians, owner, eyes(), masks(eyes(), ball), threads=1)
+    (solid,) = build_closed_surfaces(gaussians, owner, eyes(), masks(eyes(), ball), config=SMALL)
     assert shape(solid).closed and not solid.warnings
     away = np.abs(np.linalg.norm(solid.vertices - [0, 0, 0.5], axis=1) - 0.5)
     assert np.mean(away) < 0.5 * PIXEL
@@ -72,7 +67,7 @@ def test_a_thing_is_as_large_as_its_outlines_though_gaussians_are_wide():
     )
     gaussians, owner = together(clad(inner, 2000))
     blobs = replace(gaussians, scale=np.full_like(gaussians.scale, wide))
-    (solid,) = build_closed_surfaces(blobs, owner, eyes(), masks(eyes(), ball), threads=1)
+    (solid,) = build_closed_surfaces(blobs, owner, eyes(), masks(eyes(), ball), config=SMALL)
     upper = solid.vertices[solid.vertices[:, 2] > 0.3] - [0, 0, 0.3]
     size = np.linalg.norm(upper / (sides / 2), axis=1)
     assert np.median(size) == pytest.approx(1, abs=0.01)
@@ -85,7 +80,7 @@ def test_what_stands_on_the_floor_is_closed_by_it():
     bare = gaussians.mean[:, 2] > 0.01  # nobody ever saw it from below
     kept = {n: getattr(gaussians, n)[bare] for n in ("mean", "rotation", "scale", "opacity", "sh")}
     (solid,) = build_closed_surfaces(
-        Gaussians(**kept), owner[bare], eyes(), masks(eyes(), cube), threads=1
+        Gaussians(**kept), owner[bare], eyes(), masks(eyes(), cube), config=SMALL
     )
     assert solid.vertices[:, 2].min() > -1e-9
     low = (solid.vertices[:, 2] < 0.1 * solid.cell) & (
@@ -104,7 +99,9 @@ def test_a_bowl_stays_open():
         [outer, inner, box([-1, -1, 0.6], [1, 1, 2])], engine="manifold"
     )
     gaussians, owner = together(clad(bowl, 6000))
-    (solid,) = build_closed_surfaces(gaussians, owner, eyes(20), masks(eyes(20), bowl), threads=1)
+    (solid,) = build_closed_surfaces(
+        gaussians, owner, eyes(20), masks(eyes(20), bowl), config=SMALL
+    )
     inside = shape(solid).inside(
         np.array([[0, 0, 0.5], [0, 0, 0.3], [0, 0, 0.07], [0.525, 0, 0.5]])
     )
@@ -125,7 +122,7 @@ def test_what_a_mirror_shows_deep_inside_takes_nothing_that_outlines_need(monkey
     gaussians, owner = together(clad(ball))
     mine = masks(eyes(), ball)
     views = Views(np.zeros((*mine.shape, 3), np.uint8), eyes())
-    (solid,) = build_closed_surfaces(gaussians, owner, eyes(), mine, views, threads=1)
+    (solid,) = build_closed_surfaces(gaussians, owner, eyes(), mine, views, config=SMALL)
     assert solid.volume == pytest.approx(ball.volume, rel=0.05)
 
 
@@ -133,7 +130,9 @@ def test_what_stands_on_legs_is_hollow_below():
     legs = [box([x - 0.04, y - 0.04, 0], [x + 0.04, y + 0.04, 0.6]) for x, y in LEGS]
     table = trimesh.boolean.union([box([-0.5, -0.5, 0.6], [0.5, 0.5, 0.7]), *legs])
     gaussians, owner = together(clad(table, 8000))
-    (solid,) = build_closed_surfaces(gaussians, owner, eyes(20), masks(eyes(20), table), threads=1)
+    (solid,) = build_closed_surfaces(
+        gaussians, owner, eyes(20), masks(eyes(20), table), config=SMALL
+    )
     points = np.array([[x, y, z] for x, y in LEGS for z in (0.1, 0.3, 0.5)])
     assert shape(solid).inside(points).all()
     assert not shape(solid).inside(np.array([[0, 0, 0.1], [0, 0, 0.3], [0.2, 0, 0.4]])).any()
@@ -157,7 +156,9 @@ def test_every_place_in_touching_things_belongs_to_one_of_them():
     names = ("mean", "rotation", "scale", "opacity", "sh")
     kept = {n: getattr(gaussians, n)[~hidden] for n in names}
     shown = masks(eyes(20), below, above)
-    one, two = build_closed_surfaces(Gaussians(**kept), owner[~hidden], eyes(20), shown, threads=1)
+    one, two = build_closed_surfaces(
+        Gaussians(**kept), owner[~hidden], eyes(20), shown, config=SMALL
+    )
     places = np.random.default_rng(0).uniform([-0.5, -0.5, 0], [0.5, 0.5, 0.9], (40000, 3))
     in_one, in_two = shape(one).inside(places), shape(two).inside(places)
     assert not (in_one & in_two).any()
@@ -171,7 +172,7 @@ def test_floor_and_background_are_no_things_but_hide_what_is_behind():
     ground = box([-1.5, -1.5, -0.05], [1.5, 1.5, 0.0])
     gaussians, owner = together(clad(ball), clad(ground, 6000))
     owner = np.where(owner == 1, -1, owner)
-    (solid,) = build_closed_surfaces(gaussians, owner, eyes(), masks(eyes(), ball), threads=1)
+    (solid,) = build_closed_surfaces(gaussians, owner, eyes(), masks(eyes(), ball), config=SMALL)
     assert fits(solid, ball)
     assert np.abs(solid.vertices[:, :2]).max() < 0.4 + PIXEL
 
@@ -180,7 +181,7 @@ def test_specks_in_the_air_are_left_out():
     ball = trimesh.creation.icosphere(4, 0.4).apply_translation([0, 0, 0.4])
     speck = trimesh.creation.icosphere(2, 0.05).apply_translation([0.5, 0.3, 0.9])
     gaussians, owner = together(clad(ball), clad(speck, 200))
-    (solid,) = build_closed_surfaces(gaussians, 0 * owner, eyes(), threads=1)
+    (solid,) = build_closed_surfaces(gaussians, 0 * owner, eyes(), config=SMALL)
     assert solid.vertices[:, 2].max() < 0.82 and not solid.warnings
 
 
@@ -202,7 +203,10 @@ def test_the_number_of_threads_changes_nothing():
     gaussians, owner = together(
         clad(trimesh.creation.icosphere(3, 0.5).apply_translation([0, 0, 0.5]))
     )
-    (one,), (two,) = (build_closed_surfaces(gaussians, owner, eyes(8), threads=n) for n in (1, 3))
+    (one,), (two,) = (
+        build_closed_surfaces(gaussians, owner, eyes(8), config=replace(SMALL, threads=n))
+        for n in (1, 3)
+    )
     np.testing.assert_array_equal(one.vertices, two.vertices)
     np.testing.assert_array_equal(one.colours, two.colours)
 
@@ -210,9 +214,9 @@ def test_the_number_of_threads_changes_nothing():
 def test_an_object_without_gaussians_is_named():
     gaussians, owner = together(clad(trimesh.creation.icosphere(2, 0.5), 200))
     with pytest.raises(UserError, match="object 0"):
-        build_closed_surfaces(gaussians, owner + 1, eyes(8))
+        build_closed_surfaces(gaussians, owner + 1, eyes(8), config=SMALL)
     with pytest.raises(UserError, match="no object"):
-        build_closed_surfaces(gaussians, owner - 1, eyes(8))
+        build_closed_surfaces(gaussians, owner - 1, eyes(8), config=SMALL)
 
 
 def test_an_object_that_is_only_haze_is_named():
@@ -222,7 +226,7 @@ def test_an_object_that_is_only_haze_is_named():
     haze = replace(haze, opacity=np.full(haze.count, 1e-4))
     gaussians, owner = together(solid, haze)
     with pytest.raises(UserError, match="object 2"):
-        build_closed_surfaces(gaussians, owner, eyes(8), threads=1)
+        build_closed_surfaces(gaussians, owner, eyes(8), config=SMALL)
 
 
 def test_what_nobody_sees_is_coloured_without_patches():
@@ -231,7 +235,7 @@ def test_what_nobody_sees_is_coloured_without_patches():
     red = whole.mean[:, :1] < 0
     sh = (np.where(red, (0.8, 0.1, 0.1), (0.1, 0.1, 0.8)) - 0.5)[:, None] / SH_DC_COEFFICIENT
     (solid,) = build_closed_surfaces(
-        replace(whole, sh=sh), owner, eyes(), masks(eyes(), cube), threads=1
+        replace(whole, sh=sh), owner, eyes(), masks(eyes(), cube), config=SMALL
     )
     x, y, z = solid.vertices.T
     below = (z < 0.5 * solid.cell) & (np.maximum(abs(x), abs(y)) < 0.25)

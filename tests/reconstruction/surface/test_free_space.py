@@ -9,11 +9,9 @@ from corporeal.core.types import Gaussians
 from corporeal.geometry.gaussian_transforms import gaussian_subset
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.reconstruction.surface.free_space import pieces_by_free_space
+from corporeal.reconstruction.surface.surface_config import FreeSpaceConfig
 
-
-@pytest.fixture(autouse=True)
-def small(monkeypatch):
-    monkeypatch.setattr("corporeal.reconstruction.surface.free_space.FREE_SPACE_GRID_CELLS", 60_000)
+SMALL = FreeSpaceConfig(grid_cells=60_000, threads=1)
 
 
 def ball(middle, radius=0.25, count=1500):
@@ -37,7 +35,7 @@ def rod(low, high, radius, needles):
 
 def found(gaussians, of_object=None, masks=None):
     mine = np.ones(gaussians.count, bool) if of_object is None else of_object
-    return pieces_by_free_space(gaussians.mean[mine], gaussians, mine, eyes(), masks, threads=1)
+    return pieces_by_free_space(gaussians.mean[mine], gaussians, mine, eyes(), masks, SMALL)
 
 
 def test_things_apart_are_told_apart_and_most_points_come_first():

@@ -1,4 +1,4 @@
-"""A film of the room is refused, a thing among its cameras is not."""
+"""A video of the room is refused, a thing among its cameras is not."""
 
 import numpy as np
 import pytest
@@ -137,9 +137,9 @@ def test_masks_that_no_surface_can_fill_are_of_something_else_too():
 
 
 def test_what_was_seen_from_one_side_only_is_refused():
-    """A television from a fifth of the circle became a block, and was filmed."""
+    """A television from a fifth of the circle became a block, and was rendered."""
     turns = np.radians(np.linspace(0, 60, 12))
     eyes = np.stack([3 * np.cos(turns), 3 * np.sin(turns), np.full(12, 0.8)], axis=-1)
     few = tuple(camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 40.0, 64, 48)) for e in eyes)
     why = boxes_rejection_reason(np.array([box(0.1, 0.1)]), few, masked=True)
-    assert why is not None and "nothing says how deep it is" in why and "--force" in why
+    assert why is not None and "its depth is unknown" in why and "--force" in why

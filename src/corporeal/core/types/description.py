@@ -1,4 +1,4 @@
-"""What a scene is, in words: objects, their parts, and the ways that these may be."""
+"""Descriptions of scenes: objects, parts and hypotheses."""
 
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 @dataclass(frozen=True)
 class RangePlacement:
-    """Where inside a measured range somebody put a value. It cannot leave the range."""
+    """Place of a value inside a measured range."""
 
     fraction: float
     """0: the low end, 1: the high end; on a logarithmic scale where the range is wide."""
@@ -48,9 +48,10 @@ class Provenance:
 
 
 StructureKind = Literal["solid", "shell", "sheet", "hollow", "filled", "packed"]
-"""How a part is made: solid throughout; a wall, open or closed (``shell``, where nobody says which;
+"""How a part is made: solid throughout; a wall, open or closed (``shell``, if not stated which;
 ``sheet`` open: cup, plate, lid, cover; ``hollow`` closed about air); a wall with contents behind it
-(``filled``); or parts and air (``packed``)."""
+(``filled``); or parts and air (``packed``).
+"""
 WALLED_KINDS: tuple[str, ...] = ("shell", "sheet", "hollow", "filled")
 """What has a wall."""
 
@@ -66,9 +67,9 @@ class Hypothesis:
     """In [0, 1]; those of a part add up to 1 at most."""
     contents: str | None = None
     fill: float | None = None
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     solidity: float | None = None
-    """Of what is packed: share of its outer shape that is matter, in [0, 1]."""
+    """Of what is packed: share of its outer shape that is material, in [0, 1]."""
     reading: str = ""
     """What the whole object is then ("imitation"): ways of one reading are drawn together."""
     reason: str = ""
@@ -109,7 +110,7 @@ AnswerSource = Literal["annotation", "recording", "model", "metadata", "unknown"
 class ScanThickening:
     """How much of what a scan draws of a part the real part takes up: scans thicken what is thin.
 
-    Shares of volume [-]: 1 where the model is as thick as the real thing.
+    Shares of volume [-]: 1 where the model is as thick as the real object.
     """
 
     low: float
@@ -143,9 +144,9 @@ class PartDescription:
     contents: str | None = None
     """A name from the library: what is behind the wall of what is filled."""
     fill: float | None = None
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     solidity: float | None = None
-    """Of what is packed: share of its outer shape that is matter, in [0, 1]."""
+    """Of what is packed: share of its outer shape that is material, in [0, 1]."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """All ways it may be, the one above among them, likeliest first; empty: only the one above."""
     placements: dict[str, RangePlacement] = field(default_factory=dict)
@@ -171,12 +172,12 @@ class PartDescription:
     built_by: AnswerSource = "unknown"
     """The source of how it is built; ``answered_by``: of what it is made of."""
     swelling: ScanThickening | None = None
-    """How much of what the mesh draws of it is real; None: nobody said, the mesh counts."""
+    """How much of what the mesh draws of it is real; None: unknown, the mesh counts."""
     wall_unseen: bool = False
     """Whether its surface need not show the inner face of its wall, as pictures do not where that
     is plain: how thick the surface draws it tells nothing."""
     wall_usual: bool = False
-    """Whether ``thickness`` is that of most things of its name: nobody stated it of this one."""
+    """Whether ``thickness`` is that of most objects of its name: it is not stated for this one."""
     wall_why: str = ""
     """Where such a usual thickness is from; "": its table does not say."""
 
@@ -222,7 +223,7 @@ class ObjectDescription:
     usual_extent: float | None = None
     """How large such an object usually is, as a model says [m]."""
     evidence: MassEvidence | None = None
-    """An estimate of its mass made without the library; None: nobody was asked."""
+    """An estimate of its mass made without the library; None: not asked."""
     answers: tuple[ObjectAnswer, ...] = ()
     """Each of several answers, as a whole; what stands above pools them. Empty: one was given."""
 
@@ -232,7 +233,7 @@ class ModelUsage:
     """What the questions to models took; nothing where nothing was asked."""
 
     models: tuple[str, ...] = ()
-    """Who answered, as a person types it, or whoever gave the recorded answers."""
+    """Who answered, as in --vlm, or whoever gave the recorded answers."""
     questions: int = 0
     calls: int = 0
     """Requests that were sent; 0 where all answers came from the disk."""

@@ -1,4 +1,4 @@
-"""What a scene is made of: materials, walls, masses."""
+"""Materials, structures and masses of a scene."""
 
 from dataclasses import dataclass, field
 from enum import Enum
@@ -51,7 +51,7 @@ class Material:
     restitution: float = 0.5
     """Normal restitution where rigid meets rigid [-]."""
     loss: float = 0.0
-    """Loss factor at a blow: tan δ of the bulk at an impact's frequencies and strains [-]."""
+    """Loss factor at an impact: tan δ of the bulk at an impact's frequencies and strains [-]."""
     shell_thickness: float | None = None
     """How thin such objects are usually made [m]; None: solid as a rule."""
     viscosity: float | None = None
@@ -63,8 +63,7 @@ class Material:
     yield_shear: float = 0.0
     """Shear stress below which a paste does not flow [Pa]."""
     strength_local: float | None = None
-    """Tension that a brittle material bears over a square millimetre [Pa]; None: not brittle, or
-    nobody measured it."""
+    """Tension that a brittle material bears over a square millimetre [Pa]; None: not brittle, or not measured."""
     grounds: dict[str, Provenance] = field(default_factory=dict)
     """Field name → why, for every measured number above."""
 
@@ -85,7 +84,7 @@ class Structure:
     contents: Material | None = None
     """What is behind the wall of what is filled; None: air."""
     fill: float = 0.0
-    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    """Share of the cavity inside the wall that the contents take up, in [0, 1]."""
     loose: bool = False
     """Whether the contents lie at the bottom, as liquids and grains do; else they are all over."""
     inflated: bool = False
@@ -97,7 +96,7 @@ class Structure:
     rebound: float | None = None
     """Restitution that rules ask of an inflated ball of its name [-]; None: none is known."""
     solidity: float = 1.0
-    """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
+    """Share of a solid's shape that is material, the rest being air between its pieces; 1: all."""
     holds: str = ""
     """What moves by itself behind the wall of a shell, as an object of its own; "": nothing."""
     sealed: bool = False
@@ -134,7 +133,7 @@ class AnsweredMass:
     mass: float
     """Median over its own ways and ranges, without outside evidence [kg]."""
     judged: float | None
-    """What it was judged to weigh outright [kg]; None: nobody was asked, or no usable answer."""
+    """What it was judged to weigh outright [kg]; None: not asked, or no usable answer."""
     low: float = 0.0
     """5 % [kg]; 0, as ``high``: older runs did not keep it."""
     high: float = 0.0

@@ -1,4 +1,4 @@
-"""Sentences about a result, each with its kind, which is decided where something is noticed.
+"""Notes on results: sentences with a kind, set where they are made.
 
 A note is a string: what only prints sentences knows nothing of kinds. A plain string counts as a
 doubt, which errs to the safe side; so do sentences that were kept before there were kinds.

@@ -1,4 +1,4 @@
-"""What comes in: scenes, pictures and Gaussians."""
+"""Inputs: scenes, pictures and Gaussians."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -8,7 +8,7 @@ from jaxtyping import Float, Int, UInt8
 
 Vector = tuple[float, float, float]
 GRAVITY_M_S2 = 9.81
-"""Where nobody states another [m/s²]."""
+"""Default gravity [m/s²]."""
 GRAVITY_VECTOR: Vector = (0.0, 0.0, -GRAVITY_M_S2)
 """The same as a vector [m/s²]."""
 SUBSTANCE_KEY, STATED_MATTER_KEY = "substance", "stated_matter"
@@ -296,4 +296,4 @@ class Reconstruction:
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
     doubts: tuple[str, ...] = ()
-    """Those of the warnings that say where shapes are not to be believed."""
+    """Those of the warnings that say where shapes are unreliable."""

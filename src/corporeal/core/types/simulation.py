@@ -1,4 +1,4 @@
-"""What is simulated, and what comes of it."""
+"""Particles, treatments, trajectories and videos."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,10 +18,10 @@ class Discretization:
     """How one part enters the simulation: real numbers, simulated numbers, and why they differ."""
 
     kind: Literal["rigid", "deformable", "shell", "foliage"]
-    young_real: float
-    """[Pa]"""
-    young: float
-    """Simulated Young's modulus [Pa]."""
+    young_pa: float
+    """Young's modulus of the material [Pa]."""
+    simulated_young_pa: float
+    """The same as simulated [Pa]."""
     poisson: float
     density: float
     """Simulated density [kg/m³]."""
@@ -37,12 +37,14 @@ class Discretization:
     """Simulated longitudinal wave speed [m/s]; 0 when rigid."""
     step: float
     """Largest stable time step of this part [s]; inf when rigid."""
-    why: str
+    reason: str
     loss: float = 0.0
-    """Simulated loss factor [-]: its material's, less what the grid takes of a blow by itself."""
+    """Simulated loss factor [-]: its material's, less what the grid takes of an impact by
+    itself.
+    """
     vibration: float = 0.0
     """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
-    laid: bool = False
+    is_floor_covering: bool = False
     """Whether it is a rigid sheet that lies on the floor, thinner than half a cell: what strikes it
     strikes the floor."""
 
@@ -116,7 +118,7 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
-    rounding: Float[np.ndarray, "S2 Columns"] = field(
+    curvature: Float[np.ndarray, "S2 Columns"] = field(
         default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
     )
     """How each of those points curves, see ``CURVATURE_COLUMNS``; none: as corners."""
@@ -133,10 +135,10 @@ class Particles:
     """Of plants that stand in soil."""
     contents: tuple[VesselContents, ...] = ()
     """What moves in vessels: objects and parts after all that the scene has."""
-    wetted: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    wetted_point: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Where liquids touch rigid objects, inside of what is hollow too [m]."""
     wetted_normal: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
-    """Unit, out of the matter there."""
+    """Unit, out of the material there."""
     object_of_wetted: Int[np.ndarray, " W"] = field(
         default_factory=lambda: np.zeros(0, dtype=np.int64)
     )
@@ -259,13 +261,13 @@ class FractureEvent:
     energy: float
     """Taken from the motion [J]: what it bears until it breaks."""
     ratio: float
-    """Energy of the blow over that [-]."""
+    """Energy of the impact over that [-]."""
     by: str
     """The other body, or the floor."""
     speed: float
-    """Along the blow [m/s]."""
-    blow: float
-    """Energy of the blow [J]."""
+    """Along the impact [m/s]."""
+    impact_energy: float
+    """Energy of the impact [J]."""
     piece: Int[np.ndarray, " P"]
     """Which piece each of its particles belongs to."""
     surfaces: tuple[Surface, ...]
@@ -290,7 +292,7 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Video:
-    """A finished film."""
+    """A finished video."""
 
     path: Path
     fps: int

@@ -1,4 +1,4 @@
-"""Kinds under which values are stored: what stands in files, whatever classes are called."""
+"""Kinds of stored values, independent of class names."""
 
 from corporeal.core.types.description import (
     Hypothesis,

@@ -29,7 +29,7 @@ def decode_draco(
 
 
 def _check_claims(primitive: GltfEntry, packed: GltfEntry, size: int) -> None:
-    """Refuse absurd counts before the decoder allocates them."""
+    """Reject absurd counts before the decoder allocates them."""
     accessors = [primitive.refer("indices", "accessors")]
     attributes = primitive.needed("attributes")
     accessors += [attributes.refer(name, "accessors") for name in attributes.value]

@@ -1,4 +1,4 @@
-"""Join models into one GLB without unpacking them: every picture and array keeps its bytes.
+"""Merging of models into one GLB; pictures and arrays are copied byte for byte.
 
 One root, below it one named node per object with its place and its ``extras``, below that the
 object's own tree as its file has it. Names, samplers, textures, materials with their extensions,

@@ -1,4 +1,4 @@
-"""Write a scene as one GLB that any viewer opens; the same scene gives the same bytes.
+"""Deterministic writer of scenes as GLB.
 
 One node per object, named like the object, with a child node per surface. The file is Y-up, as
 glTF asks: the root node turns our Z-up into it, so that numbers pass through unrounded. What glTF

@@ -16,7 +16,7 @@ DTYPE_OF_COMPONENT_TYPE = {
 }
 WIDTH_OF_ACCESSOR_TYPE = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MAX_ROWS_WITHOUT_DATA = 10_000_000
-"""An accessor without bytes is all zeros, of any length it likes to claim; this is believed."""
+"""An accessor without bytes is all zeros, of any length it likes to claim; this is accepted."""
 
 
 def accessor_rows(accessor: GltfEntry) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Between a file and the JSON and the binary chunk of a glTF. glTF 2.0, section 4 (GLB)."""
+"""The JSON and the binary chunk of a glTF file. glTF 2.0, section 4 (GLB)."""
 
 import json
 import struct
@@ -11,7 +11,7 @@ MAX_MODEL_FILE_BYTES = 2**30
 """Largest file that is opened [bytes]."""
 MAX_GLTF_JSON_BYTES = 2**27
 """Largest JSON text [bytes]: Python objects take some thirty times as much memory."""
-GLTF_EXPORT_ADVICE = "Export the model again, or see what the Khronos glTF validator says of it."
+GLTF_EXPORT_ADVICE = "Export the model again, or check it with the Khronos glTF validator."
 
 
 def split_glb(path: Path, data: memoryview) -> tuple[memoryview, memoryview | None]:

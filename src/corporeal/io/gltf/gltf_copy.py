@@ -1,9 +1,8 @@
-"""Meshes and looks of one glTF file, copied byte for byte into another file that is being made.
+"""Copying of meshes and materials of a glTF file, byte for byte, into another.
 
-Everything is copied when it is first asked for, so that nothing arrives that nobody uses, and only
-once, however often it is asked for. Whatever an index points to gets a new number; all else passes
-as it is. glTF 2.0 specification, sections 3.6 to 3.9, and the extensions named below, Khronos
-Group.
+Entries are copied once, on first use. Whatever an index points to gets a new number; all else
+passes as it is. glTF 2.0 specification, sections 3.6 to 3.9, and the extensions named below,
+Khronos Group.
 """
 
 from typing import Any
@@ -28,7 +27,8 @@ IMPLICIT_EXTENSIONS = ("KHR_mesh_quantization",)
 class MergedDocument:
     """The JSON and the binary chunk of the file in the making."""
 
-    def __init__(self) -> None:
+    def __init__(self, max_bytes: int = MAX_MODEL_FILE_BYTES) -> None:
+        self.max_bytes = max_bytes
         self.json: dict[str, Any] = {}
         self.binary = bytearray()
         self.used: set[str] = set()
@@ -47,9 +47,9 @@ class MergedDocument:
 
         """
         self.binary += b"\0" * (-len(self.binary) % 4)
-        if len(self.binary) + len(data) > MAX_MODEL_FILE_BYTES:
+        if len(self.binary) + len(data) > self.max_bytes:
             raise UserError(
-                f"The merged file would be larger than {MAX_MODEL_FILE_BYTES >> 30} GiB. "
+                f"The merged file would be larger than {self.max_bytes >> 30} GiB. "
                 "Take fewer objects, or smaller textures."
             )
         place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}

@@ -1,4 +1,4 @@
-"""Whose a model is and under which licence, as far as its file says."""
+"""Author and licence of a model as stated in its file."""
 
 import re
 from dataclasses import dataclass

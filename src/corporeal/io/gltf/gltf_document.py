@@ -1,4 +1,4 @@
-"""A glTF file as numbers and words that were checked before use.
+"""Validated access to the JSON of a glTF file.
 
 Every look-up goes through an ``GltfEntry``, which knows its place in the JSON, so that any
 complaint names it ("/meshes/0/primitives/1"). Nothing is allocated by a size that the file merely
@@ -21,7 +21,7 @@ from corporeal.io.gltf.gltf_container import (
     read_file_bytes,
     split_glb,
 )
-from corporeal.io.referenced_files import decode_data_uri, read_beside
+from corporeal.io.referenced_files import decode_data_uri, path_beside, read_beside
 
 MAX_UNPACKED_ROWS = 60_000_000
 """Indices, vertices and triangles together that are unpacked from one file, copies included;
@@ -37,12 +37,12 @@ class GltfEntry:
     pointer: str
 
     def fail(self, what: str, next_step: str = GLTF_EXPORT_ADVICE) -> NoReturn:
-        """Refuse the file because of this entry."""
+        """Reject the file because of this entry."""
         where = f"at {self.pointer}: " if self.pointer else ""
         raise BadFileError(self.document.path, where + what, next_step)
 
     def has(self, key: str) -> bool:
-        """Tell whether the file says anything under the key."""
+        """Return whether the file says anything under the key."""
         return key in self.value
 
     def whole(self, key: str, default: int | None = None, most: int = 2**32) -> int:
@@ -237,7 +237,22 @@ class GltfDocument:
                 "Convert it, for example with Blender or gltf-pipeline.",
             )
         if not version:
-            self.warn("does not say its glTF version; taken as 2.0.")
+            self.warn("does not state its glTF version; read as 2.0.")
         least = asset.text("minVersion") if asset else ""
         if least and least != "2.0":
             self.root.fail(f"the file asks for a reader of glTF {least[:8]}; this one reads 2.0.")
+
+
+def gltf_companions(path: Path) -> list[Path]:
+    """Return the buffers and pictures beside a glTF file.
+
+    Raises:
+        BadFileError: Its JSON cannot be read.
+
+    """
+    if path.suffix.lower() == ".glb":
+        return []
+    document = GltfDocument(path)
+    uris = [e.text("uri") for e in document.entries("buffers") + document.entries("images")]
+    files = [path_beside(path.parent, u) for u in uris if u and u[:5].lower() != "data:"]
+    return [f for f in files if f is not None]

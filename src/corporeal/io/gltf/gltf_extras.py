@@ -1,4 +1,4 @@
-"""What a glTF file says in ``extras``: anybody's class and size, and our own files' motion."""
+"""``extras`` of glTF files: class and size, and motion in files written here."""
 
 import math
 from itertools import pairwise
@@ -15,13 +15,13 @@ MIN_SCALE_RATIO = 1e-6
 
 
 def is_own_file(document: GltfDocument) -> bool:
-    """Tell whether the extras mean what our writer means by them."""
+    """Return whether the extras mean what our writer means by them."""
     asset = document.root.child("asset")
     return asset is not None and asset.text("generator") == GLB_GENERATOR
 
 
 def scene_from_extras(document: GltfDocument, root: GltfEntry) -> dict:
-    """Return what a file of ours says of the whole scene; empty for other files."""
+    """Return scene data of a file written here; empty for other files."""
     if not is_own_file(document) or not isinstance(root.value.get("extras"), dict):
         return {}
     extras = root.needed("extras")

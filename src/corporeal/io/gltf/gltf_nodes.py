@@ -1,4 +1,4 @@
-"""The tree of a glTF scene: who stands where. glTF 2.0 specification, section 3.5."""
+"""The node tree of a glTF scene, with world transforms. glTF 2.0 specification, section 3.5."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -72,7 +72,7 @@ def local_matrix(node: GltfEntry) -> np.ndarray:
     x, y, z, w = node.numbers("rotation", (0.0, 0.0, 0.0, 1.0))
     length = np.sqrt(x * x + y * y + z * z + w * w)
     if not 1e-6 < length < 1e6:
-        node.fail("'rotation' is no quaternion of unit length.")
+        node.fail("'rotation' is not a unit quaternion.")
     x, y, z, w = (c / length for c in (x, y, z, w))
     rotation = np.array(
         [

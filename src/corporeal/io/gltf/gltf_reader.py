@@ -107,7 +107,7 @@ def read_gltf_model(path: Path, objects: ObjectGrouping = "auto") -> LoadedModel
 
 
 def check_extensions(document: GltfDocument) -> None:
-    """Refuse a file that means something else without an extension that is not understood."""
+    """Reject a file that means something else without an extension that is not understood."""
     for name in document.required:
         if not name.startswith(READABLE_EXTENSION_PREFIXES) and "meshopt" not in name:
             document.root.fail(
@@ -157,7 +157,7 @@ def _warn_of_unplaced_meshes(document: GltfDocument, tree: list[PlacedNode]) -> 
 
 
 def _check_total(document: GltfDocument, shown: list[list[_FinishedPrimitive]]) -> None:
-    """Refuse a small file that shows its meshes at a million places, before any is placed."""
+    """Reject a small file that shows its meshes at a million places, before any is placed."""
     if sum(map(len, shown)) > MAX_SURFACES:
         what = f"the scene has more than {MAX_SURFACES} pieces."
         document.root.fail(what, "Join its meshes first.")

@@ -1,4 +1,4 @@
-"""From a mesh's own frame into the world: by its node, or by its skeleton at rest.
+"""Transforms of meshes to world coordinates, by node or by skeleton at rest.
 
 glTF 2.0 specification, sections 3.5.2 and 3.7.3 (skins; a skinned mesh ignores its node's place).
 """
@@ -43,7 +43,7 @@ class SkinPoses:
             return world
         inverse = rows_as_floats(accessor_rows(accessor)[: len(joints)], False)
         if inverse.shape != (len(joints), 16) or not np.isfinite(inverse).all():
-            accessor.fail("is no list of one finite 4 × 4 matrix for each joint.")
+            accessor.fail("is not a list of one finite 4 × 4 matrix for each joint.")
         return world @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
 
 

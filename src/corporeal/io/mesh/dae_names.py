@@ -1,4 +1,4 @@
-"""What a COLLADA file calls its pieces and their materials, which trimesh leaves behind."""
+"""Names of pieces and materials of COLLADA files, which trimesh drops."""
 
 import io
 import re

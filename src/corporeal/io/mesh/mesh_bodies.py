@@ -1,4 +1,4 @@
-"""What a mesh file states of its bodies and of the whole scene, put into a Scene."""
+"""Conversion of bodies and scene data of a mesh file to a Scene."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -33,7 +33,11 @@ def apply_body_statements(
         for (o, path), name in zip(pairs, names, strict=True)
     ]
     loose = [name for (_, path), name in zip(pairs, names, strict=True) if path not in bodies]
-    fixed = (f"{', '.join(loose)}: no bodies in the file; they can move here.",) if loose else ()
+    fixed = (
+        (f"{', '.join(loose)}: no rigid bodies in the file; they are movable here.",)
+        if loose
+        else ()
+    )
     return replace(scene, objects=tuple(things), warnings=(*scene.warnings, *fixed))
 
 

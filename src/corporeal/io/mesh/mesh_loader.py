@@ -1,11 +1,10 @@
-"""Read OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene: +Z up.
+"""Loading of OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene, +Z up.
 
 The libraries that read them run in a child process with limits of time and memory; what it hands
 over is checked as any file's. Facts of each kind, docs/inputs.md, "Meshes".
 """
 
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -24,34 +23,19 @@ from corporeal.geometry.gaussian_transforms import UpAxis, rotation_to_z_up
 from corporeal.io.gltf.gltf_container import read_file_bytes
 from corporeal.io.mesh.mesh_bodies import apply_body_statements, apply_scene_statements
 from corporeal.io.mesh.mesh_reader_process import (
-    COMPANION_LISTERS,
     COMPANIONS_FILE,
-    LIST_COMPANIONS_FLAG,
+    MAX_MESH_READ_MEMORY_BYTES,
+    MAX_MESH_READ_S,
     RAW_MESH_FILE,
     REFUSAL_FILE,
 )
-from corporeal.io.mesh.mesh_suffixes import MAX_MESH_READ_MEMORY_BYTES, MAX_MESH_READ_S
 from corporeal.io.mesh.raw_mesh import MESH_EXPORT_ADVICE, NODE_NAMES_KEY, RawMesh, read_raw_mesh
-from corporeal.io.mesh.up_axis_inference import (
-    COMMENT_HEAD_CHARACTERS,
-    comment_says_z_up,
-    infer_up_axis,
-)
-from corporeal.io.referenced_files import path_beside
+from corporeal.io.mesh.up_axis_inference import infer_up_axis
+from corporeal.io.registry import Reader, reader_of, require_packages
 from corporeal.recognition.readable_names import everyday_words, numbered_names, safe_name
 
-MAX_COMPANION_TEXT_BYTES = 2**26
-"""Of a text that is looked through for companions [bytes]."""
 MAX_MESH_COORDINATE = 1e12
 """Coordinates beyond which a file is broken, in its own unit."""
-SUFFIXES_WITHOUT_UP_AXIS = (".obj", ".ply", ".stl", ".off")
-"""Kinds of file that do not state what is up."""
-COMPANION_KEYWORDS = {
-    ".obj": (r"mtllib",),
-    ".mtl": (r"map_\w+", r"bump", r"norm", r"disp", r"decal"),
-    ".ply": (r"comment[ \t]+TextureFile",),
-}
-"""Keywords before the names of companions, by the suffix of the file that names them."""
 
 
 @dataclass(frozen=True)
@@ -68,15 +52,21 @@ class MeshFile:
     """Whether the file itself says what its objects are."""
 
 
-def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = None) -> MeshFile:
+def load_mesh(
+    path: Path,
+    objects: ObjectGrouping = "one",
+    up: UpAxis | None = None,
+    max_seconds: float = MAX_MESH_READ_S,
+) -> MeshFile:
     """Read one file.
 
     Args:
         path: Its suffix says what it is; its companions must lie beside it.
-        objects: "one": the whole file is one object. "nodes": every named thing on the first level
+        objects: "one": the whole file is one object. "nodes": every named object on the first level
             that branches is one. "auto": the bodies that the file states (USD); without any, the
             whole file.
         up: Axis of the file that points up; None: the one it states, else its kind's usual one.
+        max_seconds: Reading it may take so long [s].
 
     Raises:
         BadFileError: The file cannot be used.
@@ -84,11 +74,14 @@ def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = N
     """
     path = Path(path)
     read_file_bytes(path)  # refuses what is absent, empty, or too large to be read
+    reader = reader_of(path, "mesh")
+    if reader is None:
+        raise BadFileError(path, "is no mesh that is read.", MESH_EXPORT_ADVICE)
     with tempfile.TemporaryDirectory(prefix="corporeal-") as folder:
-        _run_reader_process(path, Path(folder), [])
+        _run_reader_process(path, Path(folder), reader, reader.read, max_seconds)
         raw = read_raw_mesh(Path(folder) / RAW_MESH_FILE)
     _check_numbers(path, raw)
-    taken, of_up = (up, ()) if up else _assumed_up_axis(path, raw)
+    taken, of_up = (up, ()) if up else _assumed_up_axis(path, raw, reader.usual_up)
     turn = rotation_to_z_up(taken)
     turned = _to_z_up(raw, turn, raw.unit or 1.0)
     bodies = raw.bodies if objects == "auto" else {}
@@ -106,25 +99,30 @@ def load_mesh(path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = N
     return MeshFile(scene, raw.unit is not None, ours, stated=bool(raw.bodies))
 
 
-def mesh_companions(path: Path) -> list[Path]:
-    """Return the files beside it that a mesh file is made of, or that these name in turn."""
-    if path.suffix.lower() in COMPANION_LISTERS:
-        return _companions_by_reader(path)
-    named = _named_in_dae(path) if path.suffix.lower() == ".dae" else _named_in_text(path)
-    return list(dict.fromkeys(named))
+def companions_in_child(path: Path, reader: Reader) -> list[Path]:
+    """Return the files that a mesh file is made of, as the library that reads it says."""
+    with tempfile.TemporaryDirectory(prefix="corporeal-") as folder:
+        try:
+            _run_reader_process(path, Path(folder), reader, reader.companions)
+        except BadFileError:
+            return []  # whoever reads it says why
+        return [Path(name) for name in store.read_json(Path(folder) / COMPANIONS_FILE)]
 
 
 # ---------------------------------------------------------------- the child
 
 
-def _run_reader_process(path: Path, folder: Path, words: Sequence[str]) -> None:
-    """Let a child process read a file into a folder.
+def _run_reader_process(
+    path: Path, folder: Path, reader: Reader, function: str, max_seconds: float = MAX_MESH_READ_S
+) -> None:
+    """Let a child process call a function of a reader, and write what it returns into a folder.
 
     Raises:
         BadFileError: It cannot, or not within the limits.
 
     """
-    command = [sys.executable, "-P", "-m", "corporeal.io.mesh.mesh_reader_process", *words]
+    require_packages(reader, path)
+    command = [sys.executable, "-P", "-m", "corporeal.io.mesh.mesh_reader_process", function]
     # One thread each: every further one takes its share of the address space.
     threads = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL")}
     try:
@@ -134,11 +132,11 @@ def _run_reader_process(path: Path, folder: Path, words: Sequence[str]) -> None:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             env=os.environ | threads,
-            timeout=MAX_MESH_READ_S,
+            timeout=max_seconds,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        what = f"is not read within {MAX_MESH_READ_S} s."
+        what = f"is not read within {max_seconds} s."
         raise BadFileError(path, what, "Simplify the model, or export it as .glb.") from None
     if (folder / REFUSAL_FILE).exists():
         raise BadFileError(path, store.read_json(folder / REFUSAL_FILE))
@@ -155,43 +153,11 @@ def _reader_process_error(path: Path, done: subprocess.CompletedProcess[bytes]) 
     raise BadFileError(path, what, MESH_EXPORT_ADVICE)
 
 
-def _companions_by_reader(path: Path) -> list[Path]:
-    with tempfile.TemporaryDirectory(prefix="corporeal-") as folder:
-        try:
-            _run_reader_process(path, Path(folder), [LIST_COMPANIONS_FLAG])
-        except BadFileError:
-            return []  # whoever reads it says why
-        return [Path(name) for name in store.read_json(Path(folder) / COMPANIONS_FILE)]
-
-
-def _named_in_text(path: Path) -> list[Path]:
-    """Return what a file names after keywords, and what that names in turn."""
-    keywords = COMPANION_KEYWORDS.get(path.suffix.lower())
-    if keywords is None:
-        return []
-    words = "|".join(keywords)
-    names = re.findall(
-        rf"(?mi)^[ \t]*(?:{words})[ \t]+(?:-\w+[ \t]+\S+[ \t]+)*(.+?)[ \t\r]*$", _text(path)
-    )
-    found = [file for name in names if (file := path_beside(path.parent, name)) is not None]
-    return [more for file in found for more in (file, *_named_in_text(file))]
-
-
-def _named_in_dae(path: Path) -> list[Path]:
-    names = re.findall(r"<init_from>\s*(?:<ref>)?([^<]+?)\s*<", _text(path))
-    return [file for name in names if (file := path_beside(path.parent, name)) is not None]
-
-
-def _text(path: Path, most: int = MAX_COMPANION_TEXT_BYTES) -> str:
-    with path.open("rb") as stream:
-        return stream.read(most).decode(errors="replace")
-
-
 # ---------------------------------------------------------------- what it read
 
 
 def _check_numbers(path: Path, raw: RawMesh) -> None:
-    """Refuse numbers that cannot be.
+    """Reject numbers that cannot be.
 
     Raises:
         BadFileError: There are some, or there are no triangles.
@@ -217,29 +183,23 @@ def _check_numbers(path: Path, raw: RawMesh) -> None:
         raise BadFileError(path, "has no size.", MESH_EXPORT_ADVICE)
 
 
-def _assumed_up_axis(path: Path, raw: RawMesh) -> tuple[UpAxis, tuple[str, ...]]:
-    """Return what is taken for up where nobody says it, and what there is to say of that."""
-    kind = path.suffix.lower()
-    if kind not in SUFFIXES_WITHOUT_UP_AXIS:
-        return raw.up, ()
-    if kind == ".obj" and comment_says_z_up(_text(path, COMMENT_HEAD_CHARACTERS)):
-        return "+z", (
-            Note(
-                f"{path.name}: +z is up, as a comment in it says; --up y takes another.",
-                NoteKind.ASSUMED,
-            ),
-        )
+def _assumed_up_axis(path: Path, raw: RawMesh, usual: UpAxis) -> tuple[UpAxis, tuple[str, ...]]:
+    """Return the assumed up axis if none is stated, with notes."""
+    if raw.up is not None:
+        said = (Note(f"{path.name}: {raw.up_note}", NoteKind.ASSUMED),) if raw.up_note else ()
+        return raw.up, said
     before = np.cumsum([0, *(len(s.vertices) for s in raw.surfaces)])
     vertices = np.concatenate([s.vertices for s in raw.surfaces])
     pairs = zip(raw.surfaces, before, strict=False)
     triangles = np.concatenate([s.triangles + n for s, n in pairs])
-    likelier = infer_up_axis(vertices, triangles, raw.up)
+    likelier = infer_up_axis(vertices, triangles, usual)
     if likelier is None:
-        return raw.up, ()
+        return usual, ()
     axis, why = likelier
-    said = f"{path.name} does not state what is up. {raw.up} was taken, as is usual in {kind}, "
-    return raw.up, (
-        Note(f"{said}{why}. If it lies on its side, say --up {axis[1]}.", NoteKind.ASSUMED),
+    kind = path.suffix.lower()
+    said = f"{path.name} does not state what is up. {usual} was taken, as is usual in {kind}, "
+    return usual, (
+        Note(f"{said}{why}. If it lies on its side, use --up {axis[1]}.", NoteKind.ASSUMED),
     )
 
 

@@ -6,7 +6,6 @@ Companions (.mtl, pictures) are taken from the file's own folder only.
 import re
 import zipfile
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,11 @@ from corporeal.io.referenced_files import read_beside
 
 MAX_ZIP_UNPACKED_BYTES = 2**29
 """What a ZIP may unpack to [bytes]."""
+Z_UP_COMMENT_PATTERN = re.compile(
+    r"(?i)\b\+?z[ _-]+(?:axis[ _-]+)?(?:is[ _-]+)?up\b|\bup[ _-]*axis\W{1,3}\+?z\b"
+)
+COMMENT_HEAD_CHARACTERS = 2000
+"""Characters at the beginning of a file where comments say how it was written."""
 UP_OF_DAE_AXIS = {"X_UP": "+x", "Y_UP": "+y", "Z_UP": "+z"}
 
 
@@ -76,7 +80,7 @@ class _ObjMaterials(_CompanionResolver):
 
 
 def read_obj(path: Path) -> RawMesh:
-    """Read a Wavefront OBJ with its materials; nobody says its unit, +y is up.
+    """Read a Wavefront OBJ with its materials; its unit is unknown, its up axis at most a comment.
 
     Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
     but one of the two.
@@ -87,33 +91,34 @@ def read_obj(path: Path) -> RawMesh:
     looks = _ObjMaterials(path.parent, _names_in_obj(data, b"usemtl"))
     split = {"split_objects": named == b"o", "split_groups": named == b"g" and few}
     scene = _load_with_trimesh(path, "obj", data, resolver=looks, **split)
-    return RawMesh(*_finished_meshes(scene, _object_and_material), up="+y", lost=tuple(looks.lost))
+    z_up = _comment_says_z_up(data[:COMMENT_HEAD_CHARACTERS].decode(errors="replace"))
+    return RawMesh(
+        *_finished_meshes(scene, _object_and_material),
+        up="+z" if z_up else None,
+        up_note="+z is up, as a comment in it says; --up y takes another." if z_up else "",
+        lost=tuple(looks.lost),
+    )
 
 
 def read_ply(path: Path) -> RawMesh:
-    """Read a PLY with faces; nobody says its unit, +z is up."""
+    """Read a PLY with faces; unit and up axis unknown."""
     data, lost = triangulate_mixed_faces(path, read_file_bytes(path))
     scene = _load_with_trimesh(path, "ply", data)
-    return RawMesh(*_finished_meshes(scene, lambda *_: (path.stem,)), up="+z", lost=lost)
+    return RawMesh(*_finished_meshes(scene, lambda *_: (path.stem,)), lost=lost)
 
 
 def read_stl(path: Path) -> RawMesh:
-    """Read an STL, in text or in bytes; nobody says its unit, +z is up."""
-    return RawMesh(
-        *_finished_meshes(_load_with_trimesh(path, "stl"), lambda *_: (path.stem,)), up="+z"
-    )
+    """Read an STL, in text or in bytes; unit and up axis unknown."""
+    return RawMesh(*_finished_meshes(_load_with_trimesh(path, "stl"), lambda *_: (path.stem,)))
 
 
 def read_off(path: Path) -> RawMesh:
-    """Read an OFF; nobody says its unit, +z is up."""
-    return RawMesh(
-        *_finished_meshes(_load_with_trimesh(path, "off"), lambda *_: (path.stem,)), up="+z"
-    )
+    """Read an OFF; unit and up axis unknown."""
+    return RawMesh(*_finished_meshes(_load_with_trimesh(path, "off"), lambda *_: (path.stem,)))
 
 
 def read_3mf(path: Path) -> RawMesh:
     """Read a 3MF: its unit is stated, millimetres where it is not (3MF core 1.3, 3.4); +z is up."""
-    _require(path, "lxml", "networkx")
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
@@ -130,7 +135,6 @@ def read_3mf(path: Path) -> RawMesh:
 
 def read_dae(path: Path) -> RawMesh:
     """Read a COLLADA with its unit and its up axis, which is y where it states none (1.4.1)."""
-    _require(path, "lxml", "collada")
     scene = _load_with_trimesh(path, "dae")
     unit, axis = _asset_of_dae(path)
     if axis not in UP_OF_DAE_AXIS:
@@ -145,13 +149,6 @@ def read_dae(path: Path) -> RawMesh:
 
 
 # ---------------------------------------------------------------- the file
-
-
-def _require(path: Path, *packages: str) -> None:
-    missing = [name for name in packages if find_spec(name) is None]
-    if missing:
-        what = f"reading {path.suffix} needs {' and '.join(missing)}."
-        raise BadFileError(path, what, "Install with: pip install 'corporeal[meshes]'.")
 
 
 def _load_with_trimesh(
@@ -198,8 +195,14 @@ def _names_in_obj(data: bytes, keyword: bytes) -> set[bytes]:
     return set(re.findall(rb"(?m)^" + keyword + rb"[ \t]+(\S[^\r\n]*?)[ \t\r]*$", data))
 
 
+def _comment_says_z_up(text: str) -> bool:
+    """Return whether a comment (``#``) at the beginning of an OBJ says that +z is up."""
+    lines = text[:COMMENT_HEAD_CHARACTERS].splitlines()
+    return any(Z_UP_COMMENT_PATTERN.search(line) for line in lines if line.lstrip().startswith("#"))
+
+
 def _object_and_material(node: str, mesh: trimesh.Trimesh) -> tuple[str, ...]:
-    """Return the names of an OBJ's thing and surface: trimesh joins them with the material's."""
+    """Return the names of an OBJ's object and surface: trimesh joins them with the material's."""
     material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")
     owner = node.removesuffix(f"_{material}")
     return (node,) if owner in ("", node) else (owner, node)

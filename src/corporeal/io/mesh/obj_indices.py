@@ -1,4 +1,4 @@
-"""Number the corners of an OBJ from its beginning: files may count them back from where they are.
+"""Conversion of relative OBJ indices to absolute ones.
 
 ``f -3 -2 -1`` means the last three vertices *so far* (Wavefront, "Object Files", 1995: reference
 numbers). Readers that count back from the end of the file join other vertices wherever vertices

@@ -1,4 +1,4 @@
-"""Write a triangle mesh as Wavefront OBJ: what every simulator reads."""
+"""Writer of Wavefront OBJ."""
 
 import numpy as np
 from jaxtyping import Float, Int

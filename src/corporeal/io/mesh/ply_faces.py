@@ -1,4 +1,4 @@
-"""Faces of a PLY in bytes, of which some have three corners and some four or more, as triangles.
+"""Triangulation of binary PLY faces of mixed size.
 
 Blender, MeshLab and others write such files; the reader of meshes takes all faces of a file to have
 as many corners as the first. Turk, "The PLY Polygon File Format" (1994).

@@ -1,4 +1,4 @@
-"""What a child process that reads a mesh file hands to its parent."""
+"""Mesh data passed from the reader process to its parent."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -21,10 +21,12 @@ class RawMesh:
     """Surfaces in the file's own axes and unit."""
 
     surfaces: tuple[Surface, ...]
-    """All of object 0; ``extras[ALONG]``: names from the file's root to the surface."""
+    """All of object 0; ``extras[NODE_NAMES_KEY]``: names from the file's root to the surface."""
     finishes: tuple[Finish, ...]
-    up: UpAxis
-    """Axis of the file that points up: as it states, else as its kind usually has it."""
+    up: UpAxis | None = None
+    """Axis of the file that points up, as it states; None: it states none."""
+    up_note: str = ""
+    """What to say of ``up`` where it is read out of words."""
     unit: float | None = None
     """What one unit is [m], as the file states; None: it states none."""
     lost: tuple[str, ...] = ()
@@ -33,7 +35,7 @@ class RawMesh:
     """Path of each body that the file states → ``title``, ``mass`` [kg], ``velocity`` [m/s, the
     file's axes], and ``custom``, what our own writer states of it."""
     custom: Mapping[str, Any] = field(default_factory=dict)
-    """What our own writer says of the whole scene; empty of other files."""
+    """Scene data of files written here; empty for other files."""
 
 
 def write_raw_mesh(path: Path, raw: RawMesh) -> None:

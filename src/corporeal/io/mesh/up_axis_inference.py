@@ -1,12 +1,10 @@
-"""Whether a mesh whose file does not state what is up lies on its side as it is taken.
+"""Inference of the up axis of meshes that don't state it.
 
 Two things tell. As it is taken it would tip over, and does not if the other usual axis points up.
 Or it stands on the plane through the origin that the other axis is normal to, as models are placed
 by who makes them, while the axis that is taken goes through its middle. Chairs and shelves also
 stand on their backs, and balls stand anyhow: what neither tells may lie on its side all the same.
 """
-
-import re
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -22,23 +20,12 @@ BASE_AT_ZERO_EXTENT_FRACTION = 0.005
 """A base so far from the origin's plane lies in it [extents]."""
 CENTRED_SIDE_FRACTION = 0.05
 """A middle so far from the origin's plane is in it [sides]."""
-Z_UP_COMMENT_PATTERN = re.compile(
-    r"(?i)\b\+?z[ _-]+(?:axis[ _-]+)?(?:is[ _-]+)?up\b|\bup[ _-]*axis\W{1,3}\+?z\b"
-)
-COMMENT_HEAD_CHARACTERS = 2000
-"""Characters at the beginning of a file where comments say how it was written."""
-
-
-def comment_says_z_up(text: str) -> bool:
-    """Return whether a comment (``#``) at the beginning of an OBJ says that +z is up."""
-    lines = text[:COMMENT_HEAD_CHARACTERS].splitlines()
-    return any(Z_UP_COMMENT_PATTERN.search(line) for line in lines if line.lstrip().startswith("#"))
 
 
 def infer_up_axis(
     vertices: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, "T 3"], taken: UpAxis
 ) -> tuple[UpAxis, str] | None:
-    """Return the axis that is likelier up, and why; None: nothing speaks against what is taken.
+    """Return the axis that is likelier up, and why; None: the default is plausible.
 
     Args:
         vertices: In the file's axes and unit.

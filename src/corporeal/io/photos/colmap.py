@@ -1,8 +1,8 @@
 """COLMAP's models: cameras, images and points, as text or in binary.
 
 Poses are camera from world; the middle of the upper left pixel is (0.5, 0.5), as here. The world's
-frame and size are the model's own: unless somebody set them, up is nowhere and lengths mean
-nothing. Format: colmap.github.io/format.html.
+frame and size are the model's own: unless they were set, up is unknown and lengths mean nothing.
+Format: colmap.github.io/format.html.
 """
 
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
-"""Windows of photographs about what their masks show, so that reducing them loses less of it.
+"""Cropping of photographs to their masks before downscaling.
 
-A thing that fills a third of each photograph has a third of the pixels along its sides that a
+An object that fills a third of each photograph has a third of the pixels along its sides that a
 reduced photograph has: its thin parts and walls are lost. What is around it is of no use where
 masks say so. So each photograph is cut out about its mask, all to one size, before it is reduced.
 """
@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float
 CROP_MARGIN_FRACTION = 0.08
 """On either side of the largest box, in its longer side: masks err, and outlines need a rim."""
 MIN_CROP_ZOOM_RATIO = 1.15
-"""How much larger a thing must become for photographs to be cut out."""
+"""How much larger an object must become for photographs to be cut out."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def plan_crop(
 ) -> CropWindow:
     """Return how photographs are cut out about what masks show.
 
-    The window is square, where the photographs are as high: a long thing is seen from all sides.
+    The window is square, where the photographs are as high: a long object is seen from all sides.
 
     Args:
         boxes: Sides of the boxes about masks, in those of the pictures.

@@ -1,4 +1,4 @@
-"""Photographs developed: read, straightened and brought to one size, with the cameras that took it.
+"""Loading of photographs: decoded, undistorted and scaled to one size, with cameras.
 
 A few bad ones among many are left out and named.
 """
@@ -44,7 +44,7 @@ MIN_MASK_PEAK_U8 = 128
 """Of 255: a mask that nowhere has as much shows nothing."""
 MASK_NUMBERS_HINT = " (white is what counts; numbers of instances go into a folder 'instances')"
 HEIC_SIGNATURES = (b"ftypheic", b"ftypheix", b"ftypmif1", b"ftyphevc")
-"""Bytes 4 to 11 of pictures that telephones take."""
+"""Bytes 4 to 11 of pictures that phones take."""
 EXIF_ORIENTATION_TAG = 0x0112
 """EXIF's tag of how a picture is to be turned; 1: not at all."""
 QUARTER_TURNS_OF_ORIENTATION = {3: 2, 6: 3, 8: 1}
@@ -192,7 +192,7 @@ def stored_size(shot: PosedPhotoFile) -> tuple[int, int] | None:
 
 
 def unreadable_reason(path: Path) -> str:
-    """Say in a clause why a file is no picture that can be read."""
+    """Return in a clause why a file is no picture that can be read."""
     with suppress(OSError), path.open("rb") as file:
         if file.read(12)[4:] in HEIC_SIGNATURES:
             return "is a HEIC picture: convert it to JPEG"
@@ -294,7 +294,7 @@ def rotated_mask_problem(mask: tuple[int, int], picture: tuple[int, int]) -> str
 
 
 def _is_to_be_turned(shot: PosedPhotoFile, width: int, height: int, asked: int) -> bool:
-    """Tell whether a picture is to be turned: it asks for it, and only then fits its camera."""
+    """Return whether a picture is to be turned: it asks for it, and only then fits its camera."""
     if asked % 2 == 0 or not width or not height:
         return False
     lens = shot.lens(width, height)
@@ -399,7 +399,7 @@ def _refuse_if_most_unusable(source: Path, total: int, bad: list[UnusablePhoto])
     good = total - len(bad)
     if len(bad) > MAX_UNUSABLE_PHOTOS_FRACTION * total:
         what = f"{len(bad)} of {total} pictures cannot be used: {_list_reasons(bad)}."
-        raise BadFileError(source, what, "Put them where the file says, or correct the file.")
+        raise BadFileError(source, what, "Move them there, or correct the file.")
     if good < MIN_PHOTOS:
         what = f"{good} of {total} pictures can be used, but at least {MIN_PHOTOS} are needed."
         step = "Photograph the scene from all sides: 20 to 50 pictures are good."
@@ -407,7 +407,7 @@ def _refuse_if_most_unusable(source: Path, total: int, bad: list[UnusablePhoto])
 
 
 def unusable_photos_notes(total: int, bad: list[UnusablePhoto]) -> list[str]:
-    """Say which of so many pictures were left out, and why; nothing where all are used."""
+    """Return which of so many pictures were left out, and why; nothing where all are used."""
     return [
         Note(
             f"{len(bad)} of {total} pictures were left out: {_list_reasons(bad)}.",

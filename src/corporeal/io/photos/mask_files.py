@@ -1,8 +1,8 @@
-"""Masks as files that people can correct: one PNG for each photograph, in its own pixels.
+"""Mask files: one PNG for each photograph, in its own pixels, editable.
 
 A folder gets ``masks`` (white where objects are), ``instances`` where objects have numbers, and
-``masks.json``, which says what they were made by and what they were when they were made. What
-somebody changed since is never overwritten by the same means.
+``masks.json``, which says what they were made by and what they were when they were made. Edited
+masks are never overwritten by the same means.
 """
 
 from collections import Counter
@@ -43,7 +43,7 @@ class MaskRecord:
     beside: str = ""
     """What stands beside what they show, in sentences; empty: nothing is known of it."""
     contradict: bool = False
-    """Whether they are not believed because their outlines contradict each other."""
+    """Whether they are rejected because their outlines contradict each other."""
 
 
 def mask_file_names(shots: Sequence[PosedPhotoFile]) -> list[str]:
@@ -104,7 +104,7 @@ def read_mask_record(folder: Path) -> MaskRecord | None:
 
 
 def edited_masks(folder: Path) -> dict[str, str]:
-    """Return which masks somebody changed, added or removed since they were made, and digests."""
+    """Return which masks were edited, added or removed since they were made, and digests."""
     record = read_mask_record(folder)
     if record is None:
         return {}

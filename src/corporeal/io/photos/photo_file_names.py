@@ -1,9 +1,9 @@
-"""What files and folders of photographs are called."""
+"""Names of files and folders of photographs."""
 
 READABLE_IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 """Pictures that are read."""
 HEIC_SUFFIXES = (".heic", ".heif")
-"""Photographs that telephones take; they are not read, but known for what they are."""
+"""Photographs that phones take; they are not read, but known for what they are."""
 UNREAD_IMAGE_SUFFIXES = (
     ".tif",
     ".tiff",

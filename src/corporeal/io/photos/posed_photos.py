@@ -1,4 +1,4 @@
-"""Posed photographs of any kind: what a folder holds tells how they are read."""
+"""Posed photographs of any format, detected by the content of the folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +60,7 @@ POSED_PHOTOS_ADVICE = (
 
 @dataclass(frozen=True)
 class PosedPhotos:
-    """Posed pictures, and what else the file says of the scene."""
+    """Posed pictures, with further scene data of the file."""
 
     views: Views
     """Where there is a mask, all outside it is white. ``object_of_pixel``: what instance masks say,
@@ -76,7 +76,7 @@ class PosedPhotos:
     colours: UInt8[np.ndarray, "N 3"] | None = None
     """Of the points, sRGB."""
     lines: LinesOfSight | None = None
-    """Which pictures show which points; None: nobody says."""
+    """Which pictures show which points; None: unknown."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
     done: tuple[str, ...] = ()
@@ -98,7 +98,7 @@ class PosedPhotos:
 
 @dataclass(frozen=True)
 class PhotoListing:
-    """What a folder says of its photographs, before any is read."""
+    """Listing of a folder's photographs, before any is read."""
 
     source: Path
     """Named in errors."""
@@ -195,7 +195,7 @@ def list_posed_photos(path: Path) -> PhotoListing:
 
 
 def has_masks(shots: list[PosedPhotoFile]) -> bool:
-    """Tell whether there are masks, instances or an alpha channel, by names and headers."""
+    """Return whether there are masks, instances or an alpha channel, by names and headers."""
     return any(s.mask or s.instances or _has_alpha(s.picture) for s in shots)
 
 
@@ -226,7 +226,7 @@ def _with_masks_from(folder: Path, shots: list[PosedPhotoFile]) -> list[PosedPho
         for shot in shots
     ]
     if not any(shot.mask or shot.instances for shot in made):
-        step = "Masks are PNG pictures with the names of the photographs, white where things are."
+        step = "Masks are PNG pictures with the names of the photographs, white where objects are."
         raise BadFileError(folder, "holds no mask with the name of a photograph.", step)
     return made
 
@@ -304,7 +304,7 @@ def _companion_names(picture: Path) -> tuple[str, ...]:
 
 
 def unused_masks_note(folder: Path, pictures: Sequence[Path]) -> list[str]:
-    """Say that a folder has masks whose names fit none of its photographs, if it has such."""
+    """State that a folder has masks whose names fit none of its photographs, if it has such."""
     for place in (folder / name for name in MASK_FOLDERS):
         held = [p for p in sorted(place.rglob("*")) if p.suffix.lower() in READABLE_IMAGE_SUFFIXES]
         if (

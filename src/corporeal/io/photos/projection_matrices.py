@@ -74,7 +74,7 @@ def split_projection(
     size = np.linalg.norm(M)
     determinant = np.linalg.det(M / size) if size > 0 else 0.0
     if abs(determinant) < 1e-12:
-        raise BadFileError(path, "is the matrix of no finite camera.", MATRIX_FORMAT_ADVICE)
+        raise BadFileError(path, "is not the matrix of a finite camera.", MATRIX_FORMAT_ADVICE)
     sign = 1.0 if determinant > 0 else -1.0
     K, R = rq(sign * M)
     flip = np.diag(np.sign(np.diag(K)))
@@ -85,7 +85,7 @@ def split_projection(
 
 
 def check_focal(path: Path, K: Float[np.ndarray, "3 3"], width: int, height: int) -> None:
-    """Refuse a K that cannot be this picture's, as of matrices [R | t] without one.
+    """Reject a K that cannot be this picture's, as of matrices [R | t] without one.
 
     Raises:
         BadFileError: The focal length or the principal point is absurd.
@@ -96,7 +96,7 @@ def check_focal(path: Path, K: Float[np.ndarray, "3 3"], width: int, height: int
     middle = K[0, 2] / width, K[1, 2] / height
     plausible = MIN_FOCAL_SIDE_RATIO < min(focal) and max(focal) < MAX_FOCAL_SIDE_RATIO
     if not (plausible and min(middle) > -1 and max(middle) < 2):
-        words = f"says a focal length of {K[0, 0]:.4g} and {K[1, 1]:.4g} pixels and a middle at "
+        words = f"states a focal length of {K[0, 0]:.4g} and {K[1, 1]:.4g} pixels and a middle at "
         words += f"({K[0, 2]:.4g}, {K[1, 2]:.4g}) of a picture of {width} × {height}."
         raise BadFileError(path, words, MATRIX_FORMAT_ADVICE)
 

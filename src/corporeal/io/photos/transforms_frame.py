@@ -37,7 +37,7 @@ READABLE_CAMERA_MODELS = (
     "PERSPECTIVE",
 )
 FISHEYE_KEYS = ("is_fisheye", "ftheta_p0", "latlong")
-"""What instant-ngp says of lenses that no pinhole camera can stand for."""
+"""Lens parameters of instant-ngp that are not of pinhole cameras."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class TransformsFrame:
     value: dict[str, Any]
 
     def fail(self, what: str, next_step: str) -> NoReturn:
-        """Refuse the file because of this frame."""
+        """Reject the file because of this frame."""
         raise BadFileError(self.path, f"{self.where}{what}", next_step)
 
     def number(self, key: str, default: float | None = None, zero: bool = False) -> float:
@@ -106,7 +106,7 @@ class TransformsFrame:
         turn = matrix[:3, :3]
         rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) and np.linalg.det(turn) > 0
         if not rigid or not np.allclose(matrix[3], (0, 0, 0, 1)):
-            self.fail("'transform_matrix' is no rotation and place.", "It must neither scale.")
+            self.fail("'transform_matrix' is not a rigid transform.", "It must neither scale.")
         if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
             matrix[:3, :3] = nearest_rotation(turn)
         return matrix @ OPENCV_FROM_OPENGL

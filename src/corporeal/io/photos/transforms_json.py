@@ -1,4 +1,4 @@
-"""Posed pictures as a folder: ``transforms.json`` and pictures, as instant-ngp and nerfstudio do.
+"""Posed pictures as ``transforms.json``, as in instant-ngp and nerfstudio.
 
 The matrix of a frame leads from camera to world, both as OpenGL has them (x right, y up, z back;
 the world's z up); ours looks along +z with y down, so the second and the third column change sign.
@@ -107,7 +107,7 @@ def _layers(views: Views, unit: float) -> list[tuple[str, str, Callable[[int], n
 def _members_of(camera: Camera) -> dict[str, float]:
     K = camera.K
     if K[0, 1] or K[1, 0] or not np.array_equal(K[2], (0, 0, 1)):
-        raise UserError("A camera's K is skewed, which transforms.json cannot say.")
+        raise UserError("A camera's K is skewed, which transforms.json does not support.")
     fx, fy = float(K[0, 0]), float(K[1, 1])
     return {
         "camera_angle_x": 2 * math.atan(camera.width / 2 / fx),

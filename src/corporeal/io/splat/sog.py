@@ -35,8 +35,24 @@ SOG_CONVERT_ADVICE = "Save it again as SOG version 2, or as PLY."
 FileLoader = Callable[[str], bytes]
 
 
-def read_sog_zip(path: Path, data: memoryview) -> Gaussians:
+def read_sog(path: Path, data: memoryview) -> Gaussians:
+    """Return the Gaussians of a bundle, or of a ``meta.json`` with its pictures, unchecked.
+
+    Raises:
+        BadFileError: It is broken, of another version, or lacks a file.
+
+    """
+    if data[:4] == ZIP_SIGNATURE:
+        return read_sog_zip(path, data)
+    return _SogReader(path, lambda name: read_beside(path.parent, name, MAX_SOG_FILE_BYTES)).read()
+
+
+def read_sog_zip(
+    path: Path, data: memoryview, max_file_bytes: int = MAX_SOG_FILE_BYTES
+) -> Gaussians:
     """Return the Gaussians of a bundle as it says them, unchecked.
+
+    max_file_bytes: of one picture or of the JSON; larger ones are refused.
 
     Raises:
         BadFileError: It is broken, of another version, or lacks a file.
@@ -51,10 +67,10 @@ def read_sog_zip(path: Path, data: memoryview) -> Gaussians:
 
     def source(name: str) -> bytes:
         try:
-            if archive.getinfo(name).file_size > MAX_SOG_FILE_BYTES:
+            if archive.getinfo(name).file_size > max_file_bytes:
                 raise ValueError("it is too large")
             with archive.open(name) as stream:
-                return stream.read(MAX_SOG_FILE_BYTES)
+                return stream.read(max_file_bytes)
         except KeyError:
             raise ValueError("it is not in the archive") from None
         except (zipfile.BadZipFile, OSError, EOFError, RuntimeError) as p:
@@ -64,16 +80,6 @@ def read_sog_zip(path: Path, data: memoryview) -> Gaussians:
 
     with archive:
         return _SogReader(path, source).read()
-
-
-def read_sog_folder(path: Path) -> Gaussians:
-    """Return the Gaussians of a ``meta.json`` with its pictures beside it, unchecked.
-
-    Raises:
-        BadFileError: It is broken, of another version, or lacks a file.
-
-    """
-    return _SogReader(path, lambda name: read_beside(path.parent, name, MAX_SOG_FILE_BYTES)).read()
 
 
 @dataclass(frozen=True)

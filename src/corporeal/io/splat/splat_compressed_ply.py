@@ -13,8 +13,13 @@ import numpy as np
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Gaussians
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
-from corporeal.io.ply_container import COPY_AGAIN_ADVICE, PlyColumns
-from corporeal.io.splat.splat_ply import exponential, sh_rest_coefficients, stack_columns
+from corporeal.io.ply_container import COPY_AGAIN_ADVICE, PlyColumns, read_ply_elements
+from corporeal.io.splat.splat_ply import (
+    exponential,
+    gaussians_from_vertices,
+    sh_rest_coefficients,
+    stack_columns,
+)
 
 GAUSSIANS_PER_CHUNK = 256
 PACKED_PROPERTIES = ["packed_position", "packed_rotation", "packed_scale", "packed_color"]
@@ -22,6 +27,19 @@ MAX_SH_REST_COEFFICIENT = 4.0
 """Largest coefficient above band 0."""
 COMPONENT_ORDER_OF_LARGEST = np.array([[0, 1, 2, 3], [1, 0, 2, 3], [1, 2, 0, 3], [1, 2, 3, 0]])
 """For each largest component (w, x, y, z), where among (largest, a, b, c) each component stands."""
+
+
+def read_splat_ply(path: Path, data: memoryview) -> Gaussians:
+    """Return the Gaussians of a PLY as it says them, compressed or in INRIA's layout, unchecked.
+
+    Raises:
+        BadFileError: It is broken, or its vertices are no Gaussians.
+
+    """
+    elements = read_ply_elements(path, data)
+    if is_compressed_ply(elements):
+        return gaussians_from_chunks(path, elements)
+    return gaussians_from_vertices(path, elements.get("vertex", {}))
 
 
 def is_compressed_ply(elements: dict[str, PlyColumns]) -> bool:

@@ -186,7 +186,7 @@ def _unpacked(path: Path, data: memoryview, size: int) -> bytes:
 
 
 def _refuse_bounds(path: Path, data: memoryview, header: _SpzHeader, end: int) -> None:
-    """Refuse a version 4 whose extensions change what its harmonics mean."""
+    """Reject a version 4 whose extensions change what its harmonics mean."""
     at = 32
     while header.flags & EXTENSIONS_FLAG and at + EXTENSION_STRUCT.size <= end:
         kind, length = EXTENSION_STRUCT.unpack_from(data, at)

@@ -1,6 +1,6 @@
-"""The physics of a USD stage: of our own exports all that they carry, of others UsdPhysics'.
+"""Physics of USD stages: all data of files written here, UsdPhysics of others.
 
-Meshes are read elsewhere (``mesh_usd.py``); here is what things weigh, how they move and what they
+Meshes are read elsewhere (``mesh_usd.py``); here is what objects weigh, how they move and what they
 are made of, each value with who stated it.
 """
 
@@ -54,7 +54,7 @@ class StatedMaterial:
     values: Mapping[str, StatedValue] = field(default_factory=dict)
     """Field of ``Material`` → value."""
     custom: Mapping[str, Any] = field(default_factory=dict)
-    """All that a file of ours says of the part; empty of other files."""
+    """Data on the part in files written here; empty for other files."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class StatedBody:
     turns: bool = False
     """Whether it has an angular velocity."""
     custom: Mapping[str, Any] = field(default_factory=dict)
-    """All that a file of ours says of the object; empty of other files."""
+    """Data on the object in files written here; empty for other files."""
 
 
 def read_usd_physics(path: str | Path) -> tuple[StatedBody, ...]:

@@ -1,6 +1,6 @@
 """Meshes of USD, USDA, USDC and USDZ at the first time sample, in the axes and unit of the stage.
 
-What UsdPhysics says of bodies and their matter comes along (``usd_bodies.py``).
+What UsdPhysics says of bodies and their material comes along (``usd_bodies.py``).
 
 Facts: OpenUSD 26.11, UsdGeom (mesh, subset, primvar, stage metrics), UsdShade (UsdPreviewSurface).
 A layer, and a picture, must lie in the file's own folder, or in the package itself.
@@ -132,7 +132,7 @@ def _open_stage(path: Path) -> Usd.Stage:
 
 
 def _check_layers(path: Path) -> None:
-    """Refuse a file whose layers lead out of its folder, before any of these is opened."""
+    """Reject a file whose layers lead out of its folder, before any of these is opened."""
     known, todo = set(), [str(path)]
     while todo:
         name = todo.pop()

@@ -1,8 +1,8 @@
 """Write OpenUSD's text format (.usda): layers of prims with attributes, samples and metadata.
 
-Text needs no library, every tool reads it, and a person can. Grammar: OpenUSD's "Crate and text
-file formats", https://openusd.org/release/spec.html. Numbers are written in nine digits, which
-single precision survives unchanged, or shortest in double.
+Text needs no library and is readable. Grammar: OpenUSD's "Crate and text file formats",
+https://openusd.org/release/spec.html. Numbers are written in nine digits, which single precision
+survives unchanged, or shortest in double.
 """
 
 import re
@@ -35,7 +35,7 @@ class UsdSampleStream:
 
 @dataclass
 class UsdPrim:
-    """One prim: its type, what it says of itself, and what is below it."""
+    """One prim: type, properties, children."""
 
     kind: str
     """Schema ("Mesh"); "": an over that adds to a prim of another layer."""
@@ -206,12 +206,12 @@ def usda_strings(values: Iterable[str]) -> str:
 
 
 def usda_display_name(words: str) -> str:
-    """Say how people call a prim, in any alphabet."""
+    """Return how people call a prim, in any alphabet."""
     return f"displayName = {usda_string(words)}"
 
 
 def usda_inactive() -> str:
-    """Say that a prim is not there."""
+    """State that a prim is not there."""
     return "active = false"
 
 

@@ -1,4 +1,4 @@
-"""Assemble the scenes of a corpus: each planned scene is made in a process of its own.
+"""Assembly of the scenes of a corpus, each in its own process.
 
 A scene's folder below ``<corpus>/scenes`` appears whole or not at all, under an id that covers the
 settings, the seed and the bytes of its assets.
@@ -100,7 +100,7 @@ def _wind_test(pool: AssetPool, composing: ComposeConfig) -> WindTest:
 
 
 def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]:
-    """Say what is to be done for every scene of a plan.
+    """Describe what is to be done for every scene of a plan.
 
     Raises:
         UserError: The pool no longer has an asset of the plan.
@@ -121,7 +121,7 @@ def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]
 
 
 def planned_compose_config(scene: PlannedScene, composing: ComposeConfig) -> ComposeConfig:
-    """Say how one scene of a plan is composed."""
+    """Return how one scene of a plan is composed."""
     return replace(
         composing,
         assets=scene.assets,

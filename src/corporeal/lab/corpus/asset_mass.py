@@ -1,4 +1,4 @@
-"""Weigh the objects of a pool, so that they settle where what is simulated later comes to rest.
+"""Mass properties of the objects of a pool, for settling.
 
 Pieces of uniform density would do for a stone. A pot is heavier than its plant, a can is a wall
 around its contents, and a cup on its side rolls to where its handle is lowest.

@@ -1,4 +1,4 @@
-"""Read what a corpus left on the disk: one record per scene, and one per simulated part."""
+"""Results of a corpus: one record per scene, and one per simulated part."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -125,7 +125,7 @@ class SceneRecord:
     """What was measured; None: it was not run."""
     parts: tuple[PartRecord, ...] = ()
     picture: Path | None = None
-    """The film as a row of frames; of a scene that was not run, a view of it at rest."""
+    """The video as a row of frames; of a scene that was not run, a view of it at rest."""
     settings: Settings | None = None
 
     @property
@@ -274,7 +274,7 @@ COPIED_AUDIT_FIELDS = (
 def _did_interaction_happen(
     kind: InteractionKind, happened: Outcome, landed: int, sent: Sequence[str]
 ) -> bool:
-    """Tell whether what the interaction promises happened.
+    """Return whether what the interaction promises happened.
 
     fall: something came down on the floor or on another. fall-onto, collision: two objects met.
     chain: what was struck struck a third. wind: something moved or gave way by a millimetre.
@@ -314,5 +314,5 @@ def _group(scene: str, material: str, source: str) -> str:
     except UserError as error:
         raise UserError(
             f"Scene {scene} was run with the materials of {source}, and the classes of these "
-            f"cannot be read: {error} Bring the library back, or ask from where the corpus was run."
+            f"cannot be read: {error} Restore the library, or run this where the corpus was run."
         ) from error

@@ -1,4 +1,4 @@
-"""Sum a corpus up: by interaction, number of objects, material class and constitutive law."""
+"""Statistics of a corpus by interaction, number of objects, material class and constitutive law."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a corpus came to as a page of the documentation: Markdown, measured rows only."""
+"""Results of a corpus as a documentation page."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -43,12 +43,12 @@ BREAKDOWN_TITLES = {
     "law": "By law, as simulated",
 }
 COLUMN_NOTES = (
-    "- **audit**: clean where it exceeds none of its [bounds](audit.md); else what it says.",
+    "- **audit**: clean if no [bound](audit.md) is exceeded; else its message.",
     "- **happened**: whether what the interaction promises did: something came down, two met, what "
     "was struck struck a third, or the wind moved something.",
     "- **deepest overlap**: of an object with another or with the floor, in cells of the grid.",
     "- **energy gained**: kinetic and elastic, that no work accounts for, relative.",
-    "- **time**: of the process that finished the scene, film included; **memory**: its most.",
+    "- **time**: of the process that finished the scene, video included; **memory**: its most.",
 )
 
 

@@ -1,4 +1,4 @@
-"""Figures of a corpus, as drawings that stay sharp: what it consists of, how sound it is, its cost.
+"""Figures of a corpus as vector graphics: composition, audits, cost.
 
 Colours are Tol's bright scheme, which readers with any colour vision can tell apart; interactions
 have a mark of their own as well.
@@ -206,7 +206,7 @@ def _values(
     return [max(getattr(n, name), LOG_AXIS_MIN) if log else getattr(n, name) for n in mine]
 
 
-# ---------------------------------------------------------------- matter and cost
+# ---------------------------------------------------------------- material and cost
 
 
 def _materials(axes: Axes, corpus: CorpusResults) -> None:

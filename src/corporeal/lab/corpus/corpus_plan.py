@@ -1,4 +1,4 @@
-"""Which scenes a corpus has: how many objects of which classes, how they stand, what happens.
+"""Plan of a corpus: classes, arrangements and interactions of its scenes.
 
 Everything is balanced and drawn by deficit: classes, models of a class, object counts, interaction
 kinds and arrangements each come out even to within one, as far as their needs allow. Wind blows
@@ -281,7 +281,7 @@ def with_wind(
         other = min(others, key=lambda n: abs(len(sets[n]) - len(sets[k])), default=None)
         if other is None:
             happens[k] = "fall"
-            messages.append(f"No wind moves {' or '.join(sets[k])}: a fall instead.")
+            messages.append(f"No wind moves {' or '.join(sets[k])}: replaced by a fall.")
         else:
             happens[k], happens[other] = happens[other], happens[k]
     return happens, messages
@@ -345,7 +345,7 @@ def _by_class(models: Sequence[PoolAsset]) -> dict[str, list[str]]:
 
 
 def _showcase(name: str) -> PlannedScene:
-    objects = [t.model.replace("_", " ") for t in SHOWCASE_SCENE_BUILDERS[name]().things]
+    objects = [t.model.replace("_", " ") for t in SHOWCASE_SCENE_BUILDERS[name]().models]
     kind = INTERACTION_OF_SHOWCASE[name]
     return PlannedScene(name, 0, tuple(objects), (), "scatter", kind)
 

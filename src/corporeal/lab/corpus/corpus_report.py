@@ -1,4 +1,4 @@
-"""The report of a corpus: one page that holds all it shows, and its numbers as CSV and JSON."""
+"""Report of a corpus: a self-contained page, with data as CSV and JSON."""
 
 import csv
 import io
@@ -31,7 +31,7 @@ from corporeal.simulation.audit_messages import ALLOWED_BREACHES
 
 REPORT_PAGE_FILE, REPORT_TABLE_FILE, REPORT_DATA_FILE = "report.html", "report.csv", "report.json"
 THUMBNAIL_WIDTH_PX = 840
-"""Width of a film's row of frames on the page [px]."""
+"""Width of a video's row of frames on the page [px]."""
 BREAKDOWN_COLUMNS = (
     "scenes",
     "objects",

@@ -1,4 +1,4 @@
-"""Run every assembled scene of a corpus through the pipeline, each in a process of its own.
+"""Runs of all assembled scenes of a corpus, each in its own process.
 
 ``<corpus>/scenes/<scene>/scene.toml`` becomes ``<corpus>/runs/<scene>/``, a run like any other. A
 scene that is interrupted goes on from its checkpoint.
@@ -29,10 +29,10 @@ TIME_SHARE_OF_VERB: Mapping[str, tuple[float, float]] = {
     "ground": (0.05, 0.06),
     "fill": (0.06, 0.15),
     "simulate": (0.15, 0.4),
-    "film": (0.4, 0.92),
+    "video": (0.4, 0.92),
     "report": (0.92, 1.0),
 }
-"""Where each verb begins and ends in the time of a run at draft detail, roughly."""
+"""Where each stage begins and ends in the time of a run at draft detail, roughly."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def run_corpus(
     there = [s for s in planned if (folder / SCENES_FOLDER / s.name / store.META_FILE).exists()]
     if not there:
         raise UserError(
-            f"No scene of {folder} is assembled. Do it with: corporeal corpus assemble {folder}."
+            f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}."
         )
     if len(there) < len(planned):
         hands.say(
@@ -81,13 +81,13 @@ def run_corpus(
 
 def _with_showcase_view(plan: CorpusPlan, scene: PlannedScene, settings: Settings) -> Settings:
     """Let a scene of the showcase be seen from where it shows best."""
-    if plan.config.preset != "seven" or settings.film.view is not None:
+    if plan.config.preset != "seven" or settings.video.view is not None:
         return settings
-    return replace(settings, film=replace(settings.film, view=view_direction(scene.name)))
+    return replace(settings, video=replace(settings.video, view=view_direction(scene.name)))
 
 
 def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[str]) -> Job:
-    """Say what is to be done for one scene; ``read`` names the files that settings point to."""
+    """Describe what is to be done for one scene; ``read`` names the files that settings point to."""
     path = folder / SCENES_FOLDER / scene.name
     made = store.read_meta(path).key
     asked = replace(settings, describe=replace(settings.describe, record=None))
@@ -109,7 +109,7 @@ def run_scene(folder: Path, progress: ProgressCallback, scene: Path, settings: S
 
 
 def _overall_progress(progress: ProgressCallback) -> run_pipeline.ProgressOfStage:
-    """Spread the verbs over one bar."""
+    """Spread the stages over one bar."""
 
     def tell(verb: str) -> ProgressCallback:
         low, high = TIME_SHARE_OF_VERB[verb]
@@ -119,7 +119,7 @@ def _overall_progress(progress: ProgressCallback) -> run_pipeline.ProgressOfStag
 
 
 def forget_runs(jobs: Sequence[Job]) -> None:
-    """Have every verb of these runs done again."""
+    """Have every stage of these runs done again."""
     for job in jobs:
         if job.folder.exists():
             run_pipeline.delete_simulation(job.folder)

@@ -1,4 +1,4 @@
-"""Drop one real thing in the simulation, as ``life.toml`` says, and watch it rebound."""
+"""Simulated drop tests of the objects in ``life.toml``."""
 
 from dataclasses import dataclass, replace
 
@@ -6,8 +6,9 @@ import numpy as np
 
 from corporeal.core.types import GRAVITY_M_S2, Scene
 from corporeal.lab.evaluation.rebound_data import MeasuredRebound
+from corporeal.mpm.engines import build_engine
 from corporeal.mpm.problem import Diagnostics, Engine
-from corporeal.pipeline.in_memory import build_engine, pose_problem, prepare_scene
+from corporeal.pipeline.in_memory import pose_problem, prepare_scene
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.scene.scene_building import ball, box, build_scene
 
@@ -19,7 +20,7 @@ CHECKS_PER_DIAMETER = 2000
 
 @dataclass(frozen=True)
 class DropResult:
-    """One thing that was dropped in the simulation."""
+    """One object that was dropped in the simulation."""
 
     name: str
     detail: str
@@ -32,8 +33,9 @@ class DropResult:
     young_ratio: float
     """Simulated over real Young's modulus [-]."""
     unbooked: float
-    """Energy lost that no loss accounts for, over that of the blow [-]; rigid ones lose theirs in
-    their restitution, and have none."""
+    """Energy lost that no loss accounts for, over that of the impact [-]; rigid ones lose theirs in
+    their restitution, and have none.
+    """
     steps: int
 
 
@@ -54,11 +56,11 @@ def drop_scene(row: MeasuredRebound) -> Scene:
 
 
 def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
-    """Drop one thing and watch until it has left what it struck.
+    """Drop one object and watch until it has left what it struck.
 
     Args:
         row: What, from how high, on what.
-        settings: Of every verb; the floor is the row's.
+        settings: Of every stage; the floor is the row's.
 
     Raises:
         UserError: The settings don't go with it, or the simulation cannot go on.
@@ -84,7 +86,7 @@ def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
         float(max(after, 0.0) / speed),
         met[1] - met[0],
         treatment.kind,
-        treatment.young / treatment.young_real if not rigid else 1.0,
+        treatment.simulated_young_pa / treatment.young_pa if not rigid else 1.0,
         0.0 if rigid else unbooked_energy(first, last) / float(0.5 * first.mass[0] * speed**2),
         engine.steps.count,
     )

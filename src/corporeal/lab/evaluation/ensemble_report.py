@@ -1,4 +1,4 @@
-"""The spread of an ensemble as a table for the terminal, and as a figure."""
+"""Spread of an ensemble as a table and a figure."""
 
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ def spread_rows(result: Ensemble) -> list[tuple[str, ...]]:
 
 
 def failed_members(result: Ensemble) -> list[str]:
-    """Say which members could not be simulated to the end."""
+    """Return which members could not be simulated to the end."""
     return [
         f"Member {member.number} stopped: {member.error}"
         for member in result.members

@@ -1,4 +1,4 @@
-"""What mass one would guess without knowing what an object is made of.
+"""Baselines of mass prediction without materials.
 
 The fits leave the object out that they predict.
 """

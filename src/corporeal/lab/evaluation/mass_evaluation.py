@@ -1,4 +1,4 @@
-"""Mass: how well what was recognised predicts what the scales said.
+"""Evaluation of predicted masses against measured ones.
 
 The ladder of what is known, each step in the same run: the scan's volume as water; everything
 solid and usual; how objects are built and filled, with usual values; values placed in their
@@ -85,7 +85,7 @@ class MassPrediction:
     mixture_low: float
     mixture_high: float
     direct: float | None
-    """What a model said outright; None: nobody was asked."""
+    """Direct estimate of a model; None: not asked."""
     warning: str
     """Where that contradicts all the rest; "": nowhere."""
     volume_m3: float

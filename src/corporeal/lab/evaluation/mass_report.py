@@ -1,4 +1,4 @@
-"""The comparison of masses as tables for the terminal, and as a figure on logarithmic axes."""
+"""Comparison of masses as tables and a figure."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -92,7 +92,7 @@ def mass_figure(rows: Sequence[MassPrediction], path: Path) -> None:
     """
     known = [r for r in rows if r.mass_true is not None]
     if not known:
-        raise UserError("There is nothing to draw: no mass was measured. Give --truth FILE.")
+        raise UserError("There is nothing to plot: no measured masses. Give --truth FILE.")
     figure = Figure(figsize=(7.2, 6.4), dpi=150, layout="constrained")
     axes = figure.add_subplot()
     every = [v for r in known for v in (r.mass_true or 0.0, r.low, r.high, r.mass)]

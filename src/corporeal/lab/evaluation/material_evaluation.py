@@ -1,4 +1,4 @@
-"""Is each part made of what was said? Right, wrong or unknown, and whether the margin knew."""
+"""Evaluation of recognized materials: right, wrong or unknown, and calibration of margins."""
 
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -118,7 +118,9 @@ def read_material_truth(path: Path, library: str = "default") -> MaterialTruth:
 
 def _accepted(path: Path, where: str, names: object, library: str) -> tuple[str, ...]:
     if not (isinstance(names, list) and names and all(isinstance(m, str) for m in names)):
-        raise BadFileError(path, f"{where}: is {names!r}, no list of materials.", TRUTH_FILE_ADVICE)
+        raise BadFileError(
+            path, f"{where}: is {names!r}, not a list of materials.", TRUTH_FILE_ADVICE
+        )
     return tuple(materials.find_material_or_default(name, library).name for name in names)
 
 

@@ -42,7 +42,7 @@ class WeighedObject:
     mass: float | None = None
     """[kg]; None: not known."""
     fill: str = UNGROUPED_NAME
-    """Solid, hollow, full …: whose errors are told apart."""
+    """Solid, hollow, full …: whose errors are separated."""
 
 
 def objects_to_weigh(folder: Path, table: Path | None, split: str) -> list[WeighedObject]:

@@ -87,7 +87,7 @@ class ObjectsRow:
     """One scene; mean IoU over its objects, paired by the Hungarian method."""
 
     scene: str
-    things: tuple[str, ...]
+    objects: tuple[str, ...]
     points: int
     identity: float
     """The ground truth against itself: 1 by construction."""
@@ -139,7 +139,7 @@ def evaluate_objects(
     Args:
         folder: Of scenes as ``corporeal assemble`` writes them, or one such scene.
         config: How they are pictured.
-        progress: Told the share done.
+        progress: Called with the fraction done.
 
     Raises:
         UserError: There is no scene of several objects.
@@ -179,7 +179,7 @@ def evaluate_scene(name: str, taken: TouchingObjects) -> ObjectsResult:
     published = nearest_neighbour_components(cloud.position)
     row = ObjectsRow(
         scene=name,
-        things=taken.names,
+        objects=taken.names,
         points=cloud.count,
         identity=matched_iou(truth, truth),
         ours=matched_iou(truth, ours.object_of_point),

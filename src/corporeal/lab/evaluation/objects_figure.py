@@ -1,4 +1,4 @@
-"""Scenes as points: what they look like, whose each point is, and whose it was taken for."""
+"""Figure of object segmentation: colours, ground truth and prediction of points."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -46,7 +46,7 @@ def draw_objects(found: Sequence[ObjectsResult], path: Path) -> None:
 
 
 def _match_numbers(truth: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Give what was found the number of what it fits best; what fits nothing comes after."""
+    """Return what was found the number of what it fits best; what fits nothing comes after."""
     count, known = int(found.max()) + 1, int(truth.max()) + 1
     number = optimal_assignment(iou_matrix(truth, found, known, count).T)
     left = number < 0

@@ -1,4 +1,4 @@
-"""How far the outcome is known: one run simulated again with other values from the ranges.
+"""Uncertainty of the outcome by an ensemble of sampled material values.
 
 Every member is drawn as a whole (materials/value_sampling.py), filled anew and simulated; its
 frames are dropped once its outcome is known. A member that is done is not done again, and one that
@@ -130,7 +130,7 @@ def simulate_ensemble(
         samples: How many sets of values are drawn.
         seed: Of the draws.
         config: How to simulate; None: as the run was.
-        tell: Whom to tell about progress.
+        tell: Progress callback of each stage.
 
     Raises:
         UserError: The folder is no run, or the number of samples makes no sense.
@@ -233,7 +233,7 @@ def outcome_row(made: StageResults) -> ObjectQuantities:
 def outcome_spread(
     chosen: ObjectQuantities, rows: Sequence[MemberOutcome]
 ) -> Mapping[str, Mapping[str, QuantitySpread]]:
-    """Say how far each outcome number is spread over the members that came through."""
+    """Return how far each outcome number is spread over the members that came through."""
     return {
         name: {
             q: _spread(own[q], [r.objects[name][q] for r in rows if name in r.objects]) for q in own

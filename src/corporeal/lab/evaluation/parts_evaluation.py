@@ -1,4 +1,4 @@
-"""Are an object's parts found? Photographed models, whose files say which point is whose.
+"""Evaluation of part segmentation on rendered models with ground truth.
 
 A model is pictured from all sides; points on its surface that a picture shows take their colours,
 and what models see, from the pictures, as points of photographs do. Which node or material a point
@@ -44,11 +44,10 @@ from corporeal.reconstruction.segment.part_naming import name_clusters, part_phr
 from corporeal.showcase.showcase_scenes import build_single_prop_scene
 
 SHOWCASE_MODELS = ("potted_ficus", "armchair", "floor_lamp", "couch")
-NAMES_FILE_ADVICE = "Write [file] with part = 'how a person would call it', as in pot = 'clay pot'."
+NAMES_FILE_ADVICE = "Write [file] with part = 'its everyday name', as in pot = 'clay pot'."
 
 PartNames = Mapping[str, Mapping[str, str]]
-"""File's stem → part as the file calls it → as somebody calls it who sees it.
-What is called the same is one part."""
+"""File's stem → part as the file calls it → its everyday name. What is called the same is one part."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ class PartsRow:
     best_iou: float
     """Of clusters that are named after what most of their points are: no naming could do better."""
     found_iou: float
-    """Of named parts, paired by the Hungarian method: how well they are told apart."""
+    """Of named parts, paired by the Hungarian method: how well they are separated."""
     named_iou: float
     """Of named parts, each with its own name's: whether they are also called what they are."""
     right: float
@@ -123,7 +122,7 @@ class FeatureModels:
     structural: Any
     """None: the descriptor."""
     semantic: Any
-    """None: nobody compares points with words."""
+    """None: no model compares points with words."""
 
 
 Progress = Callable[[float, str], None]
@@ -163,7 +162,7 @@ def evaluate_parts(
         folder: Models, one object each; None: four of the showcase.
         names: What parts are called; those not in it are called as the file does.
         how: How they are pictured and taken apart, and who looks.
-        progress: Told the share done.
+        progress: Called with the fraction done.
 
     Raises:
         UserError: There is no model of several parts, or an encoder cannot be had.

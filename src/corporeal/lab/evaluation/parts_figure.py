@@ -1,4 +1,4 @@
-"""Objects as points: what they look like, their parts, the clusters, and the parts found."""
+"""Figure of part segmentation: colours, ground truth, clusters and prediction."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""How high real things rebound, as published: ``life.toml``, read."""
+"""Published rebounds of real objects, from ``life.toml``."""
 
 import tomllib
 from collections.abc import Iterator, Sequence
@@ -18,7 +18,7 @@ SPHERE_DRAG_COEFFICIENT = 0.47
 
 @dataclass(frozen=True)
 class StruckBlock:
-    """What a thing is dropped on, where it is not the floor."""
+    """What an object is dropped on, where it is not the floor."""
 
     material: str
     size: tuple[float, float, float]
@@ -51,10 +51,10 @@ class MeasuredRebound:
     blind: bool = False
     """Whether it was written down before it was tried for the first time."""
     scene: str = ""
-    """What several rows measured alike, the same thing on the same; "": nobody else did."""
+    """What several rows measured alike, the same thing on the same; "": none."""
 
     def off(self, restitution: float) -> float:
-        """Say how far a restitution is from the range [-]; 0 in it."""
+        """Return how far a restitution is from the range [-]; 0 in it."""
         return max(self.low - restitution, restitution - self.high, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""A table that a comparison shows a person."""
+"""Result tables."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

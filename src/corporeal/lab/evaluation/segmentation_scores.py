@@ -1,4 +1,4 @@
-"""How well objects were told apart, against the truth."""
+"""Scores of segmentation against ground truth."""
 
 import numpy as np
 from jaxtyping import Float, Int

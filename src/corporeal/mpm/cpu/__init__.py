@@ -1,1 +1,1 @@
-"""The engine on the processor: memory layout and the host side of its loops."""
+"""The CPU engine: memory layout and the host side of its loops."""

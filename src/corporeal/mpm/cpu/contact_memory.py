@@ -1,4 +1,4 @@
-"""Memory that the native contact piece works in, and the parameters it takes from the problem."""
+"""Memory of the native contact solver, and its parameters."""
 
 import numpy as np
 
@@ -63,13 +63,13 @@ def rigid_grid(
 
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
-    surface, rounding = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
-    facets = facets_of(surface, rounding)
+    surface, curvature = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
+    facets = facets_of(surface, curvature)
     points, clumps = _sort_into_cubes(points, 4.0 * cell)
     wetted, patches = _wetted_points(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
-    normals = rounding[:, :3]
+    normals = curvature[:, :3]
     thin = rigid.thinness(body.surface, normals, cell)
     spacing = rigid.surface_point_spacing(body.surface)
     # Many nodes ask where a body's surface begins: runs of points that are near each other.
@@ -88,7 +88,7 @@ def rigid_grid(
         "point": points,
         "clump": clumps,
         "surface": np.ascontiguousarray(surface),
-        "rounding": np.ascontiguousarray(rounding),
+        "curvature": np.ascontiguousarray(curvature),
         "facet": facets.row,
         "facet_point": np.ascontiguousarray(facets.point),
         "wetted": wetted,
@@ -105,23 +105,23 @@ def rigid_grid(
     record["pointed"] = len(surface) > 0 or body.path is not None
     record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
     record["wets"], record["facets"] = places.shape[1], len(facets.row)
-    record["rolls"] = bool((rounding[:, 6:8] > 0.0).any())
-    record["bends"] = bool(np.any(rounding[:, 10:] != 0.0))
+    record["rolls"] = bool((curvature[:, 6:8] > 0.0).any())
+    record["bends"] = bool(np.any(curvature[:, 10:] != 0.0))
     record["spacing"] = spacing
     record["thin"], record["slims"] = thin, len(slim)
     record["flat"] = is_bounded_by_facets(facets, body.surface)
-    record["edged"] = has_edges(rounding)
+    record["edged"] = has_edges(curvature)
     return arrays
 
 
 def _wetted_points(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Give points that liquids touch and their normals, in the body's frame, and patches of them.
+    """Return points that liquids touch and their normals, in the body's frame, and patches of them.
 
     Patches are two cells wide: a liquid looks no farther.
     """
-    if body.wetted is None:
+    if body.wetted_surface is None:
         return np.zeros((0, 6)), np.zeros((0, 6))
-    rows = np.concatenate([body.wetted.point - centre, body.wetted.normal], axis=1)
+    rows = np.concatenate([body.wetted_surface.point - centre, body.wetted_surface.normal], axis=1)
     return _sort_into_cubes(rows, WETTED_REACH_DX * cell)
 
 
@@ -159,7 +159,7 @@ class ContactMemory:
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
-        self.blows = np.ascontiguousarray(problem.blow_laws)
+        self.restitution_law = np.ascontiguousarray(problem.restitution_law_of_pair)
         self.face = face_table()
         self.stage = np.zeros(1, layout.CONTACT_STAGE_RECORD.dtype)
         self.pair = np.zeros(self.friction.size * PAIR_COLUMNS)
@@ -170,12 +170,12 @@ class ContactMemory:
             plane=self.plane,
             friction=self.friction,
             restitution=self.restitution,
-            bounces=self.blows,
+            bounces=self.restitution_law,
             contact_memory=self.stage,
             face=self.face,
         )
-        if problem.brakes:
-            self.rolling = np.array(problem.rolling, float)
+        if problem.has_rolling_resistance:
+            self.rolling = np.array(problem.rolling_resistance, float)
             write_pointers(world, rolling=self.rolling)
         write_pointers(world, **{name: getattr(ledger, name) for name in LEDGER_ARRAYS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
@@ -187,7 +187,7 @@ class ContactMemory:
         self.lengthen()
 
     def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
-        """Give the plane that a window reaches, and its normal; -1 and 0 if none or several.
+        """Return the plane that a window reaches, and its normal; -1 and 0 if none or several.
 
         Args:
             origin: The window's first block.
@@ -277,7 +277,7 @@ def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     friction = np.array(problem.friction, float)
     restitution = np.array(problem.restitution, float)
     if problem.contact == "multi":
-        for frame, soft in problem.never_touch:
+        for frame, soft in problem.all_excluded_pairs:
             friction[frame, soft] = friction[soft, frame] = BONDED_FRICTION
         return friction, restitution
     bodies, walls = len(problem.bodies), len(problem.planes)

@@ -5,12 +5,13 @@ particles, nodes and contacts are the native pieces of ``cpu.program``, launched
 """
 
 from collections.abc import Collection
+from typing import Self
 
 import numpy as np
 
 from corporeal.core.errors import SimulationError
 from corporeal.core.process_resources import usable_cores
-from corporeal.mpm.add_bodies import AddedBodies, adopt_running_conditions
+from corporeal.mpm.body_changes import BodyChange, EngineBodyChanges
 from corporeal.mpm.constants import (
     FREE_FALL_STEP_FRACTION,
     MAX_DISTANCE_FROM_ORIGIN_DX,
@@ -24,12 +25,7 @@ from corporeal.mpm.constants import (
 from corporeal.mpm.cpu import native_tables, task_lists
 from corporeal.mpm.cpu import step_clock as pacing
 from corporeal.mpm.cpu.contact_memory import ContactMemory, rigid_grid, write_pointers
-from corporeal.mpm.cpu.engine_checkpoint import (
-    EngineCheckpoint,
-    SavedArrays,
-    extend_state,
-    inherit_state,
-)
+from corporeal.mpm.cpu.engine_checkpoint import EngineCheckpoint, SavedArrays, continued
 from corporeal.mpm.cpu.field_window import NATIVE_ARRAYS, FieldWindow, window_too_wide_error
 from corporeal.mpm.cpu.layout import (
     BODY_SUMS,
@@ -58,7 +54,7 @@ from corporeal.mpm.cpu.shared_field import CarriedRigidBody
 from corporeal.mpm.cpu.spring_records import SpringRecords
 from corporeal.mpm.cpu.wind_records import WindRecords
 from corporeal.mpm.diagnostics import BodySums
-from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.material_table import MaterialTable
 from corporeal.mpm.physics import prescribed_motion, wall_stress
@@ -67,14 +63,15 @@ from corporeal.mpm.physics.rigid import RigidBody
 from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, StepStatistics
-from corporeal.mpm.split_body import ParentMap
 from corporeal.mpm.state import Velocities
 
 DEFAULT_THREADS = 4
 
 
-class CpuEngine(EngineInteraction):
+class CpuEngine(EngineBodyChanges, EngineLoadChanges):
     """Steps one problem on the CPU."""
+
+    name = "cpu"
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
         """Lay out memory.
@@ -142,7 +139,7 @@ class CpuEngine(EngineInteraction):
             if b not in separate
         ]
         self.contact = ContactMemory(self.world, problem, self.ledger)
-        self.blows = WindRecords(
+        self.winds = WindRecords(
             problem, self.first, self.ledger.external_impulse, self.rigid, self.points
         )
         self.springs = SpringRecords(problem, self.first, self.ledger.external_impulse, self.rigid)
@@ -238,13 +235,13 @@ class CpuEngine(EngineInteraction):
             chore=self.task.chore,
             list=self.node_task,
             report=self.report,
-            blow=self.blows.record,
+            blow=self.winds.record,
             bond=self.bond,
         )
         self._connect_bonds()
         self.springs.connect(world)
-        world["blows"] = len(self.blows.record)
-        world["blown"] = len(self.field) if len(self.blows.record) else 0
+        world["blows"] = len(self.winds.record)
+        world["blown"] = len(self.field) if len(self.winds.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
         world["tasks"], world["nodes"] = len(self.task.row), len(self.node_task)
         world["colour"], world["chores"] = self.task.colours, len(self.task.chore)
@@ -272,7 +269,10 @@ class CpuEngine(EngineInteraction):
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
         record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
-        record["swells"], record["pours"] = self.material[f].swells, self.material[f].pours
+        record["uses_mean_dilatation"], record["pours"] = (
+            self.material[f].uses_mean_dilatation,
+            self.material[f].pours,
+        )
         record["full"] = full_cell_mass(self.problem.bodies[f], self.problem.cell)
         record["flows_by"] = wall_stress.flow_curve(self.problem.bodies[f], self.problem.cell)
         # One lane of a node says how high mass lies over a floor.
@@ -339,7 +339,7 @@ class CpuEngine(EngineInteraction):
         total = self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]].sum(axis=0)
         self.ledger.plastic_loss += total[0]
         self.ledger.viscous_loss += total[1] + self.springs.take_loss()
-        self.ledger.push_work += total[2] + self.blows.take_work() + self.springs.take_work()
+        self.ledger.push_work += total[2] + self.winds.take_work() + self.springs.take_work()
         self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]] = 0.0
 
     def _sort(self, fields: set[int]) -> None:
@@ -394,36 +394,6 @@ class CpuEngine(EngineInteraction):
         self._note_steps()
         self.lost[:] = False
         self.connect()
-
-    def inherit(self, saved: SavedArrays, heirs: ParentMap) -> None:
-        """Go on from the ``save`` of an engine of whose bodies one is several here.
-
-        The pieces are where the problem says; all else is as it was, and so are the books.
-        """
-        self.restore(inherit_state(self.save(), saved, heirs))
-
-    def joined_by(self, problem: Problem) -> "CpuEngine":
-        """Return an engine that goes on from here with more bodies.
-
-        Forces of contacts are looked for anew in the first step. What is held stays held. The
-        potential energy of those that join is booked as work from outside.
-
-        Args:
-            problem: With those that join after all others, which are as at the start.
-
-        """
-        who = AddedBodies(len(self.problem.bodies), len(problem.bodies))
-        after = CpuEngine(adopt_running_conditions(problem, self.problem), self.threads)
-        saved, shared = self.save(), after.problem.contact == "single"
-        after.restore(extend_state(after.save(), saved, who, shared))
-        if shared:
-            after.window[0].continue_as(self.window[0], after.material[0])
-            after.connect()
-        after.grips = dict(self.grips)
-        after._take_grips()
-        added = after.measure().potential[who.before :]
-        after._enter(who.before, np.zeros(3), float(added.sum()))
-        return after
 
     # ------------------------------------------------------------ accessors of what is common
 
@@ -495,7 +465,7 @@ class CpuEngine(EngineInteraction):
         self.book()
         self.clock["gravity"], self.clock["ramp"] = self.problem.gravity, self.problem.gravity_ramp
         self.clock["fall"] = self._longest_fall()
-        self.blows.blow(self.problem)
+        self.winds.set_wind(self.problem)
 
     def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         for f, window in self.window.items():
@@ -518,3 +488,12 @@ class CpuEngine(EngineInteraction):
             # What it was strained by there was long ago: branches have forgotten it.
             self.window[f].relax(self.material[f])
         self.connect()
+
+    def _successor(self, problem: Problem, change: BodyChange) -> Self:
+        after = type(self)(problem, self.threads)
+        saved, shared = self.save(), problem.contact == "single"
+        after.restore(continued(after.save(), saved, change, shared))
+        if shared:
+            after.window[0].continue_as(self.window[0], after.material[0])
+            after.connect()
+        return after

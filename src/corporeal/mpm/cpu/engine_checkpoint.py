@@ -1,4 +1,4 @@
-"""What a CPU engine keeps of itself by name, and takes back: fields, rigid bodies, clock, books."""
+"""Checkpoints of the CPU engine: fields, rigid bodies, clock, ledgers."""
 
 import re
 from collections.abc import Collection
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from corporeal.mpm.add_bodies import AddedBodies
+from corporeal.mpm.body_changes import BodyChange
 from corporeal.mpm.cpu.contact_memory import ContactMemory
 from corporeal.mpm.cpu.field_window import FieldWindow
 from corporeal.mpm.ledger import EngineLedger
-from corporeal.mpm.split_body import ParentMap
 
 SavedArrays = dict[str, np.ndarray]
 
@@ -75,42 +75,30 @@ class EngineCheckpoint:
         self.contact.kept = saved.get("choices", np.zeros(0, np.uint8))
 
 
-def inherit_state(own: SavedArrays, saved: SavedArrays, heirs: ParentMap) -> SavedArrays:
-    """Return the state of an engine with pieces: their own, of all else what was saved before.
-
-    Args:
-        own: Of the engine as it was built, with the pieces where they are.
-        saved: Of the engine before, of whose bodies one is several now.
-        heirs: Who comes of whom.
-
-    """
-    books = {f"ledger.{name}": v for name, v in heirs.inherited(_ledger_arrays(saved)).items()}
-    return own | _select_bodies(saved, heirs.whole) | books | {"clock": saved["clock"]}
-
-
-def extend_state(
-    own: SavedArrays, saved: SavedArrays, who: AddedBodies, shared: bool
+def continued(
+    own: SavedArrays, saved: SavedArrays, change: BodyChange, shared: bool
 ) -> SavedArrays:
-    """Return the state of an engine with more bodies: their own, of all else what was saved before.
+    """Return the state of an engine with other bodies: their own, of all else what was saved.
 
     In a field that all share, ``Window.continue_as`` takes particles over by number afterwards.
 
     Args:
-        own: Of the engine as it was built, with those that join where they are.
+        own: Of the engine as it was built, with new bodies or pieces where they are.
         saved: Of the engine before.
-        who: Which bodies were there.
+        change: Who comes of whom.
         shared: Whether all bodies share one field.
 
     """
-    books = who.inherited(_ledger_arrays(saved))
-    clock, mine = saved["clock"].copy(), own["clock"]
-    for name in ("speed", "wave"):  # of whoever is fastest
-        k = 1 + CLOCK_FIELDS.index(name)
-        clock[k] = max(clock[k], mine[k])
-    kept = _select_bodies(saved, who.whole)
+    books = {f"ledger.{k}": v for k, v in change.inherited(_ledger_arrays(saved)).items()}
+    kept = _select_bodies(saved, change.whole)
     if shared:
         kept = {name: value for name, value in kept.items() if not name.startswith("field0.")}
-    return own | kept | {f"ledger.{k}": v for k, v in books.items()} | {"clock": clock}
+    clock = saved["clock"].copy()
+    if isinstance(change, AddedBodies):  # pieces are as fast as what they come of
+        for name in ("speed", "wave"):
+            k = 1 + CLOCK_FIELDS.index(name)
+            clock[k] = max(clock[k], own["clock"][k])
+    return own | kept | books | {"clock": clock}
 
 
 def _ledger_arrays(saved: SavedArrays) -> SavedArrays:

@@ -42,8 +42,9 @@ class FieldWindow:
     part: np.ndarray
     """Channels of all particles, (batches, CHANNELS, 8)."""
     history: np.ndarray
-    """What matter that flows or is nearly incompressible remembers besides, (batches, HISTORY, 8);
-    empty without any."""
+    """What material that flows or is nearly incompressible remembers besides, (batches, HISTORY,
+    8); empty without any.
+    """
     branch: np.ndarray
     """What Maxwell branches remember, (batches, MEMORY, 8); empty without any."""
     block: np.ndarray
@@ -51,7 +52,7 @@ class FieldWindow:
     table: np.ndarray
     """Number of each node block, -1: none."""
     where: np.ndarray
-    """Coordinates of node blocks, (blocks, 4); the last stands for those that nobody reaches."""
+    """Coordinates of node blocks, (blocks, 4); the last stands for unreached ones."""
     used: np.ndarray
     """Which of the two sets of nodes hold anything in each node block: bits."""
     have: np.ndarray
@@ -66,7 +67,7 @@ class FieldWindow:
     """Size of the table."""
     fits: bool
     relieves: bool
-    """Whether the history, where there is any, is that of nearly incompressible matter."""
+    """Whether the history, where there is any, is that of nearly incompressible material."""
 
     def __init__(
         self, place: np.ndarray, rows: np.ndarray, material: FieldMaterials, sorter: ParticleSorter
@@ -94,7 +95,7 @@ class FieldWindow:
         self.part = aligned_zeros((batches, CHANNELS, 8), np.float32)
         self.part.transpose(0, 2, 1)[np.arange(len(rows)) // 8, np.arange(len(rows)) % 8] = rows
         self.relieves = not material.flows
-        recalls = material.flows or material.swells
+        recalls = material.flows or material.uses_mean_dilatation
         self.history = aligned_zeros((batches if recalls else 0, HISTORY_CHANNELS, 8), np.float32)
         self.relax(material)
         self.block = np.zeros((1, BLOCK_INTEGERS), np.int32)
@@ -181,7 +182,7 @@ class FieldWindow:
         return self._rows(self.part[:, first : first + width])
 
     def past(self, first: int, width: int) -> np.ndarray:
-        """Copy some channels of what matter that flows remembers; 0 where nothing flows."""
+        """Copy some channels of what material that flows remembers; 0 where nothing flows."""
         if not len(self.history):
             return np.zeros((self.count, width), np.float32)
         return self._rows(self.history[:, first : first + width])
@@ -242,12 +243,14 @@ def _shifted_places(place: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """Shift fixed-point places, which float32 channels hold."""
     fixed = np.ascontiguousarray(place).view(np.int32).astype(np.int64) + shift
     if (np.abs(fixed) >= 2**31).any():
-        raise SimulationError("What joins is too far from all else for one grid. Drop it nearer.")
+        raise SimulationError(
+            "The added body is too far from the others for one grid. Add it nearer."
+        )
     return fixed.astype(np.int32).view(np.float32)
 
 
 def window_too_wide_error(problem: Problem, bodies: list[int], time: float) -> str:
-    """Say that some bodies no longer fit into one window."""
+    """State that some bodies no longer fit into one window."""
     names = " and ".join(repr(problem.bodies[b].name) for b in bodies)
     return (
         f"At t = {time:.4g} s {names} no longer fits into one grid: it spans more than 500 cells. "

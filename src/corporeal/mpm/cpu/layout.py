@@ -1,7 +1,7 @@
-"""Memory that Python and the native loops share: channels, columns, codes and structs.
+"""Memory layout shared by Python and native loops: channels, columns, codes and structs.
 
-``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no number and
-no struct of this layout is written in ``loops``.
+``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no
+number and no struct of this layout is written in ``loops``.
 """
 
 from corporeal.mpm.constants import BRANCHES
@@ -19,12 +19,14 @@ per cell: dx times the usual), F - 1 (9), stress (6), mass, volume, material and
 CHANNELS = 34
 """Channels of a particle."""
 EP, VC, TM = 0, 1, 2
-"""First channels of what matter that flows remembers besides: plastic strain, volume correction,
-whole motion - 1 (9)."""
+"""First channels of what material that flows remembers besides: plastic strain, volume correction,
+whole motion - 1 (9).
+"""
 LOG_VOLUME_RATIO, PRESSURE, OWN_DILATATION, CLUSTER, WAVE_BOUND = 1, 2, 3, 4, 5
-"""The same of nearly incompressible matter: ln of the mean volume over its own and the Kirchhoff
+"""The same of nearly incompressible material: ln of the mean volume over its own and the Kirchhoff
 pressure of the mean [Pa]; within a step, its own dilatation, its cluster and the wave bound so far.
-Its plastic strain, in the channel before, stays 0."""
+Its plastic strain, in the channel before, stays 0.
+"""
 HISTORY_CHANNELS = 11
 """Channels of that."""
 BRANCH_STRAIN, BRANCH_DILATATION = 0, 6
@@ -35,7 +37,7 @@ MAXWELL_CHANNELS = BRANCHES * BRANCH_CHANNELS
 """Channels of what all branches of a particle remember."""
 LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, FLIP_DAMPING_RATE, RHO, RIGID = range(12)
 """Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain
-p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, forgetting rate [1/s], ρ [kg/m³], 1 where
+p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, FLIP damping rate [1/s], ρ [kg/m³], 1 where
 rigid."""
 SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY, STIFFENING = (
     12,
@@ -200,7 +202,7 @@ FIELD_RECORD = NativeRecord(
     ("double *", "rigid"),  # rigid: its state
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
     ("double *", "facet facet_point"),  # rigid: [facets][FACET_ROW] flat faces; places on them
-    ("double *", "rounding"),  # rigid: [surfaces][ROUNDING], see types.ROUNDING
+    ("double *", "curvature"),  # rigid: [surfaces][CURVATURE_COLUMNS], see types.CURVATURE_COLUMNS
     ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
@@ -211,7 +213,7 @@ FIELD_RECORD = NativeRecord(
     ("double", "mass full"),  # full: of a cell full of it
     ("double[3]", "flows_by"),  # of a liquid at a wall: yield stress [Pa], K/d^n [Pa (s/m)^n], n
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
-    ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
+    ("int", "blocks pool rigids points surfaces pushed uses_mean_dilatation flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
@@ -448,5 +450,5 @@ READING_RECORD = NativeRecord(
     ("double *", "sum"),  # [runs][owners][SUMS]
     ("double", "dx"),
     ("int[3]", "origin"),
-    ("int", "runs owners blocks swells"),
+    ("int", "runs owners blocks uses_mean_dilatation"),
 )

@@ -1,4 +1,4 @@
-"""What the native pieces read of bodies: rows of particles, materials and rigid states."""
+"""Tables of bodies for native code: particles, materials and rigid states."""
 
 from dataclasses import dataclass
 
@@ -35,7 +35,7 @@ from corporeal.mpm.cpu.layout import (
 )
 from corporeal.mpm.material_table import MaterialTable
 from corporeal.mpm.physics import rigid
-from corporeal.mpm.physics.inclusions import frame_and_soft_density, frame_particles_near
+from corporeal.mpm.physics.inclusions import inclusion_and_soft_density, inclusion_particles_near
 from corporeal.mpm.problem import Body, Problem
 
 
@@ -47,7 +47,7 @@ class FieldMaterials:
     """Columns: see ``layout``."""
     body: Int[np.ndarray, " M"]
     """Whose each row is."""
-    swells: bool
+    uses_mean_dilatation: bool
     """Whether pressure comes from the mean dilatation of clusters."""
     flows: bool
     """Whether any of it has a return map."""
@@ -63,7 +63,9 @@ class FieldMaterials:
         table = np.zeros((len(s.body), MATERIAL_COLUMNS), np.float32)
         none = np.zeros(len(s.body))
         numbers = (s.mu, s.lam, s.yield_stress, s.hardening, s.cone, s.apex, none, s.flow_index)
-        table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.forgetting, s.density, s.rigid])
+        table[:, :SHEAR] = np.column_stack(
+            [s.law, *numbers, s.flip_damping_rate, s.density, s.rigid]
+        )
         table[:, CONSISTENCY] = s.consistency
         table[:, STIFFENING] = s.stiffening**2
         branches = s.branches
@@ -73,7 +75,7 @@ class FieldMaterials:
             (BRANCH_TIME, branches.time),
         ):
             table[:, first : first + BRANCHES] = column
-        kinds = (bool(s.swells.all()), bool(s.flows.any()), bool(s.relaxes.any()))
+        kinds = (bool(s.uses_mean_dilatation.all()), bool(s.flows.any()), bool(s.relaxes.any()))
         pours = bool(np.isin(s.law, laws.LIQUID_LAWS).any() and not s.rigid.all())
         return cls(table, s.body, *kinds, pours)
 
@@ -154,8 +156,11 @@ def bond_records(problem: Problem) -> tuple[np.ndarray, list[np.ndarray]]:
     rows, points = np.zeros(len(pairs), BOND_RECORD.dtype), []
     for row, (f, s) in zip(rows, pairs, strict=True):
         frame, soft = problem.bodies[f], problem.bodies[s]
-        stiff, held = frame_and_soft_density(frame, soft, problem.cell)
-        mass, chosen = frame.volume * frame.density, frame_particles_near(frame, soft, problem.cell)
+        stiff, held = inclusion_and_soft_density(frame, soft, problem.cell)
+        mass, chosen = (
+            frame.volume * frame.density,
+            inclusion_particles_near(frame, soft, problem.cell),
+        )
         place = frame.position - mass @ frame.position / mass.sum()
         points.append(np.column_stack([place, mass / stiff])[chosen])
         row["point"], row["points"] = points[-1].ctypes.data, len(points[-1])

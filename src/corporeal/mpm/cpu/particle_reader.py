@@ -1,4 +1,4 @@
-"""Native reading of particles: spread into arrays, or added up by body."""
+"""Native reading of particles into arrays, or sums by body."""
 
 from itertools import pairwise
 
@@ -82,7 +82,7 @@ class ParticleReader:
         for name, array in arrays.items():
             record[name] = 0 if array is None else array.ctypes.data
         record["origin"], record["blocks"] = window.origin, len(window.block)
-        record["swells"] = material.swells
+        record["uses_mean_dilatation"] = material.uses_mean_dilatation
         hands = max(1, min(len(self.launches), window.count // MIN_PARTICLES_PER_READING_THREAD))
         cuts = np.linspace(0, READING_RUNS, hands + 1).astype(int).tolist()
         for launch, (low, high) in zip(self.launches, pairwise(cuts), strict=False):

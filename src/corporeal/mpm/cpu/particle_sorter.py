@@ -1,4 +1,4 @@
-"""The native sort of one field's particles, and the memory it works in."""
+"""Native sort of one field's particles, with its memory."""
 
 from itertools import pairwise
 from typing import Protocol
@@ -85,7 +85,7 @@ class SpareMemory:
         ]
 
     def keep(self, rows: np.ndarray) -> None:
-        """Take back memory of ``rows`` or ``aligned_zeros`` that nobody needs, if it is the largest."""
+        """Take back memory of ``rows`` or ``aligned_zeros`` that is unused, if it is the largest."""
         memory = rows.base
         if memory is not None and memory.nbytes > self.memory.nbytes:
             self.memory = memory

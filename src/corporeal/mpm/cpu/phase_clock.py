@@ -1,4 +1,4 @@
-"""What each phase of a step takes on the processor, for benchmarks; others pay nothing."""
+"""Timing of the phases of a step, for benchmarks."""
 
 import ctypes
 import time

@@ -1,12 +1,12 @@
-"""The native pieces of the engine, compiled by Warp, and the memory layout they share.
+"""Native code of the engine, compiled by Warp.
 
 Warp compiles C++ for the machine it runs on and keeps it in a cache; the pieces use vector
 extensions, so they build on any processor. What they share with Python stands in ``layout``.
 
 A step is a list of phases, ``SCHEDULE``; a phase is a number of tasks of one piece, which any
 thread may take in any order. A new one needs four things: ``loops/NAME.cpp``, which does task
-``index`` and returns; a stub ``NAME_native``; a number and a branch in ``run_tasks``; a ``Phase``. How
-many tasks it has may be known only at run time: then it is an int in ``WORLD_RECORD``, which an
+``index`` and returns; a stub ``NAME_native``; a number and a branch in ``run_tasks``; a ``Phase``.
+How many tasks it has may be known only at run time: then it is an int in ``WORLD_RECORD``, which an
 earlier phase wrote. Tasks of one phase must not write to the same place, or what is written must
 not depend on their order. A piece ends the steps through ``World.full`` (a list was too short:
 Python lengthens it and goes on at the phase marked ``resume``, with ``World.again`` set) or
@@ -233,7 +233,7 @@ class CpuProgram:
         return self.hands
 
     def divide(self, first: list[int], chores: int) -> None:
-        """Say where each colour's chores begin, and how many there are."""
+        """Return where each colour's chores begin, and how many there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
             if phase.count in ("bare", "colour", "looks", "reaches"):
                 row[1] = first[phase.which]

@@ -1,4 +1,4 @@
-"""Rigid bodies in a field that they share with everything else: the control without contact.
+"""Rigid bodies in a shared velocity field: the control without contact.
 
 Their particles move with the field like all others; then each body takes the rigid motion that
 fits what they gathered, and puts them back where its shape says.

@@ -1,4 +1,4 @@
-"""What the native piece of the springs reads: records of tethers, joints and grips."""
+"""Records of tethers, joints and grips for native code."""
 
 import numpy as np
 
@@ -86,13 +86,13 @@ class SpringRecords:
         world["sprung"] = int(any(counts))
 
     def take_loss(self) -> float:
-        """Give what dampers took since last asked [J]."""
+        """Return what dampers took since last asked [J]."""
         total = float(self.tether["lost"].sum() + self.joint["lost"].sum())
         self.tether["lost"] = self.joint["lost"] = 0.0
         return total
 
     def take_work(self) -> float:
-        """Give the work that grips did since last asked [J]."""
+        """Return the work that grips did since last asked [J]."""
         total = float(self.grip["work"].sum())
         self.grip["work"] = 0.0
         return total

@@ -1,4 +1,4 @@
-"""What the native clock reads of bodies, and how long it runs before Python looks around."""
+"""Native clock: its data on bodies, and its time slice between returns to Python."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""Tasks on particles and on nodes, and which of them one thread does one after the other.
+"""Tasks on particles and nodes, and their schedule on threads.
 
 A task on particles is a piece of a column of blocks. Two that reach the same node must not run at
 once, and what they add to it must come in one order, so that the result does not depend on the

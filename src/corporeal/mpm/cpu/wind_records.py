@@ -1,4 +1,4 @@
-"""What the native piece of the loads reads: one record for every body in the wind."""
+"""Records of bodies in wind for native code."""
 
 import numpy as np
 
@@ -63,7 +63,7 @@ class WindRecords:
         record["start"], record["end"] = body.wind.start, body.wind.end
         record["half_rho_c"] = wind_pressure.HALF_RHO_C
 
-    def blow(self, problem: Problem) -> None:
+    def set_wind(self, problem: Problem) -> None:
         """Take the winds of a problem that differs in nothing else."""
         for row, b in enumerate(self.body):
             moving = problem.bodies[b].wind

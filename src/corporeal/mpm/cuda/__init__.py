@@ -1,1 +1,1 @@
-"""The engine on CUDA cards: memory layout, launches and loops."""
+"""The engine on CUDA GPUs: memory layout, launches and loops."""

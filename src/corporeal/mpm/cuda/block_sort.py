@@ -1,7 +1,7 @@
-"""Particles sorted by block on the device: by counting, with no word to the host and no memory.
+"""Counting sort of particles by block on the device, without host synchronisation or allocation.
 
 Blocks that particles are in come first and are numbered as particles reach them, so that on the
-processor sorting what is sorted changes nothing. A card's threads number them, and what is within
+processor sorting what is sorted changes nothing. A GPU's threads number them, and what is within
 one, in no fixed order.
 """
 

@@ -1,4 +1,4 @@
-"""How fields look where they meet, on the device: surfaces, normals, gaps.
+"""Contact geometry on the device: surfaces, normals, gaps.
 
 Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and relative to the node.
 """
@@ -390,7 +390,7 @@ def gap_of(
 
 @wp.func
 def mean_of(c: DeviceContacts, g: BlockGrid, s: StepGlobals, entry: int):
-    """Mean offset of a field's matter from a node [cells]."""
+    """Mean offset of a field's material from a node [cells]."""
     return wp.vec3d(c.mean[entry] / (g.node[c.slot[entry]][0] * s.cell))
 
 
@@ -398,7 +398,7 @@ def mean_of(c: DeviceContacts, g: BlockGrid, s: StepGlobals, entry: int):
 def faces_seen(
     g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, b: int, e: int
 ):
-    """Give the flat faces of a rigid body as a node sees them."""
+    """Return the flat faces of a rigid body as a node sees them."""
     x = wp.transpose(r.turn[b]) * (c.point[t] - r.centre[b])
     m = mean_of(c, g, s, e)
     first = D(r.facet_first[b])

@@ -113,7 +113,7 @@ def closing_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int):
 
 @wp.kernel
 def find_struck_pairs(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
-    """Find the rigid pairs that are hit as things move now."""
+    """Find the rigid pairs that are hit as objects move now."""
     for t in range(wp.tid(), s.flag[FLAG_TOUCHES], stride):
         if has_restitution(c, r, s, t):
             un = closing_of(c, r, s, t)
@@ -182,7 +182,7 @@ def begin_round(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, lanes: 
         s.pace[2] = D(0.0)
         if not last:
             s.flag[FLAG_HITS] = 1
-            support_hold(c.rounds, c.restitution, c.blows, c.lightness, s.dx)
+            support_hold(c.rounds, c.restitution, c.restitution_law, c.lightness, s.dx)
     wait_for_group()
     if not last:
         for pair in range(lane, everything * everything, lanes):
@@ -192,7 +192,7 @@ def begin_round(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, lanes: 
 
 @wp.kernel
 def set_targets(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
-    """Say which contacts take part in a round, and what speed each may keep."""
+    """Return which contacts take part in a round, and what speed each may keep."""
     dt = s.clock[CLOCK_DT]
     for k in range(wp.tid(), s.flag[FLAG_MEETS], stride):
         if c.stiff[k] == 1:

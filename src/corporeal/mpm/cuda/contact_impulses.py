@@ -1,4 +1,4 @@
-"""What contacts transmit on the device: impulses, and the books.
+"""Contact impulses on the device, with ledgers.
 
 Nodes of deformable fields are independent of one another: each is solved by its own thread with
 projected Gauss–Seidel. Rigid bodies couple many nodes. There every sweep is a Jacobi sweep in which

@@ -1,4 +1,4 @@
-"""Where fields meet on the device: nodes with several fields, or near a plane.
+"""Contact detection on the device: nodes with several fields, or near a plane.
 
 Same rules as ``reference.contact.find``.
 """

@@ -74,7 +74,7 @@ def enter_point(
 @wp.func
 def radius_at(r: DeviceRigidBodies, p: int):
     """Larger radius of curvature at a surface point [m]; 0 where it is not round."""
-    return r.rounding[CURVATURE_ROW * p + 6] + r.rounding[CURVATURE_ROW * p + 7]
+    return r.curvature[CURVATURE_ROW * p + 6] + r.curvature[CURVATURE_ROW * p + 7]
 
 
 @wp.func
@@ -95,7 +95,7 @@ def list_points(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: in
             continue
         p = i // s.planes
         towards = -(wp.transpose(r.turn[b]) * s.plane[w])
-        shift = shift_to_contact(r.rounding, p, towards)
+        shift = shift_to_contact(r.curvature, p, towards)
         on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
         x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(s.plane[w], x) - s.offset[w]
@@ -122,7 +122,7 @@ def list_facets(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: in
             continue
         row = FACET_ROW * k
         n = r.turn[other] * wp.vec3d(r.facet[row], r.facet[row + 1], r.facet[row + 2])
-        shift = shift_to_contact(r.rounding, p, -(wp.transpose(r.turn[b]) * n))
+        shift = shift_to_contact(r.curvature, p, -(wp.transpose(r.turn[b]) * n))
         on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
         x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(n, x - r.centre[other]) - r.facet[row + 3]
@@ -141,10 +141,10 @@ def list_facets(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: in
 def nearest_curved(r: DeviceRigidBodies, p: int, b: int, other: int, far: D):
     """Find the curved point of another body that a round point faces, nearest to its middle."""
     row = CURVATURE_ROW * p
-    n = wp.vec3d(r.rounding[row], r.rounding[row + 1], r.rounding[row + 2])
+    n = wp.vec3d(r.curvature[row], r.curvature[row + 1], r.curvature[row + 2])
     back = wp.transpose(r.turn[other])
     apart = r.centre[b] - r.centre[other]
-    x = back * (apart + r.turn[b] * (r.surface[p] - ball_radius(r.rounding, p) * n))
+    x = back * (apart + r.turn[b] * (r.surface[p] - ball_radius(r.curvature, p) * n))
     centre = back * apart
     first = int(b < other)
     best = int(-1)
@@ -152,11 +152,11 @@ def nearest_curved(r: DeviceRigidBodies, p: int, b: int, other: int, far: D):
     for q in range(r.first[other], r.first[other] + r.points[other]):
         d = x - r.surface[q]
         square = wp.length_sq(d)
-        if square < least and curved_may(r.rounding, r.surface, q, centre, far, first):
+        if square < least and curved_may(r.curvature, r.surface, q, centre, far, first):
             out = wp.vec3d(
-                r.rounding[CURVATURE_ROW * q],
-                r.rounding[CURVATURE_ROW * q + 1],
-                r.rounding[CURVATURE_ROW * q + 2],
+                r.curvature[CURVATURE_ROW * q],
+                r.curvature[CURVATURE_ROW * q + 1],
+                r.curvature[CURVATURE_ROW * q + 2],
             )
             if wp.dot(d, out) > D(0.0):
                 least = square
@@ -183,17 +183,17 @@ def list_curves(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: in
         if r.path_count[b] > 0 or b == other or c.apart[b, other] == 1 or r.bends[other] == 0:
             continue
         apart = r.centre[b] - r.centre[other]
-        radius = ball_radius(r.rounding, p)
+        radius = ball_radius(r.curvature, p)
         if radius <= D(0.0) or wp.length(apart) >= r.radius[b] + r.radius[other] + reach:
             continue
         q = nearest_curved(r, p, b, other, r.radius[b] + reach)
         if q < 0:
             continue
-        met = curved_meet(r.rounding, r.surface, p, r.turn[b], q, r.turn[other], apart, reach)
+        met = curved_meet(r.curvature, r.surface, p, r.turn[b], q, r.turn[other], apart, reach)
         at = wp.vec3d(met[0], met[1], met[2])
         n = wp.vec3d(met[3], met[4], met[5])
         if met[6] >= reach or not curved_owns(
-            r.rounding, r.surface, p, r.first[b], r.points[b], at
+            r.curvature, r.surface, p, r.first[b], r.points[b], at
         ):
             continue
         x = r.centre[b] + r.turn[b] * at
@@ -203,9 +203,9 @@ def list_curves(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: in
             t = enter_point(c, s, other, b, 1, x, n, met[6])
         if t < 2 * c.room:
             c.rolls[t] = 1
-            c.instead[t] = curved_misjudged(r.rounding, p, q, s.dx)
+            c.instead[t] = curved_misjudged(r.curvature, p, q, s.dx)
             square = square_along(r, b, other, x + radius * n, n)
-            c.inward[t] = curved_inward(r.rounding, p, q, square, s.clock[CLOCK_DT])
+            c.inward[t] = curved_inward(r.curvature, p, q, square, s.clock[CLOCK_DT])
     return 0
 
 

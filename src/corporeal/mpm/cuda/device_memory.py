@@ -1,4 +1,4 @@
-"""Memory of the device engine: what a problem puts into the structs of ``layout``."""
+"""Memory of the device engine: initialization of the structs of ``layout``."""
 
 from typing import Any
 
@@ -140,9 +140,9 @@ class DeviceMemory:
         r.surfaces = sum(len(p) for p in points)
         r.surface_body = self.put(np.concatenate([np.zeros(0, int), *body]), wp.int32)
         r.surface = self.put(np.concatenate([np.zeros((0, 3)), *points]), wp.vec3d)
-        rows = [matter.rounding[b].reshape(-1) for b in stiff]
-        r.rounding = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
-        r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.rounding]), wp.int32)
+        rows = [matter.curvature[b].reshape(-1) for b in stiff]
+        r.curvature = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
+        r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.curvature]), wp.int32)
         count, thin, flat = np.zeros((3, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [matter.thinness(cell)[b] for b in stiff]
@@ -182,7 +182,7 @@ class DeviceMemory:
     ) -> None:
         rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)
         for b in np.flatnonzero(stiff):
-            wetted = problem.bodies[b].wetted
+            wetted = problem.bodies[b].wetted_surface
             if wetted is not None:
                 both = np.stack([wetted.point - matter.centre[b], wetted.normal], axis=1)
                 rows.append(both.reshape(-1, 3))
@@ -236,15 +236,17 @@ class DeviceMemory:
             self.put(friction, wp.float64),
             self.put(restitution, wp.float64),
         )
-        c.blows = self.put(problem.blow_laws.reshape(-1, 5), wp.float64)
-        lengths = 0.0 * friction if problem.rolling is None else problem.rolling
+        c.restitution_law = self.put(problem.restitution_law_of_pair.reshape(-1, 5), wp.float64)
+        lengths = (
+            0.0 * friction if problem.rolling_resistance is None else problem.rolling_resistance
+        )
         c.rolling = self.put(lengths, wp.float64)
         rows = np.zeros((friction.size, SUPPORT_ROW))
         rows[:, SUPPORT_LEAST_GAP] = VAST_DOUBLE
         c.rounds = self.put(rows, wp.float64)
         c.lightness = self.zeros(len(friction), wp.float64)
         apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
-        for a, b in problem.never_touch:
+        for a, b in problem.all_excluded_pairs:
             apart[a, b] = apart[b, a] = 1
         c.apart = self.put(apart, wp.int32)
 

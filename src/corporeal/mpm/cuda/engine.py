@@ -1,8 +1,8 @@
-"""The engine for CUDA cards: all steps of a frame in one graph, no word to the host inside.
+"""The engine for CUDA GPUs: all steps of a frame in one graph, without host synchronisation.
 
 The same method as ``reference``, in plain Warp: particles in float32 with their places relative
 to the grid, rigid bodies and impulses in double precision. ``device="cpu"`` runs the very same
-graph on the processor, one thread, which is how it is tested where there is no card.
+graph on the processor, one thread, which is how it is tested where there is no GPU.
 """
 
 from collections.abc import Collection
@@ -29,13 +29,15 @@ from corporeal.mpm.state import ParticleConstants, Velocities, branch_energy, st
 KNOWN_FIELDS = {
     Body: "name position velocity volume density law young poisson yield_stress hardening "
     "friction_angle cohesion loss vibration consistency flow_index "
-    "rigid surface rounding wetted push wind faces tether path pivot",
+    "rigid surface curvature wetted_surface push wind faces tether path pivot",
     Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "
-    "courant bonds joints apart rolling blows",
+    "courant bonds joints excluded_pairs rolling_resistance restitution_law",
 }
 """What this engine knows of a problem; anything else must be at its default."""
 INITIAL_CONTACT_ROOM = 4096
-WARM_START_ARRAYS = tuple("cell place strain motion stress plastic opened relief pressure".split())
+WARM_START_ARRAYS = tuple(
+    "cell place strain motion stress plastic opened log_volume_ratio pressure".split()
+)
 """What a warm start takes over of particles."""
 RIGID_STATE_ARRAYS = "centre turn speed moment inertia spin cell place"
 STEP_STATE_ARRAYS = (
@@ -45,17 +47,20 @@ STEP_STATE_ARRAYS = (
 
 
 class CudaEngine(EngineInteraction):
-    """Steps one problem on a CUDA card."""
+    """Steps one problem on a CUDA GPU."""
 
-    def __init__(self, problem: Problem, device: str = "cuda") -> None:
+    name = "cuda"
+
+    def __init__(self, problem: Problem, device: str = "cuda", threads: int | None = None) -> None:
         """Lay out memory.
 
         Args:
             problem: What to simulate.
             device: A Warp device: "cuda", "cuda:1", …; "cpu" for tests.
+            threads: As every engine takes them; the host uses one.
 
         Raises:
-            UserError: There is no such card, or the problem asks for what only other engines do.
+            UserError: There is no such GPU, or the problem asks for what only other engines do.
 
         """
         self.device = require_device(device)
@@ -111,7 +116,7 @@ class CudaEngine(EngineInteraction):
         }
 
     def _start(self) -> None:
-        """Say how fast things are at the start, and find their blocks."""
+        """Return how fast objects are at the start, and find their blocks."""
         m = self.matter
         soft = self._rows("number")
         speed = wave = 0.0
@@ -259,8 +264,8 @@ class CudaEngine(EngineInteraction):
     def _sums(self) -> BodySums:
         now, cell = self._particles(), self.problem.cell
         affine = self._placed("affine") / cell
-        relief = self._placed("relief")
-        elastic = strain_energy(self.matter, now.deformation, relief)
+        log_volume_ratio = self._placed("log_volume_ratio")
+        elastic = strain_energy(self.matter, now.deformation, log_volume_ratio)
         energy = ParticleEnergy(elastic, branch_energy(self.matter, self._memory()))
         return BodySums.of(self.matter, now, affine, energy, cell)
 
@@ -414,7 +419,7 @@ def require_device(device: str) -> str:
     chosen = cards[0] if device == "cuda" and cards else device
     if chosen not in known:
         raise UserError(
-            f"The engine 'cuda' needs a CUDA card, and Warp finds no {device!r} here "
+            f"The engine 'cuda' needs a CUDA GPU, and Warp finds no {device!r} here "
             f"(found: {', '.join(known)}). Install NVIDIA's driver (CUDA 12.4 or later), or "
             "simulate on the processor: --engine cpu."
         )

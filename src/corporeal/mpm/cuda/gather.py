@@ -1,4 +1,4 @@
-"""Grid to particles on the device: they move, strain and answer.
+"""Grid-to-particle transfer on the device.
 
 Same step as ``reference.ReferenceEngine.step``; see there for the formulas.
 """
@@ -167,7 +167,7 @@ def gather_one(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals,
     if l.acts == 1:
         given = vector_at(l.blown, i)
     blown = wp.length_sq(given) > 0.0
-    swells = p.table[row, USES_MEAN_DILATATION] > 0.0
+    uses_mean_dilatation = p.table[row, USES_MEAN_DILATATION] > 0.0
     lam = p.table[row, LAMBDA]
     old = int(0)
     if keep > 0.0 or blown:
@@ -203,7 +203,7 @@ def gather_one(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals,
     # What belongs to a rigid body does not strain.
     A = (1.0 - p.table[row, RIGID]) * step * L
     law = p.table[row, LAW]
-    if swells:
+    if uses_mean_dilatation:
         # The rest of λ waits for what the whole cluster does.
         lam -= mean_bulk(law, p.table[row, MU], lam)
         grown = wp.trace(A)
@@ -251,7 +251,7 @@ def gather_one(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals,
         tau += relax_branches(p, i, row, A, memory, dt)
         book_loss(s, LOSS_VISCOUS, i, p.volume[i] * wp.ddot(maxwell_stress(p, row, memory), A))
     put_matrix(p.strain, i, strain)
-    if swells:
+    if uses_mean_dilatation:
         p.bound[i] = a[RESPONSE_WAVE]
     pull = -4.0 / s.cell * p.volume[i] * tau
     six = vec6(pull[0, 0], pull[0, 1], pull[0, 2], pull[1, 1], pull[1, 2], pull[2, 2])

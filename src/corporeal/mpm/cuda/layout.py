@@ -1,6 +1,6 @@
-"""What the kernels of the device engine share: numbers, and structs of what each step works on.
+"""Constants and structs shared by the kernels of the device engine.
 
-Plain Warp, so that the same kernels run on a CUDA card and on the processor. Every kernel loops
+Plain Warp, so that the same kernels run on a CUDA GPU and on the processor. Every kernel loops
 over its items with a stride: it is launched with as many threads as the device keeps busy, and
 the number of items may change on the device without a word to the host.
 """
@@ -35,7 +35,7 @@ FLAG_SWEPT = wp.constant(10)
 FLAG_IMPACTING = wp.constant(11)
 """1: rounds of impacts go on, of which the last is of all contacts."""
 FLAG_STRUCK = wp.constant(12)
-"""1: some rigid pair is hit as things move now."""
+"""1: some rigid pair is hit as objects move now."""
 FLAG_ROUND = wp.constant(13)
 """Rounds of this step so far."""
 FLAG_LAST_ROUND = wp.constant(14)
@@ -65,7 +65,7 @@ ARENA_SIDE, ARENA_NODES, NODES_OF_BLOCK = 6, 216, 64
 ARENA_SUMS, ARENA_MOTION = wp.constant(7), 6
 """Sums of a node: mass [kg], momentum and impulse [kg m/s]; numbers of its motion [m/s]."""
 THREADS_PER_GROUP = 128
-"""Threads of a group on a card."""
+"""Threads of a group on a GPU."""
 TASK = wp.constant(512)
 """Particles of a task at most: a block of eight a cell is one."""
 # What ``Contacts.active`` says, where it is not 0: not in this step.
@@ -204,7 +204,7 @@ class DeviceParticles:
     strain: wp.array2d(dtype=wp.float32)
     """F - 1."""
     motion: wp.array2d(dtype=wp.float32)
-    """Total deformation gradient - 1, of plastic and granular matter."""
+    """Total deformation gradient - 1, of plastic and granular material."""
     stress: wp.array2d(dtype=wp.float32)
     """-(4/dx) V₀ τ: 00 01 02 11 12 22."""
     mass: wp.array(dtype=wp.float32)
@@ -213,8 +213,8 @@ class DeviceParticles:
     opened: wp.array(dtype=wp.float32)
     branch: wp.array2d(dtype=wp.float32)
     """What Maxwell branches remember."""
-    relief: wp.array(dtype=wp.float32)
-    """Of nearly incompressible matter: ln of its mean volume over its own …"""
+    log_volume_ratio: wp.array(dtype=wp.float32)
+    """Of nearly incompressible material: ln of its mean volume over its own …"""
     pressure: wp.array(dtype=wp.float32)
     """… Kirchhoff pressure of that mean [Pa] …"""
     cluster: wp.array(dtype=wp.int32)
@@ -273,9 +273,10 @@ class BlockGrid:
     """Velocity without the step's forces [m/s]."""
     pool: wp.array2d(dtype=wp.float32)
     """Eight clusters of 2³ cells per block: volume, and volume times pressure and dilatation, of
-    nearly incompressible matter."""
+    nearly incompressible material.
+    """
     meet: wp.array(dtype=wp.int32)
-    """1 + the field's entry where it meets others; 0: nobody."""
+    """1 + the field's entry where it meets others; 0: none."""
     was: wp.array(dtype=wp.int32)
     """1 + the first kept choice of the field's node; 0: none."""
     held: wp.array(dtype=wp.int32)

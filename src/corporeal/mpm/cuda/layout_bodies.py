@@ -1,4 +1,4 @@
-"""Structs of rigid bodies, of what acts on bodies, and of what frames hold: see ``layout``."""
+"""Structs of rigid bodies, loads and inclusions: see ``layout``."""
 
 from corporeal.mpm.quiet_warp import wp
 
@@ -53,8 +53,8 @@ class DeviceRigidBodies:
     surfaces: int
     surface_body: wp.array(dtype=wp.int32)
     surface: wp.array(dtype=wp.vec3d)
-    rounding: wp.array(dtype=wp.float64)
-    """How the surface curves at each, one row after the other: see ``types.ROUNDING``."""
+    curvature: wp.array(dtype=wp.float64)
+    """How the surface curves at each, one row after the other: see ``types.CURVATURE_COLUMNS``."""
     bends: wp.array(dtype=wp.int32)
     """Of each body: whether it curves outwards or inwards anywhere."""
     facets: int

@@ -78,9 +78,9 @@ class DeviceContacts:
     """… and inverse masses as it takes them."""
     friction: wp.array2d(dtype=wp.float64)
     restitution: wp.array2d(dtype=wp.float64)
-    blows: wp.array2d(dtype=wp.float64)
-    """How it changes with the speed of a blow: 5 numbers a pair."""
+    restitution_law: wp.array2d(dtype=wp.float64)
+    """How it changes with the speed of an impact: 5 numbers a pair."""
     rolling: wp.array2d(dtype=wp.float64)
-    """c [m]; where nothing brakes what rolls nobody looks."""
+    """c [m]; unused without rolling friction."""
     face: wp.array(dtype=wp.float32)
     """Where the face of a half space lies whose mean offset is i/4096 · 1½ - 1½ [dx]."""

@@ -1,4 +1,4 @@
-"""Memory of what acts on single particles, and of rigid inclusions; goes with ``memory``."""
+"""Memory of loads on particles and of rigid inclusions."""
 
 from typing import Any
 
@@ -128,7 +128,7 @@ def lay_out_bonds(memory: DeviceMemory, problem: Problem) -> Any:
     pairs = sorted(problem.bonds) if problem.contact == "multi" else []
     bodies, h = len(problem.bodies), DeviceBonds()
     dense = [
-        inclusions.frame_and_soft_density(problem.bodies[f], problem.bodies[s], problem.cell)
+        inclusions.inclusion_and_soft_density(problem.bodies[f], problem.bodies[s], problem.cell)
         for f, s in pairs
     ]
     density = np.array(dense, float).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Mean dilatation of nearly incompressible matter on the device.
+"""Mean dilatation of nearly incompressible material on the device.
 
 Means are taken over the particles of 2³ cells of a field, as ``reference.mean_dilatation`` has it.
 """
@@ -48,11 +48,11 @@ def apply_mean_pressure(p: DeviceParticles, g: BlockGrid, s: StepGlobals, stride
         row = p.kind[i]
         if p.table[row, USES_MEAN_DILATATION] > 0.0:
             at = p.cluster[i]
-            relief = p.relief[i] + g.pool[2, at] / g.pool[0, at] - p.grown[i]
+            log_volume_ratio = p.log_volume_ratio[i] + g.pool[2, at] / g.pool[0, at] - p.grown[i]
             law = p.table[row, LAW]
             bulk = mean_bulk(law, p.table[row, MU], p.table[row, LAMBDA])
-            found = mean_pressure(law, bulk, matrix_at(p.strain, i), relief)
-            p.relief[i] = relief
+            found = mean_pressure(law, bulk, matrix_at(p.strain, i), log_volume_ratio)
+            p.log_volume_ratio[i] = log_volume_ratio
             p.pressure[i] = found[0]
             wave = wp.sqrt((p.bound[i] + found[1]) / p.table[row, DENSITY])
             wave = wave * p.table[row, STIFFENING]

@@ -1,4 +1,4 @@
-"""Memory of particles: all that is kept of them in one array of 32-bit words, (channels, lanes).
+"""Memory of particles: one array of 32-bit words, (channels, lanes).
 
 Channels lie one after the other, each over all particles, so that neighbouring threads read
 neighbouring words, and sorting is one kernel that knows no names. The host works with rows.
@@ -29,7 +29,7 @@ PARTICLE_STATE: dict[str, tuple[tuple[int, ...], Any]] = {
     "volume": ((), wp.float32),
     "plastic": ((), wp.float32),
     "opened": ((), wp.float32),
-    "relief": ((), wp.float32),
+    "log_volume_ratio": ((), wp.float32),
     "pressure": ((), wp.float32),
     "branch": ((constants.BRANCHES * int(layout.BRANCH_CHANNELS),), wp.float32),
     "kind": ((), wp.int32),
@@ -112,7 +112,7 @@ def _materials(matter: ParticleConstants) -> np.ndarray:
     table[:, layout.LAW], table[:, layout.MU], table[:, layout.LAMBDA] = s.law, s.mu, s.lam
     table[:, layout.YIELD], table[:, layout.HARD] = s.yield_stress, s.hardening
     table[:, layout.CONE], table[:, layout.APEX] = s.cone, s.apex
-    table[:, layout.DENSITY], table[:, layout.FORGET] = s.density, s.forgetting
+    table[:, layout.DENSITY], table[:, layout.FORGET] = s.density, s.flip_damping_rate
     table[:, layout.STIFFENING] = s.stiffening
     table[:, layout.CONSISTENCY], table[:, layout.INDEX] = s.consistency, s.flow_index
     named = {layout.SHEAR: "shear", layout.BULK: "bulk", layout.RELAXATION: "time"}
@@ -120,5 +120,5 @@ def _materials(matter: ParticleConstants) -> np.ndarray:
         column = getattr(s.branches, name)
         table[:, int(first) : int(first) + column.shape[1]] = column
     table[:, layout.MATERIAL_BODY], table[:, layout.RIGID] = s.body, s.rigid
-    table[:, layout.USES_MEAN_DILATATION] = s.swells
+    table[:, layout.USES_MEAN_DILATATION] = s.uses_mean_dilatation
     return table

@@ -59,7 +59,7 @@ class CudaProgram:
         self.rolls = bool(arrays.rigid.bends.numpy().any()) if arrays.rigid.surfaces else False
         table = arrays.particles.table.numpy()
         self.swelling = bool(table[:, int(layout.USES_MEAN_DILATATION)].any())
-        self.brakes = problem.brakes and bool(arrays.rigid.surfaces)
+        self.brakes = problem.has_rolling_resistance and bool(arrays.rigid.surfaces)
         self.stride = self._threads()
         self.lanes = layout.THREADS_PER_GROUP if wp.get_device(self.device).is_cuda else 1
 
@@ -84,7 +84,7 @@ class CudaProgram:
         wp.capture_launch(self.graph)
 
     def hold(self, held: bool) -> None:
-        """Say whether anything is held from outside."""
+        """Return whether anything is held from outside."""
         if held != self.held:
             self.held = held
             self.forget()

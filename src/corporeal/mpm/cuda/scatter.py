@@ -1,4 +1,4 @@
-"""Particles to grid on the device.
+"""Particle-to-grid transfer on the device.
 
 Same sums as ``reference.ReferenceEngine.step``; see there for the formulas.
 """

@@ -1,4 +1,4 @@
-"""The clock of the device engine: how long the next step is, and what it begins with."""
+"""Time step control of the device engine."""
 
 from corporeal.mpm import constants
 from corporeal.mpm.cuda import block_arena
@@ -87,7 +87,7 @@ def plan_group(s: StepGlobals, r: DeviceRigidBodies, lane: int, lanes: int):
 
 @wp.func
 def choose_step(s: StepGlobals):
-    """Say how long the next step is, and what it begins with; or stop."""
+    """Return how long the next step is, and what it begins with; or stop."""
     time = s.clock[CLOCK_TIME]
     left = s.clock[CLOCK_UNTIL] - time
     s.flag[FLAG_GOING] = 0

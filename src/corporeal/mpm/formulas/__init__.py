@@ -1,4 +1,4 @@
-"""The formulas of the fast engines in C++, each once: eight lanes on processors, one on cards.
+"""The formulas of the fast engines in C++, each once: eight lanes on processors, one on GPUs.
 
 The headers beside this file are templates on the number type (``lanes.h``). Warp includes them in
 every module that was given ``formula_options``, whatever the module is compiled for.

@@ -328,15 +328,15 @@ template <class R> struct Rule<COROTATED, R> {
     }
     Math<R>::compose(U, l, tau);
   }
-  // Kirchhoff pressure of the mean volume J e^relief over its bulk modulus, and a bound on its slope.
-  CUDA_CALLABLE static inline R mean_pressure(R j1, R relief, R &slope) {
-    R m1 = j1 + (1.0f + j1) * Math<R>::expm1(relief), most = S::high(m1, S::all(0.0f));
+  // Kirchhoff pressure of the mean volume J e^log_volume_ratio over its bulk modulus, and a bound on its slope.
+  CUDA_CALLABLE static inline R mean_pressure(R j1, R log_volume_ratio, R &slope) {
+    R m1 = j1 + (1.0f + j1) * Math<R>::expm1(log_volume_ratio), most = S::high(m1, S::all(0.0f));
     slope = (1.0f + most) * (1.0f + 2.0f * most);
     return (1.0f + m1) * m1;
   }
   // Its energy likewise: (J - 1)^2/2
-  CUDA_CALLABLE static inline double mean_energy(double J, double relief) {
-    const double m1 = J * exp(relief) - 1;
+  CUDA_CALLABLE static inline double mean_energy(double J, double log_volume_ratio) {
+    const double m1 = J * exp(log_volume_ratio) - 1;
     return 0.5 * m1 * m1;
   }
   // mu |V - 1|^2 + lambda/2 (J - 1)^2
@@ -351,14 +351,14 @@ template <class R> struct Rule<COROTATED, R> {
     return mu * sum + 0.5 * lambda * (J - 1) * (J - 1);
   }
 };
-// Energy of volume (ln J)^2/2 of a mean volume J e^relief, over its bulk modulus.
+// Energy of volume (ln J)^2/2 of a mean volume J e^log_volume_ratio, over its bulk modulus.
 template <class R> struct Logarithmic {
-  CUDA_CALLABLE static inline R mean_pressure(R j1, R relief, R &slope) {
+  CUDA_CALLABLE static inline R mean_pressure(R j1, R log_volume_ratio, R &slope) {
     slope = Lanes<R>::all(1.0f);
-    return Math<R>::log1p(j1) + relief;
+    return Math<R>::log1p(j1) + log_volume_ratio;
   }
-  CUDA_CALLABLE static inline double mean_energy(double J, double relief) {
-    const double grown = log(J) + relief;
+  CUDA_CALLABLE static inline double mean_energy(double J, double log_volume_ratio) {
+    const double grown = log(J) + log_volume_ratio;
     return 0.5 * grown * grown;
   }
 };
@@ -567,21 +567,21 @@ template <class R> struct Laws {
   CUDA_CALLABLE static inline R mean_bulk(const Material<R> &t) {
     return S::high(t.lambda - (float)LOCAL_BULK_RATIO * t.mu, S::all(0.0f));
   }
-  // Kirchhoff pressure of that part at the volume J e^relief [Pa]; adds its bound on rho c^2 to wave.
-  CUDA_CALLABLE static inline R mean_pressure(const Material<R> &t, R bulk, R j1, R relief, R &wave) {
+  // Kirchhoff pressure of that part at the volume J e^log_volume_ratio [Pa]; adds its bound on rho c^2 to wave.
+  CUDA_CALLABLE static inline R mean_pressure(const Material<R> &t, R bulk, R j1, R log_volume_ratio, R &wave) {
     R p = S::all(0.0f), slope = p;
     j1 = S::high(j1, S::all((float)MIN_VOLUME_RATIO - 1.0f));
-#define MPM_MEAN(NUMBER) averaged<NUMBER>(t, j1, relief, p, slope);
+#define MPM_MEAN(NUMBER) averaged<NUMBER>(t, j1, log_volume_ratio, p, slope);
     MPM_BULKY(MPM_MEAN)
 #undef MPM_MEAN
     wave += bulk * slope;
     return bulk * p;
   }
   template <Law NUMBER>
-  CUDA_CALLABLE static inline void averaged(const Material<R> &t, R j1, R relief, R &p, R &slope) {
+  CUDA_CALLABLE static inline void averaged(const Material<R> &t, R j1, R log_volume_ratio, R &p, R &slope) {
     const M mine = is(t, NUMBER);
     if (!S::any(mine)) return;
-    R c, own = Rule<NUMBER, R>::mean_pressure(j1, relief, c);
+    R c, own = Rule<NUMBER, R>::mean_pressure(j1, log_volume_ratio, c);
     p = S::pick(mine, own, p);
     slope = S::pick(mine, c, slope);
   }
@@ -595,11 +595,11 @@ CUDA_CALLABLE inline double stored_energy(int law, double mu, double lambda, con
   if (law == HENCKY || remembers(law)) return Rule<HENCKY, float>::energy(mu, lambda, H);
   return NAN;
 }
-// The same of a mean volume J e^relief on which the part bulk of lambda acts.
-CUDA_CALLABLE inline double mean_energy(int law, double bulk, const double *H, double relief) {
+// The same of a mean volume J e^log_volume_ratio on which the part bulk of lambda acts.
+CUDA_CALLABLE inline double mean_energy(int law, double bulk, const double *H, double log_volume_ratio) {
   const double J = Strain<double>::whole(H);
 #define MPM_MEAN(NUMBER) \
-  if (law == NUMBER) return bulk * Rule<NUMBER, float>::mean_energy(J, relief);
+  if (law == NUMBER) return bulk * Rule<NUMBER, float>::mean_energy(J, log_volume_ratio);
   MPM_BULKY(MPM_MEAN)
 #undef MPM_MEAN
   return NAN;

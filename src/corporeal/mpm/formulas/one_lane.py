@@ -1,4 +1,4 @@
-"""The formulas at one lane, as functions that Warp kernels call: for cards, and to test them alone.
+"""Scalar versions of the formulas for Warp kernels, on GPUs and in tests.
 
 Every function is a call into the headers beside this file and holds no formula of its own.
 """
@@ -15,8 +15,9 @@ from corporeal.mpm.quiet_warp import wp
     RESPONSE_LENGTH,
 ) = 6, 15, 16, 17, 18, 19, 20
 """First places in a ``Response``: F - 1 after the return map (9), bound on ρ c² [Pa], J - 1 of the
-trial strain, increment of the equivalent plastic strain, volume correction of granular matter,
-plastic work per rest volume [J/m³]; before them τ (6: 00 01 02 11 12 22) [Pa]."""
+trial strain, increment of the equivalent plastic strain, volume correction of granular material,
+plastic work per rest volume [J/m³]; before them τ (6: 00 01 02 11 12 22) [Pa].
+"""
 Response = wp.types.vector(length=RESPONSE_LENGTH, dtype=wp.float32)
 
 
@@ -63,10 +64,12 @@ def mean_bulk(law: wp.float32, mu: wp.float32, lam: wp.float32) -> wp.float32: .
   mpm::Material<float> t = {law};
   float F[9], wave = 0.0f;
   for (int k = 0; k < 9; k++) F[k] = H.data[k / 3][k % 3];
-  float p = mpm::Laws<float>::mean_pressure(t, bulk, mpm::Strain<float>::volume(F), relief, wave);
+  float p = mpm::Laws<float>::mean_pressure(t, bulk, mpm::Strain<float>::volume(F), log_volume_ratio, wave);
   return wp::vec_t<2, wp::float32>(p, wave);
 """)
-def mean_pressure(law: wp.float32, bulk: wp.float32, H: wp.mat33, relief: wp.float32) -> wp.vec2:
+def mean_pressure(
+    law: wp.float32, bulk: wp.float32, H: wp.mat33, log_volume_ratio: wp.float32
+) -> wp.vec2:
     """Kirchhoff pressure of the mean dilatation and what it adds to ρ c² [Pa]."""
     ...
 

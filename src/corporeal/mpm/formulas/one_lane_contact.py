@@ -1,4 +1,4 @@
-"""The formulas of contact at one lane, as functions that Warp kernels call: see ``one_lane``."""
+"""Scalar versions of the contact formulas for Warp kernels: see ``one_lane``."""
 
 from corporeal.mpm.quiet_warp import wp
 

@@ -77,7 +77,7 @@ struct AllShown {
   }
 };
 // How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of
-// physics/rounding.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.CURVATURE_ROW.
+// physics/rounded_surface.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.CURVATURE_ROW.
 struct Round {
   // Angle from the normal, no larger than that up to which a point stands for its surroundings.
   CUDA_CALLABLE static inline double bounded(double angle, double reach, double radius, bool &beyond) {

@@ -1,4 +1,4 @@
-"""Constitutive laws, one a file, and the menu: whoever has to choose by a law asks here.
+"""Constitutive laws, one per file, and their dispatch.
 
 A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``.
 The functions below answer for particles of different laws at once.
@@ -40,7 +40,7 @@ LawNumbers = Int[np.ndarray, " P"]
 
 
 def psi(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
-    """Give the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
+    """Return the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
     out = np.empty(len(F))
     for rule, k in _by_law(law):
         out[k] = rule.psi(F[k], mu[k], lam[k])
@@ -48,7 +48,7 @@ def psi(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 
 
 def tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
-    """Give the Kirchhoff stress τ [Pa] of particles with different laws."""
+    """Return the Kirchhoff stress τ [Pa] of particles with different laws."""
     out = np.empty_like(F)
     for rule, k in _by_law(law):
         out[k] = rule.tau(F[k], mu[k], lam[k])
@@ -56,7 +56,7 @@ def tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
 
 
 def principal_tau(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Vectors:
-    """Give the principal Kirchhoff stresses of ``tau`` [Pa], in no order, far faster."""
+    """Return the principal Kirchhoff stresses of ``tau`` [Pa], in no order, far faster."""
     out = np.empty(F.shape[:2])
     for rule, k in _by_law(law):
         if rule.principal_tau is None:
@@ -77,7 +77,7 @@ def wave_modulus(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Sca
 def flow(
     law: LawNumbers, F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
 ) -> ReturnMapResult:
-    """Bring granular and plastic matter back to what it can bear.
+    """Bring granular and plastic material back to what it can bear.
 
     Args:
         law: ``types.Law`` values.
@@ -97,7 +97,7 @@ def flow(
 
 
 def is_stiff_in_bulk(law: LawNumbers, mu: Scalars, lam: Scalars) -> Bool[np.ndarray, " P"]:
-    """Whether matter is elastic and its ν above 0.4: splines lock unless pressure is a mean.
+    """Whether material is elastic and its ν above 0.4: splines lock unless pressure is a mean.
 
     Where ν is 0.4 to within rounding it is not above.
     """
@@ -112,12 +112,12 @@ def mean_pressure(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
 
 
 def psi_mean(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
-    """Give the stored energy [J/m³] of a mean volume J̄: ``mean_pressure`` is its slope."""
+    """Return the stored energy [J/m³] of a mean volume J̄: ``mean_pressure`` is its slope."""
     return bulk * _volumetric_by_law("psi", law, J)
 
 
 def mean_modulus(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
-    """Give what a mean volume J̄ adds to the bound on ρ₀ c² [Pa]."""
+    """Return what a mean volume J̄ adds to the bound on ρ₀ c² [Pa]."""
     return bulk * _volumetric_by_law("modulus", law, J)
 
 

@@ -1,4 +1,4 @@
-"""What a constitutive law says of itself: the contract of the files beside this one.
+"""Interface of constitutive laws.
 
 ``psi`` is the stored energy per rest volume Ψ [J/m³], ``pk1`` the first Piola–Kirchhoff stress
 P = ∂Ψ/∂F [Pa], ``tau`` the Kirchhoff stress τ = P Fᵀ [Pa]; all take stacks of deformation gradients
@@ -52,7 +52,7 @@ class YieldParameters:
     """n [-]"""
 
     def of(self, chosen: np.ndarray) -> "YieldParameters":
-        """Give the numbers of some of the particles."""
+        """Return the numbers of some of the particles."""
         return YieldParameters(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 

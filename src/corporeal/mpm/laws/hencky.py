@@ -20,12 +20,12 @@ from corporeal.mpm.laws.volumetric_energy import LOGARITHMIC_VOLUMETRIC
 
 
 def principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
-    """Give the principal Kirchhoff stresses 2μ ε + λ tr ε [Pa] of principal logarithmic strains."""
+    """Return the principal Kirchhoff stresses 2μ ε + λ tr ε [Pa] of principal logarithmic strains."""
     return 2.0 * mu[:, None] * strain + (lam * np.sum(strain, axis=1))[:, None]
 
 
 def stretched_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
-    """Give the same of principal stretches."""
+    """Return the same of principal stretches."""
     return principal_tau(log_strain(stretch), mu, lam)
 
 

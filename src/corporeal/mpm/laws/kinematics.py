@@ -1,4 +1,4 @@
-"""Stacks of deformation gradients F: what every law makes of them before it speaks of stress.
+"""Kinematics of stacks of deformation gradients F.
 
 Letters: F = R S = U Σ Vᵀ, J = det F, b = F Fᵀ, ε = ln Σ.
 """
@@ -72,7 +72,7 @@ def from_stretches(U: Matrices, stretch: Vectors, V: Matrices) -> Matrices:
 
 
 def log_strain(stretch: Vectors) -> Vectors:
-    """ε = ln Σ; not a number where matter is inside out."""
+    """ε = ln Σ; not a number where material is inside out."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.log(stretch)
 
@@ -84,7 +84,7 @@ def determinant(F: Matrices) -> Scalars:
 
 
 def log_j(F: Matrices) -> Scalars:
-    """Return ln J; not a number where matter is inside out."""
+    """Return ln J; not a number where material is inside out."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.log(determinant(F))
 

@@ -19,7 +19,7 @@ from corporeal.mpm.laws.volumetric_energy import LOGARITHMIC_VOLUMETRIC
 
 
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
-    """Ψ = μ/2 (‖F‖² - 3 - 2 ln J) + λ/2 (ln J)²; not a number where matter is inside out."""
+    """Ψ = μ/2 (‖F‖² - 3 - 2 ln J) + λ/2 (ln J)²; not a number where material is inside out."""
     swelling = log_j(F)
     square = np.sum(F * F, axis=(1, 2))
     return 0.5 * mu * (square - 3.0 - 2.0 * swelling) + 0.5 * lam * swelling**2

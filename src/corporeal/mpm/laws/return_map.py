@@ -1,4 +1,4 @@
-"""Return maps of Hencky's elasticity: what all plastic laws share.
+"""Return maps of Hencky's elasticity, shared by all plastic laws.
 
 A map takes the trial strains ε = ln Σ of a step that was taken elastically and gives back the
 nearest admissible ones.

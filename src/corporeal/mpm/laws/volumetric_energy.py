@@ -1,4 +1,4 @@
-"""Energies of volume λ/2 e(J)²: what a pressure hangs on, so that it may come from a mean J."""
+"""Volumetric energies λ/2 e(J)², whose pressure may be evaluated at a mean J."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,1 +1,1 @@
-"""Formulas of the method in float64 NumPy, to be trusted."""
+"""Reference formulas of the method in float64 NumPy."""

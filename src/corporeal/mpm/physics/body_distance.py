@@ -1,4 +1,4 @@
-"""How far bodies are apart, and how deep they reach into each other and into the floor.
+"""Distances between bodies, and penetration into each other and into planes.
 
 A particle stands for a ball of a quarter cell (two particles per cell and axis); its surface is
 that far outside its centre.

@@ -1,4 +1,4 @@
-"""Contact between fields on grid nodes: where a face lies, and which way it looks.
+"""Contact between fields on grid nodes: positions and normals of faces.
 
 A pair of fields (a, c) meets at a node; n points from a to c. Every field shows itself there by
 its mean offset X̄ from the node and by its outward volume gradient g. Walls are half spaces. What
@@ -135,7 +135,7 @@ def gap_to_wall(mean: Vectors, height: Scalars, normal: Vectors, cell: float) ->
 
 
 def gap_to_plane(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:
-    """Give the same at nodes however high above the wall [m]."""
+    """Return the same at nodes however high above the wall [m]."""
     h = height / cell
     xi = np.sum(mean * normal, axis=1) / cell
     return (-half_space_mean(-h) - xi - touching_distance(h)) * cell
@@ -169,7 +169,7 @@ def surface_begins(
 
 
 def sees_thin_place(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, " E"]:
-    """Tell which nodes see a place where a rigid body is thin.
+    """Return which nodes see a place where a rigid body is thin.
 
     Args:
         places: Surface points behind which it is thin [m].
@@ -182,7 +182,7 @@ def sees_thin_place(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarr
 
 
 def touching_offset(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> Vectors:
-    """Say how far from a node two rigid bodies touch that meet there [m].
+    """Return how far from a node two rigid bodies touch that meet there [m].
 
     A node is felt up to 1½ cells beyond a body's edge, where nothing can be pushed at. So the
     place is the one nearest to the node, along the plane of contact, that lies in both bodies,
@@ -244,9 +244,9 @@ def gap_of_liquid(
 
     Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
     face alone would let the first layer of a liquid be squeezed along it. So nodes up to
-    ``LIQUID_WALL_REACH_DX`` above are in contact too, where the liquid fills the half space up to the face
-    as far as the node can tell: by its mean place, and by how ``full`` the node is, its mass over
-    that of a full cell. A sheet or a drop would hover at such a node otherwise.
+    ``LIQUID_WALL_REACH_DX`` above are in contact too, where the liquid fills the half space up to
+    the face as far as the node can tell: by its mean place, and by how ``full`` the node is, its
+    mass over that of a full cell. A sheet or a drop would hover at such a node otherwise.
     """
     h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
     deep = gap_to_plane(mean, height, normal, cell)
@@ -269,7 +269,7 @@ class WettedFaces(NamedTuple):
 
 
 def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: float) -> WettedFaces:
-    """Say where a rigid body's surface lies for the liquid at each node.
+    """Return where a rigid body's surface lies for the liquid at each node.
 
     The surface point nearest to the liquid's own place decides which face of a thin wall it is; it
     and its neighbours that look alike are averaged, w = (1 - u)² with u from 0 at the nearest to 1

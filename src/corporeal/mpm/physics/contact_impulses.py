@@ -1,4 +1,4 @@
-"""Contact between fields on grid nodes: the impulses that it transmits, and what they take.
+"""Contact between fields on grid nodes: impulses and dissipation.
 
 Rigid bodies' impacts come first, in rounds of sweeps; then all contacts, with Coulomb friction.
 """
@@ -28,7 +28,7 @@ from corporeal.mpm.physics.wall_stress import drag_impulse
 
 @dataclass
 class Movers:
-    """D things that impulses move: grid nodes (no inertia), rigid bodies, one immovable wall."""
+    """D objects that impulses move: grid nodes (no inertia), rigid bodies, one immovable wall."""
 
     inverse_mass: Float[np.ndarray, " D"]
     """[1/kg]; 0: immovable."""
@@ -72,7 +72,7 @@ class ContactList(NamedTuple):
     """Of walls that drag on a liquid (``wall_stress``): span [m² s], yield stress [Pa], drag and
     index; without a span it is Coulomb's friction. None: none does."""
     guided: Bool[np.ndarray, " E"] | None = None
-    """Which are of a rigid body with one that moves as told; None: none is."""
+    """Which are of a rigid body with one that follows a prescribed path; None: none is."""
 
     def approach(self, movers: Movers) -> Vectors:
         """Slip and approach together: u = v_a - v_c [m/s]."""
@@ -104,14 +104,14 @@ class ReboundRules(NamedTuple):
 def target_speeds(
     contacts: ContactList, speed: Scalars, rebound: ReboundRules, cell: float, dt: float
 ) -> tuple[Scalars, Bool[np.ndarray, " E"]]:
-    """Give the normal speed each contact may keep [m/s], and whose pairs are in an impact.
+    """Return the normal speed each contact may keep [m/s], and whose pairs are in an impact.
 
     An open gap may close within the step, max(g, 0)/dt. Where one contact of a rigid pair closes
     with v_app > .05 m/s, all its contacts within .1 dx or closing get -e v_app: one impact is one
     event. v_app leaves out this step's gravity, so that nothing rebounds faster than it fell.
 
     Args:
-        contacts: Where things touch.
+        contacts: Where objects touch.
         speed: At which they approach along n [m/s].
         rebound: How they rebound.
         cell: dx [m].
@@ -148,7 +148,7 @@ def solve_impacts(
     What is hit passes the blow on to what it touches: in every round the pairs that approach now
     rebound together and all others wait (generalized reflections: Smith, Kaufman, Vouga, Tamstorf
     and Grinspun 2012, "Reflections on simultaneous impact"). Solved at once, all pairs of a row of
-    touching balls would share the blow; in rounds it runs through to the last. What is light
+    touching balls would share the impact; in rounds it runs through to the last. What is light
     between what strikes it and what it rests on is held in the same round (``backing``).
 
     Returns:
@@ -205,14 +205,15 @@ def solve(
         impulse,
     )
     _sweep(*given, orders)
-    # What moves as told may leave no room between: sweeps then end as the last contacts have it.
+    # What follows a prescribed path may leave no room between: sweeps then end as the last contacts
+    # have it.
     if contacts.guided is not None and contacts.guided[orders[0]].any():
         _solve_simultaneously(*given, orders[0])
     return impulse
 
 
 def _sweep_orders(contacts: ContactList, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
-    """Give the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
+    """Return the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
 
     In the order in which the contacts of a rigid body lie next to one another the first would carry
     more, and what rests on many points would tilt and sink; with one order for all sweeps stacks
@@ -377,8 +378,8 @@ def _solve_simultaneously(contacts, rules, masses, motion, impulse, order):
 def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> Scalars:
     """Kinetic energy [J] that each normal impulse took: J_n · ½ (u_before + u_after).
 
-    Of a rigid rebound ½ m (1 - e²) v². Matter that is soft stops at a node at once, half a cell of
-    it: so much the more, the coarser the grid.
+    Of a rigid rebound ½ m (1 - e²) v². Material that is soft stops at a node at once, half a cell
+    of it: so much the more, the coarser the grid.
     """
     along = np.sum(impulse * normal, axis=1, keepdims=True) * normal
     return np.sum(along * 0.5 * (before + after), axis=1)

@@ -1,6 +1,6 @@
-"""A surface around a point that curves, outwards or inwards, and what is round that meets it.
+"""Contact of round bodies with convex or concave surfaces.
 
-Twin of ``Curved`` in surfaces.h. Rows are those of ``types.ROUNDING``.
+Twin of ``Curved`` in surfaces.h. Rows are those of ``types.CURVATURE_COLUMNS``.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Flat faces of a rigid body, on which what is round rolls: each is a plane with an end."""
+"""Flat facets of a rigid body, on which round bodies roll."""
 
 from typing import NamedTuple
 
@@ -34,27 +34,29 @@ class BodyFacets(NamedTuple):
 NO_FACETS = BodyFacets(np.zeros((0, FACET_ROW)), np.zeros((0, 3)))
 
 
-def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 12"]) -> BodyFacets:
+def facets_of(
+    surface: Float[np.ndarray, "S 3"], curvature: Float[np.ndarray, "S 12"]
+) -> BodyFacets:
     """Find the flat faces among a body's surface points: those that look alike and lie in a plane.
 
     Args:
         surface: In the body's frame [m].
-        rounding: See ``types.ROUNDING``.
+        curvature: See ``types.CURVATURE_COLUMNS``.
 
     """
-    curved = np.any(rounding[:, [6, 7, 10, 11]] != 0.0, axis=1)
-    known = np.any(rounding[:, :3] != 0.0, axis=1) & ~curved
+    curved = np.any(curvature[:, [6, 7, 10, 11]] != 0.0, axis=1)
+    known = np.any(curvature[:, :3] != 0.0, axis=1) & ~curved
     left = np.flatnonzero(known)
     rows, points, count = [], [np.zeros((0, 3))], 0
     while len(left):
-        first, normal = surface[left[0]], rounding[left[0], :3]
-        reach = FACET_SPREAD_RATIO * rounding[left[0], 8]
+        first, normal = surface[left[0]], curvature[left[0], :3]
+        reach = FACET_SPREAD_RATIO * curvature[left[0], 8]
         height = (surface[left] - first) @ normal
-        alike = rounding[left, :3] @ normal >= FACET_MIN_NORMAL_COSINE
+        alike = curvature[left, :3] @ normal >= FACET_MIN_NORMAL_COSINE
         mine = alike & (np.abs(height) <= FACET_MAX_HEIGHT_RATIO * reach)
         if mine.sum() >= MIN_POINTS_PER_FACET:
             held = surface[left[mine]]
-            stands = float(np.median(rounding[left[mine], 8]))
+            stands = float(np.median(curvature[left[mine], 8]))
             reach = max(
                 FACET_SPREAD_RATIO * stands, _widest_hole(held, normal, FACET_HOLE_RATIO * stands)
             )
@@ -69,15 +71,15 @@ def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 
 
 
 def is_bounded_by_facets(facets: BodyFacets, surface: Float[np.ndarray, "S 3"]) -> bool:
-    """Tell whether a body is bounded by flat faces: most of its surface points lie on some."""
+    """Return whether a body is bounded by flat faces: most of its surface points lie on some."""
     return len(facets.point) > MIN_FLAT_SURFACE_FRACTION * len(surface)
 
 
 def has_edges(rows: Float[np.ndarray, "S W"]) -> bool:
-    """Tell whether a body has any: whether it is known not to be round all over.
+    """Return whether a body has any: whether it is known not to be round all over.
 
     Args:
-        rows: How its surface curves at its points, ``types.ROUNDING``; without normals where that
+        rows: How its surface curves at its points, ``types.CURVATURE_COLUMNS``; without normals where that
             is not known.
 
     """
@@ -112,7 +114,7 @@ def facet_normals(
     first: FacetsAtNodes,
     second: FacetsAtNodes,
 ) -> Float[np.ndarray, "E 3"]:
-    """Give the normals along which two bodies of flat faces meet at nodes, a to c.
+    """Return the normals along which two bodies of flat faces meet at nodes, a to c.
 
     Near an edge the normal of a node leans, and what slides along a face seems to come nearer:
     where the lean feigns more of that than there is, the normal becomes that of the face, which is

@@ -107,7 +107,7 @@ def stencil(
 def _slots(
     base: Int[np.ndarray, "P 3"], field: Int[np.ndarray, " P"]
 ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], np.ndarray]:
-    """Give the nodes that are reached, field by field, and each particle's 27 among them."""
+    """Return the nodes that are reached, field by field, and each particle's 27 among them."""
     low = base.min(axis=0)
     size = base.max(axis=0) - low + 3
     stride = np.array([size[1] * size[2], size[2], 1])

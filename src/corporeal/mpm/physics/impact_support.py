@@ -1,8 +1,8 @@
-"""What holds a rigid body from behind while it is struck: twin of formulas/backing.h.
+"""Support of a rigid body during an impact: twin of formulas/backing.h.
 
 A body between what strikes it and what it rests on is squeezed at once where it is light, or where
 the contact behind is the wider one: its own vibration between the two contacts is then much quicker
-than the blow, so that both contacts are springs in series (decision 89).
+than the impact, so that both contacts are springs in series (decision 89).
 """
 
 from dataclasses import dataclass
@@ -35,8 +35,8 @@ class ImpactBodies:
     """Inverse masses [1/kg]; 0 of planes and prescribed motion, -1 of what is not rigid."""
     restitution: Float[np.ndarray, "N N"]
     """Newton's e of every pair …"""
-    blows: Float[np.ndarray, "N N 5"]
-    """… and how it changes with the speed of a blow: see ``restitution_at_speed``."""
+    restitution_law: Float[np.ndarray, "N N 5"]
+    """… and how it changes with the speed of an impact: see ``restitution_at_speed``."""
 
 
 class ImpactContacts(NamedTuple):
@@ -74,7 +74,7 @@ class ImpactPair:
 
 
 def restitution_at_speed(restitution: float, law: Float[np.ndarray, "5"], speed: float) -> float:
-    """Restitution at the speed of a blow [-]: twin of ``Impact::bounce`` in contact.h.
+    """Restitution at the speed of an impact [-]: twin of ``Impact::bounce`` in contact.h.
 
     e = e_r (v/v_r)^(-q) - s (v - v_r), within bounds: q = 1/4 where a metal yields, a slope s where
     a rubber ball was rated at two speeds (decision 77).
@@ -117,10 +117,10 @@ def equivalent_punch_radius(radius: float, thickness: float, cell: float) -> flo
 
 
 def responds_within_impact(stiffness: float, mass: float, strikes: float, behind: float) -> bool:
-    """Whether what lies between swings much quicker than the blow lasts.
+    """Whether what lies between swings much quicker than the impact lasts.
 
     ω² = k (1/m + 1/m_behind) + 1/m between both springs, against 1/m_strikes + 1/(m + m_behind) of
-    the blow, over the stiffness of the contact that is struck.
+    the impact, over the stiffness of the contact that is struck.
 
     Args:
         stiffness: k: of the contact behind over that of the one that is struck [-].
@@ -164,7 +164,9 @@ class ImpactRound:
             normal = normal / max(float(np.linalg.norm(normal)), TINY_DOUBLE)
             both = np.divmod(pair, len(bodies.light))
             blow = float(seen.blow[mine].max())
-            e = restitution_at_speed(float(bodies.restitution[both]), bodies.blows[both], blow)
+            e = restitution_at_speed(
+                float(bodies.restitution[both]), bodies.restitution_law[both], blow
+            )
             width = contact_disc_radius(seen.point[near], normal, cell)
             place = seen.point[near].mean(axis=0)
             found[int(pair)] = ImpactPair(

@@ -1,4 +1,4 @@
-"""Rigid inclusions: the stiff part of a mixed object moves with the soft matter that it holds.
+"""Rigid inclusions: stiff parts that move with the soft material around them.
 
 The frame keeps its six degrees of freedom and scatters mass only. Nodes of the soft field inside it
 are its own: before contact, frame and lumped nodes become one rigid body with their momentum and
@@ -14,11 +14,11 @@ from corporeal.mpm.constants import FRAME_LAYER_DX, FRAME_REACH_DX, PARTICLES_PE
 from corporeal.mpm.problem import Body
 
 
-def frame_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
-    """Mean densities [kg/m³] of a frame and of the soft matter around it; masses give volumes.
+def inclusion_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
+    """Mean densities [kg/m³] of a frame and of the soft material around it; masses give volumes.
 
     On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin
-    as in life it would hold nothing.
+    as in reality it would hold nothing.
     """
     far = KDTree(frame.position).query(soft.position, distance_upper_bound=FRAME_LAYER_DX * cell)[0]
     near = np.isfinite(far)
@@ -28,7 +28,7 @@ def frame_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float,
     return float(frame.volume @ frame.density) / max(float(frame.volume.sum()), layer), held
 
 
-def frame_particles_near(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
+def inclusion_particles_near(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
     """Particles of a frame that what it holds could ever meet; those far inside don't matter."""
     far = KDTree(soft.position).query(frame.position, distance_upper_bound=FRAME_REACH_DX * cell)[0]
     return np.flatnonzero(np.isfinite(far))

@@ -1,4 +1,4 @@
-"""How stiff a liquid is simulated: as much as its speed needs, not as much as it is.
+"""Artificial bulk modulus of liquids, chosen by their speed.
 
 A liquid's own sound (1480 m/s in water) would make steps a hundred times shorter than its motion
 needs. With K = ρ c₀² and c₀ ten times its largest speed its density changes by one per cent (weak

@@ -1,4 +1,4 @@
-"""Viscoelasticity: two Maxwell branches beside the elastic law, so that loss is there at impact.
+"""Viscoelasticity: two Maxwell branches in parallel with the elastic law.
 
 A branch is a spring that forgets. Its strain is a conformation tensor less the identity,
 E = b - 1 (an Oldroyd-B branch: Ram et al. 2015, "A material point method for viscoelastic fluids,
@@ -141,7 +141,7 @@ def complex_modulus(
 
 
 def branch_decay(dt: float, time: Float[np.ndarray, " *N"]) -> tuple[np.ndarray, np.ndarray]:
-    """Give what is left of old strain, and of strain made evenly during the step [-].
+    """Return what is left of old strain, and of strain made evenly during the step [-].
 
     Exact for a constant rate of strain. With T far below dt the second is T/dt: the branch is then
     a viscosity G T, without the time step that an explicit viscosity asks for.

@@ -1,4 +1,4 @@
-"""Prescribed motion: a rigid body that follows a given path, whatever it meets.
+"""Prescribed motion of rigid bodies along paths.
 
 In contact it is as heavy as a wall, with the velocity that takes it, in this step, to where its
 path says. Whatever that takes is booked: its momentum and energy change by what contacts give it
@@ -87,7 +87,9 @@ def _cubics(
 
 
 def _smooth_curve(time: ArrayLike, value: Float[np.ndarray, "N 3"]) -> "CubicHermiteSpline":
-    from scipy.interpolate import PchipInterpolator  # few scenes have anything that moves as told
+    from scipy.interpolate import (
+        PchipInterpolator,  # few scenes have anything that follows a prescribed path
+    )
 
     return PchipInterpolator(time, value)
 
@@ -133,7 +135,7 @@ class PathFollower:
         centre: Float[np.ndarray, "3"],
         rotation: Float[np.ndarray, "3 3"],
     ) -> PathStep:
-        """Say how the body moves in a step of dt [s] that ends at ``end`` [s].
+        """Return how the body moves in a step of dt [s] that ends at ``end`` [s].
 
         Args:
             end: When the step ends [s].

@@ -101,7 +101,7 @@ def fit_motion(
 
 
 def rotation_matrix(turn: Vector3) -> Matrix3:
-    """Give the rotation matrix of a rotation vector [rad] (Rodrigues' formula)."""
+    """Return the rotation matrix of a rotation vector [rad] (Rodrigues' formula)."""
     angle = float(np.linalg.norm(turn))
     K = cross_matrix(turn)
     if angle < SMALL_ROTATION_RAD:

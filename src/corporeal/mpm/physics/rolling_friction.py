@@ -1,4 +1,4 @@
-"""Rolling friction: a moment against rolling, at most c N. Twin of ``formulas/rolling.h``."""
+"""Rolling friction: a moment of at most c N against rolling. Twin of ``formulas/rolling.h``."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Where a rigid body's rounded surface points touch a plane: twin of ``Round`` in surfaces.h."""
+"""Contact of a rigid body's rounded surface points with planes: twin of ``Round`` in surfaces.h."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -7,7 +7,7 @@ from corporeal.mpm.constants import MAX_ARC_ANGLE_RAD, MIN_ARC_COMPONENT, TINY_D
 
 
 def support_point_shift(
-    rounding: Float[np.ndarray, "N 12"], towards: Float[np.ndarray, "N 3"]
+    curvature: Float[np.ndarray, "N 12"], towards: Float[np.ndarray, "N 3"]
 ) -> tuple[Float[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
     """How far from its point each rounded surface goes on in a direction [m].
 
@@ -16,16 +16,16 @@ def support_point_shift(
     n are bounded by what the point stands for.
 
     Args:
-        rounding: See ``types.ROUNDING``; what is not round is not shifted.
-        towards: Unit, in the frame of the rounding.
+        curvature: See ``types.CURVATURE_COLUMNS``; what is not round is not shifted.
+        towards: Unit, in the frame of the curvature.
 
     Returns:
         The shifts, and whether each point is the surface in that direction at all, and not its
         neighbours.
 
     """
-    normal, along = rounding[:, :3], rounding[:, 3:6]
-    ball, arc, reach = rounding[:, 6], rounding[:, 7], rounding[:, 8]
+    normal, along = curvature[:, :3], curvature[:, 3:6]
+    ball, arc, reach = curvature[:, 6], curvature[:, 7], curvature[:, 8]
     outward, ahead = np.sum(towards * normal, axis=1), np.sum(towards * along, axis=1)
     moved = np.where(np.hypot(outward, ahead) > MIN_ARC_COMPONENT, arc, 0.0)
     angle = np.where(moved > 0.0, np.arctan2(ahead, outward), 0.0)
@@ -39,7 +39,7 @@ def support_point_shift(
         ball, tilted, aside / np.maximum(size, TINY_DOUBLE)[:, None], normal
     )
     beyond = (turned != angle) | (tilted != tilt)
-    return shift, ~beyond | (rounding[:, 9] == 0.0)
+    return shift, ~beyond | (curvature[:, 9] == 0.0)
 
 
 def _bounded_angle(angle: np.ndarray, reach: np.ndarray, radius: np.ndarray) -> np.ndarray:

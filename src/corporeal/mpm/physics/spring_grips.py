@@ -1,4 +1,4 @@
-"""Taking hold of a body from outside: an impulse at a point, and a spring that pulls it along.
+"""Grips: an impulse at a point of a body, and a spring that pulls it.
 
 Both reach the particles within r = ``GRIP_RADIUS_DX`` cells of the point, weighted by (1 - d²/r²)²
 and mass; a point that lies farther out takes hold of the nearest particle's surroundings. A rigid
@@ -45,7 +45,7 @@ class Grip:
     def impulse(
         self, place: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], dt: float
     ) -> Float[np.ndarray, "3"]:
-        """Give the spring's impulse in a step [N s]: J = dt (k (x_target - x) - c v).
+        """Return the spring's impulse in a step [N s]: J = dt (k (x_target - x) - c v).
 
         k and c are at most what the step can follow with the mass that moves at once.
         """
@@ -101,14 +101,14 @@ def updated_grips(
     if stiffness == 0.0:
         return kept
     if hold is None and body not in grips:
-        raise UserError(f"Body {body} is not held yet. Say at which point to take hold of it.")
+        raise UserError(f"Body {body} is not held yet. Give the point to hold it at.")
     hold = hold or grips[body].hold
     damping = 2.0 * float(np.sqrt(stiffness * total))
     return kept | {body: Grip(hold, target, stiffness, damping)}
 
 
 def check_grip(problem: Problem, body: int, *vectors: Vector | None) -> None:
-    """Refuse bodies that are not there or follow a path, and what is no number.
+    """Reject bodies that are not there or follow a path, and what is no number.
 
     Raises:
         UserError: It says what to give.
@@ -118,5 +118,15 @@ def check_grip(problem: Problem, body: int, *vectors: Vector | None) -> None:
         raise UserError(f"There is no body {body}. Choose 0 to {len(problem.bodies) - 1}.")
     if problem.bodies[body].path is not None:
         raise UserError(f"{problem.bodies[body].name!r} follows a path: nothing else moves it.")
+    require_finite(*vectors)
+
+
+def require_finite(*vectors: Vector | None) -> None:
+    """Refuse what is no number.
+
+    Raises:
+        UserError: It says what to give.
+
+    """
     if not all(np.isfinite(v).all() for v in vectors if v is not None):
-        raise UserError("A point or an impulse is not finite. Give three numbers.")
+        raise UserError("A vector is not finite. Give three numbers.")

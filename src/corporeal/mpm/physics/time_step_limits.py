@@ -1,4 +1,4 @@
-"""How fast waves run, how large a step that allows, and how far the step budget reaches."""
+"""Wave speeds, stable time steps, and the step budget."""
 
 from collections.abc import Sequence
 from math import inf, log, sqrt
@@ -64,7 +64,7 @@ def stable_step(wave: float, motion: float, cell: float, courant: float = COURAN
 def flip_damping_rate(
     wave: Float[np.ndarray, " P"], granular: Bool[np.ndarray, " P"], pull: float, cell: float
 ) -> Float[np.ndarray, " P"]:
-    """Rate at which matter forgets the velocities that its grid cannot see [1/s].
+    """Rate at which material forgets the velocities that its grid cannot see [1/s].
 
     κ c/dx: what rings, rings away within some passages of its waves. What flows like sand does not
     ring, and the stiffness of a grain must not tell how far a heap runs out: ½ √(g/dx) for it
@@ -111,15 +111,15 @@ def limp_wall_factors(ratio: float) -> tuple[float, float, float]:
 def closed_wall_factors(ratio: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) for a thickened wall that goes all around and does not flow.
 
-    A closed convex surface cannot bend without stretching (Cohn-Vossen's theorem), so what a blow
-    feels is the indentation stiffness k = 4 E t² / (R √(3(1 - ν²))) of a spherical shell (Reissner
-    1946): E r² keeps it. E r³ would make a rubber duck t_num/t times too soft.
+    A closed convex surface cannot bend without stretching (Cohn-Vossen's theorem), so what an
+    impact feels is the indentation stiffness k = 4 E t² / (R √(3(1 - ν²))) of a spherical shell
+    (Reissner 1946): E r² keeps it. E r³ would make a rubber duck t_num/t times too soft.
     """
     return ratio**2, ratio**2, ratio
 
 
 def fold_stiffness_factor(thickness: float, simulated: float, radius: float) -> float:
-    """Factor on E r³ that lets a fold in a thickened wall yield at the same angle as in life.
+    """Factor on E r³ that lets a fold in a thickened wall yield at the same angle as in reality.
 
     A wall of thickness t and radius of curvature R folds over √(R t) (the boundary layer of thin
     shells: Pogorelov, Bendings of Surfaces and Stability of Shells, 1988), on the grid over t_num.
@@ -154,7 +154,7 @@ def compress_young(young: float, knee: float, power: float) -> float:
     """Compress Young's modulus [Pa]: K (E/K)^q above the knee.
 
     Monotone in E, so the order of stiffness is kept, whatever the densities; a compression of wave
-    speeds would make heavy soft matter stiffer than light stiff matter. Never above E.
+    speeds would make heavy soft material stiffer than light stiff material. Never above E.
     """
     return young if young <= knee else knee * (young / knee) ** power
 

@@ -1,4 +1,4 @@
-"""What a wall drags on a liquid that sticks to it: the stress of a viscous layer.
+"""Wall shear stress of a sticking liquid in a viscous layer.
 
 A node sees the wall through its spline. The layer between the wall and what the node stands for is
 ``WALL_LAYER_DX`` cells thick, whatever the place of the wall between nodes; its stress follows the
@@ -39,7 +39,7 @@ class FlowCurve(NamedTuple):
 
 
 def flow_curve(body: Body, cell: float) -> FlowCurve:
-    """Give the flow curve of a body's liquid, of several the most viscous; zeros of what is none.
+    """Return the flow curve of a body's liquid, of several the most viscous; zeros of what is none.
 
     Args:
         body: The liquid.

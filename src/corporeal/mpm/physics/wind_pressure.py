@@ -1,4 +1,4 @@
-"""Wind: what moving air does to the surface of a body.
+"""Wind pressure on the surface of a body.
 
 Air presses on the faces that it blows against, along their normals. With u the velocity of the
 air seen from the face and θ the angle between u and the face's inward normal,

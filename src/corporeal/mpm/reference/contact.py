@@ -1,4 +1,4 @@
-"""Which fields meet where in one step, and what comes of it: the reference engine's contact.
+"""Contact of the reference engine: detection and solution in one step.
 
 Order: list the nodes; look at the surfaces there; choose normals; measure gaps; solve all
 impulses together, rigid bodies and walls included.
@@ -111,7 +111,7 @@ def resolve_contacts(
 def _touches_prescribed_body(
     scene: ContactScene, pair: Int[np.ndarray, "E 2"]
 ) -> Bool[np.ndarray, " E"]:
-    """Tell which contacts are of a rigid body with one that moves as told."""
+    """Return which contacts are of a rigid body with one that follows a prescribed path."""
     bodies, walls = scene.problem.bodies, len(scene.problem.planes)
     rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
     told = np.array([body.path is not None for body in bodies] + [False] * walls)
@@ -182,7 +182,7 @@ def _rebound(
         bodies=impact_support.ImpactBodies(
             np.concatenate([np.where(stiff[:bodies], light, -1.0), np.zeros(planes)]),
             np.asarray(problem.restitution, dtype=float),
-            problem.blow_laws,
+            problem.restitution_law_of_pair,
         ),
     )
 
@@ -194,7 +194,7 @@ def find_contacts(scene: ContactScene) -> list[PossibleContacts]:
     """List everything that touches or may touch in this step."""
     fields = np.unique(scene.grid.field).tolist()
     rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
     apart = [p for p in combinations(fields, 2) if p not in bonded]
     pairs = {p: _common_slots(scene.grid, rows, p) for p in apart}
     shared = [np.zeros(0, np.int64), *(slot for both in pairs.values() for slot in both)]
@@ -259,7 +259,7 @@ class NodeSamples:
     """How fields look from some slots. M links, each one particle seen from one slot."""
 
     mean: Float[np.ndarray, "A 3"]
-    """X̄: mean offset of the field's matter from the node [m]; 0 where nobody looks."""
+    """X̄: mean offset of the field's material from the node [m]; 0 where unused."""
     outward: Float[np.ndarray, "A 3"]
     """g = Σ J V₀ ∇N [m²]."""
     slot: Int[np.ndarray, " M"]

@@ -1,4 +1,4 @@
-"""What contact works on in one step: the reference engine's bodies, nodes and rules of contact."""
+"""Input of the reference engine's contact: bodies, nodes and contact parameters."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -76,13 +76,13 @@ class ContactScene:
         And whether it is that point's at all, and not its neighbours'.
         """
         R = self.state.rotation[body]
-        rows = self.matter.rounding[body]
+        rows = self.matter.curvature[body]
         shift, own = support_point_shift(rows, np.tile(towards @ R, (len(rows), 1)))
         return self.surface(body) + shift @ R.T, own
 
     def wetted(self, body: int) -> WettedSurface | None:
         """Where liquids touch a rigid body now; None: as everything else does."""
-        given = self.problem.bodies[body].wetted
+        given = self.problem.bodies[body].wetted_surface
         if given is None or not self.is_rigid(body):
             return None
         R = self.state.rotation[body].T
@@ -160,7 +160,7 @@ class ContactScene:
         return len(self.problem.bodies) + self.grid.count
 
     def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
-        """Give the rigid body that owns the slot, or the slot itself."""
+        """Return the rigid body that owns the slot, or the slot itself."""
         bodies = len(self.problem.bodies)
         stiff = np.array([self.is_rigid(f) for f in range(bodies)])
         field = self.grid.field[slot]

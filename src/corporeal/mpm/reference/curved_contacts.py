@@ -1,4 +1,4 @@
-"""Contacts of what is round with curved faces of other rigid bodies: a marble in a bowl."""
+"""Contacts of round bodies with curved faces of other rigid bodies: a marble in a bowl."""
 
 from dataclasses import dataclass
 from itertools import permutations
@@ -25,7 +25,7 @@ def list_curved_contacts(scene: ContactScene) -> list[PossibleContacts]:
     to its middle. Where both are round, points of the first body count.
     """
     bodies = scene.problem.bodies
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
     found = []
     for round_one, other in permutations(filter(scene.is_rigid, range(len(bodies))), 2):
         pair = min(round_one, other), max(round_one, other)
@@ -159,6 +159,6 @@ class RoundOnCurved:
 
 def _turned_curvature(scene: ContactScene, body: int) -> Float[np.ndarray, "S 12"]:
     """How a body's surface curves at its points, in the world."""
-    rows, turn = scene.matter.rounding[body].copy(), scene.state.rotation[body]
+    rows, turn = scene.matter.curvature[body].copy(), scene.state.rotation[body]
     rows[:, :3], rows[:, 3:6] = rows[:, :3] @ turn.T, rows[:, 3:6] @ turn.T
     return rows

@@ -1,4 +1,4 @@
-"""The reference engine: NumPy, double precision, one idea per function. Slow and to be trusted.
+"""The reference engine: NumPy in double precision, slow, for verification.
 
 Moving-least-squares MPM (Hu et al. 2018) with one field per body and explicit contact between
 fields. Every other engine is compared with this one.
@@ -6,12 +6,14 @@ fields. Every other engine is compared with this one.
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.errors import SimulationError
 from corporeal.mpm import laws
+from corporeal.mpm.body_changes import BodyChange, EngineBodyChanges
 from corporeal.mpm.constants import (
     FREE_FALL_STEP_FRACTION,
     MAX_DISTANCE_FROM_ORIGIN_DX,
@@ -23,7 +25,7 @@ from corporeal.mpm.constants import (
     TINY_DOUBLE,
 )
 from corporeal.mpm.diagnostics import BodySums, ParticleEnergy
-from corporeal.mpm.engine_interaction import EngineInteraction
+from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics import contact, rigid
 from corporeal.mpm.physics.grid_spline import Stencil, stencil
@@ -53,10 +55,19 @@ from corporeal.mpm.state import (
 )
 
 
-class ReferenceEngine(EngineInteraction):
+class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
     """Steps one problem with NumPy in double precision."""
 
-    def __init__(self, problem: Problem) -> None:
+    name = "reference"
+
+    def __init__(self, problem: Problem, threads: int | None = None) -> None:
+        """Put all particles into one list.
+
+        Args:
+            problem: What to simulate.
+            threads: As every engine takes them; one is used.
+
+        """
         self.problem = problem
         self.steps = StepStatistics()
         self.matter = ParticleConstants.of(problem)
@@ -140,7 +151,7 @@ class ReferenceEngine(EngineInteraction):
         soft = ~m.rigid
         if soft.any():
             law, F = m.law[soft], self.state.F[soft]
-            mean = mean_volume(F, self.state.relief[soft])
+            mean = mean_volume(F, self.state.log_volume_ratio[soft])
             modulus = laws.wave_modulus(law, F, m.mu[soft], m.own_lam[soft])
             modulus += laws.mean_modulus(law, mean, m.mean_bulk[soft])
             wave = np.sqrt(modulus / m.density[soft])
@@ -224,7 +235,7 @@ class ReferenceEngine(EngineInteraction):
 
         """
         m, state = self.matter, self.state
-        forget = np.minimum(1.0, m.forgetting * dt)
+        forget = np.minimum(1.0, m.flip_damping_rate * dt)
         keep = 1.0 - forget
         both = np.hstack([new, old])
         v, v_old = np.split(grid.gather(both), 2, axis=1)
@@ -233,7 +244,7 @@ class ReferenceEngine(EngineInteraction):
         step = np.eye(3) + dt * gradient
         k, branches = m.relaxing, m.branches
         memory = advance_branches(state.memory, dt * gradient[k], branches.time, dt)
-        grown = np.where(m.swells, dt * np.trace(gradient, axis1=1, axis2=2), 0.0)
+        grown = np.where(m.uses_mean_dilatation, dt * np.trace(gradient, axis1=1, axis2=2), 0.0)
         after = replace(
             state,
             position=state.position + dt * v,
@@ -241,7 +252,7 @@ class ReferenceEngine(EngineInteraction):
             affine=gradient + keep[:, None, None] * lost_c,
             F=step @ state.F,
             motion=step @ state.motion,
-            relief=state.relief + groups.mean(grown) - grown,
+            log_volume_ratio=state.log_volume_ratio + groups.mean(grown) - grown,
             branch_strain=memory.strain,
             branch_volume=memory.volume,
         )
@@ -360,7 +371,9 @@ class ReferenceEngine(EngineInteraction):
 
     def _sums(self) -> BodySums:
         m, s = self.matter, self.state
-        energy = ParticleEnergy(strain_energy(m, s.F, s.relief), branch_energy(m, s.memory))
+        energy = ParticleEnergy(
+            strain_energy(m, s.F, s.log_volume_ratio), branch_energy(m, s.memory)
+        )
         return BodySums.of(m, self._particles(), s.affine, energy, self.problem.cell)
 
     def _rigid_bodies(self) -> dict[int, rigid.RigidBody]:
@@ -400,7 +413,7 @@ class ReferenceEngine(EngineInteraction):
         """Do nothing: a step reads ``grips``."""
 
     def _take_loads(self) -> None:
-        """Do nothing: a step reads ``problem``."""
+        self.guides = PrescribedBodies(self.problem)  # a step reads the rest from ``problem``
 
     def _set_motion(self, bodies: Collection[int], motion: Velocities) -> None:
         self.state = self.state.moving(motion, self.matter, bodies)
@@ -409,6 +422,13 @@ class ReferenceEngine(EngineInteraction):
         there = State(**_of("state.", saved))
         self.state = self.state.placed_as(there, self.matter, bodies)
         self.kept = NormalCache.none()
+
+    def _successor(self, problem: Problem, change: BodyChange) -> Self:
+        after, here = type(self)(problem), (self.matter, self.state)
+        after.state = after.state.continuing(here, after.matter, change.whole)
+        after.ledger = EngineLedger(**change.inherited(self.ledger.as_arrays()))
+        after.steps = replace(self.steps)
+        return after
 
 
 def _of(kind: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

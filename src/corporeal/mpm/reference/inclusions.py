@@ -9,7 +9,7 @@ from corporeal.mpm.constants import MIN_FRAME_VOLUME_FRACTION
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact_impulses import Movers
 from corporeal.mpm.physics.grid_spline import Stencil
-from corporeal.mpm.physics.inclusions import frame_and_soft_density
+from corporeal.mpm.physics.inclusions import inclusion_and_soft_density
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.reference.contact import ContactOutcome
 from corporeal.mpm.state import ParticleConstants, State
@@ -89,7 +89,7 @@ class FrameBonds:
         self.problem = problem
         bodies = problem.bodies
         self.density = [
-            frame_and_soft_density(bodies[f], bodies[s], problem.cell) for f, s in problem.bonds
+            inclusion_and_soft_density(bodies[f], bodies[s], problem.cell) for f, s in problem.bonds
         ]
         self.pairs = problem.bonds if problem.contact == "multi" else ()
 

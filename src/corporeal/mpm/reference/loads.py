@@ -1,4 +1,4 @@
-"""What acts on single particles: the reference engine's loads.
+"""Loads on particles in the reference engine.
 
 A load gives impulses to particles; the particles of a body that bends hand them to the grid, a
 rigid body adds them up.
@@ -26,7 +26,7 @@ class ParticleLoads:
 
     @classmethod
     def none(cls) -> "ParticleLoads":
-        """Give nothing to nobody."""
+        """Return no impulses."""
         return cls(np.zeros(0, np.int64), np.zeros((0, 3)))
 
     def joined(self, other: "ParticleLoads") -> "ParticleLoads":

@@ -1,4 +1,4 @@
-"""Mean dilatation of nearly incompressible matter (decision 23).
+"""Mean dilatation of nearly incompressible material (decision 23).
 
 Taken from every particle's own J, pressure would lock: eight constraints in a cell that has three
 nodes' worth of freedom make a block of ν = 0.49 up to a sixth too stiff.
@@ -42,7 +42,7 @@ def group_clusters(
     matter: ParticleConstants, state: State, field: Int[np.ndarray, " P"], cell: float
 ) -> DilatationClusters:
     """Group particles by the pair of cells, along each axis, that their splines are centred in."""
-    chosen = np.flatnonzero(matter.swells)
+    chosen = np.flatnonzero(matter.uses_mean_dilatation)
     place = np.floor(state.position[chosen] / cell - 0.5).astype(np.int64) >> 1
     rows = np.column_stack([field[chosen], place])
     of = np.unique(rows, axis=0, return_inverse=True)[1] if len(rows) else np.zeros(0, np.int64)

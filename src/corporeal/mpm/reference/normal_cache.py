@@ -1,4 +1,4 @@
-"""Which candidate normals won where two fields met in the last step."""
+"""Cache of chosen contact normals of the last step."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields

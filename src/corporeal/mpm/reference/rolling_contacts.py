@@ -35,24 +35,27 @@ def brake_rolling(
     Args:
         problem: Says by how much: ``rolling``.
         movers: After contact.
-        contacts: Where things touch.
+        contacts: Where objects touch.
         pair: Two bodies, or a body and B + plane, for each contact.
         impulse: What each transmits [N s].
         rounds: At which of them something round may roll.
 
     """
     extra, moment, energy = np.zeros_like(impulse), np.zeros((len(problem.bodies), 3)), 0.0
-    found = np.flatnonzero(rounds) if problem.brakes else ()
+    found = np.flatnonzero(rounds) if problem.has_rolling_resistance else ()
     for e in found:
         a, c, n = contacts.a[e], contacts.c[e], contacts.normal[e]
         push = float(impulse[e] @ n)
-        if push <= 0.0 or problem.rolling is None:
+        if push <= 0.0 or problem.rolling_resistance is None:
             continue
         one, other = (
             _rolling_side(movers, a, contacts.point[e]),
             _rolling_side(movers, c, contacts.point[e]),
         )
-        bounds = float(contacts.friction[e]), float(problem.rolling[tuple(pair[e])]) * push
+        bounds = (
+            float(contacts.friction[e]),
+            float(problem.rolling_resistance[tuple(pair[e])]) * push,
+        )
         done = brake_roll(one, other, movers.spin[a] - movers.spin[c], n, impulse[e], bounds)
         for m, side, sign in ((a, one, -1.0), (c, other, 1.0)):
             given = done.moment + np.cross(side.arm, done.impulse)

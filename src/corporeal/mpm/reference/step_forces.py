@@ -1,4 +1,4 @@
-"""Everything that acts on bodies beside gravity, pushes and each other: wind, springs, grips."""
+"""Forces of wind, springs and grips on bodies."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

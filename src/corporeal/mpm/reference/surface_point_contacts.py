@@ -36,7 +36,7 @@ def list_plane_contacts(scene: ContactScene) -> list[PossibleContacts]:
             normal = np.tile(-np.array(plane.normal), (len(near), 1))
             mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
             at = point[near], normal, height[near]
-            corner = scene.matter.rounding[b][near, 6:8].sum(axis=1) <= 0.0
+            corner = scene.matter.curvature[b][near, 6:8].sum(axis=1) <= 0.0
             touches.append(
                 PossibleContacts((b, bodies + w), mover, wall, *at, rolls=b, corner=corner)
             )
@@ -49,7 +49,7 @@ def list_facet_contacts(scene: ContactScene) -> list[PossibleContacts]:
     Each face is a plane that ends: exact, where nodes of the grid would be a road with bumps.
     """
     bodies = scene.problem.bodies
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
     found = []
     for round_one, flat_one in permutations(filter(scene.is_rigid, range(len(bodies))), 2):
         pair = min(round_one, flat_one), max(round_one, flat_one)
@@ -71,7 +71,7 @@ def _with_facets(
     turn, centre = state.rotation[flat_one], state.centre[flat_one]
     reach = SURFACE_POINT_REACH_DX * scene.problem.cell
     # What is round lies with its middle on this side of the face, or it is another one's.
-    deepest = np.minimum(reach, matter.rounding[round_one][:, 6:8].sum(axis=1))
+    deepest = np.minimum(reach, matter.curvature[round_one][:, 6:8].sum(axis=1))
     facets = matter.facets[flat_one]
     for row in facets.row if deepest.any() else ():
         normal = turn @ row[:3]
@@ -113,7 +113,7 @@ def drop_replaced_nodes(
 def in_valley(
     normal: Float[np.ndarray, "E 3"], faces: Float[np.ndarray, "F 3"], near: Bool[np.ndarray, "E F"]
 ) -> Bool[np.ndarray, " E"]:
-    """Tell which normals on nodes are sums of those of faces near them, as far as they are known.
+    """Return which normals on nodes are sums of those of faces near them, as far as they are known.
 
     What is round and touches two faces of a body touches nothing between them, but nodes there see
     both, and look halfway. The face that a normal looks at most is taken off it, again and again.

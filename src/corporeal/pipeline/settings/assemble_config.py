@@ -1,4 +1,4 @@
-"""How files become a scene: what a person may ask."""
+"""Settings of the stage assemble."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,9 +12,10 @@ class AssembleConfig:
     """How files become a scene."""
 
     objects: Literal["auto", "one", "nodes"] = "auto"
-    """What counts as one object within a file: the nodes that state a class, else the pieces that
-    touch no other or are named as things of their own (auto); the whole file (one); every branch
-    below the root (nodes)."""
+    """Grouping of a file into objects: the nodes that state a class, else the pieces that touch no
+    other or are named as objects of their own (auto); the whole file (one); every branch below the
+    root (nodes).
+    """
     stack: bool = False
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
@@ -30,13 +31,13 @@ class AssembleConfig:
     working_extent: float | None = None
     """Scale the whole scene so that its largest extent is this [m]."""
     duration: float | None = None
-    """Simulated time [s]; by default from the scene file, else long enough for the falls."""
+    """Simulated time [s]; by default from the scene file, else long enough for all falls."""
     fps: int | None = None
-    """Frames per second of the film; by default from the scene file, else 30."""
+    """Frames per second of the video; by default from the scene file, else 30."""
 
 
 def validate(config: AssembleConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
+    """Raise UserError where a setting is invalid for any scene."""
     from corporeal.discretization.object_scaling import parse_extent
     from corporeal.scene.initial_state import (  # NumPy: help needs none
         parse_initial_velocity,

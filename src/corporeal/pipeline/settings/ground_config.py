@@ -1,4 +1,4 @@
-"""Where material numbers come from: what a person may ask."""
+"""Settings of the stage ground."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -13,21 +13,22 @@ FIELD_FILES = ("vomp", "pixie", "table")
 
 @dataclass(frozen=True)
 class GroundConfig:
-    """Where the numbers come from."""
+    """Sources of material values."""
 
     library: Annotated[str, ReadsPath(names=SHIPPED_LIBRARIES)] = "default"
     """"default", "reference" (the 22 materials as first published), or the path of a TOML file."""
     floor: str = "concrete"
-    """What the floor and the walls are made of, for friction and rebound."""
+    """Material of the floor and the walls, for friction and restitution."""
     neutral: str = "plastics-PP"
-    """What stands in for a part of unknown material."""
+    """Material assumed for parts of unknown material."""
     field: Annotated[str, ReadsPath(prefixes=FIELD_FILES)] = ""
-    """Numbers of another method instead of ours: vomp:PATH, pixie:PATH or table:PATH.csv (a file of
-    the scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs."""
+    """Material values of another method: vomp:PATH, pixie:PATH or table:PATH.csv (a file of the
+    scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs.
+    """
 
 
 def validate(config: GroundConfig) -> None:
-    """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
+    """Raise UserError where a material or a file is unknown or unsuitable."""
     from corporeal.fields.field_specification import (
         parse_field_specification,  # help reads no library
     )
@@ -35,5 +36,7 @@ def validate(config: GroundConfig) -> None:
 
     library_entry(config.floor, config.library)
     if library_entry(config.neutral, config.library).group == "liquid":
-        raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
+        raise UserError(
+            f"--neutral {config.neutral} is a liquid and cannot be the material of a part."
+        )
     parse_field_specification(config.field)

@@ -1,4 +1,4 @@
-"""How objects from pictures are taken apart: what a person may ask."""
+"""Settings of the stage segment."""
 
 from dataclasses import dataclass
 
@@ -14,5 +14,5 @@ class SegmentConfig:
 
 
 def validate(config: SegmentConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
+    """Raise UserError where a setting is invalid for any scene."""
     check_range("--position-weight", config.position_weight, 0.0, 100.0)

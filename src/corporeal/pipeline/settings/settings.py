@@ -1,4 +1,4 @@
-"""What a person may ask of a whole run."""
+"""Settings of a run."""
 
 from dataclasses import dataclass, field
 
@@ -14,7 +14,7 @@ from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 
 @dataclass(frozen=True)
 class Settings:
-    """One configuration per verb."""
+    """One configuration per stage."""
 
     reconstruct: ReconstructConfig = field(default_factory=ReconstructConfig)
     assemble: AssembleConfig = field(default_factory=AssembleConfig)
@@ -23,4 +23,4 @@ class Settings:
     ground: GroundConfig = field(default_factory=GroundConfig)
     fill: FillConfig = field(default_factory=FillConfig)
     simulate: SimulateConfig = field(default_factory=SimulateConfig)
-    film: VideoConfig = field(default_factory=VideoConfig)
+    video: VideoConfig = field(default_factory=VideoConfig)

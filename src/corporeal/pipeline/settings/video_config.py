@@ -1,4 +1,4 @@
-"""Camera, size and quality of a film: what a person may ask."""
+"""Settings of the video: camera, size and quality."""
 
 import math
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ MAX_SLOW_MOTION_RATIO = 100.0
 
 @dataclass(frozen=True)
 class VideoConfig:
-    """Camera, size and quality of the film."""
+    """Camera, size and quality of the video."""
 
     width: int = 1280
     """[px]"""
     height: int = 720
     """[px]"""
     quality: Literal["draft", "normal", "fine"] = "draft"
-    """Rays per pixel; draft casts none where nothing moves, and more at edges."""
+    """Rays per pixel; draft reuses static pixels, and casts more at edges."""
     speed: float = 1.0
     """Playback speed; 1: real time, 0.25: four times slower."""
     view: Vector | None = None
@@ -33,18 +33,19 @@ class VideoConfig:
     colour_by: Literal["itself", "speed"] | ColourQuantity = "itself"
     """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
     shot: CameraShot = "wide"
-    """wide: everything, all the time, but for what goes farther than 2.5 sizes of the scene; close:
-    what is struck first, or moves most; follow: the camera goes along with what moves."""
+    """wide: everything within 2.5 sizes of the scene; close: the first contact or the largest
+    motion; follow: the camera tracks what moves.
+    """
     slow: float = 1.0
-    """How many times slower the film is about the first contact."""
+    """Slow-motion factor about the first contact."""
     caption: bool = True
     """Write the time into the picture."""
 
 
 def validate(config: VideoConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
+    """Raise UserError where a setting is invalid for any scene."""
     from corporeal.render.video_file import (
-        check_size,  # and with it the encoder, which help needs not
+        check_size,  # imports the encoder, which the help does not need
     )
 
     check_size(config.width, config.height)
@@ -52,4 +53,6 @@ def validate(config: VideoConfig) -> None:
     check_range("--slow", config.slow, 1.0, MAX_SLOW_MOTION_RATIO)
     if config.view is not None and not 0 < math.hypot(*config.view) < math.inf:
         given = " ".join(f"{x:g}" for x in config.view)
-        raise UserError(f"--view is {given}, which is no direction. Give one: --view 1 -1 0.5.")
+        raise UserError(
+            f"--view is {given}, which is not a direction. For example: --view 1 -1 0.5."
+        )

@@ -1,4 +1,4 @@
-"""Put what the files hold into one scene: on the floor, apart from each other, in metres."""
+"""Assemble: place the objects of the input files in one scene, in metres."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,9 +21,15 @@ from corporeal.geometry.scene_transforms import (
     scale_scene,
     surfaces_bounding_box,
 )
-from corporeal.io.input_files import images_in_folder, model_files_in, videos_in_folder
-from corporeal.io.load_model import READABLE_MODEL_FORMATS, MeshFrame, load_model
-from corporeal.io.scene_toml import ObjectEntry, SceneFile, read_scene_file
+from corporeal.io.input_files import (
+    images_in_folder,
+    is_scene_file,
+    model_files_in,
+    read_scene,
+    videos_in_folder,
+)
+from corporeal.io.load_model import MeshFrame, load_model, readable_model_formats
+from corporeal.io.scene_toml import ObjectEntry, SceneFile
 from corporeal.pipeline.settings.assemble_config import AssembleConfig, validate
 from corporeal.recognition.length_unit_inference import (
     InferredUnit,
@@ -36,9 +42,9 @@ from corporeal.recognition.typical_extents import extent_warning
 from corporeal.scene.initial_state import with_initial_state
 
 MIN_DURATION_S, MAX_DURATION_S = 1.0, 3.0
-"""Bounds of the time that is watched when nobody says how long [s]."""
+"""Bounds of the default duration [s]."""
 DEFAULT_FPS = 30
-"""Frames per second of the film when nobody says."""
+"""Default frames per second of the video."""
 
 
 DEFAULT_CONFIG = AssembleConfig()
@@ -51,9 +57,9 @@ class _FileObjects:
     scene: Scene
     ours: bool
     entry: ObjectEntry | None
-    """What a scene file says of the whole block; None: it is the scene file's ``file``."""
+    """The scene file's entry for the whole file; None: it is the scene file's ``file``."""
     metric: bool = True
-    """Whether its lengths are metres; else they are in a unit that nobody states."""
+    """Whether its lengths are metres; else the unit is not stated."""
 
 
 def assemble(
@@ -62,9 +68,9 @@ def assemble(
     """Return one scene from models, a folder of them, or one ``scene.toml``.
 
     Args:
-        inputs: What a person typed.
+        inputs: Input paths.
         config: How.
-        up: Axis of mesh files that points up; None: as they state, or as their kind usually has it.
+        up: Up axis of mesh files; None: as stated, or as usual for the format.
 
     Raises:
         UserError: A file cannot be used, or the options don't fit what the files hold.
@@ -84,14 +90,14 @@ def assemble(
 
 
 def _scene_file_for(inputs: list[Path]) -> SceneFile:
-    """Return the inputs as if somebody had written a scene file for them."""
+    """Return a scene file for the inputs."""
     if not inputs:
         raise UserError("No input. Name a model, several of them, or a scene.toml.")
-    if any(p.suffix.lower() == ".toml" for p in inputs):
+    if any(map(is_scene_file, inputs)):
         if len(inputs) > 1:
             step = "Name the models in the scene file instead."
             raise BadFileError(inputs[0], "a scene file stands alone.", step)
-        return read_scene_file(inputs[0])
+        return read_scene(inputs[0])
     files = [f for p in inputs for f in (_models_in(p) if p.is_dir() else [p])]
     if len(files) == 1:
         return SceneFile(files[0], file=files[0])
@@ -108,14 +114,14 @@ def _models_in(folder: Path) -> list[Path]:
         step = "Name that folder, to reconstruct what they show."
         if len(places) > 1:
             what += f" and {len(places) - 1} more folders"
-            step = "Put the photographs of one thing into one folder, and name that."
+            step = "Put the photographs of one object into one folder, and name that."
         raise BadFileError(folder, f"{what}.", step)
-    if films := videos_in_folder(folder):
-        what = f"the folder holds {len(films)} films and no model."
-        raise BadFileError(folder, what, f"Name the film itself: {films[0]}.")
-    step = "Name a model, or a folder that holds some, or photographs with poses."
+    if videos := videos_in_folder(folder):
+        what = f"the folder holds {len(videos)} videos and no model."
+        raise BadFileError(folder, what, f"Name the video itself: {videos[0]}.")
+    step = "Name a model, a folder of models, or photographs with poses."
     raise BadFileError(
-        folder, f"the folder holds no model ({READABLE_MODEL_FORMATS}) and no pictures.", step
+        folder, f"the folder holds no model ({readable_model_formats()}) and no pictures.", step
     )
 
 
@@ -182,7 +188,7 @@ def _unique_names(blocks: list[_FileObjects]) -> list[_FileObjects]:
 
 
 def _apply_extents(blocks: list[_FileObjects], extents: tuple[str, ...]) -> list[_FileObjects]:
-    """Give objects the extents asked for, and tell where the others look implausible."""
+    """Scale objects to the extents asked for, and warn of implausible ones."""
     alone = len(blocks) == len(blocks[0].scene.objects) == 1
     only = blocks[0].scene.objects[0].name if alone else ""
     wanted = [parse_extent(text, only) for text in extents]
@@ -195,7 +201,7 @@ def _apply_extents(blocks: list[_FileObjects], extents: tuple[str, ...]) -> list
             said = block.entry is not None and block.entry.extent is not None
             if hits:
                 scene = resize_object(scene, k, hits[-1][1])
-            elif said:  # by the scene file, and there is nothing to ask
+            elif said:  # set by the scene file
                 continue
             elif sentence := extent_warning(obj.name, obj.class_name, obj.real_extent):
                 messages.append(sentence)
@@ -231,7 +237,7 @@ def _in_metres(blocks: list[_FileObjects], wanted: Mapping[str, float]) -> list[
 
 
 def _scaled_to_extent(block: _FileObjects, wanted: Mapping[str, float]) -> _FileObjects:
-    """Return a block in metres where somebody says how large one of its objects is."""
+    """Return a block in metres if the extent of one of its objects is given."""
     for thing in block.scene.objects:
         asked = [extent for name, extent in wanted.items() if _matches_object(name, thing)]
         if asked:
@@ -250,7 +256,7 @@ def _largest_object(block: _FileObjects) -> SceneObject:
 
 
 def _matches_object(words: str, obj: SceneObject) -> bool:
-    """Tell whether somebody who types these words means this object."""
+    """Return whether these words name this object."""
     asked = set(words.lower().replace("_", " ").split())
     exactly = words in (obj.name, Path(obj.source).stem)
     return exactly or asked <= set(obj.class_name.lower().split())
@@ -307,7 +313,7 @@ def _place_as_stated(block: _FileObjects, plan: SceneFile) -> Scene:
 
 
 def _lift_objects(scene: Scene, drop: float) -> Scene:
-    """Hang every object a number of times its size above what it stands on."""
+    """Lift every object by a multiple of its size above its support."""
     if drop == 0:
         return scene
     for k, rise in enumerate(box_placement.lift_heights(object_boxes(scene), drop)):
@@ -316,7 +322,7 @@ def _lift_objects(scene: Scene, drop: float) -> Scene:
 
 
 def _with_overlaps_named(scene: Scene) -> Scene:
-    """Warn of objects that stand in each other: they would burst apart."""
+    """Warn of overlapping objects: they would burst apart."""
     pairs = ((scene.objects[a].name, scene.objects[b].name) for a, b in overlapping_objects(scene))
     messages = tuple(f"{a} and {b} overlap at the start." for a, b in pairs)
     return replace(scene, warnings=scene.warnings + messages)
@@ -348,7 +354,7 @@ def _merge_blocks(plan: SceneFile, blocks: list[_FileObjects]) -> Scene:
 
 def _title(plan: SceneFile, blocks: list[_FileObjects]) -> str:
     """Return the scene's name: the scene file's, or its folder's, or the models'."""
-    if plan.path.suffix.lower() == ".toml":
+    if is_scene_file(plan.path):
         return scene_title(plan.path)
     return safe_name("-".join(b.scene.name for b in blocks))[:60] or "scene"
 
@@ -361,7 +367,7 @@ def scene_title(path: Path) -> str:
 def _with_timing(
     scene: Scene, blocks: list[_FileObjects], plan: SceneFile, config: AssembleConfig
 ) -> Scene:
-    """Say gravity, duration and the like: the options first, then the scene file, then our GLB."""
+    """Set gravity, duration and the like: the options first, then the scene file, then our GLB."""
     own = blocks[0].scene if len(blocks) == 1 and blocks[0].ours else None
     scene = replace(
         scene,
@@ -370,14 +376,14 @@ def _with_timing(
         fps=config.fps or plan.fps or (own.fps if own else DEFAULT_FPS),
         settled=(own or scene).settled if plan.settled is None else plan.settled,
     )
-    raised = config.drop or config.lift  # what is dropped needs its time
+    raised = config.drop or config.lift  # long enough for the fall
     known = own.duration if own and not raised else None
     stated = config.duration or plan.duration or known
     return replace(scene, duration=stated or _default_duration(scene))
 
 
 def _default_duration(scene: Scene) -> float:
-    """Return three times the longest fall and a second more [s], and never less than the forces."""
+    """Return three times the longest fall and a second more [s], and at least until the last force ends."""
     fall = 0.0
     g = -scene.gravity[2]
     for obj, height in zip(scene.objects, object_boxes(scene)[:, 0, 2], strict=True):

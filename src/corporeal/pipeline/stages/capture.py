@@ -1,7 +1,7 @@
-"""Capture: posed pictures of a scene at rest, with depth, normals and who is where.
+"""Capture: posed views of a scene at rest, with depth, normals and object ids.
 
-The cameras stand evenly about the upper half of a sphere, each as near as it can while it sees
-every object whole. Nothing is left to chance.
+The cameras are spread evenly over a hemisphere, each as near as possible with every object in view.
+Deterministic.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ from corporeal.render.ray_scene import RayScene, StudioLight
 Progress = Callable[[float, str], None]
 
 PICTURE_FILL_FRACTION = 0.9
-"""Share of the picture that the objects take at most."""
+"""Maximum share of the picture that objects cover."""
 MAX_TOTAL_PIXELS = 2**28
 """Pixels of all views together."""
 
@@ -56,10 +56,10 @@ def capture(
     config: CaptureConfig = DEFAULT_CONFIG,
     progress: Progress = lambda fraction, words: None,
 ) -> Views:
-    """Picture a scene from all sides above the floor, which is in the pictures.
+    """Render views of a scene and its floor from a hemisphere.
 
     Raises:
-        UserError: The scene holds nothing, or more is asked for than makes sense.
+        UserError: The scene is empty, or a setting is out of range.
 
     """
     _check(scene, config)
@@ -76,18 +76,16 @@ def render_views(
     config: CaptureConfig = DEFAULT_CONFIG,
     progress: Progress = lambda fraction, words: None,
 ) -> Views:
-    """Picture a scene from where somebody stands; all pictures have one size.
+    """Render views of a scene from given cameras; all have one size.
 
     Args:
         scene: At rest.
         aims: Of the cameras, which take the place of ``views`` and ``size`` of the configuration.
         config: Quality and threads.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
-    stage = RayScene(
-        scene, StudioLight(front=VIEW_DIRECTION)
-    )  # shadows stay where they are from view to view
+    stage = RayScene(scene, StudioLight(front=VIEW_DIRECTION))  # shadows are the same in all views
     shape = (len(aims), aims[0].height, aims[0].width)
     views = Views(
         rgb=np.empty((*shape, 3), np.uint8),
@@ -137,7 +135,7 @@ def _measure(scene: Scene, stage: RayScene, aim: CameraAim, views: Views, k: int
 
 def _check(scene: Scene, config: CaptureConfig) -> None:
     if not any(len(s.triangles) for s in scene.surfaces):
-        raise UserError(f"{scene.name} holds no surface to take a picture of.")
+        raise UserError(f"{scene.name} holds no surface to render.")
     width, height = config.size
     if config.views < 1 or min(width, height) < 8:
         raise UserError("Ask for at least 1 view, and for pictures of at least 8 × 8 pixels.")

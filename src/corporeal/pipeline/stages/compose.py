@@ -1,4 +1,4 @@
-"""Compose a scene of objects from a pool: draw, size, settle, certify, begin, write it all down.
+"""Compose a scene of objects from a pool: sample, scale, settle, certify, choose an interaction, write.
 
 A composed scene is a folder: ``scene.glb`` (everything at rest), ``scene.toml`` (what happens),
 ``certificate.json`` (that it is at rest), ``composition.json`` (what it is made of, and why so
@@ -52,27 +52,26 @@ from corporeal.vlm.real_sizes import RealExtent, estimate_real_extent, find_clas
 
 Progress = Callable[[float, str], None]
 Weigh = Callable[[PoolAsset, float], MassProperties]
-"""Given an asset and its real extent [m], says how its mass lies: at that size, about the middle of
-its box."""
+"""Returns the mass properties of an asset of a real extent [m], about the middle of its box."""
 
 CELLS_ALONG_LARGEST_OBJECT = 48
 """Cells along the largest object at draft detail: half of one is the penetration allowed."""
 CONVEX_PIECES_FOLDER = "pieces"
 """Folder of the pool that keeps convex pieces."""
 DURATION_AT_REST_S = 1.0
-"""How long to film a scene in which nothing happens [s]."""
+"""Duration of a scene without an interaction [s]."""
 
 
 @dataclass(frozen=True)
 class ComposeConfig:
-    """What goes into a scene and what happens in it."""
+    """Objects of a scene, and its interaction."""
 
     classes: tuple[str, ...] = ()
-    """Classes to draw from; by default all of the pool."""
+    """Classes to sample from; by default all of the pool."""
     assets: tuple[str, ...] = ()
     """Exactly these assets of the pool, by name, instead of a random choice."""
     count: str = "1-4"
-    """Number of objects, or a range to draw it from."""
+    """Number of objects, or a range to sample it from."""
     repeat: bool = False
     """Allow several objects of one class."""
     seed: int = 0
@@ -116,15 +115,15 @@ def compose(
     """Compose one scene and write it into a folder; the same pool and seed give the same bytes.
 
     Args:
-        pool: What there is.
-        folder: Where the scene goes.
+        pool: Pool of assets.
+        folder: Folder of the scene.
         config: What goes into it.
-        progress: Told the fraction done and what is being done.
-        weigh: Says how the mass of an object lies; None: as in a solid of one material.
+        progress: Called with the fraction done and a description.
+        weigh: Returns the mass properties of an object; None: those of a homogeneous solid.
 
     Raises:
-        UserError: The pool lacks what is asked for, no rest is found, or nothing has room to
-            happen.
+        UserError: The pool lacks what is asked for, no rest is found, or no interaction is
+            possible.
 
     """
     tell = progress or (lambda fraction, words: None)
@@ -152,12 +151,12 @@ def compose(
 
 
 def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: Weigh) -> bool:
-    """Tell whether any of the objects of a scene could be moved by a wind, standing alone.
+    """Return whether wind could move any object of a scene, standing alone.
 
     Args:
-        assets: What the scene is of.
+        assets: Assets of the scene.
         config: How large objects are.
-        weigh: Says how the mass of an object lies.
+        weigh: Returns the mass properties of an object.
 
     """
     real = [s.extent for s in _asset_sizes(assets, config)]
@@ -176,7 +175,7 @@ def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: We
 def _possible_kinds(
     config: ComposeConfig, count: int, rng: np.random.Generator
 ) -> list[InteractionKind]:
-    """Return what so many objects, standing as asked, can do, in an order of chance."""
+    """Return the possible interactions of the objects, in random order."""
     if config.interaction == "none":
         return []
     stands = config.arrangement
@@ -192,7 +191,7 @@ def _possible_kinds(
 def _choose_assets(
     pool: AssetPool, config: ComposeConfig, kind: InteractionKind | None, rng: np.random.Generator
 ) -> list[PoolAsset]:
-    """Return the assets named, or draw classes and one asset of each."""
+    """Return the assets named, or sample classes and one asset of each."""
     if config.assets:
         return [_asset_by_name(pool, name) for name in config.assets]
     by_class = pool.classes
@@ -211,7 +210,7 @@ def _choose_assets(
         raise UserError(
             f"{low} objects are asked for, of {len(offered)} "
             f"class{'es' * (len(offered) != 1)} that may come once each. Name more --classes, or "
-            "say --repeat."
+            "use --repeat."
         )
     count = int(rng.integers(low, most + 1))
     classes = draw_least_used(offered, {}, count, rng, config.repeat)
@@ -276,7 +275,7 @@ def _objects(
 def _with_mass_properties(
     objects: list[_ObjectToPlace], weigh: Weigh | None
 ) -> list[_ObjectToPlace]:
-    """Let bodies know how their mass lies, walls being as thick as the object is large."""
+    """Set mass properties of bodies; wall thickness scales with the object."""
     if weigh is None:
         return objects
     matters = [weigh(t.asset, t.real.extent).scaled(t.extent / t.real.extent) for t in objects]
@@ -292,7 +291,7 @@ def _least_friction(
 ) -> dict[str, float]:
     """Return the least friction of any two parts of an object and of each other one, by name [-].
 
-    Which parts will touch is not known before all lie at rest; the least holds whichever do.
+    Contacts are not known before settling, so the least is a bound for all.
     """
     found = {}
     for k, (other, matter) in enumerate(zip(objects, matters, strict=True)):

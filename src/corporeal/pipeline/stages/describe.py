@@ -1,4 +1,4 @@
-"""Describe: say in words what is in the scene and what each part is made of."""
+"""Describe: name the objects of the scene and the materials of their parts."""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
@@ -33,20 +33,19 @@ def describe(
     """Name every object's parts and their materials.
 
     Answers are taken, in this order, from the annotation file, a model (or its recorded answers)
-    and the names in the file; what none of them knows is unknown. A model is also asked where in
-    the measured ranges each value lies, and how large such objects usually are.
+    and the names in the file; the rest is unknown. A model is also asked where in the measured
+    ranges each value lies, and how large such objects usually are.
 
     Args:
         scene: What was assembled.
-        config: Whom to ask.
+        config: Sources of answers.
         library: The library whose names and ranges a model is offered.
-        progress: Told the fraction done and what is being done.
-        from_pictures: Which objects are, by number: one surface each. An annotation may name the
-            pieces of one, and how thick the surface draws a wall tells nothing, whoever says that
-            there is one. Models beside them show their walls.
+        progress: Called with the fraction done and a description.
+        from_pictures: Objects from pictures, by number: one surface each. An annotation may name
+            their pieces; their surface does not show the thickness of walls, as those of models do.
 
     Raises:
-        UserError: An annotation or a recording does not fit the scene, nobody can be asked, or
+        UserError: An annotation or a recording does not fit the scene, a model is unavailable, or
             questions wait for a person's answers.
 
     """
@@ -56,7 +55,7 @@ def describe(
 
 
 def _with_unseen_walls(thing: ObjectDescription) -> ObjectDescription:
-    """Say of all parts, in each answer, that pictures need not show the inside of their walls."""
+    """Mark the walls of all parts, in each answer, as not visible from inside."""
     answers = (replace(one, parts=tuple(map(_wall_unseen, one.parts))) for one in thing.answers)
     return replace(thing, parts=tuple(map(_wall_unseen, thing.parts)), answers=tuple(answers))
 

@@ -73,7 +73,7 @@ from corporeal.scene.vessel_contents import add_vessel_contents, vessels_of_cont
 
 DEFAULT_CONFIG = FillConfig()
 OBJECT_NUMBER_PATTERN = re.compile(r"Object (\d+) of the scene")
-"""As the treatment, which knows no names, calls an object."""
+"""Placeholder for an object's name in messages of the discretization."""
 
 
 def fill(
@@ -83,30 +83,29 @@ def fill(
     config: FillConfig = DEFAULT_CONFIG,
     quality: QualityPreset | None = None,
 ) -> Particles:
-    """Turn meshes into material points, choosing resolution and treatment on the way.
+    """Turn meshes into material points, choosing resolution and discretization.
 
-    A wall is as thick as in life times the scale of its object.
+    A wall is as thick as in reality times the scale of its object.
 
     Args:
-        scene: What is filled.
+        scene: Scene.
         parts: Which triangles belong to which part.
         field: What every part is made of.
         config: Resolution.
-        quality: What is bought instead of what ``config.detail`` buys; None: that.
+        quality: Resolution instead of that of ``config.detail``.
 
     """
-    # What moves in vessels is an object of its own.
+    # Movable contents become objects.
     contents = pour_loose_contents(scene, parts, field, config.seed)
     scene, parts, field = add_vessel_contents(scene, parts, field, contents).all
     field = field_in_scene_scale(field, part_scales(scene, parts))
     scene, drawn = extend_plants_into_ground(scene, parts, field)
-    # What is loose fills what holds it, of which its surface alone may be drawn; what is hollow is
-    # closed below what is soft.
+    # Granular material fills its container; hollow parts are closed below soft ones.
     bedded = fill_all_beds(
         hollow_all_vessels(measure_objects(scene, parts, config.seed), field), field
     )
     anatomies = close_all_missing_walls(bedded, field)
-    # How every part is made; objects weigh what their files state.
+    # Construction of every part; masses stated in files are kept.
     leaf = find_material("leaf_tissue")
     tissue = leaf.pick(leaf.typical())
     makes = part_models(scene, anatomies, field, tissue, config.seed)
@@ -120,7 +119,7 @@ def fill(
     asked = SimulationAccuracy(quality or config.detail, config.stiffness, config.seed)
     bodies, chosen = choose_resolution(bodies, asked)
     refuse_buried_objects(scene, anatomies, chosen.cell)
-    # No point of one object in another; volumes and densities that add up to the masses.
+    # Remove overlaps; volumes and densities add up to the masses.
     together = vessels_with_contents(parts, field)
     packings = remove_mixed_points(pack_objects(bodies, chosen, config.seed), chosen.cell, together)
     particles = add_wetted_points(
@@ -169,7 +168,7 @@ def part_models(
 def solid_rods(
     anatomies: list[MeasuredObject], makes: dict[int, PartModel], seed: int
 ) -> dict[int, Rod]:
-    """Each part that is a solid rod: where it bends, rings of points stand for it."""
+    """Find solid rods, which are represented by rings of points where they bend."""
     return {
         m.part: rod
         for a in anatomies
@@ -205,7 +204,7 @@ def pack_objects(
 def ring_points(
     recipe: FillRecipe, rod: Rod | None, treatment: Discretization, cell: float
 ) -> FillRecipe:
-    """Let rings of points stand for a rod that is thinner than two cells and bends."""
+    """Represent a bending rod that is thinner than two cells by rings of points."""
     if rod is None or treatment.kind != "deformable" or rod.diameter >= 2 * cell:
         return recipe
     return replace(recipe, depth=0.0, rod=rod, thick=2 * cell)
@@ -219,7 +218,7 @@ def is_rigid(anatomy: MeasuredObject, chosen: DiscretizationPlan) -> bool:
 def gather_particles(
     parts: Parts, bodies: MeasuredScene, chosen: DiscretizationPlan, packings: list[ObjectFilling]
 ) -> Particles:
-    """Give every point its volume and density, and what is rigid its contact points."""
+    """Set volumes and densities of points, and contact points of rigid bodies."""
     scene, anatomies, makes = bodies.scene, bodies.anatomies, bodies.makes
     pairs = list(zip(anatomies, packings, strict=True))
     weighed = [weigh_points(a, p, makes, chosen.treatments, chosen.cell) for a, p in pairs]
@@ -241,7 +240,7 @@ def gather_particles(
         treatments=chosen.treatments,
         surface=np.concatenate([points for points, _ in surfaces]),
         object_of_surface=np.repeat(np.arange(len(surfaces)), [len(s) for s, _ in surfaces]),
-        rounding=np.concatenate([rounding for _, rounding in surfaces]),
+        curvature=np.concatenate([curvature for _, curvature in surfaces]),
         face=np.concatenate([face for face, _ in windward]),
         particle_of_face=np.concatenate(
             [first + bearer for first, (_, bearer) in zip(firsts, windward, strict=True)]
@@ -256,7 +255,7 @@ def gather_particles(
 def contact_surface(
     anatomy: MeasuredObject, chosen: DiscretizationPlan, number: int
 ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 12"]]:
-    """Points on the surface of what is rigid in object ``number`` [m], and how it curves there."""
+    """Points on the rigid surface of object ``number`` [m], and its curvature."""
     stiff = [m.part for m in anatomy.members if chosen.treatments[m.part].kind == "rigid"]
     if not stiff:
         return np.zeros((0, 3)), np.zeros((0, CURVATURE_COLUMNS))
@@ -309,10 +308,10 @@ def fill_sentences(
 
 
 def real_size_sentence(make: PartModel, scale: float) -> str:
-    """Say what a part weighs at its real size, and how thick its wall is; "" where it has it."""
+    """Describe what a part weighs at its real size, and how thick its wall is; "" where it has it."""
     if not is_not_life_size(scale):
         return ""
     wall = make.thickness or make.sheet
     thick = f", with a wall {wall / scale * 1e3:.3g} mm thick" if wall else ""
     weighs = f"it weighs {make.mass / scale**3:.3g} kg{thick}"
-    return f" In life, {1 / scale:.3g} times as large, {weighs}."
+    return f" At real size, {1 / scale:.3g} times as large, {weighs}."

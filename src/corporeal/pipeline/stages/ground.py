@@ -1,4 +1,4 @@
-"""Ground: turn a material's name into numbers, inside the range that somebody measured."""
+"""Ground: choose material values inside measured ranges."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -68,8 +68,8 @@ THICKNESS_SOURCE_WORDS = {
 """Who chose a wall's thickness."""
 UNFIT_PREFIX = "It does not fit the others:"
 NEUTRAL_MATERIAL_WARNING = (
-    "Nobody knows what this part is made of. {name} stands in: the commonest moulded plastic, "
-    "whose density and stiffness lie in the middle of what everyday solids have."
+    "The material of this part is unknown. {name} is assumed: the commonest moulded plastic, with "
+    "density and stiffness in the middle of those of everyday solids."
 )
 
 
@@ -107,7 +107,7 @@ def ground(
 
 
 def grounding_warnings(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
-    """Say, one sentence each, which materials nobody knew and which values are to be doubted."""
+    """Warn of unknown materials and doubtful values, one sentence each."""
     doubts = list(field.notes)
     for k, part in enumerate(parts.catalogue):
         owner = scene.objects[part.object].name
@@ -121,7 +121,7 @@ def grounding_warnings(field: MaterialField, parts: Parts, scene: Scene) -> tupl
 
 def _part_warnings(where: str, material: Material, words: PartDescription) -> list[str]:
     unknown = Note(
-        f"{where} is of unknown material; {material.name} stands in. Say what it is with "
+        f"{where} is of unknown material; {material.name} is assumed. State its material with "
         "--annotations.",
         NoteKind.GRAVE,
     )
@@ -138,7 +138,7 @@ def _part_description(inventory: Inventory, number: int, name: str) -> PartDescr
         if words.name == name:
             return words
     for piece in (p for words in parts for p in words.pieces):
-        if piece.name == name:  # it has a surface of its own, and shares it with nobody
+        if piece.name == name:  # it does not share its surface
             return replace(piece, volume_share=1.0, surface_share=1.0)
     raise UserError(f"The description has no part {name!r}. Describe the scene again.")
 
@@ -148,7 +148,8 @@ def _entry(words: PartDescription, config: GroundConfig) -> MaterialEntry:
     if entry.group == "liquid" and not CONSTITUTIVE_LAWS[entry.law].liquid:
         raise UserError(
             f"{words.name} is described as made of {entry.name}, a liquid, for which its library "
-            "has no law of flow. Say what holds it, with structure: filled and contents: "
+            "has no constitutive law of flow. Annotate its container with structure: filled and "
+            "contents: "
             f"{entry.name}."
         )
     return entry
@@ -179,15 +180,15 @@ def _material(entry: MaterialEntry, words: PartDescription) -> Material:
 
 
 def _has_own_range(ground: Provenance, measured: MeasuredRange | None) -> bool:
-    """Whether a value has a span of its own: of a wet foam, not of a grade of its material."""
+    """Whether a value has its own range, not that of a grade of its material."""
     low, high = ground.range.low, ground.range.high
     return low < high and measured is not None and (low, high) != (measured.low, measured.high)
 
 
 def _from_file(stated: Provenance, measured: MeasuredRange) -> Provenance:
-    """Believe a number of the scene's file: in the range that the file names, from its source.
+    """Take a value from the scene's file, with the range and the source that it states.
 
-    A file of ours names the library's range, and then that is it.
+    Files written here state the library's range.
     """
     if (stated.range.low, stated.range.high) == (measured.low, measured.high):
         return replace(stated, range=measured)
@@ -198,7 +199,7 @@ def _from_file(stated: Provenance, measured: MeasuredRange) -> Provenance:
 
 
 def _placed_values(entry: MaterialEntry, words: PartDescription) -> dict[str, Provenance]:
-    """Take every value where it was placed in its range, and where nobody placed it, the usual."""
+    """Take every value as placed in its range, else the typical one."""
     grounds = _typical_values(entry, words)
     if words.material is None:
         reason = NEUTRAL_MATERIAL_WARNING.format(name=entry.name)
@@ -212,7 +213,7 @@ def _placed_values(entry: MaterialEntry, words: PartDescription) -> dict[str, Pr
 
 
 def _typical_values(entry: MaterialEntry, words: PartDescription) -> dict[str, Provenance]:
-    """Take every usual value, and say where its range is an estimate."""
+    """Take every typical value, and state where its range is an estimate."""
     grounds = {f: replace(g, margin=words.margin) for f, g in entry.typical().items()}
     return {
         f: replace(g, reason=g.reason.replace("measured", "estimated"))
@@ -228,7 +229,7 @@ def _piece(words: PartDescription, config: GroundConfig) -> PartComponent:
 
 
 def _scan_thickening_words(words: PartDescription) -> str:
-    """Say how much of what its scan draws is real, where somebody said."""
+    """Return the stated ratio of real to scanned volume in words."""
     said = words.swelling
     return f" It takes up {said.likely:.0%} of what its scan draws: {said.reason}" if said else ""
 
@@ -240,7 +241,8 @@ def _structure(material: Material, words: PartDescription, config: GroundConfig)
     if words.structure == "packed":
         share = words.solidity or 1.0
         reason = (
-            f"{STRUCTURE_SOURCE_WORDS[words.built_by]} that it is packed: {share:.0%} of its shape is matter."
+            f"{STRUCTURE_SOURCE_WORDS[words.built_by]} that it is packed: {share:.0%} of its shape "
+            "is material."
             f"{_scan_thickening_words(words)}"
         )
         return Structure("solid", None, reason, solidity=share)
@@ -248,9 +250,7 @@ def _structure(material: Material, words: PartDescription, config: GroundConfig)
         return Structure("solid", None, "How it is built is unknown: the shape decides.")
     if not (words.material or words.thickness or material.shell_thickness):
         reason = f"It is described as a {words.structure} of unknown material"
-        return Structure(
-            "solid", None, f"{reason}; of {material.name} none are: the shape decides."
-        )
+        return Structure("solid", None, f"{reason}; {material.name} has none: the shape decides.")
     wall = _wall_thickness(material, words)
     thickness, reason = wall.thickness, wall.reason
     reason = f"{STRUCTURE_SOURCE_WORDS[words.built_by]} that it {WALL_KIND_WORDS[words.structure]}. {reason}"
@@ -272,7 +272,7 @@ def _structure(material: Material, words: PartDescription, config: GroundConfig)
 def _structure_of_part(
     material: Material, words: PartDescription, config: GroundConfig, scene: Scene, number: int
 ) -> Structure:
-    """Say how a part of one object is built, and what air is sealed in it."""
+    """Return the structure of a part, with sealed air."""
     bare = _structure(material, words, config)
     if words.inflation is None:
         return bare
@@ -280,7 +280,7 @@ def _structure_of_part(
 
 
 def _structure_rebound(material: Material, structure: Structure, rebound: float | None) -> Material:
-    """Let a sealed wall rebound as its bulk does, and a solid ball as the rules of its sport."""
+    """Set restitution of a sealed wall from its bulk loss, and of a solid ball from the rules of its sport."""
     if structure.sealed:
         return sealed_wall_material(material)
     return (
@@ -297,7 +297,7 @@ def ball_radius(scene: Scene, number: int) -> float:
 def with_sealed_air(
     structure: Structure, material: Material, words: PartDescription, radius: float
 ) -> Structure:
-    """Make a wall with sealed air behind it a soft solid, unless it flows when it is dented.
+    """Replace a wall with sealed air by an equivalent soft solid, unless it yields when dented.
 
     Args:
         structure: How the part is built.
@@ -316,7 +316,7 @@ def with_sealed_air(
         if CONSTITUTIVE_LAWS[material.law].flows:
             reason = f"{sealed}, which dents it less than its wall resists."
             return replace(structure, reason=reason, sealed=True)
-        reason = f"{sealed}: wall and air bounce side by side, as one soft solid."
+        reason = f"{sealed}: wall and air act in parallel, as one soft solid."
         inner = air_with_ruled_restitution(
             inflated_ball_material(InflatedBall(gauge, material, structure.thickness, radius)),
             words.rebound,
@@ -340,7 +340,7 @@ def _inner_grounds(inside: MaterialEntry, words: PartDescription) -> dict[str, P
 
 @dataclass(frozen=True)
 class _WallThickness:
-    """How thick a wall is, and why."""
+    """Thickness of a wall, with its reason."""
 
     thickness: float
     """[m]"""
@@ -349,7 +349,7 @@ class _WallThickness:
 
 def _wall_thickness(material: Material, words: PartDescription) -> _WallThickness:
     if words.thickness:
-        whose = "usual of such things" if words.wall_usual else "stated"
+        whose = "usual of such objects" if words.wall_usual else "stated"
         if words.wall_usual and words.wall_why:
             whose += f": {words.wall_why}"
         return _WallThickness(
@@ -368,8 +368,8 @@ def _wall_thickness(material: Material, words: PartDescription) -> _WallThicknes
             ground.value, f"Its thickness, unless its mesh shows it, is the usual {where}"
         )
     raise UserError(
-        f"{words.name} is described as a {words.structure or 'shell'} of {material.name}, but how "
-        "thin its wall is is not known. Give thickness_mm in the annotation file."
+        f"{words.name} is described as a {words.structure or 'shell'} of {material.name}, but the "
+        "thickness of its wall is not known. Give thickness_mm in the annotation file."
     )
 
 
@@ -386,7 +386,7 @@ def _flows(entry: MaterialEntry) -> bool:
 
 @dataclass(frozen=True)
 class PairCoefficients:
-    """What happens where parts touch; see ``MaterialField``."""
+    """Contact coefficients; see ``MaterialField``."""
 
     friction: Float[np.ndarray, "K1 K1"]
     restitution: Float[np.ndarray, "K1 K1"]
@@ -401,9 +401,9 @@ def pair_coefficients(
     """Look up friction and restitution of all pairs of parts, and of each with the floor.
 
     Args:
-        words: Of every part.
+        words: Descriptions of all parts.
         made: Its material.
-        structures: How it is built.
+        structures: Their structures.
         config: Which library, and what the floor is made of.
 
     """

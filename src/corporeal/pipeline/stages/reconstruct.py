@@ -1,7 +1,7 @@
 """Reconstruct: from posed photographs, or a trained splat, to objects with closed surfaces.
 
-What comes out is a scene of objects like any other, which ``assemble`` reads as a GLB; and the
-Gaussians themselves, for the film and for telling parts apart.
+The result is a GLB, which ``assemble`` reads, and the Gaussians, for the video and for part
+segmentation.
 """
 
 from collections.abc import Sequence
@@ -85,18 +85,16 @@ from corporeal.vlm.photographed_objects import (
 )
 
 SURFACE_ROUGHNESS = 0.8
-"""Of surfaces: pictures do not tell it apart from light."""
-RENDERED_VIEWS, RENDERED_SIZE_PX = 48, (384, 384)
-"""Of a splat that comes without cameras."""
+"""Roughness of surfaces: pictures do not separate it from light."""
 NORMAL_NEIGHBOURS = 16
 """Points that a normal is found from."""
-SPLIT_BY_PLACE_WARNING = "What belongs to it was told by where it is alone, without masks."
+SPLIT_BY_PLACE_WARNING = "Without masks, its extent was decided by place alone."
 NO_VIEWER = PhotoInterview("", "metadata")
 BACKING_SURFELS_STATEMENT = (
     "were laid along the closed surface, below what was learned: they show where that is thin, "
     "and what no photograph shows."
 )
-"""Said of the film, and of gaussians.ply."""
+"""Said of the video, and of gaussians.ply."""
 PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS, PROGRESS_AFTER_OBJECTS = 0.6, 0.66, 0.7
 """Share of the work that is done after each step. Surfaces took 27 to 38 % of it at preset normal
 (docs/inputs.md)."""
@@ -104,7 +102,7 @@ PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS, PROGRESS_AFTER_OBJECTS = 0.6, 0.6
 
 @dataclass(frozen=True)
 class ReconstructedScene:
-    """What was found in pictures or in a splat."""
+    """A scene reconstructed from pictures or a splat."""
 
     found: Reconstruction
     """Gaussians, and points with features."""
@@ -120,15 +118,15 @@ def reconstruct(
     folder: Path | None = None,
     progress: Progress = lambda fraction, words: None,
 ) -> ReconstructedScene:
-    """Find the objects of a scene in photographs, or in a splat.
+    """Reconstruct the objects of a scene from photographs or a splat.
 
     Args:
-        source: A folder of photographs, a film, or a splat.
+        source: A folder of photographs, a video, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
-        viewer: Who is asked what the pictures show, where ``config.things`` does not say it.
-        folder: Where an interrupted training, and maps of learned features, are kept.
-        progress: Told the fraction done and what is being done.
+        viewer: Model that names the objects if ``config.object_names`` does not.
+        folder: Folder of checkpoints and feature maps.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: The input cannot be used, holds nothing that could be an object, or an option
@@ -140,12 +138,15 @@ def reconstruct(
     taken, masked = gaussians_from_source(
         source, config, folder, subprogress(progress, 0.0, PROGRESS_AFTER_TRAINING)
     )
-    grown = taken.masks is not None and not masked  # of what all cameras look at: one thing
+    grown = taken.masks is not None and not masked  # the cameras' common focus: one object
     taken = _align_upright(source, taken, config, folder)
     photographers = taken.cameras
     if not taken.cameras:
         taken = replace(
-            taken, cameras=cameras_around(taken.solid, RENDERED_VIEWS, RENDERED_SIZE_PX)
+            taken,
+            cameras=cameras_around(
+                taken.solid, config.resolution.rendered_views, config.resolution.rendered_size_px
+            ),
         )
     # Points of the foreground, with features of what the pictures show.
     progress(PROGRESS_AFTER_TRAINING, "segmenting foreground from background")
@@ -174,11 +175,10 @@ def reconstruct(
     split = assign_instances(cloud, config.apart, count, normal, drawn, space)
     # One closed surface for each object.
     progress(PROGRESS_AFTER_OBJECTS, "closing surfaces")
-    found = FoundObjects(
-        taken,
-        cloud,
-        build_object_surfaces(taken, front.on_objects, cloud.position, split.object_of_point),
+    closed = build_object_surfaces(
+        taken, front.on_objects, cloud.position, split.object_of_point, config.resolution.surface
     )
+    found = FoundObjects(taken, cloud, closed)
     if not config.force and (why := _reason_not_worth(found, photographers, masked, count)):
         raise _not_worth_error(source, why, describe_masks_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
@@ -195,19 +195,19 @@ def reconstruct(
 
 @dataclass(frozen=True)
 class _NamedObjects:
-    """What objects are, and how large."""
+    """Names and sizes of objects."""
 
     objects: Sequence[SeenObject]
     names: Sequence[str]
     scale: MetricScale
     warnings: Sequence[str]
-    """What to read first: what a person can state, then what is wrong with surfaces."""
+    """Warnings: what the user can state, then defects of surfaces."""
     doubts: tuple[str, ...]
     """The latter."""
 
     @property
     def statements(self) -> list[str]:
-        """Say how large they are, where no warning does."""
+        """Return how large they are, where no warning does."""
         return [self.scale.reason] * (self.scale.source != "nobody")
 
 
@@ -221,9 +221,9 @@ def _name_objects(
     """Name objects, and decide how large they are; a lone one may be called as its folder.
 
     Args:
-        source: The folder of photographs, the film or the splat.
+        source: The folder of photographs, the video or the splat.
         found: Objects, in order of size.
-        objects: What each is, as far as anybody said.
+        objects: What each is, if stated.
         config: What was asked for.
         extents: Real largest extents, such as "duck=0.1" [m].
 
@@ -233,7 +233,7 @@ def _name_objects(
     by_name = object_from_name(title) if unnamed else None
     if by_name is not None:
         if extents or measured is not None or z_up:
-            by_name = replace(by_name, extent=None)  # somebody knows better
+            by_name = replace(by_name, extent=None)  # stated by the user
         objects = [by_name]
     names = object_names(objects)
     sizes = dict(zip(names, found.extents, strict=True))
@@ -250,16 +250,16 @@ def _name_objects(
 def _align_upright(
     source: Path, taken: GaussianScene, config: ReconstructConfig, folder: Path | None
 ) -> GaussianScene:
-    """Turn what was learned upright, and tell objects in photographs that have no masks.
+    """Align the reconstruction with gravity, and find objects in photographs without masks.
 
     Args:
         source: Named in errors.
         taken: What was learned.
         config: How.
-        folder: Where masks lie that are not believed, and a figure of others is drawn.
+        folder: Where masks lie that are rejected, and a figure of others is drawn.
 
     Raises:
-        UserError: These are the room.
+        UserError: The objects cannot be separated from the background.
 
     """
     made = turn_upright(taken, config.up, config.floor_at)
@@ -280,7 +280,7 @@ def _align_upright(
 
 
 def _not_worth_error(source: Path, why: str, lie: str, taken: GaussianScene) -> UserError:
-    """Make an error of why things are not worth simulating, with what was noticed before."""
+    """Return the error for objects that are not worth simulating, with earlier warnings."""
     noticed = dict.fromkeys((*taken.doubts, *taken.warnings))
     return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), noticed)
 
@@ -288,13 +288,13 @@ def _not_worth_error(source: Path, why: str, lie: str, taken: GaussianScene) -> 
 def _reason_not_worth(
     found: FoundObjects, photographers: Sequence[Camera], masked: bool, count: int | None
 ) -> str | None:
-    """Say why what was found is not worth simulating, if it is not.
+    """Return why what was found is not worth simulating, if it is not.
 
     Args:
         found: Objects.
-        photographers: Cameras that took the photographs; (): nobody knows.
-        masked: Whether somebody said which pixels are objects.
-        count: How many objects somebody said there are; None: nobody did.
+        photographers: Cameras of the photographs; (): unknown.
+        masked: Whether masks were given.
+        count: Stated number of objects; None: not stated.
 
     """
     taken = found.taken
@@ -310,7 +310,7 @@ def _reason_not_worth(
 
 @dataclass(frozen=True)
 class _VideoGaussians:
-    """What films show of objects and of what is about them."""
+    """Gaussians of objects and surroundings for the video."""
 
     gaussians: Gaussians
     owner: Int[np.ndarray, " N"]
@@ -318,7 +318,7 @@ class _VideoGaussians:
 
 
 def _video_gaussians(found: FoundObjects, photographers: tuple[Camera, ...]) -> _VideoGaussians:
-    """Leave out what is below the floor, and fill what photographs leave thin.
+    """Remove Gaussians below the floor, and fill thin regions.
 
     A splat stays as it came.
     """
@@ -361,10 +361,10 @@ def _metric_reconstruction(
 
 
 def _scene(source: Path, found: FoundObjects, known: _NamedObjects) -> Scene:
-    """Make one object of each solid, coloured as its Gaussians are."""
+    """Make one object of each solid, with the colours of its Gaussians."""
     factor, by = known.scale.metres_per_unit, known.scale.reason
     said = telling_words(scene_name(source))
-    # A folder called "photos" makes nothing one of paper.
+    # A folder called "photos" must not suggest the material paper.
     own = str(source) if said == everyday_words(scene_name(source)) else said or UNKNOWN_CLASS
     objects, surfaces = [], []
     things = zip(known.names, known.objects, found.solids, strict=True)

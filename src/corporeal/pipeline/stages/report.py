@@ -1,7 +1,6 @@
-"""Report: one self-contained page that shows what was assumed, what happened, and how sure it is.
+"""Report: a self-contained HTML page with assumptions, results and their uncertainty.
 
-The page holds its film and figures, so that it can be mailed. Every number carries the measured
-range it was chosen from and where that range was read.
+Video and figures are embedded. Every value is shown with its measured range and source.
 """
 
 import math
@@ -77,10 +76,10 @@ CHOICE_WORDS = {
     "annotation": "your annotation",
     "evidence": "a draw, to fit the estimate of its mass",
     "field": "another method",
-    "borrowed": "ours, which the other method does not tell",
+    "borrowed": "ours; the other method gives none",
 }
 LONG_REASON_CHARACTERS = 60
-"""Letters of a reason that is not printed at every value."""
+"""Minimum length of a reason that is printed once, not at every value [characters]."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ class ReportContent:
     parts: Parts
     field: MaterialField
     particles: Particles
-    film: Video
+    video: Video
     audit: RunAudit
     figures: Mapping[str, Path]
     """Caption → picture, in order."""
@@ -112,8 +111,8 @@ def report(story: ReportContent, path: Path) -> None:
         title=escape_html(story.scene.name),
         summary=_summary(story),
         view=story.view,
-        film=data_url_of_file(story.film.path),
-        width=story.film.width,
+        video=data_url_of_file(story.video.path),
+        width=story.video.width,
         caption=_caption(audit.breakage),
         figures="".join(
             html_figure(caption, data_url_of_file(file)) for caption, file in story.figures.items()
@@ -135,7 +134,7 @@ def report(story: ReportContent, path: Path) -> None:
 
 
 def _summary(story: ReportContent) -> str:
-    """Say in a line or two what was simulated, and in lists what to think of it, by weight."""
+    """Summarize the simulation in a line or two, and list warnings by severity."""
     lists = "".join(_section(k, s, story) for k, s in summary_sections(story.audit).items() if s)
     return (
         f'<p class="lead">{_lead(story)}</p>'
@@ -163,7 +162,7 @@ def _lead(story: ReportContent) -> str:
 
 
 def _section(section: SummarySection, sentences: Sequence[str], story: ReportContent) -> str:
-    """List the sentences of a section: what is the matter, then why, what to do, which part."""
+    """List the sentences of a section: problem, reason, advice, part."""
     rows = "".join(f"<li>{_item(sentence, story)}</li>" for sentence in sentences)
     return f"<h3>{escape_html(section.head)}</h3><ul>{rows}</ul>"
 
@@ -175,7 +174,7 @@ def _item(sentence: str, story: ReportContent) -> str:
 
 
 def _origin_list(story: ReportContent) -> str:
-    """List how the scene came about, for whoever wants to know."""
+    """List the origin of the scene."""
     scene = story.scene
     forced = [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
     settled = equilibrium_message(story.audit.settling)
@@ -189,7 +188,7 @@ def _origin_list(story: ReportContent) -> str:
 
 
 def _answer_source_words(questions: ModelUsage, answers: int) -> str:
-    """Say who chose the materials from pictures, and how often, where more often than once."""
+    """Return who recognized the materials in pictures, and how many answers were sampled."""
     times = f", asked for {answers} answers each" if answers else ""
     return f"Materials were recognised in pictures by {escape_html(_answerers(questions))}{times}."
 
@@ -201,7 +200,7 @@ def _answerers(questions: ModelUsage) -> str:
 
 
 def _forced(obj: SceneObject) -> str:
-    """Say in one sentence what pushes an object and what blows on it."""
+    """Describe the forces on an object in one sentence."""
     forces = []
     if obj.path is not None:
         rows = len(obj.path.time)
@@ -222,13 +221,13 @@ def _window(force: Push | Wind) -> str:
 
 
 def _caption(found: Sequence[PredictedBreakage]) -> str:
-    """Say below the film what it shows whole although it may not stay so."""
+    """Caption of the video: what it shows whole although it may break."""
     doubted = [b for b in found if b.word != "holds"]
     return "".join(f"<p>{escape_html(breakage_message(b))}</p>" for b in doubted)
 
 
 def _impact_words(story: ReportContent, k: int) -> str:
-    """Say what the hardest blow does to a brittle part; "" of all others."""
+    """Describe predicted breakage of a brittle part; "" of all others."""
     owner = story.scene.objects[story.parts.catalogue[k].object].name
     mine = (owner, story.field.words[k].name)
     broken = [b for b in story.audit.breakage if (b.object, b.part) == mine]
@@ -294,25 +293,25 @@ def _part_row(story: ReportContent, k: int) -> str:
 
 
 def structure_words(structure: Structure) -> str:
-    """Say how a part is built, and what is in it."""
+    """Return how a part is built, and what is in it."""
     if structure.contents is None:
-        packed = f"packed, {structure.solidity:.0%} of it matter"
+        packed = f"packed, {structure.solidity:.0%} of it material"
         return packed if structure.solidity < 1 else structure.kind
     return f"{structure.kind} with {structure.contents.name}"
 
 
 def stiffness_words(treatment: Discretization, *, liquid: bool = False) -> str:
-    """Say which Young's modulus was simulated, and how far it is from the real one.
+    """Return which Young's modulus was simulated, and how far it is from the real one.
 
-    A liquid has none: its pressure is that of its volume, with a speed of sound of our own.
+    A liquid has none: its pressure follows from its volume and an artificial speed of sound.
     """
     if treatment.kind == "rigid":
         return "rigid"
     if liquid:
         return f"liquid, its sound slowed to {treatment.wave_speed:.2g} m/s"
-    ratio = treatment.young / treatment.young_real
+    ratio = treatment.simulated_young_pa / treatment.young_pa
     factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
-    return f"{si_text(treatment.young, 'Pa')} ({factor})"
+    return f"{si_text(treatment.simulated_young_pa, 'Pa')} ({factor})"
 
 
 def _grounds(story: ReportContent, k: int) -> str:
@@ -328,12 +327,12 @@ def _grounds(story: ReportContent, k: int) -> str:
         f"{escape_html(story.scene.objects[part.object].name)}: {escape_html(material.name)}</summary>"
         f"<p>{escape_html(words.reason)} (margin {words.margin:.2f}; {SOURCE_WORDS[words.answered_by]})"
         f"{alternative_words(words)}<br>{escape_html(structure.reason)} {escape_html(fill)}<br>"
-        f"{escape_html(story.particles.treatments[k].why)}{_impact_words(story, k)}</p>{tables}</details>"
+        f"{escape_html(story.particles.treatments[k].reason)}{_impact_words(story, k)}</p>{tables}</details>"
     )
 
 
 def _piece_grounds(piece: PartComponent) -> str:
-    """Tell of one of several objects that share a part's mesh why it is as it is."""
+    """Describe one of several pieces that share a part's mesh."""
     words = piece.words
     return (
         f"<p><b>{escape_html(words.name)}</b>: {escape_html(piece.material.name)}, "
@@ -370,7 +369,7 @@ def _values(material: Material, structure: Structure, walled: bool) -> str:
 
 
 def _shared_reason(reasons: Sequence[str]) -> str:
-    """Return a long reason that several values have: it is said once, above their table."""
+    """Return a long reason that several values share; it is printed once, above their table."""
     often, count = Counter(reasons).most_common(1)[0] if reasons else ("", 0)
     return often if count > 1 and len(often) > LONG_REASON_CHARACTERS else ""
 
@@ -455,7 +454,7 @@ def _settings(audit: RunAudit) -> str:
 
 
 def usage_words(questions: ModelUsage) -> str:
-    """Say what the questions to models took."""
+    """Describe the cost of the questions to models."""
     if not questions.questions:
         return ""
     who, number = escape_html(_answerers(questions)), questions.questions

@@ -1,4 +1,4 @@
-"""Segment: say of every point which object and which part it belongs to."""
+"""Segment: assign every point to an object and a part."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,12 +28,12 @@ from corporeal.reconstruction.segment.part_clusters import PartsConfig
 from corporeal.reconstruction.segment.part_naming import NamedParts, name_parts, part_phrases
 
 NEAREST_VOTING_POINTS = 5
-"""Points nearest to a triangle that say what part it is of."""
+"""Number of nearest points that vote for a triangle's part."""
 
 
 DEFAULT_CONFIG = SegmentConfig()
 UNSEEN_SOURCES = ("metadata", "unknown")
-"""Who says of parts what words say, and has seen none."""
+"""Sources of parts that have not seen pictures."""
 
 
 def segment(
@@ -43,16 +43,16 @@ def segment(
     found: Reconstruction | None = None,
     semantic: str = "descriptor",
 ) -> Parts:
-    """Give every triangle its object and part.
+    """Assign every triangle to an object and a part.
 
-    Points are the scene's triangles in order. What the file tells apart is exact by construction,
-    with confidence 1. An object from pictures is one surface: if its description names several
-    pieces, they are found among the points of the reconstruction.
+    Points are the scene's triangles in order. Nodes and materials of a file are exact, with
+    confidence 1. An object from pictures is one surface: if its description names several pieces,
+    they are found among the points of the reconstruction.
 
     Args:
-        scene: What was assembled.
-        inventory: What its parts are called.
-        config: How objects from pictures are taken apart.
+        scene: The assembled scene.
+        inventory: Names of its parts.
+        config: Segmentation of objects from pictures.
         found: Points with features, where the scene's objects stand now; None: from a model.
         semantic: What the semantic features of these points are, as for ``features.connect``.
 
@@ -101,9 +101,9 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 
 
 def _undivided_objects_warning(objects: Sequence[ObjectDescription]) -> list[str]:
-    """Say which objects have unknown pieces: a chair from pictures may be all foam.
+    """Return a warning of objects whose pieces are unknown.
 
-    Where nothing is known of the matter, ``ground`` says so, and how to say it.
+    Unknown materials are reported by ``ground``.
     """
     names = [
         obj.name
@@ -116,8 +116,8 @@ def _undivided_objects_warning(objects: Sequence[ObjectDescription]) -> list[str
     several = len(names) > 1
     return [
         Note(
-            f"{', '.join(names)}: nobody looked what {'these are' if several else 'it is'} made up "
-            f"of. {'Each is' if several else 'It is'} one material throughout; --vlm or "
+            f"{', '.join(names)}: the pieces of {'these objects' if several else 'this object'} "
+            f"are unknown. {'Each has' if several else 'It has'} one material throughout; --vlm or "
             "--annotations name pieces.",
             NoteKind.ASSUMED,
         )
@@ -152,7 +152,7 @@ def _replace_with_pieces(
     cloud: FeatureCloud,
     middle: Float[np.ndarray, "T 3"],
 ) -> Parts:
-    """Put the pieces that were found in the place of the object's only part."""
+    """Replace the object's only part by its pieces."""
     own = np.flatnonzero(parts.object_of_point == number)
     share = _nearest_votes(middle[own], cloud.position, named, len(obj.parts))
     best = share.argmax(axis=1)
@@ -181,7 +181,7 @@ def _nearest_votes(
     named: NamedParts,
     count: int,
 ) -> Float[np.ndarray, "T K"]:
-    """Return how sure the nearest points are, together, that each place is of each part."""
+    """Return the mean confidence of the nearest points for each place and part."""
     near = np.asarray(KDTree(points).query(places, k=min(NEAREST_VOTING_POINTS, len(points)))[1])
     near = near.reshape(len(places), -1)
     share = np.zeros((len(places), count))

@@ -1,8 +1,7 @@
-"""Simulate: step the scene through time, keep every frame as it comes, and audit the whole.
+"""Simulate: step the scene through time, write every frame, and audit the result.
 
-Frames are written one by one and nothing holds a film in memory. A checkpoint lies beside them:
-whatever stops a simulation, the same call goes on from there exactly as if nothing had happened.
-A scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
+Frames are streamed to the disk with checkpoints: an interrupted simulation resumes bit for bit. A
+scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
 """
 
 from collections.abc import Callable
@@ -12,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.core import registry, store
+from corporeal.core import store
 from corporeal.core.audit_data import SettledObjectOutcome, SettlingOutcome
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import SimulationError
 from corporeal.core.types import FractureEvent, Frame, MaterialField, Particles, Scene, Trajectory
 from corporeal.core.version import __version__
 from corporeal.discretization.build_model import ModelMapping, build_model, standing_objects
-from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.problem import ENGINES, Engine, Problem
+from corporeal.mpm.engines import build_engine
+from corporeal.mpm.problem import Engine, Problem
 from corporeal.pipeline.settings.simulate_config import SimulateConfig, validate
 from corporeal.simulation.audit import audit
 from corporeal.simulation.audit_file import write_audit
@@ -47,7 +46,7 @@ from corporeal.simulation.trajectory_files import (
 )
 
 SETTLING_FILE = "settling.json"
-"""How static equilibrium was found before time 0."""
+"""File on the static equilibrium before time 0."""
 
 Progress = Callable[[float, str], None]
 EngineBuilder = Callable[[Problem], Engine]
@@ -70,21 +69,21 @@ def simulate(
     A folder that holds a checkpoint of the same problem is continued.
 
     Args:
-        scene: What happens: gravity, pushes, duration, frames per second.
+        scene: Gravity, forces, duration, frames per second.
         particles: The filled scene.
-        field: What every part is made of.
+        field: Materials of all parts.
         config: Engine and contact.
-        folder: Where the frames go.
-        progress: Told the fraction done and what is going on.
+        folder: Folder of the frames.
+        progress: Called with the fraction done and a description.
 
     Raises:
-        SimulationError: The state became impossible; the frames so far are kept.
+        SimulationError: The simulation diverged; the frames so far are kept.
         DiskError: The disk is full; the frames so far are kept.
 
     """
     validate(config)
     posed = build_model(scene, particles, field, config.contact)
-    build: EngineBuilder = registry.load_backend("engine", config.engine, ENGINES)
+    build: EngineBuilder = partial(build_engine, engine=config.engine)
     times = frame_times(scene)
     lying = bodies_to_relax(scene, particles, posed)
     if lying:
@@ -111,7 +110,7 @@ def simulate(
 
 
 def bodies_to_relax(scene: Scene, particles: Particles, posed: ModelMapping) -> tuple[int, ...]:
-    """Return bodies to bring to static equilibrium: all supported ones, if any deforms."""
+    """Return bodies to relax: all supported ones, if any deforms."""
     if not scene.settled or not any(scene.gravity):
         return ()
     carried = standing_objects(scene, particles)
@@ -127,7 +126,7 @@ def relax_to_equilibrium(
     kept: Checkpoints,
     progress: Progress,
 ) -> dict[str, np.ndarray]:
-    """Find static equilibrium, or go on with it; return the state of the engine in it."""
+    """Find static equilibrium, or resume; return the engine's state in it."""
     record = kept.folder.parent / SETTLING_FILE
     state = kept.newest().state
     if state and record.exists():
@@ -197,7 +196,7 @@ class SimulationRun:
         self._take(stage)
 
     def _take(self, stage: FractureState) -> None:
-        """Keep the books of what is simulated now."""
+        """Update the ledgers."""
         self.stage, self.posed = stage, stage.posed
         order = stage.posed.order
         self.place = np.empty_like(order)
@@ -207,10 +206,10 @@ class SimulationRun:
         self.stress = VonMises(stage.posed.problem)
 
     def through(self, progress: Progress, lying: tuple[int, ...], relax: Relax) -> None:
-        """Step to the end, writing every frame as it comes.
+        """Step to the end, writing every frame.
 
         Args:
-            progress: Told the fraction done and what is going on.
+            progress: Called with the fraction done and a description.
             lying: Bodies that are brought to static equilibrium before time 0.
             relax: Returns the state in it.
 
@@ -225,7 +224,7 @@ class SimulationRun:
                 if self.breaking:
                     self._break(number, since, saved)
                 saved, done = self.engine.save(), number + 1
-                # From a break on a run that was cut off begins anew.
+                # after a fracture, an interrupted run restarts from here
                 if self.checkpoints.due and not self.breaks:
                     self.checkpoints.keep(saved, done)
                 progress(done / len(self.times), self.words())
@@ -239,7 +238,7 @@ class SimulationRun:
             ) from error
 
     def _break(self, number: int, since: float, saved: dict[str, np.ndarray]) -> None:
-        """Break what was struck too hard since the last frame, and simulate from there again.
+        """Fracture what was overloaded since the last frame, and simulate again from there.
 
         Args:
             number: Of the frame that was written last.
@@ -254,10 +253,9 @@ class SimulationRun:
             if blow is None:
                 return
             self.engine.restore(saved)
-            assert isinstance(self.engine, CpuEngine)
             broken = fracture_body(self.stage, self.engine, blow, self.breaks)
             if broken is None:
-                # What cannot be cut stays whole.
+                # objects that cannot be cut stay whole
                 self.whole.add(blow.object)
             else:
                 self.checkpoints.forget()
@@ -270,7 +268,7 @@ class SimulationRun:
             self.keep_frame(number)
 
     def begin(self, lying: tuple[int, ...], relax: Relax) -> int:
-        """Go back to the newest checkpoint, or write the first frame; return how many are done."""
+        """Load the newest checkpoint, or write the first frame; return the number of frames."""
         for half in self.folder.rglob(".*.part"):
             half.unlink()  # left by a process that was killed while writing
         newest = self.checkpoints.newest()
@@ -291,17 +289,17 @@ class SimulationRun:
         return max(done, 1)
 
     def words(self) -> str:
-        """Where the simulation is."""
+        """Progress of the simulation in words."""
         end = self.times[-1]
         return f"{self.engine.time:.2f} of {end:.2f} s, {self.engine.steps.count:,} steps"
 
     def keep_frame(self, number: int) -> None:
-        """Write the present as frame ``number``, particles in their own order."""
+        """Write the current state as frame ``number``, particles in original order."""
         now, measure = self.engine.snapshot(), self.engine.measure()
         rigid = self.posed.rigid[self.layout.object]
         motion = now.motion[self.place]
         if rigid.any():
-            # A rigid piece has turned before it was one.
+            # a rigid fragment may have rotated before the fracture
             turned = now.deformation[self.place] @ self.stage.turned[self.layout.object]
             motion = np.where(rigid[:, None, None], turned, motion)
         stress = self.stress.at(now)[self.place]

@@ -1,11 +1,10 @@
-"""Film: the scene itself moves, carried by its particles, and a camera watches.
+"""Video: render the scene's surfaces or Gaussians, which move with the particles.
 
-What is seen are textured surfaces, or the Gaussians that were learned from pictures: those move and
-stretch with the matter (F Σ F^T), stand before the usual floor, and the surfaces that were made of
-them are only seen by their shadows on it.
+Either textured surfaces, or the Gaussians of a reconstruction, whose covariances deform with the
+material (F Σ F^T); their surfaces then only cast shadows on the floor.
 
-The camera stands where it sees the whole motion; light and camera do not move; the dice of the
-ray caster are fixed per pixel, so that nothing flickers.
+The camera sees the whole motion and is fixed, as is the light; random numbers of the ray caster are
+fixed per pixel, which prevents flicker.
 """
 
 from collections.abc import Callable, Iterator
@@ -62,26 +61,25 @@ from corporeal.simulation.moving_gaussians import (
 )
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
-VIDEO_FILE = "film.mp4"
+VIDEO_FILE = "video.mp4"
 THUMBNAIL_FILE = "thumbnail.png"
 CLOSE_UP_FILE = "close-up.png"
 CLOSE_UP_SIZE_PX = (340, 256)
-"""Of the close-up [px]."""
+"""Width of the close-up [px]."""
 CLOSE_UP_TIMES_S = (-0.03, 0.0, 0.02, 0.05, 0.12, 0.4)
 """Pictures of the close-up, from the first contact on [s]."""
 MAX_FRAMES_FOR_CAMERA = 60
-"""Frames that the camera's place is chosen by, at most."""
+"""Maximum number of frames used to place the camera."""
 OCCLUSION_CHECK_FRACTIONS = (0.0, 0.35, 0.7, 1.0)
-"""Instants at which it is seen what hides, as shares of the film."""
+"""Instants at which occlusion is tested, as shares of the video."""
 STRAY_PARTICLES_PERCENT = 0.4
-"""Percent of an object's particles, at either end, that need not be in the picture."""
+"""Percent of an object's particles, at either end, that may be out of view."""
 CORE_MASS_FRACTION = 0.5
-"""Share of an object's mass that says how large it is [-]: what flies off as drops or grains does
-not make it larger."""
+"""Share of an object's mass that defines its size [-]: scattered drops or grains do not count."""
 HAZE_DISTANCE_RATIO = 0.1
-"""Gaussians nearer than this share of the way to the scene are haze, and not drawn."""
+"""Gaussians nearer than this share of the distance to the scene are haze, and not drawn."""
 MAX_FOLLOWED_SCENE_SIZES = 2.5
-"""Sizes of the scene beyond which the camera lets objects go."""
+"""Distance beyond which the camera ignores objects [sizes of the scene]."""
 
 Progress = Callable[[float, str], None]
 
@@ -95,17 +93,17 @@ def render_video(
     folder: Path,
     progress: Progress = lambda fraction, words: None,
 ) -> Video:
-    """Write ``film.mp4`` and ``thumbnail.png``: what the scene looks like follows the particles.
+    """Write ``video.mp4`` and ``thumbnail.png``: the scene, moved by its particles.
 
     Args:
-        played: What is to be seen: surfaces, or Gaussians where the scene was made of them, bound
-            to material points at the start; those of no object stand still.
+        played: Surfaces, or Gaussians if the scene was reconstructed, bound to material points at
+            the start; those of no object are static.
         config: Size, quality, view.
-        folder: Where the film goes.
-        progress: Told the fraction done and what is going on.
+        folder: Folder of the video.
+        progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: There is nothing to show, Gaussians are asked for and there are none, the disk
+        UserError: The scene is empty, Gaussians are asked for and there are none, the disk
             is full, or the encoder fails.
 
     """
@@ -135,17 +133,17 @@ def render_video(
 
 @dataclass(frozen=True)
 class _VideoSetup:
-    """A film ready to be taken."""
+    """A video, ready to be rendered."""
 
     troupe: "_AnimatedScene"
     reel: MotionBounds
     camera: CameraTrack
     config: VideoConfig
-    """With the view that was found, where none was asked for."""
+    """With the chosen view if none was asked for."""
 
 
 def _video_setup(played: SimulationResult, config: VideoConfig) -> _VideoSetup:
-    """Bind what moves to its particles, and place the camera."""
+    """Bind surfaces to particles, and place the camera."""
     prepared, trajectory = played.prepared, played.trajectory
     scene, field = prepared.scene, prepared.field
     skin = bind_vertices(
@@ -168,7 +166,7 @@ def _video_setup(played: SimulationResult, config: VideoConfig) -> _VideoSetup:
 def frame_scenes(
     played: SimulationResult, config: VideoConfig, frames: Int[np.ndarray, " N"]
 ) -> Iterator[tuple[RayScene, CameraAim]]:
-    """Return the surfaces that a film shows in some frames, each with its camera."""
+    """Return the surfaces shown in some frames, each with its camera."""
     staged = _video_setup(played, config)
     at = staged.camera.at
     for scenery in _frame_scenes(staged.troupe, played.trajectory, frames.astype(float), at):
@@ -183,7 +181,7 @@ def _clear_view(
     trajectory: Trajectory,
     size: tuple[int, int],
 ) -> Vector | None:
-    """Return a direction in which objects do not hide behind or inside of one another."""
+    """Return a view direction without occlusion between objects."""
     if len(scene.objects) < 2:
         return None
     last = len(trajectory.frames) - 1
@@ -200,7 +198,7 @@ def _close_up(
     config: VideoConfig,
     folder: Path,
 ) -> None:
-    """Draw the first contact from close by as a row of pictures; none where nothing touches."""
+    """Render the first contact from close by as a row of pictures, if there is one."""
     if reel.contact is None:
         return
     camera = camera_track("close", reel, CLOSE_UP_SIZE_PX, config.view)
@@ -218,7 +216,7 @@ def _close_up(
 def write_caption(
     picture: np.ndarray, time: float, config: VideoConfig, about: float | None
 ) -> np.ndarray:
-    """Write the time [s] into a picture, and that the film is slow there."""
+    """Write the time [s] into a picture, and the slow motion."""
     if not config.caption:
         return picture
     slower = config.slow / config.speed if is_slow(time, about) else 1.0 / config.speed
@@ -233,7 +231,7 @@ def write_caption(
 def motion_summary(
     skin: SkinBinding, scene: Scene, particles: Particles, trajectory: Trajectory
 ) -> MotionBounds:
-    """Return what moves, for the camera: boxes of the start's surfaces, then of particles."""
+    """Return the motion for the camera: boxes of the initial surfaces, then of particles."""
     count = len(trajectory.frames)
     numbers = np.unique(
         np.linspace(0, count - 1, min(count, MAX_FRAMES_FOR_CAMERA)).round().astype(int)
@@ -268,7 +266,7 @@ def _mass_core(points: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]
 
 
 def _reach_ratio(points: np.ndarray, mass: np.ndarray) -> float:
-    """How far an object reaches at the start over the radius of most of its mass [-]."""
+    """Return the initial extent of an object over the radius of most of its mass [-]."""
     if len(points) == 0:
         return 1.0
     middle, core = _mass_core(points, mass)
@@ -304,7 +302,7 @@ def _surface_boxes(skin: SkinBinding, scene: Scene) -> np.ndarray:
 
 
 def _limit_boxes(boxes: np.ndarray) -> np.ndarray:
-    """Forget boxes that went far away, and what is below the floor."""
+    """Drop boxes that went far away, and clip at the floor."""
     first = boxes[0]
     if not np.isfinite(first).any():
         return np.nan_to_num(boxes)
@@ -319,7 +317,7 @@ def _limit_boxes(boxes: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LiquidParts:
-    """What of a scene is liquid, and has a surface of its own in every picture."""
+    """Liquid parts, whose surface is rebuilt in every frame."""
 
     of_triangle: Bool[np.ndarray, " T"]
     """Which triangles are its surface at the start."""
@@ -360,7 +358,7 @@ def liquid_parts(prepared: PreparedScene) -> LiquidParts:
 
 @dataclass(frozen=True)
 class _FrameScene:
-    """What is to be seen at one instant."""
+    """Surfaces or Gaussians at one instant."""
 
     stage: RayScene
     gaussians: Gaussians | None
@@ -385,15 +383,15 @@ def _gaussian_deformer(config: VideoConfig, played: SimulationResult) -> MovingG
         return None
     if found is None:
         raise UserError(
-            "This scene was made of surfaces and has no Gaussians to be filmed. "
-            "Film it with look 'surfaces', or run it from photographs or a splat."
+            "This scene has no Gaussians to render. Use look 'surfaces', or run it from "
+            "photographs or a splat."
         )
     return moving_gaussians(found, played.prepared)
 
 
 @dataclass(frozen=True)
 class _ParticleColours:
-    """Colours that tell something of every particle."""
+    """Colours of particles by a quantity."""
 
     panel: CategoryPanel | NumericPanel
     of_particle: Float[np.ndarray, "P 3"] | None
@@ -410,7 +408,7 @@ class _ParticleColours:
         return colours.ramp_colours(share)
 
     def keyed(self, picture: np.ndarray) -> np.ndarray:
-        """Say in the picture what the colours mean."""
+        """Draw the colour bar."""
         p = self.panel
         if isinstance(p, CategoryPanel):
             return video_overlay.draw_names(picture, p.title, p.label, p.colour)
@@ -439,7 +437,7 @@ def _particle_colours(
 
 
 def particle_speeds(trajectory: Trajectory, number: int) -> Float[np.ndarray, " P"]:
-    """How fast every particle goes on its way to the next frame, or to the last one [m/s]."""
+    """Speed of every particle on its way to the next frame, or to the last one [m/s]."""
     last = len(trajectory.frames) - 1
     if last == 0:
         return np.zeros(len(trajectory.frames[0].position))
@@ -451,7 +449,7 @@ def particle_speeds(trajectory: Trajectory, number: int) -> Float[np.ndarray, " 
 
 @dataclass(frozen=True)
 class _AnimatedScene:
-    """All that moves, in the pose it starts from."""
+    """Everything that moves, in its initial pose."""
 
     stage: RayScene
     skin: SkinBinding
@@ -461,7 +459,7 @@ class _AnimatedScene:
 
     @property
     def holds(self) -> bool:
-        """Whether its surfaces, or what moves with them, are all that there is to see."""
+        """Whether its surfaces, or what moves with them, are all that is shown."""
         painted = self.paint is not None and self.paint.of_particle is None
         return not self.liquids.bodies and not painted
 
@@ -488,12 +486,12 @@ def _frame_scenes(
     places: Float[np.ndarray, " N"],
     aim_at: Callable[[float], CameraAim],
 ) -> Iterator[_FrameScene]:
-    """Every picture's scenery in order; the next one is made ready while one is drawn.
+    """Scenes of all pictures in order; the next is prepared while one is rendered.
 
-    Where nothing moves by what could be seen, the stage is the one before.
+    Without visible motion the previous one is reused.
 
     Args:
-        troupe: All that moves.
+        troupe: Everything that moves.
         trajectory: How.
         places: Of the pictures among the frames: see ``render.pace``.
         aim_at: Where the camera is at a time [s].
@@ -527,7 +525,7 @@ def _frame_scenes(
 def _save_stills(
     picture: np.ndarray, number: int, count: int, config: VideoConfig, folder: Path
 ) -> None:
-    """Save the thumbnail (two thirds through, when objects have met) and the stills asked for."""
+    """Save the thumbnail (at two thirds of the video) and the stills asked for."""
     names = [f"stills/{number:05d}.png"] if config.stills else []
     names += [THUMBNAIL_FILE] if number == (2 * (count - 1)) // 3 else []
     for name in names:

@@ -1,4 +1,4 @@
-"""What pictures and points look like to a model, or to no model: features to find parts by."""
+"""Features of pictures and points, learned or not, for part segmentation."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""BiRefNet (Zheng et al. 2024): the one thing that a picture is of. MIT; read as ONNX.
+"""BiRefNet (Zheng et al. 2024): the foreground object of a picture. MIT; read as ONNX.
 
 Its code for torch comes with its weights and would have to be run; the ONNX file is data.
 """

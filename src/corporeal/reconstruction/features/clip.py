@@ -1,4 +1,4 @@
-"""What it is, pixel by pixel: dense CLIP features, comparable with words.
+"""Dense CLIP features, comparable with words.
 
 CLIP (Radford et al. 2021) gives one vector per picture. Its last layer's value path, without the
 attention that would mix the patches, gives one per patch (MaskCLIP, Zhou et al., ECCV 2022; F3RM,

@@ -1,4 +1,4 @@
-"""Which part of an object it is: patch features of DINOv2 (Oquab et al. 2024)."""
+"""Patch features of DINOv2 (Oquab et al. 2024)."""
 
 from functools import cached_property
 from typing import Any

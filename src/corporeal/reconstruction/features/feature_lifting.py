@@ -1,10 +1,10 @@
-"""From maps on views to features on points: mean of what each point looks like where it is seen.
+"""Lifting of feature maps to points: mean over the views that see a point.
 
 Two ways to say how much of which pixel belongs to a point, and one sum over the views:
-``back_projection`` asks where the point falls and whether it is seen there; ``uplift_features`` takes the
-weights a rasteriser blended Gaussians with. With the density frozen, training features by rendering
-them is a sparse linear problem of which that sum is the normalised first step (Marrie et al.,
-"LUDVIG", ICCV 2025; "Splat Feature Solver", arXiv 2508.12216).
+``back_projection`` asks where the point falls and whether it is seen there; ``uplift_features``
+takes the weights a rasteriser blended Gaussians with. With the density frozen, training features by
+rendering them is a sparse linear problem of which that sum is the normalised first step (Marrie et
+al., "LUDVIG", ICCV 2025; "Splat Feature Solver", arXiv 2508.12216).
 """
 
 from collections.abc import Callable, Sequence
@@ -88,7 +88,7 @@ def lift_features(
 
 
 def known_features(mean: Float32[np.ndarray, "N D"]) -> LiftedFeatures:
-    """Return features that came onto points otherwise; where they are 0 nobody knows them."""
+    """Return features that came onto points otherwise; where they are 0 they are unknown."""
     return LiftedFeatures(mean, np.any(mean, axis=1).astype(np.int64))
 
 
@@ -196,7 +196,7 @@ def visible_points(
     depth: Float[np.ndarray, "H W"],
     leeway: float = DEPTH_TOLERANCE,
 ) -> Bool[np.ndarray, " N"]:
-    """Say which points nothing hides from a camera.
+    """Return which points nothing hides from a camera.
 
     A pixel's depth is that of its middle, and a point falls beside it: depth is continued along the
     surface by the smaller of the two differences to the neighbours on either side, in each
@@ -250,7 +250,7 @@ def _depth_slope(depth: np.ndarray, axis: int) -> np.ndarray:
 def fill_unseen_points(
     position: Float[np.ndarray, "N 3"], lifted: LiftedFeatures, neighbours: int = 8
 ) -> LiftedFeatures:
-    """Give points that no view shows the mean of the nearest points that one does.
+    """Return points that no view shows the mean of the nearest points that one does.
 
     Each of the ``neighbours`` counts by 1 / distance². ``seen`` stays 0 where it was.
 

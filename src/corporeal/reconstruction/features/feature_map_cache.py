@@ -1,4 +1,4 @@
-"""Maps that were made once: one file per picture, named by all that the map depends on."""
+"""Cache of feature maps: one file per picture, named by a digest of its inputs."""
 
 import hashlib
 import io

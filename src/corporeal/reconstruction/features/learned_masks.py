@@ -1,4 +1,4 @@
-"""Masks and instances of photographs by a model that finds objects in one picture."""
+"""Masks and instances of photographs by a learned segmentation model."""
 
 import shutil
 from collections.abc import Callable, Sequence
@@ -60,10 +60,10 @@ def learned_masks(
     Args:
         source: A folder of photographs with poses.
         folder: Gets ``masks``, ``instances`` and ``masks.json``. Those that lie there by the same
-            model are kept, and what somebody corrected in them.
+            model are kept, with their corrections.
         masker: The model.
         words: What is looked for.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         UserError: The photographs or the weights cannot be used, words are missing, or most
@@ -71,12 +71,12 @@ def learned_masks(
 
     """
     if masker.needs_words and not words:
-        raise UserError("These masks are found by words: name the objects with --things.")
+        raise UserError("These masks are found by words: name the objects with --object-names.")
     made_by = store.result_key("learned masks", masker.name(), [store.path_digest(source), *words])
     record = read_mask_record(folder)
     if record is not None and record.made_by == made_by:
         count = len(edited_masks(folder))
-        more = [f"{count} of the masks were corrected by hand."] * bool(count)
+        more = [f"{count} of the masks were corrected manually."] * bool(count)
         return LearnedMasks(folder, (*record.said, *more))
     for name in (MASK_FOLDERS[0], INSTANCE_FOLDERS[0]):
         shutil.rmtree(folder / name, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Models that find objects in one picture: SAM 3, SAM 2, BiRefNet. Weights lie in a folder."""
+"""Learned segmentation models: SAM 3, SAM 2, BiRefNet. Weights lie in a folder."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,7 +96,7 @@ def connect_mask_model(spec: str) -> MaskModel:
     folder = Path(place).expanduser()
     if not place or not folder.is_dir():
         raise UserError(
-            f"There is no folder {place!r} with weights of {kind}, and none are fetched. Say "
+            f"There is no folder {place!r} with weights of {kind}, and none are downloaded. Use "
             f"--masks {kind}:FOLDER, where FOLDER holds what the model's authors publish."
         )
     return registry.load_backend("kind of masks", kind, MASK_MODEL_REGISTRY)(folder)

@@ -1,4 +1,4 @@
-"""Where weights are: in a folder, or on the Hugging Face hub and in its copy on this disk."""
+"""Weights of models: in a folder, or from the Hugging Face hub and its cache."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class ModelWeights:
 
     @property
     def name(self) -> str:
-        """Say which weights very exactly, wherever they are."""
+        """Return which weights very exactly, wherever they are."""
         return f"{self.kind}@{self.revision}"
 
     @property
@@ -57,7 +57,7 @@ class ModelWeights:
         return store.read_json(path)
 
     def check(self) -> None:
-        """Refuse a model of another kind.
+        """Reject a model of another kind.
 
         Raises:
             BadFileError: ``config.json`` is another kind's.
@@ -70,7 +70,7 @@ class ModelWeights:
             )
 
     def holds(self, names: Sequence[str]) -> None:
-        """Refuse a folder that has none of some files; ``transformers`` would make something up.
+        """Reject a folder that has none of some files; ``transformers`` would make something up.
 
         Raises:
             BadFileError: There is none of them.

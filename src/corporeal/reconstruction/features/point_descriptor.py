@@ -1,4 +1,4 @@
-"""What points look like to no model: colour, texture, orientation, finish, thickness.
+"""Handcrafted point descriptor: colour, texture, orientation, finish, thickness.
 
 Needs no weights, and so is what segments parts where there are none. It knows nothing of
 what objects are: two parts of one colour and one thickness are one to it.

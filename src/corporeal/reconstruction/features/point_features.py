@@ -1,4 +1,4 @@
-"""Points that somebody placed, looked at by models or by none."""
+"""Features of given points, learned or handcrafted."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""SAM 2 (Ravi et al. 2024): what is at a place of a picture. Apache-2.0; it knows no words."""
+"""SAM 2 (Ravi et al. 2024): segmentation by prompts. Apache-2.0; without text."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -16,7 +16,7 @@ from corporeal.reconstruction.features.model_weights import picture_statistics, 
 from corporeal.reconstruction.features.vit_pictures import enlarge_logits, prepare_picture
 
 SAM2_KINDS = ("sam2", "sam2_video")
-"""What its checkpoints call themselves: those for films hold the same model."""
+"""What its checkpoints call themselves: those for videos hold the same model."""
 
 
 class Sam2:

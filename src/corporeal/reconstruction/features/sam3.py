@@ -1,4 +1,4 @@
-"""SAM 3 (Carion et al. 2025): all objects that a word names. Under the SAM License."""
+"""SAM 3 (Carion et al. 2025): segmentation of all objects named by a text. Under the SAM License."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -17,7 +17,7 @@ from corporeal.reconstruction.features.model_weights import picture_statistics, 
 from corporeal.reconstruction.features.vit_pictures import enlarge_logits, prepare_picture
 
 SAM3_KINDS = ("sam3", "sam3_video")
-"""What its checkpoints call themselves: those for films hold the same detector."""
+"""What its checkpoints call themselves: those for videos hold the same detector."""
 MIN_SCORE = 0.3
 """Score from which on an answer counts, as its authors have it."""
 
@@ -27,7 +27,8 @@ class Sam3:
 
     needs_words = True
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, min_score: float = MIN_SCORE) -> None:
+        self.min_score = min_score
         self.weights = weights_in_folder(folder, SAM3_KINDS)
         self.weights.holds(TOKENIZER_FILES)
         self.statistics = picture_statistics(self.weights)
@@ -71,7 +72,7 @@ class Sam3:
         score = said.pred_logits[0].sigmoid()
         if said.presence_logits is not None:
             score = score * said.presence_logits[0].sigmoid()
-        found = torch.nonzero(score > MIN_SCORE)[:, 0].tolist()
+        found = torch.nonzero(score > self.min_score)[:, 0].tolist()
         return [
             MaskInstance(enlarge_logits(said.pred_masks[0, k], size) > 0, float(score[k]), word)
             for k in found

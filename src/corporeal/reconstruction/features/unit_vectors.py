@@ -1,4 +1,4 @@
-"""Rows of features: many of them, unit vectors all, compared by their cosine."""
+"""Unit feature vectors, compared by cosine."""
 
 import numpy as np
 from jaxtyping import Float, Float32

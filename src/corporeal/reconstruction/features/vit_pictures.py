@@ -1,4 +1,4 @@
-"""From pictures to what a vision transformer takes, and from its patches to a map."""
+"""Preprocessing of pictures for vision transformers, and maps of their patches."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A model of the background where pictures are too smooth to tell depth: a floor under a dome.
+"""Background model for textureless surroundings: a floor under a dome.
 
 A floor without texture agrees with itself at any depth. Were nothing known of it, Gaussians would
 float before single cameras; a plane that the rest of the floor is on says where it belongs.

@@ -1,4 +1,4 @@
-"""The part of space that masks, lines of sight and stereo leave to objects."""
+"""Volume of objects carved by masks, lines of sight and stereo."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ from jaxtyping import Bool
 
 from corporeal.core.types import Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.hull_stereo import hull_cells_seen_past
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import CarvedVolume, carve_tight_hull
@@ -17,6 +18,7 @@ def carve_volume(
     masks: Bool[np.ndarray, "V H W"],
     lines: LinesOfSight | None,
     pool: ThreadPool,
+    config: HullConfig = DEFAULT_HULL,
 ) -> CarvedVolume:
     """Carve the visual hull, and empty it where stereo sees past it and points were seen through.
 
@@ -24,12 +26,13 @@ def carve_volume(
     them. What stereo sees past is only where nothing begins: thin walls come back.
 
     lines: from the views' cameras; None: nothing is known to be seen through it.
+    config: how the hull is carved.
 
     Raises:
         UserError: Nothing is inside all masks.
 
     """
-    hull = carve_tight_hull(views, masks, pool)
+    hull = carve_tight_hull(views, masks, pool, config)
     past = hull_cells_seen_past(views, masks, hull, pool)
     if not (hull.inside & ~past).any():
         past[:] = False

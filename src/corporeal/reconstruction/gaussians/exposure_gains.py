@@ -1,4 +1,4 @@
-"""Brightness that differs from photograph to photograph: cameras choose exposure and white balance.
+"""Per-photograph gains for exposure and white balance.
 
 One gain for each photograph and channel, on sRGB values: an exposure multiplies light, and sRGB is
 nearly a power of light. Gains are relative: their geometric mean over all photographs is 1.
@@ -59,5 +59,5 @@ def update_gain(gains: ExposureGains, k: int, found: Float[np.ndarray, "3"]) -> 
 
 
 def exposures_differ(gains: ExposureGains) -> bool:
-    """Tell whether photographs differ in exposure or white balance."""
+    """Return whether photographs differ in exposure or white balance."""
     return bool(np.log(gains).std(axis=0).max() > EXPOSURE_SPREAD_LOG)

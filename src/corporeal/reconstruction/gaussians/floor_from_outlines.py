@@ -1,11 +1,11 @@
-"""How low objects reach, as their outlines tell: the height of a floor that masks hide.
+"""Height of the floor from the outlines of objects.
 
-Gaussians say it badly: nobody sees undersides, and what all masks allow bulges below them. But
+Gaussians show it badly: undersides are not seen, and what all masks allow bulges below them. But
 where an object touches the floor its lower outlines all meet: a ray through an outline touches what
-all masks allow in a short stretch there, and that lies on the object. Of what stands on a flat
-foot most rays say the same height but for noise, and the floor is there: the lowest of them are
-wrong by twice their noise. What is round below touches no outline where it touches the floor, and
-its rays say many heights.
+all masks allow in a short stretch there, and that lies on the object. Of what stands on a flat foot
+most rays say the same height but for noise, and the floor is there: the lowest of them are wrong by
+twice their noise. What is round below touches no outline where it touches the floor, and its rays
+say many heights.
 """
 
 import numpy as np
@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter1d, shift
 
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import (
     VisualHull,
@@ -38,7 +39,10 @@ MIN_FLOOR_RAYS = 20
 
 
 def floor_height_from_outlines(
-    views: Views, masks: Bool[np.ndarray, "V H W"], threads: int | None = None
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    threads: int | None = None,
+    config: HullConfig = DEFAULT_HULL,
 ) -> float | None:
     """Return the height that objects stand on [m], +z up; None: outlines do not tell.
 
@@ -47,7 +51,7 @@ def floor_height_from_outlines(
 
     """
     with ThreadPool(threads) as pool:
-        hull = carve_tight_hull(views, masks, pool)
+        hull = carve_tight_hull(views, masks, pool, config)
     around = find_viewed_region(views.cameras)
     pairs = zip(views.cameras, masks, strict=True)
     found = [_touched_heights(hull, c, m, np.array(around.centre), around.radius) for c, m in pairs]

@@ -1,4 +1,4 @@
-"""Which Gaussians belong to the objects: not the floor, not what is behind, no haze."""
+"""Foreground Gaussians: without floor, background and haze."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -66,7 +66,7 @@ def gaussian_visibility(
     masks: Bool[np.ndarray, "V H W"] | None = None,
     threads: int | None = None,
 ) -> GaussianVisibility:
-    """Say what cameras see of each Gaussian.
+    """Describe what cameras see of each Gaussian.
 
     Raises:
         UserError: There is not a mask for each camera.
@@ -92,9 +92,13 @@ def gaussian_visibility(
 
 
 def foreground_gaussians(
-    gaussians: Gaussians, cameras: Sequence[Camera], seen: GaussianVisibility, floor: bool = True
+    gaussians: Gaussians,
+    cameras: Sequence[Camera],
+    seen: GaussianVisibility,
+    floor: bool = True,
+    layer_radii: float = FLOOR_LAYER_RADII,
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which Gaussians belong to the objects.
+    """Return which Gaussians belong to the objects.
 
     With masks: those that show mostly inside them. Without: those that are above the floor, within
     the ball that the cameras look at, in a fair share of the pictures, and neither faint nor as
@@ -105,6 +109,7 @@ def foreground_gaussians(
         cameras: In the same frame.
         seen: What they see of the Gaussians, and what of that is inside masks.
         floor: Whether a floor is among the Gaussians; masks leave none.
+        layer_radii: Height of the layer that is floor, in radii of what the cameras look at [-].
 
     """
     kept = (seen.weight > seen.least) & (gaussians.opacity > FAINT_OPACITY)
@@ -116,7 +121,7 @@ def foreground_gaussians(
     kept &= gaussians.scale.max(axis=1) < HAZE_WIDTH_RADII * around.radius
     kept &= seen.views >= MIN_VIEWS_FRACTION * len(cameras)
     if floor:
-        kept &= gaussians.mean[:, 2] > FLOOR_LAYER_RADII * around.radius
+        kept &= gaussians.mean[:, 2] > layer_radii * around.radius
     return kept
 
 
@@ -137,7 +142,7 @@ def pixels_covered(
 def places_near_objects(
     gaussians: Gaussians, of_objects: Int[np.ndarray, " M"], position: Float[np.ndarray, "N 3"]
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places are at a Gaussian of objects, within a few distances or widths of it."""
+    """Return which places are at a Gaussian of objects, within a few distances or widths of it."""
     mean, widest = gaussians.mean[of_objects], gaussians.scale[of_objects].max(axis=1)
     tree = KDTree(mean)
     apart = float(np.median(np.asarray(tree.query(mean, k=2)[0])[:, 1]))
@@ -174,10 +179,10 @@ def assign_hidden_gaussians(
 def gaussians_below_floor(
     gaussians: Gaussians, owner: Int[np.ndarray, " N"], longest: float
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which Gaussians of objects are below the floor.
+    """Return which Gaussians of objects are below the floor.
 
     Where nobody looks from below, the visual hull goes on under it, as a cone that nothing denies.
-    The floor ends the surface there; in a film of a thing that is lifted the cone would show.
+    The floor ends the surface there; in a video of an object that is lifted the cone would show.
 
     Args:
         gaussians: In the world's frame: +z up, the floor at z = 0.

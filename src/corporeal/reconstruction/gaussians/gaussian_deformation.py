@@ -1,4 +1,4 @@
-"""Gaussians that move with matter: what the film of a deformed scene is drawn from."""
+"""Gaussians deformed with the material, for rendering."""
 
 from dataclasses import replace
 

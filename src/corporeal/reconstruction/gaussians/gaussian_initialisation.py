@@ -1,4 +1,4 @@
-"""Where Gaussians start: on the visual hull of masks, or on given points."""
+"""Initialisation of Gaussians on the visual hull or on given points."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Gaussians as one matrix of unbounded numbers, a row each: what training moves.
+"""Gaussians as a matrix of unconstrained training parameters.
 
 A row holds mean (3), quaternion (4), logarithms of the scales (3), logit of the opacity (1) and the
 spherical harmonics coefficient by coefficient (3 K).

@@ -1,4 +1,4 @@
-"""Gaussians from whatever a person has: photographs that they are learned from, or a splat."""
+"""Gaussians trained on photographs, or read from a splat."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -10,10 +10,11 @@ from jaxtyping import Bool, Float, UInt8
 from corporeal.core.errors import UserError
 from corporeal.core.progress import Progress, subprogress
 from corporeal.core.types import Camera, Gaussians, Note, NoteKind, Vector, Views
-from corporeal.geometry.gaussian_transforms import UpAxisChoice
+from corporeal.geometry.gaussian_transforms import UpAxis, UpAxisChoice
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.io.input_files import input_kind
 from corporeal.io.photos.posed_photos import NO_INSTANCES_MESSAGE, PosedPhotos, read_posed_photos
+from corporeal.io.registry import reader_of
 from corporeal.io.splat.load_splat import load_splat
 from corporeal.multiview.feature_matching import FEATURE_IMAGE_SIDE_PX
 from corporeal.multiview.inverted_masks import are_masks_inverted
@@ -50,12 +51,12 @@ MASK_MIN_U8 = 128
 POOR_PSNR_DB = 20.0
 """Held-out photographs agree worse than this only where something is wrong [dB]."""
 CUT_ABOVE_FLOOR_STATEMENT = (
-    "There were no masks: what is above the floor was taken for objects. What lies on it and is "
-    "thinner than 0.5 % of the scene is lost."
+    "There were no masks: everything above the floor was assumed to be objects. Objects on it "
+    "thinner than 0.5 % of the scene are lost."
 )
 NO_FLOOR_NOTE = Note(
-    "There were no masks, and no floor to tell objects from: all that most photographs "
-    "show was taken for objects. Give masks, or say where the floor is with --floor-at.",
+    "There were no masks and no floor to separate objects from: all that most photographs show was "
+    "assumed to be objects. Give masks, or the height of the floor with --floor-at.",
     NoteKind.ASSUMED,
 )
 INVERTED_MASKS_MESSAGE = (
@@ -71,10 +72,8 @@ FIRST_TRAINING_PROGRESS = 0.8
 """Share of the work that is done when such masks were learned from once: four of 21 sets are
 learned from again, so that 1.2 trainings are to be expected."""
 OVERVIEW_PICTURES = 4
-"""Pictures that somebody is shown of the whole scene."""
+"""Pictures of the whole scene for questions to a model."""
 UP_BY_AXIS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-UP_BY_SUFFIX: dict[str, Vector] = {".spz": (0.0, 1.0, 0.0)}
-"""What is up in files of a kind as a rule; in others it is -y."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class GaussianScene:
     masks: Bool[np.ndarray, "V H W"] | None = None
     """Which pixels are on objects; None: unknown."""
     coloured: Bool[np.ndarray, "V H W"] | None = None
-    """Which pixels have the colours of objects, where that is not to be believed alone."""
+    """Which pixels have the colours of objects, where that is unreliable alone."""
     z_up: bool = False
     """The file's kind says so, and that its unit is the metre."""
     usual: Vector | None = None
@@ -101,7 +100,7 @@ class GaussianScene:
     seen: Float[np.ndarray, "N 3"] | None = None
     """Sparse points on all that the photographs show, the floor too; None: the file has none."""
     doubts: tuple[str, ...] = ()
-    """Where shapes are not to be believed, in sentences."""
+    """Where shapes are unreliable, in sentences."""
     quality: HeldOutQuality | None = None
     """How well pictures of the Gaussians agree with photographs held back; None: none was."""
     statements: tuple[str, ...] = ()
@@ -222,7 +221,8 @@ def load_or_train_gaussians(
 
 def _load_splat(source: Path) -> GaussianScene:
     given = load_splat(source)
-    usual = UP_BY_SUFFIX.get(source.suffix.lower(), (0.0, -1.0, 0.0))
+    reader = reader_of(source, "splat")
+    usual = _stated_up(reader.usual_up if reader else "-y")
     read = (f"{given.count:,} Gaussians were read from {source.name}.",)
     return GaussianScene(given, usual=usual, statements=read, warnings=given.warnings)
 
@@ -280,14 +280,14 @@ class _TrainingInput:
             return trained, masks, ()
         kept = None if self.checkpoint is None else self.checkpoint.with_stem(RETRAINING_CHECKPOINT)
         later = subprogress(
-            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the thing"
+            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the object"
         )
         left = masks & ~odd
         share = np.count_nonzero(odd) / np.count_nonzero(masks)
         views = np.count_nonzero(odd.any(axis=(1, 2)))
         said = (
-            f"{share:.1%} of what masks hold shows in {views} of {len(masks)} photographs what no "
-            "other shows at the same place: it stands behind, and was left out."
+            f"{share:.1%} of what masks hold is in {views} of {len(masks)} photographs "
+            "inconsistent with all others: it is background, and was left out."
         )
         return replace(self, checkpoint=kept, progress=later).of(left), left, (said,)
 
@@ -341,7 +341,7 @@ def _lower_to_silhouettes(
         return frame
     if height is None:
         return frame
-    reason = f"{frame.reason} How low these are, outlines in masks say."
+    reason = f"{frame.reason} Their height is from outlines in masks."
     way = similarity_matrix(shift=(0.0, 0.0, -height)) @ frame.world_from_file
     return replace(frame, world_from_file=way, reason=reason)
 
@@ -401,12 +401,12 @@ def pose_warnings(
 
 
 def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str, ...]:
-    """Say where what was learned is not what photographs show, or where none was left to tell."""
+    """Return where what was learned is not what photographs show, or where none was left to tell."""
     if trained.quality is None:
         return (
             Note(
-                f"{photographs} photographs are so few that none was held back to compare with: "
-                "what they do not show is made up. Take 20 to 50, from all sides.",
+                f"{photographs} photographs are too few for a validation set: unseen surfaces are "
+                "invented. Take 20 to 50, from all sides.",
                 NoteKind.GRAVE,
             ),
         )
@@ -414,15 +414,15 @@ def _training_warnings(trained: TrainedGaussians, photographs: int) -> tuple[str
         return ()
     return (
         Note(
-            "Photographs that were not learned from look otherwise "
-            f"({trained.quality.psnr:.1f} dB): shapes are not to be trusted. Look at poses and "
-            "lenses, at what moved, and take more pictures.",
+            "Held-out photographs differ from their rendering "
+            f"({trained.quality.psnr:.1f} dB): shapes are unreliable. Check poses, lenses and "
+            "moving objects, and take more pictures.",
             NoteKind.GRAVE,
         ),
     )
 
 
-def _stated_up(up: UpAxisChoice) -> Vector | None:
+def _stated_up(up: UpAxisChoice | UpAxis) -> Vector | None:
     if up == "auto":
         return None
     sign = -1.0 if up[0] == "-" else 1.0
@@ -450,7 +450,9 @@ def _training_statements(trained: TrainedGaussians, photographs: int) -> tuple[s
 
 
 def _agreement_words(quality: HeldOutQuality) -> str:
-    shown = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on objects"
+    shown = (
+        "" if quality.psnr_on_objects is None else f", {quality.psnr_on_objects:.1f} dB on objects"
+    )
     return (
         f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
         f"from to {quality.psnr:.1f} dB{shown}."

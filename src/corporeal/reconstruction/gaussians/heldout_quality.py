@@ -1,4 +1,4 @@
-"""How near pictures of Gaussians come to photographs that they were not learned from."""
+"""Rendering quality on held-out photographs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class HeldOutQuality:
 
     psnr: float
     """Whole pictures [dB]."""
-    psnr_things: float | None
+    psnr_on_objects: float | None
     """Only pixels on objects [dB]; None without masks."""
     ssim: float
     """Of whole pictures."""

@@ -1,10 +1,10 @@
-"""Hollows that outlines cannot show, seen by stereo inside the visual hull.
+"""Stereo inside the visual hull, for concavities.
 
-No silhouette shows the mouth of a vessel that everybody looked into from above: the hull closes it.
-For pixels of every view, the depth is looked for between the front and the back of the hull at
-which patches of neighbouring views correlate best, as Goesele, Curless and Seitz (2006) do, and
-those kept that other views do not contradict. What lies on the way there is empty where two views
-see past it, and more of them than see something there.
+No silhouette shows the mouth of a vessel seen from above: the hull closes it. For pixels of every
+view, the depth is looked for between the front and the back of the hull at which patches of
+neighbouring views correlate best, as Goesele, Curless and Seitz (2006) do, and those kept that
+other views do not contradict. What lies on the way there is empty where two views see past it, and
+more of them than see something there.
 """
 
 import numpy as np
@@ -30,7 +30,8 @@ MAX_STEREO_DEPTHS = 40_000
 """Depths that are looked for in all views together, about."""
 MIN_STEREO_PATCH_DEVIATION, MIN_STEREO_CORRELATION, MIN_STEREO_CORRELATION_GAIN = 0.01, 0.7, 0.1
 """Least deviation of a patch [0–1]; least correlation of what is the same; by how much that must
-exceed the correlation at the hull's front for something deeper to be believed."""
+exceed the correlation at the hull's front for something deeper to be accepted.
+"""
 STEREO_DEPTH_TOLERANCE = 0.015
 """Relative difference of depths that agree."""
 DEPTH_ERROR_CELLS = 2.0
@@ -43,7 +44,7 @@ without such a vote."""
 def hull_cells_seen_past(
     views: Views, masks: Bool[np.ndarray, "V H W"], hull: VisualHull, pool: ThreadPool
 ) -> Bool[np.ndarray, "X Y Z"]:
-    """Tell which cells of a hull more views see past than see something in.
+    """Return which cells of a hull more views see past than see something in.
 
     Args:
         views: Posed pictures.
@@ -53,8 +54,8 @@ def hull_cells_seen_past(
 
     """
     looks = HullStereoImages(views, masks)
-    # Of plain faces few views know a depth. One that nobody speaks for stays, since what it empties
-    # is voted on once more, cell by cell.
+    # Of plain faces few views know a depth. One without support stays, since what it empties is
+    # voted on once more, cell by cell.
     depths = looks.depths(hull, 0, pool)
     points = hull.cells[hull.inside]
     votes = np.empty((len(points), 2))
@@ -138,7 +139,7 @@ class HullStereoImages:
         return known
 
     def plain(self, k: int) -> Bool[np.ndarray, "h w"]:
-        """Tell where a view's patches are too plain for their depth to be looked for."""
+        """Return where a view's patches are too plain for their depth to be looked for."""
         side, channels = 2 * PATCH_RADIUS_PX + 1, np.moveaxis(self.pictures[k], -1, 0)
         variance = np.zeros(channels.shape[1:])
         for one in channels:

@@ -1,4 +1,4 @@
-"""What training makes small: how far a picture is from a photograph.
+"""Training loss of a rendered picture against a photograph.
 
 0.8 mean|Δ| + 0.2 (1 - mean SSIM) + 0.1 mean|α - mask|
 """

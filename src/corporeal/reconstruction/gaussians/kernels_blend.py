@@ -1,4 +1,4 @@
-"""From ellipses to a picture, tile by tile, and gradients back. Loops compiled by numba.
+"""Tile-based blending of ellipses, with gradients. Loops compiled by numba.
 
 Within a tile of 16 × 16 pixels the outer loop goes over ellipses from front to back and the inner
 one along rows of pixels, which the compiler turns into vector instructions. Per pixel, with

@@ -1,4 +1,4 @@
-"""Where a camera sees a point. Compiled by numba into the loops that ask.
+"""Projection of points to cameras. Compiled by numba.
 
 A camera is a row: camera from world (3 × 4), fx, fy, cx, cy, and whatever comes after.
 """

@@ -1,4 +1,4 @@
-"""Depths that pictures agree on between the front and the back of a hull. Compiled by numba."""
+"""Stereo depths between the front and the back of a hull. Compiled by numba."""
 
 import numba
 import numpy as np
@@ -119,7 +119,7 @@ def search_depths(
 
     chord (N, 2): depths between which is looked; rule: least deviation of a patch [0–1], least
     correlation, and by how much it must exceed that at the front for something deeper to be
-    believed. Of what is not believed the front is the depth; inf: nothing is known.
+    accepted. Of what is rejected the front is the depth; inf: nothing is known.
     """
     picture = pictures[k]
     height, width, _ = picture.shape

@@ -1,4 +1,4 @@
-"""Depths from pictures: planes swept through space, and which depths agree. Compiled by numba."""
+"""Plane-sweep depths, and their consistency. Compiled by numba."""
 
 import numba
 import numpy as np

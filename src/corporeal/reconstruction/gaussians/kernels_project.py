@@ -1,4 +1,4 @@
-"""From Gaussians to ellipses in a picture, and gradients back. Loops compiled by numba.
+"""Projection of Gaussians to ellipses, with gradients. Loops compiled by numba.
 
 EWA projection (Zwicker et al. 2001) as in Kerbl et al. 2023: Σ' = J W Σ W^T J^T plus a dilation;
 opacity is multiplied by sqrt(det Σ' / det(Σ' + dilation)), so that what is dilated does not grow

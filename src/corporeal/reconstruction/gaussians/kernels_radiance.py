@@ -1,4 +1,4 @@
-"""Rays through a grid of density and colour, there and back. Compiled by numba.
+"""Volume rendering of a grid of density and colour, with gradients. Compiled by numba.
 
 A grid has nodes; between eight of them is a cube. ``row`` (X, Y, Z) says where a node's four
 numbers are among ``values`` (N, 4): the density's, then the logits of red, green and blue. ``gap``
@@ -212,7 +212,7 @@ def render_pixels(first, last, camera, width, grid, out):
 
 @numba.njit(**JIT_OPTIONS)
 def light_sources(pixels, camera, width, grid, least, count, place, weight):
-    """Say where the light of some pixels comes from, and how much, where it is not less than least.
+    """Return where the light of some pixels comes from, and how much, where it is not less than least.
 
     count (R,): entries per pixel; place (R, M, 3), in cubes, and weight (R, M): the first M.
     """

@@ -1,4 +1,4 @@
-"""Where Gaussians hide what is behind them, and what is left of space. Compiled by numba."""
+"""Occlusion by Gaussians, and space carving. Compiled by numba."""
 
 import numba
 import numpy as np

@@ -1,4 +1,4 @@
-"""What learning does to pictures and parameters: the loss with its slope, and Adam's step."""
+"""Kernels of training: loss with gradient, and Adam's step."""
 
 import numba
 import numpy as np

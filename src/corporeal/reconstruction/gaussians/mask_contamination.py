@@ -1,4 +1,4 @@
-"""Parts of masks that show what no other photograph shows there.
+"""Detection of background in masks by inconsistency with other photographs.
 
 Masks that are grown from colours take in pieces of what stands behind an object, where these have
 its colours. If every view that could see past such a place has a piece of something there, the
@@ -133,7 +133,7 @@ def _beyond_explained(
 
 
 def _has_other_hue(off: Float[np.ndarray, "3"]) -> bool:
-    """Tell whether a difference is not one of light alone."""
+    """Return whether a difference is not one of light alone."""
     return bool(
         np.square(off - off.mean()).sum() > MIN_HUE_DIFFERENCE_FRACTION * np.square(off).sum()
     )

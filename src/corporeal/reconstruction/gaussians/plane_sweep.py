@@ -1,4 +1,4 @@
-"""Points on what posed pictures show, found by sweeping planes through space (Collins 1996).
+"""Points by plane-sweep stereo of posed pictures (Collins 1996).
 
 For pixels of every view, the depth at which the views beside it show the same; kept is what other
 views confirm. No mask and no mesh is needed. Where pictures are too smooth to say, objects are
@@ -30,8 +30,6 @@ from corporeal.reconstruction.gaussians.visual_hull import camera_rows
 
 MAX_SWEEP_PICTURE_PX = 160
 """Of the pictures looked at [px]; larger ones are shrunk."""
-MAX_SWEEP_DEPTHS = 50_000
-"""Depths that are looked for in all views together, about."""
 MATES_PER_VIEW = 4
 """Neighbours that a view is compared with."""
 MAX_MATE_COSINE = np.cos(np.radians(5))
@@ -49,6 +47,17 @@ OBJECT_POINTS_WEIGHT, BACKGROUND_POINTS_WEIGHT, COVER_POINTS_WEIGHT = 9, 2, 1
 
 
 @dataclass(frozen=True)
+class PlaneSweepConfig:
+    """How densely pictures are swept."""
+
+    max_depths: int = 50_000
+    """Depths that are looked for in all views together, about [1]."""
+
+
+DEFAULT_SWEEP = PlaneSweepConfig()
+
+
+@dataclass(frozen=True)
 class SweepResult:
     """What a sweep finds."""
 
@@ -57,7 +66,11 @@ class SweepResult:
 
 
 def sweep_planes(
-    views: Views, count: int, rng: np.random.Generator, pool: ThreadPool
+    views: Views,
+    count: int,
+    rng: np.random.Generator,
+    pool: ThreadPool,
+    config: PlaneSweepConfig = DEFAULT_SWEEP,
 ) -> SweepResult:
     """Find points on what the pictures show, at most so many.
 
@@ -65,7 +78,7 @@ def sweep_planes(
         UserError: The pictures agree nowhere.
 
     """
-    looks = _SweepImages(views)
+    looks = _SweepImages(views, config.max_depths)
     depths = looks.depths(pool)
     good = looks.confirmed(depths, pool)
     if np.count_nonzero(good) < MIN_SWEEP_POINTS:
@@ -100,7 +113,7 @@ def sweep_planes(
 class _SweepImages:
     """Small pictures, and the pixels of each that are looked at: V views of h × w."""
 
-    def __init__(self, views: Views) -> None:
+    def __init__(self, views: Views, max_depths: int) -> None:
         factor = -(-max(views.rgb.shape[1:3]) // MAX_SWEEP_PICTURE_PX)
         self.cameras = views.cameras
         self.pictures = np.stack([_shrink_sweep_picture(p, factor) for p in views.rgb])
@@ -108,7 +121,7 @@ class _SweepImages:
         self.rows[:, 12:] /= factor
         self.lenses = self.rows[:, 12:].copy()
         count, height, width = self.pictures.shape[:3]
-        self.pace = max(1, round(np.sqrt(count * height * width / MAX_SWEEP_DEPTHS)))
+        self.pace = max(1, round(np.sqrt(count * height * width / max_depths)))
         self.grid = count, height // self.pace, width // self.pace
         self.view, y, x = (i.ravel() for i in np.indices(self.grid))
         y, x = (i * self.pace + self.pace // 2 for i in (y, x))

@@ -7,7 +7,7 @@ and colour are interpolated between the nodes of a grid, before they are made po
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any, Literal
@@ -21,6 +21,7 @@ from corporeal.core.types import Camera, Views
 from corporeal.geometry.grid_interpolation import trilinear_weights
 from corporeal.reconstruction.gaussians import kernels_radiance, training_checkpoint
 from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality, psnr, ssim
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.rasteriser_numba import RenderedPicture
 from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
@@ -40,8 +41,6 @@ INITIAL_DENSITY_LOG = -3.0
 """Density's number everywhere, at first: e^-3 per cube."""
 LEARNING_RATE, FINAL_RATE_FRACTION = 0.3, 0.05
 """Adam's, and what is left of it at the end."""
-RAYS_PER_STEP = 8192
-"""In a step."""
 GRADIENT_SHARES = 4
 """Into which a step's rays are dealt, whoever does them; each has a gradient of its own."""
 RIM_WINDOW_PX = 9
@@ -63,6 +62,8 @@ class FieldPreset:
     steps: int
     longest: int
     """Larger pictures are shrunk by a whole number until no side is longer [px]."""
+    rays_per_step: int = 8192
+    """Rays that a step learns from [1]."""
 
 
 FIELD_PRESETS = {
@@ -85,6 +86,10 @@ class RadianceFieldConfig:
     """Of everything that is left to chance."""
     threads: int | None = None
     """None: one per processor. Changes no result."""
+    rays_per_step: int | None = None
+    """Rays that a step learns from [1]; None: as the preset says."""
+    hull: HullConfig = DEFAULT_HULL
+    """How the visual hull is carved, whose cells are the field's."""
 
 
 DEFAULT_FIELD = RadianceFieldConfig()
@@ -127,7 +132,7 @@ class TrainedField:
         return (
             made,
             f"Pictures of it agree with {count} others that it was not learned from to "
-            f"{q.psnr:.1f} dB, {q.psnr_things:.1f} dB on objects.",
+            f"{q.psnr:.1f} dB, {q.psnr_on_objects:.1f} dB on objects.",
         )
 
 
@@ -242,10 +247,16 @@ def field_surface_points(
 
 
 def _ray_ends(
-    cameras: Sequence[Camera], depth: Float32[np.ndarray, "V H W"]
+    cameras: Sequence[Camera],
+    depth: Float32[np.ndarray, "V H W"],
+    max_pixels: int = MAX_SAMPLED_PIXELS,
 ) -> tuple[Float[np.ndarray, "R 3"], Int[np.ndarray, " R"]]:
-    """Return where rays lose half of their light [m], and of which view each is."""
-    apart = int(np.ceil(np.sqrt(depth.size / MAX_SAMPLED_PIXELS)))
+    """Return where rays lose half of their light [m], and of which view each is.
+
+    max_pixels: where pictures have more together, rays are of every so-many-th row and column.
+
+    """
+    apart = int(np.ceil(np.sqrt(depth.size / max_pixels)))
     view, v, u = np.nonzero(np.isfinite(depth[:, ::apart, ::apart]))
     v, u, found = apart * v, apart * u, np.empty((len(view), 3))
     for k, camera in enumerate(cameras):
@@ -276,7 +287,7 @@ def field_camera_rows(grid: VoxelGrid, cameras: tuple[Camera, ...]) -> Float32[n
     for r, camera in zip(made, cameras, strict=True):
         K, pose = camera.K, camera.world_from_camera
         if abs(K[0, 1]) > 1e-6 * K[0, 0]:
-            raise UserError("A camera's K is skewed: its pixels are no rectangles. Rectify.")
+            raise UserError("A camera's K is skewed: its pixels are not rectangular. Rectify.")
         r[:9] = (pose[:3, :3] / grid.cell).ravel()
         r[9:12] = (pose[:3, 3] - grid.low) / grid.cell
         r[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
@@ -310,20 +321,25 @@ def train_field(
     begun = time.monotonic()
     check_training_views(views, masks)
     preset = FIELD_PRESETS[config.preset]
-    steps = config.steps or preset.steps
+    preset = replace(
+        preset,
+        steps=config.steps or preset.steps,
+        rays_per_step=config.rays_per_step or preset.rays_per_step,
+    )
     count, every = len(views.cameras), config.held_out
     held = tuple(range(every // 2, count, every)) if every and count > every else ()
     chosen = [k for k in range(count) if k not in held]
     cameras = tuple(views.cameras[k] for k in chosen)
     work = Views(views.rgb[chosen], cameras), masks[chosen]
     poses = [(c.K.tolist(), c.world_from_camera.tolist()) for c in cameras]
-    name = training_checkpoint.fingerprint(*work[0].rgb, work[1], poses, preset, steps, config.seed)
+    how = preset, config.seed, config.hull
+    name = training_checkpoint.fingerprint(*work[0].rgb, work[1], poses, *how)
     state = training_checkpoint.load_checkpoint(checkpoint, name) if checkpoint is not None else {}
     with ThreadPool(config.threads) as pool:
-        made = _field_from_state(state) if state else _haze_in_hull(*work, pool)
+        made = _field_from_state(state) if state else _haze_in_hull(*work, pool, config.hull)
         if not state:
-            data = _TrainingData(made, *work, preset.longest, config.seed)
-            _optimise_field(data, steps, pool, progress)
+            data = _TrainingData(made, *work, preset, config.seed)
+            _optimise_field(data, pool, progress)
     if checkpoint is not None and not state:
         training_checkpoint.save_checkpoint(checkpoint, name, _checkpoint_state(made))
     out = _field_quality(made, views, masks, held) if held else None
@@ -341,9 +357,11 @@ def _field_from_state(state: dict[str, np.ndarray]) -> RadianceField:
     return begun
 
 
-def _haze_in_hull(views: Views, masks: Masks, pool: ThreadPool) -> RadianceField:
+def _haze_in_hull(
+    views: Views, masks: Masks, pool: ThreadPool, config: HullConfig
+) -> RadianceField:
     """Return a field of haze in the visual hull of masks."""
-    hull = carve_tight_hull(views, masks, pool)
+    hull = carve_tight_hull(views, masks, pool, config)
     filled = binary_dilation(
         np.pad(hull.inside, HULL_PADDING_CUBES), np.ones((3, 3, 3)), iterations=HULL_PADDING_CUBES
     )
@@ -355,13 +373,18 @@ class _TrainingData:
     """What there is to learn from."""
 
     def __init__(
-        self, made: RadianceField, views: Views, masks: Masks, longest: int, seed: int
+        self,
+        made: RadianceField,
+        views: Views,
+        masks: Masks,
+        preset: FieldPreset,
+        seed: int,
     ) -> None:
-        factor = -(-max(views.rgb.shape[1:3]) // longest)
+        factor = -(-max(views.rgb.shape[1:3]) // preset.longest)
         full = masks[..., None] * np.uint8(255)
         rgb = np.stack([shrink_picture(picture, factor) for picture in views.rgb])
         cover = np.stack([shrink_picture(mask, factor)[..., 0] for mask in full])
-        self.field, self.seed = made, seed
+        self.field, self.preset, self.seed = made, preset, seed
         self.width = rgb.shape[2]
         self.pictures = rgb.reshape(len(rgb), -1, 3)
         self.masks = cover.reshape(len(rgb), -1)
@@ -371,17 +394,18 @@ class _TrainingData:
         self.rays = np.argwhere(near.reshape(len(rgb), -1) > 0).astype(np.int32)
 
 
-def _optimise_field(data: _TrainingData, steps: int, pool: ThreadPool, progress: Progress) -> None:
+def _optimise_field(data: _TrainingData, pool: ThreadPool, progress: Progress) -> None:
     """Change a field's numbers until it looks like the pictures."""
     values, grid = data.field.values, field_arrays(data.field)
     gradients = np.zeros((GRADIENT_SHARES, *values.shape), np.float32)
     moments = np.zeros((2, *values.shape), np.float32)
     shown = data.width, data.cameras, data.pictures, data.masks, grid
+    steps, count = data.preset.steps, data.preset.rays_per_step
     for step in range(steps):
         rng = np.random.default_rng([data.seed, 3, step])
-        rays = data.rays[rng.integers(0, len(data.rays), RAYS_PER_STEP)]
+        rays = data.rays[rng.integers(0, len(data.rays), count)]
         # Random places along random rays, before a random background.
-        jitter, background = rng.random(RAYS_PER_STEP, np.float32), rng.random(3, np.float32)
+        jitter, background = rng.random(count, np.float32), rng.random(3, np.float32)
         sums = np.zeros((GRADIENT_SHARES, 3))
         deals = [slice(k, None, GRADIENT_SHARES) for k in range(GRADIENT_SHARES)]
         pool.each(
@@ -395,7 +419,7 @@ def _optimise_field(data: _TrainingData, steps: int, pool: ThreadPool, progress:
         rate = np.float32(LEARNING_RATE * FINAL_RATE_FRACTION ** (step / steps))
         rest = values, gradients, moments, rate, step + 1
         pool.each(kernels_radiance.adam_nodes, [(*span, *rest) for span in pool.spans(len(values))])
-        error = sums[:, 1].sum() / 3 / RAYS_PER_STEP
+        error = sums[:, 1].sum() / 3 / count
         words = f"step {step + 1} of {steps}, {-10 * np.log10(max(error, 1e-12)):.1f} dB"
         progress((step + 1) / steps, words)
 

@@ -1,7 +1,7 @@
-"""Pictures of Gaussians and gradients on a graphics card, by gsplat 1.5 (Ye et al. 2025) on CUDA.
+"""Rasteriser of Gaussians with gradients on a GPU, by gsplat 1.5 (Ye et al. 2025) on CUDA.
 
-The same two verbs as ``raster``. What is drawn differs a little: an alpha may be 0.999 instead of
-0.99, and a Gaussian ends at three standard deviations.
+The same two functions as ``raster``. What is drawn differs a little: an alpha may be 0.999 instead
+of 0.99, and a Gaussian ends at three standard deviations.
 """
 
 from dataclasses import dataclass
@@ -40,10 +40,10 @@ class GsplatDrawing(Drawing):
 
 
 def require_cuda() -> None:
-    """Raise UserError where there is no card."""
+    """Raise UserError where there is no GPU."""
     if not torch.cuda.is_available():
         raise UserError(
-            "The rasteriser 'gsplat' needs a graphics card with CUDA, and torch finds none. "
+            "The rasteriser 'gsplat' needs a GPU with CUDA, and torch finds none. "
             "Choose the rasteriser 'numba'."
         )
 
@@ -51,7 +51,7 @@ def require_cuda() -> None:
 def draw(
     theta: ParameterMatrix, camera: PinholeCamera, background: np.ndarray, pool: ThreadPool
 ) -> GsplatDrawing:
-    """Draw Gaussians before a background; the card shares the work itself.
+    """Draw Gaussians before a background; the GPU shares the work itself.
 
     Raises:
         UserError: There is no CUDA.

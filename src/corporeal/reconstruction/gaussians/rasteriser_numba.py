@@ -1,4 +1,4 @@
-"""Pictures of Gaussians on the processor, and gradients back to all their numbers.
+"""Rasteriser of Gaussians with gradients on the CPU.
 
 Tiles of 16 × 16 pixels, front to back (Kerbl et al. 2023); ``reference`` says the same plainly.
 """
@@ -202,7 +202,7 @@ def pinhole_of_camera(
     """
     K = camera.K
     if abs(K[0, 1]) > 1e-6 * K[0, 0]:
-        raise UserError("A camera's K is skewed: its pixels are no rectangles. Rectify pictures.")
+        raise UserError("A camera's K is skewed: its pixels are not rectangular. Rectify pictures.")
     turn = np.ascontiguousarray(camera.world_from_camera[:3, :3].T, dtype=np.float64)
     eye = np.ascontiguousarray(camera.world_from_camera[:3, 3], dtype=np.float64)
     fx, fy, cx, cy = (float(scale * k) for k in (K[0, 0], K[1, 1], K[0, 2], K[1, 2]))

@@ -1,4 +1,4 @@
-"""The rasteriser once more, plainly: every Gaussian at every pixel, double precision.
+"""Reference rasteriser: every Gaussian at every pixel, double precision.
 
 It says what ``raster`` must draw. It works on complex numbers too, so that derivatives come exact
 to rounding from a complex step: dL/dx = Im L(x + i h) / h, h = 1e-30. Decisions look at real parts.

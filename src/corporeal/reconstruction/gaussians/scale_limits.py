@@ -1,4 +1,4 @@
-"""How large Gaussians may grow, and which of their numbers move.
+"""Scale limits of Gaussians, and trainable parameters.
 
 Where masks forbid haze, there is one limit for all, if any. Where there are none, what is wide is
 flat, and small in every picture; what few views see has one colour for all sides.

@@ -1,4 +1,4 @@
-"""Space carved by what cameras see (Kutulakos and Seitz 2000): a signed distance on a grid.
+"""Space carving (Kutulakos and Seitz 2000) as a signed distance on a grid.
 
 A place is free where views see past it. One view may err, and all do along outlines; so a cell's
 distance is not the largest that any view allows, but the one that four in ten of those views exceed

@@ -1,4 +1,4 @@
-"""Masks of objects on a floor, where none are given, from Gaussians of whole photographs.
+"""Masks of objects on a floor from Gaussians of whole photographs.
 
 Where objects are decides, not how they look: what lies in the floor's plane is floor, whatever its
 colour. So shadows are none of the objects, and objects of the floor's own colour are.
@@ -48,11 +48,15 @@ BLACK_HARMONIC, WHITE_HARMONIC = -0.5 / SH_DC_COEFFICIENT, 0.5 / SH_DC_COEFFICIE
 
 
 def masks_above_floor(
-    gaussians: Gaussians, cameras: tuple[Camera, ...], floor: bool, threads: int | None = None
+    gaussians: Gaussians,
+    cameras: tuple[Camera, ...],
+    floor: bool,
+    threads: int | None = None,
+    layer_radii: float = FLOOR_LAYER_RADII,
 ) -> Bool[np.ndarray, "V H W"]:
     """Return which pixels of the cameras' pictures are on objects.
 
-    What is less than ``foreground.THICK`` above the floor cannot be told from it. There objects are
+    What is less than a thin layer above the floor cannot be told from it. There objects are
     taken to go down to it as they begin above that layer: mirrored at its top.
 
     Args:
@@ -60,11 +64,16 @@ def masks_above_floor(
         cameras: In the same frame.
         floor: Whether a floor is among the Gaussians.
         threads: None: one per processor.
+        layer_radii: Height of that layer, in radii of what the cameras look at [-].
 
     """
     radius = find_viewed_region(cameras, gaussians.mean).radius
     of_objects = foreground_gaussians(
-        gaussians, cameras, gaussian_visibility(gaussians, cameras, None, threads), floor
+        gaussians,
+        cameras,
+        gaussian_visibility(gaussians, cameras, None, threads),
+        floor,
+        layer_radii,
     )
     if of_objects.any():
         of_objects[of_objects] = _connected_with_many(
@@ -74,7 +83,7 @@ def masks_above_floor(
     theta[:, :PARAM_COLOUR] = parameters_of_gaussians(gaussians)[:, :PARAM_COLOUR]
     theta[of_objects, PARAM_COLOUR:] = WHITE_HARMONIC
     if floor:
-        theta = _mirror_feet(theta, of_objects, FLOOR_LAYER_RADII * radius)
+        theta = _mirror_feet(theta, of_objects, layer_radii * radius)
     masks = []
     with ThreadPool(threads) as pool:
         for camera, near in zip(cameras, free_depths(cameras), strict=True):
@@ -86,7 +95,7 @@ def masks_above_floor(
 def _connected_with_many(
     gaussians: Gaussians, which: np.ndarray, cell: float
 ) -> Bool[np.ndarray, " M"]:
-    """Tell which of the chosen Gaussians hang together with many others."""
+    """Return which of the chosen Gaussians hang together with many others."""
     turn = Rotation.from_quat(gaussians.rotation[which], scalar_first=True).as_matrix()
     axes = GAUSSIAN_EXTENT_SIGMAS * (turn * gaussians.scale[which, None]).transpose(0, 2, 1)
     ends = np.concatenate([axes, -axes], axis=1)

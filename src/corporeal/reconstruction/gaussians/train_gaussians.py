@@ -1,4 +1,4 @@
-"""Gaussians from posed pictures.
+"""Training of Gaussians on posed pictures.
 
 Adam on the loss of ``image_loss``, one view a step, before random backgrounds: where there are
 masks, nothing beside the objects is drawn, and without, no place is left empty. The first steps
@@ -67,16 +67,10 @@ FINAL_RATE_FRACTIONS = {PARAM_MEAN: 0.02, PARAM_SCALE: 0.15, PARAM_COLOUR: 0.15}
 """What is left of them at the end."""
 OPACITY_SCALE_PENALTY = 0.01
 """On opacities and scales, so that what nobody needs fades (Kheradmand et al. 2024)."""
-STEPS_PER_DENSIFICATION = 50
-"""Steps between rounds of densification."""
-DENSIFICATION_SPAN = (100, 0.8)
-"""Densification begins after so many steps, and ends after this share of them."""
 DEAD_OPACITY_LOGIT = -7.0
 """Logit of the opacity that haze is left with: it is dead."""
 STIR_SIGMAS_PER_RATE = 1e3
 """Reach of the random steps that faint ones take [standard deviations], per rate of the means."""
-CHECKPOINT_INTERVAL_S = 15.0
-"""Seconds between checkpoints."""
 INSIDE_HULL_FRACTION = 0.2
 """Share of the Gaussians that begin inside the visual hull, where some do."""
 TRIAL_TRAINING = {"gaussians": 5000, "steps": 300, "longest": 128, "held_out": 4}
@@ -179,12 +173,12 @@ def _begin_or_resume(
     points = points if isinstance(points, StartPoints) else None
     views, masks = _subset_of_views(schedule.views, schedule.masks, schedule.learned)
     if masks is None:
-        found = sweep_planes(views, preset.gaussians, rng, pool)
+        found = sweep_planes(views, preset.gaussians, rng, pool, schedule.config.sweep)
         schedule.surfaces = found.surfaces
         points = found.points if points is None else join_points(points, found.points)
     if points is None and masks is not None:
         own = None if lines is None else lines.only(schedule.learned)
-        schedule.outlines = carve_volume(views, masks, own, pool)
+        schedule.outlines = carve_volume(views, masks, own, pool, schedule.config.hull)
     state = (
         training_checkpoint.load_checkpoint(checkpoint, schedule.name)
         if checkpoint is not None
@@ -230,8 +224,8 @@ def _trial_gain(schedule: TrainingSchedule, progress: Progress) -> float:
     inside, hull_alone = (train_gaussians(views, masks, lines, c).quality for c in tries)
     if inside is None or hull_alone is None:
         return np.nan  # too few views to tell
-    assert inside.psnr_things is not None and hull_alone.psnr_things is not None
-    return inside.psnr_things - hull_alone.psnr_things
+    assert inside.psnr_on_objects is not None and hull_alone.psnr_on_objects is not None
+    return inside.psnr_on_objects - hull_alone.psnr_on_objects
 
 
 def _learn(
@@ -250,7 +244,7 @@ def _learn(
         recent = -10 * np.log10(max(np.mean(errors[-len(schedule.learned) :]), 1e-12))
         words = f"step {training.step} of {steps}, {recent:.1f} dB, {len(training.theta)} Gaussians"
         yield done / schedule.cost(steps), f"{words}, {left:.0f} s left"
-        if checkpoint is not None and now - written > CHECKPOINT_INTERVAL_S:
+        if checkpoint is not None and now - written > schedule.config.checkpoint_interval_s:
             written = now
             training_checkpoint.save_checkpoint(checkpoint, schedule.name, vars(training))
 
@@ -293,9 +287,10 @@ def _densify_and_wander(
     pool: ThreadPool,
 ) -> None:
     """Move Gaussians that are dead to live ones now and then; let faint ones wander."""
-    begin, end = DENSIFICATION_SPAN
-    growing = begin < training.step < end * schedule.preset.steps
-    if training.step % STEPS_PER_DENSIFICATION == 0 and growing:
+    when = schedule.config.densification
+    due = training.step % when.interval_steps == 0
+    end = when.end_fraction * schedule.preset.steps
+    if due and when.begin_step < training.step < end:
         _, haze = _limits_and_haze(training.theta, training.widest, schedule, pool)
         haze |= _in_empty_space(training.theta, schedule)
         training.theta[haze, PARAM_OPACITY] = DEAD_OPACITY_LOGIT
@@ -303,7 +298,7 @@ def _densify_and_wander(
         most = schedule.preset.gaussians
         training.theta, moments = densification.densify(training.theta, moments, most, rng)
         training.first, training.second = moments
-    if training.step % STEPS_PER_DENSIFICATION == 0:
+    if due:
         training.limits, _ = _limits_and_haze(training.theta, training.widest, schedule, pool)
     faint = np.flatnonzero(opacities(training.theta) < 0.1)
     reach = STIR_SIGMAS_PER_RATE * rate / schedule.radius
@@ -322,7 +317,7 @@ def _limits_and_haze(
 
 
 def _in_empty_space(theta: ParameterMatrix, schedule: TrainingSchedule) -> Bool[np.ndarray, " N"]:
-    """Tell which Gaussians are where lines of sight pass."""
+    """Return which Gaussians are where lines of sight pass."""
     if schedule.outlines is None:
         return np.zeros(len(theta), np.bool_)
     return schedule.outlines.emptied(theta[:, PARAM_MEAN:PARAM_ROTATION])

@@ -1,4 +1,4 @@
-"""What a training that was cut off goes on from."""
+"""Checkpoints of training."""
 
 import hashlib
 import io

@@ -13,7 +13,9 @@ from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians import training_checkpoint
 from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, free_depths
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.kernels_project import PinholeCamera
+from corporeal.reconstruction.gaussians.plane_sweep import DEFAULT_SWEEP, PlaneSweepConfig
 from corporeal.reconstruction.gaussians.rasteriser_numba import pinhole_of_camera
 from corporeal.reconstruction.gaussians.view_depths import ViewDepths
 from corporeal.reconstruction.gaussians.visual_hull import CarvedVolume
@@ -48,6 +50,21 @@ TRAINING_PRESETS = {
 
 
 @dataclass(frozen=True)
+class DensificationConfig:
+    """When a training moves dead Gaussians to live ones."""
+
+    interval_steps: int = 50
+    """Steps between rounds [1]."""
+    begin_step: int = 100
+    """The first round comes after so many steps [1]."""
+    end_fraction: float = 0.8
+    """The last round comes before this fraction of all steps [1]."""
+
+
+DEFAULT_DENSIFICATION = DensificationConfig()
+
+
+@dataclass(frozen=True)
 class TrainConfig:
     """How to learn Gaussians from pictures."""
 
@@ -73,6 +90,14 @@ class TrainConfig:
     """None: one per processor. Changes no result."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
     """Where pictures are drawn while learning: on the processor, or on a card with CUDA."""
+    hull: HullConfig = DEFAULT_HULL
+    """How the visual hull is carved, where there are masks."""
+    sweep: PlaneSweepConfig = DEFAULT_SWEEP
+    """How densely pictures are swept, where there are none."""
+    densification: DensificationConfig = DEFAULT_DENSIFICATION
+    """When dead Gaussians are moved."""
+    checkpoint_interval_s: float = 15.0
+    """Time between checkpoints [s]. Changes no result."""
 
 
 DEFAULT_TRAINING = TrainConfig()
@@ -146,7 +171,8 @@ class TrainingSchedule:
         p = self.points
         begin = () if p is None else vars(p).values()
         how = self.seed, self.held_out, self.rasteriser, self.config.begin
-        rest = cameras, self.preset, *how
+        passes = self.config.hull, self.config.sweep, self.config.densification
+        rest = cameras, self.preset, *how, *passes
         return training_checkpoint.fingerprint(self.views.rgb, self.masks, *begin, *rest)
 
     def size(self, step: int) -> "_PictureSize":

@@ -1,4 +1,4 @@
-"""How far away each view sees something, and which Gaussians float before it."""
+"""Depths of views, and floating Gaussians."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ FEW_VIEWS_FRACTION = 0.25
 
 @dataclass(frozen=True)
 class DepthVotes:
-    """What views say of Gaussians."""
+    """Votes of views on Gaussians."""
 
     nearest: Float[np.ndarray, " N"]
     """Least depth at which a view has each in its picture [m]; inf: none has."""

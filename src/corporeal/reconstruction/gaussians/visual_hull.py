@@ -17,22 +17,16 @@ from corporeal.multiview.silhouette_coherence import (
     shrink_mask,
 )
 from corporeal.multiview.viewed_region import find_viewed_region
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.kernels_training import count_mask_votes
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
-HULL_GRID_CELLS = 2_000_000
-"""Of the grid that the visual hull is carved from."""
 ASTRAY_VIEWS_FRACTION = 0.05
 """Share of the views that may see a point of the hull beside objects: masks err at edges."""
-MIN_MASK_FILL_FRACTION = 0.996
-"""Share of its mask that a silhouette of the hull fills where masks agree: the median. Outlines
-that err by 10 of 640 pixels leave .992, exact ones and those that err by 4 leave nothing."""
 COMPARED_PX_PER_CELL = 0.4
 """Pixels of the pictures in which that is compared, per cell along the box: a cell is smaller."""
 MANY_VIEWS = 8
 """Views from which on some may err more: of fewer, each is needed."""
-PHANTOM_MAX_VIEWS = 7
-"""Where no more views look, silhouettes may cross by chance where there is nothing."""
 NEEDED_PIXELS_FRACTION = 0.2
 """Share of the pixels of a piece of the hull that only it must fill for it to stand there."""
 
@@ -60,7 +54,7 @@ class CarvedVolume:
     """Which of its cells lines of sight pass through."""
 
     def emptied(self, places: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Tell which places are where lines of sight say that nothing is."""
+        """Return which places are where lines of sight say that nothing is."""
         if not self.empty.any():
             return np.zeros(len(places), np.bool_)
         cell = np.round((places - self.hull.cells[0, 0, 0]) / self.hull.side)
@@ -70,7 +64,10 @@ class CarvedVolume:
 
 
 def carve_tight_hull(
-    views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    pool: ThreadPool,
+    config: HullConfig = DEFAULT_HULL,
 ) -> VisualHull:
     """Return the visual hull in a box that hardly holds more.
 
@@ -80,14 +77,19 @@ def carve_tight_hull(
     """
     around = find_viewed_region(views.cameras)
     middle, reach = np.array(around.centre), 1.5 * around.radius
-    rough = carve_hull(middle - reach, middle + reach, views, masks, pool)
+    rough = carve_hull(middle - reach, middle + reach, views, masks, pool, config)
     found = rough.cells[rough.inside]
     low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
-    return carve_hull(low, high, views, masks, pool)
+    return carve_hull(low, high, views, masks, pool, config)
 
 
 def carve_hull(
-    low: np.ndarray, high: np.ndarray, views: Views, masks: np.ndarray, pool: ThreadPool
+    low: np.ndarray,
+    high: np.ndarray,
+    views: Views,
+    masks: np.ndarray,
+    pool: ThreadPool,
+    config: HullConfig = DEFAULT_HULL,
 ) -> VisualHull:
     """Carve a box: what is left is on objects in all views that see it, but for a few.
 
@@ -97,7 +99,7 @@ def carve_hull(
         UserError: Nothing is left.
 
     """
-    side = float(np.cbrt(np.prod(high - low) / HULL_GRID_CELLS))
+    side = float(np.cbrt(np.prod(high - low) / config.grid_cells))
     axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     points, count = cells.reshape(-1, 3), len(views.cameras)
@@ -109,7 +111,7 @@ def carve_hull(
     if (
         count >= MANY_VIEWS
         and mask_fill_fraction(points[inside], views.cameras, masks, compared)
-        < MIN_MASK_FILL_FRACTION
+        < config.min_mask_fill_fraction
     ):
         inside = enough & ~is_outside_silhouettes(seen[:, 1], seen[:, 0] + seen[:, 1])
     if not inside.any():
@@ -118,11 +120,15 @@ def carve_hull(
             "belong together, and the convention of the camera poses."
         )
     found = VisualHull(cells, side, inside.reshape(cells.shape[:3]))
-    return _without_phantoms(found, seen[:, 0].reshape(cells.shape[:3]), views, masks)
+    return _without_phantoms(found, seen[:, 0].reshape(cells.shape[:3]), views, masks, config)
 
 
 def _without_phantoms(
-    hull: VisualHull, seen: Float[np.ndarray, "X Y Z"], views: Views, masks: np.ndarray
+    hull: VisualHull,
+    seen: Float[np.ndarray, "X Y Z"],
+    views: Views,
+    masks: np.ndarray,
+    config: HullConfig = DEFAULT_HULL,
 ) -> VisualHull:
     """Drop pieces that few views see and that fill little of the masks that others do not fill.
 
@@ -133,7 +139,7 @@ def _without_phantoms(
     label(hull.inside, np.ones((3, 3, 3)), piece)
     count = int(piece.max())
     most = np.asarray(maximum(seen, piece, np.arange(1, count + 1)))
-    kept = np.concatenate([[True], most > PHANTOM_MAX_VIEWS])
+    kept = np.concatenate([[True], most > config.phantom_max_views])
     if count < 2 or kept.all():
         return hull
     pixel, owner = _shown_pixels(hull.cells[hull.inside], piece[hull.inside], views.cameras, masks)

@@ -1,4 +1,4 @@
-"""Colours of objects and of what is around them: histograms in CIELAB, as in GrabCut.
+"""Colour models of objects and background: histograms in CIELAB, as in GrabCut.
 
 Rother, Kolmogorov and Blake, "GrabCut" (2004), learn a mixture of Gaussians for either side; over
 all pictures together there are enough pixels for a histogram.

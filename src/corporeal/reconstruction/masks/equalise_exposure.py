@@ -1,6 +1,6 @@
-"""Pictures as if all had been taken with one exposure and one white balance.
+"""Equalisation of exposure and white balance.
 
-A telephone chooses both anew for every picture, so that a brown floor has as many browns as there
+A phone chooses both anew for every picture, so that a brown floor has as many browns as there
 are pictures, and what is told by colours borders on all of them. What the floor's places look like
 in each picture says by how much they differ.
 """
@@ -29,7 +29,7 @@ def equalise_exposure(
 
     Args:
         views: The pictures.
-        floor: The plane that objects stand on; None: nobody knows it.
+        floor: The plane that objects stand on; None: unknown.
         around: The ball that all look at.
         longest: Longer side of the pictures that exposures are read from [px].
 

@@ -1,4 +1,4 @@
-"""Pixels that show the floor, lit or in shadow, told by its colour and by its plane.
+"""Detection of floor pixels, lit or in shadow, by colour and plane.
 
 A shadow lies beside the object in every picture, has colours that the rest of the floor has not,
 and so is taken for a part of the object where colours alone decide. But a shadow only takes light
@@ -46,9 +46,9 @@ GAIN_ITERATIONS = 3
 def shaded_floor(
     views: Views, floor: GroundPlane | None, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show the floor's own colour, or a shade of it, on the floor.
+    """Return which pixels show the floor's own colour, or a shade of it, on the floor.
 
-    None where nobody knows the floor, or where it is grey.
+    None where the floor is unknown, or where it is grey.
 
     Args:
         views: The pictures.

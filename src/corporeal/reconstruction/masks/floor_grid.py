@@ -1,4 +1,4 @@
-"""The square of floor under what cameras look at, and where their rays meet it."""
+"""Grid on the floor under the objects, and its intersections with rays."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -82,7 +82,7 @@ def pixels_on_agreed_floor(
     agreeing: Callable[[int, Int[np.ndarray, " P"]], Bool[np.ndarray, "P n n"]],
     wide: bool = False,
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show a place of the floor about which enough views agree.
+    """Return which pixels show a place of the floor about which enough views agree.
 
     Args:
         cameras: All of one size.

@@ -1,4 +1,4 @@
-"""What the floor shows, and the light that each picture has on it.
+"""Texture of the floor, and its lighting in each picture.
 
 A picture has its own exposure and white balance, and a flash lights what is near more than what is
 far, from another place in every picture. Both are smooth over the floor, and its print is not: of
@@ -16,7 +16,7 @@ MIN_LIGHT_SAMPLES = 50
 LIGHT_ITERATIONS, REWEIGHTING_ITERATIONS = 3, 4
 """Of finding print and light in turn, and of weighing anew within one."""
 ROBUST_SCALE_LOG = 0.15
-"""Difference of logarithms at which a cell counts a quarter: things stand before some."""
+"""Difference of logarithms at which a cell counts a quarter: objects stand before some."""
 EVEN_LIGHT_WEIGHT = 0.02
 """Weight of light that is even, for each cell's of what is seen."""
 

@@ -1,4 +1,4 @@
-"""What stands on the floor, told by its plane, whatever its colours.
+"""Objects on the floor by parallax to its plane.
 
 Taken to the plane of the floor, views from all sides agree about all that lies there, shadows and
 prints too, and not about what rises above it (plane and parallax: Irani and Anandan, "A unified
@@ -69,7 +69,7 @@ class StandingRegions:
         return self.cells & (apart >= MIN_BESIDE_VIEWS_FRACTION * looking)
 
     def free(self, piece: Bool[np.ndarray, " M"]) -> bool:
-        """Tell whether a piece of the hull rises above the floor, and is no wall."""
+        """Return whether a piece of the hull rises above the floor, and is no wall."""
         return not self.room.wall(piece) and bool(
             self.room.height[piece].max() > MIN_TOP_HEIGHT_RADII
         )
@@ -138,7 +138,7 @@ def _floor_below_masks(
 def _contradicting_pixels(
     views: Views, floor: GroundPlane, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show something else than the median of all views has there on the floor."""
+    """Return which pixels show something else than the median of all views has there on the floor."""
     ground = floor_grid(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
     seen = equalise_floor_colour(

@@ -1,4 +1,4 @@
-"""Pixels that show the floor for certain: other views see the same pattern at that place of it.
+"""Certain floor pixels by consistency of their texture over views.
 
 Where an object stands its contact shadow may have the colours of the object, and an outline that is
 found by colour spreads over the floor. But a pattern on the floor is one plane's: taken to that
@@ -33,7 +33,7 @@ MIN_PATTERN_CORRELATION = 0.8
 def shows_floor_pattern(
     views: Views, floor: GroundPlane | None, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell which pixels show a pattern that lies on the floor; none where nobody knows the floor.
+    """Return which pixels show a pattern that lies on the floor; none where the floor is unknown.
 
     Args:
         views: The pictures; a patch is PATCH of their pixels wide.

@@ -1,11 +1,11 @@
-"""How well pixels fit what the floor shows at their place, whatever its colours are elsewhere.
+"""Likelihood of pixels under the floor's texture at their place.
 
-A thing on a newspaper is as white and black as this, so that colours alone do not tell them apart.
-But the floor is one plane: taken to it, all views see one print there, but for light. A pixel that
-has another colour than the print at its place, and is no shade of it, does not show the floor; nor
-does one at a place about which views do not agree, since something stands on it. How well it fits
-is learned with colours, as if it were one more channel: a thing that is as white as paper fits the
-print before which it is seen here and there, by chance, and paper everywhere.
+An object on a newspaper is as white and black as this, so that colours alone do not tell them
+apart. But the floor is one plane: taken to it, all views see one print there, but for light. A
+pixel that has another colour than the print at its place, and is no shade of it, does not show the
+floor; nor does one at a place about which views do not agree, since something stands on it. How
+well it fits is learned with colours, as if it were one more channel: an object that is as white as
+paper fits the print before which it is seen here and there, by chance, and paper everywhere.
 """
 
 from dataclasses import replace
@@ -35,7 +35,8 @@ FIT_UNKNOWN, FIT_AGREES, FIT_PARTLY, FIT_CONTRADICTS = range(4)
 """Levels: nobody knows what the floor has there, it is that, or nearly or darker, or it is not."""
 FLOOR_EXTENT_RADII = 1.6
 """How much of the floor is looked at, in radii of the ball that all cameras look at: before what
-lies beyond the ball, the upper half of a thing is seen."""
+lies beyond the ball, the upper half of an object is seen.
+"""
 MIN_FLOOR_SIGMA_LAB = 2.0
 """Least standard deviation of what a place of the floor shows, in CIELAB."""
 PLAIN_CONTRAST_PERCENTILE, EDGED_CONTRAST_PERCENTILE = 30, 70
@@ -65,7 +66,7 @@ def floor_fit(
 
     Args:
         views: The pictures.
-        floor: The plane that objects stand on; None: nobody knows it, nor anything of a pixel.
+        floor: The plane that objects stand on; None: unknown, nor anything of a pixel.
         around: The ball that all look at.
         sure: Pixels that show the floor for certain, by its pattern.
 

@@ -1,4 +1,4 @@
-"""Masks of photographs that have none, grown, and written where people can correct them."""
+"""Grown masks of photographs, written to editable files."""
 
 import shutil
 from collections.abc import Sequence
@@ -47,15 +47,11 @@ from corporeal.reconstruction.masks.region_growing import (
     grow_masks,
 )
 
-FLAT_TAKEN_STATEMENT = (
-    "What has their colours and lies flat on the floor was taken for objects, too."
-)
+FLAT_TAKEN_STATEMENT = "Flat areas of their colours on the floor were segmented as objects, too."
 OTHER_COLOURS_STATEMENT = "What stands there and borders on it in other colours was taken in."
-BY_FLOOR_STATEMENT = (
-    "It was told from a floor of its colours by what the floor shows at each of its places."
-)
+BY_FLOOR_STATEMENT = "It was separated from a floor of its colours by the floor's texture."
 DOUBTED_FOLDER = "doubted"
-"""Folder of masks that are not to be believed: what colours alone would take for objects."""
+"""Folder of masks that are unreliable: what colours alone would take for objects."""
 MASKS_METHOD_VERSION = 15
 """Raised when other masks would be grown: those of an older method are grown again."""
 PAINT_MASKS_HINT = (
@@ -77,18 +73,18 @@ class GrownMasks:
     """What came of it."""
 
     folder: Path | None
-    """Holds the masks; None: they are not to be believed, and were not written."""
+    """Holds the masks; None: they are unreliable, and were not written."""
     said: tuple[str, ...]
     """How they came about, or why there are none, in sentences."""
     doubted: Path | None = None
-    """Holds masks that are not to be believed, if there are any."""
+    """Holds masks that are unreliable, if there are any."""
     incomplete: str = ""
     """Why nobody can tell all of what the photographs are of, in a clause; empty: masks do."""
     beside: str = ""
     """What stands on the floor beside what they show, in sentences; empty: nothing is known of it,
     or somebody corrected them."""
     contradict: bool = False
-    """Whether they are not to be believed because their outlines contradict each other."""
+    """Whether they are unreliable because their outlines contradict each other."""
 
 
 def grown_masks(
@@ -104,9 +100,9 @@ def grown_masks(
     Args:
         source: A folder of photographs with poses. Masks that it has are not looked at.
         folder: Gets ``masks`` and ``masks.json``, or ``doubted/masks``. Masks of the same that lie
-            there are kept, and what somebody corrected in them.
+            there are kept, with their corrections.
         pointed: At what, in which photograph; None: at what all cameras look at.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         testing: Whether poses are tested by them: places of the floor, which these poses know, are
             asked less.
         doubted: Whether something else speaks against these poses, too: where outlines then
@@ -190,10 +186,10 @@ def _grow_and_describe(
     """Grow masks, and say what is in them beside what has their colours and stands.
 
     Plates are as flat as print on paper, which is no object. Where so much of the colours of
-    objects lies beside them, colours decide, if masks are complete and not doubted then.
-    What hangs on it in other colours is taken in unless it is asked for alone. Where masks are then
-    still doubted, or lack what has other colours, or are near to being doubted for their colours,
-    the floor has the colours of the thing, and how well these fit it at their place counts, too, if
+    objects lies beside them, colours decide, if masks are complete and not doubted then. What hangs
+    on it in other colours is taken in unless it is asked for alone. Where masks are then still
+    doubted, or lack what has other colours, or are near to being doubted for their colours, the
+    floor has the colours of the object, and how well these fit it at their place counts, too, if
     masks are right by it, and better than masks that were not doubted. None of that mends outlines
     that contradict each other under poses that something else speaks against, too.
     """
@@ -245,12 +241,12 @@ def _is_sound(grown: RegionGrowingResult) -> bool:
 
 
 def _is_better(one: RegionGrowingResult, other: RegionGrowingResult) -> bool:
-    """Tell whether colours are told apart better, and masks agree better with their hull."""
+    """Return whether colours are separated better, and masks agree better with their hull."""
     return one.alike < other.alike and one.coherence > other.coherence
 
 
 def _part_sentence(much: float) -> list[str]:
-    """Say that what was pointed at may be a part of something."""
+    """State that what was pointed at may be a part of something."""
     if not much:
         return []
     return [
@@ -293,7 +289,7 @@ def _beside_sentence(grown: RegionGrowingResult, names: Sequence[str]) -> str:
 
 def _corrections(folder: Path) -> list[str]:
     count = len(edited_masks(folder))
-    return [f"{count} of the masks were corrected by hand."] * bool(count)
+    return [f"{count} of the masks were corrected manually."] * bool(count)
 
 
 def describe_masks_in(folder: Path | None) -> str:
@@ -303,10 +299,10 @@ def describe_masks_in(folder: Path | None) -> str:
     place = folder if (folder / MASK_FOLDERS[0]).is_dir() else _doubted_folder(folder)
     if place is None:
         return ""
-    how = "" if place == folder else ", and not believed,"
+    how = "" if place == folder else ", and rejected,"
     return (
-        f"Masks that were grown from colours{how} lie in {place / MASK_FOLDERS[0]}: look at them, correct "
-        f"what is wrong, and give them with --masks {place}."
+        f"Masks that were grown from colours{how} lie in {place / MASK_FOLDERS[0]}: check and "
+        f"correct them, and use them with --masks {place}."
     )
 
 

@@ -1,4 +1,4 @@
-"""What stands on the floor and hangs together with what masks show, but has other colours.
+"""Attached parts of objects with other colours than their masks.
 
 The grey head of a hammer whose handle is yellow is in no mask that grows from the handle's colours.
 Of the hull of all that stands, which knows no colours, it is the part beside masks that borders on

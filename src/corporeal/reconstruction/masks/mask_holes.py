@@ -1,4 +1,4 @@
-"""Holes in masks: what is seen through an object stays open, what is painted on it is closed.
+"""Holes in masks: openings are kept, painted areas are closed.
 
 A label in the colour of the floor leaves a hole in the masks of the pictures that show it, and
 enough of them carve a pit. Pictures from the other side tell: through a true hole they see what

@@ -1,4 +1,4 @@
-"""Growing begins at a point or a box in one photograph, and goes on in the others."""
+"""Growing of masks from a point or a box in one photograph."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,8 +122,8 @@ def seeds_from_prompt(
     first = cut_at_prompt(views.rgb[k], spot.corners)
     if not first.any():
         raise UserError(
-            "What is pointed at cannot be told from what is around it by its colours. Point at "
-            "another place of it, in another photograph, or give a --box around it."
+            "The selected object cannot be separated from its surroundings by its colours. Select "
+            "another point of it, in another photograph, or give a --box around it."
         )
     around = _ball_of_mask(views, points, k, first)
     far = picture_distance_radii(views, around)

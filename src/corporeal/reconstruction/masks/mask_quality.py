@@ -1,12 +1,13 @@
-"""Whether masks that nobody drew are of what the photographs are of."""
+"""Plausibility of automatic masks."""
 
 from corporeal.reconstruction.masks.floor_parallax import MIN_TOP_HEIGHT_RADII, pixels_to_mask_ratio
 from corporeal.reconstruction.masks.region_growing import SETTLED_AGREEMENT, RegionGrowingResult
 
 MAX_COLOUR_OVERLAP = 0.2
 """Overlap of the colours of objects and of what is around them, of evened pictures, above which the
-outline is not to be believed. It parts little: right masks have up to .23, .42 on a print before
-the floor is asked, wrong ones .02 to .64 (decision 139)."""
+outline is unreliable. It parts little: right masks have up to .23, .42 on a print before
+the floor is asked, wrong ones .02 to .64 (decision 139).
+"""
 MIN_HULL_AGREEMENT = 0.7
 """Masks and the silhouettes of their hull must agree by so much; those of the last two rounds by
 SETTLED."""
@@ -22,18 +23,19 @@ are not of all of the thing: they would overlap with right ones by less than .8.
 
 MAX_ATTACHED_FRACTION = 0.5
 """The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were
-the thing's, the rest shadows and edges beside it, so that masks lack as much."""
+the object's, the rest shadows and edges beside it, so that masks lack as much.
+"""
 MAX_FAINT_OUTLINE_FRACTION = 0.1
 """Share of the outlines along which no edge is seen, above which they are chance: as large as what
 hulls forgive of views."""
 MAX_RIM_FRACTION = 0.2
 """Share of masks that are their outermost pixels: if masks are but a pixel too wide, as they were
 where colours tell best, they overlap with right ones by less than .8."""
-TAKEN_FOR_OBJECT = "what was taken for the thing"
+TAKEN_FOR_OBJECT = "what was taken for the object"
 
 
 def mask_doubt(grown: RegionGrowingResult | None) -> str | None:
-    """Return in a clause why masks are not to be believed; None: they are."""
+    """Return in a clause why masks are unreliable; None: they are."""
     if grown is None:
         return "no place in space looks like the middle of all photographs"
     why = _doubt_before_outlines(grown)
@@ -44,7 +46,7 @@ def mask_doubt(grown: RegionGrowingResult | None) -> str | None:
 
 
 def outlines_contradict(grown: RegionGrowingResult | None) -> bool:
-    """Tell whether masks are not to be believed because their outlines contradict each other."""
+    """Return whether masks are unreliable because their outlines contradict each other."""
     return grown is not None and _doubt_before_outlines(grown) is None and _outlines_disagree(grown)
 
 
@@ -60,7 +62,7 @@ def _doubt_before_outlines(grown: RegionGrowingResult) -> str | None:
     if not MIN_OBJECT_FRACTION <= grown.share <= MAX_OBJECT_FRACTION:
         return f"it would fill {grown.share:.1%} of the photographs"
     if grown.outer > MAX_OUTER_HULL_FRACTION or grown.cropped > MAX_CROPPED_FRACTION:
-        return "it reaches beyond what all cameras look at"
+        return "it reaches beyond the cameras' common focus"
     if grown.faint > MAX_FAINT_OUTLINE_FRACTION:
         return f"along {grown.faint:.0%} of its outline the photographs show no edge"
     return None
@@ -77,7 +79,7 @@ def incompleteness_reason(grown: RegionGrowingResult | None) -> str | None:
 def lacking_attachment_reason(grown: RegionGrowingResult | None) -> str | None:
     """Return in a clause what borders on masks and is not of them; None: not much does.
 
-    Nothing hovers: what stands under masks that do is of the thing, and no shadow beside it.
+    Nothing hovers: what stands under masks that do is of the object, and no shadow beside it.
     """
     if grown is None:
         return None
@@ -93,12 +95,12 @@ def lacking_attachment_reason(grown: RegionGrowingResult | None) -> str | None:
 
 
 def _incompleteness_clause(taken: str, much: float, more: str) -> str:
-    ground = "not all of it can be told from its ground"
+    ground = "not all of it can be separated from its ground"
     return f"{ground}: beside {taken}, {much:.1f} times as much {more}"
 
 
 def thinness_reason(grown: RegionGrowingResult | None) -> str | None:
-    """Return in a clause why masks do not tell how thick things are; None: they do."""
+    """Return in a clause why masks do not tell how thick objects are; None: they do."""
     if grown is None or grown.thinness <= MAX_RIM_FRACTION:
         return None
     return (

@@ -1,4 +1,4 @@
-"""Where growing begins: at what all cameras look at, or at what a person points at."""
+"""Seeds of growing: the cameras' common focus, or a point given by the user."""
 
 from dataclasses import dataclass
 
@@ -80,7 +80,7 @@ def seeds_from_cameras(views: Views, points: Float[np.ndarray, "N 3"] | None) ->
 def floor_from_points(
     cameras: tuple[Camera, ...], known: Float[np.ndarray, "N 3"], around: ViewedRegion
 ) -> GroundPlane | None:
-    """Return the plane that things stand on, if points show one."""
+    """Return the plane that objects stand on, if points show one."""
     ups = np.stack([-c.world_from_camera[:3, 1] for c in cameras])
     up = ups.mean(axis=0)
     length = float(np.linalg.norm(up))

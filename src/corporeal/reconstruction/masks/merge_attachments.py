@@ -1,4 +1,4 @@
-"""Masks of one colour, grown again with what hangs on them in others.
+"""Merging of attached parts of other colours into grown masks.
 
 What stands on the floor and borders on masks is an example of what objects look like, as they are.
 Growing decides about it as about any seed: what has the colours of its surroundings too, a shadow
@@ -54,7 +54,7 @@ def merge_attachments(
         views: The pictures.
         seeds: Where the given masks began.
         grown: What came of them.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         flat: As in ``grow_masks``.
 
     """

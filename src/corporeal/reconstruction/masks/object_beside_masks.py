@@ -1,6 +1,6 @@
-"""Something that stands on the floor beside what masks show, and is in none of them.
+"""Detection of objects beside the masks.
 
-Masks are of what has the colours of the middle, so that a second thing of other colours is lost
+Masks are of what has the colours of the middle, so that a second object of other colours is lost
 without a word. But it stands up, and what of the hull of all that does is seen beside masks is
 something else.
 """
@@ -17,8 +17,9 @@ from corporeal.reconstruction.masks.floor_parallax import (
 )
 
 MIN_ASIDE_FRACTION = 0.6
-"""Of the pixels of a piece, in the median view, that are beside masks: what masks lack of a thing
-has .0 to .5, other things .9."""
+"""Of the pixels of a piece, in the median view, that are beside masks: what masks lack of an object
+has .0 to .5, other objects .9.
+"""
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class ObjectBesideMasks:
 def find_object_beside_masks(
     stands: StandingRegions, masks: Bool[np.ndarray, "V H W"], near: Bool[np.ndarray, "V H W"]
 ) -> ObjectBesideMasks | None:
-    """Find the largest thing that stands beside what masks show; None: nothing does.
+    """Find the largest object that stands beside what masks show; None: nothing does.
 
     Args:
         stands: All that stands on the floor.

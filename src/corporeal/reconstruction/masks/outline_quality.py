@@ -1,4 +1,4 @@
-"""What outlines of masks are worth: whether photographs show an edge there, and how thin they are.
+"""Quality of mask outlines: image edges, and thickness.
 
 A cut through a table, where the light of a flash falls off, has colours of its own on either side
 and agrees with its hull as well as any. But nothing changes across it.
@@ -70,7 +70,7 @@ def _outline_pixels(mask: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
 
 
 def _at_border(shape: tuple[int, ...]) -> Bool[np.ndarray, "H W"]:
-    """Tell which pixels are so near the border that an edge of theirs may lie beyond."""
+    """Return which pixels are so near the border that an edge of theirs may lie beyond."""
     border = np.ones(shape, np.bool_)
     border[EDGE_SEARCH_PX:-EDGE_SEARCH_PX, EDGE_SEARCH_PX:-EDGE_SEARCH_PX] = False
     return border

@@ -1,4 +1,4 @@
-"""Pictures made smaller, with the cameras that took them."""
+"""Downscaling of pictures with their cameras."""
 
 from dataclasses import replace
 

@@ -94,8 +94,9 @@ class RegionGrowingResult:
     thinness: float
     """Share of masks that their outermost pixels are."""
     lowest: float
-    """Height of their hull's lowest cell above the floor, in radii of the ball; 0 where nobody
-    knows the floor, or what lies flat on it may be objects."""
+    """Height of their hull's lowest cell above the floor, in radii of the ball; 0 where the
+    floor is unknown, or what lies flat on it may be objects.
+    """
     masks: Bool[np.ndarray, "V H W"]
     """The pixels that are inside, at ROUGH pixels."""
     hanging: MaskAttachments | None = None
@@ -140,10 +141,10 @@ def grow_masks(
     Args:
         views: Pictures of at most FINE pixels.
         seeds: For the same pictures at ROUGH pixels, as ``reduce_views`` returns them.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
         flat: Whether what lies flat on the floor may be objects, too: only colours tell then.
         fitting: Whether colours count together with how well they fit the floor at their place.
-            Outlines are then a pixel wide of the thing, since what is mixed does not fit.
+            Outlines are then a pixel wide of the object, since what is mixed does not fit.
 
     """
     views = equalise_exposure(views, seeds.floor, seeds.around, ROUND_PICTURE_PX)

@@ -1,4 +1,4 @@
-"""What has the colours of objects, but is in no silhouette of the hull that masks carved.
+"""Pixels with the colours of objects outside the silhouettes of the hull.
 
 Masks agree with their hull because they are kept to it. What it lost is seen beside it: pieces so
 flat that they pass for a pattern on the floor, or what pictures of other places would not carve.
@@ -35,7 +35,7 @@ def residual_fraction(
 def pixels_before_floor(
     cameras: tuple[Camera, ...], floor: GroundPlane | None, around: ViewedRegion
 ) -> Bool[np.ndarray, "V H W"]:
-    """Tell behind which pixels the floor under the ball lies; none where nobody knows the floor.
+    """Tell behind which pixels the floor under the ball lies; none where the floor is unknown.
 
     Walls, and what stands before them, may have any colour.
     """

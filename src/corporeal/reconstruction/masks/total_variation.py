@@ -1,4 +1,4 @@
-"""A picture cut in two along its edges: the convex form of a graph cut.
+"""Two-region segmentation by total variation, the convex form of a graph cut.
 
     min over 0 ≤ u ≤ 1 of  Σ f u + λ Σ w |∇u|,   w = floor + (1 - floor) exp(-|Δ|² / 2 σ²)
 

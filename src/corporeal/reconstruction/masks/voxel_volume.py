@@ -1,4 +1,4 @@
-"""Cells of space that objects may fill, carved by masks, and the silhouettes of what is left."""
+"""Voxels carved by masks, and their silhouettes."""
 
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,8 @@ HIDING_HEIGHT_RADII = 0.15
 """Height above the floor, in radii of the ball, of cells that surely hide the floor."""
 MAX_EDGE_FRACTION = 0.15
 """Share of a piece at the edge of the ball that cameras look at, above which it is a
-wall: .27 of one behind a chair, 1.0 of others, up to .06 of things."""
+wall: .27 of one behind a chair, 1.0 of others, up to .06 of objects.
+"""
 FLOOR_LAYER_RADII = 0.01
 """Height of the layer that is the floor, in radii of the ball."""
 
@@ -42,7 +43,7 @@ class VoxelVolume:
     outer: Bool[np.ndarray, " M"]
     """Whether a cell is at the edge of the ball."""
     height: Float[np.ndarray, " M"]
-    """Above the floor, in radii of the ball; 0 where nobody knows it."""
+    """Above the floor, in radii of the ball; 0 where it is unknown."""
 
     @property
     def tall(self) -> Bool[np.ndarray, " M"]:
@@ -110,7 +111,7 @@ class VoxelVolume:
     def _without_walls(self, kept: np.ndarray) -> np.ndarray:
         """Leave out pieces that hover, and lie at the edge of the ball, if others do not.
 
-        Things stand on the floor; what is as high as that there is a wall of their colours.
+        Objects stand on the floor; what is as high as that there is a wall of their colours.
         """
         piece, count = self.pieces(kept)
         made = np.zeros_like(kept)
@@ -121,7 +122,7 @@ class VoxelVolume:
         return made if made.any() else kept
 
     def wall(self, piece: Bool[np.ndarray, " M"]) -> bool:
-        """Tell whether a piece goes on beyond the edge of the ball that cameras look at."""
+        """Return whether a piece goes on beyond the edge of the ball that cameras look at."""
         return bool(self.outer[piece].mean() > MAX_EDGE_FRACTION)
 
 
@@ -136,7 +137,7 @@ def voxel_volume(
     Args:
         cameras: Of the pictures.
         around: The ball.
-        floor: Nothing is below it, and nothing in a thin layer above; None: nobody knows.
+        floor: Nothing is below it, and nothing in a thin layer above; None: unknown.
         cone: Pixels that cells must be seen in, if a view shows them; None: any.
 
     """

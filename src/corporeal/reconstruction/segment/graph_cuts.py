@@ -1,4 +1,4 @@
-"""Cut a graph in two where it is narrow, the halves look unlike, and neither is a crumb.
+"""Graph cuts by narrowness, difference of appearance and size.
 
     score = (cut / all + narrowest) (1 / A + 1 / (1 - A)) (1 - R²)²
 

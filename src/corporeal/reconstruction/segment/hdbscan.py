@@ -1,4 +1,4 @@
-"""Clusters of any number and shape: dense places that sparse ones part (HDBSCAN).
+"""Density-based clustering (HDBSCAN).
 
 Campello, Moulavi and Sander, "Density-based clustering based on hierarchical density estimates"
 (PAKDD 2013). For a few thousand points: all distances are held at once.

@@ -1,4 +1,4 @@
-"""Instance masks on views, brought to points: what each view takes each point for.
+"""Lifting of instance masks to points.
 
 Numbers need not mean the same from view to view: what counts is whether two points have one number
 where both are seen. Some views take two objects for one, some take one for several; over all views,

@@ -1,4 +1,4 @@
-"""Which points are one object, where objects touch.
+"""Segmentation of touching objects.
 
 Settled objects always touch, so that nearness does not segment them. What does: the surface
 folds inwards where they meet, they look unlike, and the place where they meet is narrow. Points
@@ -254,11 +254,11 @@ def _count_warnings(
     if count is None:
         by = "where the scene is narrow, appearance and notches"
         if not config.apart:
-            by = "the space between them; what touches was taken for one"
+            by = "the space between them; touching objects count as one"
         was = "was" if found == 1 else "were"
         return [
-            f"The number of objects was not given: {found} {was} counted, by {by}. Say the number "
-            "where it is known."
+            f"The number of objects was not given: {found} {was} counted, by {by}. Give --count if "
+            "it is known."
         ]
     if found < count:
         return [f"{count} objects are to be found; there are points for {found} only."]
@@ -266,7 +266,7 @@ def _count_warnings(
 
 
 def _doubt_warnings(found: SurfacePatches, instance: np.ndarray, cuts: list[GraphCut]) -> list[str]:
-    """Say where another answer is nearly as good, and where objects are too thin to be sure of."""
+    """Return where another answer is nearly as good, and where objects are too thin to be sure of."""
     doubts = []
     if any(made.other < DOUBTFUL_SCORE_RATIO * made.score for made in cuts):
         doubts.append(

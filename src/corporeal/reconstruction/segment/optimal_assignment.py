@@ -1,4 +1,4 @@
-"""Who is who: what was found, and what was named."""
+"""Optimal assignment of found objects to names."""
 
 import numpy as np
 from jaxtyping import Float, Int

@@ -1,4 +1,4 @@
-"""What a part's words say about its look, against what its points look like; no model is asked.
+"""Attributes of parts in descriptions, matched to points without a model.
 
 Three properties that words say and points show: colour, height, and whether it is long and thin.
 What words leave open counts against no cluster, but neither for it: a name that says "green" gets

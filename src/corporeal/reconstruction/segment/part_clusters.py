@@ -1,4 +1,4 @@
-"""One object's points → clusters that may be its parts.
+"""Clustering of an object's points to candidate parts.
 
 Place and look in one vector, z_i = [ĝ_i ; w x_i]: ĝ unit, x over the object's diagonal, so that
 |z_i - z_j|² = |ĝ_i - ĝ_j|² + w² |x_i - x_j|². A few thousand superpoints stand for all points, and

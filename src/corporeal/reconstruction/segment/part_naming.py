@@ -1,4 +1,4 @@
-"""Clusters of an object's points → the parts that words name.
+"""Assignment of clusters to named parts.
 
 With a model that compares points with words (CLIP) in two passes. First a cluster's prototype, the
 mean of its points' semantic features, each weighted by how typical its structural feature is of

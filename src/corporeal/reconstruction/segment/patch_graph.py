@@ -1,4 +1,4 @@
-"""Superpoints as a graph: where two of them meet, how unlike they look, and how the surface folds.
+"""Graph of superpoints: adjacency, difference of appearance, concavity.
 
 Whether a surface folds inwards or outwards between two patches is read from their normals n and
 centres c, d = (c_j - c_i) / |c_j - c_i|: (n_i - n_j) · d is positive at a notch and negative at an

@@ -1,4 +1,4 @@
-"""From long feature vectors to short ones between which distances are nearly the same."""
+"""Distance-preserving dimensionality reduction of features."""
 
 import numpy as np
 from jaxtyping import Float, Float32

@@ -1,4 +1,4 @@
-"""What a person may ask that objects are told apart by."""
+"""Choices for --apart."""
 
 from typing import Literal
 

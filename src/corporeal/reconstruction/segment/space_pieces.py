@@ -1,4 +1,4 @@
-"""What space tells of points on objects: which of them are of one connected piece."""
+"""Connected pieces of points by free space between them."""
 
 from dataclasses import dataclass
 from itertools import combinations

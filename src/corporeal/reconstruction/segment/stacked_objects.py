@@ -1,4 +1,4 @@
-"""Thin objects that lie on each other: where little is seen of where one ends."""
+"""Segmentation of stacked thin objects."""
 
 import numpy as np
 from jaxtyping import Int

@@ -1,4 +1,4 @@
-"""Small patches of points that are near each other and look alike, after SLIC.
+"""Superpoints after SLIC.
 
 Achanta et al., "SLIC superpixels compared to state-of-the-art superpixel methods", 2012: k-means of
 place and look together in which a point only ever goes to one of the patches that began near it, so

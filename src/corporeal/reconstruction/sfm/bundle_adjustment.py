@@ -1,4 +1,4 @@
-"""Cameras and points by robust least squares, of points that lie more exactly in one direction.
+"""Bundle adjustment with anisotropic image noise.
 
 pycolmap's adjustment takes all points for equally exact in all directions. Levenberg and
 Marquardt's method, the points eliminated (Triggs et al., "Bundle adjustment, a modern synthesis",

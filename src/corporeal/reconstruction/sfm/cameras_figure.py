@@ -1,4 +1,4 @@
-"""Cameras over the points that they share, from above and from the side."""
+"""Figure of cameras and points, from above and from the side."""
 
 from pathlib import Path
 

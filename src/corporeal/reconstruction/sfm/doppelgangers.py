@@ -1,7 +1,7 @@
-"""Pictures that a model puts beside others with which they share too little to stand there.
+"""Detection of wrong registrations of similar sides (doppelgangers).
 
-Two sides of a thing that look alike, such as those of a block, are taken for one: the pictures of
-one side are put among those of the other, by points on the thing alone, with a low reprojection
+Two sides of an object that look alike, such as those of a block, are taken for one: the pictures of
+one side are put among those of the other, by points on the object alone, with a low reprojection
 error. But who stands in one place sees one floor. So where two pictures from nearly one direction
 share points in a part only of what both show, they are not from there: what is missing tells
 (Zach, Irschara and Bischof, "What can missing correspondences tell us about 3D structure and
@@ -52,7 +52,7 @@ MIN_MOVE_GAIN = 1e-9
 def remove_doppelgangers(told: SfmRun, place: Path, gathered: PreparedImages) -> SfmRun:
     """Take pictures that stand where they cannot out of a model; return what is left of it.
 
-    Where these are too many, it is left as it is: a thing that was turned over between two rounds
+    Where these are too many, it is left as it is: an object that was turned over between two rounds
     on one card parts them as well, and masks can tell.
 
     Args:
@@ -93,7 +93,7 @@ def doppelganger_groups(
 
 
 def neighbours_support_model(told: SfmRun, place: Path, gathered: PreparedImages) -> bool:
-    """Tell whether neighbours speak for a model against which only is that its points are few.
+    """Return whether neighbours speak for a model against which only is that its points are few.
 
     Many pictures of little that has a pattern share few points, of which each sees enough: what
     places it are those. That nothing contradicts is not enough: neighbours must agree, and join all

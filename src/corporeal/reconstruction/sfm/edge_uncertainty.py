@@ -1,4 +1,4 @@
-"""How exactly a point of a picture lies, across and along the edge that it is on.
+"""Position uncertainty of image points across and along edges.
 
 A point on a straight edge, such as the gap between two planks, is found again anywhere along it.
 How exactly a point lies in each direction, the gradients around it say: the structure tensor

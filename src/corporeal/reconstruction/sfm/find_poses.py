@@ -1,4 +1,4 @@
-"""Find where photographs were taken from, in up to three attempts, or say why that cannot be."""
+"""Pose estimation of photographs in up to three attempts."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -94,7 +94,7 @@ PLACES_PROGRESS = 0.15
 """The same, when it is known whether they show one place."""
 SPARSE_POINTS_WARNING = (
     "Points that pictures share are few, but they agree with what neighbours show. A search for "
-    "more was not believed."
+    "more was rejected."
 )
 LOOKING_MESSAGE = "looking whether all show one place"
 STRATEGY_PROGRESS: dict[SfmStrategy, float] = {"plain": 0.5, "masked": 0.7, "thorough": 1.0}
@@ -110,7 +110,7 @@ class FoundPoses:
     statements: tuple[str, ...]
     warnings: tuple[str, ...]
     doubt: str = ""
-    """Why they are to be believed only if masks agree with them, in a clause."""
+    """Why they are reliable only if masks agree with them, in a clause."""
 
 
 @dataclass(frozen=True)
@@ -139,15 +139,15 @@ def _load_record(folder: Path) -> _PosesRecord:
 
 
 def find_poses(source: Path, folder: Path, progress: Progress) -> FoundPoses:
-    """Find the poses of photographs, or of frames of a film.
+    """Find the poses of photographs, or of frames of a video.
 
     Args:
-        source: A folder of photographs, or a film.
+        source: A folder of photographs, or a video.
         folder: Gets pictures and model. What is there of the same source is not done again.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: pycolmap is not installed, or the poses cannot be found or not be believed.
+        UserError: pycolmap is not installed, or the poses cannot be found or not be accepted.
 
     """
     if not source.exists():
@@ -172,7 +172,7 @@ def find_poses(source: Path, folder: Path, progress: Progress) -> FoundPoses:
 
 
 def describe_moved_object(posed: FoundPoses, masks: Path) -> str | None:
-    """Say in a clause that an object did not keep its place in what is around it; None: it did.
+    """Return in a clause that an object did not keep its place in what is around it; None: it did.
 
     Args:
         posed: Poses that were found from whole pictures.
@@ -227,10 +227,10 @@ def find_object_poses(
         posed: What was found from whole pictures.
         masks: Of the object, under the names of these.
         folder: Gets pictures and model. What is there of the same is not done again.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Returns:
-        Poses that can be believed and that masks agree with; None: there are none.
+        Poses that can be accepted and that masks agree with; None: there are none.
 
     """
     begun = {
@@ -308,7 +308,7 @@ def _refusal(
     others: int = 0,
     tried: tuple[SfmRun, ...] = (),
 ) -> _PosesRecord:
-    """Refuse, and say which pictures are blurred, if that may be why."""
+    """Reject, and say which pictures are blurred, if that may be why."""
     total = len(gathered.names)
     if smeared:
         why = [*why, f"{len(smeared)} of {total} pictures are blurred ({some_names(smeared)})"]
@@ -322,7 +322,7 @@ def _refusal(
 def _try_strategies(
     folder: Path, gathered: PreparedImages, progress: Progress
 ) -> tuple[list[SfmRun], tuple[str, ...]]:
-    """Attempt until one is believed; return all, and which pictures are blurred if one was not."""
+    """Attempt until one is accepted; return all, and which pictures are blurred if one was not."""
     tried: list[SfmRun] = []
     smeared: tuple[str, ...] = ()
     before = PLACES_PROGRESS
@@ -397,7 +397,7 @@ def _best_by_masks(tried: list[SfmRun], folder: Path, gathered: PreparedImages) 
 
 
 def _is_worth_trying(way: SfmStrategy, folder: Path, tried: list[SfmRun], smeared: int) -> bool:
-    """Tell whether an attempt can better those before: thorough where none is believed."""
+    """Return whether an attempt can better those before: thorough where none is accepted."""
     if way == "masked":
         return (folder / MASK_FOLDERS[0]).is_dir()
     if way == "plain":

@@ -1,4 +1,4 @@
-"""What masks say of poses: whether silhouettes are those of one object that stood still.
+"""Consistency of masks and poses by silhouette coherence.
 
 A pattern that repeats puts a camera on the wrong one of its pieces, and an object that was turned
 over between two rounds leaves all cameras right about the floor alone. Neither shows in the
@@ -65,7 +65,7 @@ def pictures_of_something_else(place: Path, masks: Path) -> tuple[str, ...]:
 
     Args:
         place: Holds the model.
-        masks: That were grown, and are believed: PNG pictures with the names of its pictures.
+        masks: That were grown, and are accepted: PNG pictures with the names of its pictures.
 
     """
     compared = _masked_cameras(place, masks)
@@ -78,7 +78,7 @@ def pictures_of_something_else(place: Path, masks: Path) -> tuple[str, ...]:
 def hull_fill_fraction(place: Path, masks: Path) -> float:
     """Return which share of a mask the hull fills, the median of all views; 1: too few to tell.
 
-    Of all in small pictures, or of the others in larger ones, whichever is more: a thin thing is
+    Of all in small pictures, or of the others in larger ones, whichever is more: a thin object is
     lost in the former (a guitar under right poses .84 and .99), and to small errors of poses in the
     latter; an axe head that was turned over has .86 and .82.
 

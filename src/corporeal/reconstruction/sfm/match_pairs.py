@@ -1,4 +1,4 @@
-"""Which pictures are matched with one another: a search for poses costs what its pairs cost.
+"""Choice of picture pairs for matching.
 
 All pairs grow with the square of the pictures. Small copies have told which two share points
 (``groups.py``): of many partners a picture needs the best, whose points join it with the others.

@@ -1,4 +1,4 @@
-"""Whether some photographs are mirrored, as cameras that show their own user write them.
+"""Detection of mirrored photographs of front cameras.
 
 A printed sheet that is seen in a mirror is a sheet that is seen from below: both fit one model,
 with a low reprojection error, half of its cameras under the floor and what stands on it there
@@ -20,13 +20,13 @@ MIN_BOTH_SIDES_FRACTION = 0.1
 """Of all points on it, how many these must be: .33 where half of the pictures are mirrored, .03 for
 a thin axe head that was turned over, 0 for twenty other sets."""
 ONE_CAMERA_HINT = (
-    "Take all with one camera, and no mirrored pictures of a telephone's front camera; or turn "
+    "Take all with one camera, and no mirrored pictures of a phone's front camera; or turn "
     "those back that are mirrored."
 )
 
 
 def describe_mirrored(model: ColmapModel) -> str | None:
-    """Say in a clause that cameras stand on both sides of what they all see, if they do."""
+    """Return in a clause that cameras stand on both sides of what they all see, if they do."""
     if len(model.points) < MIN_POINTS_BOTH_SIDES or not len(model.sightings):
         return None
     eyes = np.stack([image.world_from_camera[:3, 3] for image in model.images])
@@ -60,7 +60,7 @@ def _dominant_plane(
 
 
 def _points_seen_from(model: ColmapModel, which: Bool[np.ndarray, " V"]) -> Bool[np.ndarray, " N"]:
-    """Tell which points some of the images show."""
+    """Return which points some of the images show."""
     seen = np.zeros(len(model.points), bool)
     seen[model.sightings[which[model.sightings[:, 0]], 1]] = True
     return seen

@@ -1,4 +1,4 @@
-"""The last adjustment of a model that COLMAP found: cameras and points, by robust least squares."""
+"""Final robust bundle adjustment of a COLMAP model."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping
@@ -40,7 +40,7 @@ def refine_model(pycolmap: Any, model: Any, taken: Mapping[str, LensPrior], imag
 
     Where the lens was in pictures that somebody cropped nobody knows: taken for their middles, it
     turns and moves cameras, and gives each another lens. One lens before middles of their own takes
-    as many numbers, and is believed where it fits better.
+    as many numbers, and is accepted where it fits better.
 
     In the end points on edges count along these for less.
 

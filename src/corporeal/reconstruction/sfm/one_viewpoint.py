@@ -1,8 +1,8 @@
-"""Whether pictures were taken from one place: a tripod, or one picture cut in many ways.
+"""Detection of pictures from one viewpoint: a tripod, or crops of one picture.
 
 There nothing is nearer than anything else. What two such pictures share differs by a shift, a turn
 and a scale alone, and COLMAP looks for depth in vain, or finds what is not there. Whoever takes but
-five degrees around a thing, or above it, shortens what lies on its floor: that is no similarity.
+five degrees around an object, or above it, shortens what lies on its floor: that is no similarity.
 Where a camera turns on the spot, its pictures differ by a rotation in space, seen through one lens.
 """
 
@@ -18,7 +18,8 @@ MAX_POINT_SHIFT_FRACTION = 0.0025
 were taken from one place: compression and noise move points by less."""
 MIN_EXPLAINED_PAIRS_FRACTION = 0.8
 """Share of the pairs of pictures with points in common that one place explains, from which on all
-were taken there. Of bursts on a way around a thing few pairs are of one burst."""
+were taken there. Of bursts on a way around an object few pairs are of one burst.
+"""
 MIN_PAIRS = 10
 """Pairs without which nothing is said."""
 MIN_PICTURES_FRACTION = 0.5
@@ -36,7 +37,7 @@ PointPair = tuple[Float[np.ndarray, "M 2"], Float[np.ndarray, "M 2"]]
 def is_same_viewpoint(
     a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int
 ) -> bool:
-    """Tell whether a shift, a turn and a scale take points of one picture to those of another.
+    """Return whether a shift, a turn and a scale take points of one picture to those of another.
 
     Args:
         a: Of the one [px].
@@ -58,7 +59,7 @@ def is_same_viewpoint(
 
 
 def pairs_of_rotation(pairs: Sequence[PointPair]) -> Bool[np.ndarray, " P"]:
-    """Tell which pairs a rotation of one camera explains, whose focal length explains the most."""
+    """Return which pairs a rotation of one camera explains, whose focal length explains the most."""
     some = pairs[:: max(1, len(pairs) // FOCAL_SAMPLE_PAIRS)]
     counts = [
         sum(_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in some)

@@ -1,9 +1,9 @@
-"""How blurred a photograph is, by the sharpest edges in its middle.
+"""Blur of photographs by the sharpest edges in their middle.
 
 An edge that is smeared by s rises over a distance that grows with s: smoothed by σ its steepest
 slope is proportional to 1 / √(σ² + s²). Two smoothings tell s whatever the contrast (Elder and
 Zucker, "Local scale control for edge detection and blur estimation", PAMI 1998). Noise has no
-edges of that size, and what is out of focus behind the thing does not count: the sharpest does.
+edges of that size, and what is out of focus behind the object does not count: the sharpest does.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Whether photographs show one place: a quick look at small copies, before the long search.
+"""Grouping of photographs by place on downscaled copies, before pose estimation.
 
 A folder of which a part shows something else would cost many minutes before COLMAP says that the
 pictures fall apart. Small pictures share enough points with their neighbours to see two separate
@@ -61,10 +61,11 @@ MAX_ALONE_FRACTION = 0.2
 leaves out fewer itself, and of more it would seem that nothing fits together."""
 ALONE_EXPLANATION = (
     "They show another place, or sides from which nothing with a pattern is seen: put a newspaper "
-    "under the thing, and photograph it in steps of at most 15°."
+    "under the object, and photograph it in steps of at most 15°."
 )
 WALK_AROUND_HINT = (
-    "Walk around the thing; a thing that is turned before a camera that stands needs a background "
+    "Walk around the object; an object that is turned before a camera that stands needs a "
+    "background "
     "without any pattern, or masks."
 )
 MEANT_GROUP_RATIO = 3.0
@@ -126,7 +127,7 @@ def place_groups(shared: Int[np.ndarray, "N N"]) -> PlaceGroups:
 
 
 def copies_share_enough(shared: Int[np.ndarray, "N N"], sizes: Sequence[tuple[int, int]]) -> bool:
-    """Tell whether small copies share so much that large ones need no finer points than their own.
+    """Return whether small copies share so much that large ones need no finer points than their own.
 
     Args:
         shared: Points that each two pictures share.
@@ -153,16 +154,16 @@ def hopelessness_reason(shared: Int[np.ndarray, "N N"]) -> str | None:
 
 
 def describe_places(groups: PlaceGroups, names: Sequence[str]) -> str:
-    """Say which places a folder shows, each by its first picture."""
+    """Return which places a folder shows, each by its first picture."""
     each = [f"{len(group)} like {names[group[0]]}" for group in groups.certain[:MAX_NAMED_PLACES]]
     return (
-        f"the photographs show {len(groups.certain)} things or places that share nothing: "
+        f"the photographs show {len(groups.certain)} objects or places that share nothing: "
         f"{', '.join(each)}."
     )
 
 
 def describe_missing_poses(doubts: Sequence[str], others: int) -> str:
-    """Say why poses were not found, and how many pictures of other places were not looked at."""
+    """Return why poses were not found, and how many pictures of other places were not looked at."""
     why = f"where the pictures were taken from cannot be found: {'; '.join(doubts)}"
     return f"{why}; {others} more show another place." if others else f"{why}."
 
@@ -210,7 +211,7 @@ class SmallCopyMatches:
 
     @property
     def stood_still(self) -> str | None:
-        """Say in a clause that all were, if they were."""
+        """Return in a clause that all were, if they were."""
         joined = self.shared >= MIN_SHARED_POINTS
         return describe_one_viewpoint(joined, self.same) or describe_one_viewpoint(
             joined, self.same | self.turned, "how a camera turns on the spot"
@@ -227,7 +228,7 @@ def match_small_copies(
     Args:
         folder: Holds ``images``; gets ``stamps`` where there are some.
         gathered: What lies there.
-        told: Told the share that is done.
+        told: Called with the fraction done.
 
     """
     pycolmap = require_pycolmap()

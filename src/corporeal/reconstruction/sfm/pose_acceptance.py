@@ -1,4 +1,4 @@
-"""Whether a model that COLMAP found can be believed, and what to photograph next time.
+"""Acceptance tests of COLMAP models, with advice.
 
 A wrong model looks like a model: low reprojection error says nothing. What speaks against one was
 found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
@@ -27,18 +27,18 @@ of sets that it posed alone all 15, 20 and 24 were joined."""
 MAX_BLURRED_FRACTION = 0.5
 """Share of heavily blurred pictures from which on there is no use in looking longer."""
 HOLD_STILL_HINT = (
-    "Hold the camera still, in more light, let it focus on the thing, and look at the pictures at "
+    "Hold the camera still, in more light, let it focus on the object, and look at the pictures at "
     "full size before you leave."
 )
 MAX_NAMED_PICTURES = 8
 MORE_OVERLAP_HINT = (
-    "Neighbouring pictures share too few points. Put the thing on something with a pattern, such "
-    "as a newspaper; take 40 to 80 pictures at most 15° apart; move neither thing nor light."
+    "Neighbouring pictures share too few points. Put the object on something with a pattern, such "
+    "as a newspaper; take 40 to 80 pictures at most 15° apart; move neither object nor light."
 )
 
 
 def model_doubts(told: SfmRun) -> list[str]:
-    """Return what speaks against a model, in clauses; nothing: it can be believed."""
+    """Return what speaks against a model, in clauses; nothing: it can be accepted."""
     if not told.registered and 0 < (told.joined or 0) < MIN_REGISTERED_FRACTION * told.pictures:
         return [f"only {told.joined} of {told.pictures} pictures share points with one another"]
     if not told.registered:
@@ -57,7 +57,7 @@ def model_doubts(told: SfmRun) -> list[str]:
         or told.bent > MAX_RADIAL_DISTORTION
     ):
         found.append(
-            f"it takes a lens that nobody has (focal length {told.focal:g} × the longer side, "
+            f"it needs an implausible lens (focal length {told.focal:g} × the longer side, "
             f"k1 {told.bent:g})"
         )
     if told.others and told.others[0] > RIVAL_GROUP_FRACTION * told.registered:
@@ -67,16 +67,16 @@ def model_doubts(told: SfmRun) -> list[str]:
 
 
 def only_sparse(told: SfmRun) -> bool:
-    """Tell whether nothing speaks against a model but that its points are few."""
+    """Return whether nothing speaks against a model but that its points are few."""
     enough = replace(told, points=MIN_POINTS_PER_PICTURE * told.registered)
     return bool(model_doubts(told)) and not model_doubts(enough)
 
 
 def too_few_placed(told: SfmRun, others: int) -> str | None:
-    """Say in a clause that most of a folder was not placed, if so.
+    """Return in a clause that most of a folder was not placed, if so.
 
     Args:
-        told: An attempt that is believed.
+        told: An attempt that is accepted.
         others: Photographs that were left out before it.
 
     """
@@ -87,7 +87,7 @@ def too_few_placed(told: SfmRun, others: int) -> str | None:
 
 
 def thorough_in_vain(told: SfmRun, blurred: int) -> bool:
-    """Tell whether a thorough attempt cannot mend what was doubted.
+    """Return whether a thorough attempt cannot mend what was doubted.
 
     Args:
         told: What came of the plain attempt.
@@ -100,19 +100,19 @@ def thorough_in_vain(told: SfmRun, blurred: int) -> bool:
 
 
 def neighbour_doubt(told: SfmRun) -> str:
-    """Say in a clause that pictures stand side by side that share too little; "": they do not."""
+    """Return in a clause that pictures stand side by side that share too little; "": they do not."""
     if not told.parted:
         return ""
     sizes = " and ".join(str(n) for n in told.parted[:3])
     return (
         f"pictures that would have been taken side by side, in groups of {sizes}, share too little "
         "of what both show: they were put in wrong places, as where a pattern repeats or two sides "
-        "look alike; or they show several things, or one that was moved"
+        "look alike; or they show several objects, or one that was moved"
     )
 
 
 def mask_contradiction_doubt(told: SfmRun) -> str | None:
-    """Say that masks contradict one another, if they do: right poses and poor masks do that, too.
+    """State that masks contradict one another, if they do: right poses and poor masks do that, too.
 
     Args:
         told: What came of an attempt, after its outliers were left out.
@@ -123,7 +123,7 @@ def mask_contradiction_doubt(told: SfmRun) -> str | None:
     placed = "some pictures were put in wrong places, " if told.parted else ""
     return Note(
         f"All masks together leave {told.filled:.0%} of what each shows: {placed}the object was "
-        "moved or turned over between the pictures, or masks miss parts of it. Look at the masks.",
+        "moved or turned over between the pictures, or masks miss parts of it. Check the masks.",
         NoteKind.GRAVE,
     )
 

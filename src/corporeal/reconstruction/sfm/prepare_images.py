@@ -1,4 +1,4 @@
-"""Photographs made ready to be posed: upright, of moderate size, each once, and their masks."""
+"""Preparation of photographs for pose estimation: orientation, size, duplicates, masks."""
 
 import numbers
 import re
@@ -48,7 +48,7 @@ MAX_DUPLICATE_DIFFERENCE_U8 = 0.5
 MIN_CONTRAST_U8 = 2.0
 """Standard deviation of a thumbnail, of 255, below which there is nothing on it."""
 EXIF_IFD_TAG, FOCAL_35MM_TAG = 0x8769, 0xA405
-"""Tags of EXIF: where its own tags lie; the focal length as on 35 mm film."""
+"""Tags of EXIF: where its own tags lie; the focal length as on 35 mm video."""
 CAMERA_MAKER_TAGS = (0x010F, 0x0110)
 """Tags of who made a camera, and of its model."""
 LENS_TAGS = (FOCAL_35MM_TAG, 0x920A, 0xA20E, 0xA210, 0xA002, 0xA003)
@@ -60,12 +60,13 @@ OPAQUE_ALPHA_U8 = 255
 ALPHA_THRESHOLD_U8 = 127
 """Alpha above which it is rather seen than not."""
 MAX_ASPECT_RATIO = 2.4
-"""Longer side over the shorter, above which a picture is no camera's: films have 21 : 9. For one
-of 1600 × 120 a lens was found that nobody has, and 24 good photographs were refused with it."""
+"""Longer side over the shorter, above which a picture is no camera's: videos have 21 : 9. For one
+of 1600 × 120 a lens was found that nobody has, and 24 good photographs were refused with it.
+"""
 JPEG_QUALITY = 95
 """Of JPEG copies."""
 IMAGES_FOLDER = "images"
-PHOTOGRAPHS_HINT = "Take 40 to 80 photographs of the thing from all around."
+PHOTOGRAPHS_HINT = "Take 40 to 80 photographs of the object from all around."
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def prepare_images(source: Path, folder: Path, progress: Progress) -> PreparedIm
     Args:
         source: The folder.
         folder: Gets ``images``, and ``masks`` and ``instances`` where there are some.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     Raises:
         BadFileError: Too few can be used.
@@ -202,7 +203,7 @@ def count_single_sizes(sizes: Sequence[tuple[int, int]]) -> int:
 
 
 def _cropping_note(sizes: Sequence[tuple[int, int]]) -> list[str]:
-    """Say what sizes say of how pictures were cropped, if they do."""
+    """Describe what sizes say of how pictures were cropped, if they do."""
     if not (alone := count_single_sizes(sizes)):
         return []
     what = f"{alone} of {len(sizes)} photographs have a size that no other has"
@@ -211,7 +212,7 @@ def _cropping_note(sizes: Sequence[tuple[int, int]]) -> list[str]:
 
 
 def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], twins: int) -> None:
-    """Refuse what shows too little; that some show the same as others says nothing against these.
+    """Reject what shows too little; that some show the same as others says nothing against these.
 
     Args:
         source: The folder.
@@ -229,7 +230,9 @@ def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], t
     if not bad:
         count = "1 photograph is" if good == 1 else f"{good} photographs are"
         raise BadFileError(
-            source, f"{count} too few to show a thing.", _elsewhere_hint(source) or PHOTOGRAPHS_HINT
+            source,
+            f"{count} too few to show an object.",
+            _elsewhere_hint(source) or PHOTOGRAPHS_HINT,
         )
     why = f" The first of the others, {bad[0][0]}, {bad[0][1]}."
     count = f"only {good}" if good else "none"
@@ -238,7 +241,7 @@ def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], t
 
 
 def _elsewhere_hint(source: Path) -> str:
-    """Say where more pictures lie than in the folder itself; empty: nowhere."""
+    """Return where more pictures lie than in the folder itself; empty: nowhere."""
     own = photos_in_folder(source)
     more = nested_images(source, own)
     if len(more) <= len(own):
@@ -357,7 +360,7 @@ def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> l
     if len(parted) <= total / 2:
         return [
             f"{len(alphas) - len(clear)} of {total} photographs are transparent in parts or all "
-            "over, and most were not cut out: this was not taken for masks. Cut out all of them, "
+            "over, and most were not cut out: this was not used as masks. Cut out all of them, "
             "or none."
         ]
     for name, alpha in alphas.items():

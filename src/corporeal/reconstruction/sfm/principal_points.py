@@ -1,4 +1,4 @@
-"""Whether lenses looked through the middles of the pictures, as they do unless somebody cropped.
+"""Principal points, which reveal cropped photographs.
 
 Photographs that were cropped, each in another way, fit together as if their lenses were longer and
 stood elsewhere: 25 of 25 were placed, 6° wrong, with a reprojection error below 1 px. Where each
@@ -20,12 +20,13 @@ MAX_PRINCIPAL_POINT_POINTS = 1500
 """Points that are asked, those that most pictures show: enough for 150 in each picture."""
 MAX_ERROR_RATIO = 0.9
 """Share of the error that is left where it is a gain: .71 to .87 where pictures were cropped; .94
-to 1.0 in twenty sets that were not; .73 in one of a telephone, whose lens moves by 1.3 %."""
+to 1.0 in twenty sets that were not; .73 in one of a phone, whose lens moves by 1.3 %.
+"""
 SLIGHT_SPREAD_FRACTION = 0.02
 """Spread of the middles, in the longer side, from which on it is said: it turns a view by 1.3°."""
 CROPPED_SPREAD_FRACTION = 0.05
-"""The same, from which on poses are not believed: 3.3°."""
-UNCROPPED_HINT = "Give the photographs as the camera took them; crop none, or all in the same way."
+"""The same, from which on poses are rejected: 3.3°."""
+UNCROPPED_HINT = "Use the original photographs; crop none, or all in the same way."
 
 
 def principal_point_spread(place: Path) -> float:
@@ -47,7 +48,7 @@ def principal_point_spread(place: Path) -> float:
 
 
 def spread_clause(spread: float) -> str:
-    """Say what it means that middles lie so far apart."""
+    """Describe what it means that middles lie so far apart."""
     return (
         "lenses would have looked past the middles of the pictures, each by another "
         f"{spread:.0%} of their width: the photographs were cropped, each in another way, or many "

@@ -1,8 +1,8 @@
-"""Whether a film shows a page that is scrolled on a screen.
+"""Detection of screen recordings of scrolled pages.
 
 What a page shows is pushed aside as a whole, by many times the height of the screen in the end; all
 of it looks as it did, so that pictures share points and COLMAP looks for depth for minutes. Who
-walks around a thing sees near and far move differently, from one chosen frame to the next by six
+walks around an object sees near and far move differently, from one chosen frame to the next by six
 degrees; and who turns a camera on the spot sees the middle of its pictures move less than their
 sides. The shift is that of the phase correlation (Kuglin and Hines, "The phase correlation image
 alignment method", 1975).
@@ -39,7 +39,7 @@ MIN_TOTAL_SCROLL_RATIO = 2.0
 
 
 def is_screen_recording(frames: Sequence[Path]) -> bool:
-    """Tell whether frames in their order show a page that is scrolled."""
+    """Return whether frames in their order show a page that is scrolled."""
     greys = [_read_grey(file) for file in frames]
     moves = [page_shift(a, b) for a, b in pairwise(greys)]
     known = [move for move in moves if move is not None]

@@ -1,4 +1,4 @@
-"""One attempt at the poses of photographs by COLMAP, through pycolmap, on the processor.
+"""One run of COLMAP through pycolmap, on the CPU.
 
 SIFT, matching, and incremental mapping (Schönberger & Frahm, "Structure-from-Motion Revisited",
 CVPR 2016). Nothing that would be fetched over the network is asked for: no learned features, and
@@ -127,7 +127,7 @@ def run_sfm(
         out: Gets the database and the model.
         gathered: What lies there.
         way: How points are found and matched.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
     pycolmap = require_pycolmap()
@@ -279,7 +279,7 @@ class _SfmSteps:
         total = len(self.gathered.names)
         if (
             self.joined < MIN_REGISTERED_FRACTION * total
-        ):  # whatever is placed, it would not be believed
+        ):  # whatever is placed, it would not be accepted
             return
         shutil.rmtree(self.out / "models", ignore_errors=True)
         (self.out / "models").mkdir()

@@ -1,7 +1,7 @@
-"""How much of what a film shows never moves: a screen's frame, or all around a turntable.
+"""Share of static pixels of a video: a screen's frame, or the surroundings of a turntable.
 
-Where a camera moves about a thing, whatever has contrast moves in its pictures. What does not would
-be taken for the world that stands still, and all cameras put at one place.
+Where a camera moves about an object, whatever has contrast moves in its pictures. What does not
+would be taken for the world that stands still, and all cameras put at one place.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ from jaxtyping import Float32, UInt8
 MIN_PIXEL_CONTRAST_U8 = 12.0
 """Mean difference of neighbouring pixels, of 255, from which on one would see a pixel move."""
 STATIC_RANGE_U8 = 10
-"""Range of a pixel's greys over the film, of 255, that compression makes of what stands still."""
+"""Range of a pixel's greys over the video, of 255, that compression makes of what stands still."""
 MIN_CONTRAST_PIXELS = 50
 """Pixels of contrast without which nothing is said."""
 
 
 class StaticPixels:
-    """Told all frames of a film, one after the other."""
+    """Told all frames of a video, one after the other."""
 
     def __init__(self) -> None:
         self.frames = 0

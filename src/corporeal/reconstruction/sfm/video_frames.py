@@ -1,7 +1,7 @@
-"""Frames of a film that are sharp and differ from one another.
+"""Selection of sharp, distinct frames of a video.
 
-ffmpeg decodes the film twice: once small and grey, to choose, and once to write what was chosen. It
-turns pictures as the film's own matrix says.
+ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen.
+It turns pictures as the video's own matrix says.
 """
 
 import contextlib
@@ -26,27 +26,27 @@ Progress = Callable[[float, str], None]
 CHOSEN_FRAMES = 60
 """Stretches of equal change; each gives one frame."""
 MIN_FRAMES = 20
-"""Frames from which a thing is seen from all sides."""
+"""Frames from which an object is seen from all sides."""
 MIN_SHARPNESS_RATIO = 0.3
 """Sharpness, over the median of the frames around, below which a frame is smeared."""
 SHARPNESS_WINDOW_FRAMES = 15
 """Frames on either side that sharpness is compared with."""
 MAX_VIDEO_S = 600.0
-"""Of a film [s]."""
+"""Of a video [s]."""
 MAX_DECODED_FRAMES = 3000
-"""Frames that are looked at; of longer films every second, third … one."""
+"""Frames that are looked at; of longer videos every second, third … one."""
 SHARPNESS_PICTURE_PX, CHANGE_THUMBNAIL_PX = 480, (32, 24)
 """Longer side of the pictures in which sharpness is measured; size of those for change [px]."""
 CHANGE_NOISE_U8 = 0.05
 """Mean difference of neighbouring thumbnails, of 255, that is noise."""
 MAX_STATIC_FRACTION = 0.25
-"""Share of what has contrast that never moves, from which on a film shows no way around a thing."""
-VIDEO_HINT = "Film the thing slowly, all around and from above, for 20 to 60 s."
+"""Share of what has contrast that never moves, from which on a video shows no way around an object."""
+VIDEO_HINT = "Record the object slowly, all around and from above, for 20 to 60 s."
 
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What a film says of itself."""
+    """Metadata of a video."""
 
     path: Path
     seconds: float
@@ -59,24 +59,27 @@ class VideoInfo:
         return min(self.rate, MAX_DECODED_FRAMES / max(self.seconds, 1e-3))
 
 
-def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
-    """Write the chosen frames of a film as PNG; return what is to be said of them.
+def write_video_frames(
+    path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S
+) -> list[str]:
+    """Write the chosen frames of a video as PNG; return what is to be said of them.
 
     Args:
-        path: The film.
+        path: The video.
         folder: Where frames go, named by their number.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
+        max_seconds: Longer films are refused [s].
 
     Raises:
         BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it
             is a recording of a screen.
 
     """
-    film = _open_video(path)
+    video = _open_video(path, max_seconds)
     change, sharp = [0.0], []
     before, standstill = None, StaticPixels()
-    expected = max(film.looked * film.seconds, 1.0)
-    for grey in _grey_frames(film):
+    expected = max(video.looked * video.seconds, 1.0)
+    for grey in _grey_frames(video):
         small = np.asarray(
             Image.fromarray(grey).resize(CHANGE_THUMBNAIL_PX, Image.Resampling.BOX), float
         )
@@ -98,9 +101,9 @@ def write_video_frames(path: Path, folder: Path, progress: Progress) -> list[str
     if standstill.share > MAX_STATIC_FRACTION:
         what = f"{standstill.share:.0%} of what has contrast in it never moves: it is a recording"
         what += " of a screen, or the camera stood still."
-        raise BadFileError(path, what, f"{VIDEO_HINT} Do not turn the thing instead.")
+        raise BadFileError(path, what, f"{VIDEO_HINT} Do not turn the object instead.")
     progress(0.7, "writing frames")
-    _write_chosen(film, chosen, folder)
+    _write_chosen(video, chosen, folder)
     if is_screen_recording(sorted(folder.glob("frame_*.png"))):
         what = "what it shows is pushed aside as a whole, many times as far as a picture is long: "
         raise BadFileError(path, f"{what}it is a recording of a page that is scrolled.", VIDEO_HINT)
@@ -135,33 +138,33 @@ def choose_frames(
     return chosen
 
 
-def _open_video(path: Path) -> VideoInfo:
-    # It warns that a turned film is not as wide as its frames are stored: so it should be.
+def _open_video(path: Path, max_seconds: float) -> VideoInfo:
+    # It warns that a turned video is not as wide as its frames are stored: so it should be.
     logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
     reading = imageio_ffmpeg.read_frames(str(path))
     try:
         said = next(reading)
-        film = VideoInfo(path, float(said["duration"]), float(said["fps"]))
+        video = VideoInfo(path, float(said["duration"]), float(said["fps"]))
     except Exception as problem:  # it raises what ffmpeg says, of several kinds
-        what = "cannot be read as a film: it is damaged, or holds no moving pictures."
+        what = "cannot be read as a video: it is damaged, or holds no moving pictures."
         step = "Copy it from the camera again, to its end, or convert it to MP4."
         raise BadFileError(path, what, step) from problem
     finally:
         with contextlib.suppress(Exception):
             reading.close()
-    if film.seconds > MAX_VIDEO_S:
-        what = f"is {film.seconds / 60:.0f} minutes long; at most {MAX_VIDEO_S / 60:.0f} are looked at."
-        raise BadFileError(path, what, "Cut out the part that goes around the thing.")
-    return film
+    if video.seconds > max_seconds:
+        what = f"is {video.seconds / 60:.0f} minutes long; at most {max_seconds / 60:.0f} are looked at."
+        raise BadFileError(path, what, "Cut out the part that goes around the object.")
+    return video
 
 
-def _grey_frames(film: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
+def _grey_frames(video: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
     """Yield the frames that are looked at, small and grey."""
     scale = (
         f"scale={SHARPNESS_PICTURE_PX}:{SHARPNESS_PICTURE_PX}:force_original_aspect_ratio=decrease"
     )
     command = [
-        *_decode_command(film, scale),
+        *_decode_command(video, scale),
         "-pix_fmt",
         "gray",
         "-c:v",
@@ -186,22 +189,22 @@ def _grey_frames(film: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
             program.kill()
 
 
-def _decode_command(film: VideoInfo, *filters: str) -> list[str]:
+def _decode_command(video: VideoInfo, *filters: str) -> list[str]:
     """Return a command that decodes the frames that are looked at."""
-    thinned = [f"fps={film.looked:.6f}"] if film.looked < film.rate else []
+    thinned = [f"fps={video.looked:.6f}"] if video.looked < video.rate else []
     program = imageio_ffmpeg.get_ffmpeg_exe()
     chain = ",".join([*thinned, *filters])
-    return [program, "-v", "error", "-i", str(film.path), "-vf", chain, "-fps_mode", "passthrough"]
+    return [program, "-v", "error", "-i", str(video.path), "-vf", chain, "-fps_mode", "passthrough"]
 
 
-def _write_chosen(film: VideoInfo, chosen: list[int], folder: Path) -> None:
+def _write_chosen(video: VideoInfo, chosen: list[int], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     wanted = "+".join(f"eq(n\\,{k})" for k in chosen)
-    out = [*_decode_command(film, f"select={wanted}"), str(folder / "%05d.png")]
+    out = [*_decode_command(video, f"select={wanted}"), str(folder / "%05d.png")]
     done = subprocess.run(out, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     written = sorted(folder.glob("?????.png"))
     if done.returncode or len(written) != len(chosen):
         words = done.stderr.decode(errors="replace").strip().splitlines()[-1:] or ["no reason"]
-        raise BadFileError(film.path, f"its frames cannot be written ({words[0][:80]}).")
+        raise BadFileError(video.path, f"its frames cannot be written ({words[0][:80]}).")
     for file, number in zip(written, chosen, strict=True):
         file.rename(folder / f"frame_{number:05d}.png")

@@ -1,8 +1,8 @@
-"""What stands at the same place of all pictures: a date, a name, a mark of who made them.
+"""Detection of watermarks: dates, names and marks at a fixed place of all pictures.
 
 Its points are the same in every two of them, also in two that show nothing else in common. From
 them all pictures would be of one place, taken from one viewpoint. What a camera that stands shows
-is at the same place, too, but all over the pictures; and where somebody walks around a thing, no
+is at the same place, too, but all over the pictures; and where somebody walks around an object, no
 place of the picture holds still from all sides.
 """
 
@@ -100,9 +100,8 @@ def write_watermark_masks(
         Image.fromarray(allowed).save(folder / f"{name}.png")
     count = sum(size in found for size in sizes)
     return (
-        f"{count} photographs have the same at the same place, as a date or a name that was put on "
-        "them: no points were looked for there. It is learned as if it were part of what they "
-        "show: photographs without it are better."
+        f"{count} photographs have a watermark, such as a date or a name: it is excluded from "
+        "matching, but it is learned as part of the scene: photographs without it are better."
     )
 
 

@@ -1,6 +1,6 @@
-"""Discs just below a closed surface: what shines through Gaussians is the thing, not the floor.
+"""Surfels below a closed surface that back transparent Gaussians.
 
-Gaussians are learned to look right from where photographs were taken. From the side of a film they
+Gaussians are learned to look right from where photographs were taken. From the side of a video they
 are thin where only those behind them, or those below the floor, which are taken away, made them
 full: a foot is ragged, and an underside that nobody photographed is a hole into a hollow shell. The
 closed surface is whole, with the colours that photographs show. A layer of opaque discs along it,
@@ -67,7 +67,7 @@ def add_backing_surfels(
 def places_seen_past(
     places: Float[np.ndarray, "N 3"], rendering: DepthRendering, reach: float
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places photographs see to be empty.
+    """Return which places photographs see to be empty.
 
     A view sees a place unless something is farther before it than reach [m], and sees it empty if
     the first surface is farther behind it than that. Two in five such views tell, as when space is

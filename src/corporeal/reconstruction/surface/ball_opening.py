@@ -1,8 +1,8 @@
-"""Hollows that photographs see into, and caverns that they do not.
+"""Morphological opening of carved cavities by a ball.
 
-Where a face shines, stereo finds highlights behind it, here and there. Carved as deep, a wet thing
+Where a face shines, stereo finds highlights behind it, here and there. Carved as deep, a wet object
 is full of caverns with mouths of some pixels. What a camera truly looks into has a mouth as wide as
-what is seen in it: of what depths of photographs add to the carving, only that is believed which a
+what is seen in it: of what depths of photographs add to the carving, only that is accepted which a
 ball can enter from outside, and what is left of it in corners.
 """
 

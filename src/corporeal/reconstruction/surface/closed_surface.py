@@ -1,4 +1,4 @@
-"""One closed surface for each object that Gaussians show.
+"""Closed surfaces of objects from Gaussians.
 
 Cameras look at the Gaussians, space is carved by what they see, the floor closes what stands on it,
 and where objects touch every place inside belongs to the nearer one's Gaussians. Marching cubes
@@ -52,17 +52,17 @@ from corporeal.reconstruction.surface.refine_depth import refine_depth
 from corporeal.reconstruction.surface.remove_flakes import remove_flakes
 from corporeal.reconstruction.surface.separate_overlaps import separate_overlaps
 from corporeal.reconstruction.surface.silhouette_guard import restore_silhouettes
+from corporeal.reconstruction.surface.surface_config import (
+    DEFAULT_CLOSED_SURFACE,
+    ClosedSurfaceConfig,
+)
 
 FLOOR_HEIGHT_M = 0.0
 """Height that nothing is below [m]."""
-OBJECT_GRID_CELLS = 1_000_000
-"""Of the grid about each object, about."""
 MAX_OBJECT_GRID_CELLS = 4_000_000
 """Where an object is thin."""
 WALL_THICKNESS_CELLS = 6.0
 """Cells that its mean wall has then, if so many suffice and none is finer than a pixel."""
-SURVEY_GRID_CELLS = 200_000
-"""Of the grid about everything, where each object is looked for."""
 OWNER_NEIGHBOURS = 4
 """A place belongs to those whose so many nearest Gaussians are nearer in the mean."""
 DEEP_INSIDE_CELLS = 3.0
@@ -84,7 +84,7 @@ COLOUR_NEIGHBOURS = 500
 COLOUR_FALLOFF_POWER = 4
 """Power of the distance by which one counts less."""
 TINY_EXTENT_FRACTION = 1e-9
-"""Shares of the thing's extent that can be divided by."""
+"""Shares of the object's extent that can be divided by."""
 WINDING_CHECK_PLACES = 4000
 """Places at which the winding number is compared."""
 MAX_SURFACE_MOVE_CELLS = 2.0
@@ -132,7 +132,7 @@ def build_closed_surfaces(
     cameras: tuple[Camera, ...],
     masks: Bool[np.ndarray, "V H W"] | None = None,
     views: Views | None = None,
-    threads: int | None = None,
+    config: ClosedSurfaceConfig = DEFAULT_CLOSED_SURFACE,
 ) -> tuple[ClosedSurface, ...]:
     """Make a solid of each object, 0 to the largest label.
 
@@ -145,7 +145,7 @@ def build_closed_surfaces(
             are made to fit them. What Gaussians cover is too coarse for that.
         views: Photographs by these cameras, in any frame of the same unit, where there are some and
             masks: they may see deeper than Gaussians do.
-        threads: None: one per core that this process may use.
+        config: How finely.
 
     Raises:
         UserError: An object has no Gaussians, or no camera sees any of it.
@@ -157,17 +157,17 @@ def build_closed_surfaces(
     lacking = np.setdiff1d(np.arange(count), object_of_gaussian)
     if len(lacking):
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
-    with ThreadPool(threads) as pool:
+    with ThreadPool(config.threads) as pool:
         rendering = render_depth(gaussians, cameras, pool)
         rendering = restrict_depth_to_objects(rendering, object_of_gaussian >= 0, masks)
         shown = None if masks is None else _owner_of_pixels(rendering, object_of_gaussian, masks)
         shallow, rgb = None, None if views is None else views.rgb
         if views is not None and masks is not None:
-            shallow, rendering = rendering, refine_depth(rendering, views, masks, pool)
+            shallow, rendering = rendering, refine_depth(rendering, views, masks, pool, config.hull)
         scene = _SurfaceInput(
             gaussians, object_of_gaussian, rendering, shallow, shown, rgb, FLOOR_HEIGHT_M
         )
-        survey, made = _survey_objects(scene, count, pool), []
+        survey, made = _survey_objects(scene, count, pool, config), []
         for k in range(count):
             made.append(_build_closed_surface(scene, k, survey, pool))
     meshes = [Mesh(one.vertices, one.triangles) for one in made]
@@ -221,12 +221,14 @@ class _CoarseSurvey:
     """Of its triangles."""
 
 
-def _survey_objects(scene: _SurfaceInput, count: int, pool: ThreadPool) -> _CoarseSurvey:
+def _survey_objects(
+    scene: _SurfaceInput, count: int, pool: ThreadPool, config: ClosedSurfaceConfig
+) -> _CoarseSurvey:
     """Find where each object is on a rough grid, and lay a fine one about it."""
     foreground = scene.gaussians.mean[scene.object_of_gaussian >= 0]
     low, high = np.percentile(foreground, (0.1, 99.9), axis=0)
     room = 0.1 * (high - low)
-    rough = grid_over_box(low - room, high + room, SURVEY_GRID_CELLS, scene.floor)
+    rough = grid_over_box(low - room, high + room, config.survey_grid_cells, scene.floor)
     distance = carve_signed_distance(rough, scene.rendering, scene.floor, pool)
     places = rough.points(distance < rough.cell)
     owner, grids = scene.owner(places), []
@@ -236,7 +238,7 @@ def _survey_objects(scene: _SurfaceInput, count: int, pool: ThreadPool) -> _Coar
         if not len(found):
             raise _missing_object_error(k)
         low, high = found.min(axis=0) - margin, found.max(axis=0) + margin
-        grids.append(grid_over_box(low, high, OBJECT_GRID_CELLS, scene.floor))
+        grids.append(grid_over_box(low, high, config.object_grid_cells, scene.floor))
     mesh = _extract_surface(distance, rough)
     middles = mesh.vertices[mesh.triangles].mean(axis=1)
     return _CoarseSurvey(tuple(grids), mesh, scene.owner(middles))
@@ -245,8 +247,8 @@ def _survey_objects(scene: _SurfaceInput, count: int, pool: ThreadPool) -> _Coar
 def _missing_object_error(k: int) -> UserError:
     return UserError(
         f"Nothing solid is found of object {k + 1}: no camera sees it, or its Gaussians are haze. "
-        "Look whether masks, where there are some, show one thing in all photographs; say the "
-        "number of objects with --count; or photograph it from more sides."
+        "Check that masks, if any, show the same object in all photographs; give the number of "
+        "objects with --count; or photograph it from more sides."
     )
 
 

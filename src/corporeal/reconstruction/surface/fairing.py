@@ -1,4 +1,4 @@
-"""Closed surfaces made fair: noise taken off, and unobserved surface put where it is likely."""
+"""Fairing of closed surfaces: denoising, and completion of unobserved areas."""
 
 import igl
 import numpy as np

@@ -1,4 +1,4 @@
-"""Bumps at the rim of a face that photographs know, laid on it.
+"""Flattening of bumps at the rim of observed faces.
 
 A patch that is partly beside the object tells nothing, so that photographs know a face (see
 ``photometric.py``) only from some pixels on from its edges and from the floor. In that strip it is
@@ -20,9 +20,9 @@ from corporeal.reconstruction.surface.photo_consistency import (
 )
 
 MAX_BUMP_DISTANCE_PX = 4.0
-"""Bumps are no farther from what is known [px]: half a patch, and as much again for its belief."""
+"""Bumps are no farther from what is known [px]: half a patch, and as much again for its confidence."""
 MAX_BUMP_HEIGHT_PX = 1.5
-"""Bumps are lower [px]: more is a thing before the face."""
+"""Bumps are lower [px]: more is an object before the face."""
 PLANE_FIT_NEIGHBOURS = 48
 """Known places next to a bump that a plane is laid through, about one for each square pixel."""
 MAX_PLANE_DEVIATION_PX, MIN_PLANE_EXTENT_PX = 0.25, 0.8

@@ -1,7 +1,7 @@
-"""Pieces of what stands in space that cameras see to be empty.
+"""Separation of pieces by observed free space.
 
 Means of Gaussians are poor witnesses of gaps: a plain face or neck has few, far apart. Cameras see
-that it is there, and see through between things that are apart. So space is carved by what they
+that it is there, and see through between objects that are apart. So space is carved by what they
 see, as for closed surfaces, and what lies about the same connected piece of the rest goes together.
 
 A piece is taken as wide as the grid can lose a line, so that thin legs and necks, of which carving
@@ -26,9 +26,8 @@ from corporeal.reconstruction.gaussians.space_carving import (
     grid_over_box,
 )
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
+from corporeal.reconstruction.surface.surface_config import DEFAULT_FREE_SPACE, FreeSpaceConfig
 
-FREE_SPACE_GRID_CELLS = 1_000_000
-"""Of the grid about everything, about."""
 GRID_PADDING_FRACTION = 0.1
 """About points, on each side, as a share of their extent."""
 STRAY_POINTS_PERCENT = 0.1
@@ -50,7 +49,7 @@ def pieces_by_free_space(
     of_object: Bool[np.ndarray, " G"],
     cameras: tuple[Camera, ...],
     masks: Bool[np.ndarray, "V H W"] | None = None,
-    threads: int | None = None,
+    config: FreeSpaceConfig = DEFAULT_FREE_SPACE,
 ) -> Int[np.ndarray, " N"]:
     """Return which connected piece each point is of, the one with most points first.
 
@@ -60,13 +59,13 @@ def pieces_by_free_space(
         of_object: Which of them are objects'.
         cameras: From where they were learned, or are looked at.
         masks: Pixels that show objects, where given.
-        threads: None: one per core that this process may use.
+        config: How finely.
 
     """
     low, high = np.percentile(position, (STRAY_POINTS_PERCENT, 100 - STRAY_POINTS_PERCENT), axis=0)
     room = GRID_PADDING_FRACTION * (high - low)
-    grid = grid_over_box(low - room, high + room, FREE_SPACE_GRID_CELLS, FLOOR_HEIGHT_M)
-    with ThreadPool(threads) as pool:
+    grid = grid_over_box(low - room, high + room, config.grid_cells, FLOOR_HEIGHT_M)
+    with ThreadPool(config.threads) as pool:
         rendering = render_depth(gaussians, cameras, pool)
         rendering = restrict_depth_to_objects(rendering, of_object, masks)
         distance = carve_signed_distance(grid, rendering, FLOOR_HEIGHT_M, pool)

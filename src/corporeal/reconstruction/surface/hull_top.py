@@ -1,7 +1,7 @@
-"""A roof of rays over what no camera looked along, lowered to where its top is to be expected.
+"""Lowering of the visual hull's roof over unobserved tops.
 
 Cameras that look down at an angle bound what is plain from above by nothing but the rays that graze
-it: the visual hull is a roof over it (Laurentini 1994). The thing touches each of these rays
+it: the visual hull is a roof over it (Laurentini 1994). The object touches each of these rays
 somewhere between its eaves and its ridge (Franco, Lapierre and Boyer 2006), and outlines do not say
 where. How much that is comes from cutting the surface off, level, until its outlines lack more than
 a pixel in some views: a roof is cut down to its eaves, a flat face at once lacks its far edge. All
@@ -25,7 +25,7 @@ from corporeal.reconstruction.surface.kernels_outline import rasterise_views
 TOP_BISECTION_STEPS = 6
 """Of what may be cut off: a 64th of the height is finer than any outline."""
 MIN_KNOWN_BELIEF = 0.5
-"""Belief from which on photographs know a vertex, and mean belief from which on the top."""
+"""Confidence from which on photographs know a vertex, and mean confidence from which on the top."""
 MIN_SAID_HEIGHT_FRACTION = 0.1
 """Share of the height from which on it is said: mass changes by as much."""
 PIXEL_NEIGHBOURHOOD = np.ones((1, 3, 3), bool)
@@ -47,7 +47,7 @@ class HullTop:
         if self.share <= MIN_SAID_HEIGHT_FRACTION:
             return ()
         return (
-            f"Its height is known to ±{self.share:.0%} only: no photograph looked along its top, "
+            f"Its height is known to ±{self.share:.0%} only: no photograph is level with its top, "
             f"the lowest looks down at {self.lowest:.0f}°, and what is plain there shows no depth. "
             "Take some pictures from low down.",
         )
@@ -132,7 +132,7 @@ def _is_bounded_by_outlines(
     cameras: Float[np.ndarray, "V 18"],
     pixel: float,
 ) -> bool:
-    """Tell whether the top of a surface would leave its outlines if it were higher by a pixel."""
+    """Return whether the top of a surface would leave its outlines if it were higher by a pixel."""
     top = mesh.vertices[mesh.vertices[:, 2].argmax()] + (0, 0, pixel)
     pose, (height, width) = cameras[:, :12].reshape(-1, 3, 4), own.shape[1:]
     right, down, ahead = (pose[:, :, :3] @ top + pose[:, :, 3]).T
@@ -144,7 +144,7 @@ def _is_bounded_by_outlines(
 
 
 def _is_no_accident(views: int, looking: int) -> bool:
-    """Tell whether so many views are no accident."""
+    """Return whether so many views are no accident."""
     return bool(is_outside_silhouettes(np.array([views]), np.array([looking]))[0])
 
 

@@ -1,4 +1,4 @@
-"""How well views agree on where a surface is, vertex by vertex. Compiled by numba."""
+"""Photo-consistency of a surface, vertex by vertex. Compiled by numba."""
 
 import numba
 import numpy as np

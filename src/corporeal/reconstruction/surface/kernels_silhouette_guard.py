@@ -1,4 +1,4 @@
-"""Pixels whose rays meet nothing on a grid, and cells in such pixels. Compiled by numba."""
+"""Pixels whose rays miss a grid, and cells in such pixels. Compiled by numba."""
 
 import numba
 import numpy as np

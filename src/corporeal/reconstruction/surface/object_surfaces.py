@@ -1,4 +1,4 @@
-"""From points on objects to connected pieces, and of segmented ones to closed surfaces."""
+"""Connected pieces of object points, and closed surfaces of segmented ones."""
 
 from dataclasses import dataclass
 
@@ -11,6 +11,10 @@ from corporeal.reconstruction.gaussians.foreground import assign_hidden_gaussian
 from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface, build_closed_surfaces
 from corporeal.reconstruction.surface.free_space import pieces_by_free_space
+from corporeal.reconstruction.surface.surface_config import (
+    DEFAULT_CLOSED_SURFACE,
+    ClosedSurfaceConfig,
+)
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,7 @@ def build_object_surfaces(
     of_objects: Int[np.ndarray, " T"],
     position: Float[np.ndarray, "M 3"],
     object_of_point: Int[np.ndarray, " M"],
+    config: ClosedSurfaceConfig = DEFAULT_CLOSED_SURFACE,
 ) -> ObjectSurfaces:
     """Give every object a surface, and number them by size.
 
@@ -37,6 +42,7 @@ def build_object_surfaces(
         of_objects: Which of them belong to objects.
         position: Points that were segmented, in the same frame.
         object_of_point: Whose each point is.
+        config: How finely surfaces are carved.
 
     Raises:
         UserError: No camera sees anything of an object.
@@ -45,7 +51,9 @@ def build_object_surfaces(
     nearest = KDTree(position).query(taken.gaussians.mean[of_objects])[1]
     owner, kept = _owner_with_company(taken, of_objects, object_of_point[nearest])
     shown = gaussian_subset(taken.gaussians, kept)
-    found = build_closed_surfaces(shown, owner[kept], taken.cameras, taken.masks, taken.views)
+    found = build_closed_surfaces(
+        shown, owner[kept], taken.cameras, taken.masks, taken.views, config
+    )
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is no object's
     return ObjectSurfaces(tuple(found[k] for k in order), place[owner], place[object_of_point])

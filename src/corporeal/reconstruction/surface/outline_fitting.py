@@ -6,7 +6,7 @@ outline differs from the object's, the surface there is moved along its normal b
 lies between goes along (compare Kolev and Cremers 2008, who add outlines to stereo as constraints).
 Where no outline is near, a surface goes inwards as most outlines do, since what is met first is too
 near; that outlines want more elsewhere, as at the rim of a pan, says nothing of its bottom.
-No side of a wall, and none of a gap, is moved as far as its middle: else thin things would be
+No side of a wall, and none of a gap, is moved as far as its middle: else thin objects would be
 turned inside out, and from then on every round would make them larger.
 """
 

@@ -1,4 +1,4 @@
-"""Surfaces moved to where photographs of them agree.
+"""Refinement of surfaces by photo-consistency.
 
 Depths of Gaussians have bumps of a pixel or two, which no outline sees in the middle of a face.
 Where a face has a pattern, patches of all views that see it correlate best at its true depth, to a
@@ -53,8 +53,7 @@ VERTICES_PER_SAMPLE = 1.2
 MAX_ROUND_MOVE_PX = 4.0
 """Nothing is moved farther in a round [px]."""
 MIN_FILL_BELIEF, FILL_ITERATIONS = 0.9, 40
-"""Belief from which on vertices that know nothing are laid as flat as others allow, and in how many
-rounds."""
+"""Confidence from which on vertices that know nothing are laid as flat as others allow, and in how many rounds."""
 MIN_PEAK_CURVATURE, TINY_LENGTH = 1e-4, 1e-9
 """Least bend of a curve at its peak; less than any length or weight."""
 
@@ -75,7 +74,7 @@ class ObjectPhotographs:
 
 @dataclass(frozen=True)
 class AgreedSurface:
-    """A surface, and how far photographs were believed."""
+    """A surface, and how far photographs were used."""
 
     mesh: Mesh
     belief: Float[np.ndarray, " N"]
@@ -231,7 +230,7 @@ def _face_height(
     mean: csr_array,
     along: int,
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-    """Return how high over the smoothed surface vertices about each see a face [px], and belief."""
+    """Return how high over the smoothed surface vertices about each see a face [px], and confidence."""
     place, count = above[asked] + told.offset, len(above)
     sums = np.zeros((count, 5))
     columns = np.ones(len(asked)), told.weight > 0, told.weight
@@ -250,7 +249,7 @@ def _face_height(
 def _knowing_vertices(
     asked: Int[np.ndarray, " A"], told: _VertexOffsets, movable: Bool[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which vertices know where the face is, or were not asked."""
+    """Return which vertices know where the face is, or were not asked."""
     out = np.ones(len(movable), bool)
     out[asked] = told.weight > 0
     return out

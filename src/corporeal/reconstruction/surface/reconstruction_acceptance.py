@@ -1,4 +1,4 @@
-"""Whether what was found in pictures is worth simulating, or a film of the room."""
+"""Acceptance tests of reconstructions before simulation."""
 
 from collections.abc import Sequence
 
@@ -19,10 +19,11 @@ from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality
 
 CAMERAS_IN_BOX_FRACTION = 0.1
-"""Share of the cameras that stand in a thing's box, from which on the thing is the room."""
+"""Share of the cameras that stand in an object's box, from which on the object is the room."""
 BOX_TO_REGION_RATIO = 2.0
-"""Longest side of a thing's box over the radius of the ball that cameras look at, from which on,
-where nobody gave masks, it is all that is in the ball."""
+"""Longest side of an object's box over the radius of the ball that cameras look at, from which on,
+where nobody gave masks, it is all that is in the ball.
+"""
 MAX_CROPPED_FRACTION = 0.5
 """Share of the photographs whose border may cut through what was taken for objects. Objects that
 right masks show reach it in a fifth, a pot from near above in .43, a bed and a wall in .60."""
@@ -36,11 +37,11 @@ MIN_MASK_OVERLAP = 0.35
 most objects; foliage and wires, whose gaps close, have less."""
 COMPARED_VIEWS = 12
 """Views in which that is compared."""
-FORCE_HINT = "--force goes on all the same."
+FORCE_HINT = "--force continues anyway."
 MASKS_HINT = (
-    "What the thing is was not told from the room: give masks (a folder 'masks' with the names of "
-    "the pictures), or grow them with 'corporeal masks' from a point or a box and correct them, or "
-    f"say where the floor is with --floor-at. {FORCE_HINT}"
+    "The object was not separated from the background: give masks (a folder 'masks' with the "
+    "names of the pictures), or grow them with 'corporeal masks' from a point or a box and correct "
+    f"them, or give the height of the floor with --floor-at. {FORCE_HINT}"
 )
 
 
@@ -50,24 +51,24 @@ def boxes_rejection_reason(
     masked: bool,
     quality: HeldOutQuality | None = None,
 ) -> str | None:
-    """Return in a sentence or two why things are not worth simulating; None: they may be.
+    """Return in a sentence or two why objects are not worth simulating; None: they may be.
 
     Args:
-        boxes: Low and high corner of each thing, in the cameras' frame and unit.
+        boxes: Low and high corner of each object, in the cameras' frame and unit.
         cameras: That took the photographs; (): nobody knows, and nothing is said.
-        masked: Whether somebody said which pixels are things.
+        masked: Whether somebody said which pixels are objects.
         quality: How well pictures agree with photographs held back; None: none was.
 
     """
     if not cameras:
         return None
     if (why := depth_doubt_text(cameras)) is not None:
-        return f"The shape would be made up: {why}. Photograph it from all sides. {FORCE_HINT}"
+        return f"The shape would be invented: {why}. Photograph it from all sides. {FORCE_HINT}"
     if quality is not None and quality.psnr < GREY_PICTURE_PSNR_DB:
         return (
-            f"The shapes would be made up: photographs that were not learned from look otherwise "
-            f"({quality.psnr:.1f} dB, as a plain grey picture has). Look at poses and lenses, at "
-            f"what moved, and take more photographs. {FORCE_HINT}"
+            f"The shapes would be invented: held-out photographs differ from their rendering "
+            f"({quality.psnr:.1f} dB, as a plain grey picture has). Check poses, lenses and moving "
+            f"objects, and take more photographs. {FORCE_HINT}"
         )
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     radius = find_viewed_region(tuple(cameras)).radius
@@ -75,16 +76,16 @@ def boxes_rejection_reason(
         inside = int(((eyes > low) & (eyes < high)).all(axis=1).sum())
         if inside >= CAMERAS_IN_BOX_FRACTION * len(cameras):
             what = f"its box holds {inside} of {len(cameras)} cameras"
-            return f"The thing would be as large as the room: {what}. {MASKS_HINT}"
+            return f"The object would be as large as the surroundings: {what}. {MASKS_HINT}"
         longest = float((high - low).max())
         if not masked and longest > BOX_TO_REGION_RATIO * radius:
             what = f"{longest / radius / 2:.1f} times as long as the ball that the cameras look at"
-            return f"The thing would be all that is in the pictures, {what}. {MASKS_HINT}"
+            return f"The object would be all that is in the pictures, {what}. {MASKS_HINT}"
     return None
 
 
 def pieces_rejection_reason(pieces: int, cameras: Sequence[Camera]) -> str | None:
-    """Return in a sentence or two why surfaces that nobody masked are not to be believed; None.
+    """Return in a sentence or two why surfaces that nobody masked are unreliable; None.
 
     One object is in one piece. Where half of the circle around it was not seen, nothing but colours
     told it from what stands behind it.
@@ -97,9 +98,10 @@ def pieces_rejection_reason(pieces: int, cameras: Sequence[Camera]) -> str | Non
     if pieces < 2 or not cameras or (unseen := widest_unseen_angle(cameras)) < UNSEEN_HALF_GAP_DEG:
         return None
     return (
-        f"The shape contradicts itself: what was looked at came out in {pieces} pieces, and from "
-        f"{unseen:.0f}° of the circle around it nobody looked. Photograph it from there, too; or, "
-        f"if these are several objects, say how many with --count. {MASKS_HINT}"
+        f"The shape contradicts itself: the object came out in {pieces} pieces, and from "
+        f"{unseen:.0f}° of the circle around it there are no photographs. Photograph it from "
+        "there, too; or, if these are several objects, give their number with --count. "
+        f"{MASKS_HINT}"
     )
 
 
@@ -114,19 +116,19 @@ def cropping_rejection_reason(masks: Bool[np.ndarray, "V H W"]) -> str | None:
     if count <= MAX_CROPPED_FRACTION * len(masks):
         return None
     what = f"{count} of {len(masks)} photographs show but a part of it"
-    return f"The thing would go on beyond the pictures: {what}. {MASKS_HINT}"
+    return f"The object would extend beyond the pictures: {what}. {MASKS_HINT}"
 
 
 def colour_rejection_reason(
     masks: Bool[np.ndarray, "V H W"], coloured: Bool[np.ndarray, "V H W"] | None
 ) -> str | None:
-    """Return in a sentence or two why what was cut out is not to be believed; None: it may be.
+    """Return in a sentence or two why what was cut out is unreliable; None: it may be.
 
-    Colours say something else of what the thing is. Either may be wrong, and neither is sure.
+    Colours say something else of what the object is. Either may be wrong, and neither is sure.
 
     Args:
         masks: Which pixels show what was taken for objects, by where it is.
-        coloured: The same, by its colours, which are not to be believed alone; None: nobody knows.
+        coloured: The same, by its colours, which are unreliable alone; None: unknown.
 
     """
     if coloured is None or not coloured.any():
@@ -148,10 +150,10 @@ def overlap_rejection_reason(
     """Return in a sentence or two why surfaces are not worth simulating; None: they may be.
 
     Args:
-        meshes: Closed, of all things, in the cameras' frame and unit.
+        meshes: Closed, of all objects, in the cameras' frame and unit.
         cameras: That took the photographs.
-        masks: Which pixels show things, as somebody said or was found.
-        given: Whether somebody, or a model that knows things, said it.
+        masks: Which pixels show objects, as somebody said or was found.
+        given: Whether somebody, or a model that knows objects, said it.
 
     """
     shown = [k for k in range(len(cameras)) if masks[k].any()]
@@ -165,14 +167,15 @@ def overlap_rejection_reason(
     if overlap < MIN_MASK_OVERLAP:
         return (
             "The closed surfaces are not what masks show: their silhouettes overlap by "
-            f"{overlap:.0%} only. Look whether masks and poses belong to the pictures, and take "
+            f"{overlap:.0%} only. Check that masks and poses belong to the pictures, and take "
             f"more photographs from more sides. {FORCE_HINT}"
         )
     if given or filled >= MIN_MASK_FILLED_FRACTION:
         return None
     return (
-        f"The shape contradicts the photographs: it fills {filled:.0%} of what was taken for the "
-        "thing in them. The rest is something else, such as what is behind it, or some were placed "
-        "wrongly. Correct the masks, or photograph the thing from all sides, where nothing else "
+        f"The shape contradicts the photographs: it fills {filled:.0%} of the object's masks in "
+        "them. The rest is something else, such as what is behind it, or some were "
+        "placed "
+        "wrongly. Correct the masks, or photograph the object from all sides, where nothing else "
         f"stands close behind it. {FORCE_HINT}"
     )

@@ -1,4 +1,4 @@
-"""Depths that photographs agree on, where Gaussians stand before them.
+"""Refinement of depths by stereo behind floating Gaussians.
 
 Gaussians are learned as balls some pixels wide, and of what is plain, such as the black inside of a
 pan, no picture says where they are: their depth is that of a hump. Neighbouring photographs say how
@@ -19,6 +19,7 @@ from scipy.ndimage import distance_transform_edt
 from corporeal.core.errors import UserError
 from corporeal.core.types import Views
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
+from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.hull_stereo import (
     DEPTH_ERROR_CELLS,
     MIN_CONFIRMING_VIEWS,
@@ -33,7 +34,11 @@ DEPTH_FILL_ITERATIONS = 200
 
 
 def refine_depth(
-    rendering: DepthRendering, views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool
+    rendering: DepthRendering,
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    pool: ThreadPool,
+    config: HullConfig = DEFAULT_HULL,
 ) -> DepthRendering:
     """Return the same, as deep as photographs see and Gaussians let most light through.
 
@@ -42,10 +47,11 @@ def refine_depth(
         views: Photographs of what is rendered, by the same cameras in any frame of the same unit.
         masks: Their pixels on objects.
         pool: Threads.
+        config: How the visual hull is carved.
 
     """
     try:
-        hull = carve_tight_hull(views, masks, pool)
+        hull = carve_tight_hull(views, masks, pool, config)
     except UserError:  # masks agree nowhere: Gaussians are all there is
         return rendering
     looks = HullStereoImages(views, masks)

@@ -1,4 +1,4 @@
-"""Sheets that hang before a face, laid on it.
+"""Removal of thin sheets before faces.
 
 Where views disagree by a hair, carving leaves sheets thinner than a pixel a pixel or two before a
 plain face. Fitting to outlines cannot take them away, since it moves no side of a wall as far as

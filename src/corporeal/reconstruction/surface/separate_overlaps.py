@@ -1,4 +1,4 @@
-"""Surfaces of touching objects drawn back to a common face wherever they overlap.
+"""Separation of overlapping surfaces of touching objects.
 
 Each was carved on its own grid and moved on its own, so that some end up a cell or two inside each
 other. What lies inside another goes half of the way out, again and again, as the other does: both

@@ -1,4 +1,4 @@
-"""What masks need, which no depth of photographs takes away.
+"""Guard that keeps silhouettes filled during carving.
 
 A mirror image lies behind its face, and photographs agree on where: carved as deep, a ball of steel
 has a dent as wide as what it mirrors. But through every pixel of a mask something is met, and rays

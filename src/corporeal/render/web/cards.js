@@ -7,7 +7,7 @@ export const NAMES = {
   restitution: 'restitution e', loss: 'loss factor η', shell_thickness: 'wall thickness',
 }
 const ANSWERED = {annotation: 'your annotation', recording: 'a recorded answer', model: 'a model', metadata: 'metadata of the file',
-  unknown: 'nobody: a neutral material'}
+  unknown: 'unknown: neutral material'}
 
 // An element with properties and children; strings become text nodes.
 export function el(tag, props = {}, ...children) {
@@ -55,10 +55,10 @@ function built(structure) {
 }
 
 function simulated(s) {
-  if (s.kind === 'rigid') return [el('b', {}, 'Simulated as a rigid body. '), s.why]
-  const ratio = s.young / s.young_real, same = Math.abs(ratio - 1) < 1e-3
-  return [`E real `, el('b', {}, si(s.young_real, 'Pa')), ', simulated ', el('b', {}, si(s.young, 'Pa')),
-    same ? ' (as measured). ' : ` (${+ratio.toPrecision(2)} ×). `, s.why]
+  if (s.kind === 'rigid') return [el('b', {}, 'Simulated as a rigid body. '), s.reason]
+  const ratio = s.simulated_young_pa / s.young_pa, same = Math.abs(ratio - 1) < 1e-3
+  return [`E real `, el('b', {}, si(s.young_pa, 'Pa')), ', simulated ', el('b', {}, si(s.simulated_young_pa, 'Pa')),
+    same ? ' (as measured). ' : ` (${+ratio.toPrecision(2)} ×). `, s.reason]
 }
 
 function valueRow(name, {value, range, unit, place, scale, chosen_by, reason, source}) {
@@ -104,7 +104,7 @@ const NUMBERS = {
 export function auditOf(header, openPart) {
   const audit = header.audit
   if (!audit) {
-    return el('p', {}, header.film ? 'The audit comes with the report, which this run does not have yet.'
+    return el('p', {}, header.video ? 'The audit comes with the report, which this run does not have yet.'
       : 'Nothing has been simulated yet: the audit says afterwards what energy, momentum and contacts did.')
   }
   const warnings = audit.warnings.map(w => el('li', {}, w.text, ' ',
@@ -148,7 +148,7 @@ export function differences(a, b) {
     }
     const s = part.simulated, t = other.simulated
     if (s.kind !== t.kind) rows.push([said, 'simulated as', s.kind, t.kind])
-    else if (s.kind !== 'rigid' && Math.abs(s.young - t.young) > 1e-3 * s.young) rows.push([said, 'E simulated', si(s.young, 'Pa'), si(t.young, 'Pa')])
+    else if (s.kind !== 'rigid' && Math.abs(s.simulated_young_pa - t.simulated_young_pa) > 1e-3 * s.simulated_young_pa) rows.push([said, 'E simulated', si(s.simulated_young_pa, 'Pa'), si(t.simulated_young_pa, 'Pa')])
   }
   for (const part of ofB.values()) rows.push([spoken(part.name), 'part', 'absent', 'present'])
   const fast = o => (o?.velocity ?? []).map(v => +v.toPrecision(3)).join(', ')

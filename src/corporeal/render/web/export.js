@@ -3,7 +3,7 @@
 import { el } from './cards.js'
 import { post } from './change.js'
 
-const FORMATS = [['glb', 'glTF film (GLB)', 'Blender, three.js, any glTF viewer'], ['usd', 'OpenUSD', 'Omniverse, Houdini; with UsdPhysics'],
+const FORMATS = [['glb', 'animated glTF video (GLB)', 'Blender, three.js, any glTF viewer'], ['usd', 'OpenUSD', 'Omniverse, Houdini; with UsdPhysics'],
   ['mjcf', 'MuJoCo (MJCF)', 'with mass, inertia, friction'], ['urdf', 'URDF', 'robot simulators'], ['npz', 'NumPy arrays', 'every particle in every frame'],
   ['h5', 'HDF5', 'needs corporeal[export]'], ['abc', 'Alembic', 'needs corporeal[export]'], ['splats', 'moving splats', 'of runs from splats or pictures']]
 

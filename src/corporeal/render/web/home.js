@@ -9,7 +9,7 @@ const address = (...names) => `/view/${names.map(encodeURIComponent).join('/')}`
 let seen = ''
 const SAYS = {reconstruct: 'a model is trained on the pictures', assemble: 'the files become one scene in metres', describe: 'every object and part is recognised',
   segment: 'the parts are found on the surfaces', ground: 'materials get numbers from measured ranges', fill: 'surfaces are filled with matter',
-  simulate: 'it moves', film: 'a film is drawn', report: 'the report is written'}
+  simulate: 'it moves', video: 'a video is drawn', report: 'the report is written'}
 
 // ---------------------------------------------------------------- runs
 

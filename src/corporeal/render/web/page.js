@@ -4,7 +4,7 @@ import * as THREE from './three.min.js'
 import { Stage, graphics, squareOf } from './stage.js'
 import { auditOf, card, differences, el, key, si, spoken, table } from './cards.js'
 
-const VIEW = [.8, -.62, .36] // three-quarter view, as the film's
+const VIEW = [.8, -.62, .36] // three-quarter view, as the video's
 const ANGLE = 30 // vertical field of view [deg]
 const CLICK = 4 // a pointer that moves less is a click [px]
 const PAUSE = .4 // at the end of a recording, before it starts again [s]
@@ -53,7 +53,7 @@ export class Viewer {
     this.see = el('div', {class: 'see'}, gpu ? this.canvas : el('p', {class: 'none'}, NO_3D), this.hud, this.legend, this.help,
       this.takes.length > 1 ? this.takes.map((take, k) => el('div', {class: `caption of${k}`}, this.options.names?.[k] ?? take.header.name)) : null)
     this.names = this.takes.map((take, k) => el('b', {}, this.options.names?.[k] ?? take.header.name))
-    this.rest = first.film ? 'recorded' : 'not simulated yet' // what is shown while nobody touches
+    this.rest = first.video ? 'recorded' : 'not simulated yet' // what is shown while nobody touches
     this.state = el('span', {class: 'state'}, this.rest)
     this.honest = el('span', {class: 'honest'}, first.honest)
     this.panel = el('div', {class: 'panel'})
@@ -87,9 +87,9 @@ export class Viewer {
   }
 
   lookTab() {
-    const header = this.takes[0].header, film = header.film
-    const choices = ['itself', 'object', 'material', 'law', 'young', 'density', 'poisson', ...(film ? ['speed'] : []),
-      ...(film?.stress > 0 || this.options.tabs ? ['stress'] : [])]
+    const header = this.takes[0].header, video = header.video
+    const choices = ['itself', 'object', 'material', 'law', 'young', 'density', 'poisson', ...(video ? ['speed'] : []),
+      ...(video?.stress > 0 || this.options.tabs ? ['stress'] : [])]
     const words = {young: 'stiffness E', density: 'density ρ', poisson: 'Poisson’s ratio ν', stress: 'stress (von Mises)'}
     this.by = el('select', {'aria-label': 'colour by', onchange: () => this.paint(this.by.value)},
       choices.map(c => el('option', {value: c}, words[c] ?? c)))
@@ -108,9 +108,9 @@ export class Viewer {
     this.soft = el('input', {type: 'checkbox', onchange: () => { if (this.soft.checked) this.by.value = 'itself'; this.paint(this.by.value) }})
     const many = splats && (splats.count < splats.all ? `the ${splats.count.toLocaleString('en')} of ${splats.all.toLocaleString('en')} Gaussians that cover most` : `${splats.count.toLocaleString('en')} Gaussians`)
     const two = this.takes.length > 1 ? differences(...this.takes.map(t => t.header)) : []
-    return el('div', {}, film ? null : this.options.unmoved?.() ?? el('p', {class: 'note'}, 'This has not been simulated yet: it stands as it will begin.'),
+    return el('div', {}, video ? null : this.options.unmoved?.() ?? el('p', {class: 'note'}, 'This has not been simulated yet: it stands as it will begin.'),
       el('label', {class: 'line'}, 'colour by', this.by), splats ? [el('label', {class: 'line'}, 'as in the pictures', this.soft), el('p', {class: 'hint'},
-        `${many} in place of the surfaces. They move and turn with the objects; only the film stretches them, too.`)] : null,
+        `${many} in place of the surfaces. They move and turn with the objects; only the video stretches them, too.`)] : null,
       el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
       el('p', {class: 'hint'}, `Squares on the floor are ${si(squareOf(Math.max(...this.stages.map(s => s.size))), 'm')} wide.`), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])

@@ -161,7 +161,7 @@ export class Stage {
     if (t === this.frame) return
     this.frame = t
     this.take.header.objects.forEach((_, k) => this.place(k, this.take.instant(k, t)))
-    if (Object.keys(this.take.header.film.since).length) this.unveil()
+    if (Object.keys(this.take.header.video.since).length) this.unveil()
     if (this.by === 'speed') this.paintSpeed(t)
   }
 
@@ -271,7 +271,7 @@ export class Stage {
   }
 
   // Where this run's own scale ends: of speeds [m/s] or stresses [Pa].
-  topOf(by) { return by === 'speed' ? this.fastestSeen() : this.liveTop ?? this.take.header.film?.stress ?? 0 }
+  topOf(by) { return by === 'speed' ? this.fastestSeen() : this.liveTop ?? this.take.header.video?.stress ?? 0 }
 
   // Where the scale of speeds ends: the fastest 0.5 % of some vertices over all frames are above [m/s].
   fastestSeen() {
@@ -298,7 +298,7 @@ export class Stage {
 
   // What was dropped into a scene is not there before.
   seen(object) {
-    const since = this.take.header.film?.since[object]
+    const since = this.take.header.video?.since[object]
     return !this.hidden.has(object) && !(since > (this.take.times[this.frame] ?? 0) - 1e-9)
   }
 

@@ -10,9 +10,9 @@ export class Take {
     this.base = 4 + length
     this.header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)))
     this.step = this.header.step
-    const film = this.header.film
-    this.times = film ? film.time : []
-    this.reels = film ? film.objects.map((reel, k) => this.unreeled(reel, k)) : []
+    const video = this.header.video
+    this.times = video ? video.time : []
+    this.reels = video ? video.objects.map((reel, k) => this.unreeled(reel, k)) : []
   }
 
   array([offset, count, kind]) { return new KINDS[kind](this.buffer, this.base + offset, count) }

@@ -1,4 +1,4 @@
-// Touch: the run simulated now, on the server, while somebody pulls at it.
+// Touch: the run simulated now, on the server, with interaction.
 
 import * as THREE from './three.min.js'
 import { key, el, si, spoken } from './cards.js'

@@ -1,4 +1,4 @@
-"""Methods that are compared: what each changes of our settings, and nothing else."""
+"""Compared methods, as changes of the default settings."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Run an evaluation of dynamics: every scene by every method, the reference, and life."""
+"""Evaluation of dynamics: every scene by every method and the reference, and measured rebounds."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -95,7 +95,7 @@ def scenes_of(target: str, out: Path) -> list[EvaluatedScene]:
     there = [s for s in there if s.path.exists()]
     if not there:
         raise UserError(
-            f"No scene of {folder} is assembled. Do it with: corporeal corpus assemble {folder}."
+            f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}."
         )
     return there
 

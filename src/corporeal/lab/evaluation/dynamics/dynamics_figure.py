@@ -1,4 +1,4 @@
-"""One figure of an evaluation: what every method met, and how far its paths are off, by scene."""
+"""Figure of an evaluation of dynamics: expectations met and path errors, by scene."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Where the runs of an evaluation of dynamics lie.
+"""Folders of an evaluation of dynamics.
 
 ``OUT/SCENE/METHOD/`` is a run as ``corporeal run`` leaves it, done up to simulate, so that
 ``pipeline.read_back`` reads it. The reference, ours at a finer detail, is a run like any other.

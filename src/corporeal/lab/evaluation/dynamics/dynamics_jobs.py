@@ -1,4 +1,4 @@
-"""Every run of an evaluation as a job in a process of its own, resumed where it was stopped."""
+"""Jobs of an evaluation of dynamics, resumable."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace

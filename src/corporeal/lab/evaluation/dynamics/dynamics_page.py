@@ -1,4 +1,4 @@
-"""The page of an evaluation of dynamics, and the same for the documentation."""
+"""Report and documentation page of an evaluation of dynamics."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -74,7 +74,7 @@ def write_dynamics_page(found: DynamicsSummary, path: Path) -> None:
 
 
 def summary_sentence(found: DynamicsSummary) -> str:
-    """Say in a sentence what was compared."""
+    """Return in a sentence what was compared."""
     run = [r for r in found.rows if r.numbers is not None]
     failed = sum(r.error.startswith("failed") for r in found.rows)
     scenes = len({r.scene for r in found.rows})
@@ -86,7 +86,7 @@ def summary_sentence(found: DynamicsSummary) -> str:
 
 
 def _outdated_runs(found: DynamicsSummary) -> str:
-    """Say how many runs the present code has not made; a finished run is kept when it changes."""
+    """Return how many runs the present code has not made; a finished run is kept when it changes."""
     numbers = [r.numbers for r in (*found.rows, *found.references) if r.numbers is not None]
     older = sum(n.source != store.source_digest() for n in numbers)
     if not older:
@@ -96,11 +96,11 @@ def _outdated_runs(found: DynamicsSummary) -> str:
 
 
 def borrowed_numbers(found: DynamicsSummary) -> list[str]:
-    """Say which numbers of which method are ours, each sentence once."""
+    """Return which numbers of which method are ours, each sentence once."""
     said = [
         f"{row.method}: {note}" for row in found.rows if row.numbers for note in row.numbers.notes
     ]
-    return list(dict.fromkeys(said)) or ["Nothing: no method brought numbers of its own."]
+    return list(dict.fromkeys(said)) or ["Nothing: no method has its own material values."]
 
 
 def _html(table: ResultTable) -> str:

@@ -1,4 +1,4 @@
-"""Sum an evaluation of dynamics up: per scene and method, per material class and law, ranks, life.
+"""Summary of an evaluation of dynamics: per scene and method, per material class and law, ranks, rebounds.
 
 Everything is read from what finished runs left on the disk.
 """
@@ -82,7 +82,7 @@ class MethodRanks:
     stiffness: RankCorrelation
     """Of real E with how little objects of a scene that something touched deform."""
     restitution: RankCorrelation
-    """Of restitution with rebound: of materials in scenes, of real balls in life."""
+    """Of restitution with rebound: of materials in scenes, of real balls in reality."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class _EvaluationState:
     """Name of a failed job → why."""
 
     def missing(self, name: str) -> str:
-        """Say why a run is not there."""
+        """Return why a run is not there."""
         return self.errors.get(name, NOT_RUN_TEXT)
 
 
@@ -269,7 +269,7 @@ def _ranks(
         # Contents that move by themselves in ours alone are left out.
         bodies = [b for b in ours.bodies if b.name in happened]
         stiff.append(
-            [(b.young, -happened[b.name].shape_error_max) for b in bodies if b.name in touched]
+            [(b.young_pa, -happened[b.name].shape_error_max) for b in bodies if b.name in touched]
         )
         ratios = [(b.restitution, happened[b.name].rebound_ratio) for b in bodies]
         bouncy.append([(e, ratio) for e, ratio in ratios if ratio is not None])

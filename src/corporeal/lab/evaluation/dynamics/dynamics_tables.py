@@ -1,4 +1,4 @@
-"""An evaluation of dynamics as tables: per scene, per group, ranks and life."""
+"""Tables of an evaluation of dynamics: per scene, per group, ranks and rebounds."""
 
 from collections.abc import Sequence
 
@@ -126,7 +126,7 @@ def ranking_sentences(found: DynamicsSummary) -> list[str]:
 
 
 def missing_references(found: DynamicsSummary) -> list[str]:
-    """Say which scenes have no reference, and why."""
+    """Return which scenes have no reference, and why."""
     return [f"{r.scene}: no reference ({r.error})" for r in found.references if r.numbers is None]
 
 

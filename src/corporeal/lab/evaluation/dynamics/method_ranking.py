@@ -1,4 +1,4 @@
-"""Who comes first in a scene, and in which columns ours does not."""
+"""Ranking of methods in a scene."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class MethodResult:
     against: RunDifference | None
     """From the reference; None: there is none to trust."""
     error: str = ""
-    """Why it failed, or cannot be believed."""
+    """Why it failed, or cannot be accepted."""
 
     @property
     def met(self) -> int:
@@ -48,7 +48,7 @@ class SceneRanking:
 
 
 def rank_scene(scene: str, rows: Mapping[str, MethodResult]) -> SceneRanking | None:
-    """Compare ours with every baseline that was run, column by column; None: nobody to compare.
+    """Compare ours with every baseline that was run, column by column; None: nothing to compare.
 
     Paths closer to the reference than ours count as equal: ours at this detail is the yardstick.
     """

@@ -1,4 +1,4 @@
-"""Methods against life: every published rebound is dropped once by each, as a job of its own."""
+"""Drop tests of all methods against published rebounds, as jobs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ RANGE_TOLERANCE = 0.03
 
 @dataclass(frozen=True)
 class MethodDrop:
-    """One thing dropped by one method."""
+    """One object dropped by one method."""
 
     row: MeasuredRebound
     restitution: float
@@ -40,7 +40,7 @@ class MethodDrop:
 
 
 def has_rebound_data(method: Method) -> bool:
-    """Whether a method has numbers for things that it has no file of."""
+    """Whether a method has numbers for objects that it has no file of."""
     return method.name not in FIELD_READERS
 
 
@@ -64,14 +64,14 @@ def drop_jobs(out: Path, methods: Sequence[Method], settings: Settings) -> list[
 
 
 def drop_folder(out: Path, row: MeasuredRebound, method: Method) -> Path:
-    """Return where the drop of one thing by one method is kept."""
+    """Return where the drop of one object by one method is kept."""
     return out / REBOUNDS_FOLDER / safe_name(row.name) / method.name
 
 
 def drop_and_save(
     folder: Path, progress: ProgressCallback, row: MeasuredRebound, settings: Settings
 ) -> None:
-    """Drop one thing, in the process of a worker."""
+    """Drop one object, in the process of a worker."""
     progress(0.0, "dropping")
     store.write_json(folder / DROP_FILE, simulate_drop(row, settings))
 
@@ -91,7 +91,7 @@ def read_drops(out: Path, method: Method) -> list[MethodDrop]:
         try:
             one = from_plain(DropResult, store.read_json(folder / DROP_FILE))
         except (ValueError, TypeError, AttributeError) as error:
-            what = f"is no drop that this version can read ({error})."
+            what = f"is not a drop of this version ({error})."
             raise BadFileError(folder / DROP_FILE, what, f"Remove {folder}.") from error
         found.append(MethodDrop(row, one.restitution))
     return found

@@ -1,4 +1,4 @@
-"""How one run differs from another of the same scene: paths, contacts, shapes, rebounds, dents."""
+"""Differences of two runs of a scene: paths, contacts, shapes, rebounds, dents."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

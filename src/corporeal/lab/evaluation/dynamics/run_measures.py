@@ -1,4 +1,4 @@
-"""What is compared of one run, kept as JSON beside it: paths, what happened, the audit."""
+"""Measures of one run for comparison, stored as JSON: paths, outcome, audit."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,8 +29,8 @@ class ObjectMeasures:
     """Of its box at the start [m]."""
     path: tuple[Vector, ...]
     """One place per instant [m]."""
-    young: float
-    """Of its materials, the mean of their logarithms by mass [Pa]: as they are in life."""
+    young_pa: float
+    """Of its materials, the mean of their logarithms by mass [Pa]: as they are in reality."""
     restitution: float
     """Of its heaviest part's material [-]."""
     groups: tuple[str, ...]
@@ -111,13 +111,13 @@ def _body(
     mass = np.array([particles.mass_real[k] for k in own])
     start = particles.position[particles.object == number]
     path = made.trajectory.ledger.centre[:, number]
-    young = np.array([rows[k].E for k in own])
+    young = np.array([rows[k].young_pa for k in own])
     heaviest = made.field.materials[own[int(mass.argmax())]]
     return ObjectMeasures(
         name=thing.name,
         diagonal=float(np.linalg.norm(np.ptp(start, axis=0))),
         path=tuple((x, y, z) for x, y, z in path.tolist()),
-        young=float(np.exp(np.average(np.log(young), weights=np.maximum(mass, 1e-30)))),
+        young_pa=float(np.exp(np.average(np.log(young), weights=np.maximum(mass, 1e-30)))),
         restitution=heaviest.restitution,
         groups=tuple(dict.fromkeys(_group(rows[k].material, library) for k in own)),
         laws=tuple(
@@ -149,5 +149,5 @@ def read_run_measures(folder: Path) -> RunMeasures:
     try:
         return from_plain(RunMeasures, store.read_json(path))
     except (ValueError, TypeError, AttributeError) as error:
-        what = f"is not what this version keeps of a run ({error})."
+        what = f"is not a file of this version ({error})."
         raise BadFileError(path, what, f"Remove {folder}; it is then run again.") from error

@@ -1,4 +1,4 @@
-"""When and from where a scene is looked at: the same for all of its films, from the reference."""
+"""Instants and cameras of a scene's videos, chosen from the reference."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -50,7 +50,7 @@ class Staging:
     """Of the dated pictures [s]."""
     closes: tuple[CloseUpShot, ...]
     end: float
-    """Of the film [s]."""
+    """Of the video [s]."""
 
     @cached_property
     def view(self) -> Vector:

@@ -1,4 +1,4 @@
-"""Whether a film differs from the reference by more than our own error: else nobody can tell it."""
+"""Test whether a control differs from the reference by more than the simulation's error."""
 
 from dataclasses import dataclass
 
@@ -19,12 +19,12 @@ on small differences of a rebound part them."""
 
 @dataclass(frozen=True)
 class MotionDifference:
-    """How far a film is from the reference, at most over objects [diagonals of the object]."""
+    """How far a video is from the reference, at most over objects [diagonals of the object]."""
 
     path: float
     """Root mean square distance of the centres."""
     shape: float
-    """Largest change of a principal width (standard deviation of its matter)."""
+    """Largest change of a principal width (standard deviation of its material)."""
 
     @property
     def limit(self) -> "MotionDifference":
@@ -49,7 +49,7 @@ def compare_motions(
     times: Float[np.ndarray, " T"],
     until: Float[np.ndarray, " B"] | None = None,
 ) -> MotionDifference:
-    """Compare two films of the same objects at the same instants.
+    """Compare two videos of the same objects at the same instants.
 
     Args:
         reference: Sets the scale.
@@ -73,14 +73,14 @@ def compare_motions(
 
 
 def principal_widths(
-    film: VideoMotion, times: Float[np.ndarray, " T"]
+    video: VideoMotion, times: Float[np.ndarray, " T"]
 ) -> Float[np.ndarray, "T B 3"]:
-    """Return standard deviations of every object's matter along its principal axes [m]."""
-    mass = film.prepared.particles.mass
+    """Return standard deviations of every object's material along its principal axes [m]."""
+    mass = video.prepared.particles.mass
     rows = []
     for time in times.tolist():
-        x = film.at(time).position.astype(float)
-        rows.append([_widths(x[m], mass[m]) for m in film.members])
+        x = video.at(time).position.astype(float)
+        rows.append([_widths(x[m], mass[m]) for m in video.members])
     return np.array(rows)
 
 

@@ -1,7 +1,7 @@
-"""What a judge can tell: every question against every control, with intervals.
+"""Detection rates of a judge: every question against every control, with intervals.
 
 A question tells a control where it raises an alarm on the control more often than on the reference
-of the same scene, beyond chance. Of a law of physics a judge is believed only through questions
+of the same scene, beyond chance. Of a law of physics a judge is trusted only through questions
 that tell a control they are meant for.
 """
 
@@ -24,14 +24,14 @@ INTERVAL_LEVEL = 0.90
 CHANCE_ACCURACY = 0.5
 """Accuracy of a coin [-]."""
 WHOLE_MARK = "whole"
-"""The mark for the whole film, beside the questions."""
+"""The mark for the whole video, beside the questions."""
 BOOTSTRAP_DRAWS = 2000
 """Of scenes, for the interval of a mean."""
 
 
 @dataclass(frozen=True)
 class VideoVerdict:
-    """What is said of one film: means over looks."""
+    """What is said of one video: means over looks."""
 
     scene: str
     condition: str
@@ -44,7 +44,7 @@ class VideoVerdict:
 
 
 def video_verdict(scene: str, condition: str, looks: Sequence[Verdict]) -> VideoVerdict:
-    """Take the mean of the looks at one film; "unclear" reports nothing."""
+    """Take the mean of the looks at one video; "unclear" reports nothing."""
     said = [look.said() for look in looks]
     alarm = {}
     for q in question_catalogue().question:
@@ -93,18 +93,18 @@ class Detectability:
 
 
 def measure_detectability(
-    films: Sequence[VideoVerdict], reference: str, controls: Mapping[str, str]
+    videos: Sequence[VideoVerdict], reference: str, controls: Mapping[str, str]
 ) -> list[Detectability]:
     """Compare every control with the reference by every question and by the whole mark.
 
     Args:
-        films: Of controls only those that differ from the reference enough to be told.
+        videos: Of controls only those that differ from the reference enough to be told.
         reference: Name of the reference among the conditions.
         controls: Control → its name among the conditions.
 
     """
-    told = {(f.scene, f.condition): f for f in films}
-    scenes = sorted({f.scene for f in films if f.condition == reference})
+    told = {(f.scene, f.condition): f for f in videos}
+    scenes = sorted({f.scene for f in videos if f.condition == reference})
     rows = []
     for control, name in controls.items():
         pairs = [(told[s, name], told[s, reference]) for s in scenes if (s, name) in told]
@@ -120,9 +120,9 @@ def measure_detectability(
     return rows
 
 
-def question_alarm(film: VideoVerdict, question: str) -> float | None:
+def question_alarm(video: VideoVerdict, question: str) -> float | None:
     """Return a question's alarm, or how far the whole mark is from the best; None: not asked."""
-    return MAX_MARK - film.whole if question == WHOLE_MARK else film.alarm.get(question)
+    return MAX_MARK - video.whole if question == WHOLE_MARK else video.alarm.get(question)
 
 
 def _measure_detectability(control: str, question: str, both: np.ndarray) -> Detectability:
@@ -160,7 +160,7 @@ def trusted_questions(
 
 @dataclass(frozen=True)
 class MethodMark:
-    """How well one method does in a group of scenes, by questions that are believed."""
+    """How well one method does in a group of scenes, by questions that are trusted."""
 
     method: str
     group: str
@@ -173,21 +173,21 @@ class MethodMark:
 
 
 def method_mark(
-    films: Sequence[VideoVerdict], method: str, group: str, questions: Sequence[str]
+    videos: Sequence[VideoVerdict], method: str, group: str, questions: Sequence[str]
 ) -> MethodMark | None:
-    """Mark a method by some questions; None: none of them applies to any of its films.
+    """Mark a method by some questions; None: none of them applies to any of its videos.
 
     Args:
-        films: Of the group's scenes.
+        videos: Of the group's scenes.
         method: Name among the conditions.
         group: What the scenes or questions have in common.
-        questions: That are believed.
+        questions: That are trusted.
 
     """
     shares = []
-    for film in films:
-        given = [film.alarm[q] for q in questions if q in film.alarm]
-        if film.condition == method and given:
+    for video in videos:
+        given = [video.alarm[q] for q in questions if q in video.alarm]
+        if video.condition == method and given:
             shares.append(1.0 - fmean(given))
     if not shares:
         return None

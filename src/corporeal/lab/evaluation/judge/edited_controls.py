@@ -1,4 +1,4 @@
-"""Films with one known fault, made from the reference: six by changing its motion.
+"""Videos with one known fault, made from the reference: six by changing its motion.
 
 Frozen, reversed and slow change time; ghost, gain and glide change the motion of one object. The
 other four are simulated: see ``simulated_controls``.

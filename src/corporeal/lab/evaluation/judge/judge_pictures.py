@@ -1,4 +1,4 @@
-"""What a judge is shown of a film in one look."""
+"""Pictures of a video for one look of a judge."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -26,7 +26,7 @@ PICTURES_PER_LOOK = DATED_PICTURES + CLOSE_UP_PICTURES + 1
 
 
 class SequentialPictures(Sequence[np.ndarray]):
-    """Pictures each of which is rendered when somebody first looks at it."""
+    """Pictures that are rendered on first access."""
 
     def __init__(self, takes: Sequence[Callable[[], np.ndarray]]) -> None:
         self._takes = takes
@@ -45,12 +45,12 @@ class SequentialPictures(Sequence[np.ndarray]):
 
 
 def judge_pictures(
-    film: VideoMotion, staging: Staging, look: int
+    video: VideoMotion, staging: Staging, look: int
 ) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
-    """Show a film: dated pictures, close-ups, and the diagram of its paths.
+    """Show a video: dated pictures, close-ups, and the diagram of its paths.
 
     Args:
-        film: What moves.
+        video: What moves.
         staging: When and from where.
         look: Which of ``LOOK_TURNS_DEG``.
 
@@ -58,11 +58,11 @@ def judge_pictures(
         ``PICTURES_PER_LOOK`` pictures, each rendered when it is looked at.
 
     """
-    stage = RayScene(film.prepared.scene, StudioLight(front=staging.view))
+    stage = RayScene(video.prepared.scene, StudioLight(front=staging.view))
     wide = staging.wide(look)
 
     def picture(time: float, camera: CameraAim, words: str) -> np.ndarray:
-        posed = stage.posed(*film.cast.skin.pose(film.at(time)))
+        posed = stage.posed(*video.cast.skin.pose(video.at(time)))
         return video_overlay.draw_caption(
             render_image(posed, camera, "draft", usable_cores()), words
         )
@@ -75,10 +75,10 @@ def judge_pictures(
         partial(picture, c.time, staging.near(c, look), f"close   t = {c.time:.3f} s")
         for c in staging.closes
     ]
-    return SequentialPictures([*dated, *close, partial(path_diagram, film, staging, wide)])
+    return SequentialPictures([*dated, *close, partial(path_diagram, video, staging, wide)])
 
 
 def pictures_description(look: int) -> str:
-    """Say in words how the pictures of a look are taken; recordings compare this."""
+    """Describe in words how the pictures of a look are taken; recordings compare this."""
     size = f"{PICTURE_SIZE_PX[0]} x {PICTURE_SIZE_PX[1]}"
     return f"{DATED_PICTURES} dated pictures, {CLOSE_UP_PICTURES} close-ups, paths; {size}; turned {LOOK_TURNS_DEG[look]:+g}°"

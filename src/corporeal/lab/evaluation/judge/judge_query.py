@@ -1,4 +1,4 @@
-"""Ask a judge about films: the price first, every film in a conversation of its own."""
+"""Questions to a judge about videos, each in a separate conversation, after a cost estimate."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from corporeal.vlm.thread_map import thread_map
 
 Progress = Callable[[float, str], None]
 CONFIRM_ABOVE_USD = 5.0
-"""Above this nobody is asked without ``--yes`` [US$]."""
+"""Above this cost ``--yes`` is required [US$]."""
 MAX_PARALLEL_QUESTIONS = 4
 """Questions under way at the same time."""
 
@@ -23,7 +23,7 @@ MAX_PARALLEL_QUESTIONS = 4
 class JudgeVerdicts:
     """What a judge said."""
 
-    films: JudgedVideos
+    videos: JudgedVideos
     verdicts: list[VideoVerdict]
     unanswered: int
     """Looks to which there is no usable answer."""
@@ -34,46 +34,46 @@ class JudgeVerdicts:
 
 
 def query_judge(
-    films: JudgedVideos,
+    videos: JudgedVideos,
     config: JudgeConfig,
     say: Callable[[str], None],
     progress: Progress = lambda fraction, words: None,
     judge: VlmClient | None = None,
 ) -> JudgeVerdicts:
-    """Ask about all films, each in a conversation of its own, in an order that tells nothing.
+    """Ask about all videos, each in a conversation of its own, in an order that tells nothing.
 
     Args:
-        films: From ``gather_films``.
-        config: Who judges.
-        say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        videos: From ``gather_videos``.
+        config: Settings of the judge.
+        say: Called with the price before the first question.
+        progress: Called with the fraction done and a description.
         judge: Who answers, instead of ``config.judge``.
 
     Raises:
-        UserError: Nobody judges, it costs more than was agreed to, or answers are absent.
+        UserError: There is no judge, it costs more than allowed, or answers are absent.
 
     """
     asking = _somebody(judge or connect_judge(config))
-    jobs = distinct_questions(films.asked)
+    jobs = distinct_questions(videos.asked)
     reckoned = estimate_cost(jobs, config.judge)
     say(price_words(reckoned, config))
     _agreed(reckoned, config)
     results = thread_map(
         [lambda a=a: asking.ask(a.question, Verdict) for a in jobs],
         MAX_PARALLEL_QUESTIONS,
-        lambda count: progress(count / max(len(jobs), 1), f"{count} of {len(jobs)} films"),
+        lambda count: progress(count / max(len(jobs), 1), f"{count} of {len(jobs)} videos"),
         lambda error: not isinstance(error, PendingQuestionsError | UnansweredError),
     )
     refuse_pending(results, config.judge)
     replies = {_named(a): r for a, r in zip(jobs, results, strict=True) if isinstance(r, Reply)}
     looks: dict[tuple[str, str], list[Verdict]] = {}
-    for asked in films.asked:
+    for asked in videos.asked:
         if _named(asked) in replies:
             said = looks.setdefault((asked.scene, asked.condition), [])
             said.append(replies[_named(asked)].answer)
-    verdicts = [video_verdict(*film, said) for film, said in sorted(looks.items())]
+    verdicts = [video_verdict(*video, said) for video, said in sorted(looks.items())]
     by = tuple(sorted({reply.model for reply in replies.values()}))
-    return JudgeVerdicts(films, verdicts, len(jobs) - len(replies), config.judge, reckoned, by)
+    return JudgeVerdicts(videos, verdicts, len(jobs) - len(replies), config.judge, reckoned, by)
 
 
 def distinct_questions(asked: Sequence[VideoQuestion]) -> list[VideoQuestion]:
@@ -89,7 +89,7 @@ def _named(asked: VideoQuestion) -> tuple[str, int, str]:
 
 
 def connect_judge(config: JudgeConfig) -> VlmClient | None:
-    """Connect to who judges; None: nobody was asked for.
+    """Connect to the judge; None: none was asked for.
 
     Raises:
         UserError: A setting cannot be right, the name is unknown, or its key is not set.
@@ -101,15 +101,13 @@ def connect_judge(config: JudgeConfig) -> VlmClient | None:
 
 def _somebody(model: VlmClient | None) -> VlmClient:
     if model is None:
-        raise UserError(
-            "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."
-        )
+        raise UserError("No judge. Choose one: --judge openai:MODEL, ask:FOLDER or replay:FOLDER.")
     return model
 
 
 def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
-    """Say what asking takes."""
-    words = f"{reckoned.films} films to judge, about {reckoned.tokens:,} tokens"
+    """Describe what asking takes."""
+    words = f"{reckoned.videos} videos to judge, about {reckoned.tokens:,} tokens"
     if not is_paid(config.judge):
         return f"{words}; {config.judge.partition(':')[0]} costs nothing."
     if reckoned.dollars is None:
@@ -118,16 +116,16 @@ def price_words(reckoned: JudgingCost, config: JudgeConfig) -> str:
 
 
 def is_paid(spec: str) -> bool:
-    """Whether somebody is paid for answers."""
+    """Whether answers are paid."""
     return spec.partition(":")[0] in LIVE_CLIENTS
 
 
 def _agreed(reckoned: JudgingCost, config: JudgeConfig) -> None:
-    """Raise UserError where more would be spent than somebody agreed to."""
+    """Raise UserError where the cost exceeds the limit."""
     if not is_paid(config.judge) or config.yes:
         return
     if reckoned.dollars is None or reckoned.dollars > CONFIRM_ABOVE_USD:
         raise UserError(
-            f"{price_words(reckoned, config)} Add --yes to ask all the same, or judge fewer: "
+            f"{price_words(reckoned, config)} Add --yes to confirm, or judge fewer: "
             "--looks 1 --control-scenes 3."
         )

@@ -1,4 +1,4 @@
-"""Judge the runs that lie in the folder of an evaluation: OUT/SCENE/METHOD."""
+"""Judgement of the runs in the folder of an evaluation: OUT/SCENE/METHOD."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,18 +34,18 @@ def judge_runs(
 
     Args:
         out: Holds ``SCENE/METHOD``, each a run.
-        config: Who judges, how often.
-        say: Told the price before anybody is asked.
-        progress: Told the fraction done and what is being done.
+        config: Settings of the judge.
+        say: Called with the price before the first question.
+        progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: There are no such runs, nobody judges, or it costs more than was agreed to.
+        UserError: There are no such runs, there is no judge, or it costs more than allowed.
 
     """
     check_judging(config)
     scenes = judged_scenes_in(out)
-    films = gather_videos(scenes, out, config, progress)
-    judged = query_judge(films, config, say, progress)
+    videos = gather_videos(scenes, out, config, progress)
+    judged = query_judge(videos, config, say, progress)
     return JudgedRuns(judged, weigh_judge(judged))
 
 

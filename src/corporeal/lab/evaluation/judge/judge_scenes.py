@@ -1,4 +1,4 @@
-"""All films of several scenes: references, controls and methods, ready to be asked about."""
+"""All videos of several scenes: references, controls and methods, ready to be asked about."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -41,12 +41,13 @@ class JudgeConfig:
     """Who judges, how often, and what it may cost."""
 
     judge: str = NO_MODEL
-    """Model that judges the films: as --vlm."""
+    """Model that judges the videos: as --vlm."""
     record: Path | None = None
     """Folder where its answers are recorded, for replay:FOLDER."""
     looks: int = 1
-    """Times that each film is judged, each from another side and with questions in another order:
-    1 to 3."""
+    """Times that each video is judged, each from another side and with questions in another order:
+    1 to 3.
+    """
     control_scenes: int = DEFAULT_CONTROL_SCENES
     """Scenes of which controls are judged."""
     yes: bool = False
@@ -66,7 +67,7 @@ class SceneRuns:
 
 @dataclass(frozen=True)
 class FailedVideo:
-    """A film that nobody judges, and why."""
+    """A video that could not be made, and why."""
 
     scene: str
     condition: str
@@ -113,7 +114,7 @@ def check_judging(config: JudgeConfig) -> None:
     check_range("--control-scenes", config.control_scenes, 0, 10_000)
 
 
-# ---------------------------------------------------------------- films
+# ---------------------------------------------------------------- videos
 
 
 def gather_videos(
@@ -122,20 +123,20 @@ def gather_videos(
     config: JudgeConfig,
     progress: Progress = lambda fraction, words: None,
 ) -> JudgedVideos:
-    """Make all films: read runs back, simulate and edit controls.
+    """Make all videos: read runs back, simulate and edit controls.
 
     Args:
         scenes: With finished runs.
         out: Folder of the evaluation; runs of controls go to ``OUT/SCENE/control-NAME``.
         config: How many looks, and controls of how many scenes.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and a description.
 
     """
-    films = JudgedVideos([], [], [], {}, methods_of(scenes))
+    videos = JudgedVideos([], [], [], {}, methods_of(scenes))
     for number, scene in enumerate(scenes):
         progress(number / len(scenes), scene.name)
-        _gather_scene(scene, out / scene.name, number < config.control_scenes, config, films)
-    return films
+        _gather_scene(scene, out / scene.name, number < config.control_scenes, config, videos)
+    return videos
 
 
 def methods_of(scenes: Sequence[SceneRuns]) -> list[str]:
@@ -145,55 +146,55 @@ def methods_of(scenes: Sequence[SceneRuns]) -> list[str]:
 
 
 def _gather_scene(
-    scene: SceneRuns, folder: Path, with_controls: bool, config: JudgeConfig, films: JudgedVideos
+    scene: SceneRuns, folder: Path, with_controls: bool, config: JudgeConfig, videos: JudgedVideos
 ) -> None:
-    """Add the films of one scene; a reference that is not clean leaves it out."""
+    """Add the videos of one scene; a reference that is not clean leaves it out."""
     reference, why = _run(scene, REFERENCE_METHOD)
     if reference is None:
-        films.failed.append(FailedVideo(scene.name, REFERENCE_METHOD, why))
+        videos.failed.append(FailedVideo(scene.name, REFERENCE_METHOD, why))
         return
     library = run_pipeline.read_run_request(scene.runs[REFERENCE_METHOD]).settings.ground.library
-    films.groups[scene.name] = scene_groups(reference, library)
+    videos.groups[scene.name] = scene_groups(reference, library)
     staging, told = stage_scene(reference), scene_facts(reference.prepared)
-    shown = {REFERENCE_METHOD: motion_of_run(reference), **_methods(scene, films)}
+    shown = {REFERENCE_METHOD: motion_of_run(reference), **_methods(scene, videos)}
     if with_controls:
         limit = _yardstick(scene, reference, staging).limit
-        for control, film in _controls(scene, reference, folder, films).items():
-            far = compare_motions(shown[REFERENCE_METHOD], film, staging.times)
+        for control, video in _controls(scene, reference, folder, videos).items():
+            far = compare_motions(shown[REFERENCE_METHOD], video, staging.times)
             effect = ControlEffect(scene.name, control, far, limit, far.exceeds(limit))
-            films.effects.append(effect)
+            videos.effects.append(effect)
             if effect.effective:
-                same = film.prepared is reference.prepared
+                same = video.prepared is reference.prepared
                 bound = shown[REFERENCE_METHOD] if same else None
-                shown[control_name(control)] = replace(film, bound_as=bound)
-    films.asked.extend(
-        VideoQuestion(scene.name, condition, look, video_question(film, staging, told, look))
-        for condition, film in shown.items()
+                shown[control_name(control)] = replace(video, bound_as=bound)
+    videos.asked.extend(
+        VideoQuestion(scene.name, condition, look, video_question(video, staging, told, look))
+        for condition, video in shown.items()
         for look in range(config.looks)
     )
 
 
-def _methods(scene: SceneRuns, films: JudgedVideos) -> dict[str, VideoMotion]:
-    """Return the films of all methods but the reference; what cannot be judged is a row."""
-    shown = {m: _read(scene, m, films) for m in scene.runs if m != REFERENCE_METHOD}
-    return {m: film for m, film in shown.items() if film is not None}
+def _methods(scene: SceneRuns, videos: JudgedVideos) -> dict[str, VideoMotion]:
+    """Return the videos of all methods but the reference; what cannot be judged is a row."""
+    shown = {m: _read(scene, m, videos) for m in scene.runs if m != REFERENCE_METHOD}
+    return {m: video for m, video in shown.items() if video is not None}
 
 
-def _read(scene: SceneRuns, method: str, films: JudgedVideos) -> VideoMotion | None:
+def _read(scene: SceneRuns, method: str, videos: JudgedVideos) -> VideoMotion | None:
     played, why = _run(scene, method)
     if played is None:
         failed = FailedVideo(scene.name, method, why)
-        films.failed.extend([failed] if failed not in films.failed else [])
+        videos.failed.extend([failed] if failed not in videos.failed else [])
         return None
     return motion_of_run(played)
 
 
 def _controls(
-    scene: SceneRuns, reference: SimulationResult, folder: Path, films: JudgedVideos
+    scene: SceneRuns, reference: SimulationResult, folder: Path, videos: JudgedVideos
 ) -> dict[str, VideoMotion]:
-    """Return the films of all controls that have a place in the scene."""
-    found = {c: _control(c, scene, reference, folder, films) for c in CONTROL_NAMES}
-    return {c: film for c, film in found.items() if film is not None}
+    """Return the videos of all controls that have a place in the scene."""
+    found = {c: _control(c, scene, reference, folder, videos) for c in CONTROL_NAMES}
+    return {c: video for c, video in found.items() if video is not None}
 
 
 def control_name(control: str) -> str:
@@ -215,7 +216,7 @@ def _run(scene: SceneRuns, method: str) -> tuple[SimulationResult | None, str]:
 
 
 def audit_breach(audit: Audit) -> str:
-    """Say what keeps a run from being judged as physics; "": nothing."""
+    """Describe what keeps a run from being judged as physics; "": nothing."""
     if audit.nan_count or audit.particles_out_of_domain:
         return "the simulation lost particles"
     if audit.mechanical_growth > ALLOWED_BREACHES["mechanical_growth"]:
@@ -225,18 +226,18 @@ def audit_breach(audit: Audit) -> str:
 
 
 def _control(
-    control: str, scene: SceneRuns, reference: SimulationResult, folder: Path, films: JudgedVideos
+    control: str, scene: SceneRuns, reference: SimulationResult, folder: Path, videos: JudgedVideos
 ) -> VideoMotion | None:
     if control in EDITED_CONTROLS:
         return edit_motion(control, reference)
     if control in scene.runs:  # also a method, so it was run
-        return _read(scene, control, films)
+        return _read(scene, control, videos)
     try:
         played = simulate_control(
             control, scene.runs[REFERENCE_METHOD], folder / f"control-{control}"
         )
     except UserError as error:
-        films.failed.append(FailedVideo(scene.name, control_name(control), str(error)))
+        videos.failed.append(FailedVideo(scene.name, control_name(control), str(error)))
         return None
     return None if played is None else motion_of_run(played)
 

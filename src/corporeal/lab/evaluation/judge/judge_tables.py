@@ -46,7 +46,7 @@ class JudgeResult:
 
 def weigh_judge(judged: JudgeVerdicts) -> JudgeResult:
     """Find what the judge can tell, and mark methods by that alone."""
-    effective = {(e.scene, control_name(e.control)) for e in judged.films.effects if e.effective}
+    effective = {(e.scene, control_name(e.control)) for e in judged.videos.effects if e.effective}
     names = [control_name(c) for c in CONTROL_NAMES]
     usable = [
         v
@@ -57,11 +57,11 @@ def weigh_judge(judged: JudgeVerdicts) -> JudgeResult:
         usable, REFERENCE_METHOD, dict(zip(CONTROL_NAMES, names, strict=True))
     )
     trusted = trusted_questions(rows)
-    methods, all_questions = judged.films.methods, [q for qs in trusted.values() for q in qs]
+    methods, all_questions = judged.videos.methods, [q for qs in trusted.values() for q in qs]
     by_physics = [
         method_mark(usable, m, law, qs) for law, qs in trusted.items() if qs for m in methods
     ]
-    groups = judged.films.groups
+    groups = judged.videos.groups
     return JudgeResult(
         rows=tuple(rows),
         believed=trusted,
@@ -76,7 +76,7 @@ def weigh_judge(judged: JudgeVerdicts) -> JudgeResult:
 
 
 def _grouped(
-    films: Sequence[VideoVerdict],
+    videos: Sequence[VideoVerdict],
     methods: Sequence[str],
     questions: Sequence[str],
     groups: Mapping[str, Sequence[str]],
@@ -84,21 +84,21 @@ def _grouped(
     """Mark every method in the scenes in which something occurs."""
     found = []
     for name in sorted({g for kinds in groups.values() for g in kinds}):
-        mine = [f for f in films if name in groups.get(f.scene, ())]
+        mine = [f for f in videos if name in groups.get(f.scene, ())]
         found += [method_mark(mine, m, name, questions) for m in methods]
     return tuple(m for m in found if m)
 
 
-def _false_alarms(films: Sequence[VideoVerdict], law: str) -> float:
+def _false_alarms(videos: Sequence[VideoVerdict], law: str) -> float:
     asked = [q.id for q in question_catalogue().question if q.law == law]
     given = [
-        f.alarm[q] for f in films if f.condition == REFERENCE_METHOD for q in asked if q in f.alarm
+        f.alarm[q] for f in videos if f.condition == REFERENCE_METHOD for q in asked if q in f.alarm
     ]
     return fmean(given) if given else 0.0
 
 
-def _whole(films: Sequence[VideoVerdict], method: str) -> float | None:
-    given = [f.whole for f in films if f.condition == method]
+def _whole(videos: Sequence[VideoVerdict], method: str) -> float | None:
+    given = [f.whole for f in videos if f.condition == method]
     return fmean(given) if given else None
 
 
@@ -115,15 +115,15 @@ def judge_tables(judged: JudgeVerdicts, result: JudgeResult) -> list[ResultTable
         _marks("Methods by constitutive law", result.by_law),
         ResultTable(
             "Not judged",
-            ("scene", "film", "why"),
-            [(f.scene, f.condition, f.reason) for f in judged.films.failed],
+            ("scene", "video", "why"),
+            [(f.scene, f.condition, f.reason) for f in judged.videos.failed],
         ),
     ]
 
 
 def _laws(result: JudgeResult) -> ResultTable:
     rows = [
-        (law, CANNOT_TELL_TEXT if not told else f"believed by: {', '.join(told)}", f"{alarms:.0%}")
+        (law, CANNOT_TELL_TEXT if not told else f"trusted by: {', '.join(told)}", f"{alarms:.0%}")
         for law, told in result.believed.items()
         for alarms in [result.false_alarms[law]]
     ]
@@ -135,7 +135,7 @@ def _laws(result: JudgeResult) -> ResultTable:
 def _controls(judged: JudgeVerdicts, result: JudgeResult) -> ResultTable:
     rows = []
     for control in question_catalogue().control:
-        effects = [e for e in judged.films.effects if e.control == control.id]
+        effects = [e for e in judged.videos.effects if e.control == control.id]
         effective = sum(e.effective for e in effects)
         if not effective:
             why = "not effective" if effects else "has no place in these scenes"
@@ -185,7 +185,7 @@ def judge_record(judged: JudgeVerdicts, result: JudgeResult) -> dict[str, Any]:
         "unanswered": judged.unanswered,
         "price": asdict(judged.price),
         **asdict(result),
-        "effects": [asdict(e) for e in judged.films.effects],
-        "failed": [asdict(f) for f in judged.films.failed],
-        "films": [asdict(v) for v in judged.verdicts],
+        "effects": [asdict(e) for e in judged.videos.effects],
+        "failed": [asdict(f) for f in judged.videos.failed],
+        "videos": [asdict(v) for v in judged.verdicts],
     }

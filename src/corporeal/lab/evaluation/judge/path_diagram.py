@@ -55,12 +55,12 @@ class DiagramPanel:
 
 
 def path_diagram(
-    film: VideoMotion, staging: Staging, camera: CameraAim
+    video: VideoMotion, staging: Staging, camera: CameraAim
 ) -> UInt8[np.ndarray, "H W 3"]:
     """Draw where every object's centre of mass goes, and on the right its height over time.
 
     Args:
-        film: What moves.
+        video: What moves.
         staging: Whose reference sets the diagram's extent.
         camera: Gives the side from which the paths are seen, along a level line of sight.
 
@@ -70,12 +70,12 @@ def path_diagram(
     fine = np.append(np.arange(0.0, staging.end, CORNER_INTERVAL_S), staging.end)
     ticks = np.searchsorted(fine, np.arange(0.0, staging.end + 1e-9, DOT_INTERVAL_S))
     ticks = np.minimum(ticks, len(fine) - 1)
-    centre = film.centres(fine)
+    centre = video.centres(fine)
     paths, heights = _panels(staging, flatten)
     image = Image.new("RGB", PICTURE_SIZE_PX, "white")
     draw = ImageDraw.Draw(image)
     _axes(draw, paths, heights, staging.end)
-    for k, thing in enumerate(film.prepared.scene.objects):
+    for k, thing in enumerate(video.prepared.scene.objects):
         shade = colours.OBJECT_COLOURS[k % len(colours.OBJECT_COLOURS)]
         _curve(draw, paths.pixels(centre[:, k] @ flatten.T), ticks, shade)
         over = np.stack([fine, centre[:, k, 2]], axis=1)

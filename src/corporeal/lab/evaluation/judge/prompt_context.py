@@ -10,7 +10,7 @@ REST_SPEED_M_S = 0.005
 
 
 def scene_facts(prepared: PreparedScene) -> str:
-    """Write the facts of a scene, a line an object, for all of its films alike."""
+    """Write the facts of a scene, a line an object, for all of its videos alike."""
     scene = prepared.scene
     lines = [_object(prepared, k) for k in range(len(scene.objects))]
     pull = float(np.linalg.norm(scene.gravity))
@@ -66,7 +66,7 @@ def _moving(velocity: Vector) -> str:
 
 
 def _acts(scene: Scene, k: int) -> str:
-    """Say what pushes an object, blows on it or leads it."""
+    """Describe what pushes an object, blows on it or leads it."""
     thing, said = scene.objects[k], []
     if isinstance(thing.push, Push):
         said.append(

@@ -78,7 +78,7 @@ def simulate_control(
         control: One of ``SIMULATED_CONTROLS``.
         reference: Folder of our own run.
         folder: Of the control's run.
-        tell: Whom to tell about progress.
+        tell: Progress callback of each stage.
 
     Raises:
         UserError: The scene cannot be simulated so.

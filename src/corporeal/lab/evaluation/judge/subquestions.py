@@ -1,4 +1,4 @@
-"""The questions about a film, the laws they belong to, and the controls they are meant to catch."""
+"""The questions about a video, the laws they belong to, and the controls they are meant to catch."""
 
 import tomllib
 from dataclasses import dataclass
@@ -13,14 +13,14 @@ from corporeal.vlm import AnswerSchema
 
 QuestionAnswer = Literal["yes", "no", "unclear", "na"]
 MAX_DESCRIPTION_CHARACTERS = 1000
-"""Longest description of a film [characters]."""
+"""Longest description of a video [characters]."""
 MIN_MARK, MAX_MARK = 1, 5
-"""Of the mark for a whole film."""
+"""Of the mark for a whole video."""
 
 
 @dataclass(frozen=True)
 class SubQuestion:
-    """One question about a film."""
+    """One question about a video."""
 
     id: str
     law: str
@@ -75,7 +75,7 @@ def _answers() -> type[VideoAnswers]:
 
 
 class Verdict(AnswerSchema):
-    """What is said of one film after one look."""
+    """What is said of one video after one look."""
 
     SCHEMA: ClassVar[str] = "verdict/1"
     happens: str = Field(min_length=1, max_length=MAX_DESCRIPTION_CHARACTERS)

@@ -1,4 +1,4 @@
-"""How one scene moves in one film: a prepared scene and its matter at any instant."""
+"""How one scene moves in one video: a prepared scene and its material at any instant."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ DIGEST_PARTICLES_PER_OBJECT = 8
 
 @dataclass(frozen=True)
 class VideoMotion:
-    """What a film shows."""
+    """What a video shows."""
 
     prepared: PreparedScene
     at: Callable[[float], Frame]
-    """Instant [s] → where the matter is then."""
+    """Instant [s] → where the material is then."""
     bound_as: "VideoMotion | None" = None
-    """Another film of the same prepared scene, whose surfaces need not be bound again."""
+    """Another video of the same prepared scene, whose surfaces need not be bound again."""
 
     @cached_property
     def cast(self) -> SceneBinding:

@@ -1,7 +1,7 @@
-"""The question about one film after one look, and what asking it costs.
+"""The question about one video after one look, and what asking it costs.
 
 It is named by a digest of the motion that it shows: an answer to another motion is never found, and
-nothing in it says which condition the film is of. The version in ``film.md`` covers the questions
+nothing in it says which condition the video is of. The version in ``video.md`` covers the questions
 of ``questions.toml``, too.
 """
 
@@ -33,7 +33,7 @@ TOKENS_PER_CHARACTER, TOKENS_PER_PICTURE, TOKENS_PER_ANSWER = 0.25, 350, 400
 
 @dataclass(frozen=True)
 class VideoQuestion:
-    """A film, ready to be asked about."""
+    """A video, ready to be asked about."""
 
     scene: str
     condition: str
@@ -41,34 +41,34 @@ class VideoQuestion:
     question: Question
 
 
-def motion_digest(film: VideoMotion, staging: Staging) -> str:
+def motion_digest(video: VideoMotion, staging: Staging) -> str:
     """Name a motion by where particles of every object are at the instants of the pictures."""
     instants = np.unique([*staging.times.tolist(), *(c.time for c in staging.closes)])
     boxes = staging.reel.boxes[0]
     size = float(np.linalg.norm(np.nanmax(boxes[:, 1], axis=0) - np.nanmin(boxes[:, 0], axis=0)))
-    x = film.sampled(instants) / (DIGEST_TOLERANCE * max(size, 1e-9))
+    x = video.sampled(instants) / (DIGEST_TOLERANCE * max(size, 1e-9))
     whole = np.nan_to_num(np.round(x), nan=0.0, posinf=1e9, neginf=-1e9)
     return hashlib.sha256(np.clip(whole, -1e9, 1e9).astype(np.int64).tobytes()).hexdigest()[:12]
 
 
-def video_question(film: VideoMotion, staging: Staging, told: str, look: int) -> Question:
-    """Ask about one film.
+def video_question(video: VideoMotion, staging: Staging, told: str, look: int) -> Question:
+    """Ask about one video.
 
     Args:
-        film: What is shown.
+        video: What is shown.
         staging: When and from where.
         told: What the judge is told of the scene: ``told_facts.facts``.
         look: From which side; also decides the order of the questions.
 
     """
-    name = f"film-{motion_digest(film, staging)}"
+    name = f"film-{motion_digest(video, staging)}"
     places = question_order(name, look)
     return Question(
         task=DYNAMICS_TASK,
         prompt=prompt_text(told, places),
         scene=name,
         views=pictures_description(look),
-        pictures=OnDemandPictures(lambda: judge_pictures(film, staging, look)),
+        pictures=OnDemandPictures(lambda: judge_pictures(video, staging, look)),
         prompt_version=_template().version,
         facts={
             "told": told,
@@ -78,7 +78,7 @@ def video_question(film: VideoMotion, staging: Staging, told: str, look: int) ->
 
 
 def question_order(name: str, look: int) -> list[int]:
-    """Return the order of the questions: another for each film and look, and always the same."""
+    """Return the order of the questions: another for each video and look, and always the same."""
     seed = hashlib.sha256(f"{name} {look}".encode()).digest()[:8]
     dice = np.random.default_rng(int.from_bytes(seed, "big"))
     return dice.permutation(len(question_catalogue().question)).tolist()
@@ -98,22 +98,22 @@ def prompt_text(told: str, places: list[int]) -> str:
 
 @cache
 def _template() -> Prompt:
-    return read_prompt(files("corporeal.lab.evaluation.judge").joinpath("film.md"))
+    return read_prompt(files("corporeal.lab.evaluation.judge").joinpath("video.md"))
 
 
 @dataclass(frozen=True)
 class JudgingCost:
-    """What asking takes, reckoned before anybody is asked."""
+    """Estimated cost of the questions."""
 
-    films: int
-    """Films times looks."""
+    videos: int
+    """Videos times looks."""
     tokens: int
     dollars: float | None
     """At list prices [US$]; None: the table of prices does not know the model."""
 
 
 def estimate_cost(asked: list[VideoQuestion], model: str) -> JudgingCost:
-    """Reckon what asking about films costs, answers that are kept already included."""
+    """Reckon what asking about videos costs, answers that are kept already included."""
     read = sum(
         round(TOKENS_PER_CHARACTER * len(a.question.text)) + TOKENS_PER_PICTURE * PICTURES_PER_LOOK
         for a in asked

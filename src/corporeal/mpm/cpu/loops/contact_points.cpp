@@ -5,7 +5,7 @@ struct Points {
   // there, from that of the point itself; whether it is below reach.
   static inline bool touching(const Field &F, int p, const double *towards, double reach, double &gap,
                               double *at) {
-    const double *row = F.rounding + mpm::CURVATURE_ROW * p;
+    const double *row = F.curvature + mpm::CURVATURE_ROW * p;
     double shift[3] = {0, 0, 0};
     if (row[6] + row[7] > 0) {
       if (gap >= reach + 2 * row[8]) return false;   // neither part goes farther than the point's reach
@@ -104,9 +104,9 @@ struct Points {
       turn_back(s, n, up);
       const double towards[3] = {-up[0], -up[1], -up[2]}, height = Vec::dot(row, centre) - row[3];
       for (int p = 0; p < F.surfaces && count < room; p++) {
-        const double *rounding = F.rounding + mpm::CURVATURE_ROW * p;
+        const double *curvature = F.curvature + mpm::CURVATURE_ROW * p;
         double gap = height + Vec::dot(up, F.surface + 3 * p);
-        const double radius = rounding[6] + rounding[7];   // its middle is on this side of the face
+        const double radius = curvature[6] + curvature[7];   // its middle is on this side of the face
         if (radius <= 0 || !touching(F, p, towards, reach, gap, at) || gap <= -reach || gap <= -radius) continue;
         turn(s, at, x);
         for (int i = 0; i < 3; i++) at[i] = x[i] + apart[i];
@@ -138,7 +138,7 @@ struct Points {
         : w(w), F(w->field[f]), G(w->field[g]), s(F.rigid), t(G.rigid), reach(mpm::SURFACE_POINT_REACH_DX * w->dx), f(f), g(g) {
       for (int i = 0; i < 3; i++) apart[i] = s[CENTRE + i] - t[CENTRE + i];
     }
-    const double *row(int q) const { return G.rounding + mpm::CURVATURE_ROW * q; }
+    const double *row(int q) const { return G.curvature + mpm::CURVATURE_ROW * q; }
     // List curved points of g near f, and the box around them, in the world from f's centre.
     bool find() {
       double centre[3], x[3];
@@ -170,14 +170,14 @@ struct Points {
     }
     // Whether a place in f's frame belongs to point p and not to its neighbours.
     bool owns(int p, const double *x) const {
-      const double *round = F.rounding + mpm::CURVATURE_ROW * p, *at = F.surface + 3 * p;
+      const double *round = F.curvature + mpm::CURVATURE_ROW * p, *at = F.surface + 3 * p;
       const double d[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]}, own = Vec::dot(d, d);
       for (int o = 0; o < F.surfaces; o++)
-        if (mpm::Curved::taken(round, own, x, F.rounding + mpm::CURVATURE_ROW * o, F.surface + 3 * o)) return false;
+        if (mpm::Curved::taken(round, own, x, F.curvature + mpm::CURVATURE_ROW * o, F.surface + 3 * o)) return false;
       return true;
     }
     bool meet(int p, Touch &T) const {
-      const double *round = F.rounding + mpm::CURVATURE_ROW * p, radius = mpm::Curved::ball(round);
+      const double *round = F.curvature + mpm::CURVATURE_ROW * p, radius = mpm::Curved::ball(round);
       double x[3], y[3], m[3], gap;
       turn(s, F.surface + 3 * p, y);
       for (int i = 0; i < 3; i++)
@@ -210,7 +210,7 @@ struct Points {
       int count = 0;
       if (!find()) return 0;
       for (int p = 0; p < F.surfaces && count < room; p++)
-        if (mpm::Curved::ball(F.rounding + mpm::CURVATURE_ROW * p) > 0) count += meet(p, list[count]);
+        if (mpm::Curved::ball(F.curvature + mpm::CURVATURE_ROW * p) > 0) count += meet(p, list[count]);
       return count;
     }
   };

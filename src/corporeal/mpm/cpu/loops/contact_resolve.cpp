@@ -210,7 +210,7 @@ struct Rolls {
     const Field *F = Points::rolls(w, T);
     const double most = w->rolling[T.fa * all + T.fc] * Vec::dot(T.J, T.normal);
     if (!F || most <= 0 || !F->rolls) return;
-    const double *round = F->rounding + mpm::CURVATURE_ROW * (T.a % F->surfaces);
+    const double *round = F->curvature + mpm::CURVATURE_ROW * (T.a % F->surfaces);
     if (round[6] + round[7] <= 0) return;
     mpm::RollingSide a, c;
     side(R.a, R.ra, a);

@@ -164,7 +164,7 @@ struct Gather {
       c1[k] -= D[1] * u[k];
       c2[k] -= D[2] * u[k];
     }
-    const i8 cluster = field.swells ? ClusterMean::of(q, block) : *(i8 *)base;
+    const i8 cluster = field.uses_mean_dilatation ? ClusterMean::of(q, block) : *(i8 *)base;
     LaneMaterial t = LaneMaterial::of(field, (const int *)(q + 8 * MT));
     f8 keep = 1.0f - Simd::low(Simd::all(1.0f), dt * t.keep);
     i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < live;
@@ -212,7 +212,7 @@ struct Gather {
       ep = *(f8u *)(past + 8 * EP);
       vc = *(f8u *)(past + 8 * VC);
     }
-    if (field.swells) t.lambda -= Laws::mean_bulk(t);
+    if (field.uses_mean_dilatation) t.lambda -= Laws::mean_bulk(t);
     mpm::Response<f8> a;
     Laws::respond(t, ep, vc, H, a);
     if (flows) {
@@ -228,7 +228,7 @@ struct Gather {
       plastic += work;
     }
     f8 *stress = a.tau, wave = a.wave, j1 = a.j1;
-    if (field.swells) {   // the rest of lambda waits for what the whole cluster does
+    if (field.uses_mean_dilatation) {   // the rest of lambda waits for what the whole cluster does
       const f8 grown = A[0] + A[4] + A[8];
       dilatation.add(cluster, live, volume, grown);
       *(f8u *)(past + 8 * OWN_DILATATION) = grown;
@@ -256,9 +256,9 @@ struct Gather {
     f8 H[9], wave = *(f8u *)(past + 8 * WAVE_BOUND);
     for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
     const f8 grown = dilatation.mean(*(i8u *)(past + 8 * CLUSTER), live);
-    const f8 relief = *(f8u *)(past + 8 * LOG_VOLUME_RATIO) + (grown - *(f8u *)(past + 8 * OWN_DILATATION)) * on;
-    const f8 p = Laws::mean_pressure(t, Laws::mean_bulk(t), Strain::volume(H), relief, wave);
-    *(f8u *)(past + 8 * LOG_VOLUME_RATIO) = relief;
+    const f8 log_volume_ratio = *(f8u *)(past + 8 * LOG_VOLUME_RATIO) + (grown - *(f8u *)(past + 8 * OWN_DILATATION)) * on;
+    const f8 p = Laws::mean_pressure(t, Laws::mean_bulk(t), Strain::volume(H), log_volume_ratio, wave);
+    *(f8u *)(past + 8 * LOG_VOLUME_RATIO) = log_volume_ratio;
     *(f8u *)(past + 8 * PRESSURE) = p * on;
     if (field.relaxes) wave *= stiffening(field, (const int *)(q + 8 * MT));
     wave2 = Simd::high(wave2, on * wave / t.rho);
@@ -271,7 +271,7 @@ struct Gather {
     fill(field, block, arena);
     for (int s = block[0]; s < block[1]; s += 8)
       batch(world, field, block, s, arena, dilatation, least, most);
-    if (field.swells)
+    if (field.uses_mean_dilatation)
       for (int s = block[0]; s < block[1]; s += 8) press(field, block, s, dilatation);
   }
   void report(double *row) const {

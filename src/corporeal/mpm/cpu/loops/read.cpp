@@ -49,9 +49,9 @@ struct Read {
     row[9] += 0.5 * m * (v2 + spread * c2);
     if (!t[RIGID]) {
       const mpm::Material<float> kind = {t[LAW], t[MU], t[LAMBDA]};
-      const double bulk = R.swells ? mpm::Laws<float>::mean_bulk(kind) : 0;
+      const double bulk = R.uses_mean_dilatation ? mpm::Laws<float>::mean_bulk(kind) : 0;
       double psi = mpm::stored_energy(law, t[MU], t[LAMBDA] - bulk, H);
-      if (R.swells) psi += mpm::mean_energy(law, bulk, H, past[8 * LOG_VOLUME_RATIO + l]);
+      if (R.uses_mean_dilatation) psi += mpm::mean_energy(law, bulk, H, past[8 * LOG_VOLUME_RATIO + l]);
       row[10] += q[8 * VO + l] * psi;
     }
     if (branch) row[11] += q[8 * VO + l] * held(t, branch, l);

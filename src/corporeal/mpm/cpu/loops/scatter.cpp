@@ -79,7 +79,7 @@ struct Scatter {
     const int row[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     const int n = block[1] - s < 8 ? block[1] - s : 8;
     f8 press = zero;
-    if (field.swells)
+    if (field.uses_mean_dilatation)
       press = pressure.mean(ClusterMean::of(q, block), n) * *(f8u *)(q + 8 * VO) * (float)(-4.0 / world->dx);
     for (int j = 0; j < 3; j++) {
       a[j][0] = zero;
@@ -128,7 +128,7 @@ struct Scatter {
     double work = 0;
     int low[3], high[3];
     ClusterMean pressure;
-    if (field.swells) sum(field, block, pressure);
+    if (field.uses_mean_dilatation) sum(field, block, pressure);
     int *box = field.box + 6 * ((block - field.block) / BLOCK_INTEGERS);
     Simd::box(field, block, box);
     Simd::range(block, box, low, high);

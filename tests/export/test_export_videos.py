@@ -1,4 +1,4 @@
-"""Films as GLB, Alembic and splats, read again and posed at several instants."""
+"""Videos as GLB, Alembic and splats, read again and posed at several instants."""
 
 import json
 import shutil
@@ -60,7 +60,7 @@ def test_a_finer_tolerance_is_kept_with_more_modes(played, written, tmp_path):
 
 def test_a_changed_frame_is_found(written, asked):
     folder = written(write_animated_glb)
-    document, binary = opened(folder / "film.glb")
+    document, binary = opened(folder / "video.glb")
     (block,) = rigid(asked)
     node = document["nodes"].index(node_of(block, document))
     (channel,) = (
@@ -75,12 +75,12 @@ def test_a_changed_frame_is_found(written, asked):
     keys = np.frombuffer(data, "<f4", accessor["count"] * 3, start).reshape(-1, 3).copy()
     keys[-1, 0] += 0.01
     data[start : start + keys.nbytes] = keys.tobytes()
-    (folder / "film.glb").write_bytes(pack_glb(document, bytes(data)))
+    (folder / "video.glb").write_bytes(pack_glb(document, bytes(data)))
     assert check_target("glb", folder, asked).measured["vertex_off_m"] > 5e-3
 
 
 def test_times_begin_at_zero_and_nodes_say_what_they_are_made_of(written, asked):
-    document, _ = opened(written(write_animated_glb) / "film.glb")
+    document, _ = opened(written(write_animated_glb) / "video.glb")
     times = document["accessors"][document["animations"][0]["samplers"][0]["input"]]
     assert times["min"] == [0.0] and times["max"] == pytest.approx([0.1])
     for solid in asked.scene.solids:
@@ -92,14 +92,14 @@ def test_times_begin_at_zero_and_nodes_say_what_they_are_made_of(written, asked)
 
 
 def test_weights_of_targets_need_no_clipping(written):
-    film = read_animated_glb(written(write_animated_glb) / "film.glb")
-    weights = [v for (_, path), v in film.tracks.items() if path == "weights"]
+    video = read_animated_glb(written(write_animated_glb) / "video.glb")
+    weights = [v for (_, path), v in video.tracks.items() if path == "weights"]
     assert weights
     assert all(w.min() >= 0 and w.max() <= 1 for w in weights)
 
 
 def test_a_scene_before_any_simulation_is_a_still(written, settled):
-    document, _ = opened(written(write_animated_glb, settled) / "film.glb")
+    document, _ = opened(written(write_animated_glb, settled) / "video.glb")
     assert "animations" not in document
 
 
@@ -118,7 +118,7 @@ def test_the_khronos_validator_finds_nothing(written, asked):
         f"{asks}.validateBytes(new Uint8Array(require('fs').readFileSync(process.argv[1])))"
         ".then(r => console.log(r.issues.numErrors, r.issues.numWarnings))"
     )
-    path = written(write_animated_glb) / "film.glb"
+    path = written(write_animated_glb) / "video.glb"
     said = subprocess.run(["node", "-e", script, str(path)], cwd=ROOT, capture_output=True)
     assert said.stdout.split() == [b"0", b"0"], said.stderr
 
@@ -134,7 +134,7 @@ def test_alembic_holds_every_shape(written, asked):
 
     folder = written(write_alembic)
     assert check_target("abc", folder, asked).measured["vertex_off_m"] < 1e-6
-    top = Abc.IArchive(str(folder / "film.abc")).getTop()
+    top = Abc.IArchive(str(folder / "video.abc")).getTop()
     for solid in asked.scene.solids:
         node = AbcGeom.IXform(top, solid.name)
         said = Abc.IStringProperty(node.getSchema().getUserProperties(), "corporeal").getValue()
@@ -151,7 +151,7 @@ def test_alembic_faces_turn_clockwise_seen_from_outside(written, asked):
 
     from corporeal.export.alembic_writer import write_alembic
 
-    top = Abc.IArchive(str(written(write_alembic) / "film.abc")).getTop()
+    top = Abc.IArchive(str(written(write_alembic) / "video.abc")).getTop()
     (block,) = rigid(asked)
     schema = AbcGeom.IPolyMesh(
         AbcGeom.IXform(top, block.name), f"surface_{block.surface_numbers[0]}"
@@ -202,7 +202,7 @@ def test_gaussians_go_where_the_surfaces_go(played, asked, written):
     moved = np.concatenate(_surfaces(asked))
     np.testing.assert_allclose(last.mean[:-1], moved, atol=2e-3)
     np.testing.assert_allclose(last.mean[-1], 1.0)
-    said = json.loads((folder / "film.json").read_text())
+    said = json.loads((folder / "video.json").read_text())
     assert said["fps"] == asked.scene.fps and said["parts"]
     assert check_target("splats", folder, asked).measured == {"frames_missing": 0.0, "counts": 1.0}
 

@@ -1,4 +1,4 @@
-"""A film drawn from Gaussians shows the matter's motion."""
+"""A video drawn from Gaussians shows the matter's motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -192,8 +192,8 @@ def greenish(picture):
 
 
 @pytest.fixture(scope="module")
-def films(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("films")
+def videos(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("videos")
     played = made_of(play(np.eye(3), (0.0, 0.0, 0.6)), *together(clad(0), clad(1)))
     made = render_video(played, SMALL, folder / "gaussians")
     render_video(played, replace(SMALL, look="surfaces"), folder / "surfaces")
@@ -201,29 +201,29 @@ def films(tmp_path_factory):
     return folder
 
 
-def test_a_scene_made_of_gaussians_is_drawn_from_them(films):
-    one, other = still(films / "gaussians", 0), still(films / "surfaces", 0)
+def test_a_scene_made_of_gaussians_is_drawn_from_them(videos):
+    one, other = still(videos / "gaussians", 0), still(videos / "surfaces", 0)
     assert reddish(one).mean() > 0.1 and not greenish(one).any()
     assert greenish(other).mean() > 0.1 and not reddish(other).any()
     both = reddish(one) & greenish(other)
     assert both.sum() > 0.8 * max(reddish(one).sum(), greenish(other).sum())
 
 
-def test_things_of_gaussians_cast_shadows_on_the_usual_floor(films):
-    one, other = still(films / "gaussians", 2), still(films / "surfaces", 2)
+def test_things_of_gaussians_cast_shadows_on_the_usual_floor(videos):
+    one, other = still(videos / "gaussians", 2), still(videos / "surfaces", 2)
     floor = ~binary_dilation(reddish(one) | greenish(other), iterations=5)
     assert floor.mean() > 0.3
     assert np.abs(one - other)[floor].mean() < 3.0, "the same floor with the same shadows"
     assert one[floor].min() < 0.8 * np.median(one[floor]), "there is a shadow"
 
 
-def test_the_picture_follows_the_motion(films):
-    first, last = (np.argwhere(reddish(still(films / "gaussians", k))) for k in (0, 2))
+def test_the_picture_follows_the_motion(videos):
+    first, last = (np.argwhere(reddish(still(videos / "gaussians", k))) for k in (0, 2))
     assert first[:, 0].min() > last[:, 0].min() + 5, "the second cube was lifted"
 
 
 def test_what_stands_still_is_carried_and_lit_once(tmp_path, monkeypatch):
-    """As in most films of photographs that say nothing of what is to happen."""
+    """As in most videos of photographs that say nothing of what is to happen."""
     carried, carry = [], stage.MovingGaussians.at
     monkeypatch.setattr(
         stage.MovingGaussians, "at", lambda *given: carried.append(1) or carry(*given)
@@ -257,6 +257,6 @@ def test_surfaces_can_be_coloured_too(tmp_path):
     assert soft.sum() > 300 and stiff.sum() > 300
 
 
-def test_gaussians_that_are_not_there_cannot_be_filmed(tmp_path):
+def test_gaussians_that_are_not_there_cannot_be_rendered(tmp_path):
     with pytest.raises(UserError, match="look 'surfaces'"):
         render_video(play(), replace(SMALL, look="gaussians"), tmp_path)

@@ -1,11 +1,11 @@
-"""What a picture of a film costs, here and in another checkout, and how far both are from exact.
+"""What a picture of a video costs, here and in another checkout, and how far both are from exact.
 
     git worktree add ../before COMMIT
-    python benchmarks/film.py RUN [RUN ...] --against ../before [--frames N] [--rounds N]
-    python benchmarks/film.py RUN [RUN ...] [--frames N]
+    python benchmarks/video_cost.py RUN [RUN ...] --against ../before [--frames N] [--rounds N]
+    python benchmarks/video_cost.py RUN [RUN ...] [--frames N]
 
-RUN is the folder of a finished run. Without another checkout, what its film shows in some frames,
-liquids too, is cast as the film casts it, on one thread, and its error and processor time are given
+RUN is the folder of a finished run. Without another checkout, what its video shows in some frames,
+liquids too, is cast as the video casts it, on one thread, and its error and processor time are given
 (``PYTHONPATH=../before/src`` gives those of another checkout). With one, each checkout poses and
 casts the same surfaces before the same camera in a process of its own, on one thread; the two take
 turns, so both meet the same machine. Given is processor time per picture, this checkout at
@@ -47,7 +47,7 @@ class Set:
 
 
 def taken(run: Path, frames: int) -> Set:
-    """Read a run and pose its surfaces as its film does, evenly over its time."""
+    """Read a run and pose its surfaces as its video does, evenly over its time."""
     from corporeal.pipeline.results import StageResults
     from corporeal.pipeline.run_pipeline import read_run
     from corporeal.pipeline.stages.video import motion_summary
@@ -114,11 +114,11 @@ def _stage(made: Set) -> Any:
     count = 1 + max(s.object for s in surfaces)
     objects = tuple(SceneObject(f"object_{k}", "thing", 1.0) for k in range(count))
     finishes = tuple(_fit(Finish, f) for f in made.finishes)
-    return RayScene(Scene("film", "", objects, surfaces, finishes))
+    return RayScene(Scene("video", "", objects, surfaces, finishes))
 
 
 def _caster() -> Callable[..., np.ndarray]:
-    """Return what casts the pictures of one film."""
+    """Return what casts the pictures of one video."""
     try:
         from corporeal.render.video_raycaster import VideoRaycaster
     except ImportError:  # the other checkout may be older than that
@@ -142,12 +142,12 @@ def _rms(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sqrt(((a.astype(np.float64) - b) ** 2).mean()))
 
 
-def film_errors(run: Path, frames: int) -> list[tuple[float, float]]:
-    """Return what a run's film shows in some frames, evenly over its time: its error and cost.
+def video_errors(run: Path, frames: int) -> list[tuple[float, float]]:
+    """Return what a run's video shows in some frames, evenly over its time: its error and cost.
 
     The cost is the least processor time [s] of ``TURNS`` casts, the studio known already.
 
-    Of a film of Gaussians, these are the surfaces behind them.
+    Of a video of Gaussians, these are the surfaces behind them.
     """
     from corporeal.pipeline.run_pipeline import read_run, read_run_request
     from corporeal.pipeline.stages.video import frame_scenes
@@ -155,7 +155,7 @@ def film_errors(run: Path, frames: int) -> list[tuple[float, float]]:
     from corporeal.render.video_raycaster import VideoRaycaster
 
     embree.RAY_SAMPLING["exact"] = embree.RaySampling(3, 1, 16)
-    results, config, caster = read_run(run), read_run_request(run).settings.film, VideoRaycaster()
+    results, config, caster = read_run(run), read_run_request(run).settings.video, VideoRaycaster()
     exactly: Callable[..., np.ndarray] = embree.render_image
     found = []
     for stage, aim in frame_scenes(
@@ -218,9 +218,9 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     asked = parser.parse_args()
     if asked.against is None:
-        print("| run | error of its film's pictures [of 255] | time of each [s] |\n|---|---|---|")
+        print("| run | error of its video's pictures [of 255] | time of each [s] |\n|---|---|---|")
         for run in asked.runs:
-            errors, costs = zip(*film_errors(run, asked.frames), strict=True)
+            errors, costs = zip(*video_errors(run, asked.frames), strict=True)
             said = (", ".join(f"{x:.2f}" for x in what) for what in (errors, costs))
             print(f"| {run.name} | {' | '.join(said)} |", flush=True)
         return

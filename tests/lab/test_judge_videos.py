@@ -1,4 +1,4 @@
-"""Films of a short run: what controls do, what is shown and asked, and who may not be judged."""
+"""Videos of a short run: what controls do, what is shown and asked, and who may not be judged."""
 
 import json
 import re
@@ -106,18 +106,18 @@ def test_frozen_stays_reversed_ends_as_it_began_and_slow_takes_four_times_as_lon
 
 
 def test_the_ghost_goes_on_through_the_floor_that_it_met(played):
-    film, end = edit_motion("ghost", played), float(played.trajectory.time[-1])
-    assert min(film.at(end).position[m, 2].max() for m in film.members) < 0.0
+    video, end = edit_motion("ghost", played), float(played.trajectory.time[-1])
+    assert min(video.at(end).position[m, 2].max() for m in video.members) < 0.0
     assert motion_of_run(played).at(end).position[:, 2].min() > -0.01
 
 
 def test_who_gains_rises_two_and_a_half_times_as_far(played):
-    film, ours = edit_motion("gain", played), motion_of_run(played)
+    video, ours = edit_motion("gain", played), motion_of_run(played)
     ledger, time = played.trajectory.ledger, played.trajectory.time
     met = np.nanmin(ledger.first_contact[-1])
     low = int(np.searchsorted(time, met)) - 1
     end = float(time[-1])
-    now, before = (f.centres(np.array([end]))[0, :, 2] for f in (film, ours))
+    now, before = (f.centres(np.array([end]))[0, :, 2] for f in (video, ours))
     (thing,) = np.flatnonzero(now != before)
     rise = before[thing] - ledger.centre[low, thing, 2]
     assert rise > 0.02
@@ -125,7 +125,7 @@ def test_who_gains_rises_two_and_a_half_times_as_far(played):
         GAINED_DISTANCE_RATIO * rise, rel=0.05
     )
     earlier = met - 0.03
-    assert np.array_equal(film.at(earlier).position, ours.at(earlier).position)
+    assert np.array_equal(video.at(earlier).position, ours.at(earlier).position)
 
 
 def test_where_nothing_rests_nothing_glides(played):
@@ -138,8 +138,8 @@ def test_what_rests_glides_aside(played):
     lies = replace(
         played, trajectory=replace(played.trajectory, ledger=replace(ledger, centre=still))
     )
-    film, end = edit_motion("glide", lies), float(played.trajectory.time[-1])
-    way = film.centres(np.array([end]))[0] - motion_of_run(played).centres(np.array([end]))[0]
+    video, end = edit_motion("glide", lies), float(played.trajectory.time[-1])
+    way = video.centres(np.array([end]))[0] - motion_of_run(played).centres(np.array([end]))[0]
     moved = np.linalg.norm(way, axis=1)
     assert sorted(moved > 0.02) == [False, True] and way[:, 2] == pytest.approx([0, 0], abs=1e-6)
 
@@ -216,9 +216,9 @@ def test_a_close_up_of_what_touches_nothing_is_nearer_than_the_dated_pictures(st
         assert near < wide
 
 
-def test_a_film_is_sixteen_pictures_and_looks_come_from_other_sides(played, staging, told):
-    film = motion_of_run(played)
-    one, other = (video_question(film, staging, told, look).pictures for look in (0, 1))
+def test_a_video_is_sixteen_pictures_and_looks_come_from_other_sides(played, staging, told):
+    video = motion_of_run(played)
+    one, other = (video_question(video, staging, told, look).pictures for look in (0, 1))
     assert len(one) == PICTURES_PER_LOOK == 16
     assert {p.shape for p in one} == {(PICTURE_SIZE_PX[1], PICTURE_SIZE_PX[0], 3)}
     assert all(not np.array_equal(a, b) for a, b in zip(one[:-1], other[:-1], strict=True))
@@ -234,21 +234,21 @@ def test_the_facts_say_how_it_starts_and_not_what_happens(told):
 
 
 def test_each_look_has_its_own_order_of_questions_and_it_is_always_the_same(played, staging, told):
-    film = motion_of_run(played)
-    texts = [video_question(film, staging, told, look).text for look in range(len(LOOK_TURNS_DEG))]
+    video = motion_of_run(played)
+    texts = [video_question(video, staging, told, look).text for look in range(len(LOOK_TURNS_DEG))]
     assert len(set(texts)) == len(LOOK_TURNS_DEG)
-    assert texts[0] == video_question(film, staging, told, 0).text
+    assert texts[0] == video_question(video, staging, told, 0).text
     for q in question_catalogue().question:
         assert all(text.count(f"- {q.id}: ") == 1 for text in texts)
 
 
 def test_motions_that_differ_are_named_differently(played, staging):
-    films = [
+    videos = [
         motion_of_run(played),
         *(edit_motion(c, played) for c in EDITED_CONTROLS if c != "glide"),
     ]
-    names = [motion_digest(film, staging) for film in films]
-    assert len(set(names)) == len(films)
+    names = [motion_digest(video, staging) for video in videos]
+    assert len(set(names)) == len(videos)
 
     def nudged(by):
         return VideoMotion(
@@ -274,17 +274,17 @@ def blank(monkeypatch):
 
 @pytest.mark.slow
 def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edited_only, blank):
-    films = gather_videos(
+    videos = gather_videos(
         [SceneRuns("balls", {REFERENCE_METHOD: run, "single": run})], tmp_path, JudgeConfig()
     )
-    conditions = [a.condition for a in films.asked]
+    conditions = [a.condition for a in videos.asked]
     assert "single" in conditions and "control:frozen" in conditions
     config = JudgeConfig(judge=f"ask:{tmp_path / 'asked'}")
     with pytest.raises(PendingQuestionsError, match="questions wait"):
-        query_judge(films, config, lambda words: None)
+        query_judge(videos, config, lambda words: None)
     pages = list((tmp_path / "asked" / "questions").glob("*.md"))
     # The baseline is the same run, and one motion is asked about once.
-    assert len(pages) == len(films.asked) - 1
+    assert len(pages) == len(videos.asked) - 1
     # Pages differ in the order of their questions alone, and are named by motions.
     lines = {tuple(sorted(page.read_text().splitlines())) for page in pages}
     assert len(lines) == 1
@@ -294,7 +294,7 @@ def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edite
 
 
 class Planted:
-    """Answers by what a film is named."""
+    """Answers by what a video is named."""
 
     looks = False
 
@@ -314,15 +314,15 @@ class Planted:
 def judged_by(oracle, run, folder):
     """Three scenes, all the same run: enough to be believed."""
     scenes = [SceneRuns(name, {REFERENCE_METHOD: run}) for name in "abc"]
-    films = gather_videos(scenes, folder, JudgeConfig())
+    videos = gather_videos(scenes, folder, JudgeConfig())
     faults = {c.id: c.questions for c in question_catalogue().control}
     named = {
         a.question.scene: faults[a.condition.removeprefix("control:")][:1]
-        for a in films.asked
+        for a in videos.asked
         if a.condition != REFERENCE_METHOD
     }
     judge = Planted(named if oracle else {})
-    judged = query_judge(films, JudgeConfig(judge="replay:none"), lambda words: None, judge=judge)
+    judged = query_judge(videos, JudgeConfig(judge="replay:none"), lambda words: None, judge=judge)
     return judged, weigh_judge(judged)
 
 
@@ -351,19 +351,19 @@ def test_who_finds_no_fault_is_believed_of_no_law_and_gives_no_mark(run, tmp_pat
 def test_a_recording_of_another_motion_is_not_found(
     run, played, staging, told, tmp_path, edited_only
 ):
-    films = gather_videos([SceneRuns("balls", {REFERENCE_METHOD: run})], tmp_path, JudgeConfig())
+    videos = gather_videos([SceneRuns("balls", {REFERENCE_METHOD: run})], tmp_path, JudgeConfig())
     from corporeal.vlm.recordings import RecordingClient
 
     kept = tmp_path / "recorded"
-    query_judge(films, JudgeConfig(), lambda words: None, judge=RecordingClient(Planted({}), kept))
+    query_judge(videos, JudgeConfig(), lambda words: None, judge=RecordingClient(Planted({}), kept))
     config = JudgeConfig(judge=f"replay:{kept}")
-    again = query_judge(films, config, lambda words: None)
-    assert len(again.verdicts) == len(films.asked) and again.answered_by == ("planted:1",)
+    again = query_judge(videos, config, lambda words: None)
+    assert len(again.verdicts) == len(videos.asked) and again.answered_by == ("planted:1",)
     end = float(played.trajectory.time[-1])
     other = VideoMotion(played.prepared, lambda time: motion_of_run(played).at(end - time / 2))
-    films.asked.append(VideoQuestion("balls", "other", 0, video_question(other, staging, told, 0)))
+    videos.asked.append(VideoQuestion("balls", "other", 0, video_question(other, staging, told, 0)))
     with pytest.raises(UserError, match="No recording in"):
-        query_judge(films, config, lambda words: None)
+        query_judge(videos, config, lambda words: None)
 
 
 # ---------------------------------------------------------------- what is refused
@@ -377,16 +377,16 @@ def test_what_is_not_physics_is_not_judged(what, words, run, tmp_path, monkeypat
     assert audit_breach(run_audit()) == ""
     assert words in audit_breach(run_audit(**what))
     monkeypatch.setattr(judge_scenes, "read_audit", lambda folder: run_audit(**what))
-    films = gather_videos([SceneRuns("balls", {REFERENCE_METHOD: run})], tmp_path, JudgeConfig())
-    assert films.asked == []
-    assert [(f.condition, words in f.reason) for f in films.failed] == [(REFERENCE_METHOD, True)]
+    videos = gather_videos([SceneRuns("balls", {REFERENCE_METHOD: run})], tmp_path, JudgeConfig())
+    assert videos.asked == []
+    assert [(f.condition, words in f.reason) for f in videos.failed] == [(REFERENCE_METHOD, True)]
 
 
 def test_a_baseline_that_failed_is_a_row_and_the_others_are_judged(run, tmp_path):
     scene = SceneRuns("balls", {REFERENCE_METHOD: run, "capped": tmp_path / "nothing"})
-    films = gather_videos([scene], tmp_path, JudgeConfig(control_scenes=0))
-    assert [a.condition for a in films.asked] == [REFERENCE_METHOD]
-    (failed,) = films.failed
+    videos = gather_videos([scene], tmp_path, JudgeConfig(control_scenes=0))
+    assert [a.condition for a in videos.asked] == [REFERENCE_METHOD]
+    (failed,) = videos.failed
     assert failed.condition == "capped" and "is not a run" in failed.reason
 
 
@@ -397,9 +397,9 @@ def test_looks_are_one_to_three(looks):
 
 
 def test_nobody_to_judge_is_an_error():
-    films = judge_scenes.JudgedVideos([], [], [], {}, [REFERENCE_METHOD])
-    with pytest.raises(UserError, match="Nobody judges"):
-        query_judge(films, JudgeConfig(), lambda words: None)
+    videos = judge_scenes.JudgedVideos([], [], [], {}, [REFERENCE_METHOD])
+    with pytest.raises(UserError, match="No judge"):
+        query_judge(videos, JudgeConfig(), lambda words: None)
 
 
 # ---------------------------------------------------------------- what it costs
@@ -423,18 +423,18 @@ def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_
         many = [
             replace(one, question=replace(one.question, scene=f"film-{k}")) for k in range(count)
         ]
-        films = judge_scenes.JudgedVideos(many, [], [], {}, [REFERENCE_METHOD])
-        return query_judge(films, JudgeConfig(**config), said.append, judge=Asked({}))
+        videos = judge_scenes.JudgedVideos(many, [], [], {}, [REFERENCE_METHOD])
+        return query_judge(videos, JudgeConfig(**config), said.append, judge=Asked({}))
 
     ask(3, judge="openai:gpt-5.4")
-    assert "3 films to judge" in said[0] and "US$ at list prices" in said[0]
+    assert "3 videos to judge" in said[0] and "US$ at list prices" in said[0]
     with pytest.raises(UserError, match="Add --yes"):
         ask(400, judge="openai:gpt-5.4")
     ask(400, judge="openai:gpt-5.4", yes=True)
     with pytest.raises(UserError, match="price of openai:new is not known"):
         ask(1, judge="openai:new")
     ask(400, judge="replay:folder")
-    assert "400 films to judge" in said[0] and said[0].endswith("replay costs nothing.")
+    assert "400 videos to judge" in said[0] and said[0].endswith("replay costs nothing.")
 
 
 # ---------------------------------------------------------------- simulated controls
@@ -443,9 +443,9 @@ def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_
 @pytest.mark.slow
 def test_every_simulated_control_runs_and_is_not_done_twice(run, tmp_path):
     scene = SceneRuns("balls", {REFERENCE_METHOD: run})
-    films = gather_videos([scene], tmp_path, JudgeConfig())
-    assert films.failed == []
-    assert {e.control for e in films.effects} == {*CONTROL_NAMES} - {"glide"}
+    videos = gather_videos([scene], tmp_path, JudgeConfig())
+    assert videos.failed == []
+    assert {e.control for e in videos.effects} == {*CONTROL_NAMES} - {"glide"}
     done = {
         c: (tmp_path / "balls" / f"control-{c}" / "8-simulate" / "meta.json")
         for c in SIMULATED_CONTROLS

@@ -1,4 +1,4 @@
-"""Blender opens a film: ``python blender_film.py FILM OUT.npz FPS SECONDS …``.
+"""Blender opens a video: ``python blender_video.py VIDEO OUT.npz FPS SECONDS …``.
 
 Saves the vertices of every mesh at these instants in the world, +Z up, as NUMBER|PARENT|MESH.
 """

@@ -1,8 +1,8 @@
 """Make the moving picture at the top of the README: three showcase scenes side by side.
 
-    python benchmarks/readme_film.py [--folder runs/showcase] [--sheet FILE]
+    python benchmarks/readme_video.py [--folder runs/showcase] [--sheet FILE]
 
-Simulates each scene at detail draft (what lies in ``--folder`` already is used again), films it,
+Simulates each scene at detail draft (what lies in ``--folder`` already is used again), renders its video,
 and writes docs/images/showcase.webp. All scenes share one clock: a shorter one waits at its end.
 ``--sheet`` writes six instants as a still picture, to look at.
 """
@@ -20,8 +20,8 @@ from corporeal.pipeline.stages.video import VideoConfig
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "showcase.webp"
 PANEL = 300, 225
 """Width and height of a scene in the picture [px]."""
-FILMED = 400, 300
-"""Width and height of its film [px]."""
+VIDEO_SIZE_PX = 400, 300
+"""Width and height of its video [px]."""
 FPS = 60
 """Of the showcase's simulations."""
 EVERY = 1
@@ -39,17 +39,17 @@ INK = (60, 60, 66)
 
 @dataclass(frozen=True)
 class Panel:
-    """One scene and the part of its film that is shown."""
+    """One scene and the part of its video that is shown."""
 
     scene: str
     words: str
     """What the scene shows."""
     left: float = 0.0
-    """Share of the film's width that is cut off at the left."""
+    """Share of the video's width that is cut off at the left."""
     top: float = 0.0
-    """Share of the film's height that is cut off above."""
+    """Share of the video's height that is cut off above."""
     share: float = 1.0
-    """Share of the film's width and height that is kept."""
+    """Share of the video's width and height that is kept."""
 
     def cut(self, picture: Image.Image) -> Image.Image:
         """Return the part that is shown, at the size of a panel, with its words below."""
@@ -71,22 +71,22 @@ PANELS = (
 
 
 def stills(panel: Panel, folder: Path) -> list[Image.Image]:
-    """Simulate and film a scene; return its frames as panels."""
+    """Simulate a scene and render its video; return its frames as panels."""
     run = folder / f"{panel.scene}-draft"
     scene = run_pipeline.write_showcase(panel.scene, run / "input")
-    film = VideoConfig(width=FILMED[0], height=FILMED[1], stills=True)
-    run_pipeline.run([scene], run, Settings(film=film), until="film")
-    paths = sorted((run / STAGE_FOLDERS["film"] / "stills").glob("*.png"))
+    video = VideoConfig(width=VIDEO_SIZE_PX[0], height=VIDEO_SIZE_PX[1], stills=True)
+    run_pipeline.run([scene], run, Settings(video=video), until="video")
+    paths = sorted((run / STAGE_FOLDERS["video"] / "stills").glob("*.png"))
     return [panel.cut(Image.open(path).convert("RGB")) for path in paths[::EVERY]]
 
 
-def side_by_side(films: list[list[Image.Image]]) -> list[Image.Image]:
-    """Join panels of the same instant; a film that is over stays at its last frame."""
+def side_by_side(videos: list[list[Image.Image]]) -> list[Image.Image]:
+    """Join panels of the same instant; a video that is over stays at its last frame."""
     joined = []
-    for instant in range(max(map(len, films))):
-        picture = Image.new("RGB", (len(films) * PANEL[0], PANEL[1]))
-        for column, film in enumerate(films):
-            picture.paste(film[min(instant, len(film) - 1)], (column * PANEL[0], 0))
+    for instant in range(max(map(len, videos))):
+        picture = Image.new("RGB", (len(videos) * PANEL[0], PANEL[1]))
+        for column, video in enumerate(videos):
+            picture.paste(video[min(instant, len(video) - 1)], (column * PANEL[0], 0))
         joined.append(picture)
     return joined
 
