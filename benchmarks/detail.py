@@ -5,7 +5,7 @@
 Each experiment has the grid and the stiffness that the policy gives it. Balls of 10 cm fall on the
 floor at 2 m/s; a column of sand, twice as wide as high, collapses; rollers as wide as the
 showcase's duck hit mud as deep as the heap of scene 1, between smooth walls two cells apart.
-``--docs`` writes docs/detail.md.
+``--docs`` writes docs/reference/resolution-benchmark.md.
 """
 
 import argparse
@@ -42,7 +42,7 @@ from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry
 from corporeal.materials import find_material
 from corporeal.simulation.surface_mark import surface_mark
 
-PAGE = Path(__file__).parents[1] / "docs" / "detail.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "resolution-benchmark.md"
 G = 9.81
 FOAM = Material("foam", Law.NEO_HOOKEAN, 2.5e5, 0.35, 30.0)
 GEL = Material("gel", Law.NEO_HOOKEAN, 1e5, 0.45, 1000.0)
@@ -200,7 +200,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--docs", action="store_true", help="write docs/detail.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument("--workers", type=int, default=min(4, usable_cores()), help="side by side")
     asked = parser.parse_args()
     text = lines(table(asked.workers))
@@ -210,30 +210,26 @@ def main() -> None:
 
 
 HEAD = (
-    "# What detail changes",
+    "# Resolution benchmark",
     "",
-    "Written by `python benchmarks/detail.py --docs`. Each experiment has the grid and the "
-    "stiffness of the treatment policy at `--detail draft`, `normal` and `fine`: 8, 12 and 20 "
-    "cells across its shortest side. The target is within 30 % of fine at draft and within 10 % "
-    "at normal.",
+    "What `--detail` changes. Written by `python benchmarks/detail.py --docs`. Each experiment "
+    "has the grid and the stiffness that the step budget gives at `--detail draft`, `normal` and "
+    "`fine`: 8, 12 and 20 cells across its shortest side. The target is within 30 % of fine at "
+    "draft and within 10 % at normal.",
     "",
 )
 TAIL = (
     "",
     "- Balls of 10 cm hit the floor at 2 m/s. The loss per bounce shrinks with the grid.",
     "- A column of dry sand (φ = 30°), twice as wide as high, runs out on a rough floor; 98 % of "
-    "it stay within the run-out. The difference is in the front, which is thinner than a cell "
-    "(decision 6).",
+    "it stay within the run-out. The difference is in the front, which is thinner than a cell.",
     "- Rollers as wide as the showcase's duck hit mud as deep as the heap of scene 1, in plane "
     "strain: a light one, with the duck's mass per length, at 4.4 m/s, and one of 1500 kg/m³ at "
-    "1.5 m/s. The imprint is measured as in the showcase: the largest fall of the surface in a "
-    "column one cell wide. By the measure of dents, used before decision 88, it was 14.2, 19.1 and "
-    "20.7 mm of the light roller, a miss by a hundredth, and 40.7, 54.2 and 62.2 of the heavy "
-    "one. On coarse grids it is too shallow, by .4 and 1.8 cells at draft. Part of that is "
-    "volumetric locking: with ν = .2 instead of .45 the heavy roller's imprint was 45 and 58 mm "
-    "deep at draft and normal by the older measure.",
+    "1.5 m/s. The imprint is the largest fall of the surface in a column one cell wide. On "
+    "coarse grids it is too shallow, by .4 and 1.8 cells at draft; part of that is volumetric "
+    "locking.",
     "- The dent of the showcase's can is not included: its wall is simulated two cells thick, so "
-    "that each detail dents a different wall ([showcase](showcase.md) lists its known errors).",
+    "that each detail dents a different wall ([showcase](showcase.md#known-errors)).",
     "",
 )
 

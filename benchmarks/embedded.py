@@ -4,7 +4,7 @@
 
 Names and surface values of the parts are recorded in recognition/facts.json, what they are made of
 in recognition/truth.toml. ``--record`` reads the files in FOLDER/objects and FOLDER/ycb again;
-``--docs`` writes docs/recognition.md.
+``--docs`` writes docs/reference/name-recognition-benchmark.md.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from corporeal.core import store
 from corporeal.lab.evaluation import material_evaluation as measured
 from recognition import page
 
-DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
+DOCS = Path(__file__).parents[1] / "docs" / "reference" / "name-recognition-benchmark.md"
 
 
 def main() -> None:

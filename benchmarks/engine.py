@@ -124,7 +124,7 @@ def main() -> None:
     )
     parser.add_argument("--quick", action="store_true", help="fewer particles and substeps")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
-    parser.add_argument("--docs", action="store_true", help="write docs/benchmarks.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument("--history", type=Path, help="add what each cost to this CSV")
     parser.add_argument("--peer", type=Path, help="virtual environment with genesis-world")
     parser.add_argument("--peer-install", type=Path, help="make that environment here, and stop")

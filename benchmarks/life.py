@@ -4,9 +4,9 @@
 
 Every thing goes through the verbs as a scene of a person would: names or materials, walls, the air
 in balls, one word of detail; nothing else can be set. ``--quick`` drops each once, at draft;
-``--docs`` writes docs/life.md. Every drop is written to FILE as it ends; ``--resume`` goes on from
-what is there, which holds as long as the code is the same. Ranges and sources:
-src/corporeal/lab/evaluation/life.toml.
+``--docs`` writes docs/reference/restitution-validation.md. Every drop is written to FILE as it
+ends; ``--resume`` goes on from what is there, which holds as long as the code is the same. Ranges
+and sources: src/corporeal/lab/evaluation/life.toml.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from corporeal.lab.evaluation.rebound_data import (
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.recognition.lexicon import head_terms, name_tokens
 
-DOCS = Path(__file__).parents[1] / "docs"
+DOCS = Path(__file__).parents[1] / "docs" / "reference"
 DETAILS, SEEDS = ("draft", "normal"), (0, 1, 2)
 LEEWAY = 0.03
 """How far from the published range still counts as inside [-]."""
@@ -129,7 +129,7 @@ def _list(names: Sequence[str]) -> str:
 
 
 HEADS = (
-    "thing",
+    "object",
     "detail",
     "published",
     "e",
@@ -162,9 +162,9 @@ def cells(result: Result) -> tuple[str, ...]:
 
 def show(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> None:
     """Print the table and what is met."""
-    table = Table(title="Rebound against life")
+    table = Table(title="Restitution validation")
     for name in HEADS:
-        table.add_column(name, justify="left" if name in ("thing", "detail", "as") else "right")
+        table.add_column(name, justify="left" if name in ("object", "detail", "as") else "right")
     for result in found:
         table.add_row(*cells(result), style=None if result.off <= LEEWAY else "red")
     console = Console()
@@ -174,11 +174,11 @@ def show(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> None:
 
 
 INTRODUCTION = f"""\
-Written by `python benchmarks/life.py --docs`: real things, dropped through the usual verbs with
+Written by `python benchmarks/life.py --docs`: real objects, dropped through the usual stages with
 nothing set but the detail, {len(SEEDS)} seeds each. *e* is the speed after over the speed before,
 *spread* how far the seeds are apart, *off* the distance from the published range, *E* the simulated
-over the real modulus (of a thickened wall much less), *unbooked* what the blow lost to transfers
-between particles and grid, and to no loss that is booked. Rigid things rebound by the
+over the real modulus (of a thickened wall much less), *unbooked* what the impact lost to transfers
+between particles and grid, beyond all booked losses. Rigid objects rebound by the
 coefficient of restitution that was measured of the pair, else by those of their materials. Where a
 height was published, the range is of speeds at the floor: the drag of a sphere in air is taken off
 on both ways. Ranges and sources: `src/corporeal/lab/evaluation/life.toml`."""
@@ -190,14 +190,9 @@ def blind(found: Sequence[Result]) -> str:
     names = ", ".join(r.row.name for r in rows)
     inside = sum(r.off <= LEEWAY for r in rows)
     return (
-        f"{len(rows)} of the things were written down before they were tried ({names}): {AT_FIRST} "
-        f"were in their range ± {LEEWAY} at draft at the first try, before anything was changed; "
-        f"{inside} are now (decisions [54](decisions/0054-heights-fall-through-air.md), "
-        "[65](decisions/0065-what-rules-say-of-balls.md), "
-        "[72](decisions/0072-what-rolls-is-braked-by-loss.md), "
-        "[77](decisions/0077-restitution-at-the-speed-of-a-blow.md), "
-        "[85](decisions/0085-what-is-soft-loses-for-what-is-rigid.md) and "
-        "[96](decisions/0096-mats-are-pressed-as-layers.md))."
+        f"{len(rows)} of the objects were written down before they were tried ({names}): "
+        f"{AT_FIRST} were in their range ± {LEEWAY} at draft at the first try, "
+        f"{inside} are now."
     )
 
 
@@ -213,9 +208,9 @@ def foretold(found: Sequence[Result]) -> str:
     inside = sum(r.off <= LEEWAY for r in rows)
     names = ", ".join(dict.fromkeys(r.row.name for r in found if told(r.row.name)))
     return (
-        f"The names of some balls ({names}) tell what the rules of their sport ask for, and their "
-        f"rows test that it comes out. Of the {len(rows)} other rows {inside} are in their range "
-        f"± {LEEWAY}."
+        f"The names of some balls ({names}) imply the rebound that the rules of their sport ask "
+        f"for, and their rows test that it comes out. Of the {len(rows)} other rows {inside} are "
+        f"in their range ± {LEEWAY}."
     )
 
 
@@ -228,7 +223,7 @@ def contradicted(found: Sequence[Result]) -> Iterator[str]:
             f"These measured the same and contradict each other: {names}. No value is within "
             f"{LEEWAY} of all; {0.5 * (low + high):.3f} would be off by {0.5 * (low - high):.3f}. "
             "They are counted as all others are "
-            "([decision 109](decisions/0109-rows-that-contradict-and-thin-ends.md))."
+            "([decision 109](../decisions/0109-rows-that-contradict-and-thin-ends.md))."
         )
 
 
@@ -238,7 +233,7 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
     used = dict.fromkeys(r.row.source for r in found)
     number = {key: k + 1 for k, key in enumerate(used)}
     lines = [
-        "# Rebound against life",
+        "# Restitution validation",
         "",
         INTRODUCTION,
         "",
@@ -282,7 +277,7 @@ def asked_for() -> argparse.Namespace:
     parser.add_argument("--json", type=Path, help="write every drop to this file")
     parser.add_argument("--resume", action="store_true", help="keep the drops that it holds")
     parser.add_argument("--row", nargs="+", metavar="NAME", help="only these things")
-    parser.add_argument("--docs", action="store_true", help="write docs/life.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument(
         "--workers", type=int, default=min(4, usable_cores()), help="drops side by side"
     )
@@ -316,7 +311,7 @@ def main() -> None:
     met = verdicts(found, wrong)
     show(found, met)
     if asked.docs:
-        (DOCS / "life.md").write_text(page(found, met), encoding="utf-8")
+        (DOCS / "restitution-validation.md").write_text(page(found, met), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ MODELS are folders of models, or a pool that ``corporeal assets index`` made of 
 composed from them by ``corporeal assemble``, by name. Points are spread over what 24 pictures show;
 with ``--gaussians`` the means of Gaussians that are learned from the pictures are told apart, too
 (minutes each). What lies in ``--out`` already is not composed, learned or judged again. ``--docs``
-writes docs/objects.md and its figure.
+writes docs/reference/object-separation-benchmark.md and its figure.
 """
 
 import argparse
@@ -158,7 +158,7 @@ def main() -> None:
     parser.add_argument("models", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("runs/objects"))
     parser.add_argument("--gaussians", action="store_true", help="learn Gaussians of the pairs")
-    parser.add_argument("--docs", action="store_true", help="write docs/objects.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     composed(asked.models, asked.out)
     shown = segmented(asked.out, list(PAIRS) + list(STACKS), gaussians=False)
@@ -182,13 +182,13 @@ def main() -> None:
         words = PAGE
         for name, text in (tables | {"times": "; ".join(costs)}).items():
             words = words.replace(f"{{{name}}}", text)
-        (DOCS / "objects.md").write_text(words, encoding="utf-8")
+        (DOCS / "reference" / "object-separation-benchmark.md").write_text(words, encoding="utf-8")
 
 
-PAGE = """# Separating objects that touch
+PAGE = """# Object separation benchmark
 
-Settled objects touch, so that distance alone does not separate them. `reconstruct.segment` has four
-methods:
+Settled objects touch, so that distance alone does not separate them. The methods are explained in
+[surfaces from Gaussians](../explanation/surfaces-from-gaussians-and-segmentation.md#objects):
 
 | method | needs |
 |---|---|
@@ -197,64 +197,30 @@ methods:
 | the same with instance masks | masks on views; instance numbers need not agree between views |
 | `components` | points; the published rule (20 nearest, connected components), for comparison |
 
-    objects(cloud, count, normals) -> Split           instance of each point, confidence, doubts
-    lifted(weights, labels, points) -> masks          instance of each point as each view has it
-    components(position) -> labels                    the published rule
-    match(similarity) -> pairs                        found objects to named ones (Hungarian method)
-
-## Method
-
-1. **Space.** Where there are Gaussians and cameras, space is carved by what these see, on a grid of
-   a million cells, and points at different connected pieces of the rest are separate. Pieces are
-   taken wider by half of a cell's diagonal, so that carving loses no thin leg, or half a pixel, if
-   that is more: narrower gaps are none
-   ([decision 146](decisions/0146-apart-is-what-cameras-see-between.md)).
-2. **Features** are normalised and reduced to their first 64 principal components.
-3. **Superpoints**, about 2000: k-means over position, features and normal in which a point can only
-   join clusters seeded near it (SLIC).
-4. **Affinity** of adjacent superpoints: exp(-(difference / δ)² / 2 - (concavity / c)² / 2) times
-   the length of their border. δ is 1.5 times the scene's own root mean square feature difference
-   between neighbours; concavity is positive where the surface folds inwards. Where there are
-   instance masks whose numbers cannot be matched between views, the share of views in which the
-   two lie in different instances enters in the same way.
-5. **Graph cuts.** The graph is cut in two, then the piece whose cut is cheapest again, until the
-   given number of objects is reached. A cut costs (cut + 0.003) (1/A + 1/(1-A)) (1 - R²)²: its
-   share of all borders, the imbalance of the two sides, and the share of feature variance that it
-   leaves unexplained. The 0.003 keeps loosely attached fragments from becoming objects. Candidates
-   are sweeps of a normalised cut, and every state that agglomerative merging passes through.
-
-Where instance numbers agree between views, or can be matched by the points that they share, none
-of this is needed: each point takes the instance that most views give it.
-
-If the number of objects is not given, cuts are made up to a cost of 0.018, and a warning says so.
-That value is a guess: it counts textureless objects correctly, and takes legs, flowers and cushions
-for objects of their own.
-
-**Warnings.** A different cut costs less than 1.3 times as much; or an object is thin (less than a
-third as high as wide) and lies on or under another. Both mean: provide instance masks, or check the
-result.
+**Warnings** are given where a different cut costs less than 1.3 times as much, or where an object
+is thin (less than a third as high as wide) and lies on or under another: provide instance masks, or
+check the result.
 
 ## Results
 
-Written by `python benchmarks/objects.py objects/ ycb/ --gaussians --docs`. Pairs are composed
-from public models with `corporeal assemble`; objects side by side are pushed until they touch.
-Points lie on the surface seen in 24 pictures of 256², colours come from the pictures, and features
-are the [descriptor](features.md), which needs no weights. Numbers are the mean IoU of objects after
-Hungarian matching. "Ours" is given the number of objects; "not counted" estimates it (in brackets).
-Masks are exact, numbered anew in each view. `corporeal evaluate objects SCENES` does the same for
-any settled scenes. All is of 27 November 2026; points on surfaces give the figures of the evening
-before.
+Written by `python benchmarks/objects.py objects/ ycb/ --gaussians --docs` on 27 November 2026.
+Pairs are composed from public models with `corporeal assemble`; objects side by side are pushed
+until they touch. Points lie on the surface seen in 24 pictures of 256², colours come from the
+pictures, and features are the [descriptor](../how-to/use-image-features.md), which needs no
+weights. Numbers are the mean IoU of objects after Hungarian matching. "Ours" is given the number of
+objects; "not counted" estimates it (in brackets). Masks are exact, numbered anew in each view.
+`corporeal evaluate objects SCENES` does the same for any settled scenes.
 
 {surface}
 
-![Points of the pairs: colours, true instances, found instances](images/objects.png)
+![Points of the pairs: colours, true instances, found instances](../images/objects.png)
 
 Stacks of thin objects, which warn:
 
 {stacks}
 
-Other pairs. The constants above were chosen with most of these scenes in view, so that no figure on
-this page is of a held-out scene:
+Other pairs. Constants were chosen with most of these scenes in view, so that no figure on this page
+is of a held-out scene:
 
 {more}
 
@@ -263,25 +229,20 @@ together):
 
 {gaussians}
 
-- **Can and vase by Gaussians**: the vase's plain neck has 13 long Gaussians, whose means leave a
-  gap that counted as space between two objects (.44 until decision 146). Without each time another
-  2 % of the Gaussians, seven of seven give 1.00 now; where their number is not given, five of seven
-  count 5 objects (.91).
+- **Can and vase by Gaussians**: 1.00 in seven of seven draws of 98 % of the Gaussians; where the
+  number is not given, five of seven count 5 objects (.91).
 - **Teddy on couch** fails: both are off-white without texture, and the couch is made of loose
-  cushions. **Cat on table** is borderline: the cat nearly covers the table's width, and whether it
-  or half the table is cut off depends on the sampled points. **Duck on armchair** fails: cushions
-  differ more from the frame than from the duck. Instance masks resolve all three; two of them warn.
-- **What warns is not reproducible.** With 19,000 to 22,000 points (`corporeal evaluate objects
-  SCENES --surface-points N`, 26 November 2026) three packets are separated with .39 to .99, cat on
-  table with .33 to .51, duck on armchair with .34 to .48. Ball on box, which does not warn, keeps
-  .98 to .99, but its objects, where their number is not given, are counted as 2 to 4. Of
-  pairs composed anew, cat on table had .39 and warned that morning, and does not with .33; lamp
-  beside armchair warns now, and three packets went from .81 to .98.
+  cushions. **Cat on table** is borderline: the cat nearly covers the table's width. **Duck on
+  armchair** fails: cushions differ more from the frame than from the duck. Instance masks resolve
+  all three; two of them warn.
+- **Pairs that warn are not reproducible.** With 19,000 to 22,000 points (`corporeal evaluate
+  objects SCENES --surface-points N`) three packets are separated with .39 to .99, cat on table with
+  .33 to .51, duck on armchair with .34 to .48. Ball on box, which does not warn, keeps .98 to .99,
+  but is counted as 2 to 4 objects where their number is not given.
 - **Normals** matter. Without them they are estimated from the points and oriented upwards at the
-  highest point. That is as good for most pairs, and much worse for some (bottle beside box, cat on
-  table): give normals where cameras tell the outside.
-- **No number here comes from learned features.** CLIP features would separate by what objects are;
-  how much better that is must be measured with the weights.
+  highest point, which is much worse for some pairs (bottle beside box, cat on table).
+- **No number here comes from learned features.** CLIP features separate by what objects are; how
+  much better that is must be measured with the weights.
 
 ## Speed
 

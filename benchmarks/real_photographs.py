@@ -6,10 +6,10 @@
 Each folder in FOLDER with ``images`` and a COLMAP model, ``sparse/0``, is a set; it may have
 ``masks``. It is reconstructed in up to four cases: with all that it has, without its masks, without
 its poses, and from the photographs alone (bare); or, where it has ``video.mp4`` whose frames have
-the numbers of its images, from the video. Measured are: photographs registered, of these the
+the numbers of its images, from that video. Measured are: photographs registered, of these the
 share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
 whole and on objects; the angle between up and the normal of the plane with the most sparse points,
-where the object is known to stand on one; sides of all things together against what the set's
+where the object is known to stand on one; sides of all objects together against what the set's
 ``known.toml`` or ``real_sets.toml`` states, the one that is farthest off, and against a second
 yardstick where these have one (for made sets all that is there, what nobody sees included);
 intersection over union of the closed surfaces' silhouettes with the masks of the set, mean and
@@ -52,12 +52,12 @@ ALONE: tuple[Case, ...] = ("bare", "video")
 VIDEO = "video.mp4"
 HEADS = (
     "set", "given", "training", "registered", "right", "rotation off", "place off",
-    "held out, thing [dB]", "up off", "size off", "IoU, worst", "one closed piece", "minutes",
+    "held out, object [dB]", "up off", "size off", "IoU, worst", "one closed piece", "minutes",
     "why not",
 )  # fmt: skip
-DOCS = Path(__file__).parents[1] / "docs"
-TITLES = {"real": "Real photographs", "made": "Made photographs"}
-"""Of the pages, each ``docs/KIND-photographs.md``."""
+DOCS = Path(__file__).parents[1] / "docs" / "reference"
+TITLES = {"real": "Real photographs benchmark", "made": "Rendered photographs benchmark"}
+"""Of the pages, each at `page_of` its kind."""
 MADE = (
     "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
 )
@@ -188,7 +188,7 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     good = "–"
     if "watertight" in row:
         pieces = row["objects"] == 1 and row["pieces"] == [1]
-        good = "yes" if row["watertight"] and pieces else f"{row['things']} things"
+        good = "yes" if row["watertight"] and pieces else f"{row['things']} objects"
     return (
         row["set"],
         WORDS[row["case"]],
@@ -212,6 +212,12 @@ def with_more(note: str, more: str) -> str:
     return f"{note.removesuffix('.')}. {more}" if note and more else note or more
 
 
+def page_of(kind: str) -> Path:
+    """Return the page of real or of made photographs."""
+    name = {"real": "real", "made": "rendered"}[kind]
+    return DOCS / f"{name}-photographs-benchmark.md"
+
+
 def write_docs(
     rows: list[dict[str, Any]],
     table: list[tuple[str, ...]],
@@ -228,16 +234,16 @@ def write_docs(
     lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in table]
-    lines += ["", "## What is known of the sets", ""]
+    lines += ["", "## Sets", ""]
     more = beside.get("sets", {})
     notes = {f.name: with_more(measure.known(f).note, more.get(f.name, "")) for f in folders}
     lines += [f"- *{name}*: {note}" for name, note in notes.items() if note]
-    lines += ["", "## What runs from photographs alone said", ""]
+    lines += ["", "## Messages of runs from photographs alone", ""]
     for row in rows:
         if row["case"] in ALONE:
             warnings = " ".join(row.get("warnings", [])) or row.get("why", "Nothing.")
             lines += [f"- *{row['set']}* at {row['training']}: {warnings}"]
-    (DOCS / f"{kind}-photographs.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    page_of(kind).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def sets_in(folder: Path, only: Sequence[str], refuse: Callable[[str], NoReturn]) -> list[Path]:

@@ -68,58 +68,27 @@ ASIDE = 0.01
 Detail = Literal["draft", "normal", "fine"]
 Training = Literal["draft", "normal"]
 FOUND = (
-    "- Photographs were taken and learned from once, on 26 November 2026, by code that learns as "
-    "today's does. All that follows is of the code of 27 November in five "
-    "rows, and masses and motion of *tree-and-ball-in-sand*; its surfaces, and all of "
-    "*lamp-on-couch*, are of the day before, after [119](decisions/"
-    "0119-what-is-soft-bridges-no-hollow.md): not done again for want of time. The rule of "
-    "[125](decisions/0125-what-masks-need-is-not-taken-away.md) gives nothing back to the sand; to "
-    "the lamp, on coarse cells, .9 %. The day before the rows said -9.6, +3.7, -1.7, -.5, +4.8, "
-    "-8.6 and -5.5 %. Worse is now the plant, by .4 points (41 g: its surface has 37 cm² less), "
-    "and the duck on mud ends farther off, by less than its spread (.6 to .9 %); nearer are the "
-    "ball of steel, duck and can, and the ends of vase, ball, can and tree. Before "
-    "[97](decisions/0097-surfaces-where-photographs-agree.md) the same photographs gave -10.2, "
-    "+6.5, -14.7, -4.6, +15.2, -26.7 and -11.5 %, before "
-    "[101](decisions/0101-what-no-camera-looks-into-is-not-empty.md) -9.0, +3.6, -16.3, -.8, +5.8, "
-    "-25.9 and -11.7 %; rows of 22 November, of older code, said -.2, +6.4, -15.1, -.4, +7.0, "
-    "-13.6 and +2.7 %.",
+    "- Photographs and training are of 26 November 2026, reconstruction and motion of 27 "
+    "November, surfaces of *tree-and-ball-in-sand* and all of *lamp-on-couch* of the day before.",
     "- Balls of rubber and mud keep their mass within a percent or so; the steel ball, a mirror, "
-    "lacks 3.6 %, and lacked 11 % before "
-    "[125](decisions/0125-what-masks-need-is-not-taken-away.md). The duck that is to weigh 74 g "
-    "weighs 80, its beak being solid and large; the can a quarter too little: its tab is not "
-    "described, and its wall is what is left.",
+    "lacks 3.6 %. The duck that is to weigh 74 g weighs 80, its beak being solid and large; the "
+    "can a quarter too little: its tab is not described, and its wall is the rest.",
     "- Where objects fly, bounce or topple, small differences grow. End positions of the model's "
-    "balls, lamp and vase depend on the particle sampling only within the own spread. A ball that "
-    "is reconstructed leaves its bounces at an angle: an offset of a tenth of a millimetre "
-    "suffices, where a pixel covers .6 mm, and its unobserved underside is rounded by guess. The "
-    "duck that hits a can at 6 m/s ends anywhere.",
+    "balls, lamp and vase depend on the particle sampling only within the own spread. A ball "
+    "that is reconstructed leaves its bounces at an angle: an offset of a tenth of a millimetre "
+    "suffices, where a pixel covers .6 mm, and its unobserved underside is a guess.",
     "- Boards of 16 mm come out 4 % too heavy. No view shows how deep the vase is hollow: its "
     "reconstruction is closed below the neck, so that the wall is counted across the mouth.",
-    "- The couch's own volume is right to 5 %, but the panels of its plywood base that lie below "
-    "the cushions are in no picture, and the border between plywood and foam shows in no colour; "
-    "only the description gives it, by height. Its textureless seat is reconstructed only "
-    "because some Gaussians begin inside the visual hull ([decision "
-    "15](decisions/0015-a-small-training-tells-where-to-begin.md)). Its plywood is weighed by the "
-    "area of its faces. Its underside and sides are there (2.3 of 2.08 m²); its top, 1.18 m² under "
-    "the seat, which no picture shows, is there since foam bridges no hollow ([119](decisions/"
-    "0119-what-is-soft-bridges-no-hollow.md)): 36.2 of 35.2 kg, 27.2 before. That is nearer than "
-    "its parts are: the low end of the arms counts as plywood's, too, which has 23.8 of 19.7 kg "
-    "(14.9 before), while the foam lacks 2.5 kg.",
+    "- The couch's volume is right to 5 %, but the panels of its plywood base below the cushions "
+    "are in no picture, and no colour shows the border between plywood and foam. Its mass, 36.2 "
+    "of 35.2 kg, is nearer than its parts: plywood has 23.8 of 19.7 kg, the foam lacks 2.5 kg.",
     "- The lamp lacks 14 %: its foot, reconstructed with a dent, is too light, and its shade, "
     "uneven inside and merged with bulb and wires, too heavy.",
-    "- The heap of sand had seven litres of caverns behind faces of faint Gaussians, which "
-    "[101](decisions/0101-what-no-camera-looks-into-is-not-empty.md) closes: on the floor of "
-    "then its surface enclosed 91.6 of 95.6 litres instead of 84.5; it encloses 90.5 now. Its rim "
-    "is 2 cm too low, 3 litres, because Gaussians there lie below the face, where the sand is "
-    "plain and no picture says otherwise "
-    "([125](decisions/0125-what-masks-need-is-not-taken-away.md)); a pit is left beside the trunk.",
-    "- The plant's soil fills the pot below its surface since [107](decisions/"
-    "0107-soil-does-not-lie-over-air.md): 6.5 of 6.8 litres, where each place inside went with the "
-    "nearest face and 4.4 litres behind the pot's wall were air (-26.7 %). Of the .9 kg that it "
-    "lacks .5 are the pot's, .2 the trunk's, .2 soil. The model has become heavier since "
-    "22 November, "
-    "too. A crown is weighed by the area of its leaves, within a factor of two; feet in sand or a "
-    "pot, which no picture shows, are guessed.",
+    "- The heap of sand encloses 90.5 of 95.6 litres: its rim is 2 cm too low, because Gaussians "
+    "there lie below the face, where the sand is plain.",
+    "- Of the .9 kg that the plant lacks .5 are the pot's, .2 the trunk's, .2 soil. A crown is "
+    "weighed by the area of its leaves, within a factor of two; feet in sand or a pot, which no "
+    "picture shows, are guessed.",
 )
 HEADS = (
     "scene",
@@ -132,7 +101,7 @@ HEADS = (
     "own spread",
     "quality [dB]",
 )
-DOCS = Path(__file__).parents[1] / "docs" / "round-trip.md"
+DOCS = Path(__file__).parents[1] / "docs" / "reference" / "reconstruction-round-trip.md"
 
 
 def settings(detail: Detail, seed: int = 0) -> Settings:
@@ -393,7 +362,7 @@ def cells(row: dict) -> tuple[str, ...]:
 def write_docs(rows: list[dict], said: str) -> None:
     """Write the table as a page."""
     about = " ".join((__doc__ or "").partition("\n\nEach scene")[2].split())
-    lines = ["# Round trip: a scene reconstructed from photographs of itself", ""]
+    lines = ["# Reconstruction round trip", ""]
     lines += [f"Written by `{said}`. Each scene {about}", ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cells(row)) + " |" for row in rows]
@@ -408,7 +377,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("runs/round-trip"))
     parser.add_argument("--detail", default="draft")
     parser.add_argument("--training", default="normal")
-    parser.add_argument("--docs", action="store_true", help="write docs/round-trip.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     rows = []
     for source in asked.scenes:

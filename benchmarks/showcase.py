@@ -3,10 +3,10 @@
     python benchmarks/showcase.py [SCENE ...] [--detail draft normal ...] [--no-run] [--json FILE]
                                   [--docs]
 
-``--docs`` writes the tables into docs/showcase.md; it needs all scenes at the first detail. Runs
-that lie in ``--folder`` already are not repeated: remove it to measure again. They lie there as
-``corporeal evaluate dynamics showcase`` lays its own out, so that ``--folder dynamics`` tells of
-those; with ``--no-run`` what was not run yet is left out.
+``--docs`` writes the tables into docs/reference/showcase.md; it needs all scenes at the first
+detail. Runs that lie in ``--folder`` already are not repeated: remove it to measure again. They
+lie there as ``corporeal evaluate dynamics showcase`` lays its own out, so that ``--folder
+dynamics`` tells of those; with ``--no-run`` what was not run yet is left out.
 """
 
 import argparse
@@ -34,7 +34,7 @@ from corporeal.showcase.scene_expectations import SCENE_EXPECTATIONS
 from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS
 from corporeal.simulation.audit_messages import breach_messages, passage_message
 
-PAGE = Path(__file__).parents[1] / "docs" / "showcase.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "showcase.md"
 BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"
 
 

@@ -8,7 +8,7 @@ pictures. Gaussians are learned from pictures and masks of things (kept in ``--o
 by the nearest model, so that only the making of solids is judged. Scenes behind ``--clad`` are not
 learned: flat Gaussians lie on the models' own surfaces, as a perfect training would put them.
 Inside is where the generalised winding number says so, of the solid and of the model. Time is the
-processor's, divided by two. ``--docs`` writes docs/solids.md.
+processor's, divided by two. ``--docs`` writes docs/reference/surface-reconstruction-benchmark.md.
 """
 
 import argparse
@@ -31,7 +31,7 @@ from corporeal.reconstruction.gaussians.training_schedule import TrainConfig
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface, build_closed_surfaces
 from corporeal.reconstruction.surface.surface_config import ClosedSurfaceConfig
 
-PAGE = Path(__file__).parents[1] / "docs" / "solids.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "surface-reconstruction-benchmark.md"
 CORES = 2
 SURFACES = ClosedSurfaceConfig(threads=CORES)
 """How finely surfaces are carved."""
@@ -155,7 +155,7 @@ def main() -> None:
     parser.add_argument("--clad", nargs="*", type=Path, default=[])
     parser.add_argument("--preset", default="draft", choices=["draft", "normal"])
     parser.add_argument("--out", type=Path, default=Path("runs/solids"))
-    parser.add_argument("--docs", action="store_true", help="write docs/solids.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     rows = [*TABLE]
     jobs = [(f, asked.preset) for f in asked.scenes] + [(f, None) for f in asked.clad]
@@ -174,101 +174,44 @@ TABLE = (
     "|---|---|---:|---|---:|---:|---:|---:|---:|---:|---:|---:|",
 )
 HEAD = (
-    "# Solids from Gaussians",
+    "# Surface reconstruction benchmark",
     "",
-    "A Gaussian splat has no inside and no outside. To weigh, fill and simulate its objects, "
-    "`corporeal.reconstruction.surface.closed_surface` extracts one closed surface per object:",
-    "",
-    "    solids(gaussians, object_of_gaussian, cameras, masks) -> tuple[Solid, ...]",
-    "",
-    "1. **Depth rendering.** The Gaussians are rendered from every camera of the input. A ray "
-    "hits the surface where its transmittance has fallen by 15 %, one standard deviation before "
-    "the densest point of that Gaussian along the ray: Gaussians learned with masks lie inside "
-    "the silhouette by about that much. A pixel with transmittance above one half counts as "
-    "empty.",
-    "2. **Carving.** For each cell of a grid of a million cells around the object, all views "
-    "give its signed distance to their depth maps; the value is a quantile: up to four in ten of "
-    "the views that see the cell may call it emptier. Cells that no view observes, inside and "
-    "below, are interpolated with about the least surface area. So the unobserved surface, below "
-    "a seat or deep in a vase, is a guess. Objects thinner than six cells on average are carved "
-    "again on a tighter grid of up to four million cells, no finer than the pixels.",
-    "3. **Floor.** The surface is cut off flat at the floor. An object that seems to lie below "
-    "the floor becomes a plate on it, at least 1.5 cells thick.",
-    "4. **Assignment.** Where objects touch, each point of space is assigned to the object with "
-    "the nearer Gaussians, and deep inside to the one whose part of the common surface has the "
-    "larger generalised winding number. The interface between two objects therefore spans the "
-    "rim of their contact. Floor and background (label -1) occlude, but are not extracted.",
-    "5. **Surface.** Marching cubes; separate components below 2 % are dropped, a warning tells "
-    "of more than one; Taubin smoothing, which does not shrink.",
-    "6. **Silhouette fit.** Rendered depth of textureless or glossy objects is biased by a pixel "
-    "or two; masks are not. Where there are masks, the surface is deformed until its silhouettes "
-    "match them. An unobserved patch is replaced by one of least bending energy where the "
-    "normals around it are close to its own, as below a ball; noise in the surrounding surface, "
-    "finer than a tenth of the patch and than two cells, is smoothed first because it would tilt "
-    "the patch. Elsewhere the patch stays as interpolated. Vertices get the colours that the "
-    "cameras see. A warning tells when winding numbers of the surface and the carved cells "
-    "disagree in more than 1 % of the cells.",
-    "7. **Overlap removal.** Objects are carved and fitted on their own grids, so that touching "
-    "objects end up overlapping by a cell or two near the rim of their contact. Vertices inside "
-    "another object move half of the way out, up to 14 times, in both objects, so that the two "
-    "meet in a common face; tangential smoothing keeps triangles from folding. All other "
-    "vertices stay, none passes through the floor, and the connectivity is unchanged, so that "
-    "closed surfaces stay closed. Where less than nine tenths of an overlap can be removed this "
-    "way, because one object passes through the other, or where it is six cells deep, both "
-    "surfaces are left unchanged; `assemble` warns of the overlap.",
-    "",
-    "## Accuracy",
+    "Closed surfaces of objects learned from posed pictures, compared with the models that were "
+    "rendered. How they are made: [surfaces from "
+    "Gaussians](../explanation/surfaces-from-gaussians-and-segmentation.md#closed-surfaces).",
     "",
     "Written by `python benchmarks/solids.py scenes/box scenes/duck scenes/can scenes/bowl "
     "scenes/chair scenes/pair --clad scenes/bowl scenes/chair --docs`: 48 views at 256 × 256, "
-    "Gaussians learned with the preset `draft`, extracted surfaces compared with the models. The "
-    "scenes are made by",
+    "Gaussians learned with the preset `draft`. The scenes are made by",
     "",
     "    corporeal assemble --from models/ --name box --seed 1 --assets 004_sugar_box --views 48 "
     "--size 256 256",
     "",
     "with `duck_khronos`, `soda_can_coke`, `024_bowl` and `chair_smallhouse_a` likewise, and "
     "`--name pair --seed 7 --assets duck_khronos soda_can_coke`, which stacks the two. Each "
-    "object is about half a metre large in its scene, so that a pixel covers 2 to 3 mm. Volume: "
-    "error relative to the model's. Overlap: intersection over union of the volumes. Distances "
-    "are means over the surface, in cells. In another: the largest depth of the surface inside "
-    "other objects, and the share of its volume that lies in them.",
+    "object is about half a metre large, so that a pixel covers 2 to 3 mm. *Clad*: Gaussians are "
+    "placed on the true surface in place of learned ones. Volume: error relative to the model's. "
+    "Overlap: intersection over union of the volumes. Distances are means over the surface, in "
+    "cells. In another: the largest depth of the surface inside other objects, and the share of "
+    "its volume that lies in them.",
     "",
 )
 TAIL = (
     "",
-    "- Volumes of compact objects are within two percent, also where they touch, and their "
-    "surfaces an eighth to a third of a cell from the models'. Without step 6 it was up to three "
-    "percent, and two to three times the distance.",
-    "- Pair: without step 7 the duck lay up to 1.0 cells deep in the can and the can up to 2.0 "
-    "cells in the duck, with 0.08 % of their volumes in common. The remaining overlap lies along "
-    "the rim, where step 6 leaves thin self-intersections and inside and outside are ambiguous. "
-    "Step 7 takes two seconds.",
-    "- The chair is black and textureless. Its pictures do not constrain the depth of the seat "
-    "between the arms, so that the learned Gaussians themselves are off by centimetres there, "
-    "which carving cannot correct. With Gaussians placed on its true surface (clad) the result "
-    "has all four legs, 4 pixels wide, and a seat closed from below, where no camera looked.",
-    "- The wall of the bowl is 2 to 3 mm thick, about a pixel and a cell. With Gaussians on its "
-    "true surface the intersection over union is .46, two fifths on the grid of a million cells "
-    "alone. Learned, its textureless inside lies too high, and the wall comes out three times as "
-    "thick as in life on any grid. State the wall thickness where the mass matters.",
-    "- Legs and boards gain most from the tighter grid: the wooden armchair of the round trip, "
-    "with boards of 16 mm and pixels of 8 mm, came out a quarter too heavy on cells of 12 mm and "
-    "a seventh too heavy on cells of 7 mm.",
-    "",
-    "## Videos",
-    "",
-    "`corporeal video` draws a scene that was made of Gaussians from them: each is bound at the "
-    "start to the nearest particles of its own object, with the same skinning weights as mesh "
-    "vertices. Its covariance becomes F Σ F^T, and its spherical harmonics turn with the "
-    "rotation of F. Gaussians of floor and background stand still. Behind them are the usual "
-    "floor and sky; the extracted surfaces are not drawn but cast shadows. `--look surfaces` "
-    "draws the solids instead.",
-    "",
-    "`--colour-by material | law | object | part | young | poisson | density | speed` colours "
-    "Gaussians or surfaces by what they are, with a key in the corner. Colours of materials, "
-    "laws and objects mean the same in every scene; numbers go from the scene's lowest to its "
-    "highest, speed from 0 to the highest.",
+    "- Compact objects, also touching ones, have volumes within two per cent; their surfaces are "
+    "an eighth to a third of a cell from the models'. Without the silhouette fit volumes are off "
+    "by up to three per cent.",
+    "- Pair: what is left of the overlap lies along the rim of the contact, where the silhouette "
+    "fit leaves thin self-intersections. Without overlap removal, which takes two seconds, the "
+    "objects lie up to 1.0 and 2.0 cells deep in each other.",
+    "- Chair: black and textureless. Pictures do not constrain the depth of the seat between the "
+    "arms, so that the learned Gaussians are off by centimetres there. Clad, it has all four "
+    "legs, 4 pixels wide, and a seat closed from below.",
+    "- Bowl: the wall is 2 to 3 mm thick, about a pixel and a cell. Learned, its textureless "
+    "inside lies too high, and the wall comes out three times too thick on any grid. State the "
+    "wall thickness where the mass matters.",
+    "- Legs and boards need the tighter grid: an armchair with boards of 16 mm and pixels of 8 "
+    "mm is a quarter too heavy on cells of 12 mm and a seventh on cells of 7 mm.",
     "",
 )
 

@@ -10,7 +10,7 @@ it takes on two cores of this machine, however busy it is, were all work shared 
 the clock stand beside it. Deep, near: share of the pixels on things where what is seen lies farther
 behind or before the model than 2 % of the radius of what the cameras look at. What lies in
 ``--out`` already is not learned again. ``--docs`` writes
-docs/splats.md.
+docs/reference/gaussian-training-benchmark.md.
 """
 
 import argparse
@@ -41,7 +41,7 @@ from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESETS, TrainConfig
 
-PAGE = Path(__file__).parents[1] / "docs" / "splats.md"
+PAGE = Path(__file__).parents[1] / "docs" / "reference" / "gaussian-training-benchmark.md"
 CORES = 2
 OFF = 0.02
 """What is seen is deep or near from here on, in radii of what the cameras look at."""
@@ -164,7 +164,7 @@ def main() -> None:
         "--presets", nargs="+", default=list(TRAINING_PRESETS), choices=list(TRAINING_PRESETS)
     )
     parser.add_argument("--sources", nargs="+", default=["masks"], choices=["masks", "pictures"])
-    parser.add_argument("--docs", action="store_true", help="write docs/splats.md")
+    parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()
     raster, rows = kept(asked.out, "raster", drawn), []
     for preset in asked.presets:
@@ -180,18 +180,12 @@ def main() -> None:
 
 
 HEAD = (
-    "# Gaussians from pictures",
+    "# Gaussian training benchmark",
     "",
-    "`reconstruct.gaussians` renders Gaussians on the CPU, learns them from posed pictures, and "
-    "deforms them with simulated particles:",
-    "",
-    "    train(views, masks) -> Trained            pictures and cameras in, Gaussians out",
-    "    render(gaussians, camera) -> Picture      colours, opacity, depth",
-    "    weights(gaussians, camera) -> csr_array   blending weight of each Gaussian in each pixel",
-    "    deformed(gaussians, F, x) -> Gaussians    after a simulation",
-    "",
-    "Written by `python benchmarks/splats.py scenes/helmet scenes/plant scenes/duck --docs`. "
-    "Three scenes are composed from models of public collections and rendered in 48 views:",
+    "Written by `python benchmarks/splats.py scenes/helmet scenes/plant scenes/duck --docs` on "
+    "27 November 2026. How Gaussians are trained: [surfaces from "
+    "Gaussians](../explanation/surfaces-from-gaussians-and-segmentation.md#training). Three "
+    "scenes are composed from models of public collections and rendered in 48 views:",
     "",
     "    corporeal assemble --from models/ --name duck --seed 7 --assets duck_khronos "
     "soda_can_coke --views 48 --size 256 256",
@@ -201,59 +195,32 @@ HEAD = (
     "chair_smallhouse_a 004_sugar_box 024_bowl --views 48 --size 256 256",
     "",
     "Every eighth view is held out: 42 views are used for training, 6 for comparison; neither "
-    "depth nor mesh. The targets are 28 dB (PSNR) for the whole picture and 26 dB for the pixels "
-    "on objects (*things*), within four minutes on two cores; a draft within one minute. *Deep*, "
+    "depth nor mesh. Targets: 28 dB (PSNR) for the whole picture and 26 dB for the pixels on "
+    "objects (*things*), within four minutes on two cores; a draft within one minute. *Deep*, "
     "*near*: share of object pixels whose rendered depth is too large, or too small, by more "
-    "than 2 % of the radius of the ball that the cameras look at.",
+    "than 2 % of the radius of the ball that the cameras look at. *Two cores*: CPU seconds, "
+    "halved. *Clock*: wall time on a busy machine.",
     "",
 )
 TAIL = (
     "",
     "- With masks only the objects are learned, in front of random backgrounds; *whole* is then "
-    "the objects in front of grey. *Two cores*: CPU seconds, halved. *Clock*: wall time while "
-    "other programs kept the machine busy.",
+    "the objects in front of grey. Without masks the backgrounds of these scenes, which are "
+    "attached to each picture and not to the room, cannot be reproduced.",
     "- Most of the error on objects lies along their silhouettes: masks are binary, while pixels "
     "there mix object and floor. Two pixels further inside, the helmet scene has 29 to 33 dB at "
     "preset normal.",
-    "- Pictures and code of 27 November 2026; the day before, with pictures composed then, the "
-    "rows of *helmet* without masks said 29.7 and 30.3 dB (24.3 and 25.8 on objects), of its draft "
-    "with masks 32.8 (26.4), of all others the same to .7 dB (.5 on objects).",
-    "- Pictures of 26 November: the code of 23 November (8796ce9) learns the same pictures of "
-    "the plant to 37.5 dB (30.1 on objects; 12.8 % deep) with masks and 34.1 dB (29.5; 18.7 %) "
-    "without at preset normal: its larger share of deep pixels, against this page's earlier "
-    "figures, is of these pictures. Without masks it is .4 dB (.8 on objects) worse now, which "
-    "other random numbers change about as much (plant, draft: 33.2 to 33.8, 27.5 to 28.2 dB).",
-    "- Without masks (`--sources pictures`) floor and background are learned too. A plane sweep "
-    "initialises textured regions; the floor found in it, and a dome above, stand in for regions "
-    "too smooth for stereo, and are covered with Gaussians before training. Floaters are removed "
-    "during training: wide Gaussians at which more views see free space than a surface. Wide "
-    "Gaussians are forced flat, those seen in few views have no view-dependent colour, and "
-    "Gaussians outside a picture are left unchanged by it. Without these measures the helmet "
-    "scene's draft had 21 dB (13 dB in views along the floor). The remaining loss is in those "
-    "views: 24 to 30 dB, against 32 to 36 dB from above. The background of these scenes is "
-    "attached to each picture and not to the room, which no set of Gaussians can reproduce.",
-    "- With masks, training is initialised on their visual hull, also where a COLMAP model has "
-    "sparse points: a few hundred points grow too slowly. Where a small trial training gives "
-    "lower loss, a fifth of the Gaussians begin inside the hull (decision 15), since a seat "
-    "between its arms lies below it. None of these three scenes needs it.",
-    "- Exposures (`exposure.py`) are learned as one gain for each photograph and channel. "
-    "The Gaussians take the mean exposure, and held-out views are compared after fitting their "
-    "gain.",
-    "- Imitated photographs: `python benchmarks/as_photographed.py scenes/helmet photo/helmet` "
-    "puts planks and papered walls behind the objects and gives every picture its own exposure, "
-    "white balance, blur, noise and JPEG compression. Learned without masks with preset draft, "
-    "held-out photographs reach 30.1 dB (29.0 dB on objects) in the helmet scene, and 29.1 dB "
-    "(31.6 dB) in the duck scene; walls that few views see stay blurred.",
-    "- Coarse to fine: 55 % of the steps without masks, and 40 % with masks, use pictures of "
-    "half the size. Drafts of two scenes took 51 and 52 s with it and 65 and 61 s without, for "
-    "0.1 dB less.",
-    "- The helmet scene without masks misses the target for objects.",
-    '- `train(config=TrainConfig(rasteriser="gsplat"))` learns on a graphics card, through '
-    "gsplat 1.5. It has never run on one here: tests compare it with a stand-in that has "
-    "gsplat's signature, so that values, shapes and gradients are right if gsplat behaves as "
-    "documented.",
-    "- `tests/splats` checks every gradient of the rasteriser against a plain reference to 1e-5, "
-    "by complex-step differentiation and, where torch is installed, by autograd.",
+    "- The helmet scene without masks misses the target for objects. The loss is in views along "
+    "the floor: 24 to 30 dB, against 32 to 36 dB from above.",
+    "- Other random seeds change rows without masks by up to 0.8 dB.",
+    "- Imitated photographs (`python benchmarks/as_photographed.py scenes/helmet photo/helmet`: "
+    "walls, exposure, white balance, blur, noise, JPEG), without masks at preset draft: 30.1 dB "
+    "(29.0 on objects) in the helmet scene, 29.1 dB (31.6) in the duck scene.",
+    "- Half-size pictures in the first part of the training save a fifth of the time for 0.1 dB.",
+    '- `train(config=TrainConfig(rasteriser="gsplat"))` trains on a GPU through gsplat 1.5. It '
+    "has been tested against a stand-in with gsplat's signature only.",
+    "- `tests/reconstruction/gaussians` checks every gradient of the rasteriser to 1e-5 by "
+    "complex-step differentiation and, where torch is installed, by autograd.",
     "",
 )
 

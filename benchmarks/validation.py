@@ -3,7 +3,8 @@
     python benchmarks/validation.py [--quick] [--case N ...] [--json FILE] [--docs]
 
 ``--quick`` runs every case coarser or shorter where that is honest; ``--docs`` also runs the
-resolutions of the plots and writes docs/validation.md and docs/images/validation-*.png.
+resolutions of the plots and writes docs/reference/solver-validation.md and
+docs/images/validation-*.png.
 """
 
 import argparse

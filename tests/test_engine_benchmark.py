@@ -49,7 +49,7 @@ def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
     assert len(kept) == len(rows) + more, "so are they in the history"
     assert kept[0]["ratio"] == "1.000"
     assert all(float(row["ratio"]) > 0 for row in kept)
-    page = (tmp_path / "benchmarks.md").read_text()
+    page = (tmp_path / "reference" / "substep-benchmark.md").read_text()
     assert page.count("| corporeal |") == len(rows) + more, "heaps and a free flight are shown too"
     assert len(list((tmp_path / "images").glob("benchmarks-*.png"))) == 3
 

@@ -18,7 +18,8 @@ def example(name):
 
 def test_there_are_eleven_and_the_index_names_each_once():
     assert [path.name[:2] for path in EXAMPLES] == [f"{k:02d}" for k in range(1, 12)]
-    named = re.findall(r"\d\d_\w+\.py", (ROOT / "docs" / "examples.md").read_text())
+    page = (ROOT / "docs" / "getting-started" / "examples.md").read_text()
+    named = re.findall(r"\d\d_\w+\.py", page)
     assert named == [path.name for path in EXAMPLES]
 
 

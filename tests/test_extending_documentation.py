@@ -1,4 +1,4 @@
-"""What docs/extend.md says can be done as it says."""
+"""What docs/how-to/add-a-law-material-provider-or-format.md says can be done as it says."""
 
 import re
 import sys
@@ -11,7 +11,8 @@ import corporeal as co
 from corporeal import vlm
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs" / "extend.md").read_text(encoding="utf-8")
+HOW_TO = ROOT / "docs" / "how-to"
+PAGE = (HOW_TO / "add-a-law-material-provider-or-format.md").read_text(encoding="utf-8")
 
 
 def blocks(kind):

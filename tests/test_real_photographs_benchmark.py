@@ -125,7 +125,7 @@ PAGE = r"- \*(?P<set>[^*]+)\*(?: at (?P<training>\w+))?: (?P<said>.*)"
 
 def read_page(kind):
     """Return rows, lines of the table, and notes of sets that make a page, as the page has them."""
-    lines = (benchmark.DOCS / f"{kind}-photographs.md").read_text(encoding="utf-8").splitlines()
+    lines = benchmark.page_of(kind).read_text(encoding="utf-8").splitlines()
     table = [tuple(line[2:-2].split(" | ")) for line in lines if line.startswith("| ")][1:]
     listed = [match.groupdict() for line in lines if (match := re.fullmatch(PAGE, line))]
     rows = [
@@ -145,7 +145,7 @@ def test_writing_a_page_again_gives_the_page(kind, tmp_path, monkeypatch):
     own = {name: note.removesuffix(f". {more.get(name)}") for name, note in told.items()}
     known = lambda folder: measure.Known(note=own.get(folder.name, ""))  # noqa: E731
     monkeypatch.setattr(measure, "known", known)
-    page = benchmark.DOCS / f"{kind}-photographs.md"
+    page = benchmark.page_of(kind)
     monkeypatch.setattr(benchmark, "DOCS", tmp_path)
     said = re.search("Written by `(.*?)`", page.read_text(encoding="utf-8"))
     names = dict.fromkeys(row[0] for row in table)

@@ -15,7 +15,7 @@ from corporeal.lab.evaluation.material_evaluation import (
 )
 from recognition import page
 
-DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
+DOCS = Path(__file__).parents[1] / "docs" / "reference" / "name-recognition-benchmark.md"
 SEEN_AGAIN = ("armchair_kaolin", "plant_potted_market", "guitar_market")
 
 

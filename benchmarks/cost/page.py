@@ -1,4 +1,4 @@
-"""docs/benchmarks.md and its figures, made from what was measured."""
+"""docs/reference/substep-benchmark.md and its figures, made from what was measured."""
 
 import os
 import platform
@@ -107,7 +107,7 @@ def machine() -> str:
 
 
 def write(results: list[Result], where: str, command: str, docs: Path) -> None:
-    """Write docs/benchmarks.md and its figures."""
+    """Write docs/reference/substep-benchmark.md and its figures."""
     images = docs / "images"
     images.mkdir(parents=True, exist_ok=True)
     figures = {
@@ -121,7 +121,7 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
         draw(axes, results)
         figure.savefig(images / f"benchmarks-{name}.png", dpi=110)
         plt.close(figure)
-        shown.append(f"![{words}](images/benchmarks-{name}.png)\n")
+        shown.append(f"![{words}](../images/benchmarks-{name}.png)\n")
     text = PAGE.format(
         machine=where,
         load=os.getloadavg()[0],
@@ -131,21 +131,22 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
         upkeep=_upkeep(results),
         rows=_table(HEAD, [result.cells() for result in results]),
     )
-    (docs / "benchmarks.md").write_text(text, encoding="utf-8")
+    (docs / "reference").mkdir(exist_ok=True)
+    (docs / "reference" / "substep-benchmark.md").write_text(text, encoding="utf-8")
 
 
-PAGE = """# What a substep costs
+PAGE = """# Substep benchmark
 
 Made by `{command}`; don't edit.
 
-Measured on: {machine} when it began, {load:.1f} when it ended. A load above the number of cores
-says that others were at work on them, and that more than one thread cannot show what it can do.
+Measured on: {machine} when it began, {load:.1f} when it ended. With a load above the number of
+cores more than one thread cannot show what it can do.
 
 Cubes of one material (E = 0.1 MPa, ν = 0.3, 1000 kg/m³, eight particles to the cell) drop on the
 floor and slide along it at 1 m/s, so that contact works and particles are sorted again and again
-throughout. A batch is a run of substeps as a simulation takes them, stability, sorting and books
-included. All contestants take turns, one batch each, and the best of five batches counts: whatever
-else the machine does hits them alike, and ratios within one run mean more than numbers of two.
+throughout. A batch is a run of substeps as a simulation takes them, stability, sorting and ledger
+included. All engines take turns, one batch each, and the best of five batches counts: ratios within
+one run mean more than numbers of two.
 Ratios of one thread each are those of `CPU-ns`.
 `ns` are nanoseconds per particle and substep, `CPU-ns` those that all threads together spent on
 the processor (which depends less on what else the machine does), `bytes` are those of all arrays

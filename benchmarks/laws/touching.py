@@ -49,7 +49,7 @@ def newtons_cradle(quick: bool = False) -> Outcome:
             absolute(f"fastest other, gaps of {gap:g} dx [v]", float(abs(u[:-1]).max()), 0, 0.05),
         ]
     words = "five rigid balls, R/dx 5, e = 1; the first at 1 m/s"
-    return Outcome("18", "A blow runs through a row of touching balls", words, tuple(checks))
+    return Outcome("18", "An impact runs through a row of touching balls", words, tuple(checks))
 
 
 # ---------------------------------------------------------------- case 19

@@ -1,7 +1,8 @@
 """Gives reconstructed scenes a body: what each point is made of, and how it all moves.
 
 Everything in ``__all__`` is loaded when it is first used: ``import corporeal`` itself imports no
-NumPy, no Warp, nothing of the package. ``docs/api.md`` shows the whole surface on one page.
+NumPy, no Warp, nothing of the package. ``docs/reference/api-on-one-page.md`` shows the
+whole surface.
 """
 
 # ruff: noqa: F401

@@ -209,7 +209,7 @@ def test_the_page_for_the_documentation_names_what_went_wrong_and_what_was_not_r
     write_corpus_page(collect_results(tmp_path), page)
     text = page.read_text()
     assert "4 scenes, 4 assembled, 2 run at detail draft. 1 of 2 have a clean audit" in text
-    wrong = text.split("## What went wrong")[1].split("##")[0]
+    wrong = text.split("## Failures")[1].split("##")[0]
     assert f"{made.scenes[1].name}: Objects penetrate" in wrong
     assert f"{made.scenes[3].name}: failed: run: the grid is too wide" in wrong
     assert f"Not run yet: {made.scenes[2].name}." in wrong

@@ -19,7 +19,7 @@ LIKELIEST = ("hull_fit", "solid_usual", "built_usual", "placed", "mass")
 
 @dataclass(frozen=True)
 class Measured:
-    """What a set of answers must not fall behind, as docs/evaluation.md has it."""
+    """What a set of answers must not fall behind, as docs/reference/mass-evaluation.md has it."""
 
     recordings: str
     mixture: float

@@ -4,7 +4,7 @@ from corporeal import materials
 from corporeal.materials.library_lint import lint_library
 from corporeal.materials.shipped_libraries import SHIPPED_LIBRARY_FILES, source_table
 
-PAGE = Path(__file__).parents[2] / "docs" / "materials.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "materials.md"
 
 
 def test_the_page_says_what_the_library_says():

@@ -30,12 +30,12 @@ INTRODUCTION_TEXT = """# Materials
 Generated from the tables in `src/corporeal/materials` by `corporeal.materials.library_markdown()`;
 a test holds this page equal to them. Each cell is the measured range with the usual value in
 brackets: E Young's modulus, ν Poisson's ratio, ρ density, σ_y yield stress, φ friction angle and c
-cohesion of what is granular; μ the surface's own sliding friction, e restitution, η loss factor, S
-strength of what breaks before it yields (a whole bar's, in bending or tension), S_loc what it
-bears over a square millimetre in tension, H hardening modulus, wall the usual thickness of objects
-made as shells.
+cohesion of granular matter; μ the surface's own sliding friction, e restitution, η loss factor, S
+strength of brittle materials (a whole bar's, in bending or tension), S_loc their tensile strength
+over a square millimetre, H hardening modulus, wall the usual thickness of objects made as
+shells.
 
-`corporeal materials` lists them, `corporeal materials show NAME` tells all of one with its sources.
+`corporeal materials` lists them, `corporeal materials show NAME` shows all of one with its sources.
 """
 OWN_LIBRARY_TEXT = """## A library of your own
 
@@ -62,11 +62,11 @@ scene is found to be made of, the floor (`--floor`) and what stands for the unkn
 `corporeal materials check my.toml` lists every mistake with its line and what to do: ends swapped,
 a Poisson's ratio of 0.5, a number without a source, a source that nothing explains, a key or law
 that does not exist, a law without the numbers that it reads, and numbers that lie three times
-beyond those of the material's namesake or of all that share its group and law, which is how a
-wrong unit shows. Of what is soft (groups soft, fibrous, polymer, elastomer, foam, food) it holds
-the loss factor against the restitution, which a ball's rebound ties together (see below): ranges
-that cannot both be true are a mistake, unless the restitution has a note on what else takes the
-energy. A range that is right all the same is marked so: `{ low = …, unusual = true }`. A library
+beyond those of the material's namesake or of all that share its group and law, which
+reveals wrong units. Of soft materials (groups soft, fibrous, polymer, elastomer, foam, food) it
+checks the loss factor against the restitution, which a ball's rebound ties together (see below):
+ranges that cannot both be true are a mistake, unless the restitution has a note on what else takes
+the energy. A range that is right all the same is marked: `{ low = …, unusual = true }`. A library
 with a mistake is not used. Every law needs E, ν and ρ; %(needs)s.
 Without friction or restitution of its own a material gets 0.5.
 """
@@ -82,7 +82,7 @@ FRICTION_RULE_TEXT = """## Friction between two surfaces
 
 Measured pairs come first, the most particular one: a material's own name before its family's
 ("wood" for plywood), that before its group's ("metal"). Published tables disagree; the range holds
-them all. What is simulated is sliding friction. For a pair that nobody measured the rule is
+them all. What is simulated is sliding friction. For an unmeasured pair the rule is
 μ = √(μ_a μ_b) of the surfaces' own values, which were chosen so that the rule comes near the
 measured pairs.
 """
@@ -97,10 +97,11 @@ For all other pairs e² = (E_b e_a² + E_a e_b²)/(E_a + E_b) of the materials' 
 plane-strain moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025); where both are
 soft and lossy (elastomer, foam, food, soft) their loss factors add up by the same shares instead.
 """
-LAYERED_TEXT = """These are weak across their layers: what strikes a sheet of them on its face crushes it
-at this pressure (`materials/flat_crush.py`).
+LAYERED_TEXT = """These are weak across their layers: an impact on the face of a sheet crushes it at this
+pressure (`materials/flat_crush.py`).
 """
-RATED_TEXT = """These were rated at a speed, and return less of a faster impact; their loss factor follows.
+RATED_TEXT = """These were rated at a speed, and return less of a faster impact; their loss factor
+follows.
 """
 SOURCES_TEXT = """## Sources
 

@@ -24,7 +24,7 @@ CALM_WINDOW_S, CALM_DRIFT_DX = 0.05, 0.02
 """Less than so many cells within so many seconds [s, dx]: rest is tested."""
 WATCH_WINDOW_S, STILL_DRIFT_DX = 0.25, 0.1
 """It stays when, left alone so long, nothing drifts by so much [s, dx]: a fifth of what counts as
-motion (docs/rest.md)."""
+motion (docs/reference/static-equilibrium-benchmark.md)."""
 MAX_RELAXATION_S = 4.0
 """Maximum relaxation time [s]."""
 CHECKS_BETWEEN_SAVE_POINTS = 10

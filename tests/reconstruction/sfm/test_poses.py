@@ -381,7 +381,7 @@ WRONG = {
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_models_that_were_right_are_believed(name):
-    """Measured against known poses, docs/inputs.md."""
+    """Measured against known poses, docs/reference/input-files.md."""
     assert model_doubts(RIGHT[name]) == []
 
 

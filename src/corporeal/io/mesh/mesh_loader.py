@@ -1,7 +1,7 @@
 """Loading of OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene, +Z up.
 
 The libraries that read them run in a child process with limits of time and memory; what it hands
-over is checked as any file's. Facts of each kind, docs/inputs.md, "Meshes".
+over is checked as any file's. Facts of each kind, docs/reference/input-files.md, "Meshes".
 """
 
 import os

@@ -43,12 +43,12 @@ BREAKDOWN_TITLES = {
     "law": "By law, as simulated",
 }
 COLUMN_NOTES = (
-    "- **audit**: clean if no [bound](audit.md) is exceeded; else its message.",
+    "- **audit**: clean if no [bound](audit-json.md) is exceeded; else its message.",
     "- **happened**: whether what the interaction promises did: something came down, two met, what "
     "was struck struck a third, or the wind moved something.",
     "- **deepest overlap**: of an object with another or with the floor, in cells of the grid.",
     "- **energy gained**: kinetic and elastic, that no work accounts for, relative.",
-    "- **time**: of the process that finished the scene, video included; **memory**: its most.",
+    "- **time**: of the process that finished the scene, video included; **memory**: its maximum.",
 )
 
 
@@ -60,15 +60,15 @@ def write_corpus_page(corpus: CorpusResults, path: Path) -> None:
 
     """
     whole = total_line(corpus)
-    lines = [f"# A corpus of {len(corpus.scenes)} scenes, run", "", _summary(corpus), ""]
+    lines = [f"# Corpus of {len(corpus.scenes)} scenes: results", "", _summary(corpus), ""]
     lines += [f"- {message}" for message in corpus.plan.messages]
     if whole is not None:
         lines += ["", "## Every scene", "", *_table(SCENE_TABLE_HEADS, map(_scene, corpus.run))]
         for key, title in BREAKDOWN_TITLES.items():
             group = [*breakdowns(corpus)[key], *([whole] if key == "interaction" else [])]
             lines += ["", f"## {title}", "", *_table((key, *BREAKDOWN_HEADS), map(_line, group))]
-    lines += ["", "## What went wrong", "", *_wrong(corpus)]
-    lines += ["", "## What the columns are", "", *COLUMN_NOTES, ""]
+    lines += ["", "## Failures", "", *_wrong(corpus)]
+    lines += ["", "## Columns", "", *COLUMN_NOTES, ""]
     store.write_bytes(path, "\n".join(lines).encode())
 
 

@@ -37,7 +37,8 @@ def cpp_law_lists() -> list[str]:
         if law.name not in written:
             raise ImportError(
                 f"types.Law has {law.name}, but formulas/laws.h has no struct Rule<{law.name}, R>. "
-                "Write its formulas there: docs/extend.md says how."
+                "Write its formulas there: "
+                "docs/how-to/add-a-law-material-provider-or-format.md says how."
             )
     menu = laws.CONSTITUTIVE_LAWS
     groups = {

@@ -22,7 +22,7 @@ def _load_law(law: Law) -> ConstitutiveLaw:
     except ModuleNotFoundError as error:
         raise ImportError(
             f"types.Law has {law.name}, but there is no mpm/laws/{name}.py. Write the law there: "
-            "docs/extend.md says how."
+            "docs/how-to/add-a-law-material-provider-or-format.md says how."
         ) from error
 
 

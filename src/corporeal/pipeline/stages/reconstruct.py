@@ -97,7 +97,7 @@ BACKING_SURFELS_STATEMENT = (
 """Said of the video, and of gaussians.ply."""
 PROGRESS_AFTER_TRAINING, PROGRESS_AFTER_VIEWS, PROGRESS_AFTER_OBJECTS = 0.6, 0.66, 0.7
 """Share of the work that is done after each step. Surfaces took 27 to 38 % of it at preset normal
-(docs/inputs.md)."""
+(docs/reference/input-files.md)."""
 
 
 @dataclass(frozen=True)

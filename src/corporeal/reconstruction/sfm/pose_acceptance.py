@@ -1,7 +1,8 @@
 """Acceptance tests of COLMAP models, with advice.
 
 A wrong model looks like a model: low reprojection error says nothing. What speaks against one was
-found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
+found on right and wrong models of the same pictures, docs/reference/input-files.md, "Photographs
+without poses".
 """
 
 from dataclasses import replace

@@ -120,12 +120,7 @@ def write_dynamics_docs(found: DynamicsSummary, command: str, path: Path) -> Non
         path: Of the page (Markdown).
 
     """
-    lines = [
-        "# Dynamics against baselines",
-        "",
-        f"Written by `{command}`. {summary_sentence(found)}",
-        "",
-    ]
+    lines = ["# Dynamics benchmark", "", f"Written by `{command}`. {summary_sentence(found)}", ""]
     lines += [RANKING_RULE, "", *(f"- {s}" for s in ranking_sentences(found)), ""]
     lines += [f"- {s}" for s in missing_references(found)] + [""]
     done = {(r.scene, r.method) for r in found.rows if r.numbers or r.error.startswith("failed")}
@@ -134,10 +129,5 @@ def write_dynamics_docs(found: DynamicsSummary, command: str, path: Path) -> Non
         if rows:
             text = markdown_table(ResultTable(table.title, table.heads, rows))
             lines += [f"## {table.title}", "", text, ""]
-    lines += [
-        "## What the columns are",
-        "",
-        *(f"- **{k}**: {v}" for k, v in COLUMN_EXPLANATIONS.items()),
-        "",
-    ]
+    lines += ["## Columns", "", *(f"- **{k}**: {v}" for k, v in COLUMN_EXPLANATIONS.items()), ""]
     store.write_bytes(path, "\n".join(lines).encode())

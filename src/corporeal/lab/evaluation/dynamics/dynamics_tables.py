@@ -105,7 +105,7 @@ def life_table(found: DynamicsSummary) -> ResultTable:
     """Return how each method does against published rebounds."""
     heads = ("method", "dropped", "in their range", "mean distance")
     rows = [(f.method, str(f.drops), str(f.inside), f"{f.off:.3f}") for f in found.life]
-    return ResultTable("Rebound against life", heads, rows)
+    return ResultTable("Restitution", heads, rows)
 
 
 def ranking_sentences(found: DynamicsSummary) -> list[str]:
