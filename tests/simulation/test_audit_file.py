@@ -11,7 +11,7 @@ from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import NO_USAGE, ModelUsage, Note, NoteKind
 from corporeal.simulation.audit_file import AUDIT_FILE, read_audit, read_run_audit, write_audit
-from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
+from sample_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
 WHOLE = run_audit(
     parts=(part_audit(), part_audit(object=None, real_mass_kg=None)),
