@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 from stories import Told, tell
 
 from corporeal.core.audit_data import pair_name
-from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.geometry.rotation import fit_rigid_motion
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.pipeline.stages.simulate import SimulateConfig

@@ -27,8 +27,7 @@ import numpy as np
 
 import corporeal
 from corporeal.export.check_exports import drift_in_mujoco
-from corporeal.export.export_record import read_record
-from corporeal.export.export_target import EXPORT_WRITERS, ExportConfig, ExportRequest
+from corporeal.export.export_target import EXPORT_WRITERS, ExportConfig, ExportRequest, read_record
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
 from corporeal.export.mjcf_writer import write_mjcf
 from corporeal.export.physical_scene import physical_scene

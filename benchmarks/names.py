@@ -25,14 +25,13 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from corporeal.core.types import Inventory, MaterialField, Parts, Scene
-from corporeal.discretization.mesh_measures import MeasuredObject
+from corporeal.discretization.mesh_measures import MeasuredObject, measure_objects
 from corporeal.discretization.object_masses import (
     warn_of_implausible_masses,
     warn_of_masses_not_as_named,
     warn_of_thick_walls,
 )
 from corporeal.discretization.part_model import PartModel
-from corporeal.discretization.scene_measures import measure_objects
 from corporeal.materials import find_material
 from corporeal.pipeline.in_memory import load_scene
 from corporeal.pipeline.mass_posterior import ground_with_mass_posterior

@@ -27,7 +27,7 @@ from rich.console import Console
 
 from corporeal.core.errors import UserError
 from corporeal.discretization.discretization_plan import DetailLevel
-from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.geometry.rotation import fit_rigid_motion
 from corporeal.io.scene_toml import SceneFile, write_scene_file
 from corporeal.pipeline.run_pipeline import Progress, Settings, open_run
 from corporeal.pipeline.stages.assemble import AssembleConfig

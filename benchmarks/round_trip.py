@@ -36,8 +36,7 @@ from corporeal.core.types import MaterialField, Reconstruction, Scene, Views
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.discretization.foliage import is_leafy
 from corporeal.discretization.mesh_kind import inner_face_fraction
-from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
-from corporeal.discretization.scene_measures import measure_objects
+from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, measure_objects
 from corporeal.geometry.scene_transforms import object_boxes, surfaces_bounding_box
 from corporeal.io.photos.transforms_json import read_views, write_views
 from corporeal.io.scene_toml import (

@@ -23,7 +23,7 @@ from corporeal.core import store
 from corporeal.core.audit_data import Audit
 from corporeal.core.process_resources import usable_cores
 from corporeal.discretization.discretization_plan import DetailLevel
-from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+from corporeal.lab.evaluation.dynamics.compared_methods import (
     OURS_NAME,
     reference_folder,
     run_folder,

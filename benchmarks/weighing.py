@@ -18,12 +18,12 @@ import numpy as np
 
 from corporeal.core.errors import UserError
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.lab.corpus.asset_mass import asset_mass_properties
+from corporeal.lab.corpus.assemble_corpus import asset_mass_properties
 from corporeal.pool.asset_pool import PoolAsset
 from corporeal.pool.pool_index import index_pool
-from corporeal.scene.mass_properties import MassProperties
+from corporeal.scene.settling_body import MassProperties
 from corporeal.showcase.prop_models import POOL_PROP_BUILDERS
-from corporeal.showcase.prop_scene import prop_scene
+from corporeal.showcase.showcase_scenes import prop_scene
 from corporeal.vlm.real_sizes import estimate_real_extent, find_class_sizes
 
 LIMIT = 10.0

@@ -7,7 +7,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.materials.shipped_libraries import citation
+from corporeal.materials.library_entry import citation
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import UNFIT_PREFIX, ground
 from corporeal.pipeline.stages.segment import segment

@@ -119,8 +119,9 @@ def test_phases_of_a_heap_add_up_and_contact_costs_nothing_where_there_is_none(e
 
 
 def test_phases_are_not_timed_on_several_threads():
+    from cost.phase_clock import PhaseClock
+
     from corporeal.core.errors import UserError
-    from corporeal.mpm.cpu.phase_clock import PhaseClock
 
     class OnTwo:
         threads = 2

@@ -11,7 +11,7 @@ from trimesh.creation import box
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from corporeal.discretization.scene_measures import measure_objects
+from corporeal.discretization.mesh_measures import measure_objects
 from corporeal.materials import find_material
 from corporeal.pipeline.in_memory import load_scene
 from corporeal.pipeline.stages.describe import describe

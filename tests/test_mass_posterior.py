@@ -22,7 +22,7 @@ from corporeal.core.types import (
     apply_hypothesis,
 )
 from corporeal.discretization.part_model import VolumeLeeway, swelling_log_sigma
-from corporeal.materials.range_fraction import value_at_fraction
+from corporeal.materials.material_candidates import value_at_fraction
 from corporeal.pipeline.mass_posterior import (
     MODELLED_SHAPE_VOLUME_LOG_STD,
     MassSampler,

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from corporeal.mpm.constants import NORMAL_CACHE_STEPS
-from corporeal.mpm.cpu.phase_clock import PhaseClock
 from cost.blocks import Drop
 from cost.contest import ROUNDS, Ours
+from cost.phase_clock import PhaseClock
 
 REST = ("list", "face", "choose", "find", "resolve")
 """Pieces of contact that are shown as one row: each is small."""

@@ -8,9 +8,9 @@ import pytest
 
 import corporeal as co
 from corporeal.core.types import Discretization, Law, Material, Structure
-from corporeal.discretization.fall_heights import FLOOR_NUMBER
 from corporeal.discretization.hertz_indentation import hertz_contact_time
 from corporeal.discretization.impact_frequency import LOSS_BAND_MIDDLE_RATIO, tune_loss_to_impacts
+from corporeal.discretization.impact_speeds import FLOOR_NUMBER
 from corporeal.discretization.pair_damping import find_impact_partners, pair_loss_factor_of_parts
 from corporeal.discretization.part_geometry import ExpectedMotion, ObjectLanding, PartGeometry
 from corporeal.materials.contact_pairs import compliance_share, contact_loss_factor

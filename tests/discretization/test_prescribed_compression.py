@@ -7,7 +7,7 @@ import pytest
 
 import corporeal as co
 from corporeal.core.types import Keyframes, Wall
-from corporeal.discretization.clearances import (
+from corporeal.discretization.prescribed_compression import (
     PlacedObject,
     SampledObject,
     measure_clearance,

@@ -12,8 +12,7 @@ import corporeal as co
 from corporeal.core import store
 from corporeal.core.registry import load_function
 from corporeal.export import export_scene as verb
-from corporeal.export.export_record import read_record
-from corporeal.export.export_target import EXPORT_WRITERS
+from corporeal.export.export_target import EXPORT_WRITERS, read_record
 
 
 def contents(folder):

@@ -7,10 +7,14 @@ import pytest
 
 from corporeal.core.types import Law
 from corporeal.export.check_exports import check_target
-from corporeal.export.dataset_statistics import DatasetStatistics
 from corporeal.export.export_target import NothingToWriteError
-from corporeal.export.particle_arrays import GNS_PARTICLE_TYPES, read_particle_table
-from corporeal.export.particle_h5_npz_writer import write_h5, write_npz
+from corporeal.export.particle_h5_npz_writer import (
+    GNS_PARTICLE_TYPES,
+    DatasetStatistics,
+    read_particle_table,
+    write_h5,
+    write_npz,
+)
 
 OBSTACLE = 3
 """What both loaders hold still."""

@@ -16,7 +16,7 @@ from corporeal.export.animated_glb_reader import read_animated_glb
 from corporeal.export.animated_glb_writer import write_animated_glb
 from corporeal.export.check_exports import check_target
 from corporeal.export.export_target import NothingToWriteError
-from corporeal.export.splat_sequence_writer import write_splat_sequence
+from corporeal.export.usd_splats import write_splat_sequence
 from corporeal.io.gltf.gltf_container import pack_glb, split_glb
 from corporeal.io.splat.load_splat import load_splat
 from corporeal.simulation.simulation_result import SimulationResult

@@ -7,7 +7,7 @@ import pytest
 from export_helpers import asked_of, rigid, soft
 
 import corporeal as co
-from corporeal.export.identifiers import identifiers
+from corporeal.export.physical_scene import identifiers
 from corporeal.export.scene_motion import frame_at
 from corporeal.export.surface_friction import surface_friction
 

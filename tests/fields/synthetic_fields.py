@@ -8,7 +8,7 @@ from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.segment import segment
-from corporeal.showcase.prop_scene import prop_scene
+from corporeal.showcase.showcase_scenes import prop_scene
 
 VOXELS = 64
 """Along the longest side."""

@@ -9,12 +9,10 @@ import pytest
 
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Law
-from corporeal.fields.field_per_part import nearest_samples, sum_up_per_part
 from corporeal.fields.field_registration import axis_turns, register_points
-from corporeal.fields.field_specification import parse_field_specification
-from corporeal.fields.impose_field import impose_field
+from corporeal.fields.field_specification import parse_field_specification, read_vomp
+from corporeal.fields.impose_field import impose_field, nearest_samples, sum_up_per_part
 from corporeal.fields.sampled_field import check_field
-from corporeal.fields.vomp_reader import read_vomp
 from corporeal.pipeline.settings.ground_config import GroundConfig, validate
 from corporeal.pipeline.stages.ground import ground, grounding_warnings
 from fields import synthetic_fields

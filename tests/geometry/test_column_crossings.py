@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.geometry.column_crossings import column_crossings, points_wound_around
 from corporeal.geometry.mesh import Mesh, join_meshes, weld_mesh
 from corporeal.geometry.mesh_queries import QueryMesh
+from corporeal.geometry.point_sampling import column_crossings, points_wound_around
 from corporeal.geometry.rotation import matrix_from_quaternion
 
 TURN = matrix_from_quaternion(np.array([0.9, 0.1, 0.2, 0.3]))

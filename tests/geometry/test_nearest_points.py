@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
-from corporeal.geometry.nearest_points import sort_into_cells
+from corporeal.geometry.quadrature import sort_into_cells
 
 
 @pytest.mark.parametrize("count", [1, 2, 50, 4000])

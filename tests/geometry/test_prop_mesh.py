@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.discretization.mesh_measures import oriented_box_size
 from corporeal.geometry.mesh import (
     Mesh,
     inward_area_loss_rate,

@@ -6,8 +6,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.mesh_queries import QueryMesh, random_rotation
-from corporeal.geometry.ray_casting import RayCaster
+from corporeal.geometry.mesh_queries import QueryMesh, RayCaster, random_rotation
 
 COUNT = 2000
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.io.mesh.dae_names import read_dae_names
 from corporeal.io.mesh.mesh_loader import load_mesh
+from corporeal.io.mesh.mesh_trimesh import read_dae_names
 
 QUARTER = trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
 """Turns what has +y up to have +z up."""

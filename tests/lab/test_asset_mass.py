@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.lab.corpus import asset_mass
-from corporeal.lab.corpus.asset_mass import asset_mass_properties
+from corporeal.lab.corpus import assemble_corpus
+from corporeal.lab.corpus.assemble_corpus import asset_mass_properties
 from corporeal.pool.asset_pool import PoolAsset
 
 
@@ -42,7 +42,7 @@ def test_what_is_heavier_at_the_top_has_its_centre_there(dumbbell, tmp_path):
 
 def test_nothing_is_weighed_twice(dumbbell, tmp_path, monkeypatch):
     first = asset_mass_properties(dumbbell, 0.5, tmp_path)
-    monkeypatch.setattr(asset_mass, "fill", None)
+    monkeypatch.setattr(assemble_corpus, "fill", None)
     again = asset_mass_properties(dumbbell, 0.5, tmp_path)
     assert again.mass == first.mass
     assert np.array_equal(again.centre, first.centre)

@@ -7,20 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from corpus_page import write_corpus_page
 from PIL import Image
 from test_plan import pool
 
 from corporeal.core import store
 from corporeal.core.audit_data import Expectation
 from corporeal.core.errors import UserError
-from corporeal.jobs.job_manifest import ManifestRow
+from corporeal.jobs.job import ManifestRow
 from corporeal.lab.corpus.collect_results import RIGID_BODY_LAW, collect_results, scene_measures
 from corporeal.lab.corpus.corpus_breakdown import asset_credits, breakdowns, total_line
-from corporeal.lab.corpus.corpus_docs_page import write_corpus_page
 from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan_corpus, write_plan
 from corporeal.lab.corpus.corpus_report import report_corpus
+from corporeal.scene.collision_chain import impact_hops
 from corporeal.scene.rest_certificate import RestCertificate
-from corporeal.scene.rigid_preview import impact_hops
 from corporeal.scene.scene_composition import (
     ComposedObject,
     SceneComposition,

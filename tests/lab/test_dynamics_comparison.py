@@ -12,7 +12,7 @@ from scipy.stats import kendalltau
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.dynamics import dynamics_figure, dynamics_page, dynamics_tables
+from corporeal.lab.evaluation.dynamics import dynamics_page, dynamics_tables
 from corporeal.lab.evaluation.dynamics.compared_methods import (
     OUR_METHOD,
     method_settings,
@@ -25,8 +25,11 @@ from corporeal.lab.evaluation.dynamics.dynamics_jobs import (
     dynamics_jobs,
 )
 from corporeal.lab.evaluation.dynamics.dynamics_summary import dynamics_record, summarise_dynamics
-from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult, rank_scene
-from corporeal.lab.evaluation.dynamics.rank_correlation import rank_correlation
+from corporeal.lab.evaluation.dynamics.method_ranking import (
+    MethodResult,
+    rank_correlation,
+    rank_scene,
+)
 from corporeal.lab.evaluation.dynamics.run_difference import compare_runs
 from corporeal.lab.evaluation.dynamics.run_measures import read_run_measures, write_run_measures
 from corporeal.pipeline.run_pipeline import Settings
@@ -301,7 +304,7 @@ def test_json_page_figure_and_docs_tell_the_same_twice(evaluated, tmp_path):
         and "rolls: no reference" in page
         and "$" not in page
     )
-    dynamics_figure.draw_dynamics(found, tmp_path / "figure.png")
+    dynamics_page.draw_dynamics(found, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     dynamics_page.write_dynamics_docs(found, "corporeal evaluate dynamics", tmp_path / "page.md")
     docs = (tmp_path / "page.md").read_text()

@@ -13,7 +13,7 @@ from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import SimulationError, UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.lab.evaluation import ensemble_report
+from corporeal.lab.evaluation import outcome_ensemble
 from corporeal.lab.evaluation import outcome_ensemble as ensembles
 from corporeal.lab.evaluation.outcome_ensemble import (
     SPREAD_QUANTITIES,
@@ -114,9 +114,9 @@ def test_a_member_that_breaks_is_told_and_the_others_count(ran, monkeypatch, tmp
 
     monkeypatch.setattr(ensembles, "simulate", breaks)
     result = simulate_ensemble(ran, 2, 9, None, silent)
-    assert ensemble_report.failed_members(result) == ["Member 1 stopped: It burst."]
+    assert outcome_ensemble.failed_members(result) == ["Member 1 stopped: It burst."]
     assert result.of("ball", "mass_kg").count == 1
-    ensemble_report.spread_figure(result, tmp_path / "spread.png")
+    outcome_ensemble.spread_figure(result, tmp_path / "spread.png")
     assert (tmp_path / "spread.png").read_bytes()[:4] == b"\x89PNG"
 
 

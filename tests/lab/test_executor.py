@@ -14,8 +14,13 @@ import pytest
 from fake_jobs import STEPS, counting, do, silent
 
 from corporeal.core import store
-from corporeal.jobs.job import Job, perform_job, remove_partial_results
-from corporeal.jobs.job_manifest import JobManifest, read_manifest_rows
+from corporeal.jobs.job import (
+    Job,
+    JobManifest,
+    perform_job,
+    read_manifest_rows,
+    remove_partial_results,
+)
 from corporeal.jobs.local_workers import local_worker_pool
 
 NAMES = ("a", "b", "c", "d", "e", "f")

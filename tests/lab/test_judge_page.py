@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.dynamics.dynamics_folders import reference_folder, run_folder
+from corporeal.lab.evaluation.dynamics.compared_methods import reference_folder, run_folder
 from corporeal.lab.evaluation.judge.detectability import VideoVerdict
 from corporeal.lab.evaluation.judge.judge_page import (
     PICTURES_PER_VIDEO,

@@ -15,14 +15,17 @@ from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.lab.evaluation.mass_baselines import hull_volume_mass, mean_mass, solid_water_mass
 from corporeal.lab.evaluation.mass_evaluation import (
     MassConfig,
     anonymise,
     compare_masses,
+    hull_volume_mass,
+    interval_coverage,
+    mass_errors,
+    mean_mass,
     predict_masses,
+    solid_water_mass,
 )
-from corporeal.lab.evaluation.mass_metrics import interval_coverage, mass_errors
 from corporeal.lab.evaluation.mass_report import mass_figure, mass_tables
 from corporeal.lab.evaluation.measured_masses import (
     models_in_folder,

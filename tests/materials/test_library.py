@@ -17,8 +17,8 @@ from corporeal.core.types import (
 )
 from corporeal.materials.contact_pairs import measured_friction_pairs, measured_restitution_pairs
 from corporeal.materials.flat_crush import layered_materials
+from corporeal.materials.library_entry import source_table
 from corporeal.materials.restitution_speed import rated_restitutions
-from corporeal.materials.shipped_libraries import source_table
 
 LIBRARIES = ["default", "reference"]
 

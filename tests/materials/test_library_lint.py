@@ -6,8 +6,8 @@ import pytest
 
 from corporeal import materials
 from corporeal.core.errors import BadFileError
+from corporeal.materials.library_entry import data_file_text, source_table
 from corporeal.materials.library_lint import lint_library
-from corporeal.materials.shipped_libraries import data_file_text, source_table
 
 SOUND = """
 [sources.my-bench]

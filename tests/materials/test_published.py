@@ -7,7 +7,7 @@ import pytest
 from corporeal import materials
 from corporeal.core.errors import UserError
 from corporeal.core.types import Law, Provenance
-from corporeal.materials.shipped_libraries import source_table
+from corporeal.materials.library_entry import source_table
 
 PUBLISHED = """
 gold           1 4 77.2       .42-.44   19.29     120

@@ -6,10 +6,12 @@ from corporeal import materials
 from corporeal.core.types import MeasuredRange, PartDescription, RangePlacement
 from corporeal.materials.material_candidates import (
     content_materials_text,
+    fraction_of,
+    is_logarithmic,
     part_materials_text,
     quantity_choice,
+    value_at_fraction,
 )
-from corporeal.materials.range_fraction import fraction_of, is_logarithmic, value_at_fraction
 from corporeal.materials.range_modifiers import range_modifier_problems, range_modifiers
 from corporeal.materials.range_placement import (
     CONTENTS_DENSITY_FIELD,
@@ -19,8 +21,8 @@ from corporeal.materials.range_placement import (
     placements_from_values,
     quantity_choices,
     usual_placements,
+    value_contradictions,
 )
-from corporeal.materials.value_consistency import value_contradictions
 
 NARROW = MeasuredRange(2e9, 2.5e9, 3e9, "s")
 WIDE = MeasuredRange(1e4, 6e4, 1.5e5, "s")

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from cost.phase_clock import PhaseClock
 from point_bodies import round_body
 from test_cpu import CELL, ball, body, problem, side_by_side
 
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.cpu.phase_clock import PhaseClock
 from corporeal.mpm.problem import FLOOR, Plane
 
 WALL = Plane((1.0, 0.0, 0.0), -0.053)

@@ -101,13 +101,18 @@ def test_of_three_candidates_the_one_that_separates_is_chosen():
     candidates = contact.candidate_normals(outward_a, outward_c)
     reach_a = np.array([[0.5, 0.6, 0.0]])
     reach_c = np.array([[0.1, 0.1, 0.05]])
-    normal = contact.separating_normal(candidates, reach_a, reach_c, 0.1)
+    normal = contact.take_candidate(
+        candidates, contact.widest_candidate(candidates, reach_a, reach_c, 0.1)
+    )
     assert normal == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
 
 
 def test_an_absent_candidate_is_never_chosen():
     candidates = np.array([[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]])
-    normal = contact.separating_normal(candidates, np.full((1, 3), 1.0), np.zeros((1, 3)), 0.1)
+    normal = contact.take_candidate(
+        candidates,
+        contact.widest_candidate(candidates, np.full((1, 3), 1.0), np.zeros((1, 3)), 0.1),
+    )
     assert normal[0].tolist() == [0.0, 1.0, 0.0]
 
 

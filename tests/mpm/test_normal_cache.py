@@ -73,17 +73,6 @@ def test_choices_are_saved_and_going_on_from_them_changes_nothing(engine):
     assert np.array_equal(ours, theirs)
 
 
-def test_a_checkpoint_of_before_there_were_choices_is_gone_on_from():
-    engine, again = CpuEngine(touching(), threads=1), CpuEngine(touching(), threads=1)
-    for _ in range(3):
-        engine.step(1e-4)
-    saved = engine.save()
-    del saved["choices"]
-    again.restore(saved)
-    again.step(1e-4)
-    assert again.world["reaches"].any()
-
-
 def test_room_for_more_contacts_does_not_lose_choices():
     small, roomy = ENGINES["cuda"](touching(1.0)), ENGINES["cuda"](touching(1.0))
     for engine in (small, roomy):

@@ -60,15 +60,6 @@ def test_rigidly_moving_particles_are_fitted_exactly():
     assert angular == pytest.approx(mass.inertia @ w, rel=1e-9)
 
 
-def test_a_blow_off_the_centre_meets_less_resistance():
-    inverse = np.linalg.inv(np.diag([0.4, 0.4, 0.4]))
-    z = np.array([0.0, 0.0, 1.0])
-    through = rigid.effective_inverse_mass(1.0, inverse, 0.5 * z, z)
-    beside = rigid.effective_inverse_mass(1.0, inverse, np.array([1.0, 0.0, 0.0]), z)
-    assert through == pytest.approx(1.0)
-    assert beside == pytest.approx(1.0 + 1.0 / 0.4)
-
-
 def test_a_wedge_is_thin_where_it_is_thin():
     """It is a block as a whole: a share of its walls cannot tell its thin end."""
     slope, cell = np.radians(15), 0.011

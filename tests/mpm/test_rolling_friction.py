@@ -11,8 +11,8 @@ from corporeal.core.types import Keyframes, Push
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.formulas import formula_options, one_lane
-from corporeal.mpm.physics.rolling_friction import RollingSide, brake_roll
 from corporeal.mpm.reference.engine import ReferenceEngine
+from corporeal.mpm.reference.rolling_contacts import RollingSide, brake_roll
 from corporeal.mpm.state import ParticleConstants
 
 wp.set_module_options(formula_options())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corporeal.multiview.inverted_masks import are_masks_inverted
+from corporeal.multiview.silhouette_outliers import are_masks_inverted
 from corporeal.render.camera_placement import camera_from_aim
 from patterned_scene import ring
 

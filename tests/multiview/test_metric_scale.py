@@ -11,7 +11,6 @@ from corporeal.multiview.metric_scale import (
     choose_metric_scale,
     implausible_scene_extent,
     scale_from_distance,
-    scale_from_extent,
     scale_from_extents,
     scale_from_file,
     stated_metric_scale,
@@ -23,9 +22,6 @@ def test_a_scale_states_its_source():
     far = scale_from_distance((0, 0, 0), (3, 0, 4), 0.5)
     assert (far.metres_per_unit, far.source) == (pytest.approx(0.1), "distance")
     assert far.reason == "Two points 5 units apart are 0.5 m apart."
-    large = scale_from_extent((-1, -1, -2), (1, 1, 2), 0.2, "a model")
-    assert (large.metres_per_unit, large.source) == (pytest.approx(0.05), "extent")
-    assert "4 units" in large.reason and "0.2 m in reality, a model said" in large.reason
 
 
 def test_a_person_measures_the_unit_or_a_distance():
@@ -57,8 +53,6 @@ def test_scenes_as_large_as_towns_or_as_small_as_dust_are_told():
 def test_no_scale_comes_of_nonsense(metres):
     with pytest.raises(UserError, match="Both must be positive"):
         scale_from_distance((0, 0, 0), (1, 0, 0), metres)
-    with pytest.raises(UserError, match="Both must be positive"):
-        scale_from_extent((1, 1, 1), (1, 1, 1), 1.0, "a model")
 
 
 # ---------------------------------------------------------------- whom to believe

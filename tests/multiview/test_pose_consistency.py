@@ -22,7 +22,6 @@ from corporeal.multiview.pose_consistency import (
     OPENGL_FROM_OPENCV_AXES,
     _MatchedPair,
     check_pose_consistency,
-    pose_consistency_doubt,
 )
 from corporeal.multiview.silhouette_coherence import silhouette_coherence
 
@@ -104,7 +103,9 @@ def test_right_poses_are_let_pass(near):
 def test_blurred_and_noisy_pictures_are_let_pass(near):
     noise = np.random.default_rng(0).normal(0, 4, near.rgb.shape)
     rgb = np.stack([gaussian_filter(p.astype(float), (1, 1, 0)) * 0.7 for p in near.rgb]) + noise
-    assert pose_consistency_doubt(replace(near, rgb=rgb.clip(0, 255).astype(np.uint8))) is None
+    assert (
+        check_pose_consistency(replace(near, rgb=rgb.clip(0, 255).astype(np.uint8))).doubt is None
+    )
 
 
 def test_matrices_for_larger_pictures_are_told_at_which_scale_they_would_agree(near):
@@ -120,7 +121,7 @@ def test_matrices_for_larger_pictures_are_told_at_which_scale_they_would_agree(n
 
 
 def test_opposite_axes_are_named(near):
-    doubt = pose_consistency_doubt(posed(near, lambda W: W @ OPENGL_FROM_OPENCV_AXES))
+    doubt = check_pose_consistency(posed(near, lambda W: W @ OPENGL_FROM_OPENCV_AXES)).doubt
     assert re.match(
         r"The poses do not agree .* only \d+% of \d+ points .*px\)\. They would if", doubt
     )
@@ -175,7 +176,7 @@ def test_a_third_of_wrong_matches_does_no_harm(shared_points):
 @pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_convention_is_named(shared_points, case):
     change, words = WRONG[case]
-    assert re.search(words, pose_consistency_doubt(posed(shared_points, change)))
+    assert re.search(words, check_pose_consistency(posed(shared_points, change)).doubt)
 
 
 @pytest.mark.parametrize(("factor", "named"), [(0.5, "2"), (2.0, "0.5"), (0.667, "1.5")])
@@ -183,7 +184,7 @@ def test_a_wrong_focal_length_is_named(shared_points, factor, named):
     """It shows where the cameras do not all look at one point."""
     scale = np.array([[factor, factor, 1], [1, factor, 1], [1, 1, 1]])
     wrong = tuple(replace(c, K=c.K * scale) for c in shared_points.cameras)
-    doubt = pose_consistency_doubt(replace(shared_points, cameras=wrong))
+    doubt = check_pose_consistency(replace(shared_points, cameras=wrong)).doubt
     assert f"if the focal lengths were {named} times as long" in doubt
 
 
@@ -242,7 +243,7 @@ def test_poses_that_good_matches_contradict_are_hopeless(centred, monkeypatch):
 
 def test_shuffled_poses_are_doubted(shared_points):
     cameras = tuple(shared_points.cameras[k] for k in (2, 4, 1, 0, 3, 7, 5, 6))
-    doubt = pose_consistency_doubt(replace(shared_points, cameras=cameras))
+    doubt = check_pose_consistency(replace(shared_points, cameras=cameras)).doubt
     assert "do not agree" in doubt and "Check the order of the pictures" in doubt
 
 
@@ -272,8 +273,9 @@ def test_silhouettes_tell_where_smooth_things_are_seen_from_afar():
     right = check_pose_consistency(views, masks)
     assert (right.by, right.doubt) == ("silhouettes", None)
     assert right.share > 0.9
-    assert "y and z axes were opposite" in pose_consistency_doubt(
-        posed(views, lambda W: W @ OPENGL_FROM_OPENCV_AXES), masks
+    assert (
+        "y and z axes were opposite"
+        in check_pose_consistency(posed(views, lambda W: W @ OPENGL_FROM_OPENCV_AXES), masks).doubt
     )
 
 
@@ -302,7 +304,7 @@ def test_thin_legs_are_no_reason_for_doubt():
 
 def test_cameras_that_only_turn_are_doubted(near):
     still = posed(near, lambda W: np.block([[W[:3, :3], np.zeros((3, 1))], [W[3:]]]))
-    assert "at one place" in pose_consistency_doubt(still)
+    assert "at one place" in check_pose_consistency(still).doubt
 
 
 # ---------------------------------------------------------------- the mathematics
@@ -359,8 +361,8 @@ def test_good_matches_are_told_from_random_ones_without_poses():
 @pytest.mark.slow
 def test_poses_of_other_programs_are_let_pass_and_their_opposites_named(shared_assets):
     read = read_posed_photos(shared_assets / "posed" / "trivial", longest=160)
-    assert pose_consistency_doubt(read.views, read.masks) is None
-    wrong = pose_consistency_doubt(
+    assert check_pose_consistency(read.views, read.masks).doubt is None
+    wrong = check_pose_consistency(
         posed(read.views, lambda W: W @ OPENGL_FROM_OPENCV_AXES), read.masks
-    )
+    ).doubt
     assert "y and z axes were opposite" in wrong

@@ -11,7 +11,7 @@ import pytest
 
 from corporeal.core.store import DATA_FILE, load
 from corporeal.discretization import discretization_plan
-from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.geometry.rotation import fit_rigid_motion
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import STAGE_FOLDERS, Settings
 from corporeal.pipeline.stages.fill import FillConfig

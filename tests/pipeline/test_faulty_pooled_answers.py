@@ -12,7 +12,7 @@ from test_faulty_answers import ASKED_AGAIN, JAR, TASKS, says, sound, task_of, w
 
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
-from corporeal.vlm.retry import RetryPolicy
+from corporeal.vlm.api_clients import RetryPolicy
 from sample_scenes import scene
 from scripted_model import weighs
 

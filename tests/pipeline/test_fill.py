@@ -28,7 +28,7 @@ from corporeal.core.types import (
 )
 from corporeal.discretization.build_model import build_model
 from corporeal.discretization.impact_speeds import expected_motions
-from corporeal.discretization.scene_measures import measure_objects
+from corporeal.discretization.mesh_measures import measure_objects
 from corporeal.materials import find_material
 from corporeal.mpm.problem import Plane
 from corporeal.pipeline.stages.fill import FillConfig, fill, name_objects

@@ -6,9 +6,9 @@ import trimesh
 from test_fill import SOLID, inputs, thing  # type: ignore[import-not-found]
 
 from corporeal.core.types import Structure
+from corporeal.discretization.mesh_measures import measure_objects
 from corporeal.discretization.missing_walls import close_all_missing_walls
 from corporeal.discretization.object_filling import FillRecipe, fill_object
-from corporeal.discretization.scene_measures import measure_objects
 from corporeal.materials import find_material
 from corporeal.pipeline.mass_posterior import MassSampler
 from corporeal.pipeline.stages.fill import fill

@@ -11,6 +11,7 @@ from corporeal import materials
 from corporeal.core.types import Law, Material, Scene, SceneObject, Structure, Surface, Video
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.discretization.discretization_plan import plan_discretization
+from corporeal.discretization.mesh_measures import measure_objects
 from corporeal.discretization.object_scaling import (
     describe_mass,
     describe_scales,
@@ -19,7 +20,6 @@ from corporeal.discretization.object_scaling import (
 )
 from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry, part_at_life_size
 from corporeal.discretization.part_model import infer_part_model
-from corporeal.discretization.scene_measures import measure_objects
 from corporeal.geometry.scene_transforms import scale_scene
 from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
 from corporeal.io.gltf.glb_writer import write_glb

@@ -17,8 +17,8 @@ from corporeal.discretization.foliage import (
     root_joint,
     weigh_bulk_foliage,
 )
+from corporeal.discretization.mesh_measures import measure_objects
 from corporeal.discretization.part_model import infer_part_model
-from corporeal.discretization.scene_measures import measure_objects
 from corporeal.geometry.mesh import Mesh
 from corporeal.materials import find_material
 from corporeal.pipeline.stages.fill import fill

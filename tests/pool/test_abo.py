@@ -9,8 +9,7 @@ import pytest
 
 from corporeal.core.errors import UserError
 from corporeal.pool import abo
-from corporeal.pool.candidate_origins import OriginConfig
-from corporeal.pool.pool_index import IndexConfig, index_pool
+from corporeal.pool.pool_index import IndexConfig, OriginConfig, index_pool
 from pool_models import plain_ball
 
 COLUMNS = (

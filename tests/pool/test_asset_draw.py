@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from corporeal.pool.asset_draw import draw_least_used
+from corporeal.pool.asset_pool import draw_least_used
 
 NAMES = tuple("abcdefghijklmno")
 

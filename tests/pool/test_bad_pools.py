@@ -9,8 +9,7 @@ import pytest
 
 from corporeal.io.gltf.gltf_reader import read_glb
 from corporeal.pool import quality_gate
-from corporeal.pool.candidate_origins import OriginConfig
-from corporeal.pool.pool_index import IndexConfig, index_pool
+from corporeal.pool.pool_index import IndexConfig, OriginConfig, index_pool
 from glb_maker import CUBE, CUBE_TRIANGLES
 from pool_models import ball, checks, glb, plain_ball
 

@@ -10,9 +10,8 @@ import pytest
 
 from corporeal.core.errors import UserError
 from corporeal.pool import objaverse
-from corporeal.pool.candidate_origins import OriginConfig
 from corporeal.pool.objaverse import WantedModels
-from corporeal.pool.pool_index import IndexConfig, index_pool
+from corporeal.pool.pool_index import IndexConfig, OriginConfig, index_pool
 from pool_models import plain_ball
 
 MUG, VASE, LOOSE, ABSENT = "8476c4170df2", "8ff7f1f24653", "c786b97d08b9", "139331da7445"

@@ -13,8 +13,7 @@ from corporeal.core.errors import UserError
 from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.io.gltf.gltf_reader import read_glb
 from corporeal.pool import gate_verdicts
-from corporeal.pool.candidate_origins import OriginConfig
-from corporeal.pool.pool_index import IndexConfig, index_pool, read_pool
+from corporeal.pool.pool_index import IndexConfig, OriginConfig, index_pool, read_pool
 from corporeal.pool.quality_gate import GateConfig
 from pool_models import ball, checks, glb, plain_ball, scene
 

@@ -4,7 +4,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.pipeline.stages.describe import describe
-from corporeal.recognition.packaged_goods import packaged_goods
+from corporeal.recognition.lexicon import packaged_goods
 from sample_scenes import plain, scene
 
 

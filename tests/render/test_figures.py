@@ -24,8 +24,8 @@ from corporeal.core.types import (
     Video,
 )
 from corporeal.render import colours, figures, video_file
+from corporeal.render.figure_legends import drawable_name
 from corporeal.render.figures import fields_figure, si_prefix_text, write_filmstrip
-from corporeal.render.glyphs import drawable_name
 
 STEEL = (0.4409, 0.8171, 0.681)
 """Its colour in every figure ever printed."""
@@ -121,16 +121,15 @@ def test_colours_of_a_scale_are_those_of_matplotlib():
 
 
 def test_a_material_has_the_same_colour_in_every_scene():
-    assert np.allclose(colours.material_colour("steel"), STEEL, atol=2e-3)
+    assert np.allclose(colours.distinct_colours(["steel"])[0], STEEL, atol=2e-3)
     # Hardwood and paper are two blues by themselves; the later one gives way.
     wood, paper, again = colours.distinct_colours(["hardwood", "paper", "hardwood"])
-    assert wood == again == colours.material_colour("hardwood") and paper != wood
+    assert wood == again == colours.distinct_colours(["hardwood"])[0] and paper != wood
     assert np.linalg.norm(np.subtract(wood, paper)) > 0.3
     names = ("steel", "rubber", "hardwood", "glass", "mud", "ceramic")
     for a, b in itertools.combinations(names, 2):
         assert (
-            np.linalg.norm(np.subtract(colours.material_colour(a), colours.material_colour(b)))
-            > 0.08
+            np.linalg.norm(np.subtract(*(colours.distinct_colours([n])[0] for n in (a, b)))) > 0.08
         )
 
 

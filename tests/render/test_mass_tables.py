@@ -51,10 +51,3 @@ def test_each_of_several_answers_has_a_row_with_its_way_its_mass_and_its_estimat
     assert "box_0" not in second
     assert "jar_0" not in table
     assert "What each answer says" not in mass_table([BOX])
-
-
-def test_an_older_run_shows_the_masses_of_its_answers_alone():
-    (told,) = {mass_table([replace(BOX, answers=(AnsweredMass(0.4, 0.3), AnsweredMass(0.8, 0.6)))])}
-    assert "not recorded" in told
-    assert '<td class="n">0.4</td>' in told
-    assert told.count("by a factor of 2.00") == 2

@@ -6,8 +6,8 @@ import trimesh
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.render.camera_placement import fit_camera
 from corporeal.render.embree import render_image
+from corporeal.render.figures import render_recoloured
 from corporeal.render.ray_scene import RayScene, StudioLight
-from corporeal.render.recolouring import render_recoloured
 
 
 def two_blocks():

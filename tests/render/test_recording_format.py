@@ -9,14 +9,12 @@ from scipy.spatial.transform import Rotation
 import corporeal as co
 from corporeal.core.types import Frame
 from corporeal.pipeline.viewer_data import bind_scene, record_trajectory, viewer_recording
-from corporeal.render.recording_compression import (
-    decode_octahedral,
-    encode_octahedral,
-    encode_time_deltas,
-)
 from corporeal.render.recording_format import (
+    MAX_SIGNED_BYTE,
     RESIDUAL_STEP_M,
     SceneBinding,
+    encode_octahedral,
+    encode_time_deltas,
     pack_recording,
     record_frames,
     stress_bytes,
@@ -25,6 +23,16 @@ from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS
 
 NEAR = 0.5 * RESIDUAL_STEP_M * np.sqrt(3) + 1e-6
 """Rounding of three coordinates, and that of float32 [m]."""
+
+
+def decode_octahedral(pairs):
+    """Return the unit vectors that ``encode_octahedral`` put into bytes, as the page does."""
+    flat = pairs / MAX_SIGNED_BYTE
+    height = 1.0 - np.abs(flat).sum(axis=1)
+    below = np.maximum(-height, 0.0)[:, None]
+    flat = flat - np.where(flat >= 0, below, -below)
+    out = np.column_stack([flat, height])
+    return out / np.linalg.norm(out, axis=1, keepdims=True)
 
 
 @pytest.fixture(scope="module")

@@ -11,11 +11,13 @@ from corporeal.scene.arrange_bodies import arrange_bodies
 from corporeal.scene.collision_chain import (
     LAST_IMPACT_SPEED_RATIO_RANGE,
     MAX_START_SPEED_RATIO,
+    PreviewContact,
     chain_start_speed,
     find_collision_chain,
+    impact_hops,
+    preview_contacts,
 )
 from corporeal.scene.interactions import begin_interaction
-from corporeal.scene.rigid_preview import PreviewContact, impact_hops, preview_contacts
 from corporeal.scene.settled_bodies import SettledBodies
 from corporeal.scene.settling_body import UNKNOWN_FRICTION, BodyPose
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from bodies import ball, box
 
-from corporeal.geometry.wind_drag import AIR_DENSITY_KG_M3, FLAT_PLATE_DRAG_COEFFICIENT, drag_areas
 from corporeal.mpm.physics import wind_pressure
 from corporeal.scene.interactions import (
     FALL_HEIGHT_SIZES_RANGE,
@@ -21,7 +20,13 @@ from corporeal.scene.interactions import (
     begin_interaction,
 )
 from corporeal.scene.settling_body import UNKNOWN_FRICTION, BodyPose
-from corporeal.scene.wind_threshold import ROUND_FOOT_SIZE_FRACTION, wind_threshold
+from corporeal.scene.wind_threshold import (
+    AIR_DENSITY_KG_M3,
+    FLAT_PLATE_DRAG_COEFFICIENT,
+    ROUND_FOOT_SIZE_FRACTION,
+    drag_areas,
+    wind_threshold,
+)
 
 GRAVITY = 9.81
 

@@ -7,9 +7,8 @@ import pytest
 import trimesh
 
 from corporeal.geometry.convex_hull import ConvexPiece
-from corporeal.scene.mass_properties import MassProperties, cubes_mass_properties
 from corporeal.scene.settle_bodies import settle_bodies
-from corporeal.scene.settling_body import SettlingBody
+from corporeal.scene.settling_body import MassProperties, SettlingBody, cubes_mass_properties
 
 
 def roll(inertial=None):

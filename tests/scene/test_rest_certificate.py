@@ -7,10 +7,9 @@ import pytest
 import trimesh
 from bodies import ball, box, convex
 
-from corporeal.scene.mass_properties import MassProperties
 from corporeal.scene.rest_certificate import measure_drift, measure_rest
 from corporeal.scene.settle_mujoco import HARD_CONTACT_STEP_S, MujocoScene
-from corporeal.scene.settling_body import BodyPose
+from corporeal.scene.settling_body import BodyPose, MassProperties
 
 FLAT = BodyPose((0.0, 0.0, 0.1))
 

@@ -17,7 +17,6 @@ from corporeal.cli.parse import parse
 from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.pipeline.stages.compose import ComposeConfig, compose
 from corporeal.pool.asset_pool import AssetPool, PoolAsset
-from corporeal.scene.mass_properties import MassProperties
 from corporeal.scene.settle_blender import (
     BLENDER_SCENE_SIZE,
     BLENDER_SCRIPT,
@@ -26,7 +25,7 @@ from corporeal.scene.settle_blender import (
     drop_in_blender,
 )
 from corporeal.scene.settle_bodies import SettleConfig, settle_bodies
-from corporeal.scene.settling_body import BodyPose
+from corporeal.scene.settling_body import BodyPose, MassProperties
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker
 
 TURN = (0.5**0.5, 0.0, 0.0, 0.5**0.5)

@@ -5,8 +5,7 @@ import pytest
 import trimesh
 from scipy.spatial import ConvexHull
 
-from corporeal.geometry.convex_hull import convex_hull_of
-from corporeal.geometry.convex_simplification import simplify_convex
+from corporeal.geometry.convex_hull import convex_hull_of, simplify_convex
 
 
 def hull(mesh):

@@ -1,9 +1,9 @@
 """Every prop is a body: closed, shaded outwards, of real size, with real matter in it."""
 
 import numpy as np
+import prop_soundness
 import pytest
 
-from corporeal.showcase import prop_soundness
 from corporeal.showcase.prop_models import PROP_BUILDERS
 
 # Matter [cm³] and size [mm] of each prop: wall area × wall where hollow, volume where solid.

@@ -3,7 +3,7 @@
 import pytest
 
 from corporeal.core.errors import UnknownChoiceError
-from corporeal.showcase.prop_scene import prop_scene
+from corporeal.showcase.showcase_scenes import prop_scene
 
 
 def test_a_prop_stands_alone_on_the_floor_and_says_what_it_is_made_of():

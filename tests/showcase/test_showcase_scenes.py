@@ -5,11 +5,12 @@ from functools import partial
 from importlib import resources
 
 import numpy as np
+import prop_soundness
 import pytest
 import trimesh
 
 from corporeal.core.errors import UnknownChoiceError
-from corporeal.showcase import prop_soundness, showcase_scenes
+from corporeal.showcase import showcase_scenes
 from corporeal.showcase.prop_models import PROP_BUILDERS
 
 NAMES = list(showcase_scenes.SHOWCASE_SCENE_BUILDERS)

@@ -312,6 +312,3 @@ def test_a_pair_that_gained_hides_nothing_of_what_another_lost(story):
     ledger = replace(known, potential=-fall, impact_loss=net, impact_of_pair=pairs)
     assert impact_loss(ledger, SCENE, CELL) == pytest.approx(0.5)
     assert impact_gain(ledger, SCENE, CELL) == pytest.approx(0.2)
-    before = replace(ledger, impact_of_pair=np.full_like(pairs, np.nan))
-    assert impact_gain(before, SCENE, CELL) is None
-    assert impact_loss(before, SCENE, CELL) == pytest.approx(0.3)

@@ -5,17 +5,25 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from corporeal.simulation.residual_shape import (
+    box_diagonal,
     fit_rigid_motion,
     mean_of_largest,
     place_at_start,
     residual_dent,
-    shape_error,
     upper_percentile,
 )
 
 RNG = np.random.default_rng(3)
 CUBE = RNG.uniform(-0.05, 0.05, (8000, 3))
 TURN = Rotation.from_rotvec([0.4, 1.9, -0.7]).as_matrix()
+
+
+def shape_error(start, now):
+    """RMS distance after the best rigid fit over the bounding box's diagonal [-]."""
+    fit = fit_rigid_motion(start, now, np.ones(len(start)))
+    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / box_diagonal(
+        start
+    )
 
 
 def pressed(points):

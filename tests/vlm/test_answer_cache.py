@@ -17,8 +17,7 @@ from fake_server import FakeServer
 from corporeal.vlm import AnswerCost, AnswerSchema, Question, Reply, connect_vlm
 from corporeal.vlm import answer_cache as cache_module
 from corporeal.vlm.answer_cache import CachingClient
-from corporeal.vlm.api_clients import OpenAIClient
-from corporeal.vlm.retry import RetryPolicy
+from corporeal.vlm.api_clients import OpenAIClient, RetryPolicy
 from corporeal.vlm.thread_map import thread_map
 
 PICTURE = np.zeros((4, 4, 3), np.uint8)
@@ -200,7 +199,7 @@ sys.path[:0] = {tests!r}
 from test_answer_cache import Colour, numbered
 from pathlib import Path
 from corporeal.vlm.answer_cache import CachingClient
-from corporeal.vlm.retry import RetryPolicy
+from corporeal.vlm.api_clients import RetryPolicy
 from corporeal.vlm.api_clients import OpenAIClient
 from corporeal.vlm.thread_map import thread_map
 model = OpenAIClient("fake@{url}", RetryPolicy(tries=12, first_wait=0.01))

@@ -11,8 +11,13 @@ from pydantic import BaseModel
 import corporeal
 from corporeal.core.errors import UserError
 from corporeal.vlm import AnswerSchema, Question, UnansweredError, VlmClient, connect_vlm
-from corporeal.vlm.api_clients import AnthropicClient, GoogleClient, OllamaClient, OpenAIClient
-from corporeal.vlm.retry import RetryPolicy
+from corporeal.vlm.api_clients import (
+    AnthropicClient,
+    GoogleClient,
+    OllamaClient,
+    OpenAIClient,
+    RetryPolicy,
+)
 
 QUICK = RetryPolicy(tries=3, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
 PICTURES = tuple(np.full((8, 8, 3), shade, np.uint8) for shade in (0, 100, 200))

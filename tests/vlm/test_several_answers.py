@@ -11,9 +11,8 @@ from fake_server import FakeServer
 from corporeal.core.errors import UserError
 from corporeal.vlm import AnswerCost, AnswerNumber, AnswerSchema, Question
 from corporeal.vlm.answer_cache import CachingClient
-from corporeal.vlm.api_clients import AnthropicClient, OpenAIClient
+from corporeal.vlm.api_clients import AnthropicClient, OpenAIClient, RetryPolicy
 from corporeal.vlm.recordings import RecordingClient, ReplayClient, write_recording
-from corporeal.vlm.retry import RetryPolicy
 
 QUICK = RetryPolicy(tries=4, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
 ASKED = Question("materials", "How heavy?", "s/chair", "1", (np.full((8, 8, 3), 100, np.uint8),))

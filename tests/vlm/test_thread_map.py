@@ -4,7 +4,7 @@ import time
 import numpy as np
 import pytest
 
-from corporeal.vlm.retry import RetryPolicy, retry_after_seconds
+from corporeal.vlm.api_clients import RetryPolicy, retry_after_seconds
 from corporeal.vlm.thread_map import thread_map
 
 

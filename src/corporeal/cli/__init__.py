@@ -242,15 +242,15 @@ def command_simulate() -> None:
 
 def _spread(asked: Any) -> None:
     """Simulate an ensemble and print the spread of its outcomes."""
-    from corporeal.lab.evaluation import ensemble_report
+    from corporeal.lab.evaluation import outcome_ensemble
     from corporeal.lab.evaluation.outcome_ensemble import simulate_ensemble
 
     with progress_bars() as tell:
         result = simulate_ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
-    show_table(ensemble_report.SPREAD_HEADS, ensemble_report.spread_rows(result))
-    ensemble_report.spread_figure(result, asked.run / "ensemble.png")
+    show_table(outcome_ensemble.SPREAD_HEADS, outcome_ensemble.spread_rows(result))
+    outcome_ensemble.spread_figure(result, asked.run / "ensemble.png")
     written = (asked.run / name for name in ("ensemble.json", "ensemble.png"))
-    print(*ensemble_report.failed_members(result), *written, sep="\n")
+    print(*outcome_ensemble.failed_members(result), *written, sep="\n")
 
 
 def _names_a_run() -> bool:

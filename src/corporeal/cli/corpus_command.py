@@ -118,22 +118,15 @@ def _run() -> None:
 
 def _report() -> None:
     """Write CORPUS/report.html, report.csv and report.json for all scenes run so far."""
-    from corporeal.lab.corpus.collect_results import collect_results
-    from corporeal.lab.corpus.corpus_docs_page import write_corpus_page
     from corporeal.lab.corpus.corpus_report import report_corpus
 
     @dataclass(frozen=True)
     class Report:
         corpus: Corpus
-        docs: Path | None = None
-        """Also write the measured rows as a documentation page (Markdown)."""
 
     asked = parse(Report, "corpus report", _report.__doc__, words=2)
     with progress_bars() as tell:
         written = report_corpus(asked.corpus, tell("report"))
-    if asked.docs is not None:
-        write_corpus_page(collect_results(asked.corpus), asked.docs)
-        written.append(asked.docs)
     print(*written, sep="\n")
 
 

@@ -268,7 +268,7 @@ def evaluate_dynamics() -> None:
 
 def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
     """Write the report of an evaluation of dynamics, and the files asked for."""
-    from corporeal.lab.evaluation.dynamics import dynamics_figure, dynamics_page
+    from corporeal.lab.evaluation.dynamics import dynamics_page
     from corporeal.lab.evaluation.dynamics.dynamics_summary import dynamics_record
 
     page = asked.page or out / "report.html"
@@ -277,7 +277,7 @@ def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
     if asked.json is not None:
         store.write_json(asked.json, dynamics_record(found))
     if asked.figure is not None:
-        dynamics_figure.draw_dynamics(found, asked.figure)
+        dynamics_page.draw_dynamics(found, asked.figure)
     if asked.docs is not None:
         command = f"corporeal evaluate dynamics {asked.target} --against "
         command += f"{' '.join(asked.how.against)} --docs {asked.docs}"

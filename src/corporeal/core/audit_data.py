@@ -286,13 +286,11 @@ class Audit:
     mechanical_growth: float
     """The same without the losses [-]."""
     unbooked_loss: float | None = field(default=None, kw_only=True)
-    """Largest share of the energy that transfers took, which no booked loss accounts for [-]; None:
-    a run from before it was kept."""
+    """Largest share of the energy that transfers took, which no booked loss accounts for [-]."""
     impact_loss: float | None = field(default=None, kw_only=True)
     """Share of the energy that normal contact took: restitution, and nodes that stop [-]."""
     impact_gain: float | None = field(default=None, kw_only=True)
-    """What it gave to pairs that have more from it than it took, likewise [-]; None: a run from
-    before it was kept."""
+    """What it gave to pairs that have more from it than it took, likewise [-]."""
     energy_gain: EnergyGain | None = field(default=None, kw_only=True)
     """Who gained, and when, where ``mechanical_growth`` is beyond what is allowed."""
     surfaces: tuple[SurfacePairCheck, ...] = field(default=(), kw_only=True)
@@ -308,8 +306,7 @@ class Audit:
     pair_penetration_m: float
     """Of objects [m]."""
     start_penetration_m: float | None = field(default=None, kw_only=True)
-    """Of objects at the start: how deep the scene puts them into each other [m]; None: a run from
-    before it was kept."""
+    """Of objects at the start: how deep the scene puts them into each other [m]."""
     parts: tuple[PartAudit, ...]
     """One per part, in the catalogue's order."""
     settling: SettlingOutcome | None
@@ -317,7 +314,7 @@ class Audit:
     warnings: tuple[str, ...]
     """What to read before trusting the video, in sentences."""
     kind_of_warning: tuple[NoteKind, ...] = field(default=(), kw_only=True)
-    """One for each; none: a run from before they were kept."""
+    """One for each."""
     breakage: tuple[PredictedBreakage, ...] = field(default=(), kw_only=True)
     """One per brittle rigid part that something struck."""
 

@@ -14,9 +14,9 @@ from corporeal.core.types import (
     Scene,
     Surface,
 )
-from corporeal.discretization.hollow_prior import hollow_if_too_thick
 from corporeal.discretization.open_vessel_walls import (
     NamedObject,
+    hollow_if_too_thick,
     sheet_if_drawn_full,
     with_usual_vessel_wall,
 )

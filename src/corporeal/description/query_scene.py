@@ -1,6 +1,11 @@
-"""Questions to a vision-language model on every object of a scene."""
+"""Questions to a vision-language model on every object of a scene.
 
-from collections.abc import Callable, Mapping
+Repeated interviews on one object; each answer is a complete interview.
+
+Questions on values depend on the answers on materials, so complete interviews are pooled.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib.resources import files
@@ -10,50 +15,54 @@ import numpy as np
 from corporeal import materials
 from corporeal.core.types import (
     Inventory,
+    MassEvidence,
     Note,
     NoteKind,
+    ObjectAnswer,
     ObjectDescription,
     PartDescription,
+    RangePlacement,
     Scene,
+    apply_hypothesis,
 )
 from corporeal.description.apply_annotations import apply_annotations
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.describe_from_file import has_wall_thickness, stated_material
-from corporeal.description.placement_questions import (
-    PlacementAnswer,
-    hypotheses_by_name,
-    make_placement_offer,
-    placements_from_answer,
-)
 from corporeal.description.pool_answers import pool_answers
-from corporeal.description.repeat_interview import repeat_interview
 from corporeal.discretization.drawn_thickness import measure_drawn_shape
-from corporeal.discretization.oriented_extent import oriented_box_size
-from corporeal.materials.material_candidates import content_materials_text, part_materials_text
+from corporeal.discretization.mesh_measures import oriented_box_size
+from corporeal.materials.material_candidates import (
+    QuantityChoice,
+    content_materials_text,
+    part_materials_text,
+)
 from corporeal.materials.range_placement import (
+    QuantityJudgement,
     library_entry,
     library_spelling,
     placed_wall_thickness,
     placement_contradictions,
+    placements_from_fractions,
+    placements_from_values,
     quantity_choices,
     usual_placements,
 )
 from corporeal.recognition.parts_by_name import PartsByName
 from corporeal.recognition.parts_by_name import name_words as telling
-from corporeal.recognition.stated_properties import (
-    apply_inflation,
-    stated_thickness,
-)
+from corporeal.recognition.stated_properties import apply_inflation, stated_thickness
 from corporeal.render.object_portrait import PortraitOptions, part_colour_names, render_portraits
-from corporeal.vlm import OnDemandPictures, VlmClient
+from corporeal.vlm import SINGLE_ANSWER, AnswerNumber, OnDemandPictures, VlmClient
 from corporeal.vlm.answer_schemas import AllowedNames, FractionAnswer, ValueAnswer
-from corporeal.vlm.human_client import is_not_pending, refuse_pending
+from corporeal.vlm.human_client import PendingQuestionsError, is_not_pending, refuse_pending
 from corporeal.vlm.interpret_answers import (
+    LookingSource,
     apply_placements,
     apply_real_shares,
     box_sides_text,
     complete_from_file,
     contradiction_with_file,
+    evidence_from_answer,
+    hypothesis_name,
     leaf_parts,
     merge_pieces,
     parts_filling_scan,
@@ -61,9 +70,123 @@ from corporeal.vlm.interpret_answers import (
     sum_usage,
     with_usual_extents,
 )
-from corporeal.vlm.interview import Interview, InterviewSubject
+from corporeal.vlm.interview import Interview, InterviewSubject, PlacementOffer
 from corporeal.vlm.prompt_files import read_prompt
 from corporeal.vlm.thread_map import thread_map
+
+
+def repeat_interview(
+    interview: Interview, count: int, described: Callable[[], list[PartDescription]], direct: bool
+) -> list[ObjectAnswer]:
+    """Return the descriptions of one object by ``count`` answers.
+
+    Answers with an unusable reply are left out with a warning; if all are, the first is used,
+    completed from the file.
+
+    Args:
+        interview: Of the object.
+        count: How many answers are wanted.
+        described: Asks about its parts, as often as it is called.
+        direct: Whether its mass is asked for outright.
+
+    Raises:
+        WaitingError: Questions wait for a person: as many as can be asked now.
+
+    """
+    if count == 1:
+        return [ObjectAnswer(tuple(described()), _judge_mass(interview, direct))]
+    told, whole, waiting = [], [], []
+    for number in range(1, count + 1):
+        interview.turn = AnswerNumber(number, count)
+        before = len(interview.transcript)
+        parts = _ask_unless_pending(described, waiting)
+        fits = _is_complete(interview.transcript[before:])
+        evidence = _ask_unless_pending(partial(_judge_mass, interview, direct), waiting)
+        if parts is not None:
+            told.append(ObjectAnswer(tuple(parts), evidence))
+            whole += [told[-1]] if fits else []
+    interview.turn = SINGLE_ANSWER
+    if waiting:
+        raise PendingQuestionsError(str(waiting[0]), sum(error.count for error in waiting))
+    _warn_of_left_out_answers(interview, whole, count)
+    return whole or told[:1]
+
+
+def _ask_unless_pending(ask: Callable, waiting: list[PendingQuestionsError]):
+    """Ask; if a person has yet to answer, continue with other questions."""
+    try:
+        return ask()
+    except PendingQuestionsError as error:
+        waiting.append(error)
+        return None
+
+
+def _is_complete(rows: Sequence[Mapping]) -> bool:
+    """Return whether every question was answered at least once."""
+    answered = {row["task"] for row in rows if row["answer"] is not None}
+    return all(row["task"] in answered for row in rows)
+
+
+def _judge_mass(interview: Interview, direct: bool) -> MassEvidence | None:
+    weighs = interview.mass() if direct else None
+    return evidence_from_answer(*weighs) if weighs else None
+
+
+def _warn_of_left_out_answers(
+    interview: Interview, whole: Sequence[ObjectAnswer], count: int
+) -> None:
+    """Warn of answers that are left out, without repetition."""
+    warnings = list(dict.fromkeys(interview.warnings))
+    if len(whole) < count:
+        kept = f"{len(whole)} of {count} answers count" if whole else "the first answer counts"
+        warnings.append(f"{interview.subject.name}: {kept}; a question to the others stayed open.")
+    interview.warnings[:] = warnings
+
+
+PlacementAnswer = FractionAnswer | ValueAnswer
+OfferedChoices = Mapping[str, Mapping[str, QuantityChoice]]
+"""Part → quantity → its range."""
+
+
+def hypotheses_by_name(words: PartDescription) -> dict[str, PartDescription]:
+    """Return the hypotheses of a part by the names used in questions; the first is the part."""
+    others = enumerate(words.hypotheses[1:], 1)
+    return {words.name: words} | {
+        hypothesis_name(words.name, k): apply_hypothesis(words, w) for k, w in others
+    }
+
+
+def make_placement_offer(
+    name: str, words: PartDescription, look: str, offered: Mapping[str, QuantityChoice]
+) -> PlacementOffer:
+    """Return the facts on one part that precede the question on its values."""
+    made = [str(words.material), *([words.structure] if words.structure else [])]
+    if words.contents is not None:
+        made.append(f"{words.fill or 1.0:.0%} full of {words.contents}")
+    if words.solidity is not None:
+        made.append(f"{words.solidity:.0%} of it matter")
+    seen = f" (it looks: {look})" if look else ""
+    return PlacementOffer(
+        f"{name}: {', '.join(made)}{seen}",
+        {field: c.words for field, c in offered.items()},
+        {field: c.bounds for field, c in offered.items()},
+    )
+
+
+def placements_from_answer(
+    answer: PlacementAnswer, by: LookingSource, offered: OfferedChoices
+) -> dict[str, dict[str, RangePlacement]]:
+    """Read an answer: part → quantity → where in its range the value lies."""
+    read = placements_from_values if isinstance(answer, ValueAnswer) else placements_from_fractions
+    return {
+        p.part: read(
+            {v.quantity: QuantityJudgement(v.number, v.reason) for v in p.values},
+            by,
+            offered[p.part],
+        )
+        for p in answer.parts
+    }
+
 
 INTERVIEW_TASKS = ("parts", "ranking", "materials", "thickness", "placement", "mass", "extents")
 ProgressCallback = Callable[[float, str], None]

@@ -1,6 +1,15 @@
-"""Simulated parameters of one part: rigid, deformable or shell, with reasons."""
+"""Simulated parameters of one part: rigid, deformable or shell, with reasons.
 
-from dataclasses import dataclass
+Plants: crowns of leaves, and parts that do not visibly bend.
+
+With true wood a plant hardly flexes: what sways is its root ball in soft potting soil and its
+leaves on their stalks. So where everything but the leaves stays rigid, the crown is a body of its
+own without stress, each of its particles on a damped spring to the wood, and the give of the soil
+is in a sprung joint at the root. Where the wood does bend, none of this applies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import hypot, inf, sqrt
 from typing import Literal
 
@@ -21,11 +30,8 @@ from corporeal.discretization.part_geometry import (
     wall_factors,
     wall_thickening_ratio,
 )
-from corporeal.discretization.plant_parts import FOLIAGE_REASON
 from corporeal.discretization.rigidity import judge_rigidity
-from corporeal.discretization.step_budget import (
-    wave_speed,
-)
+from corporeal.discretization.step_budget import wave_speed
 from corporeal.materials.restitution_speed import material_at_speed
 from corporeal.mpm.constants import GRID_LOSS_FACTOR, MIN_CELLS_FOR_GRID_LOSS
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
@@ -37,6 +43,47 @@ from corporeal.mpm.physics.time_step_limits import (
     limp_wall_factors,
     stable_step,
 )
+
+MIN_FOLIAGE_LEAVES = 20
+"""A part of fewer separate leaves is no crown."""
+POTTED_SOIL_REASON = "a rigid pot holds it, and its compliance is in the spring at the plant's root"
+FOLIAGE_REASON = "A crown of leaves without stress of its own, each on a damped spring to the wood"
+
+
+@dataclass(frozen=True)
+class PartVerdicts:
+    """Verdicts on all parts of a scene, and which of them are crowns of leaves."""
+
+    verdicts: Sequence[RigidityVerdict]
+    """One per part."""
+    foliage_parts: frozenset[int] = frozenset()
+    """Numbers of parts."""
+
+
+def judge_plants(
+    parts: Sequence[PartGeometry], verdicts: Sequence[RigidityVerdict]
+) -> PartVerdicts:
+    """Make potted soil rigid, and find the crowns of leaves.
+
+    Args:
+        parts: All parts of the scene.
+        verdicts: One per part.
+
+    """
+    judged = list(verdicts)
+    foliage_parts: set[int] = set()
+    leafy = {k for k, p in enumerate(parts) if p.leaves >= MIN_FOLIAGE_LEAVES and not p.prescribed}
+    for number in sorted({parts[k].object for k in leafy}):
+        mine = [k for k, p in enumerate(parts) if p.object == number]
+        rest = [k for k in mine if k not in leafy]
+        soil = [k for k in rest if CONSTITUTIVE_LAWS[parts[k].material.law].granular]
+        firm = [k for k in rest if k not in soil]
+        if firm and all(judged[k].rigid for k in firm):
+            for k in soil:
+                judged[k] = replace(judged[k], rigid=True, reason=POTTED_SOIL_REASON)
+            foliage_parts |= leafy & set(mine)
+    return PartVerdicts(judged, frozenset(foliage_parts))
+
 
 PartRole = Literal["soft", "rigid", "inclusion", "subgrid", "foliage"]
 """An inclusion is rigid and holds the softer parts of its object. A subgrid part is too small to

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from corporeal.core.types import Discretization
-from corporeal.discretization.fall_heights import FLOOR_NUMBER
 from corporeal.discretization.hertz_indentation import hertz_dent_of_layer
 from corporeal.discretization.impact_frequency import impact_compliance
+from corporeal.discretization.impact_speeds import FLOOR_NUMBER
 from corporeal.discretization.pair_damping import largest_part_of
 from corporeal.discretization.part_geometry import (
     MIN_COMPACT_SIDE_RATIO,

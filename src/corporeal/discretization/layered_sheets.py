@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from corporeal.core.types import Material, MaterialField, Particles
-from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.discretization.mesh_measures import oriented_box_size
 from corporeal.discretization.part_geometry import (
     MIN_COMPACT_SIDE_RATIO,
     ObjectLanding,

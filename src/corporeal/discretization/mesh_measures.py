@@ -8,7 +8,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError
 
+from corporeal.core.errors import UserError
+from corporeal.core.types import Parts, Scene
 from corporeal.discretization.mesh_kind import (
     MeshKind,
     OuterSkin,
@@ -20,10 +23,10 @@ from corporeal.discretization.mesh_kind import (
 )
 from corporeal.discretization.open_cavity import volume_below_rim
 from corporeal.discretization.open_vessel_sheet import vessel_sheet_area
-from corporeal.discretization.oriented_extent import oriented_box_size
 from corporeal.geometry.mesh import (
     Mesh,
     inward_area_loss_rate,
+    join_meshes,
     open_edge_ratio,
     orient_outward,
     signed_volume,
@@ -31,6 +34,42 @@ from corporeal.geometry.mesh import (
 )
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.point_sampling import scatter_points
+
+
+def oriented_box_size(points: Float[np.ndarray, "N 3"]) -> tuple[float, float, float]:
+    """Extents of the smallest box around the points, shortest first [m].
+
+    The box of least volume over frames that stand on a face of the convex hull and are turned to
+    one of that face's edges, beside the world's and the principal frame.
+    """
+    centred = points - points.mean(axis=0)
+    _, _, principal = np.linalg.svd(centred[:: max(1, len(centred) // 20000)], full_matrices=False)
+    frames = [np.eye(3)]
+    if principal.shape == (3, 3):
+        frames.append(principal)
+    try:
+        hull = ConvexHull(centred)
+    except QhullError:  # flat or straight: the principal frame is the right one
+        outline = centred
+    else:
+        outline = centred[hull.vertices]
+        frames += _hull_frames(hull)
+    sizes = np.ptp(np.einsum("fij,nj->fni", np.stack(frames), outline), axis=1)
+    best = np.sort(sizes[np.argmin(np.prod(sizes + 1e-12, axis=1))])
+    return float(best[0]), float(best[1]), float(best[2])
+
+
+def _hull_frames(hull: ConvexHull, most: int = 80) -> list[np.ndarray]:
+    corners = hull.points[hull.simplices]
+    edge = corners[:, 1] - corners[:, 0]
+    area = np.linalg.norm(np.cross(edge, corners[:, 2] - corners[:, 0]), axis=1)
+    frames = []
+    for k in np.argsort(area)[::-1][:most]:
+        normal = hull.equations[k, :3]
+        along = edge[k] / np.linalg.norm(edge[k])
+        frames.append(np.stack([normal, along, np.cross(normal, along)]))
+    return frames
+
 
 OBJECT_PROBES_COUNT = 20_000
 """Points that measure an object's volume; the error of a ball's is about 0.2 %."""
@@ -374,3 +413,80 @@ def _with_probed_volume(
     volume = count * spacing**3
     agrees = abs(exact - volume) < margin * exact or not count
     return replace(member, volume=exact if exact > 0 and agrees else volume)
+
+
+def measure_objects(scene: Scene, parts: Parts, seed: int) -> list[MeasuredObject]:
+    """Measure every object.
+
+    Raises:
+        UserError: A part has no surface.
+
+    """
+    whole = join_meshes(scene.surfaces)
+    anatomies = []
+    for number in range(len(scene.objects)):
+        own = np.flatnonzero(parts.object_of_point == number)
+        label = _without_unlabelled(parts.part_of_point[own])
+        rng = np.random.default_rng([seed, number, 0])
+        used, triangles = np.unique(whole.triangles[own], return_inverse=True)
+        anatomies.append(measure_object(whole.vertices[used], triangles.reshape(-1, 3), label, rng))
+    found = {m.part for a in anatomies for m in a.members}
+    for k, part in enumerate(parts.catalogue):
+        if k not in found:
+            name = scene.objects[part.object].name
+            raise UserError(
+                f"Part {part.name!r} of object {name!r} has no surface: all of its triangles have "
+                "no area. Remove it from the file, or give it another part's name."
+            )
+    return anatomies
+
+
+def _without_unlabelled(label: np.ndarray) -> np.ndarray:
+    """Give triangles that belong to no part to the object's most common part."""
+    named = label[label >= 0]
+    if len(named) == len(label) or not len(named):
+        return label
+    return np.where(label >= 0, label, np.bincount(named).argmax())
+
+
+def refuse_flat_scene(scene: Scene, anatomies: list[MeasuredObject]) -> None:
+    """Stop when nothing in the scene has a body.
+
+    Raises:
+        UserError: Every part is flat.
+
+    """
+    members = [m for a in anatomies for m in a.members]
+    if all(m.volume == 0 and m.size[0] < 1e-6 * m.size[2] for m in members):
+        raise UserError(
+            f"{scene.source}: no object encloses a volume; every part is flat, so there is "
+            "nothing to fill. Use a model of a solid object."
+        )
+
+
+def refuse_buried_objects(scene: Scene, anatomies: list[MeasuredObject], cell: float) -> None:
+    """Stop when an object reaches more than one cell into the floor or a wall.
+
+    Args:
+        scene: The objects and the walls.
+        anatomies: One per object.
+        cell: Grid spacing [m].
+
+    Raises:
+        UserError: It names the object.
+
+    """
+    for obj, anatomy in zip(scene.objects, anatomies, strict=True):
+        lowest = float(anatomy.vertices[:, 2].min())
+        if lowest < -cell:
+            raise UserError(
+                f"Object {obj.name!r} reaches {-lowest:.3g} m below the floor. "
+                "Raise its position by as much."
+            )
+        for k, wall in enumerate(scene.walls):
+            depth = float(((np.array(wall.point) - anatomy.vertices) @ np.array(wall.normal)).max())
+            if depth > cell:
+                raise UserError(
+                    f"Object {obj.name!r} reaches {depth:.3g} m into wall {k + 1}. "
+                    "Move one of them, or flip the wall's normal."
+                )

@@ -12,18 +12,17 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.types import GRAVITY_M_S2, Material, MaterialField
-from corporeal.discretization.cantilever_bending import (
-    MAX_INVISIBLE_STRAIN,
-    cantilever_tip_deflection_ratio,
-)
 from corporeal.discretization.cavity import is_vessel, part_corners
 from corporeal.discretization.fill_level import sample_isosurface
-from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
-from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, oriented_box_size
 from corporeal.discretization.part_model import (
     infer_structure,
     part_specification,
     piece_specifications,
+)
+from corporeal.discretization.rigidity import (
+    MAX_INVISIBLE_STRAIN,
+    cantilever_tip_deflection_ratio,
 )
 from corporeal.geometry.mesh import Mesh, join_meshes, weld_mesh
 from corporeal.geometry.mesh_queries import QueryMesh

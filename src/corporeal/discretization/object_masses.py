@@ -12,8 +12,7 @@ from corporeal.core.types import (
     Scene,
     SceneObject,
 )
-from corporeal.discretization.mesh_measures import MeasuredObject
-from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.discretization.mesh_measures import MeasuredObject, oriented_box_size
 from corporeal.discretization.part_model import THICKNESS_FROM_MESH, PartModel, scale_part_mass
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.recognition.mass_from_name import mass_from_name_warning

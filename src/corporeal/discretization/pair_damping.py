@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from corporeal.core.types import Material
-from corporeal.discretization.fall_heights import FLOOR_NUMBER
 from corporeal.discretization.filled_shells import bulk_mass
+from corporeal.discretization.impact_speeds import FLOOR_NUMBER
 from corporeal.discretization.layered_sheets import layered_loss_factor
 from corporeal.discretization.part_geometry import ExpectedMotion, ImpactPartner, PartGeometry
 from corporeal.materials.contact_pairs import compliance_share, contact_loss_factor

@@ -3,10 +3,6 @@
 from math import inf, sqrt
 
 from corporeal.core.types import Material
-from corporeal.discretization.cantilever_bending import (
-    MAX_INVISIBLE_STRAIN,
-    cantilever_tip_deflection_ratio,
-)
 from corporeal.discretization.filled_shells import judge_filled_shell
 from corporeal.discretization.part_geometry import (
     ExpectedMotion,
@@ -19,6 +15,26 @@ from corporeal.discretization.part_geometry import (
 )
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.mpm.physics.time_step_limits import bounded_poisson, p_wave_speed, yield_speed
+
+MAX_INVISIBLE_STRAIN = 5e-3
+"""Half a percent, of strain or of a shift over a length, is not seen."""
+
+
+def cantilever_tip_deflection_ratio(
+    load: float, young: float, length: float, depth: float
+) -> float:
+    """Shift of the tip of a bar that is held at one end, over its length [-].
+
+    δ/L = 3 ρ a L³ / (2 E h²) (Euler–Bernoulli, a solid bar).
+
+    Args:
+        load: ρ a [N/m³].
+        young: E [Pa].
+        length: L [m].
+        depth: h [m].
+
+    """
+    return 1.5 * load * length**3 / (young * depth**2)
 
 
 def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdict:

@@ -13,7 +13,6 @@ from math import sqrt
 from scipy.optimize import brentq
 
 from corporeal.core.types import Discretization
-from corporeal.discretization.cantilever_bending import MAX_INVISIBLE_STRAIN
 from corporeal.discretization.hertz_indentation import (
     dent_of_hollow_ball,
     hertz_dent_of_ball,
@@ -27,6 +26,7 @@ from corporeal.discretization.part_geometry import (
     is_flat_wall,
     is_subgrid_part,
 )
+from corporeal.discretization.rigidity import MAX_INVISIBLE_STRAIN
 from corporeal.mpm.constants import COURANT, MIN_REDUCED_POISSON_RATIO
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.mpm.physics.maxwell_branches import stiffening

@@ -14,9 +14,12 @@ from skimage.measure import label
 from corporeal.core.types import MaterialField
 from corporeal.discretization.fill_level import sample_isosurface
 from corporeal.discretization.mesh_kind import MeshKind
-from corporeal.discretization.mesh_measures import MeasuredObject, measure_assembled
+from corporeal.discretization.mesh_measures import (
+    MeasuredObject,
+    measure_assembled,
+    oriented_box_size,
+)
 from corporeal.discretization.open_vessel_sheet import find_vessel_outside
-from corporeal.discretization.oriented_extent import oriented_box_size
 from corporeal.discretization.part_model import (
     infer_structure,
     is_unseen_open_vessel,

@@ -1,14 +1,64 @@
 """Meshes and pictures beside an MJCF or a URDF."""
 
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
 from pathlib import Path
+from typing import cast
 
 import numpy as np
+from jaxtyping import Float, Int
 from PIL import Image
 
 from corporeal.core.types import Finish
 from corporeal.export.exported_solids import ExportedSolid
 from corporeal.geometry.convex_hull import ConvexPiece
-from corporeal.io.mesh.obj_writer import format_obj
+
+
+def format_obj(
+    vertices: Float[np.ndarray, "V 3"],
+    triangles: Int[np.ndarray, "T 3"],
+    uv: Float[np.ndarray, "V 2"] | None = None,
+) -> str:
+    """Return the file's text.
+
+    Args:
+        vertices: [m]
+        triangles: Vertex numbers.
+        uv: Texture coordinates, v running down as in glTF; OBJ's run up.
+
+    """
+    rows = ["v %.9g %.9g %.9g\n" * len(vertices) % _flat(vertices)]
+    corners = np.asarray(triangles) + 1
+    if uv is None:
+        return "".join([*rows, "f %d %d %d\n" * len(corners) % _flat(corners)])
+    rows.append("vt %.7g %.7g\n" * len(uv) % _flat(np.column_stack([uv[:, 0], 1 - uv[:, 1]])))
+    twice = np.repeat(corners, 2, axis=1)
+    return "".join([*rows, "f %d/%d %d/%d %d/%d\n" * len(twice) % _flat(twice)])
+
+
+def _flat(values: np.ndarray) -> tuple:
+    return tuple(np.asarray(values).ravel().tolist())
+
+
+def xml_numbers(values: Iterable[float] | np.ndarray) -> str:
+    """Write numbers in twelve digits with spaces between."""
+    return " ".join(f"{x:.12g}" for x in np.ravel(np.asarray(values, dtype=float)))
+
+
+def write_xml(path: Path, root: ET.Element) -> None:
+    """Write a document, indented."""
+    ET.indent(root)
+    text = ET.tostring(root, encoding="unicode")
+    path.write_text(f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n', encoding="utf-8")
+
+
+def xml_comment(text: str) -> ET.Element:
+    """Return a comment; two dashes, which XML forbids in one, are parted."""
+    while "--" in text:
+        text = text.replace("--", "- -")
+    closed = text.rstrip("-")
+    return cast(ET.Element, ET.Comment(f" {closed} "))
+
 
 MESH_FOLDER = "meshes"
 

@@ -17,10 +17,17 @@ import numpy as np
 from corporeal.core.version import __version__
 from corporeal.export.export_target import ExportRequest, WrittenTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
-from corporeal.export.mesh_files import MESH_FOLDER, write_collider, write_picture, write_surfaces
+from corporeal.export.mesh_files import (
+    MESH_FOLDER,
+    write_collider,
+    write_picture,
+    write_surfaces,
+    write_xml,
+    xml_comment,
+    xml_numbers,
+)
 from corporeal.export.surface_friction import ROLLING_FRICTION_M, TORSIONAL_FRICTION_M
 from corporeal.export.usd_deformables import TETRAHEDRON_CELL_DX, tetrahedra_of
-from corporeal.io.xml_writer import write_xml, xml_comment, xml_numbers
 from corporeal.recognition.readable_names import single_line_text
 
 MJCF_FILE_NAME = "scene.xml"

@@ -1,5 +1,8 @@
 """Conversion of the results of a run to solids at one instant."""
 
+import re
+import unicodedata
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -20,7 +23,6 @@ from corporeal.export.exported_solids import (
     PartMaterial,
     PhysicalScene,
 )
-from corporeal.export.identifiers import identifiers
 from corporeal.export.scene_motion import SceneMotion
 from corporeal.export.unsupported_features import unsupported_features
 from corporeal.geometry.convex_decomposition import decompose_convex
@@ -28,7 +30,32 @@ from corporeal.geometry.convex_hull import ConvexPiece, convex_hull_of
 from corporeal.geometry.mesh import join_meshes
 from corporeal.materials import materials_json
 from corporeal.mpm.physics.rigid import mass_and_inertia
+from corporeal.recognition.readable_names import unique_names
 from corporeal.simulation.simulation_result import PreparedScene
+
+
+def identifiers(titles: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
+    """Return ASCII identifiers, each once: letters, digits and underscores, no digit in front.
+
+    Accents are dropped; letters of other alphabets become underscores, and a name of nothing else
+    becomes ``thing``.
+
+    Args:
+        titles: As people call objects.
+        taken: Identifiers that stand for something else.
+
+    """
+    taken = list(taken)
+    return unique_names([*taken, *map(_identifier, titles)])[len(taken) :]
+
+
+def _identifier(title: str) -> str:
+    plain = unicodedata.normalize("NFKD", title).encode("ascii", "ignore").decode()
+    word = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")[:60]
+    if not re.search(r"[A-Za-z]", word):
+        return f"thing_{word}" if word else "thing"
+    return word if word[0].isalpha() else f"thing_{word}"
+
 
 FLAT_HULL_THICKNESS_FRACTION = 1e-4
 """Of the extent: thickness that the hull of a flat object is given."""

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from corporeal.core.errors import UserError
 from corporeal.export.exported_solids import ConvexCollider, ExportedSolid, PhysicalScene
-from corporeal.geometry.convex_simplification import simplify_convex
+from corporeal.geometry.convex_hull import simplify_convex
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 

@@ -12,8 +12,14 @@ import numpy as np
 from corporeal.core.store import write_json
 from corporeal.export.export_target import ExportRequest, NothingToWriteError, WrittenTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
-from corporeal.export.mesh_files import MESH_FOLDER, write_collider, write_surfaces
-from corporeal.io.xml_writer import write_xml, xml_comment, xml_numbers
+from corporeal.export.mesh_files import (
+    MESH_FOLDER,
+    write_collider,
+    write_surfaces,
+    write_xml,
+    xml_comment,
+    xml_numbers,
+)
 
 PLACEMENTS_FILE_NAME = "placements.json"
 

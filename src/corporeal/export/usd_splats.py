@@ -12,12 +12,15 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Int
 
+from corporeal.core.store import write_json
 from corporeal.core.types import Gaussians
 from corporeal.core.version import __version__
+from corporeal.export.export_target import ExportRequest, NothingToWriteError, WrittenTarget
 from corporeal.export.exported_solids import PhysicalScene
 from corporeal.export.scene_motion import SceneMotion, disk_array
 from corporeal.export.usd_geometry import WORLD_PRIM
 from corporeal.geometry.spherical_harmonics import SH_DEGREE_OF_COUNT
+from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.io.usd.usd_bodies import CUSTOM_DATA_KEY
 from corporeal.io.usd.usda_writer import (
     UsdLayer,
@@ -28,7 +31,7 @@ from corporeal.io.usd.usda_writer import (
     usda_string,
     usda_vectors,
 )
-from corporeal.simulation.moving_gaussians import MovingGaussians
+from corporeal.simulation.moving_gaussians import MovingGaussians, moving_gaussians
 
 SPLATS_FILE_NAME = "splats.usda"
 BOX_SIGMAS = 3.0
@@ -142,3 +145,33 @@ def _box(mean: np.ndarray, scale: np.ndarray) -> str:
 
 def _colours(motion: SceneMotion, moving: MovingGaussians, own: np.ndarray) -> Iterator[str]:
     return (write_vectors(moving.at(frame).sh[own].reshape(-1, 3)) for frame in motion.frames)
+
+
+FRAME_FILE_PATTERN = "frame_{:04d}.ply"
+MATERIALS_FILE_NAME = "video.json"
+
+
+def write_splat_sequence(asked: ExportRequest, folder: Path) -> WrittenTarget:
+    """Write ``frame_0000.ply`` and so on, ``splats.usda``, and ``video.json`` with the materials.
+
+    Raises:
+        NothingToWriteError: The scene was made of surfaces, or nothing moves.
+
+    """
+    played = asked.played
+    if played is None or played.reconstruction is None:
+        raise NothingToWriteError("The scene was made of surfaces: it has no Gaussians.")
+    moving = moving_gaussians(played.reconstruction, played.prepared)
+    for number, frame in enumerate(asked.motion.frames):
+        write_splat_ply(folder / FRAME_FILE_PATTERN.format(number), moving.at(frame))
+    owner = played.reconstruction.object_of_gaussian
+    write_splats(asked.scene, asked.motion, moving, owner, folder)
+    about = {
+        "fps": asked.scene.fps,
+        "time_s": asked.motion.time,
+        "up": "+Z",
+        "credits": asked.scene.credits,
+        "parts": [m.provenance for m in asked.scene.matter],
+    }
+    write_json(folder / MATERIALS_FILE_NAME, about)
+    return WrittenTarget(("Gaussians of no object stand still.",))

@@ -3,18 +3,152 @@
 one | one:E=2e6,nu=.4,rho=200    one material for everything, all of it solid
 omniphysgs                       one E, nu and density for every law
 vomp:PATH pixie:PATH table:PATH  a file of the whole scene, or a folder with one per object
+
+Pixie's points: ``mapped_preds.ply`` or ``world_mapped_preds.ply``.
+
+Columns x, y, z, density [kg/m³], E [Pa], nu and material_id beside colours
+(pixie/voxel/map_pred_to_coords.py, MIT); the names of the ids are those of its simulator
+(MATERIAL_ID_TO_NAME in mpm_solver_warp.py), 7 being the background of its training.
+
+VoMP's voxels: the npz that its ``save_materials`` writes.
+
+``voxel_data`` is a structured array of x, y, z in the frame and unit of the mesh file,
+youngs_modulus [Pa], poissons_ratio and density [kg/m³] (vomp/inference/utils.py, Apache-2.0).
 """
 
+import csv
 import re
+import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.core.errors import UserError
-from corporeal.fields.field_table import read_field_table
-from corporeal.fields.pixie_reader import read_pixie
+import numpy as np
+
+from corporeal.core.errors import BadFileError, UserError
 from corporeal.fields.sampled_field import FIELD_VALUE_BOUNDS, SampledField, check_field
-from corporeal.fields.vomp_reader import read_vomp
+from corporeal.io.ply_container import read_ply_elements
+
+VOMP_COLUMNS = {"young": "youngs_modulus", "poisson": "poissons_ratio", "density": "density"}
+VOMP_WRITE_AGAIN = "Write it again with VoMP's save_materials."
+
+
+def read_vomp(path: Path) -> SampledField:
+    """Read a file without unpickling anything.
+
+    Raises:
+        BadFileError: It is damaged, holds pickled objects, or lacks a column.
+
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            rows = file["voxel_data"]
+    except KeyError as error:
+        raise BadFileError(path, "has no array voxel_data.", VOMP_WRITE_AGAIN) from error
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        pickled = "Object arrays" in str(error)
+        what = "holds pickled objects, which are not read." if pickled else "is no sound npz file."
+        raise BadFileError(path, what, VOMP_WRITE_AGAIN) from error
+    except (AttributeError, TypeError, IndexError) as error:  # an npy file: one array, no names
+        raise BadFileError(path, "is no npz file.", VOMP_WRITE_AGAIN) from error
+    missing = [
+        n for n in ("x", "y", "z", *VOMP_COLUMNS.values()) if n not in (rows.dtype.names or ())
+    ]
+    if missing:
+        raise BadFileError(path, f"voxel_data has no {', '.join(missing)}.", VOMP_WRITE_AGAIN)
+    rows = rows.reshape(-1)
+    return SampledField(
+        method="VoMP",
+        path=path,
+        position=np.stack([rows[axis].astype(float) for axis in "xyz"], axis=1),
+        values={ours: rows[theirs].astype(float) for ours, theirs in VOMP_COLUMNS.items()},
+    )
+
+
+PIXIE_KINDS = ("jelly", "metal", "sand", "visplas", "fluid", "snow", "stationary", "background")
+"""By material_id."""
+PIXIE_COLUMNS = {"young": "E", "poisson": "nu", "density": "density"}
+PIXIE_FILE_NAMES = "mapped_preds.ply or world_mapped_preds.ply"
+
+
+def read_pixie(path: Path) -> SampledField:
+    """Read a file; points of the background are left out.
+
+    Raises:
+        BadFileError: It is damaged, lacks a column, or is the normalised prediction.
+
+    """
+    if path.suffix.lower() in (".npy", ".npz"):
+        what = "is Pixie's normalised prediction, without places and units."
+        raise BadFileError(path, what, f"Name {PIXIE_FILE_NAMES} instead.")
+    rows = read_ply_elements(path, memoryview(path.read_bytes())).get("vertex", {})
+    missing = [n for n in ("x", "y", "z", "material_id", *PIXIE_COLUMNS.values()) if n not in rows]
+    if missing:
+        raise BadFileError(
+            path, f"its vertices have no {', '.join(missing)}.", f"Name {PIXIE_FILE_NAMES}."
+        )
+    number = rows["material_id"].astype(float)
+    known = np.isin(number, range(len(PIXIE_KINDS)))
+    if not known.all():
+        what = f"{int((~known).sum())} points have a material_id that is none of 0 to 7."
+        raise BadFileError(path, what, "Write it again with Pixie.")
+    kind = np.array(PIXIE_KINDS)[number.astype(int)]
+    there = kind != "background"
+    return SampledField(
+        method="Pixie",
+        path=path,
+        position=np.stack([rows[axis][there].astype(float) for axis in "xyz"], axis=1),
+        values={ours: rows[theirs][there].astype(float) for ours, theirs in PIXIE_COLUMNS.items()},
+        kind=kind[there],
+    )
+
+
+TABLE_COLUMNS = {"young": "E", "poisson": "nu", "density": "density"}
+TABLE_HEADER_HELP = "Its first line names the columns: x,y,z and any of E,nu,density (SI)."
+
+
+def read_field_table(path: Path) -> SampledField:
+    """Read a CSV file.
+
+    Raises:
+        BadFileError: A column is missing, or a cell is no number.
+
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = [[cell.strip() for cell in line] for line in csv.reader(file) if any(line)]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise BadFileError(path, "is no CSV file in UTF-8.", TABLE_HEADER_HELP) from error
+    names, body = (lines[0], lines[1:]) if lines else ([], [])
+    told = {ours: theirs for ours, theirs in TABLE_COLUMNS.items() if theirs in names}
+    if not told or not {"x", "y", "z"} <= set(names):
+        raise BadFileError(path, "lacks columns.", TABLE_HEADER_HELP)
+    rows = np.array(
+        [_line_numbers(path, k, line, len(names)) for k, line in enumerate(body, start=2)]
+    )
+    rows = rows.reshape(-1, len(names))
+    column = {name: rows[:, k] for k, name in enumerate(names)}
+    return SampledField(
+        method="the table",
+        path=path,
+        position=np.stack([column[axis] for axis in "xyz"], axis=1),
+        values={ours: column[theirs] for ours, theirs in told.items()},
+    )
+
+
+def _line_numbers(path: Path, number: int, line: list[str], width: int) -> list[float]:
+    try:
+        values = [float(cell) for cell in line]
+    except ValueError as error:
+        raise BadFileError(
+            path, f"line {number} holds a cell that is no number.", TABLE_HEADER_HELP
+        ) from error
+    if len(values) != width:
+        raise BadFileError(
+            path, f"line {number} has {len(values)} cells, not {width}.", TABLE_HEADER_HELP
+        )
+    return values
+
 
 FIELD_READERS: Mapping[str, tuple[Callable[[Path], SampledField], str]] = {
     "vomp": (read_vomp, ".npz"),

@@ -4,9 +4,72 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull, HalfspaceIntersection, KDTree, QhullError
 
 from corporeal.core.errors import UserError
+
+ROLL_STEPS = 800
+FIRST_ROLL_STEP_RAD = np.radians(1.5)
+"""Of the first step; the last is 0."""
+MIN_NEAR_NEIGHBOURS = 8
+"""Neighbours that a point must have nearby, or it is astray."""
+OUTLIER_DISTANCE_MEDIANS = 3.0
+"""Mean distance to them from which on it is, in medians of all points."""
+MAX_RESTING_POINTS = 20_000
+"""Points that are looked at."""
+
+
+@dataclass(frozen=True)
+class RestingPose:
+    """The nearest pose at rest."""
+
+    up: Float[np.ndarray, "3"]
+    """What is up then, in the points' frame: unit."""
+    tilt: float
+    """How far the object rolled [rad]."""
+
+
+def find_resting_pose(
+    points: Float[np.ndarray, "N 3"], up: Float[np.ndarray, "3"]
+) -> RestingPose | None:
+    """Return how a rigid object would lie after rolling slowly down from where it was put.
+
+    The height of the centre of mass over the lowest point, c · u − min_i v_i · u, falls along its
+    steepest slope to the nearest minimum over directions u: there the lowest points support it. The
+    points weigh all the same. None: they span no body.
+    """
+    body = points[:: max(1, len(points) // MAX_RESTING_POINTS)]
+    centre = body.mean(axis=0)
+    try:
+        corners = body[ConvexHull(body).vertices]
+    except QhullError:
+        return None
+    start = up / np.linalg.norm(up)
+    here = best = start
+    least = np.inf
+    for k in range(ROLL_STEPS):
+        heights = corners @ here
+        lowest = np.argmin(heights)
+        rise = centre @ here - heights[lowest]
+        if rise < least:
+            least, best = rise, here
+        slope = centre - corners[lowest]
+        slope = slope - (slope @ here) * here
+        steep = np.linalg.norm(slope)
+        if steep < 1e-12:
+            break
+        here = here - FIRST_ROLL_STEP_RAD * (1 - k / ROLL_STEPS) * slope / steep
+        here = here / np.linalg.norm(here)
+    return RestingPose(best, float(np.arccos(np.clip(best @ start, -1, 1))))
+
+
+def remove_outliers(points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "M 3"]:
+    """Return the points without those that are astray: far from all others."""
+    if len(points) <= MIN_NEAR_NEIGHBOURS:
+        return points
+    apart = KDTree(points).query(points, k=MIN_NEAR_NEIGHBOURS + 1)[0][:, 1:].mean(axis=1)
+    return points[apart <= OUTLIER_DISTANCE_MEDIANS * np.median(apart)]
+
 
 WEIGHT_BEARING_HEIGHT_FRACTION = 2e-3
 """Of the largest side: what is no higher than this above the lowest point carries weight."""
@@ -152,3 +215,69 @@ def _largest_face_normals(normal: np.ndarray, area: np.ndarray, alike: float) ->
         found.append(best)
         area[normal @ best > np.cos(alike)] = 0.0
     return found
+
+
+SAME_PLANE_TOLERANCE = 1e-6
+"""Of the largest side: planes, and corners, nearer than this are one."""
+
+
+def simplify_convex(hull: ConvexPiece, most: int) -> ConvexPiece:
+    """Enclose a convex body in one of at most so many corners.
+
+    The body stays inside: what is left of it is cut from its upright box by planes of its own
+    faces, always the one that the farthest corner is most beyond. So it stands on the same floor
+    and against the same walls, and large flat faces stay exactly where they were.
+
+    Args:
+        hull: What.
+        most: Number of corners, at least 8.
+
+    """
+    if len(hull.vertices) <= most:
+        return hull
+    middle = hull.vertices.mean(axis=0)
+    points = hull.vertices - middle
+    size = float(np.ptp(points, axis=0).max())
+    faces = _distinct_planes(ConvexHull(points).equations, size)
+    cut = _box_planes(points)
+    corners = _plane_corners(cut, size)
+    while True:
+        beyond = corners @ faces[:, :3].T + faces[:, 3]
+        worst = int(beyond[int(beyond.max(axis=1).argmax())].argmax())
+        if beyond.max() < SAME_PLANE_TOLERANCE * size:
+            break
+        further = np.concatenate([cut, faces[worst : worst + 1]])
+        found = _plane_corners(further, size)
+        if len(found) > most:
+            break
+        cut, corners = further, found
+    return _piece_of_corners(corners + middle)
+
+
+def _box_planes(points: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "6 4"]:
+    """Return the planes of the upright box about points: n · x + d ≤ 0 inside."""
+    normals = np.concatenate([np.eye(3), -np.eye(3)])
+    return np.column_stack([normals, -(points @ normals.T).max(axis=0)])
+
+
+def _distinct_planes(equations: np.ndarray, size: float) -> np.ndarray:
+    """Keep each plane once; triangles of one flat face have the same."""
+    step = SAME_PLANE_TOLERANCE * np.array([1.0, 1.0, 1.0, size])
+    _, first = np.unique(np.round(equations / step), axis=0, return_index=True)
+    return equations[np.sort(first)]
+
+
+def _plane_corners(planes: np.ndarray, size: float) -> np.ndarray:
+    found = HalfspaceIntersection(planes, np.zeros(3)).intersections
+    _, first = np.unique(np.round(found / (SAME_PLANE_TOLERANCE * size)), axis=0, return_index=True)
+    return found[np.sort(first)]
+
+
+def _piece_of_corners(corners: np.ndarray) -> ConvexPiece:
+    hull = ConvexHull(corners)
+    triangles = hull.simplices.copy()
+    a, b, c = np.swapaxes(corners[triangles], 0, 1)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    used, number = np.unique(triangles, return_inverse=True)
+    return ConvexPiece(corners[used], number.reshape(-1, 3).astype(np.int64))

@@ -1,6 +1,5 @@
 """Voronoi fragments of a closed surface, smaller near an impact."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import manifold3d as m3
@@ -126,12 +125,3 @@ def _fragment_surface(piece: m3.Manifold, whole: Surface) -> Surface:
         uv=None if whole.uv is None else rows[:, 6:8],
         colours=rows[:, first : first + width] if width else None,
     )
-
-
-def fragment_volumes(pieces: Sequence[Surface]) -> Float[np.ndarray, " S"]:
-    """Volume that each closed surface encloses [m³]."""
-    found = []
-    for one in pieces:
-        a, b, c = (one.vertices[one.triangles[:, k]] for k in range(3))
-        found.append(float(np.einsum("td,td->", a, np.cross(b, c))) / 6.0)
-    return np.array(found)

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.jobs.job import (
+    CorpusVerb,
     Job,
     JobEvent,
+    JobManifest,
+    ManifestRow,
     ProgressCallback,
     WorkerPool,
     WorkerPoolFactory,
     remove_partial_results,
 )
-from corporeal.jobs.job_manifest import CorpusVerb, JobManifest, ManifestRow
 
 MAX_JOB_PROCESSES = 2
 """Processes that may die over one job in one call."""

@@ -21,12 +21,10 @@ from corporeal.materials.library import (
     part_materials,
     read_library,
 )
-from corporeal.materials.library_entry import MaterialEntry
+from corporeal.materials.library_entry import MaterialEntry, citation, cited_sources, is_estimate
 from corporeal.materials.library_lint import LibraryProblem
 from corporeal.materials.library_listing import describe_material, list_materials, materials_json
-from corporeal.materials.library_page import library_markdown
 from corporeal.materials.quantities import QUANTITIES, Quantity, parse_quantity_key
-from corporeal.materials.shipped_libraries import citation, cited_sources, is_estimate
 
 __all__ = [
     "QUANTITIES",
@@ -49,7 +47,6 @@ __all__ = [
     "is_estimate",
     "library",
     "library_counterpart",
-    "library_markdown",
     "list_materials",
     "materials_json",
     "pair_restitution",

@@ -10,13 +10,15 @@ from functools import lru_cache
 from pathlib import Path
 
 from corporeal.core.errors import MAX_SUGGESTED_CHOICES, BadFileError, UnknownChoiceError, UserError
-from corporeal.materials.library_entry import MaterialEntry, comparable_name, read_entries
-from corporeal.materials.library_lint import RESERVED_KEYS, LibraryProblem, lint_library
-from corporeal.materials.shipped_libraries import (
+from corporeal.materials.library_entry import (
     SHIPPED_LIBRARY_FILES,
+    MaterialEntry,
+    comparable_name,
+    read_entries,
     shipped_library,
     source_table,
 )
+from corporeal.materials.library_lint import RESERVED_KEYS, LibraryProblem, lint_library
 
 CONTENT_GROUPS = ("liquid", "bulk", "granular", "foam", "food")
 """Groups of what is found inside objects."""

@@ -19,11 +19,10 @@ from corporeal.core.types import (
 )
 from corporeal.materials.contact_pairs import measured_friction_pairs, measured_restitution_pairs
 from corporeal.materials.library import find_material, library
-from corporeal.materials.library_entry import MaterialEntry
+from corporeal.materials.library_entry import MaterialEntry, citation, source_table
+from corporeal.materials.material_candidates import fraction_of, is_logarithmic
 from corporeal.materials.quantities import QUANTITIES
-from corporeal.materials.range_fraction import fraction_of, is_logarithmic
 from corporeal.materials.range_modifiers import is_within_range, range_modifiers
-from corporeal.materials.shipped_libraries import citation, source_table
 
 PREFIXES_OF_UNIT = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
 LISTING_FIELDS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion")

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from corporeal.core.types import Law
-from corporeal.materials.library_entry import MaterialEntry, comparable_name
+from corporeal.materials.library_entry import MaterialEntry, comparable_name, shipped_library
 from corporeal.materials.quantities import QUANTITIES, SI_OF_KEY_UNIT, parse_quantity_key
-from corporeal.materials.shipped_libraries import shipped_library
 
 PLAUSIBLE_RANGE_FACTOR = 3.0
 """How far a new material may lie beyond all that are like it, as a factor."""

@@ -30,7 +30,7 @@ from corporeal.core.types import (
 from corporeal.materials.contact_pairs import ImpactBody, friction_between, pair_restitution
 from corporeal.materials.library import find_material, library, part_materials
 from corporeal.materials.library_entry import MaterialEntry
-from corporeal.materials.range_fraction import fraction_of, value_at_fraction
+from corporeal.materials.material_candidates import fraction_of, value_at_fraction
 from corporeal.materials.range_placement import CONTENTS_DENSITY_FIELD, library_entry
 
 RANGE_SPAN_OF_SOURCE = {

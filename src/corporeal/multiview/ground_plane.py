@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
-from corporeal.geometry.resting_pose import remove_outliers
-from corporeal.multiview.robust_statistics import SIGMA_PER_MEDIAN_DEVIATION
+from corporeal.geometry.convex_hull import remove_outliers
+from corporeal.multiview.point_cloud_geometry import SIGMA_PER_MEDIAN_DEVIATION
 
 PLANE_HYPOTHESES_COUNT = 3000
 """Planes through three points that are tried."""

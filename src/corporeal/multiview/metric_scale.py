@@ -206,25 +206,6 @@ def implausible_scene_extent(extent: float) -> str | None:
     )
 
 
-def scale_from_extent(low: Vector, high: Vector, metres: float, who: str) -> MetricScale:
-    """Return the scale at which the longest edge of a box is so long.
-
-    Args:
-        low: One corner of the box.
-        high: The opposite corner.
-        metres: How long the edge is in reality [m].
-        who: Who said so, for the report ("a model", "the command line").
-
-    Raises:
-        UserError: The box is a point, or the length is not positive and finite.
-
-    """
-    units = float(np.ptp([low, high], axis=0).max())
-    scale = _scale_ratio(metres, units, "The extent of the object")
-    words = f"It is {units:.4g} units large in the file and {metres:.4g} m in reality, {who} said."
-    return MetricScale(scale, "extent", words)
-
-
 def _scale_ratio(metres: float, units: float, what: str) -> float:
     scale = metres / units if units > 0 else math.nan
     if not (0 < scale < math.inf and metres < math.inf):

@@ -4,6 +4,11 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
+SIGMA_PER_MEDIAN_DEVIATION = 1.4826
+"""Standard deviation over the median distance from the median, where errors are normal:
+1/Φ⁻¹(3/4) (Hampel 1974)."""
+
+
 MIN_BALL_TOUCH_ANGLE_RAD = np.radians(60.0)
 """A ball whose two touching points stand less than this apart, seen from its middle, touches noise
 or a blunt edge, not another side (Peters, "Geographical point cloud modelling with the 3D medial

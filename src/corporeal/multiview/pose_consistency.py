@@ -91,13 +91,6 @@ class _MatchedPair:
     y: np.ndarray
 
 
-def pose_consistency_doubt(
-    views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None
-) -> str | None:
-    """Return what seems wrong with the poses, in words; None: nothing does, or none can tell."""
-    return check_pose_consistency(views, masks).doubt
-
-
 def check_pose_consistency(
     views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None
 ) -> PoseConsistency:

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.types import Camera, Note, NoteKind, Vector
-from corporeal.geometry.resting_pose import find_resting_pose, remove_outliers
+from corporeal.geometry.convex_hull import find_resting_pose, remove_outliers
 from corporeal.multiview.ground_plane import GroundPlane, GroundSearch, find_ground_plane
 from corporeal.multiview.similarity_transform import apply_similarity_to_points, similarity_matrix
 from corporeal.multiview.up_direction import UpDirection, estimate_up_direction

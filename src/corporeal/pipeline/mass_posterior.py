@@ -31,16 +31,15 @@ from corporeal.core.types import (
 from corporeal.discretization.cavity import is_vessel, measure_cavity
 from corporeal.discretization.drawn_thickness import scan_edge_length, scan_volume_log_deviation
 from corporeal.discretization.granular_bed_objects import fill_all_beds, loose_matter_parts
-from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
+from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, measure_objects
 from corporeal.discretization.missing_walls import (
     MissingWall,
     find_missing_walls,
     with_missing_walls,
 )
 from corporeal.discretization.part_model import NO_VOLUME_LEEWAY, VolumeLeeway, part_mass
-from corporeal.discretization.scene_measures import measure_objects
 from corporeal.geometry.scene_transforms import scale_to_life_size
-from corporeal.materials.range_fraction import fraction_of
+from corporeal.materials.material_candidates import fraction_of
 from corporeal.materials.range_placement import CONTENTS_DENSITY_FIELD, MASS_FIELDS
 from corporeal.materials.value_sampling import draw_hypotheses, sample_material_field, take_answer
 from corporeal.pipeline.stages.ground import GroundConfig, ground

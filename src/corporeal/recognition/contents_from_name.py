@@ -13,9 +13,8 @@ from corporeal.core.types import (
     Scene,
     SceneObject,
 )
-from corporeal.recognition.lexicon import names_open_vessel, strip_plural_s
+from corporeal.recognition.lexicon import contents_table, names_open_vessel, strip_plural_s
 from corporeal.recognition.metadata_recognition import FileEvidence
-from corporeal.recognition.packaged_goods import contents_table
 from corporeal.recognition.parts_by_name import name_words
 from corporeal.recognition.translation import translate_words
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Int
 
 from corporeal.core.types import SUBSTANCE_KEY, Finish, Part, Scene, Surface
-from corporeal.recognition.unicode_letters import has_meaning, letter_runs
+from corporeal.recognition.readable_names import has_meaning, letter_runs
 
 EXPORTER_WORDS = frozenset(
     "a aws blinn circle collada common cone001 cube curve cylinder default defaultmaterial "

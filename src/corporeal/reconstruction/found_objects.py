@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.types import FeatureCloud
-from corporeal.discretization.oriented_extent import oriented_box_size
+from corporeal.discretization.mesh_measures import oriented_box_size
 from corporeal.reconstruction.features import TextPictureEncoder, connect_encoder
-from corporeal.reconstruction.features.unit_vectors import cosine_similarity as likeness
-from corporeal.reconstruction.features.unit_vectors import unit_rows
+from corporeal.reconstruction.features.vit_pictures import cosine_similarity as likeness
+from corporeal.reconstruction.features.vit_pictures import unit_rows
 from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.reconstruction.segment.optimal_assignment import optimal_assignment

@@ -14,9 +14,9 @@ from corporeal.core.errors import BadFileError, notes_on_error
 from corporeal.core.progress import Progress
 from corporeal.core.types import Camera, Note, NoteKind
 from corporeal.io.photos.posed_photos import MASK_FOLDERS, read_posed_photos
-from corporeal.multiview.cropped_masks import find_cropped_masks
 from corporeal.multiview.pose_consistency import FEATURE_IMAGE_SIDE_PX, INCOHERENT_HULL_FRACTION
 from corporeal.multiview.silhouette_coherence import silhouette_coherence
+from corporeal.multiview.silhouette_outliers import find_cropped_masks
 from corporeal.reconstruction.features.learned_masks import learned_masks
 from corporeal.reconstruction.features.mask_models import connect_mask_model
 from corporeal.reconstruction.gaussians.gaussian_scene import MASK_MIN_U8

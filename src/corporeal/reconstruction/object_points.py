@@ -1,8 +1,8 @@
 """Points on objects, with their features."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
 from corporeal.core.progress import Progress
-from corporeal.core.types import FeatureCloud
+from corporeal.core.types import FeatureCloud, Views
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.reconstruction.features.feature_lifting import (
     LiftedFeatures,
@@ -29,14 +29,52 @@ from corporeal.reconstruction.gaussians.foreground import (
     GaussianVisibility,
     foreground_gaussians,
     gaussian_visibility,
+    pixels_covered,
+    places_near_objects,
 )
 from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
-from corporeal.reconstruction.gaussians.radiance_field import RadianceFieldConfig
-from corporeal.reconstruction.gaussians.radiance_field_points import radiance_field_points
+from corporeal.reconstruction.gaussians.radiance_field import (
+    FieldPoints,
+    RadianceFieldConfig,
+    TrainedField,
+    field_surface_points,
+    train_field,
+)
 from corporeal.reconstruction.gaussians.rasteriser_numba import gaussian_weights
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.reconstruction.segment.instance_masks import lift_labels
+
+
+def radiance_field_points(
+    taken: GaussianScene,
+    of_objects: Int[np.ndarray, " M"],
+    most: int,
+    config: RadianceFieldConfig,
+    checkpoint: Path | None = None,
+    progress: Callable[[float, str], None] = lambda fraction, words: None,
+) -> tuple[TrainedField, FieldPoints]:
+    """Learn a field of the objects, and take points from where it is dense and Gaussians agree.
+
+    Args:
+        taken: Pictures, or a splat that is pictured; masks where there are any.
+        of_objects: Its Gaussians that belong to objects.
+        most: No more points than that.
+        config: How to learn.
+        checkpoint: Where what was learned is kept.
+        progress: Called with the fraction done and what is being done.
+
+    Raises:
+        UserError: Cameras, pictures and masks do not belong together.
+
+    """
+    gaussians, cameras, masks = taken.gaussians, taken.cameras, taken.masks
+    masks = pixels_covered(gaussians, cameras, of_objects) if masks is None else masks
+    views = Views(np.stack(taken.pictures()), cameras)
+    learned = train_field(views, masks, config, checkpoint, progress)
+    at = partial(places_near_objects, gaussians, of_objects)
+    return learned, field_surface_points(learned.field, cameras, most, config.seed, at)
+
 
 MAX_OBJECT_POINTS = 100_000
 """Points that are looked at; other Gaussians do as their neighbours."""

@@ -14,11 +14,13 @@ from corporeal.reconstruction.features import connect_encoder
 from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
 from corporeal.reconstruction.features.mask_models import connect_mask_model, split_model_spec
 from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
-from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
 from corporeal.reconstruction.surface.surface_config import (
     DEFAULT_CLOSED_SURFACE,
     ClosedSurfaceConfig,
 )
+
+SegmentationRule = Literal["auto", "masks", "look", "components"]
+
 
 MASKS_AUTO, MASKS_NONE = "auto", "none"
 EncoderSpec = Annotated[str, ReadsPath(prefixes=tuple(ENCODERS))]

@@ -40,11 +40,6 @@ def colour_from_hex(text: str) -> Colour:
     return r, g, b
 
 
-def material_colour(name: str) -> Colour:
-    """Give a library name its colour, the same in every scene, on every machine."""
-    return colour_from_oklch(*_own(name))
-
-
 def distinct_colours(names: Sequence[str]) -> list[Colour]:
     """Give every name its own colour; the later of two that look alike takes another one.
 

@@ -93,12 +93,8 @@ def _answer_rows(m: MassPosterior) -> str:
 
 
 def _answered(answer: AnsweredMass) -> str:
-    way = (
-        f"{escape_html(answer.words)}, {answer.probability:.0%}" if answer.words else "not recorded"
-    )
-    mass = f"{answer.mass:.3g}"
-    if answer.high:
-        mass = _interval(answer.low, answer.mass, answer.high)
+    way = f"{escape_html(answer.words)}, {answer.probability:.0%}"
+    mass = _interval(answer.low, answer.mass, answer.high)
     judged = "–" if answer.judged is None else f"{answer.judged:.3g}"
     return table_cells(way, wrap=True) + table_cells(mass, judged)
 

@@ -20,11 +20,39 @@ from jaxtyping import Bool, Float, Int, Int8, Int16, UInt8
 from PIL import Image
 
 from corporeal.core.types import Finish, Frame, Particles, Parts, Scene, Surface
-from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.geometry.rotation import fit_rigid_motion
 from corporeal.geometry.srgb import linear_to_srgb
 from corporeal.render.packed_scene import vertex_normals, vertex_positions
-from corporeal.render.recording_compression import encode_octahedral, encode_time_deltas
 from corporeal.render.skin_binding import SkinBinding
+
+MAX_SIGNED_BYTE = 127
+"""Largest value of a signed byte."""
+
+
+def encode_octahedral(normals: Float[np.ndarray, "N 3"]) -> Int8[np.ndarray, "N 2"]:
+    """Put unit vectors into two bytes: the unit octahedron folded flat (Cigolle et al. 2014).
+
+    The angle to the vector that is read back is about 1° at worst.
+    """
+    flat = normals / np.maximum(np.abs(normals).sum(axis=1, keepdims=True), 1e-12)
+    corner = np.where(flat[:, :2] >= 0, 1.0, -1.0)
+    folded = (1.0 - np.abs(flat[:, [1, 0]])) * corner
+    return np.round(MAX_SIGNED_BYTE * np.where(flat[:, 2:] < 0, folded, flat[:, :2])).astype(
+        np.int8
+    )
+
+
+def encode_time_deltas(values: np.ndarray) -> UInt8[np.ndarray, " N"]:
+    """Lay out what changes little from frame to frame: (T, V, C) integers as bytes.
+
+    Differences between frames, which wrap around; then axis by axis; then all low bytes before all
+    high ones. Deflate finds long runs in the result.
+    """
+    change = values.copy()
+    change[1:] -= values[:-1]
+    planes = np.ascontiguousarray(np.moveaxis(change, -1, 0))
+    return planes.view(np.uint8).reshape(-1, values.itemsize).T.ravel().copy()
+
 
 RESIDUAL_STEP_M = 5e-5
 """Resolution of what is left after the rigid motion [m]; 16 bits of it reach 1.6 m."""

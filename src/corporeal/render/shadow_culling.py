@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from corporeal.render import kernels_cull, kernels_hits, kernels_sparse_light
+from corporeal.render import kernels_floor, kernels_hits, kernels_sparse_light
 from corporeal.render.kernels_floor import TILE_PX
 from corporeal.render.kernels_light import StudioLamps
 from corporeal.render.kernels_sparse_light import DIRECTION_SETS
@@ -32,7 +32,7 @@ def tiles_with_surfaces(
     """
     seen = np.zeros([-(-n // TILE_PX) for n in size[::-1]], np.bool_)
     if stage.shown:
-        kernels_cull.mark_outlined_tiles(
+        kernels_floor.mark_outlined_tiles(
             stage.vertices, stage.look.triangles, eye, frame, tangent, size, seen
         )
     return seen

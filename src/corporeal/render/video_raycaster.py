@@ -18,7 +18,6 @@ from jaxtyping import Bool, Float32, UInt8
 
 from corporeal.core.process_resources import usable_cores
 from corporeal.render import (
-    crop,
     kernels_floor,
     kernels_hits,
     kernels_light,
@@ -55,6 +54,32 @@ from corporeal.render.secondary_rays import (
     IncomingLight,
     LightSampler,
 )
+
+
+def block_around(near: Bool[np.ndarray, "h w"], block: PixelBlock, reach: int) -> PixelBlock | None:
+    """Return the part of a block that holds marked pixels and those within ``reach``."""
+    rows, columns = (np.flatnonzero(near.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    top, left = max(rows[0] - reach, 0), max(columns[0] - reach, 0)
+    bottom = min(rows[-1] + reach + 1, block.rows)
+    right = min(columns[-1] + reach + 1, block.columns)
+    return PixelBlock(int(block.first + top), int(bottom - top), int(right - left), int(left))
+
+
+def block_window(block: PixelBlock, part: PixelBlock) -> tuple[slice, slice]:
+    """Rows and columns of a block that a part of it takes."""
+    top = part.first - block.first
+    return slice(top, top + part.rows), slice(part.left, part.left + part.columns)
+
+
+def crop_values(values: np.ndarray, block: PixelBlock, part: PixelBlock) -> np.ndarray:
+    """Copy what belongs to a part from the values of a block's pixels, (P, ...) or (h, w)."""
+    flat = values.ndim < 2 or values.shape != (block.rows, block.columns)
+    trailing = values.shape[1:] if flat else ()
+    there = values.reshape(block.rows, block.columns, *trailing)[block_window(block, part)].copy()
+    return there.reshape(-1, *trailing) if flat else there
+
 
 LIGHT_FILTER_REACH_PX = 7
 """Pixels over which the light filter spreads what one of them met."""
@@ -262,11 +287,11 @@ class _FrameRender(RenderJob):
         near = kind == TILE_CAST
         last = rows[1] - wide[0] + LIGHT_DEPENDENCE_REACH_PX
         near[: max(rows[0] - wide[0] - LIGHT_DEPENDENCE_REACH_PX, 0)] = near[last:] = False
-        part = crop.block_around(near, block, LIGHT_FILTER_REACH_PX)
+        part = block_around(near, block, LIGHT_FILTER_REACH_PX)
         if part is not None:
-            near = crop.crop_values(near, block, part)
+            near = crop_values(near, block, part)
             bright = self.closely(rays, hit, near, (block, part), rows)
-            there = toned.reshape(*shape, 3)[crop.block_window(block, part)]
+            there = toned.reshape(*shape, 3)[block_window(block, part)]
             np.copyto(there, bright.reshape(there.shape), where=near[..., None])
         size = width, self.camera.height
         kernels_video.write_srgb(toned, kind.reshape(-1), wide[0], size, rows, out)
@@ -290,12 +315,10 @@ class _FrameRender(RenderJob):
 
         """
         block, part = blocks
-        rays = Rays(
-            crop.crop_values(rays.origin, *blocks), crop.crop_values(rays.direction, *blocks)
-        )
-        hit = tuple(crop.crop_values(x, *blocks) for x in hit)
+        rays = Rays(crop_values(rays.origin, *blocks), crop_values(rays.direction, *blocks))
+        hit = tuple(crop_values(x, *blocks) for x in hit)
         wall = self.empty.wall[block.first * block.columns :][: block.rows * block.columns]
-        light = crop.crop_values(wall, *blocks)
+        light = crop_values(wall, *blocks)
         toned = np.empty_like(light)
         known = kernels_video.dilate_mask(near, LIGHT_FILTER_REACH_PX)
         inner = max(rows[0] - part.first - 1, 0), min(rows[1] - part.first + 1, part.rows)

@@ -24,8 +24,7 @@ from jaxtyping import Float
 
 from corporeal.core.errors import UserError
 from corporeal.geometry.convex_hull import ConvexPiece
-from corporeal.scene.mass_properties import MassProperties
-from corporeal.scene.settling_body import BodyPose, SettlingBody, scene_unit_of
+from corporeal.scene.settling_body import BodyPose, MassProperties, SettlingBody, scene_unit_of
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from corporeal.showcase import furniture, granular_heaps, plants, snowman, tableware, toys, vessels
+from corporeal.showcase import furniture, granular_heaps, plants, snowman, toys, vessels
 from corporeal.showcase.prop_mesh import PropModel
 
 PROP_BUILDERS: dict[str, Callable[[], PropModel]] = {
@@ -24,10 +24,10 @@ PROP_BUILDERS: dict[str, Callable[[], PropModel]] = {
     "book": toys.cloth_bound_book,
     "mug": vessels.mug,
     "cushion": toys.throw_pillow,
-    "tumbler": tableware.tumbler,
-    "honey": tableware.honey,
-    "ketchup": tableware.ketchup,
-    "wooden_ball": tableware.wooden_ball,
+    "tumbler": vessels.tumbler,
+    "honey": vessels.honey,
+    "ketchup": vessels.ketchup,
+    "wooden_ball": vessels.wooden_ball,
 }
 POURED_MODELS = ("honey", "ketchup")
 """Models of what has no shape of its own: they are no props of a pool."""

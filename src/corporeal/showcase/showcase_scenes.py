@@ -390,3 +390,15 @@ def _scene_object_of_model(model: PropModel, placed: PlacedModel, number: int) -
         source="showcase",
         credit="The corporeal authors, Apache-2.0",
     )
+
+
+def prop_scene(name: str) -> Scene:
+    """Build one model as a scene of its own, standing on the floor.
+
+    Raises:
+        UnknownChoiceError: There is no model of this name.
+
+    """
+    if name not in PROP_BUILDERS:
+        raise UnknownChoiceError("showcase model", name, list(PROP_BUILDERS))
+    return scene_of_models(name, [PROP_BUILDERS[name]()], [PlacedModel(name)], duration=1.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import manifold3d as m3
 import numpy as np
 
-from corporeal.showcase import label_textures, parametric_surfaces, procedural_textures, sdf
+from corporeal.showcase import parametric_surfaces, procedural_textures, sdf
 from corporeal.showcase.prop_mesh import (
     PropMesh,
     PropModel,
@@ -87,7 +87,7 @@ def play_ball() -> PropModel:
     Not an inflated one: it is the air in it that makes that stiff, and a wall of 3 mm of rubber
     alone would sag under its own weight.
     """
-    look = textured_finish("ball foam skin", label_textures.ball_stripes(), 0.38)
+    look = textured_finish("ball foam skin", procedural_textures.ball_stripes(), 0.38)
     return PropModel("ball", (PropPart("ball", _ball_of_radius(0.11), look, "EVA_foam"),))
 
 
@@ -150,7 +150,7 @@ def cloth_bound_book() -> PropModel:
             PropPart(
                 "cover",
                 cover,
-                textured_finish("book cloth", label_textures.book_cover(), 0.65),
+                textured_finish("book cloth", procedural_textures.book_cover(), 0.65),
                 "cardboard",
             ),
             PropPart(

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from corporeal.core.types import Finish
-from corporeal.showcase import label_textures, parametric_surfaces, procedural_textures, sdf
+from corporeal.showcase import parametric_surfaces, procedural_textures, sdf
 from corporeal.showcase.prop_mesh import (
     PropMesh,
     PropModel,
@@ -17,11 +17,69 @@ from corporeal.showcase.prop_mesh import (
 )
 
 
+def tumbler() -> PropModel:
+    """Model a glass, 10 cm tall and 7 cm across, wall 3 mm: three fifths full of water."""
+    outside = [(0.0, 0.0), (0.030, 0.0), (0.034, 0.004), (0.035, 0.098), (0.0345, 0.1)]
+    inside = [(0.0325, 0.1), (0.032, 0.098), (0.031, 0.012), (0.027, 0.008), (0.0, 0.008)]
+    profile = np.concatenate(
+        [
+            parametric_surfaces.soften_corners(outside, 4),
+            parametric_surfaces.soften_corners(inside, 4),
+        ]
+    )
+    pale = plain_finish("clear glass", "#dcecf0", 0.05)
+    look = replace(pale, colour=(*pale.colour[:3], 0.1), alpha_mode="BLEND")
+    wall = PropPart(
+        "glass",
+        parametric_surfaces.lathe_surface(profile, 72),
+        look,
+        "glass",
+        contents="water",
+        fill=0.6,
+    )
+    return PropModel("tumbler", (wall,))
+
+
+def honey() -> PropModel:
+    """Model what leaves a jar at once: a column of honey, 4 cm across and 9 cm tall."""
+    look = plain_finish("honey", "#d98a12", 0.1)
+    return PropModel("honey", (PropPart("honey", _upright_cylinder(0.020, 0.09), look, "honey"),))
+
+
+def ketchup() -> PropModel:
+    """Model ketchup as a cup leaves it that is lifted off: 6 cm across and 6 cm tall."""
+    look = plain_finish("ketchup", "#b3170f", 0.15)
+    return PropModel(
+        "ketchup", (PropPart("ketchup", _upright_cylinder(0.030, 0.06), look, "ketchup"),)
+    )
+
+
+def wooden_ball() -> PropModel:
+    """Model a ball of beech, 5 cm across."""
+    t = np.linspace(-np.pi / 2, np.pi / 2, 37)
+    profile = 0.025 * np.stack([np.cos(t), np.sin(t)], 1)
+    profile[[0, -1], 0] = 0
+    mesh = parametric_surfaces.lathe_surface(profile, 72).moved((0, 0, 0.025))
+    return PropModel(
+        "wooden_ball", (PropPart("ball", mesh, plain_finish("beech", "#c99a63", 0.5), "hardwood"),)
+    )
+
+
+def _upright_cylinder(radius: float, height: float) -> PropMesh:
+    """Turn an upright cylinder with rounded edges."""
+    edge = 0.1 * radius
+    profile = [(0.0, 0.0), (radius - edge, 0.0), (radius, edge), (radius, height - edge)]
+    profile += [(radius - edge, height), (0.0, height)]
+    return parametric_surfaces.lathe_surface(parametric_surfaces.soften_corners(profile, 4), 64)
+
+
 def soda_can() -> PropModel:
     """Model a 330 ml can, 66 × 115 mm, by its outside; wall 0.1 mm and lid 0.25 mm in reality."""
     body, lid = _can_body(), _can_lid()
     # Ink on aluminium is half mirror, half paint: one partly metallic finish does for both.
-    printed = textured_finish("printed aluminium", label_textures.can_label(), 0.30, metallic=0.45)
+    printed = textured_finish(
+        "printed aluminium", procedural_textures.can_label(), 0.30, metallic=0.45
+    )
     bare = plain_finish("bare aluminium", "#c9ccd0", 0.30, metallic=1.0)
     bright = plain_finish("tab aluminium", "#dcdee2", 0.22, metallic=1.0)
     sheet = "aluminium_can_sheet"
@@ -100,7 +158,7 @@ def vase() -> PropModel:
             parametric_surfaces.soften_corners(inside, 4)[1:],
         ]
     )
-    look = textured_finish("blue-white glaze", label_textures.vase_glaze(), 0.16)
+    look = textured_finish("blue-white glaze", procedural_textures.vase_glaze(), 0.16)
     return PropModel(
         "vase", (PropPart("vase", parametric_surfaces.lathe_surface(profile, 72), look, "ceramic"),)
     )

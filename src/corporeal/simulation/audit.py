@@ -163,21 +163,16 @@ def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
 def impact_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
     """Loss by normal contact over the available energy [-].
 
-    Pairs that gained hide nothing of it, where it is known what each pair took.
+    Pairs that gained hide nothing of it.
     """
     whole = available_energy(ledger, scene, cell)
-    lost = float(ledger.impact_loss[-1]) + (impact_gain(ledger, scene, cell) or 0.0) * whole
+    lost = float(ledger.impact_loss[-1]) + impact_gain(ledger, scene, cell) * whole
     return lost / whole if whole > 0 else 0.0
 
 
-def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float | None:
-    """Energy that normal contact gave to pairs which have more from it than it took, relative [-].
-
-    None: a run from before it was kept by pairs.
-    """
+def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float:
+    """Energy that normal contact gave to pairs which have more from it than it took, relative [-]."""
     taken, whole = np.triu(ledger.impact_of_pair[-1]), available_energy(ledger, scene, cell)
-    if not np.isfinite(taken).all():
-        return None
     return float(-taken[taken < 0.0].sum()) / whole if whole > 0 else 0.0
 
 

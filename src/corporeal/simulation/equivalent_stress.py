@@ -9,15 +9,8 @@ from corporeal.mpm.material_table import MaterialTable
 from corporeal.mpm.problem import Problem, Snapshot
 
 
-def equivalent_stress(tau: Float[np.ndarray, "P 3 3"]) -> Float[np.ndarray, " P"]:
-    """Von Mises' equivalent of a stress [Pa]: σ_v = √(3/2) ‖dev τ‖."""
-    mean = np.einsum("pii->p", tau) / 3.0
-    deviator = tau - mean[:, None, None] * np.eye(3)
-    return np.sqrt(1.5 * np.einsum("pij,pij->p", deviator, deviator))
-
-
 def equivalent_of_principal(tau: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:
-    """Return the same of principal stresses [Pa]."""
+    """Von Mises' equivalent of principal stresses [Pa]: σ_v = √(3/2) ‖dev τ‖."""
     return np.sqrt(1.5 * np.sum((tau - tau.mean(axis=1, keepdims=True)) ** 2, axis=1))
 
 

@@ -16,7 +16,7 @@ from corporeal.core.types import Frame, Particles, Scene, Trajectory
 from corporeal.geometry.mesh import Mesh, join_meshes
 from corporeal.geometry.mesh_queries import QueryMesh, SegmentCrossings
 from corporeal.geometry.point_sampling import sample_surface
-from corporeal.geometry.rigid_fit import RigidFit, fit_rigid_motion, rotation_angle
+from corporeal.geometry.rotation import RigidFit, fit_rigid_motion, rotation_angle
 from corporeal.render.skin_binding import SkinBinding, bind_points
 
 NEAR_DX = 2.0

@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 
 from corporeal.core.audit_data import FLOOR_NAME, ObjectOutcome, Outcome, PairOutcome, pair_name
 from corporeal.core.types import MaterialField, Particles, Scene, Trajectory, Vector
-from corporeal.geometry.rigid_fit import fit_rigid_motion
+from corporeal.geometry.rotation import fit_rigid_motion
 from corporeal.simulation.residual_shape import (
     ResidualDent,
     box_diagonal,

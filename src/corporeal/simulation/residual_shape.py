@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.geometry.rigid_fit import RigidFit, fit_rigid_motion
+from corporeal.geometry.rotation import RigidFit, fit_rigid_motion
 
 FIT_ITERATIONS, TRUSTED_FRACTION = 5, 0.7
 """The rigid fit is repeated on the trusted share of points that fitted best."""
@@ -31,14 +31,6 @@ def trusted_fit(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) 
 def box_diagonal(points: Float[np.ndarray, "N 3"]) -> float:
     """Diagonal of the bounding box [m]."""
     return float(np.linalg.norm(np.ptp(points, axis=0)))
-
-
-def shape_error(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) -> float:
-    """RMS distance after the best rigid fit over the bounding box's diagonal [-]."""
-    fit = fit_rigid_motion(start, now, np.ones(len(start)))
-    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / box_diagonal(
-        start
-    )
 
 
 PATCH_PARTICLES = 27

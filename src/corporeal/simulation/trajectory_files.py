@@ -169,8 +169,6 @@ def _arrays(ledger: Ledger) -> dict[str, np.ndarray]:
 
 def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
     names = [f.name for f in fields(Ledger)]
-    if "impact_of_pair" not in found and "first_contact" in found:
-        found = found | {"impact_of_pair": np.full_like(found["first_contact"], np.nan)}
     absent = [name for name in names if name not in found]
     if absent:
         raise BadFileError(

@@ -13,7 +13,7 @@ from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.segment import segment
 from corporeal.scene.vessel_contents import SceneWithMaterials
 from corporeal.showcase.prop_models import POOL_PROP_BUILDERS
-from corporeal.showcase.prop_scene import prop_scene
+from corporeal.showcase.showcase_scenes import prop_scene
 from corporeal.viewer.run_store import RunStore
 
 SHOWCASE_PREFIX = "corporeal"

@@ -12,9 +12,8 @@ from starlette.responses import Response
 from starlette.routing import BaseRoute, Route
 
 from corporeal.core.errors import UserError
-from corporeal.export.export_record import ExportRecord
 from corporeal.export.export_scene import EXPORT_FOLDER, export_scene
-from corporeal.export.export_target import EXPORT_WRITERS
+from corporeal.export.export_target import EXPORT_WRITERS, ExportRecord
 from corporeal.viewer.run_store import RunStore
 from corporeal.viewer.web_app import json_route
 

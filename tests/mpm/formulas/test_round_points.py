@@ -5,7 +5,7 @@ import pytest
 
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.formulas import formula_options, one_lane_contact
-from corporeal.mpm.physics.rounded_surface import support_point_shift
+from corporeal.mpm.physics.curved_surface import support_point_shift
 
 wp.set_module_options(formula_options())
 COUNT = 300

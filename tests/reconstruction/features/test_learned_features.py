@@ -7,7 +7,7 @@ from tiny_models import PATCH, SIDE, STATISTICS, needs_models, save_clip, save_d
 
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.reconstruction.features import connect_encoder
-from corporeal.reconstruction.features.unit_vectors import cosine_similarity
+from corporeal.reconstruction.features.vit_pictures import cosine_similarity
 
 pytestmark = needs_models()
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from rasteriser_reference import render_reference
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera
@@ -18,7 +19,6 @@ from corporeal.reconstruction.gaussians.rasteriser_numba import (
     pinhole_of_camera,
     render,
 )
-from corporeal.reconstruction.gaussians.rasteriser_reference import render_reference
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 GROUPS = {

@@ -9,13 +9,13 @@ from splat_scenes import around, blobs, pictured
 from corporeal.core.errors import UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface, Views
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
-from corporeal.reconstruction.gaussians import carved_volume, scale_limits
+from corporeal.reconstruction.gaussians import carved_volume, densification
 from corporeal.reconstruction.gaussians import train_gaussians as module
+from corporeal.reconstruction.gaussians.densification import equal_scale_limits
 from corporeal.reconstruction.gaussians.depth_rendering import render_depth
 from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, points_on_hull
 from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.plane_sweep import PlaneSweepConfig
-from corporeal.reconstruction.gaussians.scale_limits import equal_scale_limits
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import (
@@ -116,7 +116,7 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
 
     small = deep()
     monkeypatch.setattr(
-        scale_limits, "equal_scale_limits", lambda theta, widest: equal_scale_limits(theta, 10.0)
+        densification, "equal_scale_limits", lambda theta, widest: equal_scale_limits(theta, 10.0)
     )
     monkeypatch.setattr(
         module, "points_on_hull", lambda *what: replace(points_on_hull(*what), width=None)

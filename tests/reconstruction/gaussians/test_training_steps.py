@@ -13,8 +13,8 @@ from corporeal.core.types import Views
 from corporeal.geometry.rotation import matrix_from_quaternion
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians import (
+    densification,
     gaussian_initialisation,
-    scale_limits,
 )
 from corporeal.reconstruction.gaussians.carved_volume import carve_volume
 from corporeal.reconstruction.gaussians.densification import (
@@ -128,7 +128,7 @@ def test_adam_takes_the_published_steps_and_survives_nan():
     before = theta.copy()
     rng, rates = RNG(0), np.linspace(0.01, 0.1, theta.shape[1]).astype(np.float32)
     first, second = np.zeros_like(theta), np.zeros_like(theta)
-    bounds = scale_limits.equal_scale_limits(theta, 10.0), np.array([[0, 1]] * len(theta))
+    bounds = densification.equal_scale_limits(theta, 10.0), np.array([[0, 1]] * len(theta))
     m, v, plain = 0.0, 0.0, before.astype(float)
     for step in range(1, 5):
         g = rng.normal(size=theta.shape).astype(np.float32)

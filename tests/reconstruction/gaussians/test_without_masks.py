@@ -6,7 +6,7 @@ from splat_scenes import around, blobs, pictured
 
 from corporeal.core.types import Gaussians, Views
 from corporeal.multiview.ground_plane import GroundPlane
-from corporeal.reconstruction.gaussians import exposure_gains, scale_limits
+from corporeal.reconstruction.gaussians import densification, exposure_gains
 from corporeal.reconstruction.gaussians.background_model import (
     BackgroundModel,
     background_model,
@@ -125,7 +125,7 @@ def test_what_is_wide_is_flat_and_what_few_see_has_one_colour(wall):
     theta[:, :3] = [[0, 0, 0], 0.6 * cameras[0].world_from_camera[:3, 3]]
     theta[:, 7:10] = np.log([0.5, 0.4, 0.2])
     with ThreadPool(1) as pool:
-        bounds, _ = scale_limits.scale_limits_from_views(theta, 1.0, surfaces, pool)
+        bounds, _ = densification.scale_limits_from_views(theta, 1.0, surfaces, pool)
     before, zeros = theta.copy(), np.zeros_like(theta)
     spans, rates = np.array([[0, 1], [0, 1]]), np.full(theta.shape[1], 0.01, np.float32)
     adam_rows(theta, zeros + 1, zeros, zeros + 1, rates, 1, (0, 0), bounds, spans, 0, 2)
@@ -138,7 +138,7 @@ def test_what_is_wide_is_flat_and_what_few_see_has_one_colour(wall):
 def test_what_is_out_of_the_picture_stays_or_fades():
     theta = parameters_of_gaussians(blobs(2))
     zeros, rates = np.zeros_like(theta), np.full(theta.shape[1], 0.1, np.float32)
-    bounds = scale_limits.equal_scale_limits(theta, 10.0)
+    bounds = densification.equal_scale_limits(theta, 10.0)
     bounds[0, 3] = 1
     before, spans = theta[:, 10].copy(), np.zeros((2, 2), int)
     pull = np.float32(0.1), np.float32(0)

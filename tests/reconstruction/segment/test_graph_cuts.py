@@ -7,8 +7,8 @@ from corporeal.reconstruction.segment.cut_proposals import (
     SweepProposals,
 )
 from corporeal.reconstruction.segment.graph_cuts import best_graph_cut
+from corporeal.reconstruction.segment.object_segmentation import count_stacked_objects
 from corporeal.reconstruction.segment.patch_graph import SurfacePatches
-from corporeal.reconstruction.segment.stacked_objects import count_stacked_objects
 
 
 def clique(sizes, bridges, appearance=None):

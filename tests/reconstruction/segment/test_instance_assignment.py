@@ -8,7 +8,7 @@ import pytest
 from corporeal.core.errors import UserError
 from corporeal.core.types import FeatureCloud
 from corporeal.reconstruction.segment.instance_assignment import assign_instances
-from corporeal.reconstruction.segment.space_pieces import SpacePieces
+from corporeal.reconstruction.segment.object_segmentation import SpacePieces
 
 RNG = np.random.default_rng(0)
 EACH = 1500

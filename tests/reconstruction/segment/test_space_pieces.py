@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from corporeal.core.types import FeatureCloud
-from corporeal.reconstruction.segment.object_segmentation import segment_objects
-from corporeal.reconstruction.segment.space_pieces import join_nearest_pieces
+from corporeal.reconstruction.segment.object_segmentation import (
+    join_nearest_pieces,
+    segment_objects,
+)
 
 RNG = np.random.default_rng(5)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.reconstruction.segment.optimal_assignment import optimal_assignment
-from corporeal.reconstruction.segment.reduce_features import reduce_features
+from corporeal.reconstruction.segment.part_clusters import reduce_features
 from corporeal.reconstruction.segment.superpoints import superpoints
 
 

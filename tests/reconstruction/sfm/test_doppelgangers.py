@@ -15,10 +15,9 @@ from corporeal.reconstruction.sfm.doppelgangers import (
     neighbours_support_model,
     remove_doppelgangers,
 )
-from corporeal.reconstruction.sfm.match_pairs import match_pairs
 from corporeal.reconstruction.sfm.pose_acceptance import model_doubts, neighbour_doubt
 from corporeal.reconstruction.sfm.prepare_images import PreparedImages
-from corporeal.reconstruction.sfm.sfm_run import SfmRun
+from corporeal.reconstruction.sfm.sfm_run import SfmRun, match_pairs
 from corporeal.render.camera_placement import camera_from_aim
 from patterned_scene import ring
 

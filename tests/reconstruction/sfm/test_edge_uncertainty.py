@@ -7,8 +7,11 @@ import pytest
 from PIL import Image
 
 from corporeal.core.types import Camera
-from corporeal.reconstruction.sfm.edge_uncertainty import whitening_matrices
-from corporeal.reconstruction.sfm.model_refinement import adjust_bundle, adjust_bundle_by_edges
+from corporeal.reconstruction.sfm.model_refinement import (
+    adjust_bundle,
+    adjust_bundle_by_edges,
+    whitening_matrices,
+)
 from corporeal.render.camera_placement import camera_from_aim
 from patterned_scene import pose_errors, ring
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from corporeal.reconstruction.sfm.match_pairs import (
+from corporeal.reconstruction.sfm.prepare_images import PreparedImages
+from corporeal.reconstruction.sfm.sfm_run import (
     ALWAYS_MATCHED_DISTANCE,
     FEW_PARTNERS,
     MAX_PARTNERS,
     NAME_DISTANCES,
     match_pairs,
     match_partners,
+    pairs_to_match,
 )
-from corporeal.reconstruction.sfm.prepare_images import PreparedImages
-from corporeal.reconstruction.sfm.sfm_run import pairs_to_match
 
 
 def walk(total, reach):

@@ -7,7 +7,7 @@ import pytest
 
 from corporeal.io.photos.colmap import ColmapImage, ColmapModel
 from corporeal.reconstruction.sfm import find_poses as posing
-from corporeal.reconstruction.sfm.mirrored_pictures import ONE_CAMERA_HINT, describe_mirrored
+from corporeal.reconstruction.sfm.doppelgangers import ONE_CAMERA_HINT, describe_mirrored
 from corporeal.reconstruction.sfm.prepare_images import PreparedImages
 from corporeal.reconstruction.sfm.sfm_run import SfmRun
 

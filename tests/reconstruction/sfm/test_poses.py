@@ -30,8 +30,11 @@ from corporeal.reconstruction.sfm.mask_consistency import remove_by_masks
 from corporeal.reconstruction.sfm.pose_acceptance import model_doubts, some_names, thorough_in_vain
 from corporeal.reconstruction.sfm.prepare_images import prepare_images
 from corporeal.reconstruction.sfm.sfm_run import SfmRun, names_by_camera, pictures_beside_first
-from corporeal.reconstruction.sfm.static_pixels import StaticPixels
-from corporeal.reconstruction.sfm.video_frames import choose_frames, write_video_frames
+from corporeal.reconstruction.sfm.video_frames import (
+    StaticPixels,
+    choose_frames,
+    write_video_frames,
+)
 from corporeal.render.camera_placement import camera_from_aim
 from corporeal.render.embree import identify_triangles
 from corporeal.render.ray_scene import RayScene

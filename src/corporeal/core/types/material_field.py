@@ -134,13 +134,13 @@ class AnsweredMass:
     """Median over its own ways and ranges, without outside evidence [kg]."""
     judged: float | None
     """What it was judged to weigh outright [kg]; None: not asked, or no usable answer."""
-    low: float = 0.0
-    """5 % [kg]; 0, as ``high``: older runs did not keep it."""
-    high: float = 0.0
+    low: float
+    """5 % [kg]."""
+    high: float
     """95 % [kg]."""
-    words: str = ""
-    """Its likeliest way, as in ``WeighedHypothesis``; "": older runs did not keep it."""
-    probability: float = 0.0
+    words: str
+    """Its likeliest way, as in ``WeighedHypothesis``."""
+    probability: float
     """How likely it takes that way to be, in [0, 1]."""
 
 
@@ -192,4 +192,4 @@ class MaterialField:
     notes: tuple[str, ...] = ()
     """What a reader of the report should know of numbers from elsewhere, in sentences."""
     floor: Material | None = None
-    """What the floor and the walls are made of; None: it was not kept, by older runs."""
+    """What the floor and the walls are made of; None: not known."""

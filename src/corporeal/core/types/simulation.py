@@ -214,8 +214,7 @@ class Ledger:
     """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of
     the grid [J]."""
     impact_of_pair: Float[np.ndarray, "*F B+W B+W"]
-    """The same of each pair, symmetric [J]; below 0: contact gave it energy; nan: a run from before
-    it was kept."""
+    """The same of each pair, symmetric [J]; below 0: contact gave it energy."""
     plastic_loss: Float[np.ndarray, "*F"]
     """[J]"""
     viscous_loss: Float[np.ndarray, "*F"]

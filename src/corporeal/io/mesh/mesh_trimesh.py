@@ -1,11 +1,18 @@
 """OBJ, PLY, STL, OFF, 3MF and DAE, read by trimesh, in the axes and the unit of the file.
 
 Companions (.mtl, pictures) are taken from the file's own folder only.
+
+Conversion of relative OBJ indices to absolute ones.
+
+``f -3 -2 -1`` means the last three vertices *so far* (Wavefront, "Object Files", 1995: reference
+numbers). Readers that count back from the end of the file join other vertices wherever vertices
+and faces alternate.
 """
 
+import io
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +29,117 @@ from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.io.gltf.gltf_container import MAX_MODEL_FILE_BYTES, read_file_bytes
 from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
 from corporeal.io.image_decoder import as_reduced_array
-from corporeal.io.mesh.dae_names import read_dae_names
-from corporeal.io.mesh.obj_indices import with_absolute_indices
 from corporeal.io.mesh.ply_faces import triangulate_mixed_faces
 from corporeal.io.mesh.raw_mesh import MAX_PIECES, MESH_EXPORT_ADVICE, NODE_NAMES_KEY, RawMesh
 from corporeal.io.referenced_files import read_beside
+
+GENERIC_NODE_PATTERN = re.compile(r"(?i)(?:instance|group|component)(?:[_ #]?\d+)?")
+"""What programs call a node that places a component, when nobody named it (SketchUp)."""
+
+PieceNames = tuple[tuple[str, ...], str]
+"""Names from the file's root to a piece, and that of its material; "": it states none."""
+
+
+def read_dae_names(data: bytes) -> dict[str, PieceNames]:
+    """Return the names of each piece, by what trimesh calls it: the id of its geometry, counted.
+
+    A piece is called as the node that places it, or, where that one is but counted, as the
+    component that it places; where a geometry has several materials, each is a piece, called as its
+    material. Nodes beside each other that have one name are numbered, and so
+    are the places of a geometry that no node names.
+    """
+    from collada import Collada
+    from collada.common import DaeError
+    from collada.polylist import Polylist
+    from collada.triangleset import TriangleSet
+
+    document: Any = Collada(io.BytesIO(data), ignore=[DaeError])
+    shapes, found = (Polylist, TriangleSet), dict[str, PieceNames]()
+    counts: dict[str | None, int] = {}
+    unnamed, numbers = set[str](), dict[str | None, int]()
+    for along, placed in _geometry_places(document.scene.nodes, ()):
+        geometry = placed.geometry
+        looks = {m.symbol: str(m.target.name or "") for m in placed.materials}
+        pieces = [p for p in geometry.primitives if isinstance(p, shapes) and p.vertex is not None]
+        own = along or _unique_name(str(geometry.name or geometry.id), unnamed, numbers)
+        for piece in pieces:
+            key = trimesh.util.unique_name(geometry.id, contains=found, counts=counts)
+            look = looks.get(piece.material, "")
+            last = (look or key,) if len(pieces) > 1 else ()
+            found[key] = ((*own, *last), look)
+    return found
+
+
+def _unique_name(name: str, taken: set[str], counts: dict[str | None, int]) -> tuple[str]:
+    """Return a name that nothing has yet, and note it."""
+    own = trimesh.util.unique_name(name, contains=taken, counts=counts)
+    taken.add(own)
+    return (own,)
+
+
+def _geometry_places(
+    nodes: Iterable[Any], along: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Return every place of a geometry, and the names of the nodes above it."""
+    from collada.scene import GeometryNode, Node, NodeNode
+
+    taken: dict[str | None, int] = {}
+    seen: set[str] = set()
+    for node in nodes:
+        if isinstance(node, GeometryNode):
+            yield along, node
+        elif isinstance(node, Node):
+            said = node.node if isinstance(node, NodeNode) else node
+            name = str(said.name or "")
+            if GENERIC_NODE_PATTERN.fullmatch(name):
+                name = _component_name(node) or name
+            if name:
+                (name,) = _unique_name(name, seen, taken)
+            yield from _geometry_places(node.children or (), (*along, name) if name else along)
+
+
+def _component_name(node: Any) -> str:
+    """Return the name of the one component that a node places; "": it places none, or several."""
+    from collada.scene import NodeNode
+
+    children = node.children or ()
+    placed = [child.node.name for child in children if isinstance(child, NodeNode)]
+    return str(placed[0] or "") if len(placed) == len(children) == 1 else ""
+
+
+INDEX_SLOT_OF_KEYWORD = {b"v": 0, b"vt": 1, b"vn": 2}
+"""What corners refer to, by their place in ``v/vt/vn``."""
+OBJ_ELEMENT_KEYWORDS = (b"f", b"fo", b"l", b"p")
+RELATIVE_INDEX_PATTERN = re.compile(rb"(?m)^[ \t]*fo?[ \t](?:[^\r\n]*[ \t/])?-\d")
+"""A face that counts back."""
+LINE_CONTINUATION_PATTERN = re.compile(rb"\\[ \t]*(?:\r\n|\r|\n)")
+
+
+def with_absolute_indices(data: bytes) -> bytes:
+    """Return an OBJ in which no corner counts back; one that has none is returned as it is."""
+    whole = LINE_CONTINUATION_PATTERN.sub(b" ", data) if b"\\" in data else data
+    if RELATIVE_INDEX_PATTERN.search(whole) is None:
+        return data
+    so_far, lines = [0, 0, 0], []
+    for line in whole.splitlines():
+        words = line.split()
+        kind = words[0] if words else b""
+        if kind in INDEX_SLOT_OF_KEYWORD:
+            so_far[INDEX_SLOT_OF_KEYWORD[kind]] += 1
+        elif kind in OBJ_ELEMENT_KEYWORDS and b"-" in line:
+            line = b" ".join([kind, *(_absolute_corner(word, so_far) for word in words[1:])])
+        lines.append(line)
+    return b"\n".join([*lines, b""])
+
+
+def _absolute_corner(corner: bytes, so_far: list[int]) -> bytes:
+    """Return a corner ``v/vt/vn``; what is no number stays, for the reader to refuse."""
+    places = corner.split(b"/")
+    for k, place in enumerate(places[: len(so_far)]):
+        if re.fullmatch(rb"-\d{1,18}", place):
+            places[k] = b"%d" % (so_far[k] + 1 + int(place))
+    return b"/".join(places)
+
 
 MAX_ZIP_UNPACKED_BYTES = 2**29
 """What a ZIP may unpack to [bytes]."""

@@ -9,7 +9,7 @@ from corporeal.core.audit_data import FLOOR_NAME, Outcome, RunAudit
 from corporeal.core.errors import UserError
 from corporeal.core.types import Law
 from corporeal.io.scene_toml import read_scene_file
-from corporeal.jobs.job_manifest import ManifestRow, read_manifest_rows
+from corporeal.jobs.job import ManifestRow, read_manifest_rows
 from corporeal.lab.corpus.corpus_plan import CorpusPlan, PlannedScene, read_plan
 from corporeal.lab.corpus.run_corpus import (
     RUNS_FOLDER,
@@ -20,9 +20,9 @@ from corporeal.lab.corpus.run_corpus import (
 from corporeal.materials import find_material_or_default
 from corporeal.pipeline.run_pipeline import Settings, read_run_request
 from corporeal.render.colours import LAW_COLOURS
+from corporeal.scene.collision_chain import impact_hops
 from corporeal.scene.interactions import InteractionKind
 from corporeal.scene.rest_certificate import RestCertificate
-from corporeal.scene.rigid_preview import impact_hops
 from corporeal.scene.scene_composition import (
     CERTIFICATE_FILE,
     COMPOSITION_FILE,

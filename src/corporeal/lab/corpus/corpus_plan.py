@@ -17,8 +17,7 @@ import numpy as np
 from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.pool.asset_draw import draw_least_used, parse_count_range
-from corporeal.pool.asset_pool import PoolAsset
+from corporeal.pool.asset_pool import PoolAsset, draw_least_used, parse_count_range
 from corporeal.scene.arrange_bodies import BodyArrangement
 from corporeal.scene.interactions import (
     ARRANGEMENTS_OF_KIND,

@@ -11,8 +11,7 @@ from pathlib import Path
 from corporeal.core import store
 from corporeal.core.errors import UserError
 from corporeal.jobs.executor import Executor, execute_jobs
-from corporeal.jobs.job import Job, ProgressCallback
-from corporeal.jobs.job_manifest import ManifestRow
+from corporeal.jobs.job import Job, ManifestRow, ProgressCallback
 from corporeal.lab.corpus.corpus_plan import CorpusPlan, PlannedScene, read_plan
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings

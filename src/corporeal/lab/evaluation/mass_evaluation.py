@@ -4,6 +4,10 @@ The ladder of what is known, each step in the same run: the scan's volume as wat
 solid and usual; how objects are built and filled, with usual values; values placed in their
 ranges; all ways they may be; and these reweighted by what was said of the mass outright. Beside it
 stand a constant, a fit on the size, and that number itself.
+
+Baselines of mass prediction without materials.
+
+The fits leave the object out that they predict.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +16,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial import ConvexHull
 
 from corporeal.core import store
@@ -19,8 +24,6 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Inventory, PartDescription, Scene
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.geometry.scene_transforms import scale_to_life_size
-from corporeal.lab.evaluation.mass_baselines import hull_volume_mass, mean_mass, solid_water_mass
-from corporeal.lab.evaluation.mass_metrics import MassErrors, interval_coverage, mass_errors
 from corporeal.lab.evaluation.measured_masses import WeighedObject
 from corporeal.pipeline.mass_posterior import (
     INTERVAL_HIGH_QUANTILE,
@@ -38,6 +41,89 @@ from corporeal.vlm import LIVE_CLIENTS
 from corporeal.vlm.human_client import is_not_pending, refuse_pending
 from corporeal.vlm.interpret_answers import leaf_parts
 from corporeal.vlm.thread_map import thread_map
+
+
+@dataclass(frozen=True)
+class MassErrors:
+    """Means over objects."""
+
+    count: int
+    ade: float
+    """Absolute difference |m̂ - m| [kg]."""
+    alde: float
+    """Absolute difference of natural logarithms |ln m̂ - ln m| [-]."""
+    ape: float
+    """Absolute relative error |m̂ - m|/m [-]."""
+    mnre: float
+    """Ratio min(m̂/m, m/m̂) [-]: 1 is perfect."""
+    within_2: float
+    """Share of the objects whose mass is right within a factor of two [-]."""
+
+
+def mass_errors(predicted: Sequence[float], measured: Sequence[float]) -> MassErrors:
+    """Compare masses [kg], all above zero.
+
+    Definitions as in Zhai et al. 2024, *Physical property understanding from language-embedded
+    feature fields*, after Standley et al. 2017, *image2mass*.
+    """
+    m, true = np.asarray(predicted, dtype=float), np.asarray(measured, dtype=float)
+    apart = np.abs(np.log(m) - np.log(true))
+    return MassErrors(
+        count=len(true),
+        ade=float(np.mean(np.abs(m - true))),
+        alde=float(np.mean(apart)),
+        ape=float(np.mean(np.abs(m - true) / true)),
+        mnre=float(np.mean(np.exp(-apart))),
+        within_2=float(np.mean(apart <= np.log(2.0))),
+    )
+
+
+def interval_coverage(
+    low: Sequence[float], high: Sequence[float], measured: Sequence[float]
+) -> float:
+    """Share of the measured masses that lie in their predicted intervals [-]."""
+    true = np.asarray(measured, dtype=float)
+    return float(np.mean((np.asarray(low) <= true) & (true <= np.asarray(high))))
+
+
+WATER_DENSITY_KG_M3 = 1000.0
+"""[kg/m³]"""
+
+
+def solid_water_mass(volume: Sequence[float]) -> list[float]:
+    """Mass of each object if it were water through and through [kg]."""
+    return [WATER_DENSITY_KG_M3 * v for v in volume]
+
+
+def mean_mass(measured: Sequence[float]) -> list[float | None]:
+    """Geometric mean of the other objects' measured masses [kg]; None: there is no other."""
+    logs = np.log(np.asarray(measured, dtype=float))
+    if len(logs) < 2:
+        return [None] * len(logs)
+    return [float(np.exp(np.delete(logs, k).mean())) for k in range(len(logs))]
+
+
+def hull_volume_mass(hull: Sequence[float], measured: Sequence[float]) -> list[float | None]:
+    """Mass [kg] by a straight line through the others, ln m = a + b ln V_hull.
+
+    None: fewer than two others, or others of one size.
+
+    Args:
+        hull: Volume of each object's convex hull [m³].
+        measured: [kg]
+
+    """
+    x, y = np.log(np.asarray(hull, dtype=float)), np.log(np.asarray(measured, dtype=float))
+    return [_without(k, x, y) for k in range(len(x))]
+
+
+def _without(k: int, x: Float[np.ndarray, " N"], y: Float[np.ndarray, " N"]) -> float | None:
+    others, known = np.delete(x, k), np.delete(y, k)
+    if len(others) < 2 or np.ptp(others) == 0:
+        return None
+    slope, offset = np.polyfit(others, known, 1)
+    return float(np.exp(offset + slope * x[k]))
+
 
 MASS_METHODS = {
     "solid_water": "solid water",

@@ -46,10 +46,10 @@ from corporeal.reconstruction.segment.instance_assignment import assign_instance
 from corporeal.reconstruction.segment.instance_masks import lift_labels
 from corporeal.reconstruction.segment.object_segmentation import (
     ObjectSegmentation,
+    SpacePieces,
     nearest_neighbour_components,
     segment_objects,
 )
-from corporeal.reconstruction.segment.space_pieces import SpacePieces
 from corporeal.reconstruction.surface.free_space import pieces_by_free_space
 
 Progress = Callable[[float, str], None]

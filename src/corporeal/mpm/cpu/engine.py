@@ -47,12 +47,11 @@ from corporeal.mpm.cpu.layout import (
     VISCOUS,
     WORLD_RECORD,
 )
+from corporeal.mpm.cpu.native_tables import SpringRecords, WindRecords
 from corporeal.mpm.cpu.particle_reader import ParticleReader
 from corporeal.mpm.cpu.particle_sorter import ParticleSorter
 from corporeal.mpm.cpu.program import CpuProgram
 from corporeal.mpm.cpu.shared_field import CarriedRigidBody
-from corporeal.mpm.cpu.spring_records import SpringRecords
-from corporeal.mpm.cpu.wind_records import WindRecords
 from corporeal.mpm.diagnostics import BodySums
 from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger

@@ -72,7 +72,7 @@ class EngineCheckpoint:
             self.rigid[b][:] = saved[f"rigid{b}"]
         self.contact.past = saved["contact"]
         # A checkpoint of before they were kept has none: then all are made anew.
-        self.contact.kept = saved.get("choices", np.zeros(0, np.uint8))
+        self.contact.kept = saved["choices"]
 
 
 def continued(

@@ -148,7 +148,7 @@ THREAD_POOL_RECORD = NativeRecord(
     "ThreadPool",
     ("void *", "yield_core read_clock"),  # the system's sched_yield and clock_gettime, or null
     ("int *", "phase"),  # [phases][4]: piece, first task, how many, or where in World that stands
-    ("double *", "spent"),  # [phases + 1], or null: see phase_clock.py
+    ("double *", "spent"),  # [phases + 1], or null
     ("int", "phases threads now piece first count started clock_id"),
     ("int", "epoch stopped"),  # a line of their own
     ("unsigned long long[7]", "fill1"),

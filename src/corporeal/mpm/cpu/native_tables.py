@@ -7,6 +7,8 @@ from jaxtyping import Float, Int
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import BRANCHES
+from corporeal.mpm.cpu import layout
+from corporeal.mpm.cpu.contact_memory import write_pointers
 from corporeal.mpm.cpu.layout import (
     BOND_RECORD,
     BRANCH_TIME,
@@ -14,9 +16,11 @@ from corporeal.mpm.cpu.layout import (
     CENTRE,
     CHANNELS,
     CONSISTENCY,
+    GRIP_RECORD,
     ID,
     INERTIA,
     INVERSE_MASS,
+    JOINT_RECORD,
     MA,
     MATERIAL_COLUMNS,
     MOMENT,
@@ -29,14 +33,87 @@ from corporeal.mpm.cpu.layout import (
     SPEED,
     SPIN,
     STIFFENING,
+    TETHER_RECORD,
     TURN,
     VE,
     VO,
+    WIND_RECORD,
 )
 from corporeal.mpm.material_table import MaterialTable
-from corporeal.mpm.physics import rigid
+from corporeal.mpm.physics import rigid, wind_pressure
 from corporeal.mpm.physics.inclusions import inclusion_and_soft_density, inclusion_particles_near
-from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.physics.spring_grips import Grip
+from corporeal.mpm.problem import Body, Joint, Problem
+
+GUST_SIGNAL = np.stack(
+    [wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE]
+)
+"""Of the gusts: share, frequency [Hz] and phase [rad] of every part."""
+
+
+class WindRecords:
+    """Records of the bodies in the wind, and the arrays that they point to."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        first: list[int],
+        impulse: np.ndarray,
+        rigid: dict[int, np.ndarray],
+        points: dict[int, np.ndarray],
+    ) -> None:
+        """Lay out memory.
+
+        Args:
+            problem: What to simulate.
+            first: Number of each body's first particle.
+            impulse: The ledger's external impulses, which the native piece adds to.
+            rigid: States of the rigid bodies.
+            points: Particles of the rigid bodies in their own frames.
+
+        """
+        blown = [b for b, body in enumerate(problem.bodies) if body.wind and len(body.faces.area)]
+        self.body = blown
+        self.record = np.zeros(len(blown), WIND_RECORD.dtype)
+        self.kept: list[np.ndarray] = [np.ascontiguousarray(GUST_SIGNAL)]
+        single = problem.contact == "single"
+        for row, b in zip(range(len(blown)), blown, strict=True):
+            record = self.record[row : row + 1]
+            self._face(record, problem.bodies[b])
+            write_pointers(record, impulse=impulse[b], signal=self.kept[0])
+            record["field"], record["first"] = 0 if single else b, first[b]
+            if b in rigid:
+                self.kept.append(np.ascontiguousarray(points[b]))
+                write_pointers(record, rigid=rigid[b], point=self.kept[-1])
+                record["free"] = not single
+
+    def _face(self, record: np.ndarray, body: Body) -> None:
+        assert body.wind is not None
+        count = len(body.position)
+        order = np.argsort(body.faces.particle, kind="stable")
+        area = np.ascontiguousarray(body.faces.area[order], np.float64)
+        owned = np.bincount(body.faces.particle, minlength=count)
+        face = np.concatenate([[0], np.cumsum(owned)]).astype(np.int32)
+        self.kept += [area, face]
+        write_pointers(record, area=area, face=face)
+        record["count"], record["wind"] = count, body.wind.velocity
+        record["gust"] = body.wind.gust
+        record["start"], record["end"] = body.wind.start, body.wind.end
+        record["half_rho_c"] = wind_pressure.HALF_RHO_C
+
+    def set_wind(self, problem: Problem) -> None:
+        """Take the winds of a problem that differs in nothing else."""
+        for row, b in enumerate(self.body):
+            moving = problem.bodies[b].wind
+            assert moving is not None
+            self.record["wind"][row], self.record["gust"][row] = moving.velocity, moving.gust
+            self.record["start"][row], self.record["end"][row] = moving.start, moving.end
+
+    def take_work(self) -> float:
+        """Work done since it was last taken [J]."""
+        total = float(self.record["work"].sum())
+        self.record["work"] = 0.0
+        return total
 
 
 @dataclass(frozen=True)
@@ -172,3 +249,92 @@ def rigid_points(body: Body, state: np.ndarray) -> np.ndarray:
     """Particles in the body's frame: place [m], mass [kg], volume [m³]."""
     place = body.position - state[CENTRE : CENTRE + 3]
     return np.column_stack([place, body.volume * body.density, body.volume])
+
+
+class SpringRecords:
+    """Records of a problem's springs, and the arrays that they point to."""
+
+    def __init__(
+        self, problem: Problem, first: list[int], impulse: np.ndarray, rigid: dict[int, np.ndarray]
+    ) -> None:
+        """Lay out memory.
+
+        Args:
+            problem: What to simulate; in a field that all share no springs act.
+            first: Number of each body's first particle.
+            impulse: The ledger's external impulses, which grips add to.
+            rigid: States of the rigid bodies.
+
+        """
+        self.problem, self.first, self.impulse, self.rigid = problem, first, impulse, rigid
+        self.start = {b: rigid_state(problem.bodies[b]) for b in rigid}
+        self.kept: list[np.ndarray] = []
+        apart = problem.contact == "multi"
+        tied = [(b, body) for b, body in enumerate(problem.bodies) if body.tether and apart]
+        joints = problem.joints if apart else ()
+        self.tether, self.joint = (
+            np.zeros(len(tied), TETHER_RECORD.dtype),
+            np.zeros(len(joints), JOINT_RECORD.dtype),
+        )
+        self.grip = np.zeros(0, GRIP_RECORD.dtype)
+        for row, (b, body) in enumerate(tied):
+            self._tie(self.tether[row : row + 1], b, body)
+        for row, joint in enumerate(joints):
+            self._join(self.joint[row], joint)
+
+    def _tie(self, record: np.ndarray, b: int, body: Body) -> None:
+        assert body.tether is not None
+        holder = body.tether.holder
+        centre = self.start[holder][layout.CENTRE : layout.CENTRE + 3]
+        anchor = np.ascontiguousarray(body.position - centre, np.float64)
+        rate = np.ascontiguousarray(body.tether.rate, np.float64)
+        self.kept += [anchor, rate]
+        write_pointers(record, anchor=anchor, rate=rate, holder=self.rigid[holder])
+        record["damping"], record["field"] = body.tether.damping, b
+        record["first"], record["count"] = self.first[b], len(rate)
+
+    def _join(self, record: np.ndarray, joint: Joint) -> None:
+        for name, b in (("first", joint.first), ("second", joint.second)):
+            record[name] = self.rigid[b].ctypes.data
+            centre = self.start[b][layout.CENTRE : layout.CENTRE + 3]
+            record[f"arm_{name}"] = np.array(joint.point) - centre
+        record["stiffness"], record["damping"] = joint.stiffness, joint.damping
+
+    def grasp(self, grips: dict[int, Grip]) -> None:
+        """Take these grips in place of all earlier ones; by body."""
+        self.grip = np.zeros(len(grips), GRIP_RECORD.dtype)
+        single = self.problem.contact == "single"
+        self.held: list[np.ndarray] = []
+        for row, (b, grip) in enumerate(grips.items()):
+            record = self.grip[row : row + 1]
+            share = np.zeros(len(self.problem.bodies[b].position))
+            write_pointers(record, impulse=self.impulse[b])
+            if b in self.rigid and not single:
+                write_pointers(record, rigid=self.rigid[b])
+            else:
+                share[grip.hold.particle] = grip.hold.share
+            self.held.append(share)
+            write_pointers(record, share=share)
+            record["arm"], record["target"] = grip.hold.arm, grip.target
+            record["stiffness"], record["damping"] = grip.stiffness, grip.damping
+            record["mass"], record["field"] = grip.hold.mass, 0 if single else b
+            record["first"], record["count"] = self.first[b], len(share)
+
+    def connect(self, world: np.ndarray) -> None:
+        """Point the world to the records."""
+        write_pointers(world, tether=self.tether, joint=self.joint, grip=self.grip)
+        counts = len(self.tether), len(self.joint), len(self.grip)
+        world["tethers"], world["joints"], world["grips"] = counts
+        world["sprung"] = int(any(counts))
+
+    def take_loss(self) -> float:
+        """Return what dampers took since last asked [J]."""
+        total = float(self.tether["lost"].sum() + self.joint["lost"].sum())
+        self.tether["lost"] = self.joint["lost"] = 0.0
+        return total
+
+    def take_work(self) -> float:
+        """Return the work that grips did since last asked [J]."""
+        total = float(self.grip["work"].sum())
+        self.grip["work"] = 0.0
+        return total

@@ -9,13 +9,13 @@ from corporeal.mpm.laws.constitutive_law import (
     ReturnMapResult,
     YieldParameters,
 )
-from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
-from corporeal.mpm.laws.return_map import (
+from corporeal.mpm.laws.hencky import (
     PrincipalReturn,
     apply_return_map,
     deviator,
     scaled_deviator,
 )
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 
 MIN_FRICTION_ANGLE_RAD = 1e-4
 """Friction angle [rad] below which a cone is taken for a cylinder; its apex is at infinity."""

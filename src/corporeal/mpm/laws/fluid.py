@@ -10,13 +10,13 @@ import numpy as np
 
 from corporeal.mpm.laws import hencky
 from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
-from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
-from corporeal.mpm.laws.return_map import (
+from corporeal.mpm.laws.hencky import (
     PrincipalReturn,
     apply_return_map,
     deviator,
     scaled_deviator,
 )
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 
 SLIP_NEWTON_ITERATIONS = 12
 """Newton's steps for the slip of a step where n is not 1: monotone, from a side of the root."""

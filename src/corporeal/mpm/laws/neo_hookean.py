@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw
+from corporeal.mpm.laws.constitutive_law import LOGARITHMIC_VOLUMETRIC, ConstitutiveLaw
 from corporeal.mpm.laws.kinematics import (
     Matrices,
     Scalars,
@@ -15,7 +15,6 @@ from corporeal.mpm.laws.kinematics import (
     stretches,
     transpose,
 )
-from corporeal.mpm.laws.volumetric_energy import LOGARITHMIC_VOLUMETRIC
 
 
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:

@@ -4,13 +4,13 @@ import numpy as np
 
 from corporeal.mpm.laws import hencky
 from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
-from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
-from corporeal.mpm.laws.return_map import (
+from corporeal.mpm.laws.hencky import (
     PrincipalReturn,
     apply_return_map,
     deviator,
     scaled_deviator,
 )
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 
 
 def return_von_mises(

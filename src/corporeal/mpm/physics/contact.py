@@ -323,16 +323,6 @@ def candidate_normals(outward_a: Vectors, outward_c: Vectors) -> Float[np.ndarra
     return unit(np.stack([outward_a - outward_c, outward_a, -outward_c], axis=1))
 
 
-def separating_normal(
-    candidates: np.ndarray,
-    reach_a: Float[np.ndarray, "E 3"],
-    reach_c: Float[np.ndarray, "E 3"],
-    cell: float,
-) -> Vectors:
-    """Take the candidate along which the two fields are farthest apart (separating axis)."""
-    return take_candidate(candidates, widest_candidate(candidates, reach_a, reach_c, cell))
-
-
 def take_candidate(candidates: Float[np.ndarray, "E 3 3"], which: Indices) -> Vectors:
     """Take one of three candidate normals at every node."""
     return np.take_along_axis(candidates, which[:, None, None], axis=1)[:, 0]

@@ -31,9 +31,6 @@ class BodyFacets(NamedTuple):
     """[m]"""
 
 
-NO_FACETS = BodyFacets(np.zeros((0, FACET_ROW)), np.zeros((0, 3)))
-
-
 def facets_of(
     surface: Float[np.ndarray, "S 3"], curvature: Float[np.ndarray, "S 12"]
 ) -> BodyFacets:

@@ -131,17 +131,6 @@ def world_inverse_inertia(R: Matrix3, inertia: Matrix3) -> Matrix3:
     return R @ np.linalg.inv(inertia) @ R.T
 
 
-def effective_inverse_mass(
-    inverse_mass: float, inverse_inertia: Matrix3, arm: Vector3, direction: Vector3
-) -> float:
-    """How much a unit impulse at ``arm`` from the centre changes the speed there [1/kg].
-
-    1/m_eff = 1/M + (r × d)ᵀ I⁻¹ (r × d)
-    """
-    lever = np.cross(arm, direction)
-    return inverse_mass + float(lever @ inverse_inertia @ lever)
-
-
 def thinness(
     surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], cell: float
 ) -> int:

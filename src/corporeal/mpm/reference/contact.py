@@ -24,10 +24,13 @@ from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import contact, contact_impulses, impact_support
 from corporeal.mpm.physics.flat_facets import facet_normals
 from corporeal.mpm.physics.grid_spline import Stencil
-from corporeal.mpm.reference.contact_scene import ContactScene, friction_table
+from corporeal.mpm.reference.contact_scene import (
+    ContactScene,
+    NormalCache,
+    PossibleContacts,
+    friction_table,
+)
 from corporeal.mpm.reference.curved_contacts import list_curved_contacts
-from corporeal.mpm.reference.normal_cache import NormalCache
-from corporeal.mpm.reference.possible_contacts import PossibleContacts
 from corporeal.mpm.reference.rolling_contacts import brake_rolling
 from corporeal.mpm.reference.surface_point_contacts import (
     drop_replaced_nodes,

@@ -1,6 +1,7 @@
 """Input of the reference engine's contact: bodies, nodes and contact parameters."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
 from typing import Protocol
 
 import numpy as np
@@ -8,12 +9,51 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import STICKING_FRICTION, TINY_DOUBLE
 from corporeal.mpm.physics import contact, contact_impulses, wall_stress
+from corporeal.mpm.physics.curved_surface import support_point_shift
 from corporeal.mpm.physics.flat_facets import FacetsAtNodes
 from corporeal.mpm.physics.grid_spline import Stencil
-from corporeal.mpm.physics.rounded_surface import support_point_shift
 from corporeal.mpm.problem import Problem, WettedSurface
-from corporeal.mpm.reference.normal_cache import NormalCache
 from corporeal.mpm.state import ParticleConstants, State
+
+
+@dataclass(frozen=True)
+class NormalCache:
+    """Candidates by pair of bodies and node; N of them. One step reads them, the next is new."""
+
+    pair: Int[np.ndarray, "N 2"]
+    node: Int[np.ndarray, "N 3"]
+    """Grid indices of nodes."""
+    candidate: Int[np.ndarray, " N"]
+    """0, 1 or 2: see ``physics.contact.candidate_normals``."""
+
+    @classmethod
+    def none(cls) -> "NormalCache":
+        """Keep nothing: everything is looked at anew."""
+        whole = np.int64
+        return cls(np.zeros((0, 2), whole), np.zeros((0, 3), whole), np.zeros(0, whole))
+
+    @classmethod
+    def of_pair(
+        cls, pair: tuple[int, int], node: Int[np.ndarray, "E 3"], candidate: Int[np.ndarray, " E"]
+    ) -> "NormalCache":
+        """Keep what one pair took at some nodes."""
+        return cls(np.tile(np.array(pair, dtype=np.int64), (len(node), 1)), node, candidate)
+
+    @classmethod
+    def of_all(cls, parts: Iterable["NormalCache"]) -> "NormalCache":
+        """Keep what several say."""
+        every = [cls.none(), *parts]
+        return cls(*(np.concatenate([getattr(k, f.name) for k in every]) for f in fields(cls)))
+
+    def of(self, pair: tuple[int, int], node: Int[np.ndarray, "E 3"]) -> Int[np.ndarray, " E"]:
+        """Candidate that each of some nodes took for a pair of bodies; -1: none is known."""
+        mine = np.all(self.pair == pair, axis=1)
+        known = dict(zip(map(tuple, self.node[mine].tolist()), self.candidate[mine], strict=True))
+        return np.array([known.get(tuple(at), -1) for at in node.tolist()], dtype=np.int64)
+
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Copy everything into a dict."""
+        return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
 
 
 class BodyStandIn(Protocol):
@@ -206,3 +246,58 @@ def friction_table(problem: Problem) -> Float[np.ndarray, "N N"]:
         bodies = len(problem.bodies)
         friction[:bodies, bodies:] = friction[:bodies, bodies:].mean(axis=0, keepdims=True)
     return friction
+
+
+@dataclass(frozen=True)
+class PossibleContacts:
+    """Some possible contacts of one pair; E of them."""
+
+    pair: tuple[int, int]
+    """Two bodies, or a body and B + plane."""
+    a: Int[np.ndarray, " E"]
+    c: Int[np.ndarray, " E"]
+    point: Float[np.ndarray, "E 3"]
+    normal: Float[np.ndarray, "E 3"]
+    gap: Float[np.ndarray, " E"]
+    slips: Bool[np.ndarray, " E"] | None = None
+    """Which of them transmit no friction; None: all do."""
+    layer: Float[np.ndarray, "E 4"] | None = None
+    """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
+    kept: NormalCache = field(default_factory=NormalCache.none)
+    """Candidate normals that were taken, where they are kept."""
+    instead: Float[np.ndarray, " E"] | None = None
+    """Of what is round on what is curved: nodes nearer than this transmit nothing [m] …"""
+    inward: Float[np.ndarray, " E"] | None = None
+    """… and the speed at which a way straight ahead leads into a hollow within a step [m/s]."""
+    rolls: int = -1
+    """The body whose surface points they are; -1: they are on nodes."""
+    corner: Bool[np.ndarray, " E"] | None = None
+    """Which of these points are not round; None: all are."""
+    acts: Float[np.ndarray, "E 3"] | None = None
+    """Where each acts [m], which is beyond no edge; None: at its point."""
+
+    @property
+    def placed(self) -> "PossibleContacts":
+        """The same, each at the place where it acts."""
+        return self if self.acts is None else replace(self, point=self.acts, acts=None)
+
+    @property
+    def grips(self) -> Float[np.ndarray, " E"]:
+        """Share of the pair's friction that each transmits [-]."""
+        return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
+
+    @property
+    def rounds(self) -> Bool[np.ndarray, " E"]:
+        """At which of them something round may roll."""
+        on_points = np.full(len(self.gap), self.rolls >= 0)
+        return on_points if self.corner is None else on_points & ~self.corner
+
+    @property
+    def inwards(self) -> Float[np.ndarray, " E"]:
+        """Speed at which each would close within the step by going straight ahead [m/s]."""
+        return np.zeros(len(self.gap)) if self.inward is None else self.inward
+
+    @property
+    def layers(self) -> Float[np.ndarray, "E 4"]:
+        """The layer of each, without a span where none drags."""
+        return np.zeros((len(self.gap), 4)) if self.layer is None else self.layer

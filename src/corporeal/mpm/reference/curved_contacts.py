@@ -14,8 +14,7 @@ from corporeal.mpm.constants import (
     SURFACE_POINT_REACH_DX,
 )
 from corporeal.mpm.physics import curved_surface
-from corporeal.mpm.reference.contact_scene import ContactScene
-from corporeal.mpm.reference.possible_contacts import PossibleContacts
+from corporeal.mpm.reference.contact_scene import ContactScene, PossibleContacts
 
 
 def list_curved_contacts(scene: ContactScene) -> list[PossibleContacts]:

@@ -34,10 +34,9 @@ from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, StepStatistics
 from corporeal.mpm.reference.contact import ContactOutcome, resolve_contacts
-from corporeal.mpm.reference.contact_scene import ContactScene
+from corporeal.mpm.reference.contact_scene import ContactScene, NormalCache
 from corporeal.mpm.reference.inclusions import FrameBonds, without_held_nodes
 from corporeal.mpm.reference.mean_dilatation import DilatationClusters, group_clusters
-from corporeal.mpm.reference.normal_cache import NormalCache
 from corporeal.mpm.reference.prescribed_bodies import PrescribedBodies
 from corporeal.mpm.reference.springs import add_impulse
 from corporeal.mpm.reference.step_forces import StepForces

@@ -16,8 +16,7 @@ from corporeal.mpm.constants import (
     VALLEY_ITERATIONS,
 )
 from corporeal.mpm.physics.flat_facets import lies_over_facet
-from corporeal.mpm.reference.contact_scene import ContactScene
-from corporeal.mpm.reference.possible_contacts import PossibleContacts
+from corporeal.mpm.reference.contact_scene import ContactScene, PossibleContacts
 
 
 def list_plane_contacts(scene: ContactScene) -> list[PossibleContacts]:

@@ -23,8 +23,13 @@ from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
 from corporeal.io.gltf.gltf_reader import read_gltf_model
 from corporeal.io.scene_toml import SceneFile, write_scene_file
 from corporeal.materials import find_material, friction_between
-from corporeal.pool.asset_draw import draw_least_used, parse_count_range
-from corporeal.pool.asset_pool import UNKNOWN_LICENCE, AssetPool, PoolAsset
+from corporeal.pool.asset_pool import (
+    UNKNOWN_LICENCE,
+    AssetPool,
+    PoolAsset,
+    draw_least_used,
+    parse_count_range,
+)
 from corporeal.recognition.readable_names import numbered_names
 from corporeal.scene.arrange_bodies import BodyArrangement
 from corporeal.scene.interactions import (
@@ -36,7 +41,6 @@ from corporeal.scene.interactions import (
     InteractionKind,
     SceneInteraction,
 )
-from corporeal.scene.mass_properties import MassProperties
 from corporeal.scene.rest_certificate import RestCertificate
 from corporeal.scene.scene_composition import (
     ComposedObject,
@@ -46,7 +50,7 @@ from corporeal.scene.scene_composition import (
 )
 from corporeal.scene.settle_bodies import SettleConfig, SettlingEngine
 from corporeal.scene.settle_for_interaction import SettledInteraction, settle_for_interaction
-from corporeal.scene.settling_body import BodyPose, SettlingBody
+from corporeal.scene.settling_body import BodyPose, MassProperties, SettlingBody
 from corporeal.scene.wind_threshold import lowest_wind_threshold
 from corporeal.vlm.real_sizes import RealExtent, estimate_real_extent, find_class_sizes
 

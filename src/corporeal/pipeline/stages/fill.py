@@ -31,13 +31,18 @@ from corporeal.discretization.granular_bed_objects import (
     fill_all_beds,
     warn_of_loose_sheets,
 )
-from corporeal.discretization.loose_contents import (
+from corporeal.discretization.mesh_measures import (
+    MeasuredObject,
+    measure_objects,
+    refuse_buried_objects,
+    refuse_flat_scene,
+)
+from corporeal.discretization.missing_walls import close_all_missing_walls, describe_missing_wall
+from corporeal.discretization.mobile_contents import (
     add_wetted_points,
     pour_loose_contents,
     vessels_with_contents,
 )
-from corporeal.discretization.mesh_measures import MeasuredObject
-from corporeal.discretization.missing_walls import close_all_missing_walls, describe_missing_wall
 from corporeal.discretization.object_filling import FillRecipe, ObjectFilling, fill_object
 from corporeal.discretization.object_masses import (
     scale_to_stated_masses,
@@ -59,11 +64,6 @@ from corporeal.discretization.part_model import (
 from corporeal.discretization.plant_roots import extend_plants_into_ground
 from corporeal.discretization.point_masses import remove_mixed_points, weigh_points
 from corporeal.discretization.rods import Rod, find_rod
-from corporeal.discretization.scene_measures import (
-    measure_objects,
-    refuse_buried_objects,
-    refuse_flat_scene,
-)
 from corporeal.discretization.vessel_shell import hollow_all_vessels
 from corporeal.geometry.scene_transforms import underside_centre
 from corporeal.materials import find_material

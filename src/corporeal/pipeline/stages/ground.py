@@ -24,6 +24,7 @@ from corporeal.core.types import (
 )
 from corporeal.fields.impose_field import impose_field
 from corporeal.materials import MaterialEntry
+from corporeal.materials.material_candidates import value_at_fraction
 from corporeal.materials.pressurised_ball import (
     InflatedBall,
     air_with_ruled_restitution,
@@ -33,13 +34,12 @@ from corporeal.materials.pressurised_ball import (
     sealed_wall_material,
     solid_with_ruled_restitution,
 )
-from corporeal.materials.range_fraction import value_at_fraction
 from corporeal.materials.range_placement import (
     CONTENTS_DENSITY_FIELD,
     contents_entry,
     library_entry,
+    value_contradictions,
 )
-from corporeal.materials.value_consistency import value_contradictions
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.pipeline.settings.ground_config import GroundConfig
 

@@ -58,7 +58,7 @@ from corporeal.reconstruction.reconstruct_config import (
     validate_reconstruct,
 )
 from corporeal.reconstruction.segment.instance_assignment import assign_instances
-from corporeal.reconstruction.segment.space_pieces import SpacePieces
+from corporeal.reconstruction.segment.object_segmentation import SpacePieces
 from corporeal.reconstruction.surface.backing_surfels import add_backing_surfels
 from corporeal.reconstruction.surface.object_surfaces import (
     build_object_surfaces,

@@ -28,7 +28,7 @@ from corporeal.core.types import (
     Wind,
 )
 from corporeal.discretization.object_scaling import describe_mass, describe_scales
-from corporeal.materials.range_fraction import fraction_of, is_logarithmic
+from corporeal.materials.material_candidates import fraction_of, is_logarithmic
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.render.html_page import (
     data_url_of_file,

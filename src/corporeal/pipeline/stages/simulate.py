@@ -53,9 +53,6 @@ EngineBuilder = Callable[[Problem], Engine]
 Relax = Callable[[], dict[str, np.ndarray]]
 
 
-DEFAULT_CONFIG = SimulateConfig()
-
-
 def simulate(
     scene: Scene,
     particles: Particles,

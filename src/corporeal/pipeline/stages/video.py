@@ -84,9 +84,6 @@ MAX_FOLLOWED_SCENE_SIZES = 2.5
 Progress = Callable[[float, str], None]
 
 
-DEFAULT_CONFIG = VideoConfig()
-
-
 def render_video(
     played: SimulationResult,
     config: VideoConfig,

@@ -16,8 +16,12 @@ from transformers import CLIPModel, CLIPTokenizer  # pyright: ignore[reportMissi
 from transformers.utils import logging  # pyright: ignore[reportMissingImports]
 
 from corporeal.reconstruction.features.model_weights import PREPROCESSOR_FILE, find_weights
-from corporeal.reconstruction.features.unit_vectors import unit_rows
-from corporeal.reconstruction.features.vit_pictures import feature_map, patch_grid, prepare_picture
+from corporeal.reconstruction.features.vit_pictures import (
+    feature_map,
+    patch_grid,
+    prepare_picture,
+    unit_rows,
+)
 
 DEFAULT_CLIP = "openai/clip-vit-large-patch14-336"
 TOKENIZER_FILES = ("tokenizer.json", "vocab.json")

@@ -19,7 +19,7 @@ from scipy.spatial import KDTree
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera
 from corporeal.geometry.grid_interpolation import bilinear_weights
-from corporeal.reconstruction.features.unit_vectors import row_batches, unit_rows
+from corporeal.reconstruction.features.vit_pictures import row_batches, unit_rows
 
 MIN_VIEW_WEIGHT_PX = 0.1
 """A Gaussian that has less weight in a view is not seen in it [px]: what little shows of those

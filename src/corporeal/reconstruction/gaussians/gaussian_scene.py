@@ -17,10 +17,9 @@ from corporeal.io.photos.posed_photos import NO_INSTANCES_MESSAGE, PosedPhotos, 
 from corporeal.io.registry import reader_of
 from corporeal.io.splat.load_splat import load_splat
 from corporeal.multiview.feature_matching import FEATURE_IMAGE_SIDE_PX
-from corporeal.multiview.inverted_masks import are_masks_inverted
 from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.multiview.pose_consistency import check_pose_consistency
-from corporeal.multiview.silhouette_outliers import outlier_views
+from corporeal.multiview.silhouette_outliers import are_masks_inverted, outlier_views
 from corporeal.multiview.similarity_transform import (
     apply_similarity_to_cameras,
     apply_similarity_to_gaussians,

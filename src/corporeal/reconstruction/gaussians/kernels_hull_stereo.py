@@ -3,9 +3,9 @@
 import numba
 import numpy as np
 
-from corporeal.reconstruction.gaussians.kernels_camera import sample_colour
 from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
 from corporeal.reconstruction.gaussians.kernels_plane_sweep import depth_at_point
+from corporeal.reconstruction.gaussians.kernels_project import sample_colour
 
 f4 = np.float32
 PATCH_RADIUS_PX = 2

@@ -3,8 +3,8 @@
 import numba
 import numpy as np
 
-from corporeal.reconstruction.gaussians.kernels_camera import from_camera, project_to_pixel
 from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
+from corporeal.reconstruction.gaussians.kernels_project import from_camera, project_to_pixel
 
 f4 = np.float32
 PATCH_RADIUS_PX = 2

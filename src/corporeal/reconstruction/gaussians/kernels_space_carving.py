@@ -10,7 +10,6 @@ from corporeal.reconstruction.gaussians.kernels_blend import (
     _tile_columns,
     _tile_rows,
 )
-from corporeal.reconstruction.gaussians.kernels_camera import from_camera, project_to_pixel
 from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
 from corporeal.reconstruction.gaussians.kernels_project import (
     COL_A,
@@ -20,6 +19,8 @@ from corporeal.reconstruction.gaussians.kernels_project import (
     COL_EXTENT,
     COL_OPACITY,
     DILATION_PX2,
+    from_camera,
+    project_to_pixel,
 )
 
 f4 = np.float32

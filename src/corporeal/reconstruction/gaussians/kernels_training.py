@@ -4,8 +4,8 @@ import numba
 import numpy as np
 
 from corporeal.reconstruction.gaussians.gaussian_parameters import PARAM_OPACITY, PARAM_SCALE
-from corporeal.reconstruction.gaussians.kernels_camera import from_camera, project_to_pixel
 from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
+from corporeal.reconstruction.gaussians.kernels_project import from_camera, project_to_pixel
 
 f4 = np.float32
 SSIM_RADIUS_PX = 5

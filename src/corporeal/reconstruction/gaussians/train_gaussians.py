@@ -19,10 +19,10 @@ from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.reconstruction.gaussians import (
     densification,
     exposure_gains,
-    scale_limits,
     training_checkpoint,
 )
 from corporeal.reconstruction.gaussians.carved_volume import carve_volume
+from corporeal.reconstruction.gaussians.densification import ScaleLimits
 from corporeal.reconstruction.gaussians.gaussian_initialisation import (
     StartPoints,
     initial_gaussians,
@@ -43,7 +43,6 @@ from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality, h
 from corporeal.reconstruction.gaussians.image_loss import image_loss, target_image
 from corporeal.reconstruction.gaussians.kernels_training import adam_rows
 from corporeal.reconstruction.gaussians.plane_sweep import sweep_planes
-from corporeal.reconstruction.gaussians.scale_limits import ScaleLimits
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.training_schedule import (
     DEFAULT_TRAINING,
@@ -189,7 +188,7 @@ def _begin_or_resume(
         rest = state["limits"], state["gains"], float(state["widest"]), float(state["ahead"])
         return TrainingState(*learned, *rest, int(state["step"]), float(state["seconds"]))
     widest, ahead, begin = (
-        scale_limits.MAX_SCALE_RADII * schedule.radius,
+        densification.MAX_SCALE_RADII * schedule.radius,
         np.nan,
         schedule.config.begin,
     )
@@ -312,8 +311,8 @@ def _limits_and_haze(
 ) -> tuple[ScaleLimits, Bool[np.ndarray, " N"]]:
     """Return what Gaussians may do, and which of them are haze; masks leave no room for any."""
     if schedule.surfaces is None:
-        return scale_limits.equal_scale_limits(theta, widest), np.zeros(len(theta), np.bool_)
-    return scale_limits.scale_limits_from_views(theta, schedule.radius, schedule.surfaces, pool)
+        return densification.equal_scale_limits(theta, widest), np.zeros(len(theta), np.bool_)
+    return densification.scale_limits_from_views(theta, schedule.radius, schedule.surfaces, pool)
 
 
 def _in_empty_space(theta: ParameterMatrix, schedule: TrainingSchedule) -> Bool[np.ndarray, " N"]:

@@ -14,7 +14,7 @@ from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
 
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.ground_plane import GroundPlane
-from corporeal.multiview.robust_statistics import SIGMA_PER_MEDIAN_DEVIATION
+from corporeal.multiview.point_cloud_geometry import SIGMA_PER_MEDIAN_DEVIATION
 from corporeal.multiview.viewed_region import ViewedRegion
 from corporeal.reconstruction.masks.floor_grid import (
     MIN_AGREEING_PARTNERS,

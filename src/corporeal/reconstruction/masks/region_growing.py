@@ -15,7 +15,7 @@ from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
 from corporeal.core.types import Views
-from corporeal.multiview.cropped_masks import find_cropped_masks
+from corporeal.multiview.silhouette_outliers import find_cropped_masks
 from corporeal.reconstruction.masks.colour_likelihood import (
     background_log_likelihood,
     colour_bins,

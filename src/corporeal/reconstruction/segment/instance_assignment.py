@@ -7,17 +7,17 @@ from scipy.spatial import KDTree
 from corporeal.core.errors import UserError
 from corporeal.core.types import FeatureCloud
 from corporeal.io.photos.posed_photos import NO_INSTANCES_MESSAGE
+from corporeal.reconstruction.reconstruct_config import SegmentationRule
 from corporeal.reconstruction.segment.instance_masks import renumber_labels
 from corporeal.reconstruction.segment.object_segmentation import (
     DEFAULT_OBJECT_SEGMENTATION,
     MAX_OBJECTS,
     TOUCHING_IS_ONE_CONFIG,
     ObjectSegmentation,
+    SpacePieces,
     nearest_neighbour_components,
     segment_objects,
 )
-from corporeal.reconstruction.segment.segmentation_rule import SegmentationRule
-from corporeal.reconstruction.segment.space_pieces import SpacePieces
 
 MIN_SAME_NUMBER_FRACTION = 0.9
 """Share of what views say of points that must be one number each, for numbers to mean the same in

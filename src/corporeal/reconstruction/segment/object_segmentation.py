@@ -7,11 +7,13 @@ many objects as are known to be there.
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import FeatureCloud
@@ -19,6 +21,7 @@ from corporeal.multiview.point_cloud_geometry import nearest_neighbours
 from corporeal.reconstruction.segment.cut_proposals import PatchGraph
 from corporeal.reconstruction.segment.graph_cuts import GraphCut, best_graph_cut
 from corporeal.reconstruction.segment.instance_masks import label_agreement
+from corporeal.reconstruction.segment.part_clusters import reduce_features
 from corporeal.reconstruction.segment.patch_graph import (
     PatchBorders,
     SurfacePatches,
@@ -27,9 +30,86 @@ from corporeal.reconstruction.segment.patch_graph import (
     cut_patches,
     join_pieces,
 )
-from corporeal.reconstruction.segment.reduce_features import reduce_features
-from corporeal.reconstruction.segment.space_pieces import join_nearest_pieces
-from corporeal.reconstruction.segment.stacked_objects import count_stacked_objects
+
+
+@dataclass(frozen=True)
+class SpacePieces:
+    """Pieces with empty space between them."""
+
+    piece_of_point: Int[np.ndarray, " N"]
+    """0 … the number of pieces - 1, what has most points first."""
+    alone: bool = False
+    """Whether nothing else tells objects apart, so that what touches is one."""
+
+
+def join_nearest_pieces(
+    piece_of_point: Int[np.ndarray, " N"], position: Float[np.ndarray, "N 3"], most: int | None
+) -> Int[np.ndarray, " N"]:
+    """Join pieces that are nearest to each other until they are few enough.
+
+    Args:
+        piece_of_point: 0 … the number of pieces - 1.
+        position: Of the points.
+        most: How many objects there are at most; None: not given.
+
+    """
+    label, count = piece_of_point.copy(), int(piece_of_point.max(initial=-1)) + 1
+    if most is None or count <= most:
+        return label
+    trees = [KDTree(position[piece_of_point == k]) for k in range(count)]
+    pairs = combinations(range(count), 2)
+    gaps = sorted((float(trees[a].query(trees[b].data)[0].min()), a, b) for a, b in pairs)
+    for _, a, b in gaps:
+        if len(np.unique(label)) <= most:
+            break
+        one, other = (label[piece_of_point == k][0] for k in (a, b))
+        label[label == other] = one
+    return np.unique(label, return_inverse=True)[1]
+
+
+MAX_THIN_RATIO = 1 / 3
+"""Height over the smaller width of what is thin [-]."""
+MIN_COVERED_FRACTION = 0.5
+"""Share of the smaller outline, seen from above, under or on which something lies."""
+MAX_GAP_RATIO = 0.5
+"""Distance of one's top and the other's bottom, over the thin one's height [-]."""
+
+
+def count_stacked_objects(found: SurfacePatches, instance: Int[np.ndarray, " M"]) -> int:
+    """Return how many objects are thin and lie on or under another.
+
+    An object's box stands upright, turned about the vertical as its patches lie. It is thin where
+    it is less than a third as high as wide; the other lies on it, or under it, where their outlines
+    overlap by half of the smaller and one begins where the other ends.
+    """
+    count = int(instance.max()) + 1
+    rows = [found.centre[instance == k] for k in range(count)]
+    height = np.array([np.ptp(r[:, 2]) for r in rows])
+    width = np.array([_outline_width(r[:, :2]) for r in rows])
+    thin = (height < MAX_THIN_RATIO * width) & (width > 0)
+    return sum(
+        any(_are_touching(rows[a], rows[b], height[a]) for b in range(count) if b != a)
+        for a in np.flatnonzero(thin)
+    )
+
+
+def _outline_width(flat: np.ndarray) -> float:
+    """Return the smaller width of an outline."""
+    if len(flat) < 3:
+        return 0.0
+    local = flat - flat.mean(axis=0)
+    axes = np.linalg.eigh(local.T @ local)[1]
+    return float(np.ptp(local @ axes, axis=0).min())
+
+
+def _are_touching(a: np.ndarray, b: np.ndarray, height: float) -> bool:
+    gap = min(abs(float(low[:, 2].max() - high[:, 2].min())) for low, high in ((a, b), (b, a)))
+    corners = [np.array([r[:, :2].min(axis=0), r[:, :2].max(axis=0)]) for r in (a, b)]
+    low, high = np.maximum(*(c[0] for c in corners)), np.minimum(*(c[1] for c in corners))
+    common = float(np.prod(np.maximum(high - low, 0)))
+    smaller = min(float(np.prod(c[1] - c[0])) for c in corners)
+    return gap < MAX_GAP_RATIO * height and common > MIN_COVERED_FRACTION * smaller
+
 
 MIN_APPEARANCE_DIFFERENCE = 0.04
 """Least difference of appearance that counts, however much alike all is."""

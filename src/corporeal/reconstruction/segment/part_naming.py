@@ -26,11 +26,11 @@ from corporeal.reconstruction.segment.part_attributes import (
 )
 from corporeal.reconstruction.segment.part_clusters import (
     DEFAULT_PARTS,
+    ROWS_PER_BATCH,
     PartClusters,
     PartsConfig,
     cluster_parts,
 )
-from corporeal.reconstruction.segment.reduce_features import ROWS_PER_BATCH
 
 CLIP_TEMPERATURE = 0.01
 """Of cosines between CLIP's pictures and words, as it was trained (Radford et al. 2021)."""

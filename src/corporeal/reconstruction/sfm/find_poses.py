@@ -18,6 +18,8 @@ from corporeal.multiview.silhouette_coherence import MIN_MASK_FILLED_FRACTION
 from corporeal.multiview.view_coverage import unseen_side_text
 from corporeal.reconstruction.sfm.cameras_figure import cameras_figure
 from corporeal.reconstruction.sfm.doppelgangers import (
+    ONE_CAMERA_HINT,
+    describe_mirrored,
     neighbours_support_model,
     remove_doppelgangers,
 )
@@ -26,8 +28,6 @@ from corporeal.reconstruction.sfm.mask_consistency import (
     pictures_of_something_else,
     remove_by_masks,
 )
-from corporeal.reconstruction.sfm.match_pairs import match_partners
-from corporeal.reconstruction.sfm.mirrored_pictures import ONE_CAMERA_HINT, describe_mirrored
 from corporeal.reconstruction.sfm.picture_blur import blurred_pictures
 from corporeal.reconstruction.sfm.place_groups import (
     SORT_PHOTOGRAPHS_HINT,
@@ -70,6 +70,7 @@ from corporeal.reconstruction.sfm.principal_points import (
 from corporeal.reconstruction.sfm.sfm_run import (
     SfmRun,
     SfmStrategy,
+    match_partners,
     remove_pictures,
     require_pycolmap,
     run_sfm,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.multiview.robust_statistics import SIGMA_PER_MEDIAN_DEVIATION
+from corporeal.multiview.point_cloud_geometry import SIGMA_PER_MEDIAN_DEVIATION
 from corporeal.reconstruction.sfm.model_refinement import adjust_bundle
 from corporeal.reconstruction.sfm.sfm_run import require_pycolmap
 

@@ -3,12 +3,12 @@
 import numba
 import numpy as np
 
-from corporeal.reconstruction.gaussians.kernels_camera import (
+from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
+from corporeal.reconstruction.gaussians.kernels_project import (
     from_camera,
     project_to_pixel,
     sample_colour,
 )
-from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
 
 f4 = np.float32
 PATCH_RADIUS_PX = 2

@@ -7,8 +7,8 @@ from jaxtyping import Bool, Float
 
 from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.multiview.cropped_masks import find_cropped_masks
 from corporeal.multiview.silhouette_coherence import MIN_MASK_FILLED_FRACTION
+from corporeal.multiview.silhouette_outliers import find_cropped_masks
 from corporeal.multiview.silhouette_overlap import compare_silhouettes
 from corporeal.multiview.view_coverage import (
     UNSEEN_HALF_GAP_DEG,

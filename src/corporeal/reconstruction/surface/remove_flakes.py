@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.ray_casting import RayCaster
+from corporeal.geometry.mesh_queries import RayCaster
 from corporeal.reconstruction.surface.fairing import (
     FLOOR_TOLERANCE_M,
     neighbour_mean_matrix,

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from corporeal.multiview.silhouette_coherence import is_outside_silhouettes
 from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.surface.kernels_silhouette_guard import (
+from corporeal.reconstruction.surface.kernels_outline import (
     count_lacking_views,
     mark_unmet_pixels,
 )

@@ -7,11 +7,15 @@ from pathlib import Path
 from corporeal.core import store
 from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.jobs.executor import Executor, execute_jobs
-from corporeal.jobs.job_manifest import read_manifest_rows
+from corporeal.jobs.job import read_manifest_rows
 from corporeal.lab.corpus.corpus_plan import read_plan
 from corporeal.lab.corpus.run_corpus import SCENE_TOML_FILE, SCENES_FOLDER
-from corporeal.lab.evaluation.dynamics.compared_methods import OUR_METHOD, parse_method
-from corporeal.lab.evaluation.dynamics.dynamics_folders import INPUT_FOLDER, ReferenceDetail
+from corporeal.lab.evaluation.dynamics.compared_methods import (
+    INPUT_FOLDER,
+    OUR_METHOD,
+    ReferenceDetail,
+    parse_method,
+)
 from corporeal.lab.evaluation.dynamics.dynamics_jobs import (
     EvaluatedScene,
     MethodComparison,

@@ -6,9 +6,11 @@ from pathlib import Path
 
 from corporeal.core import store
 from corporeal.jobs.job import Job, ProgressCallback
-from corporeal.lab.evaluation.dynamics.compared_methods import OUR_METHOD, Method, method_settings
-from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+from corporeal.lab.evaluation.dynamics.compared_methods import (
+    OUR_METHOD,
+    Method,
     ReferenceDetail,
+    method_settings,
     reference_folder,
     run_folder,
 )

@@ -9,7 +9,7 @@ from statistics import mean
 
 from corporeal.core import store
 from corporeal.core.audit_data import FLOOR_NAME
-from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+from corporeal.lab.evaluation.dynamics.compared_methods import (
     OURS_NAME,
     reference_folder,
     run_folder,
@@ -19,11 +19,13 @@ from corporeal.lab.evaluation.dynamics.dynamics_jobs import (
     MethodComparison,
     dynamics_jobs,
 )
-from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult, SceneRanking, rank_scene
-from corporeal.lab.evaluation.dynamics.rank_correlation import (
+from corporeal.lab.evaluation.dynamics.method_ranking import (
+    MethodResult,
     RankCorrelation,
     RankedPair,
+    SceneRanking,
     rank_correlation,
+    rank_scene,
 )
 from corporeal.lab.evaluation.dynamics.rebound_drops import (
     RANGE_TOLERANCE,

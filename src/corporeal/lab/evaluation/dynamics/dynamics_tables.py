@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from corporeal.lab.evaluation.dynamics.dynamics_folders import OURS_NAME
+from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME
 from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary, MethodMean
 from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult
 from corporeal.lab.evaluation.result_table import ResultTable

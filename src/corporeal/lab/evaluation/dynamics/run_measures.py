@@ -11,7 +11,7 @@ from corporeal.core.audit_data import Expectation, Outcome, PartAudit
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Vector
-from corporeal.lab.evaluation.dynamics.dynamics_folders import NUMBERS_FILE
+from corporeal.lab.evaluation.dynamics.compared_methods import NUMBERS_FILE
 from corporeal.materials import find_material, find_material_or_default
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.results import StageResults

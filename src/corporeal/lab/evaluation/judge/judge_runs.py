@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.dynamics.dynamics_folders import (
+from corporeal.lab.evaluation.dynamics.compared_methods import (
     METHOD_NAMES,
     OURS_NAME,
     reference_folder,

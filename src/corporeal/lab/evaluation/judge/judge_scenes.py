@@ -8,7 +8,7 @@ import numpy as np
 
 from corporeal.core.audit_data import Audit
 from corporeal.core.errors import UserError, check_range
-from corporeal.lab.evaluation.dynamics.dynamics_folders import OURS_NAME
+from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME
 from corporeal.lab.evaluation.judge.camera_staging import LOOK_TURNS_DEG, Staging, stage_scene
 from corporeal.lab.evaluation.judge.control_effect import (
     COMPARED_AFTER_CONTACT_S,

@@ -1,4 +1,7 @@
-"""The library as a page of the documentation."""
+"""The library as a page of the documentation.
+
+python benchmarks/materials_page.py > docs/reference/materials.md
+"""
 
 from collections.abc import Sequence
 
@@ -6,11 +9,10 @@ from corporeal.core.types import Law
 from corporeal.materials.contact_pairs import measured_friction_pairs, measured_restitution_pairs
 from corporeal.materials.flat_crush import layered_materials
 from corporeal.materials.library import library
-from corporeal.materials.library_entry import MaterialEntry
+from corporeal.materials.library_entry import MaterialEntry, source_table
 from corporeal.materials.library_listing import LISTING_FIELDS, LISTING_HEADS, range_text
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.restitution_speed import rated_restitutions
-from corporeal.materials.shipped_libraries import source_table
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 SURFACE_FIELDS = (
@@ -27,8 +29,7 @@ SURFACE_HEADS = ("material", "group", "μ", "e", "η", "S", "S_loc", "H", "wall"
 FLUID_HEADS = ("material", "ρ", "viscosity", "consistency K_c", "n", "τ_y")
 INTRODUCTION_TEXT = """# Materials
 
-Generated from the tables in `src/corporeal/materials` by `corporeal.materials.library_markdown()`;
-a test holds this page equal to them. Each cell is the measured range with the usual value in
+Generated from the tables in `src/corporeal/materials` by `benchmarks/materials_page.py`; a test holds this page equal to them. Each cell is the measured range with the usual value in
 brackets: E Young's modulus, ν Poisson's ratio, ρ density, σ_y yield stress, φ friction angle and c
 cohesion of granular matter; μ the surface's own sliding friction, e restitution, η loss factor, S
 strength of brittle materials (a whole bar's, in bending or tension), S_loc their tensile strength
@@ -252,3 +253,7 @@ def _layered() -> list[str]:
         young, crush = f"{1e-6 * row.young_across_pa:g} MPa", f"{1e-3 * row.crush_pa:g} kPa"
         lines.append(f"| {name} | {young} | {crush} | {row.source} |")
     return lines
+
+
+if __name__ == "__main__":
+    print(library_markdown())

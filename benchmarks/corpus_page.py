@@ -1,10 +1,19 @@
-"""Results of a corpus as a documentation page."""
+"""What a corpus came to as a page of the documentation: Markdown, measured rows only.
 
+python benchmarks/corpus_page.py CORPUS docs/reference/corpus-results.md
+"""
+
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from corporeal.core import store
-from corporeal.lab.corpus.collect_results import CorpusResults, SceneMeasures, SceneRecord
+from corporeal.lab.corpus.collect_results import (
+    CorpusResults,
+    SceneMeasures,
+    SceneRecord,
+    collect_results,
+)
 from corporeal.lab.corpus.corpus_breakdown import (
     BreakdownLine,
     breakdowns,
@@ -77,7 +86,7 @@ def _summary(corpus: CorpusResults) -> str:
     numbers = [s.numbers for s in corpus.run if s.numbers]
     detail = {s.settings.fill.detail for s in corpus.run if s.settings}
     said = (
-        f"Written by `corporeal corpus report CORPUS --docs FILE`. Planned by "
+        f"Written by `python benchmarks/corpus_page.py CORPUS FILE`. Planned by "
         f"`corporeal corpus assemble CORPUS {corpus.plan.config.words}`: {len(corpus.scenes)} "
         f"scenes, {made} assembled, {len(numbers)} run"
     )
@@ -148,3 +157,7 @@ def _faults(found: SceneMeasures | None) -> list[str]:
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     lines: list[Sequence[str]] = [heads, ["---"] * len(heads), *rows]
     return ["| " + " | ".join(cell.replace("|", "/") for cell in line) + " |" for line in lines]
+
+
+if __name__ == "__main__":
+    write_corpus_page(collect_results(Path(sys.argv[1])), Path(sys.argv[2]))

@@ -1,5 +1,0 @@
-"""Choices for --apart."""
-
-from typing import Literal
-
-SegmentationRule = Literal["auto", "masks", "look", "components"]
