@@ -42,8 +42,7 @@ FARTHEST, APART = 0.1, 0.05
 INSIDE = 0.85
 """Least share of rows inside."""
 AT_FIRST = 20
-"""So many of the blind rows were in their range ± ``LEEWAY`` when they were tried first, at draft
-."""
+"""So many of the blind rows were in their range ± ``LEEWAY`` when they were tried first, at draft."""
 UNBOOKED = 0.08
 """Most that may be lost unbooked at draft, over the energy of the blow [-]."""
 

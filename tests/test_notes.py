@@ -25,7 +25,7 @@ from corporeal.multiview.metric_scale import (
 from corporeal.pipeline.stages.fill import name_objects
 from corporeal.recognition.length_unit_inference import InferredUnit, unit_notes
 from corporeal.recognition.typical_extents import extent_warning
-from handmade import scene
+from sample_scenes import scene
 
 GONE = Note("a.jpg was left out.", NoteKind.LEFT_OUT)
 

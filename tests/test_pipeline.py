@@ -14,7 +14,7 @@ from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.recognition.typical_extents import extent_warning
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from glb_maker import cube
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 def silent(verb):

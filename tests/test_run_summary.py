@@ -9,7 +9,7 @@ from corporeal.core import store
 from corporeal.core.audit_data import PredictedBreakage
 from corporeal.core.types import Note, NoteKind
 from corporeal.simulation.audit_file import AUDIT_FILE
-from made_findings import run_audit
+from sample_findings import run_audit
 
 
 def blow(word, ratio, pieces=0):

@@ -5,6 +5,6 @@ import pytest
 
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory):
-    from viewer_served import a_run
+    from viewer_server import a_run
 
     return a_run(tmp_path_factory.mktemp("viewer"))

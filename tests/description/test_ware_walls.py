@@ -12,7 +12,7 @@ from corporeal.description.describe_config import DescribeConfig
 from corporeal.discretization.open_vessel_walls import NamedObject, usual_vessel_wall
 from corporeal.pipeline.stages.describe import describe
 from corporeal.recognition.lexicon import name_tokens
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 ROWS = tomllib.loads(MORE_WARE.read_text(encoding="utf-8"))["things"]
 LEXICON = files("corporeal.recognition").joinpath("lexicon.toml").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ import pytest
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import ground, grounding_warnings
 from corporeal.pipeline.stages.segment import segment
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 def density(name):

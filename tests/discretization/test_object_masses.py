@@ -9,7 +9,7 @@ import trimesh
 from corporeal.core.types import Scene, SceneObject, Surface
 from corporeal.geometry.scene_transforms import scale_scene
 from corporeal.pipeline.in_memory import prepare_scene
-from handmade import plain
+from sample_scenes import plain
 
 
 def a_bin(wall):

@@ -15,7 +15,7 @@ from corporeal.description.describe_config import DescribeConfig
 from corporeal.discretization.part_model import THICKNESS_FROM_MESH, THICKNESS_FROM_NAME
 from corporeal.pipeline.stages.describe import describe
 from corporeal.recognition.lexicon import name_tokens, names_open_vessel
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 ROWS = tomllib.loads(WARE.read_text(encoding="utf-8"))["things"]
 ONE_OF_EACH = list({row["kind"]: row for row in ROWS if row["half"] == "open"}.values())

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from exported import asked_of
+from export_helpers import asked_of
 
 import corporeal as co
 from corporeal.export.export_target import ExportConfig, ExportRequest

@@ -5,7 +5,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from exported import asked_of, replaced, rigid, soft
+from export_helpers import asked_of, replaced, rigid, soft
 
 import corporeal as co
 from corporeal.export.check_exports import (

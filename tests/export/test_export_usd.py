@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from exported import asked_of, replaced, rigid, soft, turned
+from export_helpers import asked_of, replaced, rigid, soft, turned
 
 from corporeal.core.types import Law
 from corporeal.export.check_exports import check_target

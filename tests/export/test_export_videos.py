@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import asked_of, rigid
+from export_helpers import asked_of, rigid
 
 import corporeal as co
 from corporeal.core.types import FeatureCloud, Gaussians, Reconstruction

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import asked_of, replaced, rigid, soft
+from export_helpers import asked_of, replaced, rigid, soft
 
 from corporeal.export.alembic_writer import write_alembic
 from corporeal.export.animated_glb_writer import write_animated_glb

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exported import asked_of, rigid, soft
+from export_helpers import asked_of, rigid, soft
 
 import corporeal as co
 from corporeal.export.identifiers import identifiers

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from exported import asked_of
+from export_helpers import asked_of
 
 pytest.importorskip("pxr", reason="usd-core reads USD: pip install 'corporeal[export]'")
 

@@ -17,14 +17,17 @@ from corporeal.fields.sampled_field import check_field
 from corporeal.fields.vomp_reader import read_vomp
 from corporeal.pipeline.settings.ground_config import GroundConfig, validate
 from corporeal.pipeline.stages.ground import ground, grounding_warnings
-from fields import made_up
+from fields import synthetic_fields
 
-WRITERS = {"vomp": (made_up.write_vomp, "npz"), "pixie": (made_up.write_pixie, "ply")}
+WRITERS = {
+    "vomp": (synthetic_fields.write_vomp, "npz"),
+    "pixie": (synthetic_fields.write_pixie, "ply"),
+}
 
 
 @cache
 def thing(name):
-    return made_up.thing(name)
+    return synthetic_fields.thing(name)
 
 
 @cache
@@ -37,7 +40,7 @@ def written(folder, whose, name, frame="z-up", **more):
     write, suffix = WRITERS[whose]
     it = thing(name)
     path = folder / f"field.{suffix}"
-    write(path, made_up.placed(it.voxel, frame), it.young, **more)
+    write(path, synthetic_fields.placed(it.voxel, frame), it.young, **more)
     return path
 
 
@@ -45,7 +48,7 @@ def test_there_are_24_ways_to_turn_axes_into_axes():
     assert len({turn.tobytes() for turn in axis_turns()}) == 24
 
 
-@pytest.mark.parametrize("frame", made_up.FRAMES)
+@pytest.mark.parametrize("frame", synthetic_fields.FRAMES)
 @pytest.mark.parametrize("kind", WRITERS)
 @pytest.mark.parametrize("name", ["armchair", "rubber_duck", "potted_ficus", "floor_lamp"])
 def test_a_field_finds_its_parts_in_any_frame(name, kind, frame, tmp_path):
@@ -101,7 +104,7 @@ def test_a_part_beyond_the_field_keeps_our_numbers(tmp_path):
     leaves = [p.name for p in it.parts.catalogue].index("leaves")
     there = (it.part_of_voxel != leaves) | (it.voxel[:, 2] > 0.9 * it.voxel[:, 2].max())
     path = tmp_path / "field.npz"
-    made_up.write_vomp(path, it.voxel[there], np.full(there.sum(), 1e6))
+    synthetic_fields.write_vomp(path, it.voxel[there], np.full(there.sum(), 1e6))
     field = impose_field(before, it.scene, it.parts, f"vomp:{path}")
     assert field.materials[leaves] == before.materials[leaves]
     assert re.search(r"leaves \(only \d+% of it lies near a point", field.notes[0])
@@ -132,7 +135,7 @@ def test_pixies_kinds_choose_laws_with_what_these_need(tmp_path):
 
 def test_a_folder_holds_a_file_per_object_named_with_or_without_its_number(tmp_path):
     it, before = thing("armchair"), ours("armchair")
-    made_up.write_vomp(tmp_path / "armchair.npz", it.voxel, it.young)
+    synthetic_fields.write_vomp(tmp_path / "armchair.npz", it.voxel, it.young)
     field = impose_field(before, it.scene, it.parts, f"vomp:{tmp_path}")
     assert any(m.grounds["young"].chosen_by == "field" for m in field.materials)
     (tmp_path / "armchair.npz").rename(tmp_path / "chair.npz")
@@ -221,14 +224,14 @@ def _cut_zip(folder):
 
 def _nan(folder):
     it = thing("armchair")
-    made_up.write_vomp(folder / "a.npz", it.voxel, np.where(np.arange(len(it.young)) < 3, np.nan,
+    synthetic_fields.write_vomp(folder / "a.npz", it.voxel, np.where(np.arange(len(it.young)) < 3, np.nan,
                                                             it.young))  # fmt: skip
     return "vomp", folder / "a.npz"
 
 
 def _nowhere(folder):
     it = thing("armchair")
-    made_up.write_pixie(folder / "a.ply", np.full_like(it.voxel, np.nan), it.young)
+    synthetic_fields.write_pixie(folder / "a.ply", np.full_like(it.voxel, np.nan), it.young)
     return "pixie", folder / "a.ply"
 
 
@@ -310,7 +313,7 @@ def test_a_field_of_another_object_does_not_fit(tmp_path):
 def test_what_cannot_be_computed_with_is_refused(tmp_path):
     it = thing("armchair")
     path = tmp_path / "a.npz"
-    made_up.write_vomp(path, it.voxel, it.young)
+    synthetic_fields.write_vomp(path, it.voxel, it.young)
     field = read_vomp(path)
     with pytest.raises(BadFileError, match="values of poisson"):
         check_field(replace(field, values={"poisson": np.full(len(it.young), 0.5)}))

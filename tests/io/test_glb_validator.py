@@ -143,7 +143,7 @@ def test_real_models_keep_their_shapes_and_looks(shared_assets, tmp_path):
                     np.testing.assert_array_equal(a.uv[a.triangles], b.uv[b.triangles])
                 worn, old = after.finishes[a.finish], before.finishes[b.finish]
                 np.testing.assert_array_equal(worn.texture, old.texture)
-                same = ("colour", "alpha_mode", "roughness", "metallic", "transmission", "glow")
+                same = ("colour", "alpha_mode", "roughness", "metallic", "transmission", "emission")
                 assert [getattr(worn, x) for x in same] == [getattr(old, x) for x in same]
                 assert a.name == b.name
                 checked += 1

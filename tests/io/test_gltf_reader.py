@@ -69,7 +69,7 @@ def scene():
         finishes=(
             Finish("paint", (0.5, 0.25, 1.0, 1.0), rng.integers(0, 255, (4, 6, 3), np.uint8), 0.5),
             Finish("glass", (1.0, 1.0, 1.0, 0.5), None, 0.0, 0.25, 0.75, alpha_mode="BLEND"),
-            Finish("ember", (0.5, 0.5, 0.5, 1.0), glow=4.0, alpha_mode="MASK", alpha_cutoff=0.25),
+            Finish("ember", (0.5, 0.5, 0.5, 1.0), emission=4.0, alpha_mode="MASK", alpha_cutoff=0.25),
         ),
         gravity=(0.0, 0.0, -1.5),
         duration=1.5,
@@ -93,8 +93,8 @@ def test_what_was_written_is_read_back(scene, tmp_path):
         if was.texture is not None:
             assert np.array_equal(was.texture, now.texture)
         assert repr(was).split("texture")[0] == repr(now).split("texture")[0]
-        assert (was.metallic, was.roughness, was.transmission, was.glow, was.alpha_mode) == (
-            now.metallic, now.roughness, now.transmission, now.glow, now.alpha_mode,
+        assert (was.metallic, was.roughness, was.transmission, was.emission, was.alpha_mode) == (
+            now.metallic, now.roughness, now.transmission, now.emission, now.alpha_mode,
         )  # fmt: skip
     for was, now in zip(scene.surfaces, back.surfaces, strict=True):
         assert (was.name, was.object, was.finish, was.extras) == (

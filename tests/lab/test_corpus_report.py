@@ -28,7 +28,7 @@ from corporeal.scene.scene_composition import (
     write_composition,
 )
 from corporeal.simulation.audit_file import write_audit
-from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
+from sample_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
 SETTINGS = {
     "ground": {"library": "default"},

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_dynamics import body, expecting, pair, run
+from sample_dynamics import body, expecting, pair, run
 from scipy.stats import kendalltau
 
 from corporeal.core import store
@@ -30,7 +30,7 @@ from corporeal.lab.evaluation.dynamics.rank_correlation import rank_correlation
 from corporeal.lab.evaluation.dynamics.run_difference import compare_runs
 from corporeal.lab.evaluation.dynamics.run_measures import read_run_measures, write_run_measures
 from corporeal.pipeline.run_pipeline import Settings
-from made_findings import object_outcome
+from sample_findings import object_outcome
 
 # ---------------------------------------------------------------- differences
 

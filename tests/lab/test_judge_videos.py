@@ -56,7 +56,7 @@ from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.vlm import Reply
 from corporeal.vlm.human_client import PendingQuestionsError
-from made_findings import run_audit
+from sample_findings import run_audit
 
 SHORT = 0.3
 """Long enough for both balls to bounce [s]."""

@@ -33,7 +33,7 @@ from corporeal.lab.evaluation.measured_masses import (
 from corporeal.materials import find_material
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.ground import GroundConfig
-from oracle import Oracle, part, weighs, whole
+from scripted_model import Oracle, part, weighs, whole
 
 FEW = MassConfig(samples=40)
 

@@ -14,7 +14,7 @@ from corporeal.lab.evaluation.material_evaluation import (
     read_material_truth,
     recognition_record,
 )
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 TRUTH = """
 [oak_table]

@@ -98,7 +98,7 @@ def test_a_blow_is_stored_in_wall_and_air_where_a_ball_turns():
     ball, mass, speed = racquetball(), 0.04, 6.9
 
     def force(x):
-        return ball.spring * x + limp_force(ball.gauge, ball.radius, x)
+        return ball.spring * x + limp_force(ball.gauge_pressure, ball.radius, x)
 
     x, v, dt = 0.0, speed, 1e-6
     while v > 0.0:

@@ -17,8 +17,8 @@ from corporeal.recognition.metadata_recognition import substance_hint
 from corporeal.recognition.parts_by_name import identify_parts
 from corporeal.render.object_portrait import render_portraits
 from corporeal.vlm.recordings import RecordingClient
-from handmade import plain, scene
-from oracle import Oracle, decomposed, everywhere, part, sizes, weighs, whole
+from sample_scenes import plain, scene
+from scripted_model import Oracle, decomposed, everywhere, part, sizes, weighs, whole
 
 VINYL = {"substance": "soft_PVC", "shell_thickness_m": 0.002}
 DUCK = ("duck_0", [("body", plain("vinyl"), VINYL), ("beak", plain("vinyl"), {**VINYL, "x": 1})])

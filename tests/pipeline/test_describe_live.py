@@ -14,7 +14,7 @@ from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import ground
 from corporeal.pipeline.stages.segment import segment
 from corporeal.showcase.showcase_scenes import build_showcase_scene
-from oracle import decomposed, part, weighs
+from scripted_model import decomposed, part, weighs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "vlm"))
 from fake_server import FakeServer

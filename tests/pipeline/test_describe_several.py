@@ -8,8 +8,8 @@ from corporeal.core.errors import UserError
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
 from corporeal.vlm.recordings import ANSWER_NUMBER_KEY, RecordingClient
-from handmade import plain, scene
-from oracle import Oracle, everywhere, offered, part, weighs, whole
+from sample_scenes import plain, scene
+from scripted_model import Oracle, everywhere, offered, part, weighs, whole
 
 VASE = ("vase_0", [("mesh", plain(), {})])
 GLASS = {"parts": [part("vase", "glass", "sheet")]}

@@ -38,7 +38,7 @@ from corporeal.reconstruction.gaussians import rasteriser_numba
 from corporeal.render import colours, video_file
 from corporeal.render.camera_placement import CameraAim, camera_from_aim
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
-from made_ledger import ledger
+from sample_ledger import ledger
 
 SMALL = VideoConfig(width=128, height=96, quality="draft", stills=True)
 TURN = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()

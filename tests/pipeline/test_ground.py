@@ -11,7 +11,7 @@ from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import GroundConfig, ground, grounding_warnings
 from corporeal.pipeline.stages.segment import segment
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 def stated(name, substance, **extras):

@@ -144,7 +144,7 @@ def test_a_sealed_ball_with_a_stiff_wall_bounces_on_wall_and_air():
 def test_what_flows_when_it_is_dented_stays_a_wall():
     asked = {"substance": "ABS", "shell_thickness_m": 0.0004}
     structure = co.prepare_scene(named("thing", **asked, inflation_kPa=0)).field.structures[0]
-    assert (structure.kind, structure.contents, structure.gauge) == ("shell", None, None)
+    assert (structure.kind, structure.contents, structure.gauge_pressure) == ("shell", None, None)
 
 
 def test_a_sealed_wall_that_the_budget_would_let_be_crushed_is_rigid():

@@ -92,11 +92,13 @@ def asked(cameras, tmp_path, monkeypatch):
 @pytest.mark.parametrize("of", [anything, half])
 def test_nonsense_is_refused_with_where_it_lies_unless_somebody_wants_to_go_on(asked, of):
     """Half of each picture ended as "the poses do not agree", after a training."""
-    with pytest.raises(BadFileError, match=r"found@.* are of no one thing.*masks.*--force") as told:
+    with pytest.raises(
+        BadFileError, match=r"found@.* are not of one object.*masks.*--force"
+    ) as told:
         asked(of)
     assert any("were found by found@" in note for note in told.value.__notes__)
     folder, _, doubts = asked(of, force=True)
-    assert (folder / "masks").is_dir() and "no one thing" in doubts[0]
+    assert (folder / "masks").is_dir() and "not of one object" in doubts[0]
 
 
 def test_masks_of_a_thing_are_taken_without_a_doubt(asked):

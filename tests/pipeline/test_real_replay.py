@@ -5,7 +5,7 @@ import pytest
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
 from corporeal.recognition.metadata_recognition import substance_hint
 from corporeal.recognition.parts_by_name import identify_parts
-from recorded import check_answered, check_chosen, grounded, rows
+from recorded_scenes import check_answered, check_chosen, grounded, rows
 
 NAMES = (
     "armchair_kaolin",

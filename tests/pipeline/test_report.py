@@ -32,8 +32,8 @@ from corporeal.pipeline.stages.report import (
     usage_words,
 )
 from corporeal.pipeline.stages.segment import segment
-from handmade import plain, scene
-from made_findings import run_audit
+from sample_findings import run_audit
+from sample_scenes import plain, scene
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,8 @@ from corporeal.pipeline.stages.report import ReportContent, report
 from corporeal.pipeline.stages.segment import segment
 from corporeal.showcase.showcase_scenes import build_showcase_scene
 from corporeal.simulation.audit import part_rows
-from handmade import plain
-from made_findings import run_audit
+from sample_findings import run_audit
+from sample_scenes import plain
 
 REPLAY = f"replay:{Path(__file__).parents[1] / 'recordings' / 'showcase'}"
 

@@ -19,7 +19,7 @@ from corporeal.pipeline.stages.ground import ground
 from corporeal.pipeline.stages.segment import segment
 from corporeal.reconstruction.features.point_descriptor import point_descriptor
 from corporeal.reconstruction.segment.part_naming import NamedParts
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 CHAIR = (
     "chair_0",

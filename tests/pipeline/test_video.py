@@ -32,7 +32,7 @@ from corporeal.pipeline.stages.video import _box, _reach_ratio, render_video
 from corporeal.render import video_file
 from corporeal.render.video_raycaster import VideoRaycaster
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
-from made_ledger import ledger
+from sample_ledger import ledger
 
 SMALL = VideoConfig(width=128, height=96, quality="draft")
 

@@ -5,7 +5,7 @@ import pytest
 from corporeal import materials
 from corporeal.pipeline.stages.describe import describe
 from corporeal.recognition.contents_from_name import known_contents
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 def told(name, *parts):

@@ -19,7 +19,7 @@ from corporeal.recognition.metadata_recognition import (
     substance_hint,
 )
 from corporeal.recognition.parts_by_name import identify_parts
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 class Named:

@@ -5,7 +5,7 @@ import pytest
 from corporeal import materials
 from corporeal.pipeline.stages.describe import describe
 from corporeal.recognition.packaged_goods import packaged_goods
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 def built(name):

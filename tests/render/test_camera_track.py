@@ -10,7 +10,7 @@ from corporeal.core.types import Frame
 from corporeal.render.camera_placement import camera_axes
 from corporeal.render.camera_track import FirstContact, MotionBounds, camera_track, first_contact
 from corporeal.render.time_remap import frame_positions, interpolate_frames
-from made_ledger import ledger
+from sample_ledger import ledger
 
 SIZE = (320, 240)
 TIME = np.linspace(0, 1, 31)

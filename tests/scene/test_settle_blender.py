@@ -113,7 +113,7 @@ def test_a_failure_is_told_in_its_own_last_words(fake):
     assert "failed with code 2" in words
     assert "Traceback: | RuntimeError: no licence to fall." in words
     fake("nothing")
-    assert "wrote no result. Its last words: Blender 4.2.1 (a stand-in)." in refusal()
+    assert "wrote no result. Its last output: Blender 4.2.1 (a stand-in)." in refusal()
 
 
 def test_what_takes_too_long_is_ended_with_all_that_it_started(fake, tmp_path):

@@ -3,7 +3,7 @@
 import fcntl
 
 import pytest
-from spoiled_runs import sound_run
+from faulty_runs import sound_run
 
 from corporeal.showcase.prop_models import PROP_BUILDERS
 

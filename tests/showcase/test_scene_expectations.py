@@ -15,7 +15,7 @@ from corporeal.showcase.scene_expectations import (
 )
 from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS
 from corporeal.simulation.outcome import level_reach, vertical_extent
-from made_findings import object_outcome, outcome, pair_outcome
+from sample_findings import object_outcome, outcome, pair_outcome
 
 
 def pair(separated=True, gap=3.0):

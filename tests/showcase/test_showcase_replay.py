@@ -9,7 +9,7 @@ from corporeal.pipeline.stages.assemble import assemble
 from corporeal.recognition.metadata_recognition import substance_hint
 from corporeal.recognition.parts_by_name import identify_parts
 from corporeal.showcase import showcase_scenes
-from recorded import FOLDER, check_answered, check_chosen, grounded, rows
+from recorded_scenes import FOLDER, check_answered, check_chosen, grounded, rows
 
 MACHINE = ("/work", "/tmp", "/home", "/Users", "C:\\")
 

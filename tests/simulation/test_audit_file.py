@@ -3,16 +3,15 @@
 import json
 from dataclasses import fields, replace
 
-import numpy as np
 import pytest
 
 from corporeal.core import store
 from corporeal.core.audit_data import Expectation, SettledObjectOutcome, SettlingOutcome
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
-from corporeal.core.types import NO_USAGE, Inventory, ModelUsage, Note, NoteKind
+from corporeal.core.types import NO_USAGE, ModelUsage, Note, NoteKind
 from corporeal.simulation.audit_file import AUDIT_FILE, read_audit, read_run_audit, write_audit
-from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
+from sample_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
 WHOLE = run_audit(
     parts=(part_audit(), part_audit(object=None, real_mass_kg=None)),
@@ -77,7 +76,7 @@ def test_a_kind_that_there_is_not_is_refused(tmp_path):
     store.write_json(
         tmp_path / AUDIT_FILE, store.to_plain(WHOLE) | {"kind_of_warning": ["dire", "doubt"]}
     )
-    with pytest.raises(BadFileError, match="'dire' is no NoteKind"):
+    with pytest.raises(BadFileError, match="'dire' is not a NoteKind"):
         read_run_audit(tmp_path)
 
 
@@ -102,19 +101,6 @@ def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
     assert again.pop("hints") == []
     assert again.pop("kind_of_warning") == []
     assert again == {key: value for key, value in BEFORE.items() if key != "questions"}
-
-
-def test_the_answers_of_a_run_from_before_open(tmp_path):
-    """``usage`` was a dictionary in what describe left."""
-    took = [["models", {"list": [{"value": "openai:x"}], "tuple": False}], ["calls", {"value": 1}]]
-    none = {"list": [], "tuple": True}
-    tree = {"type": "Inventory", "fields": {"objects": none, "usage": {"dict": took}}}
-    kept = np.frombuffer(json.dumps(tree).encode(), np.uint8)
-    np.savez(tmp_path / store.DATA_FILE, **{store.TREE_ARRAY: kept})
-    made = store.load(tmp_path / store.DATA_FILE)
-    assert made == Inventory((), usage=ModelUsage(("openai:x",), calls=1))
-    store.save(tmp_path / store.DATA_FILE, made)
-    assert store.load(tmp_path / store.DATA_FILE) == made
 
 
 def test_what_is_not_finite_comes_back_as_not_a_number(tmp_path):

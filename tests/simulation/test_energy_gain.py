@@ -15,7 +15,7 @@ from corporeal.simulation.audit import reject_expectations
 from corporeal.simulation.audit_messages import breach_messages
 from corporeal.simulation.energy_gain import EnergyWatch, energy_gain
 from corporeal.simulation.ledger_row import ledger_row
-from made_findings import run_audit
+from sample_findings import run_audit
 
 NAMES = ("ball", "block")
 

@@ -7,7 +7,7 @@ import pytest
 
 from corporeal.core.types import Finish, Push, Scene, SceneObject, Surface, Wind
 from corporeal.simulation.run_hints import run_hints
-from made_findings import object_outcome, outcome, part_audit
+from sample_findings import object_outcome, outcome, part_audit
 
 CORNERS = np.eye(3)
 FACES = np.array([[0, 1, 2]])

@@ -10,7 +10,7 @@ from corporeal.simulation.summary_text import (
     split_advice,
     summary_sections,
 )
-from made_findings import run_audit
+from sample_findings import run_audit
 
 PIECES = Note(
     "can: nobody looked what it is made up of. --vlm or --annotations name pieces.",

@@ -17,7 +17,7 @@ from corporeal.simulation.trajectory_files import (
     write_frame,
     write_layout,
 )
-from made_ledger import ledger
+from sample_ledger import ledger
 
 LAYOUT = FrameLayout(object=np.array([0, 1, 1, 0, 2]), rigid=np.array([False, True, False]))
 

@@ -9,6 +9,6 @@ collect_ignore_glob = [] if find_spec("starlette") and find_spec("uvicorn") else
 
 @pytest.fixture(scope="session")
 def small_run(tmp_path_factory):
-    from viewer_served import a_run
+    from viewer_server import a_run
 
     return a_run(tmp_path_factory.mktemp("viewer"))

@@ -6,7 +6,7 @@ from corporeal.viewer.access import AccessPolicy, host_name
 from corporeal.viewer.run_store import RunStore
 from corporeal.viewer.server import ListenAddress, access_policy_of, address_words, is_local
 from corporeal.viewer.web_app import SiteOptions, make_app
-from viewer_served import LOCAL, serving
+from viewer_server import LOCAL, serving
 
 TOKEN = "a-token-that-nobody-guesses"
 

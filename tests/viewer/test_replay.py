@@ -133,7 +133,7 @@ def test_a_replay_that_nobody_asked_for_is_not_found(small_run):
     from corporeal.viewer.replay_jobs import ReplayJobs
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     shelf = RunStore((), small_run.parent)
     replays = ReplayJobs(shelf, LiveSession(shelf.made))

@@ -4,7 +4,7 @@ import pytest
 
 from corporeal.pipeline import run_files
 from corporeal.pipeline.run_pipeline import read_run
-from made_findings import run_audit
+from sample_findings import run_audit
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from corporeal.viewer.run_store import RunStore
 from corporeal.viewer.uploads import INBOX_FOLDER, UploadInbox, UploadLimits, upload_route
 from corporeal.viewer.web_app import SiteOptions, make_app
 from corporeal.viewer.zip_unpack import unpack_zip
-from viewer_served import LOCAL, serving
+from viewer_server import LOCAL, serving
 
 
 def packed(*files, kind=zipfile.ZIP_DEFLATED):

@@ -21,7 +21,7 @@ from corporeal.vlm.answer_schemas import (
 )
 from corporeal.vlm.human_client import schema_example
 from corporeal.vlm.interpret_answers import evidence_from_answer, part_hypotheses
-from oracle import decomposed, part
+from scripted_model import decomposed, part
 
 NAMES = AllowedNames(
     {"steel": "steel", "Steel": "steel", "sand": "sand"}.get,

@@ -39,7 +39,7 @@ def part_as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
     inflated = part.structure.inflated
     density = mean_density(part) if inflated else inner.density * part.structure.fill
     spread = replace(inner, density=density)
-    if part.structure.gauge is not None:
+    if part.structure.gauge_pressure is not None:
         blow = equivalent_solid(
             part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2
         )
@@ -59,7 +59,7 @@ def part_as_sealed_ball(part: PartGeometry, speed: float) -> InflatedBall:
     structure = part.structure
     radius = (0.75 * part.volume / pi) ** (1.0 / 3.0)
     skin = material_at_speed(part.material, speed)
-    return InflatedBall(structure.gauge or 0.0, skin, structure.thickness or 0.0, radius)
+    return InflatedBall(structure.gauge_pressure or 0.0, skin, structure.thickness or 0.0, radius)
 
 
 def wall_and_contents_masses(part: PartGeometry) -> tuple[float, float]:
@@ -92,7 +92,7 @@ def judge_filled_shell(
     assert inner is not None
     if structure.inflated:
         inside = judge(part_as_contents(part, motion.impact_speed), motion)
-        if structure.gauge is not None:
+        if structure.gauge_pressure is not None:
             return replace(inside, reason=f"{inside.reason}; its wall and the air in it bounce")
         return replace(inside, reason=f"{inside.reason}; its wall is as limp as its {inner.name}")
     wall = judge(part_as_wall(part), motion)

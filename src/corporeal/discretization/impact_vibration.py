@@ -34,7 +34,7 @@ MIN_NOTABLE_LOSS_FACTOR = 0.005
 
 
 def vibration_loss(density: float, speed: float, young: float) -> float:
-    """Loss factor [-] that a ball's vibrations take of a blow on a rigid plane.
+    """Loss factor [-] that a ball's vibrations take of an impact on a rigid plane.
 
     Args:
         density: [kg/m³]

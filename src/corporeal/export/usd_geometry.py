@@ -150,8 +150,8 @@ def _material_prim(name: str, finish: Finish, coloured: bool, folder: Path) -> U
         shader.set("color3f", "inputs:diffuseColor", usda_vector(finish.colour[:3]))
     shader.set("float", "inputs:metallic", usda_number(finish.metallic))
     shader.set("float", "inputs:roughness", usda_number(finish.roughness))
-    if finish.glow:
-        light = [finish.glow * c for c in finish.colour[:3]]
+    if finish.emission:
+        light = [finish.emission * c for c in finish.colour[:3]]
         shader.set("color3f", "inputs:emissiveColor", usda_vector(light))
     _add_transparency(shader, path, finish, coloured)
     shader.lines.append("token outputs:surface")

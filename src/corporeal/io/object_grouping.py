@@ -34,7 +34,7 @@ objects are glued, and pieces that hang in the air are farther apart than that [
 SURFACE_SAMPLES_PER_PIECE = 1500
 """Points on a piece, beside its vertices, whose distances to another are measured."""
 USUAL_PART_CLASSES = frozenset({"wheel", "tire", "drawer", "mirror", "key", "light bulb", "foam"})
-"""Things of the table of sizes that are usually found as parts of others."""
+"""Objects of the table of sizes that are usually found as parts of others."""
 
 
 def group_pieces_into_objects(whole: Scene, pieces: Scene) -> Scene:

@@ -98,7 +98,7 @@ def is_carried_by_air(gauge: float, skin: Material, thickness: float, radius: fl
 class InflatedBall:
     """A ball with an elastic wall and air sealed in it."""
 
-    gauge: float
+    gauge_pressure: float
     """Pressure above that of the air around it [Pa]."""
     skin: Material
     thickness: float
@@ -118,7 +118,9 @@ class InflatedBall:
     def air_energy(self, squeeze: float) -> float:
         """Return the work on the air inside less that of the air outside [J]."""
         volume, lost = 4.0 / 3.0 * pi * self.radius**3, lost_volume_fraction(squeeze)
-        inside = (ATMOSPHERIC_PRESSURE_PA + self.gauge) * ((1.0 - lost) ** (1.0 - HEAT_RATIO) - 1.0)
+        inside = (ATMOSPHERIC_PRESSURE_PA + self.gauge_pressure) * (
+            (1.0 - lost) ** (1.0 - HEAT_RATIO) - 1.0
+        )
         return volume * (inside / (HEAT_RATIO - 1.0) - ATMOSPHERIC_PRESSURE_PA * lost)
 
     def squeeze(self, energy: float) -> float:
@@ -156,7 +158,10 @@ def equivalent_solid(ball: InflatedBall, energy: float) -> EquivalentSolid:
     """
     depth = max(ball.squeeze(energy), REFERENCE_SQUEEZE_RATIO)
     flat = pi * ball.radius**2 * (2.0 * depth - depth**2)
-    force = ball.spring * depth * ball.radius + pressed_gauge_pressure(ball.gauge, depth) * flat
+    force = (
+        ball.spring * depth * ball.radius
+        + pressed_gauge_pressure(ball.gauge_pressure, depth) * flat
+    )
     plane = force / (4.0 / 3.0 * ball.radius**2 * depth**1.5)
     wall, air = ball.wall_energy(depth), ball.air_energy(depth)
     return EquivalentSolid(
@@ -170,9 +175,9 @@ def inflated_ball_material(ball: InflatedBall) -> Material:
     How hard an impact changes it says ``equivalent_solid``.
     """
     light, skin = equivalent_solid(ball, 0.0), ball.skin
-    density = AIR_DENSITY * (1.0 + ball.gauge / ATMOSPHERIC_PRESSURE_PA)
+    density = AIR_DENSITY * (1.0 + ball.gauge_pressure / ATMOSPHERIC_PRESSURE_PA)
     bounces = restitution_of_loss(light.loss)
-    why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa act in parallel"
+    why = f"wall of {skin.name} and air at {ball.gauge_pressure / 1e3:.3g} kPa act in parallel"
     values = {
         "young": _ground(0.5 * light.young_pa, light.young_pa, 1.5 * light.young_pa, why),
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "as of a ball full of air"),
@@ -182,7 +187,7 @@ def inflated_ball_material(ball: InflatedBall) -> Material:
             0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"
         ),
     }
-    return _material(f"air at {ball.gauge / 1e3:.3g} kPa behind {skin.name}", values)
+    return _material(f"air at {ball.gauge_pressure / 1e3:.3g} kPa behind {skin.name}", values)
 
 
 def sealed_air_material(gauge: float) -> Material:

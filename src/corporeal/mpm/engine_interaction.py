@@ -28,7 +28,7 @@ from corporeal.mpm.state import Velocities
 
 
 class EngineInteraction(EngineReadout):
-    """Blows, pulls, stops and warm starts of an engine, over accessors that it gives."""
+    """Impulses, pulls, stops and warm starts of an engine, over accessors that it gives."""
 
     grips: dict[int, Grip]
     """What is held from outside, by body."""

@@ -375,19 +375,20 @@ class State:
 
     def continuing(
         self,
-        before: tuple[ParticleConstants, "State"],
+        there: "State",
+        then: ParticleConstants,
         matter: ParticleConstants,
         whole: Collection[int],
     ) -> "State":
         """Return this state with whole bodies, and the time, as they were in another problem.
 
         Args:
-            before: The other problem's matter and state, in which these bodies have their numbers.
+            there: State of the other problem.
+            then: Particle constants of the other problem, in which these bodies have their numbers.
             matter: Of this one.
             whole: Bodies that are the same in both.
 
         """
-        then, there = before
         mine, body = self._of(matter, whole)
         theirs, their_body = there._of(then, whole)
         found = {"time": there.time}

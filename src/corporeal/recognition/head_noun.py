@@ -46,7 +46,7 @@ def strip_whole_from_part_name(words: Sequence[str], phrases: PhraseSet) -> tupl
 
 
 def names_several_objects(words: Sequence[str]) -> bool:
-    """Return whether a name is that of several things: "pile of bricks"."""
+    """Return whether a name is that of several objects: "pile of bricks"."""
     several = {phrase[0] for phrase in _phrases("several")}
     return any(a in several and b in ("of", "de", "von") for a, b in pairwise(words))
 
@@ -75,7 +75,7 @@ def _move_complement_first(words: list[str], known: KnownWords, phrases: PhraseS
 
 
 def _names_object(words: Sequence[str], known: KnownWords, phrases: PhraseSet) -> bool:
-    """Return whether words name a thing: a clip-on lamp is no clip."""
+    """Return whether words name an object: a clip-on lamp is no clip."""
     named = any(word in known.last for word in words)
     return named or any(_is_in_phrase(words, k, phrases) for k in range(len(words)))
 

@@ -26,7 +26,7 @@ from corporeal.recognition.typical_extents import sized_classes
 LOOSE_MATERIALS = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
 """Materials of contents, never of containers: a compost bin."""
 NOUNS_SHAPED_OF_LOOSE = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
-"""Things that are made of it: a snow shoe is not."""
+"""Objects that are made of it: a snow shoe is not."""
 NOUNS_WHOLLY_OF_MATERIAL = frozenset(("block", "ring", "bag"))
 """What is all of it even so: a bag of sand is sand."""
 FUEL_MATERIALS = frozenset("wood hardwood softwood coal charcoal".split())
@@ -305,7 +305,7 @@ def _head_noun_among(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]])
 
 @cache
 def _noun_words() -> frozenset[str]:
-    """Return words that name a thing: what stands behind the last of them only describes it."""
+    """Return words that name an object: what stands behind the last of them only describes it."""
     tables = {
         phrase[-1] for table in ("hollow", "open", "cast") for phrase in _table_phrases(table)
     }

@@ -126,7 +126,13 @@ def _surface_groups(
 def _finish_key(finish: Finish) -> Hashable:
     """Two finishes that differ in a running number only are one."""
     picture = None if finish.texture is None else zlib.crc32(finish.texture[::8, ::8].tobytes())
-    numbers = (*finish.colour, finish.metallic, finish.roughness, finish.transmission, finish.glow)
+    numbers = (
+        *finish.colour,
+        finish.metallic,
+        finish.roughness,
+        finish.transmission,
+        finish.emission,
+    )
     plain = re.sub(r"[\W\d_]+", "", finish.name).lower()
     return (plain, tuple(round(x, 3) for x in numbers), finish.alpha_mode, picture)
 

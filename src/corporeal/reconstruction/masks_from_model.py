@@ -57,13 +57,13 @@ def masks_from_model(
     with notes_on_error(said):
         why, share = several_objects_reason(shown.masks, shown.views.cameras)
         if why is not None and not config.force:
-            what = f"masks by {masker.name()} are of no one thing: {why}."
+            what = f"masks by {masker.name()} are not of one object: {why}."
             advice = (
                 f"Check and correct {learned.folder / MASK_FOLDERS[0]}, use other weights or "
                 "words, or omit --masks to grow masks. --force continues anyway."
             )
             raise BadFileError(source, what, advice)
-    doubts = [] if why is None else [Note(f"Masks are of no one thing: {why}.", NoteKind.GRAVE)]
+    doubts = [] if why is None else [Note(f"Masks are not of one object: {why}.", NoteKind.GRAVE)]
     if why is None and share < INCOHERENT_HULL_FRACTION:
         doubts = [
             Note(

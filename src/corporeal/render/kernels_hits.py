@@ -52,7 +52,7 @@ class HitBuffer(NamedTuple):
     albedo: np.ndarray
     """(G, 3) linear"""
     traits: np.ndarray
-    """(G, 6): metallic, roughness, translucency, glow, opacity, transmission"""
+    """(G, 6): metallic, roughness, translucency, emission, opacity, transmission"""
     triangle: np.ndarray
     """(G,) int32; -1: none"""
 

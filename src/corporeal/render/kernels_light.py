@@ -376,7 +376,7 @@ def shade_with_view_terms(cos, spot, graze, tint, traits, light, lamps, sky, out
         out: The light (3,).
 
     """
-    metal, rough, through, glow, solid = traits[0], traits[1], traits[2], traits[3], traits[4]
+    metal, rough, through, emission, solid = traits[0], traits[1], traits[2], traits[3], traits[4]
     for c in range(3):
         sky[c] = (
             light[0] * lamps.horizon[c]
@@ -397,7 +397,7 @@ def shade_with_view_terms(cos, spot, graze, tint, traits, light, lamps, sky, out
         sunlight = lamps.sun_colour[c] * light[3] * lit * (1.25 / np.pi)
         body = albedo * (0.5 * sky[c] * bounce + sunlight) * (1 - metal) * (1 - fresnel)
         gleam = fresnel * light[4 + c] * hidden + f0 * shine * lamps.sun_colour[c]
-        out[c] = solid * (body + albedo * glow) + min(solid * 4, 1.0) * gleam
+        out[c] = solid * (body + albedo * emission) + min(solid * 4, 1.0) * gleam
 
 
 @numba.njit(**JIT)

@@ -129,7 +129,7 @@ def _row(f: Finish) -> list[float]:
         f.roughness,
         f.transmission,
         f.translucency,
-        f.glow,
+        f.emission,
         ALPHA_MODES[f.alpha_mode],
         f.alpha_cutoff,
         -1.0,

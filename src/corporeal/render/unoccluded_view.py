@@ -34,7 +34,7 @@ def unoccluded_view(
     boxes: Float[np.ndarray, "F B 2 3"],
     size: tuple[int, int],
 ) -> Vector | None:
-    """Return a direction to look from in place of the usual one; None: that one is good.
+    """Return a view direction in place of the usual one; None: that one is good.
 
     Args:
         stages: The scene at a few instants.

@@ -249,5 +249,5 @@ def _horizontal_vector(across: np.ndarray) -> Vector:
 
 
 def _watch_duration(until: float) -> float:
-    """Return the duration of the video [s] when the last impact that counts comes after ``until``."""
+    """Return the duration of the scene [s] when the last impact that counts comes after ``until``."""
     return round(min(max(until + WATCH_AFTER_IMPACT_S, 1.0), 3.0), 2)

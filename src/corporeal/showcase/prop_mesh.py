@@ -82,12 +82,14 @@ class PropModel:
 
 
 def plain_finish(
-    name: str, colour: str, roughness: float, metallic: float = 0.0, glow: float = 0.0
+    name: str, colour: str, roughness: float, metallic: float = 0.0, emission: float = 0.0
 ) -> Finish:
     """Make a finish of one colour, given as '#rrggbb' in sRGB."""
     rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     red, green, blue = (float(x) for x in srgb_to_linear(rgb).round(6))
-    return Finish(name, (red, green, blue, 1.0), metallic=metallic, roughness=roughness, glow=glow)
+    return Finish(
+        name, (red, green, blue, 1.0), metallic=metallic, roughness=roughness, emission=emission
+    )
 
 
 def textured_finish(

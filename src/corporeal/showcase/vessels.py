@@ -146,7 +146,7 @@ def floor_lamp() -> PropModel:
             PropPart(
                 "bulb",
                 mesh_difference(bulb, metal),
-                plain_finish("lit glass", "#fff0cf", 0.3, glow=3.0),
+                plain_finish("lit glass", "#fff0cf", 0.3, emission=3.0),
                 "glass",
                 1e-3,
             ),
@@ -185,7 +185,7 @@ def _lamp_shade() -> PropMesh:
 
 
 def _opal_finish() -> Finish:
-    return replace(plain_finish("opal glass", "#f6efe0", 0.25, glow=0.28), translucency=0.5)
+    return replace(plain_finish("opal glass", "#f6efe0", 0.25, emission=0.28), translucency=0.5)
 
 
 def _lamp_stem() -> PropMesh:

@@ -20,7 +20,7 @@ from corporeal.simulation.simulation_result import PreparedScene
 from corporeal.viewer.wind_faces import with_wind_faces
 
 MAX_ADDED_OBJECTS = 12
-"""Things that are added to one scene."""
+"""Objects that are added to one scene."""
 PARTICLE_LIMIT_RATIO = 100
 """Times the particles that a scene may have: what could not be filled even with thin walls."""
 MAX_DROP_HEIGHT_M = 2.0

@@ -157,7 +157,7 @@ def test_the_numbers_of_the_method_are_written_from_python():
         f"{constants.cpp_type(value)} {name}": value
         for name, value in constants.constants_by_name().items()
     }
-    assert {"double LATTICE_GAP", "double DEEPEST", "int SWEEPS"} <= listed.keys()
+    assert {"double LATTICE_GAP_DX", "double MAX_FACE_DEPTH_DX", "int SWEEPS"} <= listed.keys()
 
 
 @wp.kernel

@@ -1,8 +1,12 @@
 """Photographs of a painted ball on a mottled floor, made by a test."""
 
+from functools import cache
+
 import numpy as np
 
 from corporeal.core.types import Views
+from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
+from corporeal.reconstruction.masks.region_growing import grow_masks
 from corporeal.render.camera_placement import CameraAim, camera_from_aim
 
 WIDE, HIGH = 96, 72
@@ -77,6 +81,16 @@ def scene(
         near = np.abs(place).max(axis=-1) < 2
         seen.append(place[near][random.permutation(near.sum())[:60]])
     return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)
+
+
+@cache
+def grown_scene(other=None):
+    """Give photographs, true masks, seeds, and what is grown of them: done once."""
+    views, masks, _ = scene(other=other)
+    seeds = seeds_from_cameras(views, None)
+    grown = grow_masks(views, seeds)
+    assert grown is not None
+    return views, masks, seeds, grown
 
 
 def _met(rays, eye, far, middle):

@@ -1,11 +1,12 @@
 """Masks of a folder of photographs: written, corrected, pointed at, refused."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from painted_scene import GREY, HIGH, WIDE, agreement, scene
+from painted_scene import GREY, HIGH, WIDE, agreement, grown_scene, scene
 from PIL import Image
 
 from corporeal.cli import main
@@ -22,8 +23,6 @@ from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.masks import grown_masks as module
 from corporeal.reconstruction.masks.grown_masks import GrownMasks, grown_masks
 from corporeal.reconstruction.masks.mask_prompts import MaskPrompt
-from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
-from corporeal.reconstruction.masks.region_growing import grow_masks
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate_reconstruct
 
 
@@ -38,10 +37,28 @@ def photos(tmp_path):
     return tmp_path / "photos", masks
 
 
-def test_masks_are_written_and_read_as_given_ones(photos, tmp_path):
-    folder, masks = photos
-    made = grown_masks(folder, tmp_path / "made")
-    assert made.folder is not None
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """Photographs, their true masks, and what was grown of them; all that lies there stays so."""
+    place = tmp_path_factory.mktemp("grown")
+    views, masks, _ = scene()
+    write_views(place / "photos", views)
+    made = grown_masks(place / "photos", place / "made")
+    assert made.folder == place / "made"
+    return place / "photos", masks, made
+
+
+@pytest.fixture(scope="module")
+def grey(tmp_path_factory):
+    """Photographs of a thing in the colours of its floor, and what was grown of them."""
+    place = tmp_path_factory.mktemp("grey")
+    views = scene(ball=GREY)[0]
+    write_views(place / "photos", views)
+    return place / "photos", views, grown_masks(place / "photos", place / "made")
+
+
+def test_masks_are_written_and_read_as_given_ones(grown):
+    folder, masks, made = grown
     read = read_posed_photos(folder, WIDE, made.folder)
     assert agreement(read.masks / 255, masks).mean() > 0.93
     assert read_posed_photos(folder, WIDE, made.folder / "masks").masks is not None
@@ -59,11 +76,13 @@ def test_masks_lie_on_the_photograph_as_it_is_stored(photos, tmp_path):
     assert agreement(np.stack(written) / 255, masks).mean() > 0.9, "the pixels were not bent"
 
 
-def test_what_was_corrected_is_kept_and_makes_results_stale(photos, tmp_path):
-    folder, _ = photos
+def test_what_was_corrected_is_kept_and_makes_results_stale(grown, tmp_path):
+    folder, _, first = grown
     run = _Run([folder], tmp_path, Settings(), no_progress_of_stage)
     before = run._borrowed("reconstruct")
+    shutil.copytree(first.folder, tmp_path / "0-reconstruct")
     made = grown_masks(folder, tmp_path / "0-reconstruct")
+    assert made == replace(first, folder=tmp_path / "0-reconstruct"), "what lies there is kept"
     assert run._borrowed("reconstruct") == before, "what was made is no correction"
     mask = made.folder / "masks" / "0003.png"
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(mask)
@@ -94,9 +113,7 @@ def test_what_masks_hold_a_part_of_is_refused_until_somebody_corrects_them(tmp_p
 @pytest.mark.parametrize("left_over", [0.0, 0.5])
 def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monkeypatch, left_over):
     folder, _ = photos
-    views, _, points = scene()
-    whole = grow_masks(views, seeds_from_cameras(views, points))
-    assert whole is not None
+    whole = grown_scene()[-1]
     made = {False: replace(whole, left_over=1.0), True: replace(whole, left_over=left_over)}
     monkeypatch.setattr(module, "grow_masks", lambda *_, flat=False: made[flat])
     found = grown_masks(folder, tmp_path / "made")
@@ -104,29 +121,26 @@ def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monke
     assert ("1.0 times as much" in found.incomplete) == (left_over > 0)
 
 
-def test_what_cannot_be_told_is_not_written(tmp_path):
-    write_views(tmp_path / "photos", scene(ball=GREY)[0])
-    made = grown_masks(tmp_path / "photos", tmp_path / "made")
+def test_what_cannot_be_told_is_not_written(grey):
+    photos, _, made = grey
     assert made.folder is None and "No masks were grown" in made.said[0]
-    assert not (tmp_path / "made" / "masks").exists()
+    assert not (photos.parent / "made" / "masks").exists()
     assert made.doubted is not None, "they are kept, to be compared with"
-    assert read_posed_photos(tmp_path / "photos", WIDE, made.doubted).masks is not None
-    again = grown_masks(tmp_path / "photos", tmp_path / "made")
-    assert again == made
+    assert read_posed_photos(photos, WIDE, made.doubted).masks is not None
+    assert grown_masks(photos, photos.parent / "made") == made
 
 
-def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(tmp_path, monkeypatch):
-    views, _, _ = scene(ball=GREY)
-    write_views(tmp_path / "photos", views)
+def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(grey, tmp_path, monkeypatch):
+    photos, views, made = grey
+    run = tmp_path / "run"
+    shutil.copytree(made.doubted.parent, run)
     none = Gaussians(*(np.zeros((0, n)) for n in (3, 4, 3)), np.zeros(0), np.zeros((0, 1, 3)))
     monkeypatch.setattr(
         gaussian_source,
         "load_or_train_gaussians",
         lambda *_: GaussianScene(none, views.cameras, views),
     )
-    taken, masked = gaussians_from_source(
-        tmp_path / "photos", ReconstructConfig(), tmp_path, unheard
-    )
+    taken, masked = gaussians_from_source(photos, ReconstructConfig(), run, unheard)
     assert not masked and taken.coloured is not None
     assert taken.coloured.shape == views.rgb.shape[:3]
 
@@ -164,12 +178,14 @@ def type_in(monkeypatch, *words):
     return 0
 
 
-def test_the_command_says_how_to_go_on(photos, tmp_path, monkeypatch, capsys):
+def test_the_command_says_how_to_go_on(grown, tmp_path, monkeypatch, capsys):
+    photos, _, made = grown
     out = tmp_path / "masks"
-    assert type_in(monkeypatch, "masks", photos[0], "--out", out) == 0
+    shutil.copytree(made.folder, out)
+    assert type_in(monkeypatch, "masks", photos, "--out", out) == 0
     told = capsys.readouterr().out.replace("\n", " ")
     assert f"Look at {out / MASK_FOLDERS[0]}." in told, "they lie there"
-    assert f"corporeal run {photos[0]} --masks {out}" in told
+    assert f"corporeal run {photos} --masks {out}" in told
 
 
 @pytest.mark.parametrize(
@@ -210,18 +226,20 @@ def test_photographs_without_poses_are_referred(tmp_path, monkeypatch, capsys):
     assert "corporeal masks runs/bare/0-reconstruct/poses" in told, "to be typed as it is"
 
 
-def test_a_run_grows_masks_where_there_are_none(photos, tmp_path):
+def test_a_run_grows_masks_where_there_are_none(grown, tmp_path):
     """Unless it was told not to, or there are some."""
+    photos, _, first = grown
+    shutil.copytree(first.folder, tmp_path / "run")
 
-    def asked(masks, source=photos[0]):
+    def asked(masks, source=photos):
         config = ReconstructConfig(masks=masks)
         return find_or_grow_masks(config, source, tmp_path / "run", lambda fraction, words: None)
 
-    grown = asked("auto")
-    assert grown.grown and grown.folder == tmp_path / "run"
-    assert "There were no masks." in grown.warnings[0]
+    found = asked("auto")
+    assert found.grown and found.folder == tmp_path / "run"
+    assert "There were no masks." in found.warnings[0]
     assert asked("none").folder is None
-    assert asked(str(grown.folder)).folder == grown.folder
+    assert asked(str(found.folder)).folder == found.folder
     views, masks, _ = scene()
     owners = np.where(masks, 0, -1).astype(np.int32)
     write_views(tmp_path / "masked", Views(views.rgb, views.cameras, object_of_pixel=owners))

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from painted_scene import agreement, scene
+from painted_scene import agreement, grown_scene, scene
 
 from corporeal.core.errors import BadFileError
 from corporeal.io.photos.transforms_json import write_views
@@ -14,9 +14,7 @@ from corporeal.reconstruction.masks.grown_masks import OTHER_COLOURS_STATEMENT
 from corporeal.reconstruction.masks.mask_attachments import MaskAttachments
 from corporeal.reconstruction.masks.mask_prompts import MaskPrompt
 from corporeal.reconstruction.masks.mask_quality import lacking_attachment_reason
-from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
 from corporeal.reconstruction.masks.merge_attachments import merge_attachments
-from corporeal.reconstruction.masks.region_growing import grow_masks
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 
 
@@ -24,41 +22,34 @@ def unheard(fraction, words):
     """Progress that nobody is told of."""
 
 
-def before_and_after(views, seeds):
-    grown = grow_masks(views, seeds)
-    assert grown is not None
-    return grown, merge_attachments(views, seeds, grown, unheard)
+def before_and_after(other):
+    views, masks, seeds, grown = grown_scene(other)
+    return masks, grown, merge_attachments(views, seeds, grown, unheard)
 
 
 def test_a_head_of_another_colour_is_taken_in():
     """A hammer in the colours of its handle lost its grey head."""
-    views, masks, _ = scene(other="head")
-    before, after = before_and_after(views, seeds_from_cameras(views, None))
+    masks, before, after = before_and_after("head")
     assert agreement(before.inside, masks).mean() < 0.9, "colours alone do not tell"
     assert agreement(after.inside, masks).mean() > 0.93
 
 
 def test_a_small_thing_close_beside_it_is_taken_in():
     """Its hull is a piece of its own, of less than a tenth of the ball's, and no crumb."""
-    views, masks, _ = scene(other="close")
-    before, after = before_and_after(views, seeds_from_cameras(views, None))
+    masks, before, after = before_and_after("close")
     assert agreement(before.inside, masks).mean() < 0.9, "colours alone do not tell"
     assert agreement(after.inside, masks).mean() > 0.93
 
 
 @pytest.mark.parametrize("other", [None, "ball", "disc"])
 def test_what_does_not_touch_it_or_lies_there_is_not(other):
-    views, _, _ = scene(other=other)
-    before, after = before_and_after(views, seeds_from_cameras(views, None))
+    _, before, after = before_and_after(other)
     assert after is before
 
 
 def test_what_is_not_held_in_the_end_is_not_taken():
     """Hanging pixels that have the floor's colours: growing does not believe them."""
-    views, _, _ = scene()
-    seeds = seeds_from_cameras(views, None)
-    grown = grow_masks(views, seeds)
-    assert grown is not None
+    views, _, seeds, grown = grown_scene()
     beside = np.roll(grown.masks, 20, axis=2) & ~grown.masks
     grown = replace(grown, hanging=MaskAttachments(beside, beside))
     assert merge_attachments(views, seeds, grown, unheard) is grown
@@ -75,9 +66,7 @@ def test_a_run_says_that_it_was(tmp_path):
 
 @pytest.mark.parametrize("share", [0.3, 0.7])
 def test_much_that_borders_on_it_and_was_not_taken_in_ends_the_run(tmp_path, monkeypatch, share):
-    views, _, _ = scene()
-    grown = grow_masks(views, seeds_from_cameras(views, None))
-    assert grown is not None
+    views, _, _, grown = grown_scene()
     rows = np.arange(len(grown.masks[0]))[:, None]
     above = np.cumsum(grown.masks.sum(axis=2), axis=1) / grown.masks.sum(axis=(1, 2))[:, None]
     some = np.roll(grown.masks & (above < share)[:, rows], 20, axis=2) & ~grown.masks
@@ -94,10 +83,8 @@ def test_much_that_borders_on_it_and_was_not_taken_in_ends_the_run(tmp_path, mon
 
 def test_who_points_at_a_part_hears_that_something_borders_on_it(tmp_path, monkeypatch):
     """Of a flowerpot that was pointed at masks held the lower half, without a word."""
-    views, masks, _ = scene()
+    views, masks, _, grown = grown_scene()
     write_views(tmp_path / "photos", views)
-    grown = grow_masks(views, seeds_from_cameras(views, None))
-    assert grown is not None
     more = np.roll(grown.masks, grown.masks.shape[2] // 3, axis=2) & ~grown.masks
     for hangs, told in ((MaskAttachments(more, more), True), (None, False)):
         made = replace(grown, hanging=hangs)
@@ -110,10 +97,7 @@ def test_who_points_at_a_part_hears_that_something_borders_on_it(tmp_path, monke
 
 def test_masks_that_test_poses_do_not_ask_the_floor_that_these_know(monkeypatch):
     """Of an axe head that was turned over, poses of the card under it were believed so."""
-    views, _, _ = scene()
-    seeds = seeds_from_cameras(views, None)
-    grown = grow_masks(views, seeds)
-    assert grown is not None
+    views, _, seeds, grown = grown_scene()
     asked = []
 
     def again(*_, fitting=False):

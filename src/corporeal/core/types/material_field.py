@@ -90,7 +90,7 @@ class Structure:
     inflated: bool = False
     """Whether wall and contents, sealed air, are one soft solid: of mass over volume all through.
     """
-    gauge: float | None = None
+    gauge_pressure: float | None = None
     """Pressure of air sealed behind an elastic wall that bears more than the air does, above that
     around it [Pa]; None: there is none, or the air bears more."""
     rebound: float | None = None

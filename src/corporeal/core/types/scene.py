@@ -28,7 +28,7 @@ class Finish:
     metallic: float = 0.0
     roughness: float = 1.0
     transmission: float = 0.0
-    glow: float = 0.0
+    emission: float = 0.0
     """Emitted light as a multiple of the base colour."""
     alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alpha_cutoff: float = 0.5
@@ -91,7 +91,7 @@ class Keyframes:
 
 @dataclass(frozen=True)
 class Wind:
-    """Air that blows on one whole object within a time window; at rest it only slows down."""
+    """Wind on one whole object within a time window; at rest it only slows down."""
 
     velocity: Vector
     """Of the air [m/s]."""

@@ -149,9 +149,9 @@ class GlbDocument:
         extensions = {}
         if f.transmission:
             extensions["KHR_materials_transmission"] = {"transmissionFactor": f.transmission}
-        if f.glow:
-            strength = max(f.glow, 1.0)
-            item["emissiveFactor"] = [f.glow / strength * c for c in f.colour[:3]]
+        if f.emission:
+            strength = max(f.emission, 1.0)
+            item["emissiveFactor"] = [f.emission / strength * c for c in f.colour[:3]]
             if strength > 1:
                 extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": strength}
         if extensions:

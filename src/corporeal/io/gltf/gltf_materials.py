@@ -68,7 +68,7 @@ class FinishReader:
             metallic=base.metallic,
             roughness=base.roughness,
             transmission=_transmission(material),
-            glow=_emission_ratio(material, base.colour),
+            emission=_emission_ratio(material, base.colour),
             alpha_mode=_alpha_mode(material),
             alpha_cutoff=material.number("alphaCutoff", 0.5),
         )

@@ -10,7 +10,7 @@ from corporeal.io.gltf.gltf_document import GltfDocument, GltfEntry
 Z_UP_FROM_Y_UP = np.array(
     [[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]],
 )
-"""(x, y, z) → (x, -z, y): the one place where the file's Y-up becomes the house's Z-up."""
+"""(x, y, z) → (x, -z, y): the one place where the file's Y-up becomes Z-up."""
 MAX_NODES = 100_000
 TRANSFORM_KEYS = {"matrix", "translation", "rotation", "scale"}
 IDENTITY_MATRIX = tuple(np.eye(4).ravel().tolist())

@@ -1,9 +1,10 @@
 """Inference of the up axis of meshes that don't state it.
 
-Two things tell. As it is taken it would tip over, and does not if the other usual axis points up.
-Or it stands on the plane through the origin that the other axis is normal to, as models are placed
-by who makes them, while the axis that is taken goes through its middle. Chairs and shelves also
-stand on their backs, and balls stand anyhow: what neither tells may lie on its side all the same.
+There are two criteria. As it is taken it would tip over, and does not if the other usual axis
+points up. Or it stands on the plane through the origin that the other axis is normal to, as models
+are placed by who makes them, while the axis that is taken goes through its middle. Chairs and
+shelves also stand on their backs, and balls stand anyhow: what neither tells may lie on its side
+all the same.
 """
 
 import numpy as np

@@ -54,7 +54,7 @@ from corporeal.reconstruction.surface.free_space import pieces_by_free_space
 
 Progress = Callable[[float, str], None]
 TOUCHING_EXTENT_RATIO = 0.002
-"""Things touch that are nearer than this, as a share of the scene's extent."""
+"""Objects touch that are nearer than this, as a share of the scene's extent."""
 MAX_SURFACE_POINTS = 60_000
 """Points on the surface by which distances are measured, and Gaussians told whose they are."""
 APPROACH_STEPS = 100

@@ -145,11 +145,11 @@ def solve_impacts(
 ) -> Vectors:
     """Let rigid pairs that are hit rebound, one impact after the other, and move the movers.
 
-    What is hit passes the blow on to what it touches: in every round the pairs that approach now
-    rebound together and all others wait (generalized reflections: Smith, Kaufman, Vouga, Tamstorf
-    and Grinspun 2012, "Reflections on simultaneous impact"). Solved at once, all pairs of a row of
-    touching balls would share the impact; in rounds it runs through to the last. What is light
-    between what strikes it and what it rests on is held in the same round (``backing``).
+    The struck body passes the impact on to what it touches: in every round the pairs that approach
+    now rebound together and all others wait (generalized reflections: Smith, Kaufman, Vouga,
+    Tamstorf and Grinspun 2012, "Reflections on simultaneous impact"). Solved at once, all pairs of
+    a row of touching balls would share the impact; in rounds it runs through to the last. What is
+    light between what strikes it and what it rests on is held in the same round (``backing``).
 
     Returns:
         Impulses J [N s], as of ``solve``.

@@ -424,8 +424,8 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         self.kept = NormalCache.none()
 
     def _successor(self, problem: Problem, change: BodyChange) -> Self:
-        after, here = type(self)(problem), (self.matter, self.state)
-        after.state = after.state.continuing(here, after.matter, change.whole)
+        after = type(self)(problem)
+        after.state = after.state.continuing(self.state, self.matter, after.matter, change.whole)
         after.ledger = EngineLedger(**change.inherited(self.ledger.as_arrays()))
         after.steps = replace(self.steps)
         return after

@@ -322,7 +322,7 @@ def with_sealed_air(
             words.rebound,
         )
         built = Structure("filled", structure.thickness, reason, inner, 1.0, inflated=True)
-        return replace(built, gauge=gauge, rebound=words.rebound)
+        return replace(built, gauge_pressure=gauge, rebound=words.rebound)
     reason = f"{sealed}: it bounces as a soft solid, nine times as stiff as the pressure."
     inner = air_with_ruled_restitution(sealed_air_material(gauge), words.rebound)
     return Structure("filled", structure.thickness, reason, inner, 1.0, inflated=True)

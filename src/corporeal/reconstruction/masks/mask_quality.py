@@ -19,7 +19,8 @@ MIN_OBJECT_FRACTION, MAX_OBJECT_FRACTION = 0.005, 0.7
 """Shares of the photographs that objects may fill."""
 MAX_RESIDUAL_FRACTION = 0.25
 """As much again as masks hold, with their colours and on the floor in the middle, above which masks
-are not of all of the thing: they would overlap with right ones by less than .8."""
+are not of all of the object: they would overlap with right ones by less than .8.
+"""
 
 MAX_ATTACHED_FRACTION = 0.5
 """The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were

@@ -53,7 +53,7 @@ MIN_GROUP_PICTURES, MIN_GROUP_FRACTION = 5, 0.1
 """Pictures of a group, and its share of all, from which on it is a place of its own."""
 MAX_NAMED_PLACES = 4
 SORT_PHOTOGRAPHS_HINT = (
-    "Put the photographs of each into a folder of their own. If all show one thing that was moved "
+    "Put the photographs of each into a folder of their own. If all show one object that was moved "
     "or turned over, give masks of it."
 )
 MAX_ALONE_FRACTION = 0.2

@@ -68,7 +68,7 @@ def write_video_frames(
         path: The video.
         folder: Where frames go, named by their number.
         progress: Called with the fraction done and a description.
-        max_seconds: Longer films are refused [s].
+        max_seconds: Longer videos are rejected [s].
 
     Raises:
         BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it

@@ -1,4 +1,4 @@
-"""Controls that are simulated: the reference's own scene, with one thing in it that is wrong.
+"""Controls that are simulated: the reference's own scene, with one fault.
 
 ``single`` and ``capped`` are settings of the simulation; ``halfgravity`` is another scene;
 ``wrong`` exchanges stiff and soft materials. Each is an ordinary run in a folder of its own, so

@@ -1,4 +1,4 @@
-"""The questions about a video, the laws they belong to, and the controls they are meant to catch."""
+"""The questions about a video, their laws, and the controls they detect."""
 
 import tomllib
 from dataclasses import dataclass

@@ -12,7 +12,7 @@ from corporeal.recognition.metadata_recognition import (
 from corporeal.recognition.stated_properties import apply_stated_wall
 from corporeal.vlm.annotation_file import PartAnnotation
 from corporeal.vlm.annotation_file import apply_structure_annotation as annotated
-from handmade import plain, scene
+from sample_scenes import plain, scene
 
 
 class Named:

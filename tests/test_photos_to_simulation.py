@@ -107,7 +107,7 @@ def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
 
 
 def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch):
-    """What comes of it to the last bit: see tests/reconstruct/gaussians/test_train.py."""
+    """What comes of it to the last bit: see tests/reconstruction/gaussians/test_train_gaussians.py."""
     write_views(tmp_path / "photos", views)
     often = partial(training_schedule.TrainConfig, checkpoint_interval_s=0.0)
     monkeypatch.setattr(gaussian_source, "TrainConfig", often)

@@ -40,7 +40,7 @@ def test_the_mouse_lifts_a_ball_and_the_force_at_rest_is_its_weight(small_run, t
     from corporeal.viewer.live_socket import live_route
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     shelf = RunStore((), small_run.parent)
     things = LiveAssets(shelf)
@@ -99,7 +99,7 @@ def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small
     from corporeal.viewer.replay_jobs import REPLAYS_FOLDER, ReplayJobs
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     shelf = RunStore((), small_run.parent)
     things = LiveAssets(shelf)
@@ -158,7 +158,7 @@ def test_a_thing_from_the_pool_is_dropped_where_one_clicks(small_run, tmp_path):
     from corporeal.viewer.live_socket import live_route
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     shelf = RunStore((), small_run.parent)
     things = LiveAssets(shelf)

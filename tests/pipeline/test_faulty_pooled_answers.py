@@ -8,13 +8,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_planted_faults import ASKED_AGAIN, JAR, TASKS, says, sound, task_of, ways
+from test_faulty_answers import ASKED_AGAIN, JAR, TASKS, says, sound, task_of, ways
 
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
 from corporeal.vlm.retry import RetryPolicy
-from handmade import scene
-from oracle import weighs
+from sample_scenes import scene
+from scripted_model import weighs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "vlm"))
 from fake_server import FakeServer

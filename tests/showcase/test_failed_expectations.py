@@ -5,7 +5,7 @@ themselves are tried in scenes of some seconds; `corporeal evaluate judge` makes
 """
 
 import pytest
-from spoiled_runs import PLANTED, happened, spoiled
+from faulty_runs import PLANTED, happened, spoiled
 
 from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS
 from corporeal.pipeline import run_pipeline

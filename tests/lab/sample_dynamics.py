@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from corporeal.core.audit_data import Expectation
 from corporeal.lab.evaluation.dynamics.run_measures import ObjectMeasures, RunMeasures
-from made_findings import object_outcome, outcome, pair_outcome
+from sample_findings import object_outcome, outcome, pair_outcome
 
 FPS = 60
 FRAMES = 61

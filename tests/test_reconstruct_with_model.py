@@ -15,7 +15,7 @@ from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.pipeline.run_pipeline import Settings, open_run
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, ReconstructionResolution
 from gaussian_boxes import DOWN, box, together
-from oracle import decomposed, part, weighs
+from scripted_model import decomposed, part, weighs
 
 sys.path.insert(0, str(Path(__file__).parent / "vlm"))
 from fake_server import FakeServer

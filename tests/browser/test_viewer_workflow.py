@@ -33,7 +33,7 @@ def test_from_an_upload_to_an_export_by_the_page_alone(tmp_path):
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.uploads import UploadLimits
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     runs = tmp_path / "runs"
     runs.mkdir()

@@ -12,8 +12,8 @@ import pytest
 
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.stages.describe import describe
-from handmade import plain, scene
-from oracle import decomposed, part, weighs, whole
+from sample_scenes import plain, scene
+from scripted_model import decomposed, part, weighs, whole
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "vlm"))
 from fake_server import FakeServer

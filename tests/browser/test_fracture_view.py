@@ -35,7 +35,7 @@ def test_the_page_shows_the_pieces_of_what_broke(broken_run, tmp_path):
     from corporeal.pipeline.run_pipeline import read_run
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     pieces = len(read_run(broken_run).trajectory.breaks[0].surfaces)
     assert pieces > 5

@@ -93,7 +93,7 @@ def test_a_report_plays_from_a_file_and_a_click_opens_the_card(report, tmp_path)
 def test_two_runs_stand_beside_each_other_under_one_policy(small_run, tmp_path):
     from corporeal.viewer.run_store import RunStore
     from corporeal.viewer.web_app import SiteOptions, make_app
-    from viewer_served import LOCAL, serving
+    from viewer_server import LOCAL, serving
 
     app = make_app(SiteOptions(RunStore((), small_run.parent)), LOCAL)
     with serving(app) as server, browser(tmp_path) as tab:
