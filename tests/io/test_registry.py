@@ -124,7 +124,7 @@ def test_errors_of_the_command_line_list_the_mesh_format(toy_mesh, tmp_path, com
     (tmp_path / "what.xyz").write_text("0 0 0")
     code, said = command("run", tmp_path / "what.xyz", "--out", tmp_path / "run")
     assert code != 0
-    assert re.search(r"is no model\s\(\.glb, .*\.toymesh\s+are\s+read\)", said.err, re.DOTALL), (
+    assert re.search(r"model\s\(\.glb, .*\.toymesh\s+are\s+read\)", said.err, re.DOTALL), (
         said.err
     )
     toy_mesh.write_text("no numbers")

@@ -325,7 +325,7 @@ def stl(path, extent):
         ("chair.off", 900.0, 0.9, "in millimetres"),
         ("duck.obj", 2.0, 0.0508, "in inches"),
         ("hammer.stl", 13.0, 0.3302, "in inches"),  # of 13 cm it would be but nearly a hammer
-        ("chair.obj", 3e6, 0.9, "as large as a chair usually is"),
+        ("chair.obj", 3e6, 0.9, "the size that a chair usually is"),
     ],
 )
 def test_a_mesh_without_a_unit_is_as_large_as_such_things_are(tmp_path, name, size, metres, said):
@@ -349,7 +349,7 @@ def test_a_mesh_that_fits_no_unit_is_in_that_of_the_scene_file_s_other_meshes(tm
     """A brick of 5 cm, placed by hand beside others in metres, was made 22 cm large."""
     scene = assemble([placed(tmp_path, ("plank.ply", 0.6), ("pipe.ply", 0.2), ("brick.ply", 0.05))])
     assert [o.real_extent for o in scene.objects] == pytest.approx([0.6, 0.2, 0.05])
-    both = "plank.ply and pipe.ply state no unit: they were taken to be in metres"
+    both = "plank.ply and pipe.ply state no unit: they were read in metres"
     assert any(s.startswith(both) and "20 cm to 60 cm large" in s for s in scene.warnings)
     assert any("brick.ply" in s and "as the other meshes are" in s for s in scene.warnings)
     assert any("but a brick is usually about 22 cm" in s for s in scene.warnings)
