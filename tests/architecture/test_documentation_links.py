@@ -70,11 +70,7 @@ def test_no_link_of_the_site_leaves_it(page):
 def test_broken_links_are_noticed():
     page = DOCS / "getting-started" / "quickstart.md"
     text = "# One\n\n[a](gone.md) [b](quickstart.md#nowhere) [c](#one) [d](#two) `[e](gone.md)`\n"
-    assert [said.partition(":")[0] for said in broken(page, text)] == [
-        "gone.md",
-        "quickstart.md#nowhere",
-        "#two",
-    ]
+    assert [said.partition(":")[0] for said in broken(page, text)] == ["gone.md", "quickstart.md#nowhere", "#two"]
 
 
 def test_headings_are_called_in_links_as_on_github():

@@ -48,12 +48,7 @@ def _tile(asset: PoolAsset, size: int) -> SheetTile:
     scene = read_glb(asset.file, "one")
     low, high = surfaces_bounding_box(scene.surfaces)
     foot = np.array([*(low + high)[:2] / 2, low[2]])
-    camera = fit_camera(
-        np.stack([low, high])[None, None] - foot,
-        (size, size),
-        VIEW_DIRECTION,
-        PICTURE_FILL_FRACTION,
-    )
+    camera = fit_camera(np.stack([low, high])[None, None] - foot, (size, size), VIEW_DIRECTION, PICTURE_FILL_FRACTION)
     picture = render_image(RayScene(move_scene(scene, -foot)), camera, "draft")
     facts = f"{asset.size} · {asset.triangles:,} triangles"
     return SheetTile(picture, asset.name, (asset.class_name, facts, asset.licence))
@@ -82,17 +77,15 @@ def _index() -> None:
 
     @dataclass(frozen=True)
     class Index:
-        folders: Annotated[
-            tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")
-        ] = ()
+        folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")] = ()
         """Searched recursively."""
         pool: Folder = DEFAULT_POOL
         """The pool's folder."""
         origin: Annotated[CandidateOrigin, tyro.conf.arg(name="from")] = "folders"
         """Kind of source: plain folders, the cache of the package objaverse, or Amazon Berkeley Objects."""
         csv: Path | None = None
-        """Table with columns file, class and, where known, licence, attribution, metric (whether
-        lengths are metres: yes or no), extent_m, source."""
+        """Table with columns file, class and, where known, licence, attribution, metric (whether lengths are metres:
+        yes or no), extent_m, source."""
         objaverse: WantedModels = field(default_factory=WantedModels)
         gate: GateConfig = field(default_factory=GateConfig)
 
@@ -150,13 +143,7 @@ def _list() -> None:
 
 
 def _row(a: PoolAsset) -> tuple[str, ...]:
-    return (
-        a.class_name,
-        a.name,
-        a.size,
-        f"{a.triangles:,}",
-        re.split(r" \(|;", a.licence)[0],
-    )
+    return (a.class_name, a.name, a.size, f"{a.triangles:,}", re.split(r" \(|;", a.licence)[0])
 
 
 def _of_class(pool: AssetPool, class_name: str) -> Sequence[PoolAsset]:
@@ -174,9 +161,7 @@ def _show() -> None:
 
     @dataclass(frozen=True)
     class Show:
-        names: Annotated[
-            tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="NAME ...")
-        ] = ()
+        names: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="NAME ...")] = ()
         pool: Folder = DEFAULT_POOL
         """The pool's folder."""
         class_name: Annotated[str, tyro.conf.arg(name="class")] = ""
