@@ -21,8 +21,8 @@ SURFACE_HEADS = ("material", "group", "μ", "e", "η", "S", "S_loc", "H", "wall"
 FLUID_HEADS = ("material", "ρ", "viscosity", "consistency K_c", "n", "τ_y")
 INTRODUCTION_TEXT = """# Materials
 
-Generated from the tables in `src/corporeal/materials` by `benchmarks/materials_page.py`; a test holds this page equal to
-them. Each cell is the measured range with the usual value in
+Generated from the tables in `src/corporeal/materials` by `benchmarks/materials_page.py`; a test holds this page equal
+to them. Each cell is the measured range with the usual value in
 brackets: E Young's modulus, ν Poisson's ratio, ρ density, σ_y yield stress, φ friction angle and c
 cohesion of granular matter; μ the surface's own sliding friction, e restitution, η loss factor, S
 strength of brittle materials (a whole bar's, in bending or tension), S_loc their tensile strength
