@@ -11,6 +11,9 @@ Facts: OpenUSD 26.11, UsdGeom: ``size``, ``radius``, ``height``, ``axis``; a cap
 alone, all stand about the origin, a cone's tip points along its axis.
 """
 
+# pyright: reportAttributeAccessIssue=false, reportOptionalMemberAccess=false
+# pyright: reportCallIssue=false, reportArgumentType=false, reportOptionalIterable=false
+
 import io
 from collections import Counter
 from collections.abc import Iterator
