@@ -72,9 +72,7 @@ def main() -> None:
     if sys.argv[1:2] == [SERVE]:
         serve(*sys.argv[2:])
         return
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("other", type=Path, help="the other checkout")
     parser.add_argument("--particles", type=int, default=100_000)
     parser.add_argument("--rounds", type=int, default=15)

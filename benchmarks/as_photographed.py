@@ -170,9 +170,7 @@ def _met(eye: np.ndarray, ray: np.ndarray, radius: float) -> np.ndarray:
     return np.where((inside > 0) & (far > 0), far, np.inf)
 
 
-def photographed(
-    rgb: np.ndarray, k: int, rng: np.random.Generator, stops: float = 0.0
-) -> np.ndarray:
+def photographed(rgb: np.ndarray, k: int, rng: np.random.Generator, stops: float = 0.0) -> np.ndarray:
     """Return a picture (H, W, 3) in [0, 1] as a careless photographer gets it, in bytes.
 
     Exposures are so many stops apart, beside what they differ by anyway.
@@ -272,9 +270,7 @@ def look_of(asked: argparse.Namespace, **more: Any) -> Look:
 
 def main() -> None:
     """Read, change, write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scene", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=0)

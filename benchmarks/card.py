@@ -82,9 +82,7 @@ def adds(engine: CudaEngine) -> Adds:
     """Count what the next scatter adds, from where particles are."""
     a = engine.arrays
     count = int(a.sheet.flag.numpy()[layout.FLAG_TASKS])
-    tasks = np.column_stack(
-        [getattr(a.grid, f"task_{name}").numpy()[:count] for name in ("home", "first", "last")]
-    )
+    tasks = np.column_stack([getattr(a.grid, f"task_{name}").numpy()[:count] for name in ("home", "first", "last")])
     where = a.grid.where.numpy()
     cell = particle_memory.read_rows(a.particles, "cell")
     corner = np.array(list(np.ndindex(3, 3, 3)))
@@ -119,10 +117,7 @@ def sectors(by_channel: bool) -> int:
     """Sectors that a warp asks for in a gather, word by word, for rows by channel or one by one."""
     rows = [*words(f"{GATHER_READS} {GATHER_WRITES}"), 1]
     spread = [1 if by_channel else row for row in rows]
-    return sum(
-        row * min(WARP, WARP * WORD * apart // SECTOR)
-        for row, apart in zip(rows, spread, strict=True)
-    )
+    return sum(row * min(WARP, WARP * WORD * apart // SECTOR) for row, apart in zip(rows, spread, strict=True))
 
 
 # ---------------------------------------------------------------- registers
@@ -150,9 +145,7 @@ def read_cubin(data: bytes) -> list[Kernel]:
     (table,) = struct.unpack_from("<Q", data, 40)
     size, count, names_at = struct.unpack_from("<3H", data, 58)
     headers = [struct.unpack_from("<IIQQQQIIQQ", data, table + size * k) for k in range(count)]
-    sections = {
-        text_at(data, headers[names_at][4] + h[0]): (data[h[4] : h[4] + h[5]], h) for h in headers
-    }
+    sections = {text_at(data, headers[names_at][4] + h[0]): (data[h[4] : h[4] + h[5]], h) for h in headers}
     symbols, _ = sections[".symtab"]
     strings, _ = sections[".strtab"]
     found: dict[int, dict[int, int]] = {}
@@ -206,9 +199,7 @@ def report(name: str, drop: Drop) -> None:
 
 def main() -> None:
     """Count, and print."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kernels", type=int, nargs="*", metavar="ARCHITECTURE", default=[])
     chosen = parser.parse_args()
     for architecture in chosen.kernels:

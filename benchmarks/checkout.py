@@ -28,10 +28,7 @@ class Checkout:
         """
         told = [SERVE, str(root), *map(str, words)]
         self.process = subprocess.Popen(
-            [sys.executable, benchmark, *told],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
+            [sys.executable, benchmark, *told], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
     def ask(self, question: Any) -> float:

@@ -41,13 +41,9 @@ def variants(name: str, folder: Path) -> dict[str, Told]:
 
 def dent_profile(told: Told) -> tuple[np.ndarray, np.ndarray]:
     """Deepest inward displacement [m] along the can's axis [m] at the end."""
-    can = told.particles.object == next(
-        k for k, o in enumerate(told.scene.objects) if o.name == "soda_can_0"
-    )
+    can = told.particles.object == next(k for k, o in enumerate(told.scene.objects) if o.name == "soda_can_0")
     start = told.video.frames[0].position[can].astype(float)
-    fit = fit_rigid_motion(
-        start, told.video.frames[-1].position[can].astype(float), np.ones(can.sum())
-    )
+    fit = fit_rigid_motion(start, told.video.frames[-1].position[can].astype(float), np.ones(can.sum()))
     shift = fit.undo(told.video.frames[-1].position[can].astype(float)) - start
     middle = start.mean(axis=0)
     outward = (start - middle) * [0.0, 1.0, 1.0]

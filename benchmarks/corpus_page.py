@@ -8,43 +8,12 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from corporeal.core import store
-from corporeal.lab.corpus.collect_results import (
-    CorpusResults,
-    SceneMeasures,
-    SceneRecord,
-    collect_results,
-)
-from corporeal.lab.corpus.corpus_breakdown import (
-    BreakdownLine,
-    breakdowns,
-    scene_materials,
-    total_line,
-)
+from corporeal.lab.corpus.collect_results import CorpusResults, SceneMeasures, SceneRecord, collect_results
+from corporeal.lab.corpus.corpus_breakdown import BreakdownLine, breakdowns, scene_materials, total_line
 
-SCENE_TABLE_HEADS = (
-    "scene",
-    "what happens",
-    "objects",
-    "materials",
-    "particles",
-    "deepest overlap [dx]",
-)
-SCENE_TABLE_HEADS = (
-    *SCENE_TABLE_HEADS,
-    "energy gained",
-    "time [s]",
-    "memory [MB]",
-    "happened",
-    "audit",
-)
-BREAKDOWN_HEADS = (
-    "scenes",
-    "clean",
-    "happened",
-    "overlap [dx], median",
-    "worst",
-    "time [s], median",
-)
+SCENE_TABLE_HEADS = ("scene", "what happens", "objects", "materials", "particles", "deepest overlap [dx]")
+SCENE_TABLE_HEADS = (*SCENE_TABLE_HEADS, "energy gained", "time [s]", "memory [MB]", "happened", "audit")
+BREAKDOWN_HEADS = ("scenes", "clean", "happened", "overlap [dx], median", "worst", "time [s], median")
 BREAKDOWN_HEADS = (*BREAKDOWN_HEADS, "memory [MB], most", "materials")
 BREAKDOWN_TITLES = {
     "interaction": "By interaction",

@@ -45,13 +45,9 @@ def dents(run: Path, size: tuple[int, int]) -> list[Seen]:
     """Measure every dent of a run in pictures of some size [px]."""
     results: StageResults = read_run(run)
     scene, trajectory, field = results.scene, results.trajectory, results.field
-    skin = bind_vertices(
-        scene, results.parts, results.particles, granular_parts(field), fluid_parts(field)
-    )
+    skin = bind_vertices(scene, results.parts, results.particles, granular_parts(field), fluid_parts(field))
     owner = np.repeat([s.object for s in scene.surfaces], [len(s.vertices) for s in scene.surfaces])
-    camera = camera_track(
-        "close", motion_summary(skin, scene, results.particles, trajectory), size, None
-    )
+    camera = camera_track("close", motion_summary(skin, scene, results.particles, trajectory), size, None)
     place, normal = skin.pose(trajectory.frames[-1])
     aim = camera.at(float(trajectory.time[-1]))
     facing = np.sum(normal * (np.asarray(aim.eye) - place), axis=1) > 0
@@ -85,12 +81,7 @@ def main() -> None:
     asked = parser.parse_args()
     width, height = asked.size
     rows = [
-        (
-            run.name,
-            s.thing,
-            f"{1e3 * s.depth:.1f}",
-            *(f"{a:.0f} x {b:.0f}" for a, b in (s.dent, s.whole)),
-        )
+        (run.name, s.thing, f"{1e3 * s.depth:.1f}", *(f"{a:.0f} x {b:.0f}" for a, b in (s.dent, s.whole)))
         for run in asked.runs
         for s in dents(run, (width, height))
     ]

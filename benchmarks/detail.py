@@ -16,28 +16,12 @@ from pathlib import Path
 
 import numpy as np
 from laws import grains
-from laws.bodies import (
-    DOWN,
-    Stuff,
-    ball,
-    blue_noise,
-    body,
-    box,
-    cylinder_sdf,
-    disc,
-    floor,
-    problem,
-    walls,
-)
+from laws.bodies import DOWN, Stuff, ball, blue_noise, body, box, cylinder_sdf, disc, floor, problem, walls
 from laws.watching import started
 
 from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Discretization, Law, Material, Structure
-from corporeal.discretization.discretization_plan import (
-    QUALITY_PRESETS,
-    DetailLevel,
-    plan_discretization,
-)
+from corporeal.discretization.discretization_plan import QUALITY_PRESETS, DetailLevel, plan_discretization
 from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry
 from corporeal.materials import find_material
 from corporeal.simulation.surface_mark import surface_mark
@@ -51,11 +35,7 @@ AIMS = {"draft": 30.0, "normal": 10.0}
 
 
 def planned(
-    material: Material,
-    size: tuple[float, float, float],
-    share: float,
-    speed: float,
-    detail: DetailLevel,
+    material: Material, size: tuple[float, float, float], share: float, speed: float, detail: DetailLevel
 ) -> tuple[Stuff, float]:
     """Ask the policy for the numbers and the grid of one solid thing.
 
@@ -183,10 +163,7 @@ def differences(values: dict[str, float]) -> dict[str, float]:
 
 def lines(rows: list[tuple[str, dict[str, float]]]) -> list[str]:
     """Write the table as Markdown."""
-    text = [
-        "| | draft | normal | fine | draft − fine | normal − fine | |",
-        "|---|---:|---:|---:|---:|---:|---|",
-    ]
+    text = ["| | draft | normal | fine | draft − fine | normal − fine | |", "|---|---:|---:|---:|---:|---:|---|"]
     for name, values in rows:
         away = differences(values)
         met = all(abs(away[d]) <= aim for d, aim in AIMS.items())
@@ -197,9 +174,7 @@ def lines(rows: list[tuple[str, dict[str, float]]]) -> list[str]:
 
 def main() -> None:
     """Print the table, or write it down."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument("--workers", type=int, default=min(4, usable_cores()), help="side by side")
     asked = parser.parse_args()

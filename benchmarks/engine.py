@@ -43,12 +43,7 @@ class Size:
 
 
 FULL = Size(
-    100_000,
-    (10_000, 30_000, 100_000, 300_000, 1_000_000, 5_000_000),
-    (2, 4, 8, 16),
-    (64, 128, 256),
-    64,
-    (1, 2, 4),
+    100_000, (10_000, 30_000, 100_000, 300_000, 1_000_000, 5_000_000), (2, 4, 8, 16), (64, 128, 256), 64, (1, 2, 4)
 )
 QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24, (1,))
 PHASED = (
@@ -71,11 +66,7 @@ def rivals(size: Size) -> list[Drop]:
     free = usable_cores()
     plain = drop_of(size.particles)
     laws = [replace(plain, law=law, threads=t) for law in Law for t in (1, 2, 4) if t <= free]
-    heaps = [
-        drop_of(size.particles, objects=count, heap=heap)
-        for count in size.objects
-        for heap in (False, True)
-    ]
+    heaps = [drop_of(size.particles, objects=count, heap=heap) for count in size.objects for heap in (False, True)]
     many = drop_of(size.particles, objects=size.objects[-1], heap=True)
     heaps += [replace(many, threads=t) for t in (2, 4) if t <= free]
     spread = [drop_of(size.particles, objects=8, extent=cells) for cells in size.extents]
@@ -106,11 +97,7 @@ def held_contest(contestants: list[Contestant], substeps: int) -> list[page.Resu
     for one, cost in zip(contestants, contest(contestants, substeps), strict=True):
         version = one.version if isinstance(one, Peer) else ""
         upkeep = one.upkeep() if isinstance(one, Ours) else {}
-        found.append(
-            page.Result(
-                one.engine, one.drop, one.particles, *cost, one.bytes, one.grown, version, upkeep
-            )
-        )
+        found.append(page.Result(one.engine, one.drop, one.particles, *cost, one.bytes, one.grown, version, upkeep))
         one.close()
         cells = zip(found[-1].cells(), WIDTHS, strict=True)
         print(" ".join(f"{cell:{width}s}" for cell, width in cells), flush=True)
@@ -119,18 +106,14 @@ def held_contest(contestants: list[Contestant], substeps: int) -> list[page.Resu
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="fewer particles and substeps")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--docs", action="store_true", help="write the page of results")
     parser.add_argument("--history", type=Path, help="add what each cost to this CSV")
     parser.add_argument("--peer", type=Path, help="virtual environment with genesis-world")
     parser.add_argument("--peer-install", type=Path, help="make that environment here, and stop")
-    parser.add_argument(
-        "--phases", action="store_true", help="print where a substep's time goes, and stop"
-    )
+    parser.add_argument("--phases", action="store_true", help="print where a substep's time goes, and stop")
     chosen = parser.parse_args()
     if chosen.phases:
         size = QUICK if chosen.quick else FULL

@@ -31,16 +31,9 @@ from corporeal.reconstruction.features.feature_lifting import (
     uplift_features,
     visible_points,
 )
-from corporeal.reconstruction.features.point_descriptor import (
-    mean_view_directions,
-    point_descriptor,
-)
+from corporeal.reconstruction.features.point_descriptor import mean_view_directions, point_descriptor
 from corporeal.reconstruction.gaussians.feature_distillation import distil_features
-from corporeal.reconstruction.gaussians.radiance_field import (
-    RadianceFieldConfig,
-    field_surface_points,
-    train_field,
-)
+from corporeal.reconstruction.gaussians.radiance_field import RadianceFieldConfig, field_surface_points, train_field
 
 SIDE, FOCAL, AWAY = 256, 300.0, 3.0
 GRID = 37
@@ -82,9 +75,7 @@ def timed(what: str, work: Callable[[], Any]) -> Any:
 
 def main() -> None:
     """Time every way that features come onto points, or learn fields."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sizes", nargs="*", type=int, help="points, channels, views")
     parser.add_argument("--fields", nargs="+", type=Path, default=[], metavar="SCENE")
     parser.add_argument("--preset", choices=["draft", "normal"], default="draft")
@@ -130,10 +121,7 @@ def _row(scene: Path, preset: str) -> list[str]:
     which, depth = seen.object_of_pixel, seen.depth
     if which is None or depth is None:
         raise SystemExit(f"{scene}: its views do not say where things are, and how far away.")
-    config, start = (
-        RadianceFieldConfig(preset, threads=min(CORES, usable_cores())),
-        time.process_time(),
-    )
+    config, start = (RadianceFieldConfig(preset, threads=min(CORES, usable_cores())), time.process_time())
     made = train_field(Views(seen.rgb, seen.cameras), which >= 0, config)
     spent = time.process_time() - start
     found = field_surface_points(made.field, seen.cameras, 100_000)

@@ -78,9 +78,7 @@ def young_across(flute: Flute, young: float, thickness: float) -> float:
     whole = np.zeros((3 * len(x), 3 * len(x)))
     for k in range(BEAMS):
         own = slice(3 * k, 3 * k + 6)
-        whole[own, own] += beam(
-            points[k], points[k + 1], young * thickness, young * thickness**3 / 12
-        )
+        whole[own, own] += beam(points[k], points[k + 1], young * thickness, young * thickness**3 / 12)
     shift = np.zeros(len(whole))
     shift[-2] = -1.0  # the upper crest comes down by one
     free = slice(3, len(whole) - 3)

@@ -68,9 +68,7 @@ def _taken(views: Views, masks: np.ndarray | None) -> GaussianScene:
     return GaussianScene(learned.gaussians, views.cameras, views, masks)
 
 
-def _height(
-    taken: GaussianScene, made: np.ndarray, scale: float, cameras: tuple[Camera, ...]
-) -> float:
+def _height(taken: GaussianScene, made: np.ndarray, scale: float, cameras: tuple[Camera, ...]) -> float:
     """Return how high the true floor is in the frame as found, over the scene's diameter."""
     around = find_viewed_region(cameras)
     foot = made @ np.array([around.centre[0], around.centre[1], 0.0, 1.0])
@@ -88,9 +86,7 @@ def _rolled(cameras: tuple[Camera, ...], rng: np.random.Generator) -> tuple[Came
     made = []
     for camera in cameras:
         roll = np.radians(ROLL) * rng.normal()
-        turn = similarity_matrix(
-            matrix_from_quaternion(np.array([np.cos(roll / 2), 0, 0, np.sin(roll / 2)]))
-        )
+        turn = similarity_matrix(matrix_from_quaternion(np.array([np.cos(roll / 2), 0, 0, np.sin(roll / 2)])))
         made.append(replace(camera, world_from_camera=camera.world_from_camera @ turn))
     return tuple(made)
 

@@ -111,9 +111,7 @@ def _lawn(points: np.ndarray) -> np.ndarray:
 def _outdoors(points: np.ndarray) -> np.ndarray:
     """Return colours of a hedge, and of clouds in the sky above it."""
     height = points[:, 2] - HEDGE * (1 + 0.3 * noise(points * [1, 1, 0], 2.0, 20))
-    leaves = (
-        np.array(LEAVES) * (1 + 0.5 * noise(points, 0.3, 21) + 0.3 * noise(points, 1, 22))[:, None]
-    )
+    leaves = np.array(LEAVES) * (1 + 0.5 * noise(points, 0.3, 21) + 0.3 * noise(points, 1, 22))[:, None]
     cloudy = np.clip(0.5 + noise(points, 8.0, 23), 0, 1)[:, None]
     return np.where(height[:, None] < 0, leaves, (1 - cloudy) * SKY + cloudy * np.array(CLOUD))
 

@@ -105,9 +105,7 @@ def check(console: Console) -> None:
     for poisson, hardness, loss, cells, rule in product(
         (0.3, 0.49), HARDNESS, (0.1, 0.15, 0.3, 0.6), (8, 12), (False, True)
     ):
-        taken = GRID_LOSS_FACTOR / cells**2 + (
-            vibration_loss(1.0, 1.0, 1.0 / hardness) if rule else 0.0
-        )
+        taken = GRID_LOSS_FACTOR / cells**2 + (vibration_loss(1.0, 1.0, 1.0 / hardness) if rule else 0.0)
         other = {"radius": 0.12, "density": 300.0, "speed": 7.0, "seed": cells}
         e, count = Blow(cells, max(0.0, loss - taken), hardness, poisson, **other).strike()
         off[rule].append(abs(e - restitution_of_loss(loss)))
@@ -121,9 +119,7 @@ def check(console: Console) -> None:
 
 def main() -> None:
     """Run what was asked."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="other balls, against theory")
     (check if parser.parse_args().check else beyond)(Console())
 

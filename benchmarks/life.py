@@ -106,11 +106,7 @@ def verdicts(found: Sequence[Result], wrong: Sequence[str]) -> list[tuple[str, b
     inside = sum(r.off <= LEEWAY for r in found)
     far = [f"{r.row.name} ({r.detail}, {r.off:.2f})" for r in found if r.off > FARTHEST]
     split = [f"{n} ({d:.2f})" for n, d in apart(found).items() if d > APART]
-    leaky = [
-        f"{r.row.name} ({r.unbooked:.0%})"
-        for r in found
-        if r.detail == "draft" and r.unbooked > UNBOOKED
-    ]
+    leaky = [f"{r.row.name} ({r.unbooked:.0%})" for r in found if r.detail == "draft" and r.unbooked > UNBOOKED]
     return [
         (
             f"at least {INSIDE:.0%} of rows in their range ± {LEEWAY}: {inside} of {len(found)}",
@@ -127,18 +123,7 @@ def _list(names: Sequence[str]) -> str:
     return ("not " + ", ".join(names)) if names else "all"
 
 
-HEADS = (
-    "object",
-    "detail",
-    "published",
-    "e",
-    "spread",
-    "off",
-    "touches [ms]",
-    "as",
-    "E",
-    "unbooked",
-)
+HEADS = ("object", "detail", "published", "e", "spread", "off", "touches [ms]", "as", "E", "unbooked")
 
 
 def cells(result: Result) -> tuple[str, ...]:
@@ -269,17 +254,13 @@ def kept(path: Path) -> list[DropResult]:
 
 def asked_for() -> argparse.Namespace:
     """Read the command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="one seed, draft only")
     parser.add_argument("--json", type=Path, help="write every drop to this file")
     parser.add_argument("--resume", action="store_true", help="keep the drops that it holds")
     parser.add_argument("--row", nargs="+", metavar="NAME", help="only these things")
     parser.add_argument("--docs", action="store_true", help="write the page of results")
-    parser.add_argument(
-        "--workers", type=int, default=min(4, usable_cores()), help="drops side by side"
-    )
+    parser.add_argument("--workers", type=int, default=min(4, usable_cores()), help="drops side by side")
     asked = parser.parse_args()
     if asked.docs and (asked.quick or asked.row):
         parser.error("--docs needs all of it: leave out --quick and --row")

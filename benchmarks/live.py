@@ -44,13 +44,7 @@ def results_of(name):
     inventory = describe(scene)
     parts = segment(scene, inventory)
     field = ground_with_mass_posterior(scene, parts, inventory, Settings().ground)
-    return StageResults(
-        assemble=scene,
-        describe=inventory,
-        segment=parts,
-        ground=field,
-        fill=fill(scene, parts, field),
-    )
+    return StageResults(assemble=scene, describe=inventory, segment=parts, ground=field, fill=fill(scene, parts, field))
 
 
 class Visitor:

@@ -101,9 +101,7 @@ def sides_of(views: Views) -> np.ndarray:
     return high - low
 
 
-def write_set(
-    out: Path, views: Views, sides: np.ndarray, note: str, video: bool, zoomed: bool
-) -> None:
+def write_set(out: Path, views: Views, sides: np.ndarray, note: str, video: bool, zoomed: bool) -> None:
     """Write what ``real_photographs.py`` reads.
 
     Args:
@@ -119,9 +117,7 @@ def write_set(
     names = tuple(f"{'frame' if video else 'img'}_{k:05d}" for k in range(len(views.cameras)))
     for name in ("images", "masks"):
         (out / name).mkdir(parents=True, exist_ok=True)
-    for name, rgb, owner, camera in zip(
-        names, views.rgb, views.object_of_pixel, views.cameras, strict=True
-    ):
+    for name, rgb, owner, camera in zip(names, views.rgb, views.object_of_pixel, views.cameras, strict=True):
         exif = _lens(camera) if zoomed else Image.Exif()
         photograph = Image.fromarray(rgb)
         photograph.save(out / "images" / f"{name}.jpg", quality=QUALITY, subsampling=0, exif=exif)
@@ -152,9 +148,7 @@ def _write_video(path: Path, frames: np.ndarray) -> None:
 
 def main() -> None:
     """Walk around, take pictures, write."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("model", type=Path, nargs="+")
     parser.add_argument("out", type=Path)
     parser.add_argument("--pictures", type=int, default=30)

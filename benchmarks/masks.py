@@ -76,10 +76,7 @@ def spots(mask: np.ndarray) -> dict[str, np.ndarray]:
 
 def measured(folder: Path, pointed: int) -> dict:
     """Measure one set."""
-    shown, drawn = (
-        read_posed_photos(folder, MASK_PICTURE_PX, bare=True),
-        read_posed_photos(folder, MASK_PICTURE_PX),
-    )
+    shown, drawn = (read_posed_photos(folder, MASK_PICTURE_PX, bare=True), read_posed_photos(folder, MASK_PICTURE_PX))
     if drawn.masks is None or drawn.masks.shape != shown.views.rgb.shape[:3]:
         raise SystemExit(f"{folder} has no mask for each of its photographs.")
     masks = drawn.masks >= ON
@@ -104,9 +101,7 @@ def measured(folder: Path, pointed: int) -> dict:
     for k in np.linspace(0, len(masks) - 1, min(pointed, len(masks))).round().astype(int):
         for how, corners in spots(small[k]).items():
             try:
-                found = grown(
-                    seeds_from_prompt(rough, shown.points, PicturePrompt(int(k), corners))
-                )
+                found = grown(seeds_from_prompt(rough, shown.points, PicturePrompt(int(k), corners)))
             except UserError:
                 found = None
             row[how].append((0.0, 0.0) if found is None else agreement(found.inside, masks))
@@ -139,9 +134,7 @@ def table(rows: list[dict]) -> str:
 
 def main() -> None:
     """Measure every set that is named."""
-    asked = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("folders", type=Path, nargs="+")
     asked.add_argument("--pointed", type=int, default=6)
     asked.add_argument("--json", type=Path)

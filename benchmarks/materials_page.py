@@ -15,21 +15,14 @@ from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.restitution_speed import rated_restitutions
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
-SURFACE_FIELDS = (
-    "friction",
-    "restitution",
-    "loss",
-    "strength",
-    "strength_local",
-    "hardening",
-    "shell_thickness",
-)
+SURFACE_FIELDS = ("friction", "restitution", "loss", "strength", "strength_local", "hardening", "shell_thickness")
 FLUID_FIELDS = ("density", "viscosity", "consistency", "flow_index", "yield_shear")
 SURFACE_HEADS = ("material", "group", "μ", "e", "η", "S", "S_loc", "H", "wall")
 FLUID_HEADS = ("material", "ρ", "viscosity", "consistency K_c", "n", "τ_y")
 INTRODUCTION_TEXT = """# Materials
 
-Generated from the tables in `src/corporeal/materials` by `benchmarks/materials_page.py`; a test holds this page equal to them. Each cell is the measured range with the usual value in
+Generated from the tables in `src/corporeal/materials` by `benchmarks/materials_page.py`; a test holds this page equal to
+them. Each cell is the measured range with the usual value in
 brackets: E Young's modulus, ν Poisson's ratio, ρ density, σ_y yield stress, φ friction angle and c
 cohesion of granular matter; μ the surface's own sliding friction, e restitution, η loss factor, S
 strength of brittle materials (a whole bar's, in bending or tension), S_loc their tensile strength
@@ -119,20 +112,10 @@ def library_markdown() -> str:
     return "\n".join(
         [
             INTRODUCTION_TEXT,
-            OWN_LIBRARY_TEXT
-            % {"laws": ", ".join(law.name.lower() for law in Law), "needs": _needs()},
+            OWN_LIBRARY_TEXT % {"laws": ", ".join(law.name.lower() for law in Law), "needs": _needs()},
             *("## Library `default`", "", counts, "", *_table(LISTING_HEADS, default, _core), ""),
-            *(
-                "### Surface, damping, hardening, walls",
-                "",
-                *_table(SURFACE_HEADS, default, _other),
-            ),
-            *(
-                "",
-                "### Liquids and pastes",
-                "",
-                *_table(FLUID_HEADS, _liquids(default), _flowing),
-            ),
+            *("### Surface, damping, hardening, walls", "", *_table(SURFACE_HEADS, default, _other)),
+            *("", "### Liquids and pastes", "", *_table(FLUID_HEADS, _liquids(default), _flowing)),
             "",
             LOSS_TEXT + "\n".join(_notes()),
             "",
@@ -156,14 +139,9 @@ def library_markdown() -> str:
 
 def _needs() -> str:
     """Describe what some laws cannot do without."""
-    asked = {
-        law.name.lower(): CONSTITUTIVE_LAWS[law].needs
-        for law in Law
-        if CONSTITUTIVE_LAWS[law].needs
-    }
+    asked = {law.name.lower(): CONSTITUTIVE_LAWS[law].needs for law in Law if CONSTITUTIVE_LAWS[law].needs}
     return ",\n".join(
-        f"`{name}` also {' and '.join(QUANTITIES[f].words.lower() for f in fields)}"
-        for name, fields in asked.items()
+        f"`{name}` also {' and '.join(QUANTITIES[f].words.lower() for f in fields)}" for name, fields in asked.items()
     )
 
 

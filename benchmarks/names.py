@@ -105,9 +105,7 @@ class Weighed:
         return [w for tell in told for w in tell(self.scene, self.anatomies, self.masses)]
 
 
-def weigh(
-    mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0, from_pictures: bool = False
-) -> Weighed:
+def weigh(mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0, from_pictures: bool = False) -> Weighed:
     """Write a mesh [m], upright along z, to a file and take it through the pipeline's functions.
 
     Args:
@@ -124,10 +122,7 @@ def weigh(
     inventory = describe(scene, from_pictures=[0] if from_pictures else ())
     parts = segment(scene, inventory)
     anatomies = measure_objects(scene, parts, 0)
-    field, leaf = (
-        ground_with_mass_posterior(scene, parts, inventory, GroundConfig()),
-        find_material("leaf_tissue"),
-    )
+    field, leaf = (ground_with_mass_posterior(scene, parts, inventory, GroundConfig()), find_material("leaf_tissue"))
     makes = part_models(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
     return Weighed(scene, anatomies, makes, field, inventory, parts)
 
@@ -171,9 +166,7 @@ def _off(mass: float, life: Sequence[float]) -> float:
 
 def main() -> None:
     """Measure every name of the list and print what came out."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--list", type=Path, default=LIST)
     parser.add_argument("--only", nargs="+", help="these names alone")
     parser.add_argument("--json", type=Path, help="keep what was found in this file")

@@ -152,9 +152,7 @@ def table(rows: list[ObjectsRow]) -> str:
 
 def main() -> None:
     """Compose, judge, print, and write the page."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("models", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("runs/objects"))
     parser.add_argument("--gaussians", action="store_true", help="learn Gaussians of the pairs")

@@ -43,11 +43,7 @@ With each way, give also, for this very part, judged from the pictures, its use 
 - contents_density: of what fills it, as it lies in there [kg/m³]; otherwise null.
 """
 VALUES_VERSION = "values/1"
-NAMES = {
-    "density": "density",
-    "shell_thickness": "wall_mm",
-    "contents_density": "contents_density",
-}
+NAMES = {"density": "density", "shell_thickness": "wall_mm", "contents_density": "contents_density"}
 """Quantity as the product asks for it → field of the answer; others take their usual value."""
 RANGE = re.compile(r"- (\w+): .*?: ([\d.e+-]+) to ([\d.e+-]+).*?; usually ([\d.e+-]+)")
 
@@ -94,9 +90,7 @@ class OneQuestion:
 
     def _materials(self, question, check):
         wanted = replace(
-            question,
-            prompt=question.prompt + VALUES,
-            prompt_version=f"{question.prompt_version} {VALUES_VERSION}",
+            question, prompt=question.prompt + VALUES, prompt_version=f"{question.prompt_version} {VALUES_VERSION}"
         )
 
         def plain(found: ValuedAnswer) -> MaterialsAnswer:
@@ -120,9 +114,7 @@ class OneQuestion:
             parts.append(PartValues(part=name, values=rows))
         return ValueAnswer(parts=parts)
 
-    def _value(
-        self, way: ValuedWay, quantity: str, low: str, high: str, usual: str
-    ) -> QuantityValue:
+    def _value(self, way: ValuedWay, quantity: str, low: str, high: str, usual: str) -> QuantityValue:
         said = getattr(way, NAMES.get(quantity, ""), None)
         value = float(usual) if said is None else min(max(said, float(low)), float(high))
         self._count(outside=int(said is not None and value != said))
@@ -142,9 +134,7 @@ vlm.VLM_CLIENTS["one"] = f"{__name__}:OneQuestion"
 
 def main() -> None:
     """Ask, and print the ladder."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("models", type=Path)
     parser.add_argument("--answers", type=Path, required=True)
     parser.add_argument("--truth", type=Path)
@@ -157,9 +147,7 @@ def main() -> None:
     except UserError as waiting:
         raise SystemExit(str(waiting)) from None
     for row in result.rows:
-        print(
-            f"{row.object}: {row.mixture:.3g} kg ({row.mixture_low:.3g} to {row.mixture_high:.3g})"
-        )
+        print(f"{row.object}: {row.mixture:.3g} kg ({row.mixture_low:.3g} to {row.mixture_high:.3g})")
     for method, errors in result.metrics.get("all", {}).items():
         print(f"{result.methods[method]}: {errors}")
     print(OneQuestion.characters)

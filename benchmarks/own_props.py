@@ -72,22 +72,16 @@ def write(folder: Path, batch: int = 1) -> None:
 def recipe(name: str, prop: Prop) -> str:
     """Tell how a prop is built, as Markdown."""
     lines = [f"## {name}: {prop.what}, {prop.mass:.3f} kg", ""]
+    lines += ["| piece | volume [cm³] | density [kg/m³] | mass [g] | from |", "|---|--:|--:|--:|---|"]
     lines += [
-        "| piece | volume [cm³] | density [kg/m³] | mass [g] | from |",
-        "|---|--:|--:|--:|---|",
-    ]
-    lines += [
-        f"| {p.name} | {p.volume * 1e6:.1f} | {p.density:.0f} | {p.mass * 1e3:.1f} | {p.source} |"
-        for p in prop.built
+        f"| {p.name} | {p.volume * 1e6:.1f} | {p.density:.0f} | {p.mass * 1e3:.1f} | {p.source} |" for p in prop.built
     ]
     return "\n".join(lines) + "\n"
 
 
 def main() -> None:
     """Write the folder and print what stands where."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--batch", type=int, choices=sorted(BATCHES), default=1)
     asked = parser.parse_args()

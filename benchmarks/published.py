@@ -129,9 +129,7 @@ def summary(found: Sequence[Found]) -> str:
 
 def main() -> None:
     """Weigh both halves and print what was asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--second", action="store_true", help="weigh the second list")
     which.add_argument("--ware", action="store_true", help="weigh open ware as from photographs")

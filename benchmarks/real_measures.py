@@ -107,9 +107,7 @@ def pose_errors(found: ColmapModel, given: ColmapModel) -> PoseErrors:
     return PoseErrors(len(ours), right, len(theirs), *middle, way)
 
 
-def _agreeing(
-    a: Float[np.ndarray, "N 3"], b: Float[np.ndarray, "N 3"], near: float
-) -> Bool[np.ndarray, " N"]:
+def _agreeing(a: Float[np.ndarray, "N 3"], b: Float[np.ndarray, "N 3"], near: float) -> Bool[np.ndarray, " N"]:
     """Return which places agree with most others, of similarities through three places each."""
     rng, best = np.random.default_rng(0), np.ones(len(a), bool)
     most = 0
@@ -227,11 +225,7 @@ def held_out(made: ReconstructedScene) -> dict[str, Any]:
     if not found:
         return {}
     count, all_of_it, thing = found[0].groups()
-    return {
-        "held_out": int(count),
-        "psnr": float(all_of_it),
-        "psnr_thing": float(thing) if thing else None,
-    }
+    return {"held_out": int(count), "psnr": float(all_of_it), "psnr_thing": float(thing) if thing else None}
 
 
 def model_of(folder: Path) -> ColmapModel:

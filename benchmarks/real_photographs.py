@@ -58,9 +58,7 @@ HEADS = (
 DOCS = Path(__file__).parents[1] / "docs" / "reference"
 TITLES = {"real": "Real photographs benchmark", "made": "Rendered photographs benchmark"}
 """Of the pages, each at `page_of` its kind."""
-MADE = (
-    "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
-)
+MADE = "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
 NOTES = Path(__file__).with_name("photograph_notes.toml")
 """For each kind of page: what stands in its head (``page``), and beside sets by name (``sets``)."""
 EVERY = 2.0
@@ -219,11 +217,7 @@ def page_of(kind: str) -> Path:
 
 
 def write_docs(
-    rows: list[dict[str, Any]],
-    table: list[tuple[str, ...]],
-    folders: list[Path],
-    kind: str,
-    said: str,
+    rows: list[dict[str, Any]], table: list[tuple[str, ...]], folders: list[Path], kind: str, said: str
 ) -> None:
     """Write the page, whole."""
     about = (__doc__ or "").split("\n\n")
@@ -259,9 +253,7 @@ def sets_in(folder: Path, only: Sequence[str], refuse: Callable[[str], NoReturn]
 
 def main() -> None:
     """Reconstruct all sets asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", help="sets, by the names of their folders")
     parser.add_argument("--cases", nargs="*", choices=get_args(Case))

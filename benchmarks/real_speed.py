@@ -65,8 +65,7 @@ def timed(photographs: Path, training: str, work: Path) -> dict[str, tuple[float
     reconstruct(photographs, config, folder=work, progress=told)
     ends = [*list(begins.values())[1:], (time.perf_counter(), time.process_time())]
     return {
-        phase: (end[0] - begin[0], end[1] - begin[1])
-        for (phase, begin), end in zip(begins.items(), ends, strict=True)
+        phase: (end[0] - begin[0], end[1] - begin[1]) for (phase, begin), end in zip(begins.items(), ends, strict=True)
     }
 
 
@@ -84,9 +83,7 @@ def measured(photographs: Path, training: str, threads: int, work: Path) -> dict
 
 def main() -> None:
     """Time every number of photographs."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--photographs", nargs="+", type=int, default=[20, 40])
     parser.add_argument("--long-side", type=int, default=640)

@@ -56,9 +56,7 @@ def once(points: int, channels: int) -> None:
     from corporeal.lab.evaluation.segmentation_scores import named_iou
     from corporeal.reconstruction.segment.part_naming import name_parts
 
-    thing = ObjectDescription(
-        "boxes", "boxes", tuple(PartDescription(f"box {k}", None) for k in range(PARTS))
-    )
+    thing = ObjectDescription("boxes", "boxes", tuple(PartDescription(f"box {k}", None) for k in range(PARTS)))
     small, words, _ = scene(2000, channels)
     name_parts(small, thing, words)
     cloud, words, part = scene(points, channels)
@@ -80,9 +78,7 @@ def once(points: int, channels: int) -> None:
 
 def main() -> None:
     """Measure every size in a process of its own."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", nargs="+", type=int, default=[100_000, 500_000])
     parser.add_argument("--channels", type=int, default=768)
     parser.add_argument("--threads", default="2")

@@ -42,13 +42,9 @@ LATE = 0.1
 """The end of the simulation, over which is measured whether a thing is still on its way [s]."""
 
 
-def measure(
-    path: Path, out: Path, detail: DetailLevel, seconds: float, settled: str = "said"
-) -> dict:
+def measure(path: Path, out: Path, detail: DetailLevel, seconds: float, settled: str = "said") -> dict:
     """Simulate one scene; return what became of its objects, as data."""
-    settings = Settings(
-        assemble=AssembleConfig(duration=seconds, fps=FPS), fill=FillConfig(detail=detail)
-    )
+    settings = Settings(assemble=AssembleConfig(duration=seconds, fps=FPS), fill=FillConfig(detail=detail))
     row: dict = {"scene": path.parent.name}
     start = time.process_time()
     if settled != "said":
@@ -134,9 +130,7 @@ def measure_all(paths: list[Path], out: Path, asked: argparse.Namespace, console
         asked.processes, mp_context=context, initializer=keep_to_one_core, initargs=(free,)
     ) as pool:
         jobs = {
-            pool.submit(
-                measure, path, out / "runs", asked.detail, asked.seconds, asked.settled
-            ): path
+            pool.submit(measure, path, out / "runs", asked.detail, asked.seconds, asked.settled): path
             for path in missing
         }
         for job in as_completed(jobs):
@@ -199,9 +193,7 @@ def summary(rows: list[dict]) -> str:
 
 def main() -> None:
     """Measure what has not been measured yet; print it."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="of the scenes")
     parser.add_argument("--out", type=Path, default=Path("runs/rest"))
     parser.add_argument("--only", nargs="*", default=[], help="scenes whose names contain this")

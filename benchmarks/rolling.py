@@ -184,12 +184,7 @@ def slopes() -> None:
     """Print the table of what rolls down a slope or along the level."""
     slope = 0.5 * G * np.sin(SLOPE)
     rows = [
-        (
-            f"ball of {n:,} triangles, floor, 5°, 1 s",
-            posed(drawn(n), gravity=DOWN),
-            1.0,
-            slope / 1.4,
-        )
+        (f"ball of {n:,} triangles, floor, 5°, 1 s", posed(drawn(n), gravity=DOWN), 1.0, slope / 1.4)
         for n in (20, 80, 320, 1280, 5120, 20480)
     ]
     rows += [
@@ -203,8 +198,7 @@ def slopes() -> None:
         way, _, lost = moved(unknown(problem), time)
         further, speed, taken = moved(problem, time)
         print(
-            f"| {name} | {way / ideal:.3f} | {lost:.2g} | {further / ideal:.3f} | {taken:.2g} "
-            f"| {speed:.4f} |",
+            f"| {name} | {way / ideal:.3f} | {lost:.2g} | {further / ideal:.3f} | {taken:.2g} | {speed:.4f} |",
             flush=True,
         )
 
@@ -214,9 +208,7 @@ TABLES = {"slopes": slopes, "bowls": swings, "floors": floors}
 
 def main() -> None:
     """Print the tables."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", choices=TABLES, help="one table alone")
     asked = parser.parse_args()
     for name, table in TABLES.items():

@@ -39,12 +39,7 @@ from corporeal.discretization.mesh_kind import inner_face_fraction
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, measure_objects
 from corporeal.geometry.scene_transforms import object_boxes, surfaces_bounding_box
 from corporeal.io.photos.transforms_json import read_views, write_views
-from corporeal.io.scene_toml import (
-    ObjectEntry,
-    SceneFile,
-    read_scene_file,
-    write_scene_file,
-)
+from corporeal.io.scene_toml import ObjectEntry, SceneFile, read_scene_file, write_scene_file
 from corporeal.multiview.similarity_transform import apply_similarity_to_points
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import Settings, open_run, write_showcase
@@ -183,11 +178,7 @@ def _colour(rgb: np.ndarray) -> str:
 
 def _called(rgb: np.ndarray) -> str:
     """Return the basic colour term that is nearest in CIELAB."""
-    text = (
-        files("corporeal.reconstruction.segment")
-        .joinpath("attributes.toml")
-        .read_text(encoding="utf-8")
-    )
+    text = files("corporeal.reconstruction.segment").joinpath("attributes.toml").read_text(encoding="utf-8")
     table = tomllib.loads(text)["colour"]
     terms = [(word, code) for word in BASIC for code in table[word]]
     known = [[int(code[i : i + 2], 16) / 255 for i in (1, 3, 5)] for _, code in terms]
@@ -219,10 +210,7 @@ def _merged(pieces: list[Piece]) -> dict[str, dict]:
 
 def as_begun(scene: Scene, folder: Path) -> Path:
     """Write how the photographed things start to move, as a person would say it."""
-    entries = tuple(
-        ObjectEntry(name=o.name, velocity=o.velocity, push=o.push, wind=o.wind)
-        for o in scene.objects
-    )
+    entries = tuple(ObjectEntry(name=o.name, velocity=o.velocity, push=o.push, wind=o.wind) for o in scene.objects)
     path = folder / "scene.toml"
     said = SceneFile(path, folder / "views", scene.duration, scene.fps, scene.gravity)
     said = replace(said, settled=scene.settled, objects=entries, walls=scene.walls)
@@ -264,15 +252,8 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
     """Run a scene twice and compare; what is there already is not done again."""
     name = Path(source).resolve().parent.name if source.endswith(".toml") else Path(source).stem
     folder = out / name
-    path = (
-        write_showcase(source, folder / "input")
-        if source in SHOWCASE_SCENE_BUILDERS
-        else Path(source)
-    )
-    with (
-        progress_bars() as tell,
-        open_run([path], folder / "mesh", settings(detail), tell, "simulate") as of,
-    ):
+    path = write_showcase(source, folder / "input") if source in SHOWCASE_SCENE_BUILDERS else Path(source)
+    with progress_bars() as tell, open_run([path], folder / "mesh", settings(detail), tell, "simulate") as of:
         mesh = of.made
     scene, spread = mesh.scene, []
     for seed in (1, 2):
@@ -292,15 +273,10 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
         names = tuple(scene.objects[k].name for k in order)
         again = replace(
             settings(detail),
-            reconstruct=ReconstructConfig(
-                object_names=names, training=training, apart="look", floor_at=0.0
-            ),
+            reconstruct=ReconstructConfig(object_names=names, training=training, apart="look", floor_at=0.0),
             describe=DescribeConfig(annotations=said),
         )
-        with (
-            progress_bars() as tell,
-            open_run([start], folder / "pictures", again, tell, until) as of,
-        ):
+        with progress_bars() as tell, open_run([start], folder / "pictures", again, tell, until) as of:
             pictures = of.made
         order = ordered(scene, reconstructed(pictures), order)
         store.write_json(kept, order.tolist())
@@ -323,9 +299,7 @@ def ordered(scene: Scene, found: Reconstruction, order: np.ndarray) -> np.ndarra
     """Return which object is which, as a person sees it who names things of nearly one size."""
     if len(found.boxes) != len(order):
         return order
-    middles = apply_similarity_to_points(
-        found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file)
-    )
+    middles = apply_similarity_to_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
     apart = cdist(middles, [box.mean(axis=0) for box in object_boxes(scene)])
     return linear_sum_assignment(apart)[1]
 

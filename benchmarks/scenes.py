@@ -29,9 +29,7 @@ WARM_UP = 20
 
 def main() -> None:
     """Compose, print, keep."""
-    words = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+    words = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     words.add_argument("pool", type=Path)
     words.add_argument("--count", type=int, default=1000)
     words.add_argument("--first-seed", type=int, default=0)
@@ -96,9 +94,7 @@ def look() -> dict:
 def tell(done: int, count: int, seconds: list[float], now: dict) -> None:
     """One line of progress."""
     left = (count - done) * float(np.mean(seconds)) / 60
-    print(
-        f"{done} of {count}, {np.mean(seconds):.2f} s each, {now}, {left:.0f} min left", flush=True
-    )
+    print(f"{done} of {count}, {np.mean(seconds):.2f} s each, {now}, {left:.0f} min left", flush=True)
 
 
 def print_table(result: dict) -> None:

@@ -18,11 +18,7 @@ from jaxtyping import Float
 
 from corporeal.lab.evaluation.measured_masses import read_measured_masses
 from corporeal.pipeline.mass_posterior import weighted_quantiles
-from corporeal.vlm.mass_evidence import (
-    UNRELATED_EVIDENCE_PROBABILITY,
-    evidence_masses,
-    mass_likelihood,
-)
+from corporeal.vlm.mass_evidence import UNRELATED_EVIDENCE_PROBABILITY, evidence_masses, mass_likelihood
 
 SHARED, TOGETHER = 0.268, 0.676
 """Slope of a judgement's error over that of the ways' median, and their correlation, over 58
@@ -59,9 +55,7 @@ def _judged(thing: Drawn, rule: str) -> Float[np.ndarray, " N"]:
     if rule == "shared within ways":
         share, together, middle = SHARED_PLACED, TOGETHER_PLACED, np.log(thing.placed)
     away = (away - share * (middle - logs)) / (width * sqrt(1 - together**2))
-    return (1 - UNRELATED_EVIDENCE_PROBABILITY) * np.exp(
-        -0.5 * away**2
-    ) + UNRELATED_EVIDENCE_PROBABILITY
+    return (1 - UNRELATED_EVIDENCE_PROBABILITY) * np.exp(-0.5 * away**2) + UNRELATED_EVIDENCE_PROBABILITY
 
 
 def _printed(thing: Drawn) -> Float[np.ndarray, " N"]:
@@ -87,18 +81,13 @@ def report(things: Sequence[Drawn], rule: str) -> tuple[Scored, float]:
     """Score a rule's intervals, and its draws: the mean ranked score of ln m."""
     counted = [weights(one, rule) for one in things]
     found = [weighted_quantiles(one.masses, w) for one, w in zip(things, counted, strict=True)]
-    scores = [
-        ranked(np.log(one.masses), w, float(np.log(one.truth)))
-        for one, w in zip(things, counted, strict=True)
-    ]
+    scores = [ranked(np.log(one.masses), w, float(np.log(one.truth))) for one, w in zip(things, counted, strict=True)]
     return against(found, [one.truth for one in things]), float(np.mean(scores))
 
 
 def main() -> None:
     """Print one line per set and rule."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--truth", type=Path, required=True)
     parser.add_argument("--recordings", type=Path, nargs="+", required=True)

@@ -23,11 +23,7 @@ from corporeal.core import store
 from corporeal.core.audit_data import Audit
 from corporeal.core.process_resources import usable_cores
 from corporeal.discretization.discretization_plan import DetailLevel
-from corporeal.lab.evaluation.dynamics.compared_methods import (
-    OURS_NAME,
-    reference_folder,
-    run_folder,
-)
+from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME, reference_folder, run_folder
 from corporeal.pipeline.run_pipeline import STAGE_FOLDERS, Settings
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.showcase.scene_expectations import SCENE_EXPECTATIONS
@@ -40,10 +36,7 @@ BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"
 
 def faults(audit: Audit) -> list[str]:
     """Say which bounds of the audit are exceeded, and who passed through whom."""
-    return [
-        *breach_messages(audit),
-        *(f"{passage_message(pair)}." for pair in audit.surfaces if pair.passed),
-    ]
+    return [*breach_messages(audit), *(f"{passage_message(pair)}." for pair in audit.surfaces if pair.passed)]
 
 
 def row(told: Told, detail: str) -> dict:
@@ -140,12 +133,8 @@ def measured_rows(asked: argparse.Namespace) -> Iterator[dict]:
 
 def main() -> None:
     """Run what has not been run yet; print it."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument(
-        "scene", nargs="*", help=f"among {', '.join(SHOWCASE_SCENE_BUILDERS)}; none: all"
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scene", nargs="*", help=f"among {', '.join(SHOWCASE_SCENE_BUILDERS)}; none: all")
     parser.add_argument("--detail", nargs="+", choices=get_args(DetailLevel), default=["draft"])
     parser.add_argument("--folder", type=Path, default=Path("runs/showcase"), help="of the runs")
     parser.add_argument("--no-run", action="store_true", help="only what lies in the folder")
@@ -154,15 +143,11 @@ def main() -> None:
     asked = parser.parse_args()
     unknown = set(asked.scene) - set(SHOWCASE_SCENE_BUILDERS)
     if unknown:
-        parser.error(
-            f"no scene {sorted(unknown)[0]!r}: choose among {', '.join(SHOWCASE_SCENE_BUILDERS)}"
-        )
+        parser.error(f"no scene {sorted(unknown)[0]!r}: choose among {', '.join(SHOWCASE_SCENE_BUILDERS)}")
     if asked.docs and asked.scene:
         parser.error("--docs needs all scenes: name none")
     rows = list(measured_rows(asked))
-    if asked.docs and len([r for r in rows if r["detail"] == asked.detail[0]]) < len(
-        SHOWCASE_SCENE_BUILDERS
-    ):
+    if asked.docs and len([r for r in rows if r["detail"] == asked.detail[0]]) < len(SHOWCASE_SCENE_BUILDERS):
         parser.error(f"--docs needs all scenes at detail {asked.detail[0]}")
     if asked.json:
         asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")

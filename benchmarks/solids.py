@@ -50,9 +50,7 @@ def learned(folder: Path, views: Views, preset: str, out: Path) -> Gaussians:
         if views.object_of_pixel is None:
             raise SystemExit(f"{folder}: its views do not say where things are.")
         config = TrainConfig(preset, threads=CORES)
-        made = train_gaussians(
-            Views(views.rgb, views.cameras), views.object_of_pixel >= 0, config=config
-        )
+        made = train_gaussians(Views(views.rgb, views.cameras), views.object_of_pixel >= 0, config=config)
         write_splat_ply(path, made.gaussians)
     return load_splat(path, up="+z")
 
@@ -148,9 +146,7 @@ def judged(folder: Path, preset: str | None, out: Path) -> list[str]:
 
 def main() -> None:
     """Judge every scene, print a table, write the page."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--clad", nargs="*", type=Path, default=[])
     parser.add_argument("--preset", default="draft", choices=["draft", "normal"])
@@ -184,8 +180,7 @@ HEAD = (
     "scenes/chair scenes/pair --clad scenes/bowl scenes/chair --docs`: 48 views at 256 × 256, "
     "Gaussians learned with the preset `draft`. The scenes are made by",
     "",
-    "    corporeal assemble --from models/ --name box --seed 1 --assets 004_sugar_box --views 48 "
-    "--size 256 256",
+    "    corporeal assemble --from models/ --name box --seed 1 --assets 004_sugar_box --views 48 --size 256 256",
     "",
     "with `duck_khronos`, `soda_can_coke`, `024_bowl` and `chair_smallhouse_a` likewise, and "
     "`--name pair --seed 7 --assets duck_khronos soda_can_coke`, which stacks the two. Each "

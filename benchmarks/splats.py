@@ -98,9 +98,7 @@ def drawn() -> dict:
     count, side = LARGE
     rng = np.random.default_rng(0)
     theta = rng.normal(size=(count, PARAM_COLOUR + 3 * 16)).astype(np.float32)
-    theta[:, PARAM_MEAN:PARAM_ROTATION] /= np.linalg.norm(
-        theta[:, PARAM_MEAN:PARAM_ROTATION], axis=1
-    )[:, None]
+    theta[:, PARAM_MEAN:PARAM_ROTATION] /= np.linalg.norm(theta[:, PARAM_MEAN:PARAM_ROTATION], axis=1)[:, None]
     theta[:, PARAM_SCALE:PARAM_OPACITY] = np.log(rng.uniform(0.004, 0.012, (count, 3)))
     theta[:, PARAM_COLOUR:] *= 0.3
     pose = np.eye(4)
@@ -155,14 +153,10 @@ def lines(rows: list[dict], raster: dict) -> list[str]:
 
 def main() -> None:
     """Learn every scene, print a table, write the page."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, default=Path("runs/splats"))
-    parser.add_argument(
-        "--presets", nargs="+", default=list(TRAINING_PRESETS), choices=list(TRAINING_PRESETS)
-    )
+    parser.add_argument("--presets", nargs="+", default=list(TRAINING_PRESETS), choices=list(TRAINING_PRESETS))
     parser.add_argument("--sources", nargs="+", default=["masks"], choices=["masks", "pictures"])
     parser.add_argument("--docs", action="store_true", help="write the page of results")
     asked = parser.parse_args()

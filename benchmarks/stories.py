@@ -41,9 +41,7 @@ class Told:
 
     def expectations(self) -> list[Expectation]:
         """Compare what happened with what must be seen."""
-        return list(
-            reject_expectations(compare_with_expectations(self.name, self.outcome), self.audit)
-        )
+        return list(reject_expectations(compare_with_expectations(self.name, self.outcome), self.audit))
 
     def gap(self, first: int, second: int) -> Float[np.ndarray, " F"]:
         """Distance between two objects at every frame [cells].
@@ -53,8 +51,7 @@ class Told:
         one, other = (self.particles.object == k for k in (first, second))
         cell = self.particles.cell
         nearest = [
-            KDTree(frame.position[one]).query(frame.position[other])[0].min() / cell
-            for frame in self.video.frames
+            KDTree(frame.position[one]).query(frame.position[other])[0].min() / cell for frame in self.video.frames
         ]
         return np.array(nearest) - 2 * PARTICLE_RADIUS_DX
 

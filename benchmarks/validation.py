@@ -47,12 +47,7 @@ def run(numbers: list[str], quick: bool, workers: int) -> list[Outcome]:
     """Run cases and show how far they are."""
     found: dict[str, Outcome] = {}
     cost = {n: CASES[n].seconds[not quick] for n in numbers}
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[left]}"),
-    )
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("{task.fields[left]}"))
     with Progress(*columns, console=Console(stderr=True)) as bar:
         start = time.perf_counter()
         task = bar.add_task("validation", total=sum(cost.values()), left="")
@@ -107,17 +102,10 @@ def converge(workers: int) -> list[tuple[convergence.Plot, list[list[float]]]]:
         for k in range(len(series.cells))
     ]
     points.sort(key=lambda point: -point[2])
-    with (
-        ProcessPoolExecutor(workers) as pool,
-        Progress(console=Console(stderr=True)) as bar,
-    ):
+    with ProcessPoolExecutor(workers) as pool, Progress(console=Console(stderr=True)) as bar:
         task = bar.add_task("convergence", total=len(points))
         waiting = {
-            pool.submit(convergence.measured, p, s, convergence.PLOTS[p].series[s].cells[k]): (
-                p,
-                s,
-                k,
-            )
+            pool.submit(convergence.measured, p, s, convergence.PLOTS[p].series[s].cells[k]): (p, s, k)
             for p, s, k in points
         }
         for done in as_completed(waiting):
@@ -129,19 +117,12 @@ def converge(workers: int) -> list[tuple[convergence.Plot, list[list[float]]]]:
 
 def main() -> None:
     """Run what was asked."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="coarser and shorter")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--case", nargs="+", choices=list(CASES), metavar="N", help="only these")
     parser.add_argument("--docs", action="store_true", help="write the page and its plots")
-    parser.add_argument(
-        "--workers",
-        type=int,
-        default=min(4, usable_cores()),
-        help="cases that run side by side",
-    )
+    parser.add_argument("--workers", type=int, default=min(4, usable_cores()), help="cases that run side by side")
     asked = parser.parse_args()
     if asked.docs and (asked.quick or asked.case):
         parser.error("--docs needs the whole suite in full: leave out --quick and --case")

@@ -59,9 +59,7 @@ def taken(run: Path, frames: int) -> Set:
     prepared, trajectory = results.prepared, results.trajectory
     scene = prepared.scene
     skin = bind_vertices(scene, prepared.parts, prepared.particles, granular_parts(prepared.field))
-    camera = camera_track(
-        "wide", motion_summary(skin, scene, prepared.particles, trajectory), SMALL, None
-    )
+    camera = camera_track("wide", motion_summary(skin, scene, prepared.particles, trajectory), SMALL, None)
     moments = [trajectory.frames[int(k)] for k in _even(frames, len(trajectory.frames))]
     return Set(
         [_plain(f) for f in scene.finishes],
@@ -158,9 +156,7 @@ def video_errors(run: Path, frames: int) -> list[tuple[float, float]]:
     results, config, caster = read_run(run), read_run_request(run).settings.video, VideoRaycaster()
     exactly: Callable[..., np.ndarray] = embree.render_image
     found = []
-    for stage, aim in frame_scenes(
-        results.played, config, _even(frames, len(results.trajectory.frames))
-    ):
+    for stage, aim in frame_scenes(results.played, config, _even(frames, len(results.trajectory.frames))):
         caster.picture(copy(stage), aim, config.quality, 1)
         cost = []
         for _ in range(TURNS):
@@ -186,18 +182,14 @@ def measure(run: Path, other: Path, frames: int, rounds: int) -> None:
         taken_up: list[list[float]] = []
         for _ in range(rounds + 1):
             taken_up.append(
-                [
-                    who.ask((*size, str(path), "draft"))
-                    for (_, who, size), path in zip(rows, kept, strict=True)
-                ]
+                [who.ask((*size, str(path), "draft")) for (_, who, size), path in zip(rows, kept, strict=True)]
             )
         for k, (name, _, size) in enumerate(rows):
             cost = [round_[k] for round_ in taken_up[1:]]
             ratio = median(round_[k] / round_[-1] for round_ in taken_up[1:])
             off = error(kept[k], exact[size])
             print(
-                f"| {run.name} | {name}, {size[0]} × {size[1]} | {min(cost):.3f} | {ratio:.2f} "
-                f"| {off:.2f} |",
+                f"| {run.name} | {name}, {size[0]} × {size[1]} | {min(cost):.3f} | {ratio:.2f} | {off:.2f} |",
                 flush=True,
             )
         here.close()
@@ -209,9 +201,7 @@ def main() -> None:
     if sys.argv[1:2] == [SERVE]:
         serve(*sys.argv[2:])
         return
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
     parser.add_argument("--against", type=Path, help="the other checkout")
     parser.add_argument("--frames", type=int, default=2, help="pictures of each run")

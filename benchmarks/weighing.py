@@ -44,9 +44,7 @@ def assets(folders: Sequence[Path], below: Path) -> list[PoolAsset]:
 def weighed(asset: PoolAsset) -> tuple[MassProperties, float]:
     """Weigh one asset; return also the processor time that it took [s]."""
     known = find_class_sizes([asset.class_name], "metadata")
-    extent = estimate_real_extent(
-        asset.name, asset.class_name, asset.extent, asset.metric, known
-    ).extent
+    extent = estimate_real_extent(asset.name, asset.class_name, asset.extent, asset.metric, known).extent
     start = time.process_time()
     return asset_mass_properties(asset, extent), time.process_time() - start
 
@@ -69,9 +67,7 @@ def compared(found: dict, before: dict) -> dict[str, float]:
 
 def main() -> None:
     """Weigh all, print a table, the slowest first."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", nargs="*", type=Path, help="of models")
     parser.add_argument("--only", nargs="+", help="weigh these alone, by name")
     parser.add_argument("--json", type=Path, help="keep what was found in this file")
@@ -113,10 +109,7 @@ def table(rows: dict[str, dict], before: dict[str, dict]) -> None:
             cells += [f"{before[name]['seconds']:.1f}", *(f"{v:.1e}" for v in off.values())]
         print(f"| {' | '.join(cells)} |")
     slow = [n for n, r in rows.items() if r["seconds"] > LIMIT]
-    print(
-        f"\n{len(rows)} assets, {len(slow)} above {LIMIT:g} s"
-        + (f": {', '.join(slow)}" * bool(slow))
-    )
+    print(f"\n{len(rows)} assets, {len(slow)} above {LIMIT:g} s" + (f": {', '.join(slow)}" * bool(slow)))
 
 
 if __name__ == "__main__":

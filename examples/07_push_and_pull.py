@@ -11,9 +11,7 @@ REACH = 0.05
 def main() -> float:
     """Return the momentum along x right after the kick over the impulse that was given."""
     ball = co.ball("rubber", radius=0.04, at=(0, 0, 0.1))
-    engine = co.build_engine(
-        co.pose_problem(co.prepare_scene(co.build_scene(ball, gravity=(0, 0, 0))))
-    )
+    engine = co.build_engine(co.pose_problem(co.prepare_scene(co.build_scene(ball, gravity=(0, 0, 0)))))
     engine.advance(0.01)
     engine.apply_impulse(0, (0.0, 0.0, 0.1), (IMPULSE, 0.0, 0.0))
     engine.advance(0.03)

@@ -6,10 +6,7 @@ from pathlib import Path
 
 import corporeal as co
 
-SETTINGS = co.Settings(
-    assemble=co.AssembleConfig(duration=0.1, fps=10),
-    video=co.VideoConfig(width=160, height=120),
-)
+SETTINGS = co.Settings(assemble=co.AssembleConfig(duration=0.1, fps=10), video=co.VideoConfig(width=160, height=120))
 
 
 def main() -> float:

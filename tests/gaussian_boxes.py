@@ -35,9 +35,7 @@ def box(sides, middle, colour):
         rotation=rotation.astype(np.float32),
         scale=np.tile(np.float32([0.6, 0.6, 0.1]) * np.float32(SPACING), (count, 1)),
         opacity=np.full(count, 0.98, np.float32),
-        sh=np.tile(
-            ((np.float32(colour) - np.float32(0.5)) / np.float32(SH_DC_COEFFICIENT)), (count, 1, 1)
-        ),
+        sh=np.tile(((np.float32(colour) - np.float32(0.5)) / np.float32(SH_DC_COEFFICIENT)), (count, 1, 1)),
     )
 
 

@@ -46,9 +46,7 @@ class Maker:
 
     def view(self, data):
         self.binary += b"\0" * (-len(self.binary) % 4)
-        self.json["bufferViews"].append(
-            {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
-        )
+        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)})
         self.binary += data
         return len(self.json["bufferViews"]) - 1
 

@@ -67,9 +67,7 @@ def on_slab(block, seed=0, side=256):
         Surface(name, k, k, v, t, uv=uv)
         for k, (name, (v, t, uv)) in enumerate(zip(("slab", "block"), made, strict=True))
     )
-    finishes = tuple(
-        Finish(f"look{k}", texture=blots(seed + k, (512, side)[k]), roughness=1.0) for k in range(2)
-    )
+    finishes = tuple(Finish(f"look{k}", texture=blots(seed + k, (512, side)[k]), roughness=1.0) for k in range(2))
     things = (SceneObject("slab", "slab", 0.6), SceneObject("block", "block", 0.12))
     return Scene("patterned", "made by a test", things, surfaces, finishes)
 
@@ -77,9 +75,7 @@ def on_slab(block, seed=0, side=256):
 def ring(angles, size=(400, 300), height=0.35, away=0.5):
     """Aims from a circle [deg] above the slab, at the block."""
     return [
-        CameraAim(
-            (away * np.cos(a), away * np.sin(a), height), (0.0, 0.0, 0.04), 38.0, size[0], size[1]
-        )
+        CameraAim((away * np.cos(a), away * np.sin(a), height), (0.0, 0.0, 0.04), 38.0, size[0], size[1])
         for a in np.radians(angles)
     ]
 

@@ -37,9 +37,7 @@ def grounded(scene, folder):
 
 def check_answered(scene, inventory):
     """Nothing was asked of anybody, and nothing that matters stayed open."""
-    assert {(r["by"], r["model"]) for r in inventory.transcript} == {
-        ("recording", "by hand, from the sheets")
-    }
+    assert {(r["by"], r["model"]) for r in inventory.transcript} == {("recording", "by hand, from the sheets")}
     asked = {(r["task"], r["scene"]) for r in inventory.transcript}
     assert {("materials", f"{scene.name}/{o.name}") for o in scene.objects} <= asked
     assert {("mass", f"{scene.name}/{o.name}") for o in scene.objects} <= asked
@@ -79,9 +77,7 @@ def _check_part(leaf, said, placed):
         assert words.reason == made["reason"]
         assert structure.kind == KINDS[made["built"]]
         assert structure.solidity == (made["solidity"] or 1.0)
-        assert {h.probability for h in words.hypotheses} == {
-            way["probability"] for way in said["ways"]
-        }
+        assert {h.probability for h in words.hypotheses} == {way["probability"] for way in said["ways"]}
         assert placed is not None
         places = {v["quantity"]: v for v in placed["values"]}
         inside = places.pop("contents_density", None)

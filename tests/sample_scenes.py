@@ -16,9 +16,7 @@ def scene(*objects, name="hand-made"):
         things.append(SceneObject(thing, words, real_extent=1.0))
         for surface, finish, extras in parts:
             finishes.append(finish)
-            surfaces.append(
-                Surface(surface, number, len(finishes) - 1, CORNER, FACES, extras=extras)
-            )
+            surfaces.append(Surface(surface, number, len(finishes) - 1, CORNER, FACES, extras=extras))
     return Scene(name, "by hand", tuple(things), tuple(surfaces), tuple(finishes))
 
 

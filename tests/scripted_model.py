@@ -27,10 +27,7 @@ def decomposed(*options):
     return {
         "object": "a thing",
         "decompositions": [
-            {
-                "parts": [{"name": n, "look": "plain", "seen": "yes"} for n in names],
-                "why": "So it looks.",
-            }
+            {"parts": [{"name": n, "look": "plain", "seen": "yes"} for n in names], "why": "So it looks."}
             for names in options
         ],
     }
@@ -39,10 +36,7 @@ def decomposed(*options):
 def offered(question):
     """Part → quantities, as a placement question lists them."""
     blocks = re.split(r"^Part ", question.lists["ranges"], flags=re.MULTILINE)[1:]
-    return {
-        block.split(":\n", 1)[0]: re.findall(r"^- (\w+): ", block, flags=re.MULTILINE)
-        for block in blocks
-    }
+    return {block.split(":\n", 1)[0]: re.findall(r"^- (\w+): ", block, flags=re.MULTILINE) for block in blocks}
 
 
 def everywhere(fraction):
@@ -51,10 +45,7 @@ def everywhere(fraction):
     def answer(question):
         return {
             "parts": [
-                {
-                    "part": name,
-                    "values": [{"quantity": q, "fraction": fraction} | SIMPLE for q in quantities],
-                }
+                {"part": name, "values": [{"quantity": q, "fraction": fraction} | SIMPLE for q in quantities]}
                 for name, quantities in offered(question).items()
             ]
         }

@@ -35,10 +35,7 @@ except SystemExit:
 @pytest.mark.parametrize(
     ("done", "unwanted"),
     [
-        (
-            HELP,
-            "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline.run_pipeline",
-        ),
+        (HELP, "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline.run_pipeline"),
         # What a run of a model has imported when its first verb begins.
         (
             "import corporeal.cli.validate_settings, corporeal.pipeline.run_pipeline",
@@ -100,20 +97,14 @@ MISTAKES = {
     "no radius": (lambda: co.cylinder("sand", float("nan"), 1), "The radius of cylinder is nan"),
     "flat box": (lambda: co.box("wood", (1, 1, 0)), "The height of box is 0.0"),
     "two sides": (lambda: co.box("wood", (1, 1)), "Give three finite numbers"),
-    "endless speed": (
-        lambda: co.ball("rubber", 0.1, velocity=(0, 0, float("inf"))),
-        "velocity of ball is",
-    ),
+    "endless speed": (lambda: co.ball("rubber", 0.1, velocity=(0, 0, float("inf"))), "velocity of ball is"),
     "open mesh": (lambda: co.solid("wood", CUBE, np.array([[0, 1, 2]])), "solid is not closed"),
     "nothing": (lambda: co.build_scene(), "at least one solid"),
     "in the floor": (
         lambda: co.build_scene(co.ball("rubber", 0.1, at=(0, 0, 0))),
         "ball reaches 0.1 m below the floor",
     ),
-    "no time": (
-        lambda: co.build_scene(co.ball("rubber", 0.1), duration=0),
-        "The duration of scene is 0",
-    ),
+    "no time": (lambda: co.build_scene(co.ball("rubber", 0.1), duration=0), "The duration of scene is 0"),
     "no file": (lambda: co.load_scene("absent.glb"), "No such file: absent.glb. Check the path."),
 }
 
@@ -147,9 +138,7 @@ def test_frames_without_a_folder_go_with_the_result():
 
 
 def test_a_scene_that_was_written_is_loaded_as_it_was(tmp_path):
-    made = co.build_scene(
-        co.ball("steel", 0.05, velocity=(1, 0, 0)), co.box("wood", (1, 1, 1), (2, 0, 0.5))
-    )
+    made = co.build_scene(co.ball("steel", 0.05, velocity=(1, 0, 0)), co.box("wood", (1, 1, 1), (2, 0, 0.5)))
     co.write_glb(tmp_path / "two.glb", made)
     again = co.load_scene(tmp_path / "two.glb")
     assert [o.velocity for o in again.objects] == [o.velocity for o in made.objects]

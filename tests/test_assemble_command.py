@@ -32,15 +32,7 @@ def test_a_folder_of_models_becomes_a_certified_scene_with_views(typed, tmp_path
         *("scene.glb", "scene.toml", "certificate.json", "composition.json", "views")
     }
     proof = json.loads((folder / "certificate.json").read_text())
-    assert {
-        "drift_m",
-        "penetration_m",
-        "extent_m",
-        "seed",
-        "attempts",
-        "seconds",
-        "objects",
-    } <= set(proof)
+    assert {"drift_m", "penetration_m", "extent_m", "seed", "attempts", "seconds", "objects"} <= set(proof)
     assert len(json.loads((folder / "views" / "transforms.json").read_text())["frames"]) == 2
     assert "corporeal run scenes/box-plank-0/scene.toml" in text.out
 

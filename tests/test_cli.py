@@ -87,9 +87,7 @@ def test_a_run_says_in_the_terminal_what_it_was_taken_for_and_that_nothing_moves
 
 
 def test_the_package_runs_as_a_module():
-    said = subprocess.run(
-        [sys.executable, "-m", "corporeal", "--version"], capture_output=True, text=True, check=True
-    )
+    said = subprocess.run([sys.executable, "-m", "corporeal", "--version"], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == __version__
 
 
@@ -158,9 +156,7 @@ def test_an_unknown_material_in_an_annotation_shows_the_menu(typed, tmp_path):
         (("--neutral", "water"), "liquid"),
     ],
 )
-def test_settings_that_cannot_be_right_are_refused_before_anything_is_done(
-    typed, tmp_path, words, told
-):
+def test_settings_that_cannot_be_right_are_refused_before_anything_is_done(typed, tmp_path, words, told):
     write_glb(tmp_path / "box.glb", a_box())
     refused(typed("run", "box.glb", *words), told)
     assert not (tmp_path / "runs").exists()
@@ -198,9 +194,7 @@ def test_help_is_there_for_every_verb(typed):
         assert verb in text.out
 
 
-def test_who_is_asked_is_said_in_one_word_and_what_is_missing_in_one_line(
-    typed, tmp_path, monkeypatch
-):
+def test_who_is_asked_is_said_in_one_word_and_what_is_missing_in_one_line(typed, tmp_path, monkeypatch):
     monkeypatch.delenv("OPENAI_API_KEY", raising=False)
     write_glb(tmp_path / "box.glb", a_box())
     ask = ("run", "box.glb", "--view-size", 32, "--vlm")

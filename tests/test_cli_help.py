@@ -158,16 +158,7 @@ def test_an_option_of_another_sub_command_is_refused(command):
     assert "--anonymous" in said.err
 
 
-HEAVY = (
-    "warp",
-    "numba",
-    "scipy",
-    "igl",
-    "embreex",
-    "trimesh",
-    "pydantic",
-    "corporeal.pipeline.run_pipeline",
-)
+HEAVY = ("warp", "numba", "scipy", "igl", "embreex", "trimesh", "pydantic", "corporeal.pipeline.run_pipeline")
 
 
 @pytest.mark.parametrize("words", [["--version"], ["run", "--help"]])

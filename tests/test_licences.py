@@ -29,10 +29,7 @@ def typed(monkeypatch, tmp_path, command):
 
 def a_pool(folder):
     """Two models: of one a table says whose it is, of the other its own file."""
-    for name, sides, asset in (
-        ("box", (0.3, 0.3, 0.3), {}),
-        ("plank", (0.4, 0.1, 0.2), {"copyright": BY_FILE}),
-    ):
+    for name, sides, asset in (("box", (0.3, 0.3, 0.3), {}), ("plank", (0.4, 0.1, 0.2), {"copyright": BY_FILE})):
         fine = trimesh.creation.box(sides).subdivide().subdivide()
         (folder / name).mkdir(parents=True)
         (folder / name / f"{name}.glb").write_bytes(glb(fine.vertices, fine.faces, **asset))
@@ -44,9 +41,7 @@ def a_pool(folder):
 
 def told_by(video):
     """What players show of a video's tags."""
-    probe = subprocess.run(
-        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(video)], capture_output=True, text=True
-    ).stderr
+    probe = subprocess.run([imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(video)], capture_output=True, text=True).stderr
     said = dict(line.split(":", 1) for line in probe.splitlines() if ":" in line)
     return {key.strip(): value.strip() for key, value in said.items()}
 

@@ -95,9 +95,7 @@ def described(folder, name, parts, finishes=("material",)):
     inventory = describe(scene)
     found = segment(scene, inventory)
     field, leaf = ground(scene, found, inventory), find_material("leaf_tissue")
-    makes = part_models(
-        scene, measure_objects(scene, found, 0), field, leaf.pick(leaf.typical()), 0
-    )
+    makes = part_models(scene, measure_objects(scene, found, 0), field, leaf.pick(leaf.typical()), 0)
     return field.words, [makes[k].mass for k in range(len(found.catalogue))]
 
 

@@ -65,9 +65,7 @@ def spread(mesh, answered_by):
 def test_a_modelled_shape_is_in_doubt_only_where_a_name_alone_tells_what_it_is():
     """Gold's density is known to .1 %; what was drawn of it is not."""
     modelled = trimesh.creation.icosphere(2, RADIUS)
-    assert spread(modelled, "metadata") == pytest.approx(
-        2 * 1.645 * MODELLED_SHAPE_VOLUME_LOG_STD, rel=0.25
-    )
+    assert spread(modelled, "metadata") == pytest.approx(2 * 1.645 * MODELLED_SHAPE_VOLUME_LOG_STD, rel=0.25)
     assert spread(modelled, "model") < 0.02
     scanned = trimesh.creation.icosphere(4, RADIUS)  # its edges leave it open, its form does not
     assert spread(scanned, "metadata") == pytest.approx(spread(scanned, "model"), rel=0.1)
@@ -78,9 +76,7 @@ def a_ball(*ways, evidence=None, **said):
     scene = one_thing(MESH, "ball", 0.1)
     inventory = describe(scene)
     (part,) = inventory.objects[0].parts
-    words = replace(
-        apply_hypothesis(PartDescription(part.name, None), ways[0]), hypotheses=ways, **said
-    )
+    words = replace(apply_hypothesis(PartDescription(part.name, None), ways[0]), hypotheses=ways, **said)
     words = replace(words, answered_by="model", built_by="model")
     objects = (ObjectDescription("ball_0", "ball", (words,), evidence=evidence),)
     inventory = replace(inventory, objects=objects)
@@ -156,10 +152,7 @@ def test_evidence_that_is_plainly_wrong_moves_nothing_by_a_silent_factor():
 
 def test_a_printed_net_weight_counts_once_however_often_it_is_printed():
     ounce = 0.028349523125
-    facts = (
-        PrintedFact("net weight", 0.305, "305 g"),
-        PrintedFact("net weight", 10.75 * ounce, "10 3/4 OZ"),
-    )
+    facts = (PrintedFact("net weight", 0.305, "305 g"), PrintedFact("net weight", 10.75 * ounce, "10 3/4 OZ"))
     masses = np.geomspace(0.1, 1.0, 200)
     wide = MassEvidence(0.01, 0.3, 9.0, "Who knows.")
     once = mass_likelihood(masses, replace(wide, printed=facts[:1]))
@@ -188,19 +181,11 @@ def test_a_cover_with_a_core_weighs_both():
     """The fault of the first round: a share of 0 for what lies inside erased a shell there."""
     scale, inventory = a_ball(STEEL)
     cover = PartDescription("cover", "leather", "sheet", volume_share=1.0, surface_share=1.0)
-    shell = PartDescription(
-        "shell", "steel", "hollow", volume_share=0.9, surface_share=0.9, inside="cover"
-    )
+    shell = PartDescription("shell", "steel", "hollow", volume_share=0.9, surface_share=0.9, inside="cover")
     whole = replace(inventory.objects[0].parts[0], pieces=(replace(cover, inner_share=0.9), shell))
-    inventory = replace(
-        inventory, objects=(replace(inventory.objects[0], parts=(replace(whole, hypotheses=()),)),)
-    )
+    inventory = replace(inventory, objects=(replace(inventory.objects[0], parts=(replace(whole, hypotheses=()),)),))
     both = scale.mass(inventory)
-    area, leather, steel = (
-        MESH.area,
-        materials.find_material("leather"),
-        materials.find_material("steel"),
-    )
+    area, leather, steel = (MESH.area, materials.find_material("leather"), materials.find_material("steel"))
     skin = leather.ranges["density"].typical * area * leather.ranges["shell_thickness"].typical
     wall = steel.ranges["density"].typical * 0.9 * area * steel.ranges["shell_thickness"].typical
     assert both == pytest.approx(skin + wall, rel=0.05)
@@ -208,12 +193,8 @@ def test_a_cover_with_a_core_weighs_both():
 
 def test_a_solid_weighs_less_by_what_lies_inside_it():
     scale, inventory = a_ball(STEEL)
-    body = PartDescription(
-        "body", "ABS", "solid", volume_share=1.0, surface_share=1.0, inner_share=0.3
-    )
-    core = PartDescription(
-        "core", "steel", "solid", volume_share=0.3, surface_share=0.4, inside="body"
-    )
+    body = PartDescription("body", "ABS", "solid", volume_share=1.0, surface_share=1.0, inner_share=0.3)
+    core = PartDescription("core", "steel", "solid", volume_share=0.3, surface_share=0.4, inside="body")
     whole = replace(inventory.objects[0].parts[0], pieces=(body, core), hypotheses=())
     inventory = replace(inventory, objects=(replace(inventory.objects[0], parts=(whole,)),))
     abs_, steel = (materials.find_material(n).ranges["density"].typical for n in ("ABS", "steel"))
@@ -320,9 +301,7 @@ def test_a_wall_as_thick_as_a_scan_draws_it_is_as_open_as_the_scan():
     """Noise moves both faces outwards: a drawn wall swells, one of a known thickness does not."""
     scale, inventory = scanned_bowl()
     field = ground(scale.scene, scale.parts, inventory, scale.grounding)
-    assert scale.of(field, [VolumeLeeway(1.2)])[0] == pytest.approx(
-        1.2 * scale.of(field)[0], rel=1e-6
-    )
+    assert scale.of(field, [VolumeLeeway(1.2)])[0] == pytest.approx(1.2 * scale.of(field)[0], rel=1e-6)
     (words,) = inventory.objects[0].parts
     stated = replace(words, thickness=0.004)
     inventory = replace(inventory, objects=(ObjectDescription("bowl_0", "bowl", (stated,)),))
@@ -336,16 +315,11 @@ def test_an_ensemble_draws_ways_as_often_as_the_evidence_leaves_them_likely():
     believed = weigh(STEEL, SHELL, evidence=judged(light))
 
     def hollow(mixtures):
-        made = [
-            sample_hypotheses(inventory, mixtures, np.random.default_rng(k), "default")
-            for k in range(300)
-        ]
+        made = [sample_hypotheses(inventory, mixtures, np.random.default_rng(k), "default") for k in range(300)]
         return np.mean([m.objects[0].parts[0].structure == "hollow" for m in made])
 
     assert hollow(()) == pytest.approx(0.4, abs=0.08)
-    assert hollow(believed.mixtures) == pytest.approx(
-        believed.mixtures[0].hypotheses[0].probability, abs=0.04
-    )
+    assert hollow(believed.mixtures) == pytest.approx(believed.mixtures[0].hypotheses[0].probability, abs=0.04)
 
 
 def test_weighted_quantiles():

@@ -98,9 +98,7 @@ def weighed_by(tmp_path_factory):
     return weighed
 
 
-@pytest.mark.parametrize(
-    ("name", "life", "unit"), [(n, m, u) for n, _, m, u in THINGS], ids=[t[0] for t in THINGS]
-)
+@pytest.mark.parametrize(("name", "life", "unit"), [(n, m, u) for n, _, m, u in THINGS], ids=[t[0] for t in THINGS])
 def test_a_thing_by_its_name_weighs_what_such_things_do_or_is_doubted(weighed_by, name, life, unit):
     found = weighed_by(name)
     low, high = life

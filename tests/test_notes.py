@@ -6,22 +6,10 @@ import pickle
 import pytest
 
 from corporeal.core import store
-from corporeal.core.types import (
-    Inventory,
-    Note,
-    NoteKind,
-    note_kind,
-    note_kinds,
-    notes_with_kinds,
-    with_text,
-)
+from corporeal.core.types import Inventory, Note, NoteKind, note_kind, note_kinds, notes_with_kinds, with_text
 from corporeal.io.input_files import unused_nested_images_note
 from corporeal.io.photos.image_loader import unusable_photos_notes
-from corporeal.multiview.metric_scale import (
-    choose_metric_scale,
-    scale_from_distance,
-    scale_from_file,
-)
+from corporeal.multiview.metric_scale import choose_metric_scale, scale_from_distance, scale_from_file
 from corporeal.pipeline.stages.fill import name_objects
 from corporeal.recognition.length_unit_inference import InferredUnit, unit_notes
 from corporeal.recognition.typical_extents import extent_warning
@@ -73,7 +61,8 @@ def test_each_is_of_the_kind_that_it_is_meant_to_be(tmp_path):
             extent_warning("duck_0", "duck", 100.0), *unit_notes([unit]), *choose_metric_scale(size=10.0).warnings
         ],
         NoteKind.LEFT_OUT: [
-            *unusable_photos_notes(9, [("a.jpg", "is black")]), *unused_nested_images_note(tmp_path, [tmp_path / "a.jpg"])
+            *unusable_photos_notes(9, [("a.jpg", "is black")]),
+            *unused_nested_images_note(tmp_path, [tmp_path / "a.jpg"]),
         ],
         NoteKind.GRAVE: [*choose_metric_scale(measured, (), scale_from_file("A capture"), ()).warnings],
     }  # fmt: skip

@@ -33,9 +33,7 @@ pytestmark = pytest.mark.slow
 def views():
     """Photographs of a red crate and a blue brick beside it."""
     colours = ((0.6, 0.05, 0.04, 1.0), (0.05, 0.1, 0.6, 1.0))
-    surfaces = tuple(
-        Surface(name, k, k, CORNERS * SIDES[k] + PLACES[k], FACES) for k, name in enumerate(NAMES)
-    )
+    surfaces = tuple(Surface(name, k, k, CORNERS * SIDES[k] + PLACES[k], FACES) for k, name in enumerate(NAMES))
     things = tuple(SceneObject(n, n, max(s)) for n, s in zip(NAMES, SIDES, strict=True))
     finishes = tuple(Finish(n, c) for n, c in zip(NAMES, colours, strict=True))
     scene = Scene("pair", "", things, surfaces, finishes)
@@ -47,9 +45,7 @@ def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "PANEL_SIZE_PX", (130, 98))
     monkeypatch.setitem(
-        training_schedule.TRAINING_PRESETS,
-        "draft",
-        training_schedule.TrainingPreset(4000, 1, 300, 128),
+        training_schedule.TRAINING_PRESETS, "draft", training_schedule.TrainingPreset(4000, 1, 300, 128)
     )
     return command
 
@@ -68,9 +64,7 @@ def colmap(folder, views, matrix):
 
 def test_photographs_become_a_video_of_things_that_fall(typed, views, tmp_path):
     write_views(tmp_path / "photos", views)
-    code, said = typed(
-        "run", "photos", "--object-names", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL
-    )
+    code, said = typed("run", "photos", "--object-names", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL)
     assert code == 0, said.err
     run = tmp_path / "runs" / "photos"
     report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())

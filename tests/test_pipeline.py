@@ -22,9 +22,7 @@ def silent(verb):
 
 
 def test_a_run_remembers_what_it_was_asked(tmp_path):
-    wanted = Settings(
-        describe=DescribeConfig(annotations=Path("said.yaml")), fill=FillConfig(detail="fine")
-    )
+    wanted = Settings(describe=DescribeConfig(annotations=Path("said.yaml")), fill=FillConfig(detail="fine"))
     with pytest.raises(UserError):
         run([tmp_path / "nowhere.glb"], tmp_path / "run", wanted, silent)
     asked = read_run_request(tmp_path / "run")
@@ -130,9 +128,7 @@ def building(monkeypatch, tmp_path):
     return tmp_path / "cache" / "scenes", built
 
 
-def test_a_scene_of_our_own_is_built_once_for_each_state_of_the_code(
-    building, tmp_path, monkeypatch
-):
+def test_a_scene_of_our_own_is_built_once_for_each_state_of_the_code(building, tmp_path, monkeypatch):
     kept, built = building
     for run_name in ("a", "b"):
         path = run_pipeline.write_cached_showcase("duck-on-mud", tmp_path / run_name)

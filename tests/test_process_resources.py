@@ -27,8 +27,7 @@ def test_an_affinity_mask_counts(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "most"),
-    [("50000 100000\n", 1), ("max 100000\n", None), ("nonsense", None), ("150000 100000", 2)],
+    ("text", "most"), [("50000 100000\n", 1), ("max 100000\n", None), ("nonsense", None), ("150000 100000", 2)]
 )
 def test_a_quota_counts(tmp_path, text, most):
     free = usable_cores(tmp_path / "none")
@@ -36,9 +35,7 @@ def test_a_quota_counts(tmp_path, text, most):
     assert usable_cores(tmp_path / "cpu.max") == min(most or free, free)
 
 
-@pytest.mark.parametrize(
-    ("text", "most"), [("1", 1), ("1,2", 1), ("0", None), ("many", None), ("", None)]
-)
+@pytest.mark.parametrize(("text", "most"), [("1", 1), ("1,2", 1), ("0", None), ("many", None), ("", None)])
 def test_a_wish_in_the_environment_counts(tmp_path, monkeypatch, text, most):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     free = usable_cores(tmp_path / "none")
@@ -98,8 +95,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 def test_an_array_takes_the_pages_that_the_last_one_freed():
     quiet = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
     usual, kept = (
-        int(subprocess.check_output([sys.executable, "-c", FAULTS, how], env=quiet))
-        for how in ("usual", "keep")
+        int(subprocess.check_output([sys.executable, "-c", FAULTS, how], env=quiet)) for how in ("usual", "keep")
     )
     assert kept < 0.1 * usual
 

@@ -39,9 +39,7 @@ def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, 
     assert verb.line(now) == said
 
 
-@pytest.mark.parametrize(
-    ("seconds", "said"), [(1.4, "1 s"), (89.0, "89 s"), (90.0, "2 min"), (9000.0, "2.5 h")]
-)
+@pytest.mark.parametrize(("seconds", "said"), [(1.4, "1 s"), (89.0, "89 s"), (90.0, "2 min"), (9000.0, "2.5 h")])
 def test_times_are_said_as_people_say_them(seconds, said):
     assert duration_words(seconds) == said
 
@@ -71,12 +69,7 @@ def test_a_log_has_a_line_where_a_verb_begins_and_ends():
         assert where.waits_for("fill begins")
         tell("video")
         assert where.waits_for("video begins")
-    assert where.getvalue().splitlines() == [
-        "fill begins",
-        "fill done in 0 s",
-        "video begins",
-        "video done in 0 s",
-    ]
+    assert where.getvalue().splitlines() == ["fill begins", "fill done in 0 s", "video begins", "video done in 0 s"]
 
 
 def test_what_is_over_at_once_is_not_worth_a_line():

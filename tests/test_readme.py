@@ -30,9 +30,7 @@ def test_the_library_is_as_large_as_it_says():
 
 
 def test_rebounds_are_counted_as_their_page_counts_them():
-    said = re.search(
-        r"of (\d+) rebounds of real objects (\d+) lie within", (ROOT / "README.md").read_text()
-    )
+    said = re.search(r"of (\d+) rebounds of real objects (\d+) lie within", (ROOT / "README.md").read_text())
     text = (ROOT / "docs/reference/restitution-validation.md").read_text()
     page = re.search(r"Of the (\d+) other rows (\d+) are", text)
     assert said is not None

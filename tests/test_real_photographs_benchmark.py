@@ -81,9 +81,7 @@ def test_errors_of_poses_do_not_see_a_similarity_but_a_wrong_camera(sets, tmp_pa
     poses[3][:3, 3] += 0.5
     way = similarity_matrix(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), 0.3, (4.0, 5.0, 6.0))
     made = [Camera(s.K, w, s.width, s.height) for s, w in zip(cameras, poses, strict=True)]
-    write_colmap(
-        tmp_path, apply_similarity_to_cameras(made, way), tuple(i.name for i in given.images)
-    )
+    write_colmap(tmp_path, apply_similarity_to_cameras(made, way), tuple(i.name for i in given.images))
     found = measure.pose_errors(read_colmap(tmp_path), given)
     assert found.registered == COUNT and found.right == COUNT - 1
     assert found.angle < 1e-3 and found.place < 1e-4
@@ -106,8 +104,7 @@ def test_a_size_is_compared_with_both_yardsticks():
 def test_sides_are_of_all_things_together_and_volume_is_of_the_largest():
     box = trimesh.creation.box((1, 1, 1))
     things = tuple(
-        Mesh(np.array(box.vertices) * size + [x, 0, size / 2], np.array(box.faces))
-        for size, x in ((1.0, 0), (0.5, 2))
+        Mesh(np.array(box.vertices) * size + [x, 0, size / 2], np.array(box.faces)) for size, x in ((1.0, 0), (0.5, 2))
     )
     came = measure.Came(things, np.array([0, 0, 1.0]), things)
     row = measure.sizes(came, measure.Known(unit=0.1, sides=(0.275, 0.1, 0.1)))

@@ -65,9 +65,7 @@ def test_the_order_is_measured_as_it_is_said():
 
 
 def test_the_page_says_what_was_measured():
-    assert DOCS.read_text(encoding="utf-8") == page.markdown(), (
-        "python benchmarks/embedded.py --docs"
-    )
+    assert DOCS.read_text(encoding="utf-8") == page.markdown(), "python benchmarks/embedded.py --docs"
 
 
 @pytest.mark.parametrize("stem", SEEN_AGAIN)

@@ -21,18 +21,7 @@ sys.path.insert(0, str(Path(__file__).parent / "vlm"))
 from fake_server import FakeServer
 
 RED, BLUE, YELLOW = (0.8, 0.1, 0.1), (0.1, 0.2, 0.8), (0.9, 0.8, 0.1)
-SMALL = (
-    "--width",
-    "128",
-    "--height",
-    "96",
-    "--duration",
-    "0.05",
-    "--fps",
-    "20",
-    "--view-size",
-    "64",
-)
+SMALL = ("--width", "128", "--height", "96", "--duration", "0.05", "--fps", "20", "--view-size", "64")
 THINGS = (("post", "blue below, yellow above", 0.3), ("crate", "red", 0.4))
 MADE_OF = {"blue base": "steel", "yellow top": "rubber", "crate": "wood"}
 
@@ -66,10 +55,7 @@ def answer(text):
         "parts": [
             {
                 "part": block.split(":\n", 1)[0],
-                "values": [
-                    {"quantity": q} | place
-                    for q in re.findall(r"^- (\w+): ", block, flags=re.MULTILINE)
-                ],
+                "values": [{"quantity": q} | place for q in re.findall(r"^- (\w+): ", block, flags=re.MULTILINE)],
             }
             for block in blocks
         ]

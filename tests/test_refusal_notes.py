@@ -45,12 +45,8 @@ def test_notes_follow_the_sentence_of_a_run_that_is_refused(tmp_path, monkeypatc
 
 
 def test_masks_that_are_refused_say_what_was_doubted_before(tmp_path, monkeypatch):
-    found = gaussian_source._MasksFound(
-        None, (), (DOUBTED,), incomplete="not all of it can be told"
-    )
-    monkeypatch.setattr(
-        gaussian_source, "_find_source_poses", lambda *_: FoundPoses(tmp_path, (), (LEFT_OUT,))
-    )
+    found = gaussian_source._MasksFound(None, (), (DOUBTED,), incomplete="not all of it can be told")
+    monkeypatch.setattr(gaussian_source, "_find_source_poses", lambda *_: FoundPoses(tmp_path, (), (LEFT_OUT,)))
     monkeypatch.setattr(gaussian_source, "find_or_grow_masks", lambda *_: found)
     monkeypatch.setattr(gaussian_source, "pose_warnings", lambda _: ())
     with pytest.raises(UserError, match="not all of it can be told") as refusal:

@@ -74,9 +74,7 @@ def post_on_toy(folder):
         cube = trimesh.creation.box(size)
         place = np.array([0.0, 0.0, height])
         surfaces.append(Surface(name, k, k, cube.vertices + place, np.asarray(cube.faces)))
-        things.append(
-            SceneObject(name=f"cube_{k}", class_name=f"{name} cube", real_extent=max(size))
-        )
+        things.append(SceneObject(name=f"cube_{k}", class_name=f"{name} cube", real_extent=max(size)))
     folder.mkdir(parents=True)
     path = folder / "scene.glb"
     finishes = tuple(Finish(name) for _, _, name in boxes)
@@ -85,13 +83,9 @@ def post_on_toy(folder):
 
 
 @pytest.mark.slow
-def test_a_settled_scene_with_something_soft_is_at_rest_and_without_settling_it_is_not(
-    rest, tmp_path
-):
+def test_a_settled_scene_with_something_soft_is_at_rest_and_without_settling_it_is_not(rest, tmp_path):
     path = post_on_toy(tmp_path / "soft")
-    row, control = (
-        rest.measure(path, tmp_path / said, "draft", 0.15, said) for said in ("said", "no")
-    )
+    row, control = (rest.measure(path, tmp_path / said, "draft", 0.15, said) for said in ("said", "no"))
     assert row["objects"][0]["treatments"] == ["deformable"]
     assert row["settled"] is True
     assert row["objects"][1]["sank_dx"] > rest.STILL

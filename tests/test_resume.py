@@ -40,9 +40,7 @@ def a_scene(path: Path, duration: float) -> Path:
     """Write a steel cube that falls on a rubber one; return its path."""
     surfaces = tuple(
         Surface(name, k, 0, CORNERS * size + place, FACES, extras={"substance": name})
-        for k, (name, size, place) in enumerate(
-            [("rubber", 0.1, [0, 0, 0.001]), ("steel", 0.06, [0.02, 0.02, 0.13])]
-        )
+        for k, (name, size, place) in enumerate([("rubber", 0.1, [0, 0, 0.001]), ("steel", 0.06, [0.02, 0.02, 0.13])])
     )
     objects = tuple(SceneObject(f"{s.name}_0", "box", 0.1) for s in surfaces)
     scene = Scene("two", "", objects, surfaces, (Finish("red"),), duration=duration, fps=60)
@@ -87,11 +85,7 @@ def kill(process: subprocess.Popen) -> None:
 def told(folder: Path) -> dict[str, bytes]:
     """Every file of a simulation that follows from its inputs."""
     simulated = folder / run_pipeline.STAGE_FOLDERS["simulate"]
-    names = [
-        *sorted(simulated.glob("frames/*")),
-        simulated / "ledger.npz",
-        simulated / "audit.json",
-    ]
+    names = [*sorted(simulated.glob("frames/*")), simulated / "ledger.npz", simulated / "audit.json"]
     return {str(path.relative_to(simulated)): path.read_bytes() for path in names}
 
 

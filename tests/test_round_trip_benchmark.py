@@ -40,9 +40,7 @@ def test_large_pieces_that_are_told_as_one_are_all_named():
     assert list(_merged(foam)) == ["grey body and cushion"]
 
 
-@pytest.mark.parametrize(
-    ("rgb", "term"), [((200, 30, 30), "red"), ((10, 10, 10), "black"), ((200, 200, 195), "white")]
-)
+@pytest.mark.parametrize(("rgb", "term"), [((200, 30, 30), "red"), ((10, 10, 10), "black"), ((200, 200, 195), "white")])
 def test_colours_go_by_the_basic_terms(rgb, term):
     assert _called(np.array(rgb)) == term
 
@@ -76,8 +74,6 @@ def test_things_are_put_aside_by_a_hundredth_of_their_size(drum, tmp_path):
     scene = assemble([drum])
     aside = assemble([put_aside(StageResults(assemble=scene), drum, tmp_path, seed=1)])
     shift = object_boxes(aside)[0] - object_boxes(scene)[0]
-    assert np.linalg.norm(shift[0]) == pytest.approx(
-        ASIDE * np.ptp(object_boxes(scene)[0], axis=0).max()
-    )
+    assert np.linalg.norm(shift[0]) == pytest.approx(ASIDE * np.ptp(object_boxes(scene)[0], axis=0).max())
     np.testing.assert_allclose(shift[0], shift[1], atol=1e-9)
     assert shift[0, 2] == pytest.approx(0, abs=1e-9)  # what stands on the floor stays on it

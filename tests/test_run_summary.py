@@ -35,9 +35,7 @@ def test_what_would_break_is_said_where_the_video_shows_it_whole(tmp_path, capsy
     assert ("break" in text) == bool(told)
 
 
-@pytest.mark.parametrize(
-    ("count", "told"), [(6, "and 1 warning more:"), (7, "and 2 warnings more:")]
-)
+@pytest.mark.parametrize(("count", "told"), [(6, "and 1 warning more:"), (7, "and 2 warnings more:")])
 def test_warnings_that_are_left_out_are_counted_as_one_counts(tmp_path, capsys, count, told):
     warnings = tuple(f"Number {k}." for k in range(count))
     store.write_json(tmp_path / AUDIT_FILE, store.to_plain(run_audit(warnings=warnings)))
@@ -52,9 +50,7 @@ def test_what_a_run_says_last_is_in_order_of_weight(tmp_path, capsys):
         Note("Say more with --vlm.", NoteKind.ASSUMED),
         "It may be wrong.",
     )
-    store.write_json(
-        tmp_path / AUDIT_FILE, store.to_plain(run_audit(warnings=warnings, hints=("Still.",)))
-    )
+    store.write_json(tmp_path / AUDIT_FILE, store.to_plain(run_audit(warnings=warnings, hints=("Still.",))))
     show_summary(tmp_path)
     said = capsys.readouterr()
     assert (said.out + said.err).splitlines()[-4:] == [

@@ -53,9 +53,7 @@ def test_enums_nothing_and_infinity_come_back(tmp_path):
 def test_what_is_filled_comes_back_with_its_contents(tmp_path):
     syrup = Material("syrup", Law.NEO_HOOKEAN, 1e4, 0.49, 1330.0)
     made = Structure("filled", 4e-4, "said", contents=syrup, fill=0.9)
-    words = PartDescription(
-        "jar", "glass", "filled", contents="syrup", hypotheses=(Hypothesis("PET", "filled", 0.25),)
-    )
+    words = PartDescription("jar", "glass", "filled", contents="syrup", hypotheses=(Hypothesis("PET", "filled", 0.25),))
     store.save(tmp_path / "x.npz", {"made": made, "words": words})
     assert store.load(tmp_path / "x.npz") == {"made": made, "words": words}
 
@@ -147,10 +145,7 @@ def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkey
 def test_a_file_in_the_way_of_a_folder_is_one_clear_error(tmp_path):
     (tmp_path / "runs").write_text("")
     for folder in (tmp_path / "runs", tmp_path / "runs" / "scene"):
-        with (
-            pytest.raises(store.DiskError, match="a file is in its way"),
-            store.lock_folder(folder),
-        ):
+        with pytest.raises(store.DiskError, match="a file is in its way"), store.lock_folder(folder):
             pass
     nowhere = Path("/proc/nowhere")
     with pytest.raises(store.DiskError, match="no folder can be made"), store.lock_folder(nowhere):

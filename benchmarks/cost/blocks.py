@@ -62,11 +62,7 @@ def problem_of(drop: Drop) -> Problem:
     planes = (FLOOR,) if drop.floor else ()
     count = len(bodies) + len(planes)
     return Problem(
-        bodies,
-        CELL,
-        friction=np.full((count, count), 0.1),
-        restitution=np.zeros((count, count)),
-        planes=planes,
+        bodies, CELL, friction=np.full((count, count), 0.1), restitution=np.zeros((count, count)), planes=planes
     )
 
 

@@ -12,17 +12,7 @@ from pathlib import Path
 
 from cost.page import Result
 
-COLUMNS: tuple[str, ...] = (
-    "date",
-    "commit",
-    "law",
-    "particles",
-    "objects",
-    "which",
-    "threads",
-    "cpu_ns",
-    "ratio",
-)
+COLUMNS: tuple[str, ...] = ("date", "commit", "law", "particles", "objects", "which", "threads", "cpu_ns", "ratio")
 
 
 def rows(results: Sequence[Result], date: str, commit: str) -> list[dict[str, str]]:

@@ -184,11 +184,7 @@ def _find(results: list[Result], **wanted: Any) -> list[Result]:
     """All results of ours on the CPU that are as wanted; one cube on the floor unless told."""
     usual = {"objects": 1, "extent": 0, "floor": True, "device": "cpu", "heap": False}
     wanted = usual | {"engine": "corporeal"} | wanted
-    return [
-        r
-        for r in results
-        if all(getattr(r if k == "engine" else r.drop, k) == v for k, v in wanted.items())
-    ]
+    return [r for r in results if all(getattr(r if k == "engine" else r.drop, k) == v for k, v in wanted.items())]
 
 
 def _targets(results: list[Result]) -> list[tuple[str, ...]]:
@@ -244,9 +240,7 @@ def _linear(results: list[Result]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _judged(
-    what: str, value: float, unit: str, target: float | None = None, at_most: bool = False
-) -> tuple[str, ...]:
+def _judged(what: str, value: float, unit: str, target: float | None = None, at_most: bool = False) -> tuple[str, ...]:
     figure = f"{value:.0f} {unit}" if unit != "×" else f"{value:.2f} ×"
     if target is None:
         return what, figure, "", ""
@@ -279,9 +273,7 @@ def _particles(axes: Any, results: list[Result]) -> None:
     sizes = _series(results)
     axes.loglog([r.particles for r in sizes], [r.cost for r in sizes], "o-", color=BLUE)
     for r in sizes:
-        axes.annotate(
-            f"{r.cost:.0f}", (r.particles, r.cost), (0, 8), textcoords="offset points", ha="center"
-        )
+        axes.annotate(f"{r.cost:.0f}", (r.particles, r.cost), (0, 8), textcoords="offset points", ha="center")
     for r in _find(results, engine="genesis", threads=1):
         axes.loglog([r.particles], [r.cost], "s", color=RED)
         axes.annotate("genesis-world", (r.particles, r.cost), (8, -4), textcoords="offset points")
@@ -299,9 +291,7 @@ def _threads(axes: Any, results: list[Result]) -> None:
             axes.loglog(count, [first[t] for t in count], label=words, **style)
             axes.loglog(count, first[1] / count, ":", color=GREY)
 
-    for law, shade in zip(
-        Law, plt.get_cmap("viridis")(np.linspace(0.1, 0.85, len(Law))), strict=True
-    ):
+    for law, shade in zip(Law, plt.get_cmap("viridis")(np.linspace(0.1, 0.85, len(Law))), strict=True):
         line(_find(results, law=law, across=across), NAMES[law], marker="o", color=shade)
     line(_find(results, engine="genesis"), "genesis-world, corotated", marker="s", color=RED)
     axes.set(xlabel="threads (dotted: in proportion)", ylabel="ns per particle and substep")

@@ -21,9 +21,7 @@ class PhaseClock:
 
         """
         if watched.threads != 1:
-            raise UserError(
-                f"Phases are timed on one thread, not {watched.threads}: ask for --threads 1."
-            )
+            raise UserError(f"Phases are timed on one thread, not {watched.threads}: ask for --threads 1.")
         self.pool = watched.thread_pool
         phases = len(program.SCHEDULE)
         self.spent = np.zeros(phases + 1)

@@ -56,11 +56,7 @@ def two_cantilevers(cells: int, transfer: str = "flip") -> Cantilever:
         Stuff(density=7850.0),
         rigid=True,
     )
-    run = started(
-        problem(
-            beam, foot, cell=cell, friction=0.8, planes=[floor()], gravity=DOWN, transfer=transfer
-        )
-    )
+    run = started(problem(beam, foot, cell=cell, friction=0.8, planes=[floor()], gravity=DOWN, transfer=transfer))
     x, z = beam.position[:, 0], beam.position[:, 2] - low - HEIGHT / 2
     middle = np.abs(z) < 0.3 * cell
     groups = [
@@ -73,8 +69,7 @@ def two_cantilevers(cells: int, transfer: str = "flip") -> Cantilever:
     falls = crossing(path.time, 0.5 * sunk.max() - sunk)
     inside = (path.time >= falls[0]) & (path.time <= falls[-1])
     return Cantilever(
-        float(sunk[inside].mean() / bend_at(np.abs(x).max() / LENGTH)),
-        float((len(falls) - 1) / (falls[-1] - falls[0])),
+        float(sunk[inside].mean() / bend_at(np.abs(x).max() / LENGTH)), float((len(falls) - 1) / (falls[-1] - falls[0]))
     )
 
 

@@ -68,16 +68,7 @@ def body(
     n = len(points)
     numbers = {
         name: np.full(n, float(getattr(stuff, name)))
-        for name in (
-            "density",
-            "young",
-            "poisson",
-            "yield_stress",
-            "hardening",
-            "friction_angle",
-            "cohesion",
-            "loss",
-        )
+        for name in ("density", "young", "poisson", "yield_stress", "hardening", "friction_angle", "cohesion", "loss")
     }
     shear = stuff.young / (2 * (1 + stuff.poisson))
     extent = max(float(np.ptp(points, axis=0).max()), 1e-30)
@@ -198,12 +189,7 @@ def bricks(centre: tuple, size: tuple, spacing: float, turn: np.ndarray | None =
 
 
 def box(
-    centre: tuple,
-    size: tuple,
-    spacing: float,
-    fill: str = "bricks",
-    turn: np.ndarray | None = None,
-    **more,
+    centre: tuple, size: tuple, spacing: float, fill: str = "bricks", turn: np.ndarray | None = None, **more
 ) -> Body:
     """Fill a box with bricks in its own frame, or with a ``lattice`` of the world, or ``blue``."""
     if fill == "bricks":
@@ -220,9 +206,7 @@ def ball(centre: tuple, radius: float, spacing: float, fill: str = "lattice", **
     return body(points, 4 / 3 * np.pi * radius**3, **more)
 
 
-def cylinder(
-    centre: tuple, radius: float, height: float, spacing: float, fill: str = "lattice", **more
-) -> Body:
+def cylinder(centre: tuple, radius: float, height: float, spacing: float, fill: str = "lattice", **more) -> Body:
     """Fill an upright cylinder."""
     reach = float(np.hypot(radius, height / 2))
     points = _filled(fill, cylinder_sdf(centre, radius, height), centre, reach, spacing)
@@ -258,17 +242,10 @@ def ball_surface(centre: tuple, radius: float, count: int) -> Points:
     return np.array(centre) + radius * np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
 
 
-def round_rows(
-    normal: Points, along: Points, ball: float, arc: float, surface: Points
-) -> Float[np.ndarray, "N 12"]:
+def round_rows(normal: Points, along: Points, ball: float, arc: float, surface: Points) -> Float[np.ndarray, "N 12"]:
     """Say how a surface curves at points on it: see ``types.ROUNDING``."""
     rows = np.zeros((len(surface), CURVATURE_COLUMNS))
-    rows[:, :3], rows[:, 3:6], rows[:, 6:8], rows[:, 8] = (
-        normal,
-        along,
-        (ball, arc),
-        point_reach(surface),
-    )
+    rows[:, :3], rows[:, 3:6], rows[:, 6:8], rows[:, 8] = (normal, along, (ball, arc), point_reach(surface))
     rows[:, 9] = is_surrounded(rows, surface)
     rows[:, 10] = 1.0 / (ball + arc)
     rows[:, 11] = 1.0 / ball if ball > 0.0 else 0.0
@@ -283,9 +260,7 @@ def ball_rounding(centre: tuple, radius: float, surface: Points) -> Float[np.nda
     return round_rows(normal, along, radius, 0.0, surface)
 
 
-def box_surface(
-    centre: tuple, size: tuple, count: int = 9, turn: np.ndarray | None = None
-) -> Points:
+def box_surface(centre: tuple, size: tuple, count: int = 9, turn: np.ndarray | None = None) -> Points:
     """Spread points evenly on the faces of a box."""
     axis = np.linspace(-0.5, 0.5, count)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -62,19 +62,14 @@ def any_collision(quick: bool = False) -> Outcome:
     checks = []
     for name, (found, most) in margin.items():
         checks.append(absolute(f"momentum change, {name}", found.momentum, 0.0, most))
-        checks.append(
-            absolute(f"angular momentum change, {name}", found.angular_momentum, 0.0, most)
-        )
+        checks.append(absolute(f"angular momentum change, {name}", found.angular_momentum, 0.0, most))
     checks.append(absolute("momentum change, production with FLIP", usual.momentum, 0.0, 1e-5))
     grown = max(0.0, *(books.energy - 1 for books in (exact, fast, usual, stiff_in_bulk)))
     checks.append(absolute("growth of energy", grown, 0.0, 1e-3))
     words = (
-        "two soft balls, oblique, with friction, R/dx 3; APIC, and FLIP where said; energy also "
-        "with FLIP at ν = .49"
+        "two soft balls, oblique, with friction, R/dx 3; APIC, and FLIP where said; energy also with FLIP at ν = .49"
     )
-    return Outcome(
-        "1", "A collision conserves momentum and never gains energy", words, tuple(checks)
-    )
+    return Outcome("1", "A collision conserves momentum and never gains energy", words, tuple(checks))
 
 
 @dataclass(frozen=True)
@@ -97,9 +92,7 @@ def crowded_node(bodies: int, trials: int, sweeps: int = SWEEPS) -> NodeSolve:
         mass = 10 ** rng.uniform(-2, 2, bodies)
         before = rng.standard_normal((bodies, 3))
         still = np.zeros((bodies, 3))
-        movers = contact_impulses.Movers(
-            1 / mass, np.zeros((bodies, 3, 3)), still, before.copy(), still.copy()
-        )
+        movers = contact_impulses.Movers(1 / mass, np.zeros((bodies, 3, 3)), still, before.copy(), still.copy())
         contacts = _all_pairs(bodies, rng)
         contact_impulses.solve(contacts, movers, np.zeros(len(contacts.a)), sweeps)
         after, energy = movers.velocity, mass @ np.sum(before**2, axis=1)
@@ -120,9 +113,7 @@ def _all_pairs(bodies: int, rng: np.random.Generator) -> contact_impulses.Contac
     n = len(a)
     own = contact.unit(rng.standard_normal((bodies, 3)))
     normal = contact.unit(own[a] - own[c])
-    return contact_impulses.ContactList(
-        a, c, np.zeros((n, 3)), normal, np.zeros(n), np.full(n, 0.3)
-    )
+    return contact_impulses.ContactList(a, c, np.zeros((n, 3)), normal, np.zeros(n), np.full(n, 0.3))
 
 
 def node_of_many_bodies(quick: bool = False) -> Outcome:
@@ -164,9 +155,7 @@ class Collision:
     """Of the force at half its peak [s]."""
 
 
-def discs(
-    cells: int, angle: float = 0.0, contact: str = "multi", transfer: str = "flip"
-) -> Collision:
+def discs(cells: int, angle: float = 0.0, contact: str = "multi", transfer: str = "flip") -> Collision:
     """Let Sulsky's two discs meet: r = .2 m, E = 1 kPa, in plane strain between smooth walls.
 
     Args:
@@ -191,24 +180,17 @@ def discs(
         )
         for s in (-1, 1)
     ]
-    given = problem(
-        *sides, cell=cell, planes=walls(1, 0.0, 2 * cell), contact=contact, transfer=transfer
-    )
+    given = problem(*sides, cell=cell, planes=walls(1, 0.0, 2 * cell), contact=contact, transfer=transfer)
     return collision(given, 2.2, 2 * radius, 2 * 0.1 * np.sqrt(2), looks=240)
 
 
-def collision(
-    given: Problem, until: float, touching: float, speed: float, looks: int = 100
-) -> Collision:
+def collision(given: Problem, until: float, touching: float, speed: float, looks: int = 100) -> Collision:
     """Watch two bodies meet whose centres are ``touching`` [m] apart when they touch."""
     run = started(given)
     bodies = bodies_of(given)
     start = given.bodies[0].position.mean(axis=0)
     line = given.bodies[1].position.mean(axis=0) - start
-    behind = [
-        g[far_from(b.position @ line * side)]
-        for g, b, side in zip(bodies, given.bodies, (-1, 1), strict=True)
-    ]
+    behind = [g[far_from(b.position @ line * side)] for g, b, side in zip(bodies, given.bodies, (-1, 1), strict=True)]
     path = follow(run, until, looks, bodies + behind)
     apart = path.place[:, 1] - path.place[:, 0]
     distance = np.linalg.norm(apart, axis=1)
@@ -245,22 +227,8 @@ def two_discs(quick: bool = False) -> Outcome:
     checks = []
     for name, f, control in (("along the grid", found, glued), ("at 30°", tilted, None)):
         checks += [
-            absolute(
-                f"restitution, {name}",
-                f.restitution,
-                0.90,
-                0.02,
-                "",
-                control and control.restitution,
-            ),
-            absolute(
-                f"contact time, {name} [s]",
-                f.duration,
-                0.95,
-                0.03,
-                "s",
-                control and control.duration,
-            ),
+            absolute(f"restitution, {name}", f.restitution, 0.90, 0.02, "", control and control.restitution),
+            absolute(f"contact time, {name} [s]", f.duration, 0.95, 0.03, "s", control and control.duration),
             absolute(f"gap at first contact, {name} [dx]", f.gap, 0.0, 0.4, "dx"),
             absolute(f"spurious tangential, {name} [%]", 100 * f.tangential, 0.0, 3.0, "%"),
         ]
@@ -305,9 +273,7 @@ class Hertz:
         slow = np.sqrt(np.maximum(speed**2 - 0.8 * stiff * x**2.5 / mass, 0))
         middle = 0.5 * (slow[1:] + slow[:-1])
         width = 2 * np.sum(np.diff(x) / middle)
-        return cls(
-            float(depth), float(2.943 * depth / speed), float(stiff * depth**1.5), float(width)
-        )
+        return cls(float(depth), float(2.943 * depth / speed), float(stiff * depth**1.5), float(width))
 
 
 SPHERE, SPEED, RADIUS = Stuff(young=1e5, poisson=0.3, density=1000.0), 0.2, 0.2
@@ -328,8 +294,7 @@ def spheres(cells: int, fill: str = "blue", transfer: str = "flip") -> Collision
     far = near + np.array([2 * RADIUS + cell, 0.0, 0.0])
     volume = float(one.volume.sum())
     pair = [
-        body(one.position + place, volume, SPHERE, (v, 0.0, 0.0))
-        for place, v in ((near, SPEED / 2), (far, -SPEED / 2))
+        body(one.position + place, volume, SPHERE, (v, 0.0, 0.0)) for place, v in ((near, SPEED / 2), (far, -SPEED / 2))
     ]
     hertz = Hertz.of(RADIUS, SPHERE, SPEED)
     given = problem(*pair, cell=cell, transfer=transfer)

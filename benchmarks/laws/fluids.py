@@ -96,12 +96,7 @@ class Tank:
         friction[0, 1] = friction[1, 0] = ROUGH if self.rough else 0.0
         poured = body(points, float(np.prod(size)), stuff)
         return problem(
-            poured,
-            cell=self.cell,
-            friction=friction,
-            planes=planes,
-            gravity=self.gravity,
-            gravity_ramp=self.ramp,
+            poured, cell=self.cell, friction=friction, planes=planes, gravity=self.gravity, gravity_ramp=self.ramp
         )
 
     def started(self) -> Engine:

@@ -95,18 +95,8 @@ def _block_and_slab(given: Slope, cell: float, turn: np.ndarray) -> tuple[Body, 
     def at(x: float, z: float) -> tuple:
         return tuple(origin + turn @ np.array([x, 0.0, z]))
 
-    block = box(
-        at(0.13, thick + SIZE[2] / 2),
-        SIZE,
-        cell / 2,
-        given.fill,
-        turn,
-        stuff=stuff,
-        rigid=given.rigid,
-    )
-    slab = box(
-        at(long / 2, thick / 2), (long, wide, thick), cell / 2, given.fill, turn, stuff=stuff
-    )
+    block = box(at(0.13, thick + SIZE[2] / 2), SIZE, cell / 2, given.fill, turn, stuff=stuff, rigid=given.rigid)
+    slab = box(at(long / 2, thick / 2), (long, wide, thick), cell / 2, given.fill, turn, stuff=stuff)
     normal = turn[:, 2]
     return block, slab, Plane(tuple(normal), float(origin @ normal))
 
@@ -116,32 +106,17 @@ def sliding_block(quick: bool = False) -> Outcome:
     time = 0.5
     found = block_on_slab(Slope(), time)
     glued = block_on_slab(Slope(contact="single"), time)
-    checks = [
-        relative(
-            "slip of a soft block on a slab [m]",
-            found.distance,
-            slide(0.3, time),
-            2.0,
-            glued.distance,
-        ),
-    ]
+    checks = [relative("slip of a soft block on a slab [m]", found.distance, slide(0.3, time), 2.0, glued.distance)]
     if not quick:
         gentle = block_on_slab(Slope(ramp=0.1), time).distance
-        checks.append(
-            relative("the same, gravity grows in 0.1 s [m]", gentle, slide(0.3, time, 0.1), 2.0)
-        )
+        checks.append(relative("the same, gravity grows in 0.1 s [m]", gentle, slide(0.3, time, 0.1), 2.0))
         stiff = block_on_slab(Slope(rigid=True), time).distance
         checks.append(relative("slip of a rigid block on a slab [m]", stiff, slide(0.3, time), 2.0))
         # A tenth of its weight drives it: an error of friction shows ten times as large.
         near = NEAR * float(np.tan(SLOPE))
         lossy = block_on_slab(Slope(friction=near, ramp=0.1, loss=LOSS), time).distance
         checks.append(
-            relative(
-                f"slip at {NEAR} of the friction that holds, loss {LOSS} [m]",
-                lossy,
-                slide(near, time, 0.1),
-                3.0,
-            )
+            relative(f"slip at {NEAR} of the friction that holds, loss {LOSS} [m]", lossy, slide(near, time, 0.1), 3.0)
         )
     return Outcome(
         "7",
@@ -161,10 +136,7 @@ def sticking_block(quick: bool = False) -> Outcome:
         absolute("drift sideways [% dx]", 100 * found.drift, 0.0, 2.0, "% dx"),
     )
     return Outcome(
-        "8",
-        "A block sticks where friction exceeds the slope",
-        f"30°, μ = .8, gravity grows in 0.1 s; {time} s",
-        checks,
+        "8", "A block sticks where friction exceeds the slope", f"30°, μ = .8, gravity grows in 0.1 s; {time} s", checks
     )
 
 
@@ -175,13 +147,7 @@ def tilted_block(quick: bool = False) -> Outcome:
     blue = block_on_slab(Slope(tilt=20.0, fill="blue"), time)
     glued = None if quick else block_on_slab(Slope(tilt=20.0, contact="single"), time).distance
     checks = [
-        relative(
-            "slip, particles aligned with the block [m]",
-            aligned.distance,
-            slide(0.3, time),
-            2.0,
-            glued,
-        ),
+        relative("slip, particles aligned with the block [m]", aligned.distance, slide(0.3, time), 2.0, glued),
         relative("slip, blue-noise fill [m]", blue.distance, slide(0.3, time), 2.0),
     ]
     return Outcome(
@@ -213,9 +179,7 @@ def rolled(shape: str, friction: float, time: float) -> float:
     return 0.5 * G * np.sin(SLOPE) * time**2 / (1 + k)
 
 
-def round_body(
-    shape: str, friction: float, cells: int = 5, rigid: bool = False, time: float = 0.4
-) -> float:
+def round_body(shape: str, friction: float, cells: int = 5, rigid: bool = False, time: float = 0.4) -> float:
     """Release a ball or cylinder on a slope; how far it came, relative to the reference [-].
 
     A cylinder lies between smooth walls. What is soft lies on a soft slab that the floor holds; a
@@ -243,21 +207,12 @@ def _on_slab(shape: str, friction: float, cell: float) -> Problem:
     table = np.zeros((3 + len(sides), 3 + len(sides)))
     table[0, 1] = table[1, 0] = table[0, 2] = table[2, 0] = friction
     table[1, 2] = table[2, 1] = HELD
-    return problem(
-        round_one, slab, cell=cell, friction=table, planes=[ground, *sides], gravity=down_slope()
-    )
+    return problem(round_one, slab, cell=cell, friction=table, planes=[ground, *sides], gravity=down_slope())
 
 
 def _rigid_ball(friction: float, cell: float) -> Problem:
     centre = (0.13 * cell, 0.31 * cell, RADIUS)
-    steel = ball(
-        centre,
-        RADIUS,
-        cell / 2,
-        stuff=RUBBER,
-        rigid=True,
-        surface=ball_surface(centre, RADIUS, 5000),
-    )
+    steel = ball(centre, RADIUS, cell / 2, stuff=RUBBER, rigid=True, surface=ball_surface(centre, RADIUS, 5000))
     return problem(steel, cell=cell, friction=friction, planes=[floor()], gravity=down_slope())
 
 

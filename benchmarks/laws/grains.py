@@ -12,13 +12,7 @@ from laws.watching import started
 
 REPOSE = 30.0
 """Friction angle φ [degrees]."""
-SAND = Stuff(
-    law=Law.DRUCKER_PRAGER,
-    young=1e6,
-    poisson=0.3,
-    density=1500.0,
-    friction_angle=float(np.radians(REPOSE)),
-)
+SAND = Stuff(law=Law.DRUCKER_PRAGER, young=1e6, poisson=0.3, density=1500.0, friction_angle=float(np.radians(REPOSE)))
 ROUGH = 0.6
 """Friction of the floor: tan 31°, as rough as the sand."""
 LUBE = 1.24
@@ -56,14 +50,7 @@ def on_rough_floor(sand: Body, cell: float, ramp: float = 0.0) -> Problem:
     friction = np.zeros((4, 4))
     friction[0, 1] = friction[1, 0] = ROUGH
     corner = [Plane((1.0, 0.0, 0.0), 0.0), Plane((0.0, 1.0, 0.0), 0.0)]
-    return problem(
-        sand,
-        cell=cell,
-        friction=friction,
-        planes=[floor(), *corner],
-        gravity=DOWN,
-        gravity_ramp=ramp,
-    )
+    return problem(sand, cell=cell, friction=friction, planes=[floor(), *corner], gravity=DOWN, gravity_ramp=ramp)
 
 
 def settled(given: Problem, radius: float, time: float) -> Heap:

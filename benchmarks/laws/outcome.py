@@ -27,33 +27,22 @@ class Check:
         return bool(self.error <= self.target)
 
 
-def relative(
-    quantity: str, value: float, reference: float, percent: float, control: float | None = None
-) -> Check:
+def relative(quantity: str, value: float, reference: float, percent: float, control: float | None = None) -> Check:
     """Hold a value to a reference within so many percent."""
     error = 100 * abs(value / reference - 1)
     return Check(quantity, reference, value, error, percent, "%", control)
 
 
 def absolute(
-    quantity: str,
-    value: float,
-    reference: float,
-    margin: float,
-    unit: str = "",
-    control: float | None = None,
+    quantity: str, value: float, reference: float, margin: float, unit: str = "", control: float | None = None
 ) -> Check:
     """Hold a value to a reference within a margin."""
     return Check(quantity, reference, value, abs(value - reference), margin, unit, control)
 
 
-def at_least(
-    quantity: str, value: float, reference: float, least: float, control: float | None = None
-) -> Check:
+def at_least(quantity: str, value: float, reference: float, least: float, control: float | None = None) -> Check:
     """Hold a value to a floor below its ideal reference; what lies above the ideal errs too."""
-    return Check(
-        quantity, reference, value, abs(reference - value), round(reference - least, 9), "", control
-    )
+    return Check(quantity, reference, value, abs(reference - value), round(reference - least, 9), "", control)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from matplotlib import pyplot as plt  # the backend comes first
 MISSED = {
     "12b": "The reference depends on where the face lies on the grid: one field on this grid sinks "
     "by 5.25 mm with the face on a grid plane and by 5.82 mm off it, and tends to 5.6 mm with 12 "
-    "and 16 cells across the foam. That is 1 % more than ours and 4 % less than the reference.",
+    "and 16 cells across the foam. That is 1 % more than ours and 4 % less than the reference."
 }
 """Why a target is missed where it is."""
 

@@ -9,14 +9,7 @@ from laws.bodies import Stuff, cylinder, floor, problem
 from laws.outcome import Outcome, absolute, relative
 from laws.watching import started
 
-COPPER = Stuff(
-    law=Law.VON_MISES,
-    young=117e9,
-    poisson=0.35,
-    density=8930.0,
-    yield_stress=400e6,
-    hardening=100e6,
-)
+COPPER = Stuff(law=Law.VON_MISES, young=117e9, poisson=0.35, density=8930.0, yield_stress=400e6, hardening=100e6)
 LENGTH, RADIUS, SPEED, TIME = 32.4e-3, 3.2e-3, 227.0, 80e-6
 
 
@@ -43,9 +36,7 @@ def taylor_bar(cells: int, fill: str = "lattice") -> Mushroom:
     """
     cell = RADIUS / cells
     centre = (0.13 * cell, 0.31 * cell, LENGTH / 2)
-    bar = cylinder(
-        centre, RADIUS, LENGTH, cell / 2, fill, stuff=COPPER, velocity=(0.0, 0.0, -SPEED)
-    )
+    bar = cylinder(centre, RADIUS, LENGTH, cell / 2, fill, stuff=COPPER, velocity=(0.0, 0.0, -SPEED))
     run = started(problem(bar, cell=cell, planes=[floor()]))
     run.advance(TIME)
     now = run.snapshot()
@@ -73,7 +64,5 @@ def copper_bar(quick: bool = False) -> Outcome:
         relative("final radius of the foot [m]", found.radius, 7.07e-3, 5.0),
         absolute("largest plastic strain", found.strain, 2.875, 0.375),
     )
-    words = (
-        f"R/dx {cells}, {found.particles} particles, H = 100 MPa; middles of the published ranges"
-    )
+    words = f"R/dx {cells}, {found.particles} particles, H = 100 MPa; middles of the published ranges"
     return Outcome("15", "A copper bar mushrooms on a wall as Taylor's", words, checks)

@@ -35,11 +35,7 @@ def at_rest(history: History) -> Rest:
     last = history.measures[-1]
     weight = last.mass.sum() * G * (last.time - 0.5 * RAMP)
     held = last.plane_impulse[0].sum(axis=0)[2]
-    return Rest(
-        float(np.abs(moved[:, :, :2]).max()),
-        float(np.abs(later).max()),
-        float(held / weight),
-    )
+    return Rest(float(np.abs(moved[:, :, :2]).max()), float(np.abs(later).max()), float(held / weight))
 
 
 def cubes(count: int, rigid: bool) -> list[Body]:
@@ -55,14 +51,7 @@ def cubes(count: int, rigid: bool) -> list[Body]:
 def standing(count: int, rigid: bool, time: float = 1.0) -> Rest:
     """Let cubes stand on one another on the floor."""
     run = started(
-        problem(
-            *cubes(count, rigid),
-            cell=CELL,
-            friction=0.5,
-            planes=[floor()],
-            gravity=DOWN,
-            gravity_ramp=RAMP,
-        )
+        problem(*cubes(count, rigid), cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=RAMP)
     )
     return at_rest(watch(run, time, 40))
 
@@ -72,9 +61,7 @@ def braked(rigid: bool) -> float:
     size, speed, mu = (0.2, 0.1, 0.1), 1.5, 0.3
     centre = (0.1, 0.3 * CELL, 0.05)
     skin = box_surface(centre, size, 17) if rigid else None
-    block = box(
-        centre, size, CELL / 2, stuff=RUBBER, rigid=rigid, surface=skin, velocity=(speed, 0.0, 0.0)
-    )
+    block = box(centre, size, CELL / 2, stuff=RUBBER, rigid=rigid, surface=skin, velocity=(speed, 0.0, 0.0))
     run = started(problem(block, cell=CELL, friction=mu, planes=[floor()], gravity=DOWN))
     history = watch(run, speed / (mu * G) + 0.1, 20)
     return float(history.moved[:, 0, 0].max() / (speed**2 / (2 * mu * G)))

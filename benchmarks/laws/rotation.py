@@ -70,18 +70,11 @@ def rotating_body(quick: bool = False) -> Outcome:
     time = 0.12 if quick else 0.3
     for law in CONSTITUTIVE_LAWS:
         name = law.name.lower().replace("_", "-")
-        checks.append(
-            absolute(f"τ/E after any rotation, {name}", turned_at_once(law).stress, 0.0, 1e-6)
-        )
+        checks.append(absolute(f"τ/E after any rotation, {name}", turned_at_once(law).stress, 0.0, 1e-6))
     for law in tuple(CONSTITUTIVE_LAWS)[1:2] if quick else CONSTITUTIVE_LAWS:
         name = law.name.lower().replace("_", "-")
         found = turning_body(law, ReferenceEngine, time)
         checks.append(absolute(f"τ/E of a spinning block, {name}", found.stress, 0.0, 1e-6))
     fast = turning_body(Law.NEO_HOOKEAN, started, time)
     checks.append(absolute("τ/E of a spinning block, production engine", fast.stress, 0.0, 1e-5))
-    return Outcome(
-        "17",
-        "Rotating a body costs no stress",
-        "f64 twin; all laws, return maps included",
-        tuple(checks),
-    )
+    return Outcome("17", "Rotating a body costs no stress", "f64 twin; all laws, return maps included", tuple(checks))

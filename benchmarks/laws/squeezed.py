@@ -93,9 +93,7 @@ def held_alone(case: Case) -> tuple[float, float]:
 
 def by_rule(case: Case) -> tuple[float, float]:
     """Do as the engines do: hold it where it swings quickly, else in rounds."""
-    return (held if responds_within_impact(case.stiffness, case.mass, 1.0, 0.0) else in_rounds)(
-        case
-    )
+    return (held if responds_within_impact(case.stiffness, case.mass, 1.0, 0.0) else in_rounds)(case)
 
 
 RULES = {

@@ -26,9 +26,7 @@ class Sink:
     """[s]"""
 
 
-def heavy_on_foam(
-    cells: int, plane_strain: bool, face: float = 0.0, contact: str = "multi", time: float = 0.4
-) -> Sink:
+def heavy_on_foam(cells: int, plane_strain: bool, face: float = 0.0, contact: str = "multi", time: float = 0.4) -> Sink:
     """Put a steel block of .2 × .1 m on foam of .2 × .2 m at once.
 
     Args:
@@ -45,22 +43,12 @@ def heavy_on_foam(
     base = face * cell
     x, y = 0.13 * cell, deep / 2 + (0.0 if plane_strain else 0.31 * cell)
     foam = box((x, y, base + side / 2), (side, deep, side), cell / 2, stuff=FOAM)
-    steel = box(
-        (x, y, base + side + 0.05),
-        (side, deep, 0.1),
-        cell / 2,
-        stuff=STEEL,
-        rigid=contact == "multi",
-    )
+    steel = box((x, y, base + side + 0.05), (side, deep, 0.1), cell / 2, stuff=STEEL, rigid=contact == "multi")
     planes = [floor(base), *(walls(1, 0.0, deep) if plane_strain else [])]
     table = np.zeros((2 + len(planes), 2 + len(planes)))
     table[0, 1] = table[1, 0] = 0.5
     table[0, 2] = table[2, 0] = HELD
-    run = started(
-        problem(
-            foam, steel, cell=cell, friction=table, planes=planes, gravity=DOWN, contact=contact
-        )
-    )
+    run = started(problem(foam, steel, cell=cell, friction=table, planes=planes, gravity=DOWN, contact=contact))
     return bobbing(follow(run, time, round(500 * time)))
 
 
@@ -148,9 +136,4 @@ def self_weight(quick: bool = False) -> Outcome:
     share = confined_column(20)
     top = COLUMN.density * G * length**2 / (2 * COLUMN.p_wave_modulus)
     check = relative("sink of the top [m]", share * top, top, 1.0)
-    return Outcome(
-        "13",
-        "A confined column settles under its weight as Hooke says",
-        "20 cells, smooth walls",
-        (check,),
-    )
+    return Outcome("13", "A confined column settles under its weight as Hooke says", "20 cells, smooth walls", (check,))

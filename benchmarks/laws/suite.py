@@ -3,18 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from laws import (
-    bending,
-    collisions,
-    friction,
-    grains,
-    plastic,
-    rest,
-    rotation,
-    statics,
-    touching,
-    waves,
-)
+from laws import bending, collisions, friction, grains, plastic, rest, rotation, statics, touching, waves
 from laws.outcome import Outcome
 
 

@@ -74,15 +74,9 @@ def marble_on(rigid: bool, cell: float = 1 / 32, drop: float = 0.01) -> Problem:
         surface=box_surface(middle, COUCH, 33) if rigid else None,
     )
     small = body(
-        centre[None],
-        4 / 3 * np.pi * MARBLE**3,
-        GLASS,
-        rigid=True,
-        surface=ball_surface(tuple(centre), MARBLE, 600),
+        centre[None], 4 / 3 * np.pi * MARBLE**3, GLASS, rigid=True, surface=ball_surface(tuple(centre), MARBLE, 600)
     )
-    return problem(
-        slab, small, cell=cell, friction=0.3, restitution=0.3, planes=[floor()], gravity=DOWN
-    )
+    return problem(slab, small, cell=cell, friction=0.3, restitution=0.3, planes=[floor()], gravity=DOWN)
 
 
 def resting_gap(rigid: bool, time: float = 0.6) -> float:
@@ -128,8 +122,7 @@ def plate_holds(quick: bool = False) -> Outcome:
     """Case 20: nothing passes through what would stop it."""
     found = [(v, ball_on_plate(v)) for v in ((30.0,) if quick else (10.0, 30.0, 100.0))]
     checks = tuple(
-        absolute(f"passed through at {v:g} m/s [0 or 1]", float(pair.passed is not None), 0.0, 0.0)
-        for v, pair in found
+        absolute(f"passed through at {v:g} m/s [0 or 1]", float(pair.passed is not None), 0.0, 0.0) for v, pair in found
     )
     words = "40 mm steel ball on a free steel plate of 1 mm, draft: cells of 6 mm; by their meshes"
     return Outcome("20", "A ball does not pass through a plate", words, checks)

@@ -57,20 +57,12 @@ class Tumbler:
         levels = _between(self.base, self.base + self.level, h)
         poured = np.concatenate([_disc(inner, z, h) for z in levels])
         young, poisson = elastic_moduli(bulk_modulus(WATER, sqrt(2 * G * self.level)))
-        stuff = Stuff(
-            Law.FLUID, young, poisson, WATER, yield_stress=0.0, consistency=1e-3, flow_index=1.0
-        )
+        stuff = Stuff(Law.FLUID, young, poisson, WATER, yield_stress=0.0, consistency=1e-3, flow_index=1.0)
         water = body(poured, pi * inner**2 * self.level, stuff, name="water")
         friction = np.array([[0, 0, 0.5], [0, 0, 0], [0.5, 0, 0]])
         down = (0.0, 0.0, -G)
         return problem(
-            glass,
-            water,
-            cell=self.cell,
-            friction=friction,
-            planes=[floor()],
-            gravity=down,
-            gravity_ramp=0.1,
+            glass, water, cell=self.cell, friction=friction, planes=[floor()], gravity=down, gravity_ramp=0.1
         )
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:

@@ -111,9 +111,7 @@ def equal_bars(quick: bool = False) -> Outcome:
         found = [meeting_bars(cells, shift) for shift in shifts]
         glued = meeting_bars(cells, shifts[0], contact="single")
         worst = min(f.restitution for f in found)
-        checks.append(
-            at_least(f"restitution at L/dx = {cells}", worst, 1.0, least, glued.restitution)
-        )
+        checks.append(at_least(f"restitution at L/dx = {cells}", worst, 1.0, least, glued.restitution))
         mean = float(np.mean([f.contact_time for f in found]))
         checks.append(relative(f"contact time at L/dx = {cells} [s]", mean, 1 / SOUND, 10.0))
     words = (

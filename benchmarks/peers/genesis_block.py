@@ -36,21 +36,14 @@ size = across * cell
 margin = 3 * cell
 """Cells that this engine keeps free at the border of its grid."""
 scene = gs.Scene(
-    sim_options=gs.options.SimOptions(
-        dt=step * PER_CALL, substeps=PER_CALL, gravity=(0.0, 0.0, -9.81)
-    ),
+    sim_options=gs.options.SimOptions(dt=step * PER_CALL, substeps=PER_CALL, gravity=(0.0, 0.0, -9.81)),
     mpm_options=gs.options.MPMOptions(
-        lower_bound=(-0.5, -0.5, 0.0),
-        upper_bound=(0.5, 0.5, 1.0),
-        grid_density=1.0 / cell,
-        particle_size=cell / 2,
+        lower_bound=(-0.5, -0.5, 0.0), upper_bound=(0.5, 0.5, 1.0), grid_density=1.0 / cell, particle_size=cell / 2
     ),
     show_viewer=False,
 )
 block = scene.add_entity(
-    material=gs.materials.MPM.Elastic(
-        E=YOUNG, nu=POISSON, rho=DENSITY, sampler="regular", model="corotation"
-    ),
+    material=gs.materials.MPM.Elastic(E=YOUNG, nu=POISSON, rho=DENSITY, sampler="regular", model="corotation"),
     morph=gs.morphs.Box(pos=(0.0, 0.0, margin + HEIGHT + size / 2), size=(size, size, size)),
 )
 scene.build()

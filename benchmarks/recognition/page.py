@@ -2,11 +2,7 @@
 
 from collections.abc import Sequence
 
-from corporeal.lab.evaluation.material_evaluation import (
-    RecognitionRow,
-    margin_bands,
-    recognition_score,
-)
+from corporeal.lab.evaluation.material_evaluation import RecognitionRow, margin_bands, recognition_score
 from recognition.facts import SETS, facts, judge
 
 HEAD = """# Name recognition benchmark
@@ -87,8 +83,5 @@ def _line(about: str, rows: Sequence[RecognitionRow]) -> str:
 def _bands(rows: Sequence[RecognitionRow]) -> list[str]:
     lines = ["## Calibration of the margin", "", "All sets together, answered parts only."]
     lines += ["", "| margin | answers | mean margin | right |", "| --- | --- | --- | --- |"]
-    lines += [
-        f"| {b.low:.2f}–{b.high:.2f} | {b.count} | {b.margin:.2f} | {b.right:.0%} |"
-        for b in margin_bands(rows)
-    ]
+    lines += [f"| {b.low:.2f}–{b.high:.2f} | {b.count} | {b.margin:.2f} | {b.right:.0%} |" for b in margin_bands(rows)]
     return [*lines, "", f"Over all sets, margin orders {recognition_score(rows).ordering:.2f}."]

@@ -68,11 +68,7 @@ def _ring(radius: float, tube: float) -> trimesh.Trimesh:
 
 def _table(length: float, width: float, height: float, top: float) -> trimesh.Trimesh:
     x, y = 0.45 * length, 0.45 * width
-    legs = [
-        block(LEG, LEG, height - top).apply_translation((i * x, j * y, 0))
-        for i in (-1, 1)
-        for j in (-1, 1)
-    ]
+    legs = [block(LEG, LEG, height - top).apply_translation((i * x, j * y, 0)) for i in (-1, 1) for j in (-1, 1)]
     board = block(length, width, top).apply_translation((0, 0, height - top))
     return trimesh.util.concatenate([*legs, board])
 

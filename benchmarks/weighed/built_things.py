@@ -56,10 +56,7 @@ def hammer() -> Prop:
         "hammer",
         "solid",
         (PropPart("hammer", mesh, plain_finish("hammer", "#ffffff", 0.5), "steel"),),
-        (
-            Piece("head", enclosed(head), STEEL, forged),
-            Piece("handle", enclosed(handle), ASH, "ash: 670 kg/m³"),
-        ),
+        (Piece("head", enclosed(head), STEEL, forged), Piece("handle", enclosed(handle), ASH, "ash: 670 kg/m³")),
     )
 
 
@@ -183,9 +180,7 @@ def helmet() -> Prop:
     """Model a bicycle helmet: polystyrene foam in a thin shell, with straps."""
     foam = helmet_foam()
     straps = [
-        parametric_surfaces.tube_surface(
-            [(x, side * 0.088, 0.002), (0.01, side * 0.004, -0.115)], 0.004, 10
-        )
+        parametric_surfaces.tube_surface([(x, side * 0.088, 0.002), (0.01, side * 0.004, -0.115)], 0.004, 10)
         for x in (0.05, -0.045)
         for side in (1, -1)
     ]
@@ -213,9 +208,7 @@ def helmet() -> Prop:
 def screwdriver(at: Size) -> tuple[PropMesh, PropMesh]:
     """Return blade and grip of a screwdriver that lies along x."""
     blade = parametric_surfaces.tube_surface([(-0.125, 0, 0), (0.004, 0, 0)], 0.0030, 12).moved(at)
-    grip = parametric_surfaces.tube_surface(
-        [(0.012, 0, 0), (0.05, 0, 0), (0.095, 0, 0)], (0.011, 0.0135, 0.0125), 16
-    )
+    grip = parametric_surfaces.tube_surface([(0.012, 0, 0), (0.05, 0, 0), (0.095, 0, 0)], (0.011, 0.0135, 0.0125), 16)
     grip = grip.moved(at)
     return mesh_difference(blade, grip), grip
 
@@ -225,9 +218,7 @@ def spanner(at: Size, size: float) -> PropMesh:
     bar = block((0.15, 0.014, 0.006), (0, 0, 0), 0.001)
     jaws = []
     for end in (-1, 1):
-        disc = parametric_surfaces.lathe_surface(
-            [(0, -0.004), (0.018, -0.004), (0.018, 0.004), (0, 0.004)], 32
-        )
+        disc = parametric_surfaces.lathe_surface([(0, -0.004), (0.018, -0.004), (0.018, 0.004), (0, 0.004)], 32)
         slot = block((0.022, 0.015, 0.02), (end * 0.092, 0, 0), 0.0005)
         jaws.append(mesh_difference(disc.moved((end * 0.082, 0, 0)), slot))
     mesh = mesh_union([bar, *jaws])
@@ -241,19 +232,13 @@ def toolbox() -> Prop:
     sides = [block((long, ply, tall), (0, s * (wide - ply) / 2, tall / 2), 0.0005) for s in (1, -1)]
     ends = [block((ply, wide, tall), (s * (long - ply) / 2, 0, tall / 2), 0.0005) for s in (1, -1)]
     posts = [block((ply, 0.09, 0.26), (s * (long - ply) / 2, 0, 0.13), 0.0005) for s in (1, -1)]
-    bar = parametric_surfaces.tube_surface(
-        [(-long / 2 + 0.004, 0, 0.235), (long / 2 - 0.004, 0, 0.235)], 0.0125, 20
-    )
+    bar = parametric_surfaces.tube_surface([(-long / 2 + 0.004, 0, 0.235), (long / 2 - 0.004, 0, 0.235)], 0.0125, 20)
     ply_box = mesh_union([floor, *sides, *ends, *posts])
     rod = mesh_difference(bar, ply_box)
     on = ply + 0.0002
     head, shaft = (m.moved((-0.15, 0.035, on + 0.0153)) for m in hammer_pieces())
-    blades, grips = zip(
-        *(screwdriver((0.02, y, on + 0.0137)) for y in (-0.045, -0.078)), strict=True
-    )
-    keys = [
-        spanner((x, y, on + 0.0045), s) for x, y, s in ((0.06, 0.075, 1.0), (0.06, -0.014, 0.8))
-    ]
+    blades, grips = zip(*(screwdriver((0.02, y, on + 0.0137)) for y in (-0.045, -0.078)), strict=True)
+    keys = [spanner((x, y, on + 0.0045), s) for x, y, s in ((0.06, 0.075, 1.0), (0.06, -0.014, 0.8))]
     metal = concatenate_meshes([head, *blades, *keys])
     grain = procedural_textures.wood_texture(512, 11, "#c9a877", "#dcc197", "#e8d3ae")
     carrier = mesh_union([ply_box, rod])
@@ -268,20 +253,13 @@ def toolbox() -> Prop:
             PropPart("box", carrier, box, "plywood"),
             PropPart("metal", metal, plain_finish("metal", "#6b6f75", 0.4, metallic=0.6), "steel"),
             PropPart("shaft", shaft, plain_finish("shaft", "#d2a86a", 0.6), "hardwood"),
-            PropPart(
-                "grips",
-                concatenate_meshes(grips),
-                plain_finish("grips", "#d98a1f", 0.3),
-                "hard_plastic",
-            ),
+            PropPart("grips", concatenate_meshes(grips), plain_finish("grips", "#d98a1f", 0.3), "hard_plastic"),
         ),
         (
             Piece("boards", enclosed(ply_box), BIRCH_PLY, "birch plywood of 9 mm: 680 kg/m³"),
             Piece("rod", enclosed(rod), BEECH, "beech, 25 mm"),
             Piece("metal", enclosed(metal), STEEL, "hammer, two spanners, two blades, all steel"),
             Piece("shaft", enclosed(shaft), ASH, "ash: 670 kg/m³"),
-            Piece(
-                "grips", enclosed(concatenate_meshes(grips)), ACETATE, "cellulose acetate, solid"
-            ),
+            Piece("grips", enclosed(concatenate_meshes(grips)), ACETATE, "cellulose acetate, solid"),
         ),
     )

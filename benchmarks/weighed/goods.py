@@ -5,13 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from corporeal.showcase import parametric_surfaces, procedural_textures
-from corporeal.showcase.prop_mesh import (
-    PropMesh,
-    PropPart,
-    mesh_difference,
-    mesh_union,
-    textured_finish,
-)
+from corporeal.showcase.prop_mesh import PropMesh, PropPart, mesh_difference, mesh_union, textured_finish
 from weighed import pictures
 from weighed.piece import Piece, Prop
 from weighed.vessels import RUBBER
@@ -82,11 +76,7 @@ def dictionary() -> Prop:
     block = leaves * leaf
     thick = block + 2 * board
     size = (wide - 0.006, tall - 0.008, block)
-    pages = (
-        parametric_surfaces.RoundedBox(size, 0.0006, tile=0.05, grain=1)
-        .mesh()
-        .moved((0.0005, 0, thick / 2))
-    )
+    pages = parametric_surfaces.RoundedBox(size, 0.0006, tile=0.05, grain=1).mesh().moved((0.0005, 0, thick / 2))
     slabs = [
         parametric_surfaces.RoundedBox((wide, tall, board), 0.001, corner=3).mesh().moved((0, 0, z))
         for z in (board / 2, thick - board / 2)
@@ -97,9 +87,7 @@ def dictionary() -> Prop:
     on_board = np.abs(n[:, 2:]) > 0.9
     turned_over = np.sign(n[:, 2:])
     uv = np.stack([0.5 + v[:, 0] / wide, 0.5 + v[:, 1] / tall], 1)
-    uv = np.where(
-        on_board, np.stack([0.5 + turned_over[:, 0] * (uv[:, 0] - 0.5), uv[:, 1]], 1), 0.02
-    )
+    uv = np.where(on_board, np.stack([0.5 + turned_over[:, 0] * (uv[:, 0] - 0.5), uv[:, 1]], 1), 0.02)
     cover = replace(cover, uv=uv)
     pages = mesh_difference(pages, cover)
     sheets = leaves * size[0] * size[1]
@@ -107,40 +95,24 @@ def dictionary() -> Prop:
         "dictionary",
         "solid",
         (
-            PropPart(
-                "cover", cover, textured_finish("cover", pictures.dictionary(), 0.7), "cardboard"
-            ),
-            PropPart(
-                "pages",
-                pages,
-                textured_finish("pages", procedural_textures.pages_texture(), 0.9),
-                "paper",
-            ),
+            PropPart("cover", cover, textured_finish("cover", pictures.dictionary(), 0.7), "cardboard"),
+            PropPart("pages", pages, textured_finish("pages", procedural_textures.pages_texture(), 0.9), "paper"),
         ),
         (
             Piece("pages", sheets * leaf, 0.060 / leaf, "640 leaves of 60 g/m², .078 mm each"),
             Piece("boards", enclosed(cover), 615.0, "grey board: 3 mm of it are 1,845 g/m²"),
-            Piece(
-                "cloth",
-                (2 * wide + thick) * tall * 3e-4,
-                0.2 / 3e-4,
-                "book cloth and end papers of 200 g/m²",
-            ),
+            Piece("cloth", (2 * wide + thick) * tall * 3e-4, 0.2 / 3e-4, "book cloth and end papers of 200 g/m²"),
         ),
     )
 
 
 def cushion() -> Prop:
     """Model a sofa cushion, 45 × 30 cm, stuffed with polyester fibre."""
-    pillow = parametric_surfaces.CushionShape(
-        (0.45, 0.30, 0.03), 0.055, 0.0145, 0.004, 24, pinch=0.06, seams=(0,)
-    )
+    pillow = parametric_surfaces.CushionShape((0.45, 0.30, 0.03), 0.055, 0.0145, 0.004, 24, pinch=0.06, seams=(0,))
     mesh = pillow.mesh()
     v = mesh.vertices
     mesh = replace(mesh, uv=np.stack([v[:, 0] / 0.45 + 0.5, v[:, 1] / 0.3 + 0.5], 1))
-    look = textured_finish(
-        "cushion", pictures.stripes("#284b7a", "#e9e2d0", "#8fa9c6", count=15), 0.95
-    )
+    look = textured_finish("cushion", pictures.stripes("#284b7a", "#e9e2d0", "#8fa9c6", count=15), 0.95)
     cover = 2 * 0.45 * 0.30 * 1.1
     return Prop(
         "sofa cushion",
@@ -156,22 +128,14 @@ def cushion() -> Prop:
 def brick() -> Prop:
     """Model a facing brick, 240 × 115 × 71 mm, with three rows of holes."""
     size, hole = (0.240, 0.115, 0.071), 0.013
-    body = (
-        parametric_surfaces.RoundedBox(size, 0.0015, corner=2, tile=0.12)
-        .mesh()
-        .moved((0, 0, size[2] / 2))
-    )
+    body = parametric_surfaces.RoundedBox(size, 0.0015, corner=2, tile=0.12).mesh().moved((0, 0, size[2] / 2))
     holes = [
-        parametric_surfaces.lathe_surface(
-            [(0, -0.01), (hole, -0.01), (hole, 0.09), (0, 0.09)], 40
-        ).moved((x, y, 0))
+        parametric_surfaces.lathe_surface([(0, -0.01), (hole, -0.01), (hole, 0.09), (0, 0.09)], 40).moved((x, y, 0))
         for x in np.linspace(-0.085, 0.085, 5)
         for y in (-0.031, 0.0, 0.031)
     ]
     mesh = mesh_difference(body, *holes)
-    clay = procedural_textures.speckle_texture(
-        512, 61, "#7e3325", "#a24a33", "#b9644a", falloff=0.5, contrast=0.16
-    )
+    clay = procedural_textures.speckle_texture(512, 61, "#7e3325", "#a24a33", "#b9644a", falloff=0.5, contrast=0.16)
     source = "fired clay of facing bricks: 1,950 kg/m³ (solid clay bricks: about 2,000)"
     return Prop(
         "brick with holes",

@@ -5,13 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from corporeal.showcase import parametric_surfaces, procedural_textures
-from corporeal.showcase.prop_mesh import (
-    PropPart,
-    mesh_difference,
-    mesh_union,
-    plain_finish,
-    textured_finish,
-)
+from corporeal.showcase.prop_mesh import PropPart, mesh_difference, mesh_union, plain_finish, textured_finish
 from weighed import labels
 from weighed.goods import enclosed
 from weighed.labels import dyed
@@ -29,9 +23,7 @@ def pear() -> Prop:
         (0.026, 0.066), (0.019, 0.082), (0.015, 0.094), (0.005, 0.099), (0.0, 0.096),
     ])  # fmt: skip
     body = parametric_surfaces.lathe_surface(outline, 96)
-    stalk = parametric_surfaces.tube_surface(
-        [(0, 0, 0.090), (0.002, 0, 0.103), (0.007, 0, 0.115)], 0.0022, 12
-    )
+    stalk = parametric_surfaces.tube_surface([(0, 0, 0.090), (0.002, 0, 0.103), (0.007, 0, 0.115)], 0.0022, 12)
     mesh = mesh_union([body, dyed(stalk, "#5b3a1e")])
     per_area = 2.8
     of = (
@@ -42,11 +34,7 @@ def pear() -> Prop:
     return Prop(
         "imitation pear",
         "hollow",
-        (
-            PropPart(
-                "pear", mesh, textured_finish("pear", labels.pear_skin(), 0.35), "plastics-LDPE"
-            ),
-        ),
+        (PropPart("pear", mesh, textured_finish("pear", labels.pear_skin(), 0.35), "plastics-LDPE"),),
         (
             Piece("wall", swept(outline) * per_area / POLYETHYLENE, POLYETHYLENE, of),
             Piece("stalk", enclosed(mesh_difference(stalk, body)), POLYETHYLENE, "moulded with it"),
@@ -130,9 +118,7 @@ def wine_bottle() -> Prop:
         [0.0140, 0.285], [0.0150, 0.287], [0.0150, height], [0.0, height],
     ])  # fmt: skip
     shares = [z / height for z in (low, high, capsule)]
-    empty = (
-        "empty bottles of 750 ml weigh 300 to 950 g, about 500 g on average (wineloverspage.com)"
-    )
+    empty = "empty bottles of 750 ml weigh 300 to 950 g, about 500 g on average (wineloverspage.com)"
     return Prop(
         "bottle of wine, full",
         "filled",
@@ -160,9 +146,7 @@ def candle() -> Prop:
         (0.024, 0.136), (0.012, 0.132), (0.0, 0.131),
     ]  # fmt: skip
     body = parametric_surfaces.lathe_surface(outline, 96)
-    wick = parametric_surfaces.tube_surface(
-        [(0, 0, 0.125), (0, 0, 0.138), (0.002, 0, 0.144)], 0.0012, 10
-    )
+    wick = parametric_surfaces.tube_surface([(0, 0, 0.125), (0, 0, 0.138), (0.002, 0, 0.144)], 0.0012, 10)
     mesh = mesh_union([dyed(body, "#f1e6cc"), dyed(wick, "#2b2622")])
     return Prop(
         "pillar candle",
@@ -192,9 +176,7 @@ def sand_bucket() -> Prop:
         [0.09, level + 0.012], [0.04, level + 0.020], [0.0, level + 0.022],
     ])  # fmt: skip
     sand = parametric_surfaces.lathe_surface(heap, 96)
-    grains = procedural_textures.speckle_texture(
-        512, 17, "#a58a5c", "#c9b083", "#e2cfa6", falloff=0.3, contrast=0.25
-    )
+    grains = procedural_textures.speckle_texture(512, 17, "#a58a5c", "#c9b083", "#e2cfa6", falloff=0.3, contrast=0.25)
     sand = replace(sand, uv=sand.vertices[:, :2] / 0.12)
     relief = "UN relief bucket of 14 l (IOM 4700000060): 300 mm high, 300 and 240 mm wide, of HDPE "
     return Prop(

@@ -5,13 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from corporeal.geometry.srgb import srgb_to_linear
-from corporeal.showcase.procedural_textures import (
-    TextureImage,
-    colour_ramp,
-    fractal_noise,
-    image_bytes,
-    rgb_of_hex,
-)
+from corporeal.showcase.procedural_textures import TextureImage, colour_ramp, fractal_noise, image_bytes, rgb_of_hex
 from corporeal.showcase.prop_mesh import PropMesh
 from weighed.pictures import SIZE, band, blank, words
 
@@ -73,6 +67,4 @@ def wine(heights: Sequence[float]) -> TextureImage:
 
 def crust(n: int = 512) -> TextureImage:
     """Baked dough, lighter where it cracked."""
-    return image_bytes(
-        colour_ramp(0.5 + 0.16 * fractal_noise(n, 12, 1.3), "#a8672c", "#c98a45", "#deb071")
-    )
+    return image_bytes(colour_ramp(0.5 + 0.16 * fractal_noise(n, 12, 1.3), "#a8672c", "#c98a45", "#deb071"))

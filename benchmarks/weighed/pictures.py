@@ -5,12 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal.showcase.procedural_textures import (
-    TextureImage,
-    fractal_noise,
-    image_bytes,
-    rgb_of_hex,
-)
+from corporeal.showcase.procedural_textures import TextureImage, fractal_noise, image_bytes, rgb_of_hex
 
 SIZE = 1024
 """Width and height of a picture [px]."""
@@ -28,9 +23,7 @@ def band(draw: Brush, low: float, high: float, colour: str) -> None:
     draw.rectangle([0, round((1 - high) * SIZE), SIZE, round((1 - low) * SIZE)], fill=colour)
 
 
-def words(
-    picture: Image.Image, text: str, at: tuple[float, float], size: tuple[float, float], ink: str
-) -> None:
+def words(picture: Image.Image, text: str, at: tuple[float, float], size: tuple[float, float], ink: str) -> None:
     """Write a word into a box about ``at`` (share round, height), ``size`` wide and high."""
     font = ImageFont.load_default(120)
     left, top, right, bottom = font.getbbox(text)

@@ -53,9 +53,7 @@ class Prop:
         model = PropModel(name, self.seen)
         model = model.moved((0, 0, -model.bounds()[0, 2]))
         made = scene_of_models(name, [model], [PlacedModel(name)], duration=1.0)
-        surfaces = tuple(
-            replace(s, name=f"surface {k}", extras={}) for k, s in enumerate(made.surfaces)
-        )
+        surfaces = tuple(replace(s, name=f"surface {k}", extras={}) for k, s in enumerate(made.surfaces))
         finishes = tuple(replace(f, name=f"finish {k}") for k, f in enumerate(made.finishes))
         return replace(made, surfaces=surfaces, finishes=finishes)
 

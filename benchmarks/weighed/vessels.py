@@ -25,9 +25,7 @@ def flower_pot() -> Prop:
     ])  # fmt: skip
     mesh = parametric_surfaces.lathe_surface(ring, 96, loop=True)
     look = textured_finish(
-        "pot",
-        procedural_textures.speckle_texture(512, 31, "#9c4f30", "#b9653f", "#cc7d55", contrast=0.1),
-        0.9,
+        "pot", procedural_textures.speckle_texture(512, 31, "#9c4f30", "#b9653f", "#cc7d55", contrast=0.1), 0.9
     )
     volume = turned(np.concatenate([ring, ring[:1]]))
     source = (
@@ -61,11 +59,7 @@ def tomato_can() -> Prop:
     return Prop(
         "can of chopped tomatoes",
         "filled",
-        (
-            PropPart(
-                "can", by_height(parametric_surfaces.lathe_surface(profile, 96)), look, "steel"
-            ),
-        ),
+        (PropPart("can", by_height(parametric_surfaces.lathe_surface(profile, 96)), look, "steel"),),
         (
             Piece("body", body, STEEL, tin),
             Piece("ends", ends, STEEL, tin),
@@ -105,9 +99,7 @@ def jam_jar() -> Prop:
         "jar of strawberry jam",
         "filled",
         (
-            PropPart(
-                "jar", by_height(parametric_surfaces.lathe_surface(outside, 96)), jar, "glass"
-            ),
+            PropPart("jar", by_height(parametric_surfaces.lathe_surface(outside, 96)), jar, "glass"),
             PropPart("lid", top, checks, "steel"),
         ),
         (
@@ -136,11 +128,7 @@ def cola_bottle() -> Prop:
     return Prop(
         "bottle of cola, half full",
         "filled",
-        (
-            PropPart(
-                "bottle", by_height(parametric_surfaces.lathe_surface(closed, 96)), look, "PET"
-            ),
-        ),
+        (PropPart("bottle", by_height(parametric_surfaces.lathe_surface(closed, 96)), look, "PET"),),
         (
             Piece("bottle", preform / PET, PET, "a preform of 39.9 g, made for 1.5 l"),
             Piece("cap", 0.0028 / POLYETHYLENE, POLYETHYLENE, "a screw cap of 2.8 g"),
@@ -170,9 +158,7 @@ def frying_pan() -> Prop:
         "frying pan of stainless steel",
         "hollow",
         (
-            PropPart(
-                "pan", parametric_surfaces.lathe_surface(closed, 128), metal, "stainless_steel"
-            ),
+            PropPart("pan", parametric_surfaces.lathe_surface(closed, 128), metal, "stainless_steel"),
             PropPart("handle", handle, black, "bakelite"),
         ),
         (

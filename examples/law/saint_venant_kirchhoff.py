@@ -3,14 +3,7 @@
 import numpy as np
 
 from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw
-from corporeal.mpm.laws.kinematics import (
-    Matrices,
-    Scalars,
-    isotropic_tensors,
-    per_particle,
-    stretches,
-    transpose,
-)
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, isotropic_tensors, per_particle, stretches, transpose
 
 
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:

@@ -31,12 +31,7 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.mpm.engines import build_engine
     from corporeal.mpm.problem import ENGINES as ENGINES
     from corporeal.mpm.problem import FLOOR, Body, Engine, Plane, Problem
-    from corporeal.pipeline.in_memory import (
-        load_scene,
-        pose_problem,
-        prepare_scene,
-        simulate_scene,
-    )
+    from corporeal.pipeline.in_memory import load_scene, pose_problem, prepare_scene, simulate_scene
     from corporeal.pipeline.run_pipeline import Settings, run
     from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
     from corporeal.pipeline.stages.capture import CaptureConfig, capture

@@ -79,11 +79,7 @@ def upward_imports(folder, packages):
         package = path.relative_to(folder).parts[0].removesuffix(".py")
         for module in imported(path):
             other = module.removeprefix(f"{inside}.").split(".")[0]
-            if (
-                package not in ("__init__", "__main__")
-                and module.startswith(f"{inside}.")
-                and other != package
-            ):
+            if package not in ("__init__", "__main__") and module.startswith(f"{inside}.") and other != package:
                 if layer[other] >= layer[package]:
                     yield f"{package} imports {other} ({name_of(path)})"
 
@@ -92,9 +88,7 @@ def packages_of(folder):
     return {path.relative_to(folder).parts[0].removesuffix(".py") for path in folder.rglob("*.py")}
 
 
-@pytest.mark.parametrize(
-    ("folder", "packages"), [(ROOT, PACKAGES), (ROOT / "mpm", SOLVER)], ids=["package", "mpm"]
-)
+@pytest.mark.parametrize(("folder", "packages"), [(ROOT, PACKAGES), (ROOT / "mpm", SOLVER)], ids=["package", "mpm"])
 def test_imports_point_down(folder, packages):
     assert packages_of(folder) - {"__init__", "__main__"} == set(layers(packages))
     assert list(upward_imports(folder, packages)) == []

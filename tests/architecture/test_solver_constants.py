@@ -112,11 +112,7 @@ def names(texts):
 
 def assigned_twice(texts):
     """Names that are given a number in several places, engines' own memory aside."""
-    return {
-        name: paths
-        for name, paths in names(texts).items()
-        if len(paths) > 1 and sorted(paths) != list(LAYOUTS)
-    }
+    return {name: paths for name, paths in names(texts).items() if len(paths) > 1 and sorted(paths) != list(LAYOUTS)}
 
 
 def named_elsewhere(texts):
@@ -125,9 +121,7 @@ def named_elsewhere(texts):
         if path == HOME or path.startswith(OF_A_LAW):
             continue
         if whole(path):
-            yield from (
-                (path, name) for name, value in assigned_in_python(text) if is_fraction(value)
-            )
+            yield from ((path, name) for name, value in assigned_in_python(text) if is_fraction(value))
         else:
             yield from ((path, name) for name, value in assigned_in_cpp(text) if "." in value)
 

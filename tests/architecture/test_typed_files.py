@@ -109,13 +109,7 @@ def test_no_exception_outlives_its_reason(find, allowed):
 
 
 @pytest.mark.parametrize(
-    "line",
-    [
-        'audit["outcome"]["objects"]',
-        'row.get("metrics")["ape"]',
-        'x["a"].get("b")',
-        'f()["a"]["b"]',
-    ],
+    "line", ['audit["outcome"]["objects"]', 'row.get("metrics")["ape"]', 'x["a"].get("b")', 'f()["a"]["b"]']
 )
 def test_two_keys_in_a_row_are_found(line):
     assert nested_reads(line) == [1]

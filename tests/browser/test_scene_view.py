@@ -35,12 +35,7 @@ def report(small_run, tmp_path_factory):
     above = ("summary", "video", "caption", "verdict", "expectations", "parts", "masses", "figures")
     empty = dict.fromkeys((*above, "grounds", "audit", "sources", "credits", "settings"), "")
     text = fill_page(
-        "corporeal.pipeline.stages",
-        "report.html",
-        **empty,
-        title=escape_html("drop"),
-        width=640,
-        view=view,
+        "corporeal.pipeline.stages", "report.html", **empty, title=escape_html("drop"), width=640, view=view
     )
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(text)

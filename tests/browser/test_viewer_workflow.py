@@ -44,9 +44,7 @@ def test_from_an_upload_to_an_export_by_the_page_alone(tmp_path):
     work = RunRequests(shelf, runs)
     # The disk of who runs this may be nearly full.
     work.inbox.limits = UploadLimits(free_disk_bytes=0)
-    app = make_app(
-        SiteOptions(shelf, works=True), LOCAL, (*work.routes(), *RunExports(shelf).routes())
-    )
+    app = make_app(SiteOptions(shelf, works=True), LOCAL, (*work.routes(), *RunExports(shelf).routes()))
     try:
         with serving(app) as server, browser(tmp_path) as tab:
             tab.open(server.address)

@@ -24,12 +24,7 @@ from corporeal.core.types import (
 )
 from corporeal.description.pool_answers import pool_answers
 from corporeal.materials.library_listing import materials_json
-from corporeal.pipeline.mass_posterior import (
-    MassSampler,
-    sample_hypotheses,
-    sample_masses,
-    weighted_quantiles,
-)
+from corporeal.pipeline.mass_posterior import MassSampler, sample_hypotheses, sample_masses, weighted_quantiles
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import GroundConfig, ground
 from corporeal.pipeline.stages.segment import segment
@@ -84,9 +79,7 @@ def test_ways_are_pooled_each_answer_with_the_same_weight():
     other = account(replace(HOLLOW, probability=0.8), Hypothesis("brass", "solid", 0.2))
     (words,) = pool_answers(THING, [one, other]).parts
     ways = {(w.material, w.structure): w.probability for w in words.hypotheses}
-    assert ways == pytest.approx(
-        {("steel", "hollow"): 0.6, ("steel", "solid"): 0.3, ("brass", "solid"): 0.1}
-    )
+    assert ways == pytest.approx({("steel", "hollow"): 0.6, ("steel", "solid"): 0.3, ("brass", "solid"): 0.1})
     assert (words.structure, words.margin) == ("hollow", pytest.approx(0.6))
 
 
@@ -106,10 +99,7 @@ def test_where_answers_differ_the_interval_spans_what_each_of_them_says():
     assert both.low < hollow.mass < solid.mass < both.high * 1.01
     assert [h.prior for h in both.hypotheses] == pytest.approx([0.5, 0.5])  # in turn, so exactly
     assert [a.mass for a in both.answers] == pytest.approx([solid.mass, hollow.mass], rel=0.1)
-    drawn = [
-        sample_hypotheses(inventory, (both,), np.random.default_rng(k), "default").objects[0]
-        for k in range(60)
-    ]
+    drawn = [sample_hypotheses(inventory, (both,), np.random.default_rng(k), "default").objects[0] for k in range(60)]
     found = [d.parts[0].structure for d in drawn]
     assert 15 < found.count("solid") < 45
     assert all(d.answers == () for d in drawn)
@@ -129,13 +119,9 @@ def test_values_of_each_answer_are_its_own_so_that_their_spread_widens_the_inter
 
 
 def test_the_same_answer_three_times_says_what_it_says_once():
-    one = account(
-        placed(SOLID, 0.3, "density"), replace(HOLLOW, probability=0.5), evidence=judged(2.0)
-    )
+    one = account(placed(SOLID, 0.3, "density"), replace(HOLLOW, probability=0.5), evidence=judged(2.0))
     alone, thrice = weigh(one)[0], weigh(one, one, one)[0]
-    assert replace(thrice, answers=()) == replace(
-        alone, evidence=thrice.evidence, hypotheses=thrice.hypotheses
-    )
+    assert replace(thrice, answers=()) == replace(alone, evidence=thrice.evidence, hypotheses=thrice.hypotheses)
     assert len(thrice.answers) == 3
     evidence = thrice.evidence
     assert (evidence.low, evidence.high) == pytest.approx((2.0 / 1.2, 2.4))

@@ -36,9 +36,7 @@ def test_the_water_in_a_sponge_does_not_make_its_foam_doubtful():
     assert grounding_warnings(ground(wet, parts, inventory), parts, wet) == ()
 
 
-@pytest.mark.parametrize(
-    "name", ["dry sponge", "sponge", "wet stone", "wet steel ball", "wet thingamajig"]
-)
+@pytest.mark.parametrize("name", ["dry sponge", "sponge", "wet stone", "wet steel ball", "wet thingamajig"])
 def test_what_is_dry_or_holds_no_water_weighs_what_it_did(name):
     assert density(name) is None
 

@@ -18,9 +18,7 @@ def turned(profile, segments=64):
     profile = np.array(profile)
     turn = 2 * np.pi * np.arange(segments) / segments
     ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    vertices = np.concatenate(
-        [np.column_stack([r * ring, np.full(segments, z)]) for r, z in profile]
-    )
+    vertices = np.concatenate([np.column_stack([r * ring, np.full(segments, z)]) for r, z in profile])
     triangles = []
     for k in range(len(profile) - 1):
         for i in range(segments):
@@ -36,10 +34,7 @@ def measured(profile):
     return anatomy, anatomy.members[0]
 
 
-OPEN = [
-    *((1e-5, 0.0), (R, 0.0), (R, HEIGHT), (R - WALL, HEIGHT)),
-    *((R - WALL, BASE), (1e-5, BASE)),
-]
+OPEN = [*((1e-5, 0.0), (R, 0.0), (R, HEIGHT), (R - WALL, HEIGHT)), *((R - WALL, BASE), (1e-5, BASE))]
 CLOSED = [(1e-5, 0.0), (R, 0.0), (R, HEIGHT), (1e-5, HEIGHT)]
 
 
@@ -63,10 +58,7 @@ def test_a_closed_can_that_is_drawn_by_its_outside_is_hollow_behind_its_wall():
 def test_what_has_no_room_is_not_poured():
     room = np.pi * (R - WALL) ** 2 * (HEIGHT - BASE)
     assert fill_to_volume(*measured(OPEN), 0.0, 1.2 * room) is None
-    assert (
-        fill_to_volume(*measured([(1e-5, 0.0), (0.1, 0.0), (0.1, 0.01), (1e-5, 0.01)]), 0.006, 1e-6)
-        is None
-    )
+    assert fill_to_volume(*measured([(1e-5, 0.0), (0.1, 0.0), (0.1, 0.01), (1e-5, 0.01)]), 0.006, 1e-6) is None
 
 
 BOWL = [
@@ -84,10 +76,7 @@ def cones(*rings):
 
 @pytest.mark.parametrize(
     ("profile", "volume"),
-    [
-        (BOWL, cones((0.028, 0.004), (0.047, 0.023), (0.067, 0.06))),
-        (MORTAR, cones((0.035, 0.02), (0.045, 0.08))),
-    ],
+    [(BOWL, cones((0.028, 0.004), (0.047, 0.023), (0.067, 0.06))), (MORTAR, cones((0.035, 0.02), (0.045, 0.08)))],
 )
 def test_a_wide_bowl_and_a_thick_one_are_filled_in_their_hollow(profile, volume):
     anatomy, member = measured(profile)

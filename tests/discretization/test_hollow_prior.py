@@ -22,8 +22,7 @@ def test_it_is_said_why(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["brass", "brass cylinder", "brass bar", "solid brass samovar", "rubber samovar", "anvil"],
+    "name", ["brass", "brass cylinder", "brass bar", "solid brass samovar", "rubber samovar", "anvil"]
 )
 def test_what_may_well_be_solid_stays_so(tmp_path, name):
     (words,) = weigh(DRUM, tmp_path / f"{name}.glb").field.words

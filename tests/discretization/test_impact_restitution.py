@@ -15,9 +15,7 @@ from corporeal.mpm.physics.impact_support import restitution_at_speed
 def fallen(material, speed):
     made = co.build_scene(co.ball(material, 0.02, (0, 0, 0.03), (0, 0, -speed), "thing"))
     (surface,) = made.surfaces
-    return co.prepare_scene(
-        replace(made, surfaces=(replace(surface, extras={"substance": material}),))
-    )
+    return co.prepare_scene(replace(made, surfaces=(replace(surface, extras={"substance": material}),)))
 
 
 def test_a_lead_ball_rebounds_less_the_harder_it_strikes():
@@ -36,9 +34,7 @@ def test_what_was_drawn_stays_drawn_and_what_is_unknown_stays():
     field, treatments = ready.field, ready.particles.treatments
     (usual,) = restitutions_at_impact(field, treatments).restitution[:1, -1]
     drawn = replace(field, restitution=0.9 * field.restitution)
-    assert restitutions_at_impact(drawn, treatments).restitution[0, -1] == pytest.approx(
-        0.9 * usual
-    )
+    assert restitutions_at_impact(drawn, treatments).restitution[0, -1] == pytest.approx(0.9 * usual)
     strange = replace(field.materials[0], name="of a library of one's own")
     own = replace(field, materials=(strange,))
     assert restitutions_at_impact(own, treatments).restitution[0, -1] == field.restitution[0, -1]

@@ -90,9 +90,7 @@ def test_how_wide_a_mat_is_does_not_matter(width):
     pair = ready.field.restitution[0, 1]
     engine.advance(0.02)
     now = engine.measure()
-    left = float(now.momentum[0, 2] / now.mass[0]) + 9.81 * (
-        0.02 - float(np.nanmin(now.first_contact))
-    )
+    left = float(now.momentum[0, 2] / now.mass[0]) + 9.81 * (0.02 - float(np.nanmin(now.first_contact)))
     assert left / 2.0 == pytest.approx(pair, abs=0.05)
 
 
@@ -118,7 +116,4 @@ def test_a_soft_ball_on_cardboard_loses_as_much_as_a_rigid_one():
     below = PartGeometry(1, board, solid, (0.008, 0.2, 0.2), 3.2e-4, 0.09)
     loss = layered_loss_factor(ball, ObjectLanding(1, 3.0, 0.0189), below)
     assert restitution_of_loss(loss) == pytest.approx(0.465, abs=0.02)
-    assert (
-        layered_loss_factor(ball, ObjectLanding(1, 3.0, 0.0189), replace(below, material=rubber))
-        is None
-    )
+    assert layered_loss_factor(ball, ObjectLanding(1, 3.0, 0.0189), replace(below, material=rubber)) is None

@@ -5,11 +5,7 @@ from dataclasses import replace
 import pytest
 
 import corporeal as co
-from corporeal.discretization.impact_vibration import (
-    MAX_IMPACT_NUMBER,
-    VIBRATION_LOSS_COEFFICIENT,
-    vibration_loss,
-)
+from corporeal.discretization.impact_vibration import MAX_IMPACT_NUMBER, VIBRATION_LOSS_COEFFICIENT, vibration_loss
 from corporeal.lab.evaluation.drop_test import drop_scene, simulate_drop
 from corporeal.lab.evaluation.rebound_data import measured_rebounds
 from corporeal.materials.loss_restitution import restitution_of_loss
@@ -44,14 +40,10 @@ def test_a_ball_that_steps_have_softened_loses_no_more_than_a_stiff_one():
     assert beyond > 0.01
     assert softened.loss == pytest.approx(0.15 - 3.2 / 64 - beyond, abs=1e-3)
     assert "simulated vibrations" in softened.reason
-    assert simulate_drop(row("bouncy ball"), DRAFT).restitution == pytest.approx(
-        restitution_of_loss(0.15), abs=0.015
-    )
+    assert simulate_drop(row("bouncy ball"), DRAFT).restitution == pytest.approx(restitution_of_loss(0.15), abs=0.015)
 
 
-@pytest.mark.parametrize(
-    "name", ["ball of plasticine", "tennis ball on carpet", "ball of seat foam"]
-)
+@pytest.mark.parametrize("name", ["ball of plasticine", "tennis ball on carpet", "ball of seat foam"])
 def test_what_yields_falls_on_something_soft_or_is_as_stiff_as_in_life_keeps_its_loss(name):
     assert "vibrations" not in prepared(name).particles.treatments[0].reason
 

@@ -34,9 +34,7 @@ SAID = PartDescription("a", "steel")
 PUT = replace(SAID, placements={"shell_thickness": RangePlacement(0.5, "model", "It looks so.")})
 CAN = trimesh.creation.cylinder(0.03, 0.1)
 CUP = trimesh.creation.annulus(0.028, 0.03, 0.1)
-FLAG = trimesh.Trimesh(
-    [[0, 0, 0], [0.1, 0, 0], [0.1, 0.06, 0], [0, 0.06, 0.0]], [[0, 1, 2], [0, 2, 3]]
-)
+FLAG = trimesh.Trimesh([[0, 0, 0], [0.1, 0, 0], [0.1, 0.06, 0], [0, 0.06, 0.0]], [[0, 1, 2], [0, 2, 3]])
 
 BUILDS = {
     "solid": (CAN, Structure("solid"), SAID),
@@ -67,9 +65,7 @@ def made(mesh, field, scale):
     anatomy = surveyed(mesh, scale)
     (member,) = anatomy.members
     scene = field_in_scene_scale(field, (scale,))
-    return infer_part_model(anatomy, member, scene, np.random.default_rng(1)), part_mass(
-        member, scene, 0.0
-    )
+    return infer_part_model(anatomy, member, scene, np.random.default_rng(1)), part_mass(member, scene, 0.0)
 
 
 @pytest.mark.parametrize("build", BUILDS)

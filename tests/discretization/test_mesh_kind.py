@@ -107,9 +107,7 @@ def test_a_small_part_that_overlaps_itself_or_holds_another_is_not_counted_twice
     """Few of the object's probes hit it, or none: 4, 24 and 3 of 20 000 here."""
     at = [trimesh.transformations.translation_matrix((0.8, y, 0)) for y in (-0.3, 0.0, 0.3)]
     box = trimesh.creation.box
-    crossed = trimesh.util.concatenate(
-        [box((0.03, 0.03, 0.1), at[0]), box((0.03, 0.1, 0.03), at[0])]
-    )
+    crossed = trimesh.util.concatenate([box((0.03, 0.03, 0.1), at[0]), box((0.03, 0.1, 0.03), at[0])])
     twice = trimesh.util.concatenate([box((0.1, 0.1, 0.1), at[1]), box((0.08, 0.08, 0.08), at[1])])
     shell, core = box((0.1, 0.1, 0.1), at[2]), box((0.09, 0.09, 0.09), at[2])
     anatomy = examined(box((1, 1, 1)), crossed, twice, shell, core, rng=rng)

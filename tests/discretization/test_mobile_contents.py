@@ -79,8 +79,7 @@ def test_a_pushed_vessel_and_what_is_in_it_are_expected_to_move_as_they_were_tol
 
 
 @pytest.mark.parametrize(
-    ("change", "does"),
-    [({}, True), ({"fill": 0.95}, False), ({"loose": False}, False), ({"inflated": True}, False)],
+    ("change", "does"), [({}, True), ({"fill": 0.95}, False), ({"loose": False}, False), ({"inflated": True}, False)]
 )
 def test_what_is_full_or_keeps_its_shape_stays_in_its_vessel(glass, change, does):
     water = glass.field.materials[1]

@@ -53,9 +53,7 @@ def drawn(outside, hollow):
 def area_of(outside):
     """Area that the outside sweeps [m²], by Pappus."""
     p = np.array(outside)
-    return float(
-        2 * np.pi * (p[1:, 0] + p[:-1, 0]) / 2 @ np.linalg.norm(np.diff(p, axis=0), axis=1)
-    )
+    return float(2 * np.pi * (p[1:, 0] + p[:-1, 0]) / 2 @ np.linalg.norm(np.diff(p, axis=0), axis=1))
 
 
 def area_found(mesh, words=WARE):
@@ -63,9 +61,7 @@ def area_found(mesh, words=WARE):
         np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros(len(mesh.faces), np.int64),
         np.random.default_rng(1),
     )  # fmt: skip
-    made = infer_structure(
-        anatomy.members[0], PieceSpecification(Structure("shell", WALL), STEEL, words)
-    )
+    made = infer_structure(anatomy.members[0], PieceSpecification(Structure("shell", WALL), STEEL, words))
     return made.mass / (STEEL.density * WALL)
 
 
@@ -126,9 +122,5 @@ def test_nothing_else_is_read_as_ware():
     """Whatever a mesh that somebody made draws, a closed wall, and a cover about something else."""
     mesh = drawn(OUTSIDES["pan"], "closed")
     sheet = area_of(OUTSIDES["pan"])
-    for words in (
-        replace(WARE, wall_unseen=False),
-        replace(WARE, structure="hollow"),
-        replace(WARE, inner_share=0.5),
-    ):
+    for words in (replace(WARE, wall_unseen=False), replace(WARE, structure="hollow"), replace(WARE, inner_share=0.5)):
         assert area_found(mesh, words) > 1.2 * sheet

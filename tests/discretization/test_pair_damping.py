@@ -101,9 +101,7 @@ def test_a_mat_loses_at_the_frequency_of_the_blow():
     assert found.vibration == pytest.approx(pi / lasts / LOSS_BAND_MIDDLE_RATIO)
     assert struck is RIGID
     # Of two alike at once the same; a ball as soft as the mat takes longer.
-    again = tune_loss_to_impacts(
-        [*parts, ball(LOSSY, 2)], [*moving, fallen(0)], [mat(), RIGID, RIGID]
-    )
+    again = tune_loss_to_impacts([*parts, ball(LOSSY, 2)], [*moving, fallen(0)], [mat(), RIGID, RIGID])
     assert again[0].vibration == pytest.approx(found.vibration)
     slower = tune_loss_to_impacts(parts, moving, [mat(), mat()])[0]
     assert slower.vibration == pytest.approx(found.vibration / 2**0.4)
@@ -120,10 +118,7 @@ def test_only_what_is_flat_and_struck_and_loses_is_tuned():
     assert tune_loss_to_impacts([SLAB, striker], moving, [clay, RIGID])[0] is clay
     lying = mat()
     assert tune_loss_to_impacts([SLAB, striker], [LYING, LYING], [lying, RIGID])[0] is lying
-    assert (
-        tune_loss_to_impacts([SLAB, striker], [fallen(FLOOR_NUMBER), fallen(0)], [lying, RIGID])[0]
-        is lying
-    )
+    assert tune_loss_to_impacts([SLAB, striker], [fallen(FLOOR_NUMBER), fallen(0)], [lying, RIGID])[0] is lying
     carpet = mat(kind="shell", thickness=0.01)
     assert tune_loss_to_impacts([sheet, striker], moving, [carpet, RIGID])[0].vibration > 0.0
 

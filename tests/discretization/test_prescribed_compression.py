@@ -69,10 +69,7 @@ def ball(height=0.03):
 DOWN = (0.2, 0, 0, -0.006)
 PRESSED = {
     "ball on the floor": ((ball(), plate(0.06, DOWN)), 0.1),
-    "ball on a block": (
-        (ball(0.09), plate(0.12, DOWN), co.box("wood", CUBE, name="block")),
-        0.1,
-    ),
+    "ball on a block": ((ball(0.09), plate(0.12, DOWN), co.box("wood", CUBE, name="block")), 0.1),
     "cube, first after a way": ((cube("rubber"), plate(0.16, (0.2, 0, 0, -0.103))), 0.05),
     "cube in a hand": ((cube("seat_foam"), *fingers(0.004)), 0.1),
     "cube in a hand that comes down and lifts it": ((cube("seat_foam"), *lifters()), 0.1),
@@ -93,10 +90,7 @@ ABOVE = co.box("steel", (0.02, SIDE, SIDE), at=(-0.05, 0, 0.23), name="pusher")
 OVER = co.box("steel", (0.02, SIDE, SIDE), at=(0, 0, 0.23), name="pusher")
 FREE = {
     "pusher": (cube("rubber"), told(BESIDE, (0, 0, 0, 0), (0.5, 0.2, 0, 0))),
-    "pusher that came down": (
-        cube("rubber"),
-        told(ABOVE, (0, 0, 0, 0), (0.5, 0, 0, -0.2), (1, 0.2, 0, -0.2)),
-    ),
+    "pusher that came down": (cube("rubber"), told(ABOVE, (0, 0, 0, 0), (0.5, 0, 0, -0.2), (1, 0.2, 0, -0.2))),
     "pusher that was above it, and came down beside it": (
         cube("rubber"),
         told(OVER, (0, 0, 0, 0), (0.3, -0.1, 0, 0), (0.6, -0.1, 0, -0.2), (1, 0.2, 0, -0.2)),
@@ -161,10 +155,7 @@ def test_a_cube_of_foam_in_a_hand_presses_back_with_its_modulus_times_area_and_s
     """E A ε = 60 kPa · (60 mm)² · .1 = 21.6 N; held by friction a few percent more."""
     pair = fingers(0.004)
     scene = replace(co.build_scene(cube("seat_foam"), *pair), duration=0.08, fps=100)
-    held = tuple(
-        replace(obj, path=replace(obj.path, time=(0.0, 0.05))) if obj.path else obj
-        for obj in scene.objects
-    )
+    held = tuple(replace(obj, path=replace(obj.path, time=(0.0, 0.05))) if obj.path else obj for obj in scene.objects)
     ledger = co.simulate_scene(replace(scene, objects=held)).trajectory.ledger
     impulse, time = np.array(ledger.external_impulse), np.array(ledger.time)
     force = (impulse[-1, 1:, 0] - impulse[-2, 1:, 0]) / (time[-1] - time[-2])

@@ -5,19 +5,12 @@ import pytest
 import trimesh
 
 from corporeal.discretization.mesh_measures import measure_object
-from corporeal.discretization.rods import (
-    SECTION_RING_RADIUS_RATIO,
-    Rod,
-    find_rod,
-    rod_section_points,
-)
+from corporeal.discretization.rods import SECTION_RING_RADIUS_RATIO, Rod, find_rod, rod_section_points
 
 
 def found(mesh):
     rng = np.random.default_rng(0)
-    anatomy = measure_object(
-        np.array(mesh.vertices), np.array(mesh.faces), np.zeros(len(mesh.faces), np.int64), rng
-    )
+    anatomy = measure_object(np.array(mesh.vertices), np.array(mesh.faces), np.zeros(len(mesh.faces), np.int64), rng)
     return find_rod(anatomy.members[0], rng)
 
 
@@ -64,10 +57,7 @@ def test_the_centreline_of_a_bent_rod_follows_it():
         trimesh.creation.cone(0.02, 0.5),
         trimesh.creation.icosphere(3, 0.1),
         trimesh.util.concatenate(
-            [
-                trimesh.creation.cylinder(0.01, 0.5),
-                trimesh.creation.cylinder(0.01, segment=[[0, 0, 0], [0.15, 0, 0.2]]),
-            ]
+            [trimesh.creation.cylinder(0.01, 0.5), trimesh.creation.cylinder(0.01, segment=[[0, 0, 0], [0.15, 0, 0.2]])]
         ),
     ],
     ids=["strip", "cone", "ball", "fork"],

@@ -58,9 +58,7 @@ def test_only_what_is_round_and_rigid_is_braked():
     assert rolling is not None
     roller = RollingBody.of(problem.bodies[0])
     assert roller.radius == pytest.approx(0.01, rel=0.02) and roller.length == 0.0
-    assert (
-        rolling[0, 2] == rolling[2, 0] == rolling_resistance_length(roller, glass, concrete) > 0.0
-    )
+    assert rolling[0, 2] == rolling[2, 0] == rolling_resistance_length(roller, glass, concrete) > 0.0
     assert rolling[0, 1] == rolling[1, 0] == rolling_resistance_length(roller, glass, wood)
     assert rolling[1, 2] == 0.0  # a die has no round points
     unknown = rolling_resistance_lengths(problem.bodies, (glass, wood), None, 1)

@@ -22,11 +22,7 @@ from corporeal.discretization.part_geometry import is_folding_wall, wall_factors
 from corporeal.materials import library
 from corporeal.mpm.constants import GRID_LOSS_FACTOR, MIN_REDUCED_POISSON_RATIO
 from corporeal.mpm.physics.maxwell_branches import stiffening
-from corporeal.mpm.physics.time_step_limits import (
-    compress_young,
-    fit_young_compression,
-    p_wave_speed,
-)
+from corporeal.mpm.physics.time_step_limits import compress_young, fit_young_compression, p_wave_speed
 
 SOLID = Structure("solid")
 FALL = ExpectedMotion(impact_speed=3.0, acceleration=9.81)
@@ -48,9 +44,7 @@ def shell(thickness):
 
 
 def sphere(material, diameter, structure=SOLID, number=0):
-    return PartGeometry(
-        number, material, structure, (diameter,) * 3, pi / 6 * diameter**3, pi * diameter**2
-    )
+    return PartGeometry(number, material, structure, (diameter,) * 3, pi / 6 * diameter**3, pi * diameter**2)
 
 
 def cylinder(material, diameter, height, structure=SOLID, number=0):
@@ -216,9 +210,7 @@ def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
     parts = [sphere(m, 0.1, number=k) for k, m in enumerate((FOAM, RUBBER, plaster, copper))]
     # Long enough to bend: a ball of metal would be marked too deeply, and be rigid.
     parts[2:] = [replace(p, size=(0.1, 0.1, 0.21)) for p in parts[2:]]
-    foam, rubber, soft_metal, hard_metal = plan_discretization(
-        parts, [FALL] * 4, "draft"
-    ).treatments
+    foam, rubber, soft_metal, hard_metal = plan_discretization(parts, [FALL] * 4, "draft").treatments
     assert (
         foam.simulated_young_pa
         < rubber.simulated_young_pa
@@ -252,9 +244,7 @@ def test_a_limp_looking_wall_is_rigid_at_rest_and_gives_way_when_struck():
     ball = replace(sphere(RUBBER, 0.4, shell(0.002)), closed=True)
     calm = ExpectedMotion(impact_speed=0.0, acceleration=9.81)
     assert not judge_rigidity(ball, calm).rigid
-    (still,), (struck,) = (
-        plan_discretization([ball], [m], "draft").treatments for m in (calm, FALL)
-    )
+    (still,), (struck,) = (plan_discretization([ball], [m], "draft").treatments for m in (calm, FALL))
     assert still.kind == "rigid"
     assert struck.kind == "shell"
 
@@ -266,10 +256,7 @@ def test_a_crowded_scene_takes_fewer_steps_than_a_small_one():
     assert draft.steps(20_000) * 20_000 == pytest.approx(draft.work)
 
 
-@given(
-    st.lists(st.tuples(st.floats(1e3, 1e12), st.floats(1.0, 1e4)), min_size=2, max_size=8),
-    st.floats(0.2, 9e3),
-)
+@given(st.lists(st.tuples(st.floats(1e3, 1e12), st.floats(1.0, 1e4)), min_size=2, max_size=8), st.floats(0.2, 9e3))
 def test_compression_keeps_the_order_never_stiffens_and_slows_all_waves(parts, limit):
     if max(speed for _, speed in parts) <= limit:
         return
@@ -288,20 +275,14 @@ MATERIALS = [entry.pick(entry.typical()) for entry in library().values()]
 
 @pytest.mark.parametrize("detail", QUALITY_PRESETS)
 @pytest.mark.parametrize("speed", [0.5, 3.0, 30.0])
-def test_every_two_materials_of_the_library_are_simulated_in_their_order_of_stiffness(
-    detail, speed
-):
+def test_every_two_materials_of_the_library_are_simulated_in_their_order_of_stiffness(detail, speed):
     parts = [sphere(m, 0.1, number=k) for k, m in enumerate(MATERIALS)]
-    treatments = plan_discretization(
-        parts, [ExpectedMotion(speed, 9.81)] * len(parts), detail
-    ).treatments
+    treatments = plan_discretization(parts, [ExpectedMotion(speed, 9.81)] * len(parts), detail).treatments
     bulk = [t for t in treatments if t.kind == "deformable"]
     assert len(bulk) > 10
     order = sorted(bulk, key=lambda t: t.young_pa)
     assert all(
-        a.simulated_young_pa < b.simulated_young_pa
-        for a, b in pairwise(order)
-        if b.young_pa > 1.01 * a.young_pa
+        a.simulated_young_pa < b.simulated_young_pa for a, b in pairwise(order) if b.young_pa > 1.01 * a.young_pa
     )
 
 
@@ -311,9 +292,7 @@ def test_shells_are_simulated_in_their_order_of_bending_stiffness():
         for t in (2e-4, 1e-3)
     ]  # fmt: skip
     parts = [sphere(m, 0.2, shell(t), number=k) for k, (m, t) in enumerate(made)]
-    treatments = plan_discretization(
-        parts, [ExpectedMotion(30.0, 9.81)] * len(parts), "draft"
-    ).treatments
+    treatments = plan_discretization(parts, [ExpectedMotion(30.0, 9.81)] * len(parts), "draft").treatments
     rows = sorted(
         (m.young * t**3, s.simulated_young_pa * (s.thickness or 0.0) ** 3)
         for (m, t), p, s in zip(made, parts, treatments, strict=True)
@@ -384,8 +363,7 @@ def test_a_closed_elastic_wall_keeps_its_indentation_stiffness():
 def test_a_closed_wall_that_flows_keeps_its_hinges():
     """A can dents by folding: its map is the same whether its lid is on or not."""
     (shut,), (open_,) = (
-        plan_discretization([replace(CAN, closed=closed)], [FALL], "draft").treatments
-        for closed in (True, False)
+        plan_discretization([replace(CAN, closed=closed)], [FALL], "draft").treatments for closed in (True, False)
     )
     assert shut == open_
 
@@ -396,10 +374,7 @@ def test_a_long_part_that_is_no_known_rod_says_what_it_was_taken_for():
     rod = replace(cylinder(WOOD, 0.02, 1.0), diameter=0.02)
     tube = cylinder(STEEL, 0.03, 1.2, shell(1.2e-3))
     board = block(WOOD, 0.02, 0.6, 0.9)
-    said = [
-        plan_discretization([p], [FALL], "draft").treatments[0].reason
-        for p in (strip, tripod, rod, tube, board)
-    ]
+    said = [plan_discretization([p], [FALL], "draft").treatments[0].reason for p in (strip, tripod, rod, tube, board)]
     assert ["solid bar" in why for why in said] == [True, True, False, False, False]
     assert "a solid bar 10 mm across" in said[0] and "a solid bar 30 mm across" in said[1]
 
@@ -432,9 +407,7 @@ def test_the_bulk_gives_way_before_the_shape_does():
     assert fine.poisson > 0.48
     assert fine.simulated_young_pa == RUBBER.young
     # Only as far as is needed.
-    (between,) = plan_discretization(
-        [sphere(replace(RUBBER, young=0.6e6), 0.06)], [fast], "draft"
-    ).treatments
+    (between,) = plan_discretization([sphere(replace(RUBBER, young=0.6e6), 0.06)], [fast], "draft").treatments
     assert MIN_REDUCED_POISSON_RATIO < between.poisson < 0.49
     assert between.simulated_young_pa == 0.6e6
     (foam,) = plan_discretization([sphere(FOAM, 0.06)], [fast], "draft").treatments
@@ -503,8 +476,6 @@ def test_steps_follow_what_is_resisted_at_once():
         for m, motion in ((limp, still), (lossy, still), (lossy, moving))
     )
     assert slow.loss == 0.3
-    assert slow.wave_speed / bare.wave_speed == pytest.approx(
-        sqrt(stiffening(0.3, FOAM.poisson)), rel=1e-6
-    )
+    assert slow.wave_speed / bare.wave_speed == pytest.approx(sqrt(stiffening(0.3, FOAM.poisson)), rel=1e-6)
     # What contact and transfers take of a blow counts on the material's loss.
     assert struck.loss == pytest.approx(0.3 - GRID_LOSS_FACTOR / 8**2)

@@ -55,9 +55,7 @@ def test_a_cup_that_is_filled_in_holds_what_a_cup_of_its_wall_does(filled):
 def test_it_weighs_and_its_wall_is_as_before(filled):
     field, anatomy = made_of(WARE), anatomy_of(drawn(filled))
     before = infer_structure(anatomy.members[0], part_specification(0, field))
-    now = infer_structure(
-        hollow_all_vessels([anatomy], field)[0].members[0], part_specification(0, field)
-    )
+    now = infer_structure(hollow_all_vessels([anatomy], field)[0].members[0], part_specification(0, field))
     assert now.mass == pytest.approx(before.mass, rel=1e-9)
     assert (now.thickness, now.whose, now.shown) == (before.thickness, before.whose, 0.0)
 

@@ -16,16 +16,12 @@ from corporeal.export.export_target import EXPORT_WRITERS, read_record
 
 
 def contents(folder):
-    return {
-        str(p.relative_to(folder)): p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()
-    }
+    return {str(p.relative_to(folder)): p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
 
 
 def left(folder):
     """What lies in a folder beside what was finished."""
-    return [
-        p.name for p in folder.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE
-    ]
+    return [p.name for p in folder.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE]
 
 
 def complaints(said):
@@ -37,9 +33,7 @@ def complaints(said):
 def test_a_run_is_exported_from_the_command_line(command, run_folder, tmp_path):
     before = contents(run_folder)
     out = tmp_path / "для других"
-    code, said = command(
-        "export", run_folder, "--to", "usd", "mjcf", "urdf", "glb", "--out", out, "--check"
-    )
+    code, said = command("export", run_folder, "--to", "usd", "mjcf", "urdf", "glb", "--out", out, "--check")
     assert code == 0, said.err
     assert contents(run_folder) == before
     record = read_record(out / "export.json")
@@ -67,9 +61,7 @@ def test_the_same_run_gives_the_same_bytes(run_folder, tmp_path):
     for name in ("a", "b"):
         verb.export_scene(run_folder, ["usd", "mjcf", "urdf", "glb"], tmp_path / name)
     files = [p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*") if p.is_file()]
-    different = [
-        f for f in files if (tmp_path / "a" / f).read_bytes() != (tmp_path / "b" / f).read_bytes()
-    ]
+    different = [f for f in files if (tmp_path / "a" / f).read_bytes() != (tmp_path / "b" / f).read_bytes()]
     assert [f.name for f in different if f.name != store.LOCK_FILE] == []
 
 
@@ -144,9 +136,7 @@ def breaking(monkeypatch):
     """Let the writer of GLB fail in the middle."""
 
     def set_(error):
-        monkeypatch.setattr(
-            "corporeal.export.animated_glb_writer.write_animated_glb", broken(error)
-        )
+        monkeypatch.setattr("corporeal.export.animated_glb_writer.write_animated_glb", broken(error))
 
     return set_
 
@@ -159,9 +149,7 @@ def breaking(monkeypatch):
         (errno.EACCES, "permission denied. Choose another folder with --out"),
     ],
 )
-def test_a_disk_that_refuses_leaves_what_was_there(
-    command, run_folder, tmp_path, breaking, number, told
-):
+def test_a_disk_that_refuses_leaves_what_was_there(command, run_folder, tmp_path, breaking, number, told):
     out = tmp_path / "out"
     verb.export_scene(run_folder, ["glb"], out)
     before = contents(out / "glb")

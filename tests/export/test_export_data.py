@@ -26,9 +26,7 @@ def test_particles_have_the_kinds_that_the_loaders_know(asked, played):
     for k, solid in enumerate(asked.scene.solids):
         kinds = set(table.kind[particles.object == k].tolist())
         assert kinds == ({0} if solid.rigid else {GNS_PARTICLE_TYPES[laws[solid.heaviest]]})
-    assert (
-        GNS_PARTICLE_TYPES[Law.DRUCKER_PRAGER] == 6 and OBSTACLE not in GNS_PARTICLE_TYPES.values()
-    )
+    assert GNS_PARTICLE_TYPES[Law.DRUCKER_PRAGER] == 6 and OBSTACLE not in GNS_PARTICLE_TYPES.values()
 
 
 def test_the_loader_of_gns_reads_positions_kinds_and_a_property(written, asked, played):

@@ -29,10 +29,7 @@ def typed(*words):
 
 def started(*words):
     return subprocess.Popen(
-        typed(*words),
-        env=os.environ | {"PYTHONPATH": SOURCE},
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
+        typed(*words), env=os.environ | {"PYTHONPATH": SOURCE}, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     )
 
 
@@ -80,9 +77,7 @@ def test_killed_at_any_time_leaves_whole_targets_or_none(run_folder, tmp_path, c
     # The same command again needs no cleaning, and what it writes is what it always writes.
     verb.export_scene(run_folder, targets, out)
     assert {k: v for k, v in files(out).items() if k != "export.json"} == complete
-    assert [
-        p.name for p in out.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE
-    ] == []
+    assert [p.name for p in out.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE] == []
 
 
 def test_killed_over_an_older_export_leaves_the_older_one(run_folder, tmp_path):
@@ -106,11 +101,7 @@ def mounted(options, place, *words):
     command = f'mount -t tmpfs -o {options} tmpfs "$0" && exec "$@"; exit 77'
     shell = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", command, str(place)]
     done = subprocess.run(
-        [*shell, *typed(*words)],
-        env=os.environ | {"PYTHONPATH": SOURCE},
-        capture_output=True,
-        text=True,
-        timeout=300,
+        [*shell, *typed(*words)], env=os.environ | {"PYTHONPATH": SOURCE}, capture_output=True, text=True, timeout=300
     )
     if done.returncode in (1, 77) and ("unshare" in done.stderr or "mount" in done.stderr):
         pytest.skip(f"no disk can be mounted here: {done.stderr.strip()[:100]}")

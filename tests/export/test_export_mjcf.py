@@ -8,12 +8,7 @@ import pytest
 from export_helpers import asked_of, replaced, rigid, soft
 
 import corporeal as co
-from corporeal.export.check_exports import (
-    body_mass_error,
-    check_target,
-    drift_in_mujoco,
-    urdf_in_mujoco,
-)
+from corporeal.export.check_exports import body_mass_error, check_target, drift_in_mujoco, urdf_in_mujoco
 from corporeal.export.export_target import ExportConfig, ExportRequest, NothingToWriteError
 from corporeal.export.mjcf_writer import TIME_STEP_S, write_mjcf
 from corporeal.export.physical_scene import physical_scene

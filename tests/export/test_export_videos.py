@@ -64,9 +64,7 @@ def test_a_changed_frame_is_found(written, asked):
     (block,) = rigid(asked)
     node = document["nodes"].index(node_of(block, document))
     (channel,) = (
-        c
-        for c in document["animations"][0]["channels"]
-        if c["target"] == {"node": node, "path": "translation"}
+        c for c in document["animations"][0]["channels"] if c["target"] == {"node": node, "path": "translation"}
     )
     sampler = document["animations"][0]["samplers"][channel["sampler"]]
     accessor = document["accessors"][sampler["output"]]
@@ -153,9 +151,7 @@ def test_alembic_faces_turn_clockwise_seen_from_outside(written, asked):
 
     top = Abc.IArchive(str(written(write_alembic) / "video.abc")).getTop()
     (block,) = rigid(asked)
-    schema = AbcGeom.IPolyMesh(
-        AbcGeom.IXform(top, block.name), f"surface_{block.surface_numbers[0]}"
-    ).getSchema()
+    schema = AbcGeom.IPolyMesh(AbcGeom.IXform(top, block.name), f"surface_{block.surface_numbers[0]}").getSchema()
     sample = schema.getValue(Abc.ISampleSelector(0))
     points = np.array(sample.getPositions())
     faces = np.array(list(sample.getFaceIndices())).reshape(-1, 3)
@@ -242,9 +238,7 @@ def test_usd_has_the_gaussians_of_every_object_at_every_frame(played, asked, wri
             np.testing.assert_allclose(same, 1.0, atol=1e-5)
     still = stage.GetPrimAtPath("/World/background").GetAttribute("positions")
     assert still.GetNumTimeSamples() == 0 and len(still.Get()) == 1
-    said = stage.GetPrimAtPath(f"/World/{asked.scene.solids[0].name}").GetCustomDataByKey(
-        "corporeal"
-    )
+    said = stage.GetPrimAtPath(f"/World/{asked.scene.solids[0].name}").GetCustomDataByKey("corporeal")
     assert said["parts"]["0"]["values"]["young"]["source"]
 
 

@@ -176,10 +176,7 @@ def posed_in_blender(path, asked, tmp_path):
     seconds = [asked.motion.time[k] for k in FRAMES]
     run(python_of("bpy"), "blender_video.py", path, tmp_path / "posed.npz", 40, *seconds)
     with np.load(tmp_path / "posed.npz") as file:
-        return [
-            [file[name] for name in file.files if name.startswith(f"{number}|")]
-            for number in range(len(FRAMES))
-        ]
+        return [[file[name] for name in file.files if name.startswith(f"{number}|")] for number in range(len(FRAMES))]
 
 
 def largest_error(posed, asked):
@@ -198,11 +195,7 @@ def largest_error(posed, asked):
 
 @pytest.mark.parametrize(
     ("writer", "name", "bound"),
-    [
-        (write_usd, "video.usda", 1e-5),
-        (write_alembic, "video.abc", 1e-5),
-        (write_animated_glb, "video.glb", 1e-3),
-    ],
+    [(write_usd, "video.usda", 1e-5), (write_alembic, "video.abc", 1e-5), (write_animated_glb, "video.glb", 1e-3)],
     ids=["usd", "alembic", "glb"],
 )
 def test_blender_shows_every_vertex_where_it_was(written, asked, tmp_path, writer, name, bound):

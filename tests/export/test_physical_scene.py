@@ -47,9 +47,7 @@ def test_at_the_end_everything_is_where_it_went(played):
     particles = played.prepared.particles
     for solid in end.scene.solids:
         own = particles.object == solid.number
-        np.testing.assert_allclose(
-            solid.origin, particles.mass[own] @ last[own] / particles.mass[own].sum(), atol=1e-6
-        )
+        np.testing.assert_allclose(solid.origin, particles.mass[own] @ last[own] / particles.mass[own].sum(), atol=1e-6)
     (block,) = rigid(end)
     # Without contact it falls freely from 1 m/s.
     np.testing.assert_allclose(block.velocity, [0.5, 0.0, -1.0 - 0.1 * 9.81], atol=2e-3)
@@ -66,9 +64,7 @@ def test_what_is_soft_has_all_of_its_matter(asked, played):
         assert solid.grains is not None
         assert solid.grains.mass.sum() == pytest.approx(solid.mass, rel=1e-12)
         back = solid.grains.position + solid.origin
-        np.testing.assert_allclose(
-            back, played.trajectory.frames[0].position[solid.grains.number], atol=1e-7
-        )
+        np.testing.assert_allclose(back, played.trajectory.frames[0].position[solid.grains.number], atol=1e-7)
 
 
 def test_colliders_hold_the_surface(asked):
@@ -89,9 +85,7 @@ def test_pushes_and_winds_are_said_to_be_left_out(settled):
     assert [s.split(" ")[0] for s in told] == ["board", "Wind"]
 
 
-@pytest.mark.parametrize(
-    ("at", "frame"), [("start", 0), ("end", 4), ("0.05", 2), ("0.06", 2), ("0.1", 4)]
-)
+@pytest.mark.parametrize(("at", "frame"), [("start", 0), ("end", 4), ("0.05", 2), ("0.06", 2), ("0.1", 4)])
 def test_the_nearest_frame_is_exported(at, frame):
     assert frame_at(at, np.arange(5) / 40) == frame
 

@@ -17,10 +17,7 @@ from corporeal.pipeline.settings.ground_config import GroundConfig, validate
 from corporeal.pipeline.stages.ground import ground, grounding_warnings
 from fields import synthetic_fields
 
-WRITERS = {
-    "vomp": (synthetic_fields.write_vomp, "npz"),
-    "pixie": (synthetic_fields.write_pixie, "ply"),
-}
+WRITERS = {"vomp": (synthetic_fields.write_vomp, "npz"), "pixie": (synthetic_fields.write_pixie, "ply")}
 
 
 @cache
@@ -121,9 +118,7 @@ def test_pixies_kinds_choose_laws_with_what_these_need(tmp_path):
                 assert law is not Law.DRUCKER_PRAGER or material.friction_angle
     same = written(tmp_path, "pixie", "armchair", kind=6)  # stationary: judged like any part
     for now, then in zip(
-        impose_field(before, it.scene, it.parts, f"pixie:{same}").materials,
-        before.materials,
-        strict=True,
+        impose_field(before, it.scene, it.parts, f"pixie:{same}").materials, before.materials, strict=True
     ):
         assert now.law is then.law
     fluid = written(tmp_path, "pixie", "armchair", kind=4)
@@ -250,9 +245,7 @@ def _columns(folder):
 
 
 def _plain_ply(folder):
-    (folder / "a.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n"
-    )
+    (folder / "a.ply").write_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n")
     return "pixie", folder / "a.ply"
 
 

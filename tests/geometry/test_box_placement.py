@@ -52,10 +52,5 @@ def test_a_chair_under_a_table_rises_with_it():
 
 
 def test_boxes_that_only_touch_do_not_overlap():
-    assert (
-        box_placement.overlapping_boxes(boxes((1, 1, 1), (1, 1, 1), at=[[0, 0, 0], [1, 0, 0]]))
-        == []
-    )
-    assert box_placement.overlapping_boxes(
-        boxes((1, 1, 1), (1, 1, 1), at=[[0, 0, 0], [0.9, 0, 0]])
-    ) == [(0, 1)]
+    assert box_placement.overlapping_boxes(boxes((1, 1, 1), (1, 1, 1), at=[[0, 0, 0], [1, 0, 0]])) == []
+    assert box_placement.overlapping_boxes(boxes((1, 1, 1), (1, 1, 1), at=[[0, 0, 0], [0.9, 0, 0]])) == [(0, 1)]

@@ -23,9 +23,7 @@ def asked(mesh, columns, layers):
     heights = np.tile(np.arange(layers) + 0.5, (count, 1))
     found = np.zeros((count, layers), bool)
     found[points_wound_around(met, heights)] = True
-    places = np.concatenate(
-        [np.repeat(columns.reshape(-1, 1, 2), layers, axis=1), heights[..., None]], axis=-1
-    )
+    places = np.concatenate([np.repeat(columns.reshape(-1, 1, 2), layers, axis=1), heights[..., None]], axis=-1)
     return met, found.reshape(-1), places.reshape(-1, 3)
 
 

@@ -34,13 +34,9 @@ def spread(shape, deepest=None):
     return point_relaxation.relax_points(points, shape, Counted(shape.mesh), SPACING, limit), asked
 
 
-def test_what_cannot_feel_the_surface_is_not_asked_again_and_ends_in_the_same_place(
-    ball, monkeypatch
-):
+def test_what_cannot_feel_the_surface_is_not_asked_again_and_ends_in_the_same_place(ball, monkeypatch):
     found, asked = spread(ball)
-    monkeypatch.setattr(
-        point_relaxation.FreeDistances, "still", lambda self, points, which: which < 0
-    )
+    monkeypatch.setattr(point_relaxation.FreeDistances, "still", lambda self, points, which: which < 0)
     every, all_asked = spread(ball)
     assert found.tobytes() == every.tobytes()
     assert sum(asked) < 0.95 * sum(all_asked)
@@ -48,9 +44,7 @@ def test_what_cannot_feel_the_surface_is_not_asked_again_and_ends_in_the_same_pl
 
 def test_in_a_wall_with_a_depth_every_point_is_asked(ball, monkeypatch):
     found, asked = spread(ball, 0.3)
-    monkeypatch.setattr(
-        point_relaxation.FreeDistances, "still", lambda self, points, which: which < 0
-    )
+    monkeypatch.setattr(point_relaxation.FreeDistances, "still", lambda self, points, which: which < 0)
     every, all_asked = spread(ball, 0.3)
     assert found.tobytes() == every.tobytes()
     assert asked == all_asked

@@ -67,8 +67,7 @@ def test_a_small_hole_leaves_out_only_what_is_outside(missing):
     torn = QueryMesh(Mesh(whole.mesh.vertices, whole.mesh.triangles[missing:]))
     assert not torn.closed
     points, expected = (
-        np.concatenate(list(scatter_points_by_slab(shape, 0.03, np.random.default_rng(3))))
-        for shape in (torn, whole)
+        np.concatenate(list(scatter_points_by_slab(shape, 0.03, np.random.default_rng(3)))) for shape in (torn, whole)
     )
     expected = expected[torn.inside(expected)]
     assert len(points) > 100_000
@@ -98,18 +97,14 @@ def test_points_deep_inside_follow_no_lattice(tilted_cube):
     deep = points[shape.closest(points)[0] > 0.15]
     rng = np.random.default_rng(1)
     wave = rng.normal(size=(3000, 3))
-    wave *= (2 * np.pi / 0.05 * rng.uniform(0.9, 1.3, (3000, 1))) / np.linalg.norm(
-        wave, axis=1, keepdims=True
-    )
+    wave *= (2 * np.pi / 0.05 * rng.uniform(0.9, 1.3, (3000, 1))) / np.linalg.norm(wave, axis=1, keepdims=True)
     peak = np.abs(np.exp(1j * deep @ wave.T).sum(axis=0)) ** 2 / len(deep)
     assert peak.max() < 0.05 * len(deep)
 
 
 def test_the_same_seed_gives_the_same_points():
     ball = shaped(trimesh.creation.icosphere(3))
-    first, again, other = (
-        fill_body(ball, ball, 0.15, all_through, np.random.default_rng(s)).points for s in (1, 1, 2)
-    )
+    first, again, other = (fill_body(ball, ball, 0.15, all_through, np.random.default_rng(s)).points for s in (1, 1, 2))
     assert np.array_equal(first, again)
     assert not np.array_equal(first[:50], other[:50])
 

@@ -60,9 +60,7 @@ def test_flipped_triangles_are_turned_back(share, rng):
     ball = welded(trimesh.creation.icosphere(3))
     turn = rng.uniform(size=len(ball.triangles)) < share
     faces = np.where(turn[:, None], ball.triangles[:, ::-1], ball.triangles)
-    assert signed_volume(orient_outward(Mesh(ball.vertices, faces))) == pytest.approx(
-        signed_volume(ball)
-    )
+    assert signed_volume(orient_outward(Mesh(ball.vertices, faces))) == pytest.approx(signed_volume(ball))
 
 
 def test_a_cavity_stays_and_a_mirrored_leg_is_turned():

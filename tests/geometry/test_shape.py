@@ -10,9 +10,7 @@ from corporeal.geometry.mesh_queries import QueryMesh
 def ball(turned=False):
     made = trimesh.creation.icosphere(4)
     faces = np.asarray(made.faces, dtype=np.int64)
-    return QueryMesh(
-        Mesh(np.asarray(made.vertices, dtype=float), faces[:, ::-1] if turned else faces)
-    )
+    return QueryMesh(Mesh(np.asarray(made.vertices, dtype=float), faces[:, ::-1] if turned else faces))
 
 
 def test_a_way_through_a_ball_goes_in_and_out_where_the_ball_begins_and_ends(rng):

@@ -7,11 +7,7 @@ import trimesh
 
 from corporeal.geometry.mesh import Mesh, join_meshes, weld_mesh
 from corporeal.geometry.mesh_queries import MAX_OPEN_EDGES_BRUTE, QueryMesh
-from corporeal.geometry.winding_number import (
-    unbalanced_edges,
-    vertical_line_table,
-    winding_without_table,
-)
+from corporeal.geometry.winding_number import unbalanced_edges, vertical_line_table, winding_without_table
 
 BODIES = {
     "ball": trimesh.creation.icosphere(3),

@@ -258,10 +258,7 @@ def test_a_skinned_mesh_stands_as_its_skeleton_rests(tmp_path):
     bind = np.eye(4, dtype=np.float32)
     bind[3, 0] = -1  # column-major: moves by -1 in x
     mesh = made.mesh(
-        attributes={
-            "JOINTS_0": made.accessor(np.zeros((8, 4), np.uint8)),
-            "WEIGHTS_0": made.accessor(weights),
-        }
+        attributes={"JOINTS_0": made.accessor(np.zeros((8, 4), np.uint8)), "WEIGHTS_0": made.accessor(weights)}
     )
     inverse = made.accessor(bind.reshape(1, 16)[:, :4], type="MAT4", bufferView=0)
     made.json["accessors"][inverse]["bufferView"] = made.view(bind.tobytes())

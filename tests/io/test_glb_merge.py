@@ -117,10 +117,7 @@ def test_another_reader_sees_the_same_objects_at_the_same_places(tmp_path):
     """Trimesh reads the file as it is, Y up."""
     file = cube(name="box").save(tmp_path / "box.glb")
     turn = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))  # a quarter about the vertical
-    members = [
-        member(file, "box_0", (1.0, 2.0, 3.0), turn, 2.0),
-        member(file, "box_1", (-4.0, 0.0, 0.5)),
-    ]
+    members = [member(file, "box_0", (1.0, 2.0, 3.0), turn, 2.0), member(file, "box_1", (-4.0, 0.0, 0.5))]
     seen = trimesh.load_scene(merged(tmp_path, *members))
     assert {"scene", "box_0", "box_1"} <= set(seen.graph.nodes)
     # The file's cube is x, y, z in [0, 1], and so x, -z, y of ours.
@@ -259,9 +256,7 @@ def test_meshes_in_any_packing_keep_their_shapes(tmp_path, make):
     written = json_of(path)
     assert written.get("extensionsRequired", []) == made.json.get("extensionsRequired", [])
     assert set(written.get("extensionsRequired", [])) <= set(written.get("extensionsUsed", []))
-    moved = [
-        p["targets"][0]["POSITION"] for p in written["meshes"][1]["primitives"] if p.get("targets")
-    ]
+    moved = [p["targets"][0]["POSITION"] for p in written["meshes"][1]["primitives"] if p.get("targets")]
     for accessor in moved:
         view = written["bufferViews"][written["accessors"][accessor]["bufferView"]]
         chunk = GltfDocument(path).chunk[view["byteOffset"] :][: view["byteLength"]]
@@ -440,10 +435,7 @@ def test_nothing_two_of_one_name_and_too_much_are_refused(tmp_path):
         (lambda j: j["nodes"][0].update(mesh="box"), "'mesh' is 'box'"),
         (lambda j: j["nodes"][0].update(children=[0]), "hangs in the tree twice"),
         (lambda j: j.update(extensionsRequired=["ACME_magic"]), "ACME_magic"),
-        (
-            lambda j: j["bufferViews"][0].update(extensions={"EXT_meshopt_compression": {}}),
-            "EXT_meshopt_compression",
-        ),
+        (lambda j: j["bufferViews"][0].update(extensions={"EXT_meshopt_compression": {}}), "EXT_meshopt_compression"),
     ],
 )
 def test_a_broken_member_is_named(tmp_path, spoil, said):

@@ -38,9 +38,7 @@ const {dirname, join} = require('path');
 
 
 def node(*arguments):
-    return subprocess.run(
-        ["node", *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=300
-    )
+    return subprocess.run(["node", *map(str, arguments)], cwd=ROOT, capture_output=True, text=True, timeout=300)
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +76,7 @@ def test_merged_files_are_valid(judge, tmp_path):
     merge_glb_files(path, members, "scene", {"gravity_m_s2": [0, 0, -9.81]})
     (found,) = judge(path)
     # Below its object, a skinned mesh is no root; its place is its skeleton's all the same.
-    assert set(found) <= {
-        (1, "NODE_SKINNED_MESH_NON_ROOT"),
-        (1, "NODE_SKINNED_MESH_LOCAL_TRANSFORMS"),
-    }
+    assert set(found) <= {(1, "NODE_SKINNED_MESH_NON_ROOT"), (1, "NODE_SKINNED_MESH_LOCAL_TRANSFORMS")}
 
 
 def test_the_validator_is_asked(judge, tmp_path):

@@ -22,9 +22,7 @@ from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube
 def volume(scene):
     """Signed volume: positive where the outside is out."""
     return sum(
-        np.einsum("td,td->", a, np.cross(b, c)) / 6
-        for s in scene.surfaces
-        for a, b, c in [s.vertices[s.triangles.T]]
+        np.einsum("td,td->", a, np.cross(b, c)) / 6 for s in scene.surfaces for a, b, c in [s.vertices[s.triangles.T]]
     )
 
 
@@ -289,9 +287,7 @@ def test_a_metal_texture_counts_by_its_mean(tmp_path):
     picture[:2, :, 2] = 255
     picture[..., 1] = 51
     pbr = {"metallicRoughnessTexture": {"index": 0}}
-    scene = read_glb(
-        textured({"pbrMetallicRoughness": pbr}, png(picture))[0].save(tmp_path / "a.glb")
-    )
+    scene = read_glb(textured({"pbrMetallicRoughness": pbr}, png(picture))[0].save(tmp_path / "a.glb"))
     assert scene.finishes[0].metallic == pytest.approx(0.5)
     assert scene.finishes[0].roughness == pytest.approx(0.2)
 
@@ -344,10 +340,7 @@ def three_things():
     made = Maker()
     names = ("Chair_01", "table", "Lamp.002")
     mesh = made.mesh()
-    children = [
-        made.node(root=False, name=n, mesh=mesh, translation=[3 * k, 0, 0])
-        for k, n in enumerate(names)
-    ]
+    children = [made.node(root=False, name=n, mesh=mesh, translation=[3 * k, 0, 0]) for k, n in enumerate(names)]
     made.node(name="Sketchfab_model", children=children)
     return made
 

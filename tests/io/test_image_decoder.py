@@ -27,9 +27,7 @@ def bomb(width, height):
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b"")
 
 
-@pytest.mark.parametrize(
-    ("mode", "channels"), [("RGB", 3), ("RGBA", 4), ("L", 3), ("LA", 4), ("P", 3), ("1", 3)]
-)
+@pytest.mark.parametrize(("mode", "channels"), [("RGB", 3), ("RGBA", 4), ("L", 3), ("LA", 4), ("P", 3), ("1", 3)])
 def test_every_kind_of_picture_ends_as_eight_bit_rgb(mode, channels):
     start = Image.new("RGBA", (3, 2), (255, 255, 255, 128))
     picture = (start.convert("RGB") if mode == "P" else start).convert(mode)
@@ -55,8 +53,7 @@ def test_a_decompression_bomb_is_refused_unopened(size):
 
 
 @pytest.mark.parametrize(
-    "data",
-    [b"", b"GIF89a\x01\0\x01\0", b"%PDF-1.4", bomb(100, 100), png(Image.new("L", (9, 9)))[:40]],
+    "data", [b"", b"GIF89a\x01\0\x01\0", b"%PDF-1.4", bomb(100, 100), png(Image.new("L", (9, 9)))[:40]]
 )
 def test_what_is_no_whole_picture_is_refused(data):
     with pytest.raises(ValueError, match="picture") as told:

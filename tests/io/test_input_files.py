@@ -16,9 +16,7 @@ def test_a_scene_is_made_of_every_file_that_it_names(tmp_path):
     made.json["images"] = [{"uri": "skin.png"}, {"uri": "data:,"}, {"uri": "../../etc/passwd"}]
     (tmp_path / "cube.gltf").write_text(json.dumps(made.json))
     cube().save(tmp_path / "ball.glb")
-    text = (
-        '[[object]]\nfile = "cube.gltf"\n[[object]]\nfile = "ball.glb"\n[[object]]\nfile = "x.glb"'
-    )
+    text = '[[object]]\nfile = "cube.gltf"\n[[object]]\nfile = "ball.glb"\n[[object]]\nfile = "x.glb"'
     (tmp_path / "scene.toml").write_text(text)
     names = {"scene.toml", "cube.gltf", "cube.bin", "skin.png", "ball.glb"}
     assert {p.name for p in list_input_files([tmp_path / "scene.toml"])} == names
@@ -32,9 +30,7 @@ def test_a_broken_file_still_counts_as_itself(tmp_path):
     for name in ("none.glb", "none.ply", "none.spz", "none.mp4", "none.json"):
         assert list_input_files([tmp_path / name]) == []
         (tmp_path / "scene.toml").write_text(f'[[object]]\nfile = "{name}"')
-        assert list_input_files([tmp_path / "scene.toml"]) == [tmp_path / "scene.toml"], (
-            "it cannot be read"
-        )
+        assert list_input_files([tmp_path / "scene.toml"]) == [tmp_path / "scene.toml"], "it cannot be read"
 
 
 def test_a_folder_is_called_by_its_whole_name(tmp_path):
@@ -52,9 +48,7 @@ def test_names_tell_what_an_input_is(tmp_path):
     (models / "a.glb").touch()
     assert input_kind([posed]) == input_kind([posed / "transforms.json"]) == "photographs"
     assert input_kind([splat]) == input_kind([tmp_path / "a.PLY"]) == "splat"
-    assert (
-        input_kind([models]) == input_kind([models / "a.glb"]) == input_kind([tmp_path]) == "model"
-    )
+    assert input_kind([models]) == input_kind([models / "a.glb"]) == input_kind([tmp_path]) == "model"
     assert list_input_files([posed / "transforms.json"]) == [posed] == list_input_files([posed])
     (tmp_path / "fall.toml").write_text('file = "posed"')
     assert input_kind([tmp_path / "fall.toml"]) == "photographs"

@@ -48,11 +48,7 @@ def same_rotation(a, b):
 def columns_of(g):
     """What INRIA's layout calls its properties, and their numbers."""
     rest = g.sh[:, 1:].swapaxes(1, 2).reshape(g.count, -1)
-    names = [
-        *"xyz",
-        *(f"f_dc_{k}" for k in range(3)),
-        *(f"f_rest_{k}" for k in range(rest.shape[1])),
-    ]
+    names = [*"xyz", *(f"f_dc_{k}" for k in range(3)), *(f"f_rest_{k}" for k in range(rest.shape[1]))]
     names += ["opacity", *(f"scale_{k}" for k in range(3)), *(f"rot_{k}" for k in range(4))]
     logit = np.log(g.opacity / (1 - g.opacity))[:, None]
     table = np.concatenate([g.mean, g.sh[:, 0], rest, logit, np.log(g.scale), g.rotation], axis=1)
@@ -110,11 +106,7 @@ def test_the_written_file_is_laid_out_as_viewers_expect(tmp_path):
     names = [line.split()[-1] for line in head.decode().splitlines() if line.startswith("property")]
     assert len(names) == 62
     assert names[:9] == ["x", "y", "z", "nx", "ny", "nz", "f_dc_0", "f_dc_1", "f_dc_2"]
-    assert names[54:] == [
-        "opacity",
-        *(f"scale_{k}" for k in range(3)),
-        *(f"rot_{k}" for k in range(4)),
-    ]
+    assert names[54:] == ["opacity", *(f"scale_{k}" for k in range(3)), *(f"rot_{k}" for k in range(4))]
     table = dict(zip(names, np.frombuffer(body, "<f4").reshape(2, 62).T, strict=True))
     np.testing.assert_array_equal(table["f_rest_15"], given.sh[:, 1, 1])  # green begins at 15
     np.testing.assert_allclose(table["scale_2"], np.log(given.scale[:, 2]), rtol=1e-6)
@@ -171,19 +163,12 @@ def packed_ply(g, colours=True):
     chunks = [slice(k, k + 256) for k in range(0, g.count, 256)]
     bounds = [
         np.concatenate(
-            [
-                f(v[c], axis=0)
-                for v in ((g.mean, log, tint) if colours else (g.mean, log))
-                for f in (np.min, np.max)
-            ]
+            [f(v[c], axis=0) for v in ((g.mean, log, tint) if colours else (g.mean, log)) for f in (np.min, np.max)]
         )
         for c in chunks
     ]
     names = [
-        f"{e}_{w}{a}"
-        for w, axes in (("", "xyz"), ("scale_", "xyz"), ("", "rgb"))
-        for e in ("min", "max")
-        for a in axes
+        f"{e}_{w}{a}" for w, axes in (("", "xyz"), ("scale_", "xyz"), ("", "rgb")) for e in ("min", "max") for a in axes
     ]
     names = names if colours else names[:12]
     for k, c in enumerate(chunks):
@@ -202,10 +187,7 @@ def packed_ply(g, colours=True):
             np.stack(
                 [
                     place[:, 0] << 21 | place[:, 1] << 11 | place[:, 2],
-                    largest.astype(np.uint64) << 30
-                    | turn[:, 0] << 20
-                    | turn[:, 1] << 10
-                    | turn[:, 2],
+                    largest.astype(np.uint64) << 30 | turn[:, 0] << 20 | turn[:, 1] << 10 | turn[:, 2],
                     size[:, 0] << 21 | size[:, 1] << 11 | size[:, 2],
                     shade[:, 0] << 24 | shade[:, 1] << 16 | shade[:, 2] << 8 | shade[:, 3],
                 ],
@@ -217,9 +199,7 @@ def packed_ply(g, colours=True):
     lines += [f"property float {n}" for n in names] + [f"element vertex {g.count}"]
     lines += [f"property uint packed_{n}" for n in ("position", "rotation", "scale", "color")]
     if rest.shape[1]:
-        lines += [f"element sh {g.count}"] + [
-            f"property uchar f_rest_{k}" for k in range(rest.shape[1])
-        ]
+        lines += [f"element sh {g.count}"] + [f"property uchar f_rest_{k}" for k in range(rest.shape[1])]
     body = np.array(bounds, "<f4").tobytes() + np.concatenate(rows).astype("<u4").tobytes()
     body += np.clip((rest / 8 + 0.5) * 256, 0, 255).astype(np.uint8).tobytes()
     return "\n".join([*lines, "end_header", ""]).encode() + body
@@ -234,9 +214,7 @@ def test_compressed_ply_says_the_same_to_its_steps(kept, colours):
     np.testing.assert_allclose(np.log(read.scale), np.log(given.scale), atol=6 / 1023 / 2 + 1e-5)
     np.testing.assert_allclose(read.opacity, given.opacity, atol=0.5 / 255 + 1e-6)
     inside = np.abs(given.sh[:, 0] * SH_DC_COEFFICIENT) <= 0.5
-    np.testing.assert_allclose(
-        read.sh[:, 0][inside], given.sh[:, 0][inside], atol=0.5 / 255 / SH_DC_COEFFICIENT
-    )
+    np.testing.assert_allclose(read.sh[:, 0][inside], given.sh[:, 0][inside], atol=0.5 / 255 / SH_DC_COEFFICIENT)
     np.testing.assert_allclose(read.sh[:, 1:], given.sh[:, 1:], atol=8 / 256 / 2 + 1e-6)
     assert same_rotation(read.rotation, given.rotation) < STEP
 
@@ -273,9 +251,7 @@ def spz(g, version, degree, flags=0):
     attributes = [a for a in attributes if a]
     streams = [zstandard.ZstdCompressor().compress(a) for a in attributes]
     head = head[:15] + bytes([len(streams)]) + struct.pack("<I12x", 32)
-    table = b"".join(
-        struct.pack("<QQ", len(s), len(a)) for s, a in zip(streams, attributes, strict=True)
-    )
+    table = b"".join(struct.pack("<QQ", len(s), len(a)) for s, a in zip(streams, attributes, strict=True))
     return head + table + b"".join(streams)
 
 
@@ -336,11 +312,7 @@ def sog(g, degree, **changes):
     meta = {
         "version": 2,
         "count": g.count,
-        "means": {
-            "mins": low.tolist(),
-            "maxs": high.tolist(),
-            "files": ["means_l.webp", "means_u.webp"],
-        },
+        "means": {"mins": low.tolist(), "maxs": high.tolist(), "files": ["means_l.webp", "means_u.webp"]},
         "scales": {"codebook": sizes, "files": ["scales.webp"]},
         "quats": {"files": ["quats.webp"]},
         "sh0": {"codebook": tints, "files": ["sh0.webp"]},
@@ -376,11 +348,7 @@ def test_sog_says_the_same_to_its_steps(tmp_path, kept, degree, form):
     files = sog(given, degree)
     for name, data in files.items():
         (tmp_path / name).write_bytes(data)
-    path = {
-        "zip": kept(zipped(files), "a.sog"),
-        "folder": tmp_path,
-        "meta.json": tmp_path / "meta.json",
-    }
+    path = {"zip": kept(zipped(files), "a.sog"), "folder": tmp_path, "meta.json": tmp_path / "meta.json"}
     read = load_splat(path[form])
     np.testing.assert_allclose(read.mean, given.mean, atol=4e-4)
     np.testing.assert_allclose(np.log(read.scale), np.log(given.scale), atol=6 / 255 / 2 + 1e-5)
@@ -391,9 +359,7 @@ def test_sog_says_the_same_to_its_steps(tmp_path, kept, degree, form):
 
 def test_splat_records_say_the_same_to_their_steps(kept):
     given = some_gaussians(degree=0)
-    rgba = np.clip(
-        np.round(np.c_[given.sh[:, 0] * SH_DC_COEFFICIENT + 0.5, given.opacity] * 255), 0, 255
-    )
+    rgba = np.clip(np.round(np.c_[given.sh[:, 0] * SH_DC_COEFFICIENT + 0.5, given.opacity] * 255), 0, 255)
     turn = np.clip(np.round((given.rotation + 1) * 127.5), 0, 255)
     rows = [
         m.tobytes() + s.tobytes() + bytes(c) + bytes(q)
@@ -415,9 +381,7 @@ def test_splat_records_say_the_same_to_their_steps(kept):
 
 def ksplat(g, level, degree):
     """Write one section: a full bucket of 256 and one of the rest, each about its own middle."""
-    number, place, rest = [("<f4", "<f4", "<f4"), ("<f2", "<u2", "<f2"), ("<f2", "<u2", "u1")][
-        level
-    ]
+    number, place, rest = [("<f4", "<f4", "<f4"), ("<f2", "<u2", "<f2"), ("<f2", "<u2", "u1")][level]
     block, half = 20.0, 32767
     middles = np.array([[0.5, 0, 0], [0, -0.25, 0]], "<f4")
     owner = (np.arange(g.count) >= 256).astype(int)
@@ -427,27 +391,17 @@ def ksplat(g, level, degree):
     if level == 2:
         harmonics = np.round((harmonics + 1.5) / 3 * 255)
     kind = np.dtype(
-        [
-            ("m", place, 3),
-            ("s", number, 3),
-            ("q", number, 4),
-            ("c", "u1", 4),
-            ("h", rest, harmonics.shape[1]),
-        ]
+        [("m", place, 3), ("s", number, 3), ("q", number, 4), ("c", "u1", 4), ("h", rest, harmonics.shape[1])]
     )
     rows = np.zeros(g.count, kind)
     rows["m"], rows["s"], rows["q"], rows["h"] = mean, g.scale, g.rotation, harmonics
-    rows["c"] = np.clip(
-        np.round(np.c_[g.sh[:, 0] * SH_DC_COEFFICIENT + 0.5, g.opacity] * 255), 0, 255
-    )
+    rows["c"] = np.clip(np.round(np.c_[g.sh[:, 0] * SH_DC_COEFFICIENT + 0.5, g.opacity] * 255), 0, 255)
     head = bytearray(4096 + 1024)
     head[1] = 1
     struct.pack_into("<II", head, 4, 1, 1)
     struct.pack_into("<IH", head, 16, g.count, level)
     struct.pack_into("<ff", head, 36, -1.5, 1.5)
-    struct.pack_into(
-        "<IIIIfHxxIxxxxIIH", head, 4096, g.count, g.count, 256, 2, block, 12, half, 1, 1, degree
-    )
+    struct.pack_into("<IIIIfHxxIxxxxIIH", head, 4096, g.count, g.count, 256, 2, block, 12, half, 1, 1, degree)
     return bytes(head) + struct.pack("<I", g.count - 256) + middles.tobytes() + rows.tobytes()
 
 
@@ -459,9 +413,7 @@ def test_ksplat_says_the_same_to_its_steps(kept, level, degree):
     np.testing.assert_allclose(read.mean, given.mean, atol=[1e-9, 2e-4, 2e-4][level])
     np.testing.assert_allclose(read.scale, given.scale, rtol=[1e-9, 5e-4, 5e-4][level], atol=1e-9)
     np.testing.assert_allclose(read.sh[:, 1:], given.sh[:, 1:], atol=[1e-9, 5e-4, 6e-3][level])
-    np.testing.assert_allclose(
-        read.sh[:, 0], given.sh[:, 0], atol=0.5 / 255 / SH_DC_COEFFICIENT + 1e-6
-    )
+    np.testing.assert_allclose(read.sh[:, 0], given.sh[:, 0], atol=0.5 / 255 / SH_DC_COEFFICIENT + 1e-6)
     assert same_rotation(read.rotation, given.rotation) < [2e-3, 3e-3, 3e-3][level]
 
 
@@ -513,9 +465,7 @@ def test_harmonics_are_orthonormal_and_turn_by_any_rotation():
     np.testing.assert_allclose(moved.mean, 2 * one.mean @ R.T + [1, 2, 3], rtol=1e-5)
     np.testing.assert_allclose(moved.scale, 2 * one.scale)
     np.testing.assert_allclose(
-        np.einsum("rk,nkc->rnc", sh_basis(rays @ R.T, 3), moved.sh),
-        np.einsum("rk,nkc->rnc", Y, one.sh),
-        atol=1e-5,
+        np.einsum("rk,nkc->rnc", sh_basis(rays @ R.T, 3), moved.sh), np.einsum("rk,nkc->rnc", Y, one.sh), atol=1e-5
     )
 
 
@@ -568,54 +518,32 @@ BAD = {
         GOOD.split(b"end_header\n")[0].replace(b"vertex 50", b"vertex 0") + b"end_header\n",
         r"holds no Gaussians",
     ),
-    "short ascii": (
-        ply(*columns_of(some_gaussians(9, 0)), "ascii").replace(b"vertex 9", b"vertex 10"),
-        r"9 of the 10",
-    ),
-    "words in ascii": (
-        ply(*columns_of(some_gaussians(9, 0)), "ascii")[:-9] + b" hello",
-        r"rows of 'vertex'",
-    ),
+    "short ascii": (ply(*columns_of(some_gaussians(9, 0)), "ascii").replace(b"vertex 9", b"vertex 10"), r"9 of the 10"),
+    "words in ascii": (ply(*columns_of(some_gaussians(9, 0)), "ascii")[:-9] + b" hello", r"rows of 'vertex'"),
     "long ascii": (
-        ply(*columns_of(some_gaussians(9, 0)), "ascii").replace(
-            b"vertex 9", b"vertex 999999999999"
-        ),
+        ply(*columns_of(some_gaussians(9, 0)), "ascii").replace(b"vertex 9", b"vertex 999999999999"),
         r"fewer of the",
     ),
     "empty": (b"", r"empty"),
     "noise": (bytes(range(256)) * 9, r"no Gaussian splat.*SPZ"),
     "a picture": (b"\x89PNG\r\n\x1a\n" + bytes(300), r"no Gaussian splat"),
     "gzip of something": (gzip.compress(b"hello" * 100), r"no SPZ"),
-    "broken gzip": (
-        spz(some_gaussians(50), 3, 3)[:40] + bytes(99),
-        r"gzip stream is broken|no SPZ|ends",
-    ),
+    "broken gzip": (spz(some_gaussians(50), 3, 3)[:40] + bytes(99), r"gzip stream is broken|no SPZ|ends"),
     "cut spz": (spz(some_gaussians(50), 3, 3)[:-400], r"ends [\d,]+ bytes before"),
-    "spz of version 9": (
-        gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 9, 4, 0, 12, 0, 0)),
-        r"version 9",
-    ),
-    "spz of the released past": (
-        gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 1, 4, 0, 12, 0, 0)),
-        r"version 1",
-    ),
+    "spz of version 9": (gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 9, 4, 0, 12, 0, 0)), r"version 9"),
+    "spz of the released past": (gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 1, 4, 0, 12, 0, 0)), r"version 1"),
     "spz of billions": (
         gzip.compress(struct.pack("<4sIIBBBB", b"NGSP", 3, 2**31, 0, 12, 0, 0) + bytes(10**6)),
         r"claims 2,147,483,648",
     ),
     "spz with early extensions": (
-        gzip.compress(
-            struct.pack("<4sIIBBBBI", b"NGSP", 3, 1, 0, 12, 2, 0, 0xADBE0002) + bytes(99)
-        ),
+        gzip.compress(struct.pack("<4sIIBBBBI", b"NGSP", 3, 1, 0, 12, 2, 0, 0xADBE0002) + bytes(99)),
         r"extensions before",
     ),
     "cut zip": (zipped(sog(some_gaussians(50), 3))[:-60], r"ZIP is broken"),
     "zip of something": (zipped({"a.txt": b"a"}), r"meta.json: it is not in the archive"),
     "sog of version 3": (zipped(sog(some_gaussians(50), 0, version=3)), r"SOG version 3"),
-    "sog with a lying count": (
-        zipped(sog(some_gaussians(50), 0, count=10**12)),
-        r"of 1,000,000,000,000",
-    ),
+    "sog with a lying count": (zipped(sog(some_gaussians(50), 0, count=10**12)), r"of 1,000,000,000,000"),
     "sog without a picture": (
         zipped({k: v for k, v in sog(some_gaussians(50), 0).items() if k != "quats.webp"}),
         r"quats.webp: it is not",
@@ -674,11 +602,7 @@ def test_what_is_packed_with_zstandard_says_what_to_install(kept, monkeypatch):
 
 def test_a_broken_stream_of_version_4_is_refused(kept):
     good = spz(some_gaussians(50), 4, 3)
-    for at, words in (
-        (15, "table of streams"),
-        (40, "not as long as"),
-        (140, "stream is broken|ends"),
-    ):
+    for at, words in ((15, "table of streams"), (40, "not as long as"), (140, "stream is broken|ends")):
         broken = bytearray(good)
         broken[at] ^= 0x5A
         with pytest.raises(BadFileError, match=words):

@@ -29,17 +29,14 @@ SIZE = np.array([10.0, 20.0, 45.0])
 @pytest.fixture
 def chair(tmp_path):
     """A red quad and a triangle with a picture whose left half is blue."""
-    (tmp_path / "look.mtl").write_text(
-        "newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 0\nmap_Kd pics/half blue.png\n"
-    )
+    (tmp_path / "look.mtl").write_text("newmtl red\nKd 1 0 0\nnewmtl blue\nKd 0 0 0\nmap_Kd pics/half blue.png\n")
     (tmp_path / "pics").mkdir()
     picture = np.zeros((4, 4, 3), np.uint8)
     picture[:, :2, 2] = 255
     Image.fromarray(picture).save(tmp_path / "pics" / "half blue.png")
     path = tmp_path / "Old_Chair.obj"
     path.write_text(
-        f"mtllib look.mtl\n{CORNERS}vt 0 0\nvt 0.25 0\nvt 0 1\n"
-        "usemtl red\nf 1 2 3 4\nusemtl blue\nf 1/1 2/2 5/3\n"
+        f"mtllib look.mtl\n{CORNERS}vt 0 0\nvt 0.25 0\nvt 0 1\nusemtl red\nf 1 2 3 4\nusemtl blue\nf 1/1 2/2 5/3\n"
     )
     return path
 
@@ -143,9 +140,7 @@ def test_one_block_has_the_same_extents_as_every_kind_of_file(kind, tmp_path):
     places = unit * np.concatenate([s.vertices for s in read.scene.surfaces])
     np.testing.assert_allclose(places.min(axis=0), 0, atol=1e-6)
     np.testing.assert_allclose(places.max(axis=0), SIZE * MM, rtol=1e-4)
-    solid = trimesh.util.concatenate(
-        [trimesh.Trimesh(s.vertices, s.triangles) for s in read.scene.surfaces]
-    )
+    solid = trimesh.util.concatenate([trimesh.Trimesh(s.vertices, s.triangles) for s in read.scene.surfaces])
     assert solid.is_watertight
     # Inside out it would be negative.
     np.testing.assert_allclose(unit**3 * solid.volume, np.prod(SIZE * MM), rtol=1e-4)
@@ -179,8 +174,7 @@ def test_components_of_a_collada_give_their_names_to_nodes_that_are_but_counted(
     start, end = text.index('<node id="n">'), text.index("</visual_scene>")
     component = text[start:end].replace('id="n"', 'id="c" name="Chair"')
     places = "".join(
-        f'<node id="{name}" name="{name}"><translate>{x} 0 0</translate>'
-        '<instance_node url="#c"/></node>'
+        f'<node id="{name}" name="{name}"><translate>{x} 0 0</translate><instance_node url="#c"/></node>'
         for x, name in ((0, "instance_0"), (9, "instance_1"), (18, "Garden_Chair"))
     )
     text = f'{text[:start]}<node id="all" name="SketchUp">{places}</node>{text[end:]}'
@@ -318,10 +312,7 @@ def test_materials_keep_their_names_without_their_library(chair):
 def test_a_material_that_its_library_has_not_keeps_its_name(chair):
     (chair.parent / "look.mtl").write_text("newmtl red\nKd 1 0 0\n")
     scene = load_mesh(chair).scene
-    assert {f.name: f.colour for f in scene.finishes} == {
-        "red": (1, 0, 0, 1),
-        "blue": DEFAULT_FINISH.colour,
-    }
+    assert {f.name: f.colour for f in scene.finishes} == {"red": (1, 0, 0, 1), "blue": DEFAULT_FINISH.colour}
     assert not scene.warnings
 
 
@@ -349,9 +340,7 @@ def test_a_picture_comes_from_the_files_own_folder_only(tmp_path):
         Image.fromarray(np.full((4, 4, 3), 90, np.uint8)).save(place)
 
     def look(file):
-        text = PICTURED.replace("FILE", file).replace(
-            "}\ndef Shader", "token outputs:surface\n}\ndef Shader"
-        )
+        text = PICTURED.replace("FILE", file).replace("}\ndef Shader", "token outputs:surface\n}\ndef Shader")
         (tmp_path / "own" / "a.usda").write_text(
             usd_text(block(), 1.0, "Z", text).replace("(0.2, 0.4, 0.6)", "(1, 1, 1)")
         )
@@ -387,10 +376,7 @@ def test_instances_of_instances_end_at_the_deadline(tmp_path):
     pytest.importorskip("pxr")
     lines = ['#usda 1.0\nclass "c0" {\ndef Mesh "m" {\npoint3f[] points = [(0, 0, 0)]\n}\n}\n']
     for level in range(1, 9):
-        inner = "\n".join(
-            f'def "x{k}" (instanceable = true\nreferences = </c{level - 1}>) {{}}'
-            for k in range(10)
-        )
+        inner = "\n".join(f'def "x{k}" (instanceable = true\nreferences = </c{level - 1}>) {{}}' for k in range(10))
         lines.append(f'class "c{level}" {{\n{inner}\n}}\n')
     (tmp_path / "a.usda").write_text("".join(lines) + 'def "a" (references = </c8>) {}\n')
     start = processor_seconds()
@@ -451,10 +437,7 @@ HOSTILE = {
         lambda: ply(3, 1, TRIANGLE + struct.pack("<B3i", 3, 0, 1, -2)),
         "a face without corners|cannot be read as PLY",
     ),
-    "nan.ply": (
-        lambda: ply(3, 1, struct.pack("<9fB3i", *[np.nan] * 9, 3, 0, 1, 2)),
-        "finite|cannot be read",
-    ),
+    "nan.ply": (lambda: ply(3, 1, struct.pack("<9fB3i", *[np.nan] * 9, 3, 0, 1, 2)), "finite|cannot be read"),
     "claims a trillion points.ply": (lambda: ply(10**12, 1, TRIANGLE), "PLY|does not fit"),
     "claims a billion faces.ply": (lambda: ply(3, 10**9, TRIANGLE), "no triangles|does not fit"),
     "cut off.ply": (lambda: ply(3, 1, TRIANGLE[:20]), "PLY|no triangles"),

@@ -31,10 +31,7 @@ def views():
     surface = Surface("box", 0, 0, np.asarray(box.vertices), np.asarray(box.faces))
     scene = Scene("box", "", (SceneObject("box", "box", 0.6),), (surface,), (Finish("grey"),))
     made = capture(scene, CaptureConfig(views=5, size=SIZE, threads=1))
-    lenses = [
-        replace(c, K=c.K + np.array([[0, 0, k], [0, 2, 1.5], [0, 0, 0]]))
-        for k, c in enumerate(made.cameras)
-    ]
+    lenses = [replace(c, K=c.K + np.array([[0, 0, k], [0, 2, 1.5], [0, 0, 0]])) for k, c in enumerate(made.cameras)]
     return Views(rgb=made.rgb, cameras=tuple(lenses))
 
 
@@ -54,9 +51,7 @@ def keep_binary(folder, cameras, names, points, model=1):
     lenses = images = count
     for k, (camera, name) in enumerate(zip(cameras, names, strict=True)):
         K, pose = camera.K, camera.world_from_camera
-        lenses += struct.pack(
-            "<iiQQ4d", k, model, camera.width, camera.height, K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-        )
+        lenses += struct.pack("<iiQQ4d", k, model, camera.width, camera.height, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
         turn, shift = quaternion_from_matrix(pose[:3, :3].T), -pose[:3, :3].T @ pose[:3, 3]
         images += struct.pack("<I7dI", 9 - k, *turn, *shift, k) + name.encode() + b"\0"
         images += struct.pack("<Q", k) + struct.pack("<ddq", 1.0, 2.0, -1) * k
@@ -100,21 +95,13 @@ def keep_as(kind, folder, views):
     place = folder if "3x4" in kind else folder / "images"
     keep_pictures(place, views)
     if kind == "colmap text":
-        write_colmap(
-            folder / "sparse" / "0",
-            views.cameras,
-            NAMES,
-            POINTS,
-            np.full((7, 3), [10, 20, 30], "u1"),
-        )
+        write_colmap(folder / "sparse" / "0", views.cameras, NAMES, POINTS, np.full((7, 3), [10, 20, 30], "u1"))
     elif kind == "colmap binary":
         keep_binary(folder / "sparse", views.cameras, NAMES, POINTS)
     for k, camera in enumerate(views.cameras if "3x4" in kind else ()):
         P = projection_matrix(camera) * (-1.0) ** k * 3.7
         if kind == "3x4 text":
-            text = "CONTOUR\n" * (k % 2) + "\n".join(
-                " ".join(repr(float(x)) for x in row) for row in P
-            )
+            text = "CONTOUR\n" * (k % 2) + "\n".join(" ".join(repr(float(x)) for x in row) for row in P)
             (folder / f"shot {k}.txt").write_text(text)
         else:
             (folder / "projections").mkdir(exist_ok=True)
@@ -145,17 +132,10 @@ def test_a_projection_matrix_comes_apart_as_it_was_put_together():
     for sign in (1, -1):
         for _ in range(20):
             K = np.array(
-                [
-                    [rng.uniform(50, 900), rng.normal(), rng.uniform(10, 400)],
-                    [0, rng.uniform(50, 900), 120],
-                    [0, 0, 1],
-                ]
+                [[rng.uniform(50, 900), rng.normal(), rng.uniform(10, 400)], [0, rng.uniform(50, 900), 120], [0, 0, 1]]
             )
             pose = np.eye(4)
-            pose[:3, :3], pose[:3, 3] = (
-                matrix_from_quaternion(rng.normal(size=4)),
-                rng.normal(size=3),
-            )
+            pose[:3, :3], pose[:3, 3] = (matrix_from_quaternion(rng.normal(size=4)), rng.normal(size=3))
             P = sign * rng.uniform(0.1, 9) * projection_matrix(Camera(K, pose, 100, 100))
             found, stood = split_projection(Path("P"), P)
             np.testing.assert_allclose(found, K, rtol=1e-8, atol=1e-8)
@@ -179,9 +159,7 @@ def said(folder, count=4, **more):
         frames.append({"file_path": f"./train/r_{k}", "transform_matrix": pose.tolist()})
         if not (folder / "train").exists():
             (folder / "train").mkdir()
-        Image.fromarray(np.full((12, 16, 3), (40 * k + 20) % 256, np.uint8)).save(
-            folder / "train" / f"r_{k}.png"
-        )
+        Image.fromarray(np.full((12, 16, 3), (40 * k + 20) % 256, np.uint8)).save(folder / "train" / f"r_{k}.png")
     whole = {"camera_angle_x": 0.7, "frames": frames} | more
     (folder / "transforms.json").write_text(json.dumps(whole))
     return whole
@@ -197,9 +175,7 @@ def test_an_angle_alone_is_enough_and_the_suffix_may_lack(tmp_path):
     focal = 8 / np.tan(0.35)
     np.testing.assert_allclose(read.views.cameras[2].K, [[focal, 0, 8], [0, focal, 6], [0, 0, 1]])
     pose = np.array(whole["frames"][2]["transform_matrix"])
-    np.testing.assert_allclose(
-        read.views.cameras[2].world_from_camera[:3, 2], -pose[:3, 2], atol=1e-12
-    )
+    np.testing.assert_allclose(read.views.cameras[2].world_from_camera[:3, 2], -pose[:3, 2], atol=1e-12)
     assert [int(r[0, 0, 0]) for r in read.views.rgb] == [20, 60, 100, 140]
     assert read.z_up
     (tmp_path / "transforms.json").rename(tmp_path / "transforms_train.json")
@@ -247,14 +223,7 @@ def test_what_is_transparent_is_masked_and_white(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "masks/r_{}.png",
-        "train/masks/r_{}.png",
-        "masks/r_{}.png.png",
-        "mask/r_{}.jpg",
-        "masks/r_{}_mask.png",
-    ],
+    "name", ["masks/r_{}.png", "train/masks/r_{}.png", "masks/r_{}.png.png", "mask/r_{}.jpg", "masks/r_{}_mask.png"]
 )
 def test_masks_may_lie_in_a_folder(tmp_path, name):
     said(tmp_path)
@@ -273,9 +242,7 @@ def test_a_picture_without_a_mask_among_masked_ones_is_left_out(tmp_path):
     said(tmp_path)
     (tmp_path / "masks").mkdir()
     for k in (0, 1, 3):
-        Image.fromarray(np.eye(12, 16, dtype=np.uint8) * 255).save(
-            tmp_path / "masks" / f"r_{k}.png"
-        )
+        Image.fromarray(np.eye(12, 16, dtype=np.uint8) * 255).save(tmp_path / "masks" / f"r_{k}.png")
     read = read_posed_photos(tmp_path)
     assert read.names == ("./train/r_0", "./train/r_1", "./train/r_3")
     assert "1 of 4 pictures were left out: ./train/r_2 has no mask" in read.warnings[0]
@@ -433,9 +400,7 @@ def test_bent_pictures_are_straightened(tmp_path, model):
     cameras = tuple(Camera(np.eye(3), np.eye(4), 160, 120) for _ in range(3))
     write_colmap(folder, cameras, NAMES[:3])
     numbers = " ".join(str(x) for x in p)
-    (folder / "cameras.txt").write_text(
-        "".join(f"{k} {model} 160 120 {numbers}\n" for k in (1, 2, 3))
-    )
+    (folder / "cameras.txt").write_text("".join(f"{k} {model} 160 120 {numbers}\n" for k in (1, 2, 3)))
     keep_pictures(tmp_path / "images", Views(np.stack([picture] * 3), cameras), NAMES[:3])
     read = read_posed_photos(tmp_path)
     camera = read.views.cameras[0]
@@ -504,9 +469,7 @@ def test_grey_pictures_among_coloured_ones_are_told(tmp_path):
 
 def test_a_single_view_is_too_few(tmp_path):
     said(tmp_path, count=1)
-    with pytest.raises(
-        BadFileError, match=r"1 of 1 pictures can be used, but at least 3 are needed.*20 to 50"
-    ):
+    with pytest.raises(BadFileError, match=r"1 of 1 pictures can be used, but at least 3 are needed.*20 to 50"):
         read_posed_photos(tmp_path)
 
 
@@ -585,9 +548,7 @@ def test_masks_that_show_nothing_are_left_out_unless_most_do(tmp_path):
     assert "./train/r_2 has a mask that shows nothing" in read.warnings[0]
     for k in (0, 1, 3):
         Image.fromarray(np.zeros((12, 16), np.uint8)).save(tmp_path / "masks" / f"r_{k}.png")
-    with pytest.raises(
-        BadFileError, match=r"4 of 4 pictures cannot be used: .* shows nothing .*instances"
-    ):
+    with pytest.raises(BadFileError, match=r"4 of 4 pictures cannot be used: .* shows nothing .*instances"):
         read_posed_photos(tmp_path)
 
 
@@ -631,11 +592,7 @@ def test_a_folder_without_poses_is_refused(tmp_path, views):
 @pytest.mark.parametrize(
     ("file", "text", "words"),
     [
-        (
-            "cameras",
-            "1 FULL_OPENCV 80 64 1 1 1 1 0 0 0 0 0 0 0 0",
-            "FULL_OPENCV.*image_undistorter",
-        ),
+        ("cameras", "1 FULL_OPENCV 80 64 1 1 1 1 0 0 0 0 0 0 0 0", "FULL_OPENCV.*image_undistorter"),
         ("cameras", "1 OPENCV_FISHEYE 80 64 1 1 1 1 0 0 0 0", "OPENCV_FISHEYE"),
         ("cameras", "1 PINHOLE 80 64 99 99 40", "PINHOLE camera has bad numbers"),
         ("cameras", "1 PINHOLE 80 64 -9 99 40 32", "bad numbers"),

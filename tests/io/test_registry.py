@@ -65,9 +65,7 @@ def register(monkeypatch, folder, module, text, **row):
     """Write a module, and give the registry one row more, in the process that reads meshes, too."""
     (folder / f"{module}.py").write_text(text)
     monkeypatch.syspath_prepend(folder)
-    monkeypatch.setenv(
-        "PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])
-    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]))
     made = Reader(read=f"{module}:read_toy", **row)
     monkeypatch.setattr(registry, "READERS", (*READERS, made))
 
@@ -124,9 +122,7 @@ def test_errors_of_the_command_line_list_the_mesh_format(toy_mesh, tmp_path, com
     (tmp_path / "what.xyz").write_text("0 0 0")
     code, said = command("run", tmp_path / "what.xyz", "--out", tmp_path / "run")
     assert code != 0
-    assert re.search(r"is no model\s\(\.glb, .*\.toymesh\s+are\s+read\)", said.err, re.DOTALL), (
-        said.err
-    )
+    assert re.search(r"model\s\(\.glb, .*\.toymesh\s+are\s+read\)", said.err, re.DOTALL), said.err
     toy_mesh.write_text("no numbers")
     code, said = command("run", toy_mesh, "--out", tmp_path / "run")
     assert code != 0 and "cannot be read as TOYMESH" in " ".join(said.err.split())

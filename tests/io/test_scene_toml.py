@@ -8,12 +8,7 @@ from hypothesis import strategies as st
 
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Push, Wall, Wind
-from corporeal.io.scene_toml import (
-    ObjectEntry,
-    SceneFile,
-    read_scene_file,
-    write_scene_file,
-)
+from corporeal.io.scene_toml import ObjectEntry, SceneFile, read_scene_file, write_scene_file
 
 WHOLE = """
 duration = 2
@@ -93,10 +88,7 @@ def test_a_scene_file_says_that_things_had_come_to_rest(tmp_path, said, meant):
         ('[[object]]\nfile = "a.glb"\nvelocity = "fast"', "three numbers"),
         ('[[object]]\nfile = "a.glb"\npush = [1, 0, 0]', "not a table"),
         ('[[object]]\nfile = "a.glb"\npush = { to = 1 }', "'acceleration' is missing"),
-        (
-            '[[object]]\nfile = "a.glb"\npush = { acceleration = [1, 0, 0], from = 1, to = 0.5 }',
-            "before it begins",
-        ),
+        ('[[object]]\nfile = "a.glb"\npush = { acceleration = [1, 0, 0], from = 1, to = 0.5 }', "before it begins"),
         ("[[object]]\nfile = 3", "not a text"),
         ('[[object]]\nfile = "a.glb"\nextent = -1', "from 0.0001 to 1000"),
         ('[[object]]\nname = "a"', "names no model"),
@@ -165,9 +157,7 @@ scene_files = st.fixed_dictionaries(
         "fps": st.none() | st.integers(1, 1000),
         "gravity": st.none() | vectors(),
         "objects": st.lists(entries, max_size=3),
-        "walls": st.lists(
-            st.tuples(st.sampled_from([(0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)]), vectors()), max_size=2
-        ),
+        "walls": st.lists(st.tuples(st.sampled_from([(0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)]), vectors()), max_size=2),
     }
 )
 
@@ -221,15 +211,9 @@ def test_files_elsewhere_are_still_found(tmp_path):
         (SceneFile(Path("x"), Path("a.glb"), gravity=(0.0, 0.0, -math.inf)), "'gravity' is"),
         (SceneFile(Path("x"), Path("a.glb"), fps=0), "'fps' is 0"),
         (SceneFile(Path("x"), Path("a.glb"), objects=(ObjectEntry(),)), "object 1 names no file"),
+        (SceneFile(Path("x"), objects=(ObjectEntry(name="\ud800", file=Path("a.glb")),)), "is not valid TOML"),
         (
-            SceneFile(Path("x"), objects=(ObjectEntry(name="\ud800", file=Path("a.glb")),)),
-            "is not valid TOML",
-        ),
-        (
-            SceneFile(
-                Path("x"),
-                objects=(ObjectEntry(file=Path("a.glb"), wind=Wind((99.0, 0.0, 0.0), gust=1.0)),),
-            ),
+            SceneFile(Path("x"), objects=(ObjectEntry(file=Path("a.glb"), wind=Wind((99.0, 0.0, 0.0), gust=1.0)),)),
             "it blows at up to 198 m/s",
         ),
     ],

@@ -102,9 +102,7 @@ def test_the_unit_of_depth_suits_the_scene(tmp_path, size, unit):
     path = write_views(tmp_path, made)
     assert json.loads(path.read_text())["integer_depth_scale"] == pytest.approx(unit)
     there = np.isfinite(made.depth)
-    np.testing.assert_allclose(
-        read_views(tmp_path).depth[there], made.depth[there], atol=0.501 * unit, rtol=1e-6
-    )
+    np.testing.assert_allclose(read_views(tmp_path).depth[there], made.depth[there], atol=0.501 * unit, rtol=1e-6)
 
 
 def test_floor_beyond_the_reach_of_a_number_is_nothing(tmp_path):
@@ -200,10 +198,7 @@ def frame(said, k=0, **change):
         (lambda s: frame(s, file_path=7), "'file_path' is '7'"),
         (lambda s: s["frames"][0].pop("file_path"), "frame 1: 'file_path' is missing, but others"),
         (lambda s: frame(s, depth_file_path="train/r_0"), "'depth_file_path' is missing, but"),
-        (
-            lambda s: [frame(s, k, depth_file_path="train/r_0") for k in (0, 1)],
-            "holds colours .RGB., not grey numbers",
-        ),
+        (lambda s: [frame(s, k, depth_file_path="train/r_0") for k in (0, 1)], "holds colours .RGB., not grey numbers"),
     ],
 )
 def test_a_mistake_in_the_file_is_named(tmp_path, spoil, told):

@@ -72,9 +72,7 @@ def test_places_of_a_geometry_that_no_node_names_are_things_apart():
     ]  # fmt: skip
 
 
-PLACES = "".join(
-    f"<node><translate>{x} 0 0</translate><instance_geometry url='#g'/></node>" for x in range(3)
-)
+PLACES = "".join(f"<node><translate>{x} 0 0</translate><instance_geometry url='#g'/></node>" for x in range(3))
 THREE = f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
 <asset/><library_geometries><geometry id="g" name="brick"><mesh>
 <source id="p"><float_array id="a" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>

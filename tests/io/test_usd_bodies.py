@@ -137,9 +137,7 @@ def test_what_no_such_material_has_is_believed_and_doubted(kitchen):
     scene = kitchen("5")
     prepared = co.prepare_scene(scene)
     assert prepared.field.materials[1].density == pytest.approx(5000)
-    (told,) = (
-        d for d in grounding_warnings(prepared.field, prepared.parts, scene) if "density" in d
-    )
+    (told,) = (d for d in grounding_warnings(prepared.field, prepared.parts, scene) if "density" in d)
     assert "measured values are" in told and told.startswith("block: ")
 
 
@@ -160,8 +158,7 @@ def test_what_no_matter_has_is_one_sentence(tmp_path, density, mass, said):
 
 def test_one_changed_density_is_another_mass(kitchen):
     masses = [
-        np.bincount(p.object, p.mass)[1]
-        for p in (co.prepare_scene(kitchen(d)).particles for d in ("0.6", "0.75"))
+        np.bincount(p.object, p.mass)[1] for p in (co.prepare_scene(kitchen(d)).particles for d in ("0.6", "0.75"))
     ]
     assert masses[1] / masses[0] == pytest.approx(0.75 / 0.6, rel=1e-5)
 
@@ -176,11 +173,7 @@ def test_the_whole_file_is_one_object_where_that_is_asked(kitchen, tmp_path):
 SHAPES = {
     "Cube": ("double size = 2", 8.0, (2, 2, 2)),
     "Sphere": ("double radius = 1.5", 4 / 3 * np.pi * 1.5**3, (3, 3, 3)),
-    "Cylinder": (
-        'double radius = 0.5\ndouble height = 3\ntoken axis = "X"',
-        0.75 * np.pi,
-        (3, 1, 1),
-    ),
+    "Cylinder": ('double radius = 0.5\ndouble height = 3\ntoken axis = "X"', 0.75 * np.pi, (3, 1, 1)),
     "Capsule": (
         'double radius = 0.5\ndouble height = 1\ntoken axis = "Y"',
         np.pi * 0.25 + 4 / 3 * np.pi * 0.125,

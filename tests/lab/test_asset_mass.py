@@ -15,15 +15,11 @@ def dumbbell(tmp_path):
     scene = trimesh.Scene()
     for name, height in (("steel", 0.3), ("wood", -0.3)):
         ball = trimesh.creation.icosphere(3, radius=0.2)
-        ball.visual = trimesh.visual.TextureVisuals(
-            material=trimesh.visual.material.PBRMaterial(name=name)
-        )
+        ball.visual = trimesh.visual.TextureVisuals(material=trimesh.visual.material.PBRMaterial(name=name))
         scene.add_geometry(ball.apply_translation([0.0, height, 0.0]), name, name)
     file = tmp_path / "dumbbell.glb"
     file.write_bytes(scene.export(file_type="glb"))
-    return PoolAsset(
-        "dumbbell", "dumbbell", file, str(file), "0" * 64, "", "", 1.0, False, 1, 0.0, 0
-    )
+    return PoolAsset("dumbbell", "dumbbell", file, str(file), "0" * 64, "", "", 1.0, False, 1, 0.0, 0)
 
 
 def test_what_is_heavier_at_the_top_has_its_centre_there(dumbbell, tmp_path):

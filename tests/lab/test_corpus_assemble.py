@@ -14,12 +14,7 @@ from corporeal.discretization.object_scaling import SceneSizing
 from corporeal.jobs.executor import Executor
 from corporeal.jobs.job import Job
 from corporeal.jobs.local_workers import local_worker_pool
-from corporeal.lab.corpus.assemble_corpus import (
-    Sources,
-    assemble_corpus,
-    assembly_jobs,
-    fallback_compose_configs,
-)
+from corporeal.lab.corpus.assemble_corpus import Sources, assemble_corpus, assembly_jobs, fallback_compose_configs
 from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan_corpus, read_plan
 from corporeal.lab.corpus.corpus_report import report_corpus
 from corporeal.lab.corpus.run_corpus import RunConfig, forget_runs, run_corpus, run_scene
@@ -78,9 +73,7 @@ def test_an_id_covers_settings_seed_and_bytes_and_nothing_else(pool):
 
 
 def test_a_scene_is_tried_as_planned_first_and_keeps_its_interaction_whatever_is_tried():
-    config = ComposeConfig(
-        assets=("a", "b"), seed=9, arrangement="stack", interaction="fall", count="2"
-    )
+    config = ComposeConfig(assets=("a", "b"), seed=9, arrangement="stack", interaction="fall", count="2")
     tried = fallback_compose_configs(config)
     assert tried[0] == config and tried == fallback_compose_configs(config)
     assert {w.interaction for w in tried} == {"fall"} and len({w.seed for w in tried}) == 3
@@ -124,9 +117,7 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
     more = Sources(AssetPool(pool.folder, (*pool.assets, replace(pool.assets[0], name="new"))),
                    ComposeConfig(), SMALL)  # fmt: skip
     assert assemble_corpus(tmp_path, few, more, hands) == rows, "a plan is kept"
-    settings = Settings(
-        assemble=AssembleConfig(duration=0.1), video=VideoConfig(width=64, height=48)
-    )
+    settings = Settings(assemble=AssembleConfig(duration=0.1), video=VideoConfig(width=64, height=48))
     ran = run_corpus(tmp_path, RunConfig(first=1), settings, hands)
     assert [r.status for r in ran.values()] == ["finished"], ran
     said.clear()

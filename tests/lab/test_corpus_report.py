@@ -21,12 +21,7 @@ from corporeal.lab.corpus.corpus_plan import CorpusConfig, plan_corpus, write_pl
 from corporeal.lab.corpus.corpus_report import report_corpus
 from corporeal.scene.collision_chain import impact_hops
 from corporeal.scene.rest_certificate import RestCertificate
-from corporeal.scene.scene_composition import (
-    ComposedObject,
-    SceneComposition,
-    write_certificate,
-    write_composition,
-)
+from corporeal.scene.scene_composition import ComposedObject, SceneComposition, write_certificate, write_composition
 from corporeal.simulation.audit_file import write_audit
 from sample_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
@@ -43,10 +38,7 @@ PARTS = (
     part_audit(object="b_0", material="rubber", law="neo_hookean"),
 )
 HAPPENED = outcome(
-    {
-        "a_0": object_outcome(dent_depth_dx=0.1),
-        "b_0": object_outcome(dent_depth_dx=0.1, at_rest=False),
-    },
+    {"a_0": object_outcome(dent_depth_dx=0.1), "b_0": object_outcome(dent_depth_dx=0.1, at_rest=False)},
     {
         "a_0|b_0": pair_outcome(first_contact_s=0.5, separated=True),
         "a_0|floor": pair_outcome(first_contact_s=0.0),
@@ -67,9 +59,7 @@ def composed(scene):
         ComposedObject(a, c, a, "somewhere", "", "CC-BY-4.0", f"<b>{a}'s maker</b>", 0.1, "", "", 1)
         for a, c in zip(scene.assets, scene.classes, strict=True)
     )
-    return SceneComposition(
-        scene.seed, scene.arrangement, "mujoco", scene.interaction, "it <falls>", objects
-    )
+    return SceneComposition(scene.seed, scene.arrangement, "mujoco", scene.interaction, "it <falls>", objects)
 
 
 def a_corpus(folder, audits, failed=()):
@@ -139,9 +129,7 @@ def test_a_chain_is_one_only_when_what_was_struck_strikes_a_third():
     assert impact_hops([("a", "b"), ("b", "c")], ["a"]) == {"a": 0, "b": 1, "c": 2}
     assert impact_hops([("b", "a"), ("c", "b"), ("d", "c")], ["a"])["d"] == 3
     assert impact_hops([("a", "b"), ("c", "a")], ["a"])["c"] == 1, "the first one struck both"
-    assert "c" not in impact_hops([("b", "c"), ("a", "b")], ["a"]), (
-        "they met before they were reached"
-    )
+    assert "c" not in impact_hops([("b", "c"), ("a", "b")], ["a"]), "they met before they were reached"
     assert impact_hops([], ["a"]) == {"a": 0} and impact_hops([("a", "b")], []) == {}
 
 
@@ -163,11 +151,7 @@ def test_groups_count_scenes_and_objects_and_give_median_and_worst(tmp_path):
     assert sum(line.scenes for line in groups["objects"]) == 4
     law = {line.group: line for line in groups["law"]}
     assert set(law) == {RIGID_BODY_LAW, "Neo-Hookean"}, "no law acts in what is rigid"
-    assert (
-        law[RIGID_BODY_LAW].objects,
-        law[RIGID_BODY_LAW].at_rest,
-        law["Neo-Hookean"].at_rest,
-    ) == (4, 4, 0)
+    assert (law[RIGID_BODY_LAW].objects, law[RIGID_BODY_LAW].at_rest, law["Neo-Hookean"].at_rest) == (4, 4, 0)
     group = {line.group: line for line in groups["material class"]}
     assert {name: line.objects for name, line in group.items()} == {"metal": 4, "elastomer": 4}
     assert group["metal"].materials == ("steel",), "only of the parts that are metal"
@@ -201,9 +185,7 @@ def test_the_page_the_table_and_the_data_tell_of_every_scene(tmp_path):
 
 
 def test_the_page_for_the_documentation_names_what_went_wrong_and_what_was_not_run(tmp_path):
-    made = a_corpus(
-        tmp_path, [audit(), audit(max_penetration_dx=1.7), audit()], failed=["the grid is too wide"]
-    )
+    made = a_corpus(tmp_path, [audit(), audit(max_penetration_dx=1.7), audit()], failed=["the grid is too wide"])
     (tmp_path / "runs" / made.scenes[2].name / store.META_FILE).unlink()
     page = tmp_path / "page.md"
     write_corpus_page(collect_results(tmp_path), page)

@@ -13,23 +13,11 @@ from scipy.stats import kendalltau
 from corporeal.core import store
 from corporeal.core.errors import UserError
 from corporeal.lab.evaluation.dynamics import dynamics_page, dynamics_tables
-from corporeal.lab.evaluation.dynamics.compared_methods import (
-    OUR_METHOD,
-    method_settings,
-    parse_method,
-)
+from corporeal.lab.evaluation.dynamics.compared_methods import OUR_METHOD, method_settings, parse_method
 from corporeal.lab.evaluation.dynamics.dynamics_evaluation import scenes_of, select_scenes
-from corporeal.lab.evaluation.dynamics.dynamics_jobs import (
-    EvaluatedScene,
-    MethodComparison,
-    dynamics_jobs,
-)
+from corporeal.lab.evaluation.dynamics.dynamics_jobs import EvaluatedScene, MethodComparison, dynamics_jobs
 from corporeal.lab.evaluation.dynamics.dynamics_summary import dynamics_record, summarise_dynamics
-from corporeal.lab.evaluation.dynamics.method_ranking import (
-    MethodResult,
-    rank_correlation,
-    rank_scene,
-)
+from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult, rank_correlation, rank_scene
 from corporeal.lab.evaluation.dynamics.run_difference import compare_runs
 from corporeal.lab.evaluation.dynamics.run_measures import read_run_measures, write_run_measures
 from corporeal.pipeline.run_pipeline import Settings
@@ -91,16 +79,12 @@ def test_contacts_are_compared_as_sets_and_by_time():
 
 
 def test_a_dent_elsewhere_and_another_shape_are_seen():
-    here = object_outcome(
-        dent_place=(0, 0, 0), dent_depth_dx=3.0, length_m=0.2, shape_error_max=0.1
-    )
+    here = object_outcome(dent_place=(0, 0, 0), dent_depth_dx=3.0, length_m=0.2, shape_error_max=0.1)
     there = replace(here, dent_place=(0.1, 0, 0), shape_error_max=0.01)
     found = compare_runs(run(objects={"ball_0": there}), run(objects={"ball_0": here}))
     assert found.dent == pytest.approx(0.5) and found.shape == pytest.approx(1.0)
     shallow = replace(here, dent_depth_dx=0.5)
-    assert (
-        compare_runs(run(objects={"ball_0": there}), run(objects={"ball_0": shallow})).dent is None
-    )
+    assert compare_runs(run(objects={"ball_0": there}), run(objects={"ball_0": shallow})).dent is None
 
 
 # ---------------------------------------------------------------- ranks
@@ -195,16 +179,12 @@ def evaluated(tmp_path):
     path = tmp_path / "scene.glb"
     path.write_bytes(b"scene")
     scenes = [EvaluatedScene("falls", path), EvaluatedScene("rolls", path)]
-    comparison = MethodComparison(
-        tmp_path / "out", (OUR_METHOD, parse_method("single")), "normal", Settings()
-    )
+    comparison = MethodComparison(tmp_path / "out", (OUR_METHOD, parse_method("single")), "normal", Settings())
     pairs = {"ball_0|floor": pair(0.4), "duck_0|floor": pair(0.3)}
     bodies = [body(), body("duck_0", young_pa=1e9)]
     soft = {"ball_0": object_outcome(shape_error_max=0.1)}
     good = expecting(run(bodies, soft, pairs), True, True)
-    bad = expecting(
-        run([body(velocity=(1.0, 0, 0)), bodies[1]], soft, pairs, faults=("Overlap.",)), True, False
-    )
+    bad = expecting(run([body(velocity=(1.0, 0, 0)), bodies[1]], soft, pairs, faults=("Overlap.",)), True, False)
     made = {"falls.ours": good, "falls.single": bad, "falls.reference-normal": good}
     made["rolls.ours"] = good
     for job in dynamics_jobs(scenes, comparison):
@@ -256,9 +236,7 @@ def test_a_baseline_without_contents_of_their_own_has_ranks(evaluated):
 
 def test_a_reference_that_gained_energy_is_refused(evaluated):
     scenes, comparison = evaluated
-    reference = next(
-        j for j in dynamics_jobs(scenes, comparison) if j.name == "falls.reference-normal"
-    )
+    reference = next(j for j in dynamics_jobs(scenes, comparison) if j.name == "falls.reference-normal")
     finish(reference, replace(run(), faults=("Energy grew.",), growth=1.0))
     found = summarise_dynamics(scenes, comparison, {})
     assert found.references[0].numbers is None
@@ -288,9 +266,7 @@ def test_runs_of_an_earlier_state_of_the_code_are_counted(evaluated):
     for job in dynamics_jobs(scenes, comparison):
         if job.done:
             finish(job, replace(read_run_measures(job.folder), source=store.source_digest()))
-    assert "earlier state" not in dynamics_page.summary_sentence(
-        summarise_dynamics(scenes, comparison, {})
-    )
+    assert "earlier state" not in dynamics_page.summary_sentence(summarise_dynamics(scenes, comparison, {}))
 
 
 def test_json_page_figure_and_docs_tell_the_same_twice(evaluated, tmp_path):
@@ -299,11 +275,7 @@ def test_json_page_figure_and_docs_tell_the_same_twice(evaluated, tmp_path):
     assert '"path": [[' not in json.dumps(dynamics_record(found))
     dynamics_page.write_dynamics_page(found, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text()
-    assert (
-        "falls: ours first, beside single." in page
-        and "rolls: no reference" in page
-        and "$" not in page
-    )
+    assert "falls: ours first, beside single." in page and "rolls: no reference" in page and "$" not in page
     dynamics_page.draw_dynamics(found, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     dynamics_page.write_dynamics_docs(found, "corporeal evaluate dynamics", tmp_path / "page.md")

@@ -59,9 +59,7 @@ def test_members_differ_and_stay_in_their_ranges(ran, made):
     assert all(1.5e6 <= y <= 2.5e6 for y in young)
     masses = [member.objects["ball"]["mass_kg"] for member in made.members]
     density = [member.drawn[0]["density"] for member in made.members]
-    assert masses == pytest.approx(
-        [d * trimesh.creation.icosphere(2, 0.05).volume for d in density]
-    )
+    assert masses == pytest.approx([d * trimesh.creation.icosphere(2, 0.05).volume for d in density])
     told = made.of("ball", "mass_kg")
     assert told.smallest <= told.low <= told.median <= told.high <= told.largest
     assert told.count == 3
@@ -77,9 +75,7 @@ def test_what_is_done_is_not_done_again_and_more_members_add_to_it(ran, made, mo
         patched.setattr(ensembles, "simulate", never)
         assert simulate_ensemble(ran, 3, 0, None, silent) == made
     told = []
-    more = simulate_ensemble(
-        ran, 4, 0, None, lambda verb: lambda share, words: told.append((share, words))
-    )
+    more = simulate_ensemble(ran, 4, 0, None, lambda verb: lambda share, words: told.append((share, words)))
     assert more.members[:3] == made.members
     shares = [share for share, words in told if "of 4" in words]
     assert shares == sorted(shares)
@@ -122,14 +118,9 @@ def test_a_member_that_breaks_is_told_and_the_others_count(ran, monkeypatch, tmp
 
 def test_the_spread_is_that_of_the_members():
     rows = [MemberOutcome(v, (), {"a": {"rebound_m": float(v)}}) for v in range(101)]
-    rows += [
-        MemberOutcome(101, (), {"a": {"rebound_m": None}}),
-        MemberOutcome(102, (), {}, "burst"),
-    ]
+    rows += [MemberOutcome(101, (), {"a": {"rebound_m": None}}), MemberOutcome(102, (), {}, "burst")]
     (told,) = outcome_spread({"a": {"rebound_m": 7.0}}, rows)["a"].values()
-    assert told == QuantitySpread(
-        chosen=7.0, low=5.0, median=50.0, high=95.0, smallest=0.0, largest=100.0, count=101
-    )
+    assert told == QuantitySpread(chosen=7.0, low=5.0, median=50.0, high=95.0, smallest=0.0, largest=100.0, count=101)
     (nothing,) = outcome_spread({"a": {"rebound_m": None}}, rows[101:])["a"].values()
     assert nothing == QuantitySpread(chosen=None, count=0)
 

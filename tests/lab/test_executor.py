@@ -14,13 +14,7 @@ import pytest
 from fake_jobs import STEPS, counting, do, silent
 
 from corporeal.core import store
-from corporeal.jobs.job import (
-    Job,
-    JobManifest,
-    perform_job,
-    read_manifest_rows,
-    remove_partial_results,
-)
+from corporeal.jobs.job import Job, JobManifest, perform_job, read_manifest_rows, remove_partial_results
 from corporeal.jobs.local_workers import local_worker_pool
 
 NAMES = ("a", "b", "c", "d", "e", "f")
@@ -45,16 +39,13 @@ def steps(folder):
 def start(folder, *names):
     """Carry six jobs, or those named, out in a process of its own."""
     return subprocess.Popen(
-        [sys.executable, fake_jobs.__file__, str(folder), *(names or NAMES)],
-        stderr=subprocess.DEVNULL,
+        [sys.executable, fake_jobs.__file__, str(folder), *(names or NAMES)], stderr=subprocess.DEVNULL
     )
 
 
 def workers_of(process):
     """Process numbers of its workers."""
-    told = subprocess.run(
-        ["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True
-    )
+    told = subprocess.run(["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True)
     return [int(pid) for pid in told.stdout.split()]
 
 
@@ -72,9 +63,7 @@ def gone(pid):
 def test_every_job_is_done_once_in_a_process_of_its_own(tmp_path):
     heard = []
     rows = do(tmp_path, counting(tmp_path, NAMES[:3]), say=heard.append)
-    assert {name: (r.status, r.attempts) for name, r in rows.items()} == {
-        name: ("finished", 1) for name in NAMES[:3]
-    }
+    assert {name: (r.status, r.attempts) for name, r in rows.items()} == {name: ("finished", 1) for name in NAMES[:3]}
     pids = {(tmp_path / "runs" / name / "pid").read_text() for name in NAMES[:3]}
     assert len(pids) == 3 and str(os.getpid()) not in pids
     assert heard[-1].startswith("[3/3]")

@@ -9,11 +9,7 @@ import pytest
 from corporeal.core.errors import UserError
 from corporeal.lab.evaluation.dynamics.compared_methods import reference_folder, run_folder
 from corporeal.lab.evaluation.judge.detectability import VideoVerdict
-from corporeal.lab.evaluation.judge.judge_page import (
-    PICTURES_PER_VIDEO,
-    blind_spots_sentence,
-    write_judge_page,
-)
+from corporeal.lab.evaluation.judge.judge_page import PICTURES_PER_VIDEO, blind_spots_sentence, write_judge_page
 from corporeal.lab.evaluation.judge.judge_pictures import SequentialPictures
 from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts, distinct_questions
 from corporeal.lab.evaluation.judge.judge_runs import judged_scenes_in
@@ -27,15 +23,11 @@ from corporeal.vlm import OnDemandPictures, Question
 
 def asked(condition, motion):
     pictures = [np.full((30, 40, 3), 200, np.uint8)] * 16
-    return VideoQuestion(
-        "balls", condition, 0, Question("dynamics", "?", motion, pictures=pictures)
-    )
+    return VideoQuestion("balls", condition, 0, Question("dynamics", "?", motion, pictures=pictures))
 
 
 def said(condition, words, alarm=0.0):
-    return VideoVerdict(
-        "balls", condition, {q.id: alarm for q in question_catalogue().question}, 4.0, (words,)
-    )
+    return VideoVerdict("balls", condition, {q.id: alarm for q in question_catalogue().question}, 4.0, (words,))
 
 
 @pytest.fixture
@@ -47,10 +39,7 @@ def judged():
         {},
         ["ours", "single"],
     )
-    verdicts = [
-        said("ours", "Both <script>alert(1)</script> bounce."),
-        said("single", "It sticks.", 1.0),
-    ]
+    verdicts = [said("ours", "Both <script>alert(1)</script> bounce."), said("single", "It sticks.", 1.0)]
     return JudgeVerdicts(videos, verdicts, 0, "ask:x", JudgingCost(2, 10, None), ("by hand",))
 
 

@@ -23,9 +23,7 @@ SCENES = [f"scene-{k}" for k in range(8)]
 
 def answers(alarms=(), also=()):
     """Report a violation by some questions; ``also`` says other answers outright."""
-    said = {
-        q.id: q.violation if q.id in alarms else opposite(q) for q in question_catalogue().question
-    }
+    said = {q.id: q.violation if q.id in alarms else opposite(q) for q in question_catalogue().question}
     return said | dict(also)
 
 
@@ -34,9 +32,7 @@ def opposite(question):
 
 
 def verdict(alarms=(), whole=5, also=()):
-    return Verdict.model_validate(
-        {"happens": "It moves.", "answers": answers(alarms, also), "whole": whole}
-    )
+    return Verdict.model_validate({"happens": "It moves.", "answers": answers(alarms, also), "whole": whole})
 
 
 def oracle(condition):
@@ -80,9 +76,7 @@ def test_an_oracle_tells_each_control_by_its_own_question_only():
 
 def test_an_oracle_is_believed_of_every_law_that_its_questions_are_about():
     about = {q.law for q in question_catalogue().question if q.id in FAULT.values()}
-    assert {
-        law for law, questions in trusted_questions(rows_of(oracle)).items() if questions
-    } == about
+    assert {law for law, questions in trusted_questions(rows_of(oracle)).items() if questions} == about
 
 
 def test_an_oracle_on_two_scenes_is_not_yet_believed_and_on_three_it_is():

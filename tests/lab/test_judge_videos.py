@@ -9,23 +9,14 @@ import pytest
 
 from corporeal.core.errors import UserError
 from corporeal.lab.evaluation.judge import judge_pictures, judge_scenes
-from corporeal.lab.evaluation.judge.camera_staging import (
-    LOOK_TURNS_DEG,
-    PICTURE_SIZE_PX,
-    close_up_shots,
-    stage_scene,
-)
+from corporeal.lab.evaluation.judge.camera_staging import LOOK_TURNS_DEG, PICTURE_SIZE_PX, close_up_shots, stage_scene
 from corporeal.lab.evaluation.judge.control_effect import (
     MIN_VISIBLE_PATH,
     MIN_VISIBLE_SHAPE,
     MotionDifference,
     compare_motions,
 )
-from corporeal.lab.evaluation.judge.edited_controls import (
-    EDITED_CONTROLS,
-    GAINED_DISTANCE_RATIO,
-    edit_motion,
-)
+from corporeal.lab.evaluation.judge.edited_controls import EDITED_CONTROLS, GAINED_DISTANCE_RATIO, edit_motion
 from corporeal.lab.evaluation.judge.judge_pictures import PICTURES_PER_LOOK
 from corporeal.lab.evaluation.judge.judge_query import check_judging, query_judge
 from corporeal.lab.evaluation.judge.judge_scenes import (
@@ -36,21 +27,12 @@ from corporeal.lab.evaluation.judge.judge_scenes import (
     audit_breach,
     gather_videos,
 )
-from corporeal.lab.evaluation.judge.judge_tables import (
-    CANNOT_TELL_TEXT,
-    judge_record,
-    judge_tables,
-    weigh_judge,
-)
+from corporeal.lab.evaluation.judge.judge_tables import CANNOT_TELL_TEXT, judge_record, judge_tables, weigh_judge
 from corporeal.lab.evaluation.judge.prompt_context import scene_facts
 from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS, exchange_materials
 from corporeal.lab.evaluation.judge.subquestions import question_catalogue
 from corporeal.lab.evaluation.judge.video_motion import VideoMotion, motion_of_run
-from corporeal.lab.evaluation.judge.video_question import (
-    VideoQuestion,
-    motion_digest,
-    video_question,
-)
+from corporeal.lab.evaluation.judge.video_question import VideoQuestion, motion_digest, video_question
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig
@@ -121,9 +103,7 @@ def test_who_gains_rises_two_and_a_half_times_as_far(played):
     (thing,) = np.flatnonzero(now != before)
     rise = before[thing] - ledger.centre[low, thing, 2]
     assert rise > 0.02
-    assert now[thing] - ledger.centre[low, thing, 2] == pytest.approx(
-        GAINED_DISTANCE_RATIO * rise, rel=0.05
-    )
+    assert now[thing] - ledger.centre[low, thing, 2] == pytest.approx(GAINED_DISTANCE_RATIO * rise, rel=0.05)
     earlier = met - 0.03
     assert np.array_equal(video.at(earlier).position, ours.at(earlier).position)
 
@@ -135,9 +115,7 @@ def test_where_nothing_rests_nothing_glides(played):
 def test_what_rests_glides_aside(played):
     ledger = played.trajectory.ledger
     still = np.broadcast_to(ledger.centre[:1], ledger.centre.shape)
-    lies = replace(
-        played, trajectory=replace(played.trajectory, ledger=replace(ledger, centre=still))
-    )
+    lies = replace(played, trajectory=replace(played.trajectory, ledger=replace(ledger, centre=still)))
     video, end = edit_motion("glide", lies), float(played.trajectory.time[-1])
     way = video.centres(np.array([end]))[0] - motion_of_run(played).centres(np.array([end]))[0]
     moved = np.linalg.norm(way, axis=1)
@@ -161,9 +139,7 @@ def test_a_control_that_is_the_reference_is_not_effective(played, staging):
     same = compare_motions(ours, VideoMotion(played.prepared, ours.at), staging.times)
     assert same == MotionDifference(0.0, 0.0)
     assert not same.exceeds(MotionDifference(0.0, 0.0).limit)
-    assert (
-        compare_motions(ours, edit_motion("frozen", played), staging.times).path > MIN_VISIBLE_PATH
-    )
+    assert compare_motions(ours, edit_motion("frozen", played), staging.times).path > MIN_VISIBLE_PATH
 
 
 def test_what_differs_less_than_twice_a_finer_run_is_not_effective():
@@ -243,22 +219,16 @@ def test_each_look_has_its_own_order_of_questions_and_it_is_always_the_same(play
 
 
 def test_motions_that_differ_are_named_differently(played, staging):
-    videos = [
-        motion_of_run(played),
-        *(edit_motion(c, played) for c in EDITED_CONTROLS if c != "glide"),
-    ]
+    videos = [motion_of_run(played), *(edit_motion(c, played) for c in EDITED_CONTROLS if c != "glide")]
     names = [motion_digest(video, staging) for video in videos]
     assert len(set(names)) == len(videos)
 
     def nudged(by):
         return VideoMotion(
-            played.prepared,
-            lambda time: replace(f := played.trajectory.frames[0], position=f.position + by),
+            played.prepared, lambda time: replace(f := played.trajectory.frames[0], position=f.position + by)
         )
 
-    assert motion_digest(nudged(0.0), staging) == motion_digest(
-        edit_motion("frozen", played), staging
-    )
+    assert motion_digest(nudged(0.0), staging) == motion_digest(edit_motion("frozen", played), staging)
     assert motion_digest(nudged(0.01), staging) != motion_digest(nudged(0.0), staging)
 
 
@@ -266,17 +236,13 @@ def test_motions_that_differ_are_named_differently(played, staging):
 def blank(monkeypatch):
     """Take grey pictures: a hundred real ones cost 20 s, and only words are looked at."""
     monkeypatch.setattr(
-        judge_pictures,
-        "render_image",
-        lambda stage, aim, *how: np.full((aim.height, aim.width, 3), 128, np.uint8),
+        judge_pictures, "render_image", lambda stage, aim, *how: np.full((aim.height, aim.width, 3), 128, np.uint8)
     )
 
 
 @pytest.mark.slow
 def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edited_only, blank):
-    videos = gather_videos(
-        [SceneRuns("balls", {REFERENCE_METHOD: run, "single": run})], tmp_path, JudgeConfig()
-    )
+    videos = gather_videos([SceneRuns("balls", {REFERENCE_METHOD: run, "single": run})], tmp_path, JudgeConfig())
     conditions = [a.condition for a in videos.asked]
     assert "single" in conditions and "control:frozen" in conditions
     config = JudgeConfig(judge=f"ask:{tmp_path / 'asked'}")
@@ -326,9 +292,7 @@ def judged_by(oracle, run, folder):
     return judged, weigh_judge(judged)
 
 
-def test_an_oracle_is_believed_of_what_its_controls_show_and_of_nothing_else(
-    run, tmp_path, edited_only
-):
+def test_an_oracle_is_believed_of_what_its_controls_show_and_of_nothing_else(run, tmp_path, edited_only):
     judged, result = judged_by(True, run, tmp_path)
     assert result.believed == {
         "gravity": ["pace"], "inertia": ["backwards", "start"], "impenetrability": ["through"],
@@ -348,9 +312,7 @@ def test_who_finds_no_fault_is_believed_of_no_law_and_gives_no_mark(run, tmp_pat
     assert {row[1] for row in judge_tables(judged, result)[0].rows} == {CANNOT_TELL_TEXT}
 
 
-def test_a_recording_of_another_motion_is_not_found(
-    run, played, staging, told, tmp_path, edited_only
-):
+def test_a_recording_of_another_motion_is_not_found(run, played, staging, told, tmp_path, edited_only):
     videos = gather_videos([SceneRuns("balls", {REFERENCE_METHOD: run})], tmp_path, JudgeConfig())
     from corporeal.vlm.recordings import RecordingClient
 
@@ -370,8 +332,7 @@ def test_a_recording_of_another_motion_is_not_found(
 
 
 @pytest.mark.parametrize(
-    ("what", "words"),
-    [({"mechanical_growth": 46.8}, "energy grew by 4680.0%"), ({"nan_count": 3}, "lost particles")],
+    ("what", "words"), [({"mechanical_growth": 46.8}, "energy grew by 4680.0%"), ({"nan_count": 3}, "lost particles")]
 )
 def test_what_is_not_physics_is_not_judged(what, words, run, tmp_path, monkeypatch):
     assert audit_breach(run_audit()) == ""
@@ -405,12 +366,8 @@ def test_nobody_to_judge_is_an_error():
 # ---------------------------------------------------------------- what it costs
 
 
-def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_a_yes(
-    played, staging, told
-):
-    one = VideoQuestion(
-        "balls", REFERENCE_METHOD, 0, video_question(motion_of_run(played), staging, told, 0)
-    )
+def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_a_yes(played, staging, told):
+    one = VideoQuestion("balls", REFERENCE_METHOD, 0, video_question(motion_of_run(played), staging, told, 0))
     said = []
 
     class Asked(Planted):
@@ -420,9 +377,7 @@ def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_
 
     def ask(count, **config):
         said.clear()
-        many = [
-            replace(one, question=replace(one.question, scene=f"film-{k}")) for k in range(count)
-        ]
+        many = [replace(one, question=replace(one.question, scene=f"film-{k}")) for k in range(count)]
         videos = judge_scenes.JudgedVideos(many, [], [], {}, [REFERENCE_METHOD])
         return query_judge(videos, JudgeConfig(**config), said.append, judge=Asked({}))
 
@@ -446,10 +401,7 @@ def test_every_simulated_control_runs_and_is_not_done_twice(run, tmp_path):
     videos = gather_videos([scene], tmp_path, JudgeConfig())
     assert videos.failed == []
     assert {e.control for e in videos.effects} == {*CONTROL_NAMES} - {"glide"}
-    done = {
-        c: (tmp_path / "balls" / f"control-{c}" / "8-simulate" / "meta.json")
-        for c in SIMULATED_CONTROLS
-    }
+    done = {c: (tmp_path / "balls" / f"control-{c}" / "8-simulate" / "meta.json") for c in SIMULATED_CONTROLS}
     times = {c: path.stat().st_mtime_ns for c, path in done.items()}
     gather_videos([scene], tmp_path, JudgeConfig())
     assert {c: path.stat().st_mtime_ns for c, path in done.items()} == times

@@ -27,12 +27,7 @@ from corporeal.lab.evaluation.mass_evaluation import (
     solid_water_mass,
 )
 from corporeal.lab.evaluation.mass_report import mass_figure, mass_tables
-from corporeal.lab.evaluation.measured_masses import (
-    models_in_folder,
-    objects_to_weigh,
-    read_abo,
-    read_measured_masses,
-)
+from corporeal.lab.evaluation.measured_masses import models_in_folder, objects_to_weigh, read_abo, read_measured_masses
 from corporeal.materials import find_material
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.ground import GroundConfig
@@ -129,10 +124,7 @@ def test_the_layout_of_abo_500_is_read(tmp_path):
     for scene in ("B01_X", "B02_Y", "B03_Z"):
         save(tmp_path / "scenes" / scene, "mesh", a_ball())
     found = objects_to_weigh(tmp_path, None, "test")
-    assert [(w.name, w.mass, w.file.parent.name) for w in found] == [
-        ("B02_Y", 2.5, "B02_Y"),
-        ("B03_Z", 3.5, "B03_Z"),
-    ]
+    assert [(w.name, w.mass, w.file.parent.name) for w in found] == [("B02_Y", 2.5, "B02_Y"), ("B03_Z", 3.5, "B03_Z")]
     assert len(read_abo(tmp_path, "all")) == 3
     with pytest.raises(UserError, match=r"no split 'dev'. Choose one of: train, test, all"):
         read_abo(tmp_path, "dev")
@@ -148,9 +140,7 @@ def test_the_layout_of_abo_500_is_read(tmp_path):
 def weighed(tmp_path_factory):
     """Four things and the scales' word on them, as their usual values say."""
     folder = tmp_path_factory.mktemp("things")
-    steel, brass, rubber = (
-        find_material(n).ranges["density"].typical for n in ("steel", "brass", "soft_PVC")
-    )
+    steel, brass, rubber = (find_material(n).ranges["density"].typical for n in ("steel", "brass", "soft_PVC"))
     ball, large = a_ball(), a_ball(0.05)
     save(folder, "one", ball, "steel")
     save(folder, "two", large, "brass")
@@ -200,9 +190,7 @@ def test_the_comparison_has_every_method_and_every_group(weighed, tmp_path):
     assert every["solid_usual"].ape > 1 > every["mass"].ape
     row = result.rows[2]
     assert row.hull_fit > 0
-    assert row.constant == pytest.approx(
-        math.prod(r.mass_true for k, r in enumerate(result.rows) if k != 2) ** (1 / 3)
-    )
+    assert row.constant == pytest.approx(math.prod(r.mass_true for k, r in enumerate(result.rows) if k != 2) ** (1 / 3))
     mass_figure(result.rows, tmp_path / "mass.png")
     assert (tmp_path / "mass.png").read_bytes()[:4] == b"\x89PNG"
     titles = [table.title for table in mass_tables(result)]
@@ -244,9 +232,7 @@ def test_an_anonymous_object_betrays_nothing_but_its_pictures(weighed):
     assert hidden.objects[0].name.startswith("object-")
     assert np.array_equal(hidden.surfaces[0].vertices, scene.surfaces[0].vertices)
     assert anonymise(scene, things[1].file).name != hidden.name
-    blind = predict_masses(
-        things[:1], DescribeConfig(), GroundConfig(), replace(FEW, anonymous=True)
-    )[0]
+    blind = predict_masses(things[:1], DescribeConfig(), GroundConfig(), replace(FEW, anonymous=True))[0]
     assert "unknown" in blind.described
 
 
@@ -255,14 +241,8 @@ SAID = weighs(0.3, 0.4, 0.5)
 
 def asked(things, monkeypatch, said=SAID, **config):
     """Predict with an oracle in the model's place: (oracle, predictions)."""
-    oracle = Oracle(
-        parts=whole("ball"),
-        materials=lambda q: {"parts": [part("ball", "soft_PVC", "hollow")]},
-        mass=said,
-    )
-    monkeypatch.setattr(
-        "corporeal.pipeline.stages.describe.connect_vlm", lambda spec, record: oracle
-    )
+    oracle = Oracle(parts=whole("ball"), materials=lambda q: {"parts": [part("ball", "soft_PVC", "hollow")]}, mass=said)
+    monkeypatch.setattr("corporeal.pipeline.stages.describe.connect_vlm", lambda spec, record: oracle)
     describing = DescribeConfig(vlm="oracle:1", views=2, view_size=32, **config)
     return oracle, predict_masses(things, describing, GroundConfig(), replace(FEW, anonymous=True))
 

@@ -9,11 +9,7 @@ from corporeal import cli
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.lab.evaluation.material_evaluation import (
-    evaluate_materials,
-    read_material_truth,
-    recognition_record,
-)
+from corporeal.lab.evaluation.material_evaluation import evaluate_materials, read_material_truth, recognition_record
 from sample_scenes import plain, scene
 
 TRUTH = """
@@ -45,11 +41,7 @@ def test_parts_are_right_wrong_or_unknown(folder):
     truth = read_material_truth(folder / "truth.toml")
     assert truth["oak_table"] == {"oak table": ("hardwood", "wood")}
     rows = evaluate_materials(folder, truth, DescribeConfig(), "default", quiet)
-    assert {r.file: r.verdict for r in rows} == {
-        "oak_table": "right",
-        "vase": "wrong",
-        "thing": "unknown",
-    }
+    assert {r.file: r.verdict for r in rows} == {"oak_table": "right", "vase": "wrong", "thing": "unknown"}
     scores = recognition_record(rows)["scores"]
     assert scores["right"] == scores["wrong"] == scores["unknown"] == pytest.approx(1 / 3)
     assert scores["ordering"] == 1.0
@@ -57,9 +49,7 @@ def test_parts_are_right_wrong_or_unknown(folder):
 
 def test_a_person_types_it_and_gets_a_table_and_data(folder, monkeypatch, capsys):
     words = ["materials", str(folder), "--truth", str(folder / "truth.toml")]
-    monkeypatch.setattr(
-        sys, "argv", ["corporeal", "evaluate", *words, "--json", str(folder / "out.json")]
-    )
+    monkeypatch.setattr(sys, "argv", ["corporeal", "evaluate", *words, "--json", str(folder / "out.json")])
     with pytest.raises(SystemExit) as ended:
         cli.main()
     assert ended.value.code == 0

@@ -7,9 +7,7 @@ from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.lab.evaluation import objects_evaluation, objects_figure
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
-FACES = np.array(
-    [int(digit) for digit in "013032467475045051237276026064157173"],
-).reshape(-1, 3)
+FACES = np.array([int(digit) for digit in "013032467475045051237276026064157173"]).reshape(-1, 3)
 
 
 def box(name, number, low, size):
@@ -22,10 +20,7 @@ def box(name, number, low, size):
 
 @pytest.fixture(scope="module")
 def scene():
-    parts = (
-        box("tall", 0, (0, 0, 0), (0.2, 0.2, 0.5)),
-        box("low", 1, (0.4, 0, 0), (0.4, 0.3, 0.2)),
-    )
+    parts = (box("tall", 0, (0, 0, 0), (0.2, 0.2, 0.5)), box("low", 1, (0.4, 0, 0), (0.4, 0.3, 0.2)))
     things, surfaces, finishes = zip(*parts, strict=True)
     return Scene("two", "", things, surfaces, finishes)
 
@@ -42,9 +37,7 @@ def test_things_that_stand_apart_are_pushed_until_they_touch(scene):
 
 
 def test_a_scene_is_judged_by_what_its_pictures_show(scene, tmp_path):
-    how = objects_evaluation.ObjectsEvaluationConfig(
-        surface_points=3000, pictures=8, picture_size=64
-    )
+    how = objects_evaluation.ObjectsEvaluationConfig(surface_points=3000, pictures=8, picture_size=64)
     taken = objects_evaluation.touching_from_photographs("two", scene, how)
     assert taken.cloud.count == 3000 and taken.masks.shape == (8, 3000)
     truth = taken.object_of_point
@@ -67,8 +60,7 @@ def test_a_scene_is_judged_by_what_its_pictures_show(scene, tmp_path):
     assert "<svg" in (tmp_path / "figure.svg").read_text(encoding="utf-8")
     table = objects_evaluation.objects_tables([row])[0]
     assert (
-        len(table.heads) == len(table.rows[0])
-        and objects_evaluation.objects_record([row])["rows"][0]["identity"] == 1
+        len(table.heads) == len(table.rows[0]) and objects_evaluation.objects_record([row])["rows"][0]["identity"] == 1
     )
 
 

@@ -9,12 +9,7 @@ import pytest
 from own_props import write
 
 from corporeal.core import store
-from corporeal.lab.evaluation.mass_evaluation import (
-    MassComparison,
-    MassConfig,
-    compare_masses,
-    predict_masses,
-)
+from corporeal.lab.evaluation.mass_evaluation import MassComparison, MassConfig, compare_masses, predict_masses
 from corporeal.lab.evaluation.measured_masses import read_measured_masses
 from corporeal.pipeline.stages.describe import DescribeConfig
 from corporeal.pipeline.stages.ground import GroundConfig

@@ -10,12 +10,7 @@ import pytest
 from own_props import write
 
 from corporeal.core import store
-from corporeal.lab.evaluation.mass_evaluation import (
-    MassComparison,
-    MassConfig,
-    compare_masses,
-    predict_masses,
-)
+from corporeal.lab.evaluation.mass_evaluation import MassComparison, MassConfig, compare_masses, predict_masses
 from corporeal.lab.evaluation.measured_masses import read_measured_masses
 from corporeal.pipeline.stages.describe import DescribeConfig
 from corporeal.pipeline.stages.ground import GroundConfig
@@ -36,9 +31,7 @@ def on_the_scales(tmp_path_factory) -> MassComparison:
     if not all(any(name in text for text in recorded) for name in names):
         pytest.skip("other versions of what draws and joins meshes made files of other bytes here")
     answered = DescribeConfig(vlm=f"replay:{RECORDINGS}", answers=3)
-    return compare_masses(
-        predict_masses(things, answered, GroundConfig(), MassConfig(anonymous=True))
-    )
+    return compare_masses(predict_masses(things, answered, GroundConfig(), MassConfig(anonymous=True)))
 
 
 def test_of_what_hides_how_it_is_built_grounded_is_no_worse_than_asked_directly(on_the_scales):
@@ -49,9 +42,7 @@ def test_of_what_hides_how_it_is_built_grounded_is_no_worse_than_asked_directly(
     assert every["mixture"].alde < every["solid_usual"].alde / 3
 
 
-def test_an_imitation_taken_for_real_and_a_wood_taken_for_another_are_all_that_is_missed(
-    on_the_scales,
-):
+def test_an_imitation_taken_for_real_and_a_wood_taken_for_another_are_all_that_is_missed(on_the_scales):
     rows = on_the_scales.rows
     outside = {r.object for r in rows if r.mass_true and not r.low <= r.mass_true <= r.high}
     assert outside <= {"thing_14", "thing_15"}

@@ -22,13 +22,7 @@ from corporeal.lab.evaluation.parts_evaluation import (
     parts_tables,
     read_names,
 )
-from corporeal.lab.evaluation.segmentation_scores import (
-    iou_matrix,
-    majority_names,
-    matched_iou,
-    named_iou,
-    roc_area,
-)
+from corporeal.lab.evaluation.segmentation_scores import iou_matrix, majority_names, matched_iou, named_iou, roc_area
 from corporeal.showcase.showcase_scenes import build_single_prop_scene
 from glb_maker import CUBE, CUBE_TRIANGLES
 
@@ -47,9 +41,7 @@ def folder(tmp_path_factory):
 
 
 def boxes():
-    brown, green = (
-        Finish(n, (*c, 1.0)) for n, c in (("a", (0.2, 0.08, 0.03)), ("b", (0.0, 0.3, 0.0)))
-    )
+    brown, green = (Finish(n, (*c, 1.0)) for n, c in (("a", (0.2, 0.08, 0.03)), ("b", (0.0, 0.3, 0.0))))
     upper = CUBE * np.array([0.6, 0.6, 1]) + np.array([0.2, 0.2, 1])
     surfaces = tuple(
         Surface(name, 0, k, at.astype(float), CUBE_TRIANGLES.astype(np.int64))
@@ -194,11 +186,7 @@ def test_models_that_look_are_asked_for_pixels_and_words(folder, tmp_path):
 
     clip, dinov2 = save_clip(tmp_path / "clip"), save_dinov2(tmp_path / "dinov2")
     look = PartsEvaluationConfig(
-        points=1500,
-        photographs=4,
-        photograph_size=56,
-        structural=f"dinov2:{dinov2}",
-        semantic=f"clip:{clip}",
+        points=1500, photographs=4, photograph_size=56, structural=f"dinov2:{dinov2}", semantic=f"clip:{clip}"
     )
     (judged,) = evaluate_parts(folder, {}, PartsMethod(look))
     cloud = judged.taken.cloud

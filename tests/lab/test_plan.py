@@ -22,11 +22,7 @@ from corporeal.lab.corpus.corpus_plan import (
     write_plan,
 )
 from corporeal.pool.asset_pool import PoolAsset
-from corporeal.scene.interactions import (
-    ARRANGEMENTS_OF_KIND,
-    INTERACTION_KINDS,
-    MIN_OBJECTS_OF_KIND,
-)
+from corporeal.scene.interactions import ARRANGEMENTS_OF_KIND, INTERACTION_KINDS, MIN_OBJECTS_OF_KIND
 
 PRINT = """
 import sys, test_plan as t
@@ -36,17 +32,11 @@ print(repr(plan_corpus(t.pool(20), CorpusConfig(seed=int(sys.argv[1]))).scenes))
 
 
 def asset(name, class_name):
-    return PoolAsset(
-        name, class_name, Path(f"{name}.glb"), "", name, "CC0", "", 1.0, True, 500, 0, 0
-    )
+    return PoolAsset(name, class_name, Path(f"{name}.glb"), "", name, "CC0", "", 1.0, True, 500, 0, 0)
 
 
 def pool(classes, models=(1, 2, 3)):
-    return [
-        asset(f"c{k:02d}_{m}", f"c{k:02d}")
-        for k in range(classes)
-        for m in range(models[k % len(models)])
-    ]
+    return [asset(f"c{k:02d}_{m}", f"c{k:02d}") for k in range(classes) for m in range(models[k % len(models)])]
 
 
 def spread(counts):
@@ -84,9 +74,7 @@ def test_every_plan_is_even_and_possible(scenes, classes, count, seed, repeat):
     taken = sorted(every, reverse=True)[: min(classes, 15)]
     assert len(made.scenes) == scenes and spread(taken) <= 1 and sum(taken) == sum(every)
     kinds = Counter(s.interaction for s in made.scenes)
-    possible = [
-        k for k in INTERACTION_KINDS if MIN_OBJECTS_OF_KIND[k] <= max(s.count for s in made.scenes)
-    ]
+    possible = [k for k in INTERACTION_KINDS if MIN_OBJECTS_OF_KIND[k] <= max(s.count for s in made.scenes)]
     assert set(kinds) <= set(INTERACTION_KINDS)
     assert scenes < len(INTERACTION_KINDS) or (
         set(possible) <= set(kinds) and spread([kinds[k] for k in possible]) <= 1
@@ -111,10 +99,7 @@ def test_wind_blows_where_it_moves_something_and_nothing_else_changes():
     assert [s.assets for s in blown.scenes] == [s.assets for s in calm.scenes]
     for made in (calm, blown):
         assert spread(Counter(s.interaction for s in made.scenes).values()) <= 1
-    assert (
-        all(s.count >= MIN_OBJECTS_OF_KIND[s.interaction] for s in blown.scenes)
-        and not blown.messages
-    )
+    assert all(s.count >= MIN_OBJECTS_OF_KIND[s.interaction] for s in blown.scenes) and not blown.messages
 
 
 def test_where_no_wind_moves_anything_things_fall_and_it_is_said():
@@ -170,9 +155,7 @@ def test_a_small_pool_gives_what_it_can_and_says_so():
     assert "1 class, 15 were asked for" in told and "--repeat" in told and "chain" in told
     again = plan_corpus(pool(1), CorpusConfig(scenes=8, repeat=True))
     assert {s.interaction for s in again.scenes} == set(INTERACTION_KINDS)
-    assert (
-        plan_corpus(pool(3), CorpusConfig()).messages[1].startswith("Scenes have at most 3 objects")
-    )
+    assert plan_corpus(pool(3), CorpusConfig()).messages[1].startswith("Scenes have at most 3 objects")
 
 
 def test_an_empty_pool_and_senseless_numbers_are_said_to_be():

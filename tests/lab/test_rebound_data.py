@@ -6,11 +6,7 @@ from math import pi, sqrt
 import pytest
 
 from corporeal.core.errors import BadFileError
-from corporeal.lab.evaluation.rebound_data import (
-    contradictory_rebounds,
-    measured_rebounds,
-    rebound_sources,
-)
+from corporeal.lab.evaluation.rebound_data import contradictory_rebounds, measured_rebounds, rebound_sources
 from corporeal.materials import find_material
 
 
@@ -34,9 +30,7 @@ def test_rows_that_measured_the_same_and_cannot_both_be_met_are_found():
     """Three groups of one class dropped the same ball on the same cardboard."""
     (rows,) = contradictory_rebounds(measured_rebounds(), 0.03)
     assert len(rows) == 3 and all("cardboard" in row.name for row in rows)
-    assert not list(contradictory_rebounds(measured_rebounds(), 0.07)), (
-        "a value is within .07 of all three"
-    )
+    assert not list(contradictory_rebounds(measured_rebounds(), 0.07)), "a value is within .07 of all three"
     other = replace(rows[0], speed=1.1 * rows[0].speed)
     with pytest.raises(BadFileError, match="its rows differ"):
         list(contradictory_rebounds([other, *rows[1:]], 0.03))

@@ -39,9 +39,7 @@ def field_of(*names, structures=None, words=None, pieces=()):
     friction = np.array(
         [
             [
-                materials.friction_between(
-                    materials.find_material(a), materials.find_material(b)
-                ).sliding.typical
+                materials.friction_between(materials.find_material(a), materials.find_material(b)).sliding.typical
                 for b in floor
             ]
             for a in floor
@@ -61,9 +59,7 @@ def draws(field, owners, count=150):
     return [sample_material_field(field, owners, np.random.default_rng(k)) for k in range(count)]
 
 
-@pytest.mark.parametrize(
-    ("low", "peak", "high"), [(0, 0.5, 1), (0, 0, 0.5), (0.3, 1, 1), (2, 3, 7)]
-)
+@pytest.mark.parametrize(("low", "peak", "high"), [(0, 0.5, 1), (0, 0, 0.5), (0.3, 1, 1), (2, 3, 7)])
 def test_a_triangle_is_a_distribution_on_its_support(low, peak, high):
     quantiles = (np.arange(20_000) + 0.5) / 20_000
     drawn = np.array([triangular_quantile(q, low, peak, high) for q in quantiles])
@@ -103,9 +99,7 @@ def test_what_moves_together_in_life_moves_together_here():
 
 
 def test_one_object_has_one_grade_of_a_material():
-    drawn = sample_material_field(
-        field_of("hardwood", "hardwood", "hardwood"), [0, 0, 1], np.random.default_rng(3)
-    )
+    drawn = sample_material_field(field_of("hardwood", "hardwood", "hardwood"), [0, 0, 1], np.random.default_rng(3))
     legs, other = drawn.materials[:2], drawn.materials[2]
     assert legs[0] == legs[1]
     assert legs[0].young != other.young
@@ -128,10 +122,7 @@ def test_what_was_chosen_narrows_the_draw_and_what_was_stated_ends_it():
 def test_walls_contents_and_shares_are_drawn_too():
     soup = usual("sauce")
     can = Structure("filled", 4e-4, contents=soup, fill=0.9, loose=True)
-    halves = tuple(
-        PartDescription(n, n, volume_share=s, surface_share=s)
-        for n, s in (("steel", 0.3), ("ABS", 0.7))
-    )
+    halves = tuple(PartDescription(n, n, volume_share=s, surface_share=s) for n, s in (("steel", 0.3), ("ABS", 0.7)))
     words = PartDescription("can", "steel", "filled", contents="sauce", pieces=halves)
     pieces = (tuple(PartComponent(w, usual(w.name), Structure("solid")) for w in halves),)
     field = field_of("steel", structures=(can,), words=(words,), pieces=pieces)
@@ -163,12 +154,8 @@ def test_sealed_air_is_as_it_was_asked_for_in_every_draw():
 
 def test_what_is_blown_up_by_mouth_may_have_another_wall_and_a_ball_of_rules_not():
     def walls(kpa):
-        air = Structure(
-            "filled", 3e-4, contents=sealed_air_material(1e3 * kpa), fill=1.0, inflated=True
-        )
-        words = PartDescription(
-            "x", "soft_PVC", thickness=3e-4, wall_usual=True, inflation=1e3 * kpa
-        )
+        air = Structure("filled", 3e-4, contents=sealed_air_material(1e3 * kpa), fill=1.0, inflated=True)
+        words = PartDescription("x", "soft_PVC", thickness=3e-4, wall_usual=True, inflation=1e3 * kpa)
         field = field_of("soft_PVC", structures=(air,), words=(words,))
         return {d.structures[0].thickness for d in draws(field, (0,), 20)}
 
@@ -200,17 +187,13 @@ def inventory(words):
 
 
 def names(words, count=2000):
-    drawn = (
-        draw_hypotheses(inventory(words), np.random.default_rng(k), "default") for k in range(count)
-    )
+    drawn = (draw_hypotheses(inventory(words), np.random.default_rng(k), "default") for k in range(count))
     return [d.objects[0].parts[0].material for d in drawn]
 
 
 def test_alternatives_come_as_often_as_they_were_stated():
     others = (Hypothesis("glass", None, 0.25), Hypothesis("ABS", None, 0.1))
-    words = PartDescription(
-        "cup", "porcelain", hypotheses=(Hypothesis("porcelain", None, 0.65), *others)
-    )
+    words = PartDescription("cup", "porcelain", hypotheses=(Hypothesis("porcelain", None, 0.65), *others))
     found = names(words)
     assert found.count("glass") / len(found) == pytest.approx(0.25, abs=0.03)
     assert found.count("ABS") / len(found) == pytest.approx(0.1, abs=0.02)
@@ -223,28 +206,20 @@ def test_a_way_is_drawn_as_a_whole_and_needs_walls():
     toy = Hypothesis("polystyrene", "hollow", 0.5, placements=place, reason="Too shiny.")
     fruit = replace(apply_hypothesis(PartDescription("fruit", None), real), hypotheses=(real, toy))
     drawn = [
-        draw_hypotheses(inventory(fruit), np.random.default_rng(k), "default").objects[0].parts[0]
-        for k in range(40)
+        draw_hypotheses(inventory(fruit), np.random.default_rng(k), "default").objects[0].parts[0] for k in range(40)
     ]
     assert {(p.material, p.structure, tuple(p.placements)) for p in drawn} == {
         ("apple", "solid", ()),
         ("polystyrene", "hollow", ("shell_thickness",)),
     }
-    wall_less = next(
-        e.name for e in materials.library().values() if "shell_thickness" not in e.ranges
-    )
+    wall_less = next(e.name for e in materials.library().values() if "shell_thickness" not in e.ranges)
     odd = Hypothesis(wall_less, "hollow", 1.0)
-    assert set(names(PartDescription("cup", "porcelain", "shell", hypotheses=(odd,)), 20)) == {
-        "porcelain"
-    }
+    assert set(names(PartDescription("cup", "porcelain", "shell", hypotheses=(odd,)), 20)) == {"porcelain"}
 
 
 def test_ways_of_one_reading_are_drawn_together():
     def piece(name, real, toy):
-        ways = (
-            Hypothesis(real, "solid", 0.5, reading="real"),
-            Hypothesis(toy, "hollow", 0.5, reading="toy"),
-        )
+        ways = (Hypothesis(real, "solid", 0.5, reading="real"), Hypothesis(toy, "hollow", 0.5, reading="toy"))
         return replace(apply_hypothesis(PartDescription(name, None), ways[0]), hypotheses=ways)
 
     parts = (piece("peel", "leather", "soft_PVC"), piece("flesh", "apple", "polystyrene"))
@@ -252,10 +227,7 @@ def test_ways_of_one_reading_are_drawn_together():
     met = {
         tuple(
             p.material
-            for p in draw_hypotheses(inventory(whole), np.random.default_rng(k), "default")
-            .objects[0]
-            .parts[0]
-            .pieces
+            for p in draw_hypotheses(inventory(whole), np.random.default_rng(k), "default").objects[0].parts[0].pieces
         )
         for k in range(40)
     }

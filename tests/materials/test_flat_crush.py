@@ -50,9 +50,7 @@ def test_what_presses_less_than_the_layers_bear_loses_nothing_to_them():
     elastic = crush_restitution(rubber, BOARD, 0.0, 0.79)
     assert crush_restitution(rubber, BOARD, 0.02, 0.79) == pytest.approx(elastic)
     # Both return their own parts of what they store.
-    low, high = sorted(
-        (rubber.material.restitution, material_across_layers(BOARD.material).restitution)
-    )
+    low, high = sorted((rubber.material.restitution, material_across_layers(BOARD.material).restitution))
     assert low < elastic < high
     speeds = (0.3, 1.0, 3.0)
     found = [crush_restitution(rubber, BOARD, v, 0.79) for v in speeds]
@@ -86,9 +84,7 @@ def test_two_lossy_bodies_lose_in_series():
     one, other = (ImpactBody(materials.find_material(n), made(n)) for n in ("potato", "rubber"))
     e = pair_restitution(one, other).value
     assert e == pair_restitution(other, one).value
-    assert e == pytest.approx(
-        restitution_of_loss(contact_loss_factor(one.material, other.material)), abs=0.01
-    )
+    assert e == pytest.approx(restitution_of_loss(contact_loss_factor(one.material, other.material)), abs=0.01)
     own = pair_restitution(one, one).value
     assert own == pytest.approx(one.material.restitution)
     stiff = replace(other, material=replace(other.material, young=1e13))

@@ -6,15 +6,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.core.errors import OutOfRangeError, UnknownChoiceError, UserError
-from corporeal.core.types import (
-    Law,
-    MaterialField,
-    Part,
-    PartDescription,
-    Parts,
-    Provenance,
-    Structure,
-)
+from corporeal.core.types import Law, MaterialField, Part, PartDescription, Parts, Provenance, Structure
 from corporeal.materials.contact_pairs import measured_friction_pairs, measured_restitution_pairs
 from corporeal.materials.flat_crush import layered_materials
 from corporeal.materials.library_entry import source_table
@@ -25,9 +17,7 @@ LIBRARIES = ["default", "reference"]
 
 def test_every_source_can_be_looked_up_and_none_is_idle():
     cited = {
-        row["source"]
-        for table in (measured_friction_pairs(), measured_restitution_pairs())
-        for row in table.values()
+        row["source"] for table in (measured_friction_pairs(), measured_restitution_pairs()) for row in table.values()
     }
     cited |= {rating.source for rating in rated_restitutions().values()}
     cited |= {one.source for one in layered_materials().values()}
@@ -129,49 +119,25 @@ def test_what_breaks_before_it_yields_has_a_strength_and_nothing_else_has():
         assert entry.law is Law.HENCKY
         strain = entry.ranges["strength"].typical / entry.ranges["young"].typical
         assert 5e-5 < strain < 0.02, name
-    assert (
-        materials.find_material("glass").pick(materials.find_material("glass").typical()).strength
-        == 60e6
-    )
-    assert (
-        materials.find_material("steel").pick(materials.find_material("steel").typical()).strength
-        is None
-    )
+    assert materials.find_material("glass").pick(materials.find_material("glass").typical()).strength == 60e6
+    assert materials.find_material("steel").pick(materials.find_material("steel").typical()).strength is None
 
 
 def test_a_kind_of_plastic_that_nobody_can_tell_spans_the_kinds_that_it_may_be():
-    hard, soft = (
-        materials.find_material("plastic"),
-        materials.find_material("soft plastic, kind unknown"),
-    )
+    hard, soft = (materials.find_material("plastic"), materials.find_material("soft plastic, kind unknown"))
     for name in "PP HDPE polystyrene ABS PVC PET polycarbonate nylon".split():
         for field in ("density", "young"):
-            assert materials.find_material(name).ranges[field].typical in hard.ranges[field], (
-                name,
-                field,
-            )
+            assert materials.find_material(name).ranges[field].typical in hard.ranges[field], (name, field)
     for name in "LDPE soft_PVC TPU".split():
         for field in ("density", "young"):
-            assert materials.find_material(name).ranges[field].typical in soft.ranges[field], (
-                name,
-                field,
-            )
+            assert materials.find_material(name).ranges[field].typical in soft.ranges[field], (name, field)
 
 
 def test_balls_weigh_what_their_rules_say():
-    for name, diameter, low, high in (
-        ("baseball", 0.074, 0.142, 0.149),
-        ("softball", 0.097, 0.177, 0.198),
-    ):
+    for name, diameter, low, high in (("baseball", 0.074, 0.142, 0.149), ("softball", 0.097, 0.177, 0.198)):
         mass = materials.find_material(name).ranges["density"].typical * np.pi / 6 * diameter**3
         assert low < mass < high, name
-    cell = (
-        materials.find_material("battery").ranges["density"].typical
-        * np.pi
-        / 4
-        * 0.0145**2
-        * 0.0505
-    )
+    cell = materials.find_material("battery").ranges["density"].typical * np.pi / 4 * 0.0145**2 * 0.0505
     assert cell == pytest.approx(0.023, rel=0.05)
 
 
@@ -220,16 +186,11 @@ def test_the_rule_comes_near_what_was_measured():
 
 
 def test_the_softer_body_decides_how_two_bodies_part():
-    made = {
-        n: materials.find_material(n).pick(materials.find_material(n).typical())
-        for n in ("steel", "rubber")
-    }
+    made = {n: materials.find_material(n).pick(materials.find_material(n).typical()) for n in ("steel", "rubber")}
     assert materials.series_restitution(made["steel"], made["rubber"]) == pytest.approx(
         made["rubber"].restitution, abs=1e-3
     )
-    assert materials.series_restitution(made["steel"], made["steel"]) == pytest.approx(
-        made["steel"].restitution
-    )
+    assert materials.series_restitution(made["steel"], made["steel"]) == pytest.approx(made["steel"].restitution)
 
 
 def striker(name, solid=True, **stated):
@@ -293,10 +254,7 @@ def test_containers_hold_what_kitchens_and_workshops_hold():
 
 
 def test_what_is_inside_is_in_materials_json_with_its_grounds():
-    tin, soup = (
-        materials.find_material(n).pick(materials.find_material(n).typical())
-        for n in ("steel", "sauce")
-    )
+    tin, soup = (materials.find_material(n).pick(materials.find_material(n).typical()) for n in ("steel", "sauce"))
     made = Structure("filled", 2e-4, "said", contents=soup, fill=0.9)
     words, one = PartDescription("can", "steel", "filled"), np.ones((2, 2))
     field = MaterialField((tin,), (made,), (words,), one, one)

@@ -32,10 +32,7 @@ PLANTED = {
         ("low = 240, typical = 260", "low = 240, typical = 360"),
         "yield_MPa: is out of order: 240, 360, 300. Put them in order.",
     ),
-    "incompressible": (
-        ("high = 0.3,", "high = 0.5,"),
-        "poisson: reaches 0.5: 0.5 is incompressible.",
-    ),
+    "incompressible": (("high = 0.3,", "high = 0.5,"), "poisson: reaches 0.5: 0.5 is incompressible."),
     "no source": ((', source = "my-bench" }\npoisson', " }\npoisson"), "young_GPa: has no source."),
     "empty source": (
         ('source = "my-bench" }\npoisson', 'source = "" }\npoisson'),
@@ -71,16 +68,10 @@ PLANTED = {
     "no group": (('group = "metal"', ""), "has no group, so its values cannot be compared"),
     "strange group": (('"metal"', '"metals"'), "group: 'metals' is not a group."),
     "not a range": (("{ low = 0.28, typical = 0.29, high = 0.3,", "0.3 #"), "is 0.3, not a range."),
-    "a word for a number": (
-        ("low = 0.28", 'low = "0.28"'),
-        "poisson: 'low' is missing or not a nu",
-    ),
+    "a word for a number": (("low = 0.28", 'low = "0.28"'), "poisson: 'low' is missing or not a nu"),
     "not a number": (("low = 0.28", "low = nan"), "poisson: 'low' is missing or not a number."),
     "strange entry": (("low = 0.28", "min = 0.1, low = 0.28"), "an unknown entry 'min'."),
-    "strange base": (
-        ("\n[sources", "extends = 'mine'\n[sources"),
-        "extends: 'mine' is not a library",
-    ),
+    "strange base": (("\n[sources", "extends = 'mine'\n[sources"), "extends: 'mine' is not a library"),
     "no citation": (('cite = "Our', 'site = "Our'), "has no citation."),
     "two of one name": (
         ("[lamp_steel]", "[other]\nlaw = 'hencky'\naliases = ['Lamp_Steel']\n[lamp_steel]"),
@@ -205,9 +196,7 @@ def test_no_file_makes_the_check_itself_fail():
             said = SOUND.replace("[lamp_steel]", f"[lamp_steel]\nfamily = 'x'\n{key} = {value}")
             found(said)
             found(f"{key} = {value}\n{SOUND}")
-            found(
-                SOUND.replace("low = 195", f"low = {value}").replace('"my-bench" }', f"{value} }}")
-            )
+            found(SOUND.replace("low = 195", f"low = {value}").replace('"my-bench" }', f"{value} }}"))
 
 
 # ---------------------------------------------------------------- used
@@ -215,9 +204,7 @@ def test_no_file_makes_the_check_itself_fail():
 
 def test_a_library_with_a_mistake_is_refused(tmp_path):
     (tmp_path / "mine.toml").write_text(SOUND.replace("von_mises", "hooke"))
-    with pytest.raises(
-        BadFileError, match=r"mine.toml: line 6, .*'hooke' is not a constitutive law"
-    ):
+    with pytest.raises(BadFileError, match=r"mine.toml: line 6, .*'hooke' is not a constitutive law"):
         materials.library(str(tmp_path / "mine.toml"))
     with pytest.raises(BadFileError, match="cannot be read"):
         materials.library(str(tmp_path / "absent.toml"))

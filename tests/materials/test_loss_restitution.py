@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from corporeal.materials.loss_restitution import (
-    loss_of_restitution,
-    restitution_of_loss,
-    restitution_range_of_loss,
-)
+from corporeal.materials.loss_restitution import loss_of_restitution, restitution_of_loss, restitution_range_of_loss
 from corporeal.mpm.physics.maxwell_branches import fit_branches
 
 

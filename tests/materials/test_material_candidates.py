@@ -5,11 +5,7 @@ import re
 import pytest
 
 from corporeal import materials
-from corporeal.materials.material_candidates import (
-    content_materials_text,
-    part_materials_text,
-    quantity_choice,
-)
+from corporeal.materials.material_candidates import content_materials_text, part_materials_text, quantity_choice
 
 OWN = """
 [sources.mine]

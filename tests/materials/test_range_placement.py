@@ -44,9 +44,7 @@ def test_no_place_can_leave_the_measured_range(measured, fraction):
 
 @given(st.sampled_from([r for r in RANGES if r.low < r.high]), st.floats(0, 1))
 def test_the_place_of_a_value_is_where_it_came_from(measured, fraction):
-    assert fraction_of(measured, value_at_fraction(measured, fraction)) == pytest.approx(
-        fraction, abs=1e-6
-    )
+    assert fraction_of(measured, value_at_fraction(measured, fraction)) == pytest.approx(fraction, abs=1e-6)
 
 
 def test_every_treatment_lies_inside_what_was_measured():
@@ -67,9 +65,7 @@ def test_a_range_is_offered_with_its_unit_its_usual_place_and_what_narrows_it():
     first, *uses = offered.words.splitlines()
     assert first.startswith("Young's modulus: 10 to 150 kPa, logarithmic scale; usually 60 (place")
     assert "  - seat, mattress: 40 to 110 kPa" in uses
-    angle = quantity_choice(
-        "sand", "friction_angle", materials.library()["sand"].ranges["friction_angle"]
-    )
+    angle = quantity_choice("sand", "friction_angle", materials.library()["sand"].ranges["friction_angle"])
     assert angle.words.splitlines()[0].split("; ")[0].endswith("°")
 
 
@@ -89,9 +85,7 @@ def test_only_what_is_open_is_offered():
     assert set(shell) - set(solid) == {"shell_thickness"}
     stated = PartDescription("x", "steel", "shell", thickness=1e-3, values={"young": 2.05e11})
     assert set(quantity_choices(stated)) == {"poisson", "density", "yield_stress"}
-    filled = quantity_choices(
-        PartDescription("x", "aluminium_can_sheet", "filled", contents="water")
-    )
+    filled = quantity_choices(PartDescription("x", "aluminium_can_sheet", "filled", contents="water"))
     assert filled[CONTENTS_DENSITY_FIELD].range == materials.library()["water"].ranges["density"]
 
 
@@ -104,9 +98,7 @@ def test_a_name_is_spelt_as_the_library_does_or_is_none():
 def test_a_value_on_a_printed_bound_is_inside():
     offered = quantity_choices(PartDescription("x", "soft_PVC", "solid"))
     low, _ = offered["young"].bounds
-    placed = placements_from_values(
-        {"young": QuantityJudgement(low * (1 - 1e-9), "why")}, "model", offered
-    )
+    placed = placements_from_values({"young": QuantityJudgement(low * (1 - 1e-9), "why")}, "model", offered)
     assert placed["young"] == RangePlacement(0.0, "model", "why")
     fallback = usual_placements(offered, "nobody")["young"]
     typical = offered["young"].range.typical
@@ -120,15 +112,9 @@ def at(**fractions):
 
 def test_stiff_but_weak_and_light_but_stiff_do_not_fit():
     clay, foam = PartDescription("x", "plasticine"), PartDescription("x", "seat_foam")
-    assert placement_contradictions(clay, at(young=1.0, yield_stress=0.0)).keys() == {
-        "yield_stress"
-    }
-    assert placement_contradictions(clay, at(young=0.0, yield_stress=1.0))[
-        "yield_stress"
-    ].startswith("soft but strong")
-    assert placement_contradictions(foam, at(young=1.0, density=0.0))["young"].startswith(
-        "light but stiff"
-    )
+    assert placement_contradictions(clay, at(young=1.0, yield_stress=0.0)).keys() == {"yield_stress"}
+    assert placement_contradictions(clay, at(young=0.0, yield_stress=1.0))["yield_stress"].startswith("soft but strong")
+    assert placement_contradictions(foam, at(young=1.0, density=0.0))["young"].startswith("light but stiff")
     for fraction in (0.0, 0.3, 0.5, 1.0):
         assert placement_contradictions(clay, at(young=fraction, yield_stress=fraction)) == {}
         assert placement_contradictions(foam, at(young=fraction, density=fraction)) == {}

@@ -8,11 +8,7 @@ import pytest
 from corporeal import materials
 from corporeal.core.types import Provenance
 from corporeal.materials.loss_restitution import restitution_of_loss
-from corporeal.materials.restitution_speed import (
-    material_at_speed,
-    rated_restitutions,
-    yield_restitution,
-)
+from corporeal.materials.restitution_speed import material_at_speed, rated_restitutions, yield_restitution
 
 
 def made(name):
@@ -29,9 +25,7 @@ def test_a_baseball_bounces_better_from_a_hand_than_from_a_bat():
     ball = made("baseball_core")
     dropped = material_at_speed(ball, 25.9 - 10 * 0.44704)
     assert dropped.restitution == pytest.approx(ball.restitution + 0.01, abs=1e-4)
-    assert restitution_of_loss(dropped.loss) == pytest.approx(
-        restitution_of_loss(ball.loss) + 0.01, abs=1e-4
-    )
+    assert restitution_of_loss(dropped.loss) == pytest.approx(restitution_of_loss(ball.loss) + 0.01, abs=1e-4)
     assert material_at_speed(ball, 25.9).loss == pytest.approx(ball.loss)
     assert material_at_speed(ball, 1e3).restitution == pytest.approx(0.12)
 
@@ -58,9 +52,7 @@ def test_a_metal_that_yields_follows_johnson():
     assert yield_restitution(lead, concrete, 4.43) == pytest.approx(0.167, abs=0.002)
     slow, fast = (yield_restitution(lead, concrete, v) for v in (1.0, 16.0))
     assert slow / fast == pytest.approx(2.0)
-    assert (
-        yield_restitution(lead, concrete, 0.0) == yield_restitution(concrete, concrete, 4.0) == 1.0
-    )
+    assert yield_restitution(lead, concrete, 0.0) == yield_restitution(concrete, concrete, 4.0) == 1.0
     assert yield_restitution(lead, concrete, 1e-6) == 1.0 < inf
 
 

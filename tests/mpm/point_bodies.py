@@ -60,9 +60,7 @@ def flat_faces(size, distance=0.012):
     """Points inside the faces of a box around the origin, and rows that say which way they look."""
     points, rows = [], []
     for axis in range(3):
-        one, two = (
-            np.arange(-s / 2 + distance / 2, s / 2, distance) for s in np.delete(size, axis)
-        )
+        one, two = (np.arange(-s / 2 + distance / 2, s / 2, distance) for s in np.delete(size, axis))
         grid = np.stack(np.meshgrid(one, two, indexing="ij"), -1).reshape(-1, 2)
         for side in (-1.0, 1.0):
             points.append(np.insert(grid, axis, side * size[axis] / 2, axis=1))

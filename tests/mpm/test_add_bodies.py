@@ -14,14 +14,8 @@ FOAM, STONE, MORE = 0, 1, 2
 @pytest.fixture(scope="module")
 def problems():
     """A foam ball and a stone in free fall, and the same with two more."""
-    here = [
-        co.ball("seat_foam", radius=0.05, at=(0, 0, 2.0)),
-        co.ball("granite", radius=0.05, at=(0.5, 0, 2.0)),
-    ]
-    more = [
-        co.ball("granite", radius=0.05, at=(1.0, 0, 1.0)),
-        co.ball("seat_foam", radius=0.05, at=(1.5, 0, 1.0)),
-    ]
+    here = [co.ball("seat_foam", radius=0.05, at=(0, 0, 2.0)), co.ball("granite", radius=0.05, at=(0.5, 0, 2.0))]
+    more = [co.ball("granite", radius=0.05, at=(1.0, 0, 1.0)), co.ball("seat_foam", radius=0.05, at=(1.5, 0, 1.0))]
     few, all_ = (co.pose_problem(co.prepare_scene(co.build_scene(*s))) for s in (here, here + more))
     assert few.cell == all_.cell
     for old, new in zip(few.bodies, all_.bodies, strict=False):
@@ -47,9 +41,7 @@ def test_who_was_there_goes_on_as_if_nothing_had_happened(problems, contact):
     engine.advance(0.02)
     after.advance(0.02)
     # In one shared field, what is out of reach is not felt either.
-    np.testing.assert_allclose(
-        after.snapshot().position[:count], engine.snapshot().position, atol=1e-6
-    )
+    np.testing.assert_allclose(after.snapshot().position[:count], engine.snapshot().position, atol=1e-6)
     # Who joined falls under the present gravity.
     falls = after.measure().momentum[MORE:] / after.measure().mass[MORE:, None]
     np.testing.assert_allclose(falls, np.tile([0.003, 0.0, -0.05], (2, 1)), atol=1e-4)

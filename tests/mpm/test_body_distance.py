@@ -66,9 +66,7 @@ def test_a_body_on_the_floor_is_not_in_it():
     body = block((0.05, 0.05, 0.05))
     still = np.broadcast_to(np.eye(3), (len(body), 3, 3))
     assert plane_depth(body, FLOOR, still, CELL) < 0.1 * CELL
-    assert plane_depth(body - [0, 0, 0.5 * CELL], FLOOR, still, CELL) == pytest.approx(
-        0.5 * CELL, abs=0.1 * CELL
-    )
+    assert plane_depth(body - [0, 0, 0.5 * CELL], FLOOR, still, CELL) == pytest.approx(0.5 * CELL, abs=0.1 * CELL)
 
 
 def test_a_grain_that_has_flowed_does_not_reach_through_the_floor():

@@ -22,9 +22,7 @@ def problem():
     soft = co.ball("seat_foam", radius=0.05, at=(0, 0, 2.0))
     hard = co.ball("granite", radius=0.05, at=(0.5, 0, 2.0))
     scene = co.build_scene(soft, hard)
-    return co.pose_problem(
-        co.prepare_scene(replace(scene, objects=tuple(replace(o, wind=air) for o in scene.objects)))
-    )
+    return co.pose_problem(co.prepare_scene(replace(scene, objects=tuple(replace(o, wind=air) for o in scene.objects))))
 
 
 @pytest.mark.parametrize("kind", ENGINES)

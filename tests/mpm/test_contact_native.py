@@ -112,9 +112,7 @@ def test_bodies_more_than_a_cell_and_a_quarter_apart_are_not_looked_at():
     """Their splines overlap, but no gap between them closes in a step."""
     low, high = bricks(np.array([0.0, 0.0, 0.2])), bricks(np.array([0.0, 0.0, 0.2]))
     high[:, 2] += 0.08 + 1.2 * CELL
-    given = problem(
-        body(low), body(high, velocity=(0, 0, -0.5)), planes=(), gravity=(0.0, 0.0, 0.0)
-    )
+    given = problem(body(low), body(high, velocity=(0, 0, -0.5)), planes=(), gravity=(0.0, 0.0, 0.0))
     engine = CpuEngine(given, threads=1)
     engine.advance(0.1 * CELL / 0.5)
     assert engine.contact.stage["touches"][0] == 0
@@ -145,11 +143,7 @@ def mat_on_a_slab(apart):
     mat = np.stack(np.meshgrid(axis, axis, [0.0, CELL / 2], indexing="ij"), -1).reshape(-1, 3)
     slab, lift = mat - (0, 0, 1.5 * CELL), (0, 0, CELL / 4)
     faces = np.stack(np.meshgrid(flat, flat, [-CELL, 0.0], indexing="ij"), -1).reshape(-1, 3)
-    return problem(
-        body(slab + lift, rigid=True, surface=faces),
-        body(mat + lift, velocity=(0, 0, -0.1)),
-        planes=(),
-    )
+    return problem(body(slab + lift, rigid=True, surface=faces), body(mat + lift, velocity=(0, 0, -0.1)), planes=())
 
 
 def test_a_mat_on_a_slab_meets_it_as_in_the_reference():

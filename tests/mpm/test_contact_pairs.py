@@ -101,17 +101,14 @@ def test_of_three_candidates_the_one_that_separates_is_chosen():
     candidates = contact.candidate_normals(outward_a, outward_c)
     reach_a = np.array([[0.5, 0.6, 0.0]])
     reach_c = np.array([[0.1, 0.1, 0.05]])
-    normal = contact.take_candidate(
-        candidates, contact.widest_candidate(candidates, reach_a, reach_c, 0.1)
-    )
+    normal = contact.take_candidate(candidates, contact.widest_candidate(candidates, reach_a, reach_c, 0.1))
     assert normal == pytest.approx(np.array([[0.0, 0.0, 1.0]]))
 
 
 def test_an_absent_candidate_is_never_chosen():
     candidates = np.array([[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]])
     normal = contact.take_candidate(
-        candidates,
-        contact.widest_candidate(candidates, np.full((1, 3), 1.0), np.zeros((1, 3)), 0.1),
+        candidates, contact.widest_candidate(candidates, np.full((1, 3), 1.0), np.zeros((1, 3)), 0.1)
     )
     assert normal[0].tolist() == [0.0, 1.0, 0.0]
 
@@ -210,10 +207,7 @@ def test_rigid_bodies_keep_their_angular_momentum_together():
 
     def angular():
         total = np.cross(movers.centre[:-1], movers.velocity[:-1] / movers.inverse_mass[:-1, None])
-        own = [
-            np.linalg.solve(i, w)
-            for i, w in zip(movers.inverse_inertia[:-1], movers.spin[:-1], strict=True)
-        ]
+        own = [np.linalg.solve(i, w) for i, w in zip(movers.inverse_inertia[:-1], movers.spin[:-1], strict=True)]
         return total.sum(axis=0) + np.sum(own, axis=0)
 
     before = angular()
@@ -231,12 +225,7 @@ def test_a_pair_shares_velocity_along_the_normal_as_their_masses_say():
         np.zeros((3, 3)),
     )
     contacts = contact_impulses.ContactList(
-        np.array([0]),
-        np.array([1]),
-        np.zeros((1, 3)),
-        np.array([[1.0, 0.0, 0.0]]),
-        np.zeros(1),
-        np.array([0.5]),
+        np.array([0]), np.array([1]), np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]), np.zeros(1), np.array([0.5])
     )
     impulse = contact_impulses.solve(contacts, movers, np.zeros(1), 1)
     reduced = 4.0 / 5.0
@@ -279,9 +268,7 @@ def test_one_impact_is_one_event_for_all_near_contacts_of_a_rigid_pair():
         np.array([0.0, 0.009, 0.05, 0.0]),
         np.zeros(4),
     )
-    rebound = contact_impulses.ReboundRules(
-        np.array([0, 0, 0, 1]), np.full(4, e), *np.zeros((2, 4))
-    )
+    rebound = contact_impulses.ReboundRules(np.array([0, 0, 0, 1]), np.full(4, e), *np.zeros((2, 4)))
     approach = np.array([0.5, 0.5, 0.5, 0.04])  # the other pair is too slow to bounce
     target, hit = contact_impulses.target_speeds(contacts, approach, rebound, cell, dt)
     assert hit.tolist() == [True, True, True, False]
@@ -290,16 +277,9 @@ def test_one_impact_is_one_event_for_all_near_contacts_of_a_rigid_pair():
 
 def test_nothing_rebounds_from_the_gravity_of_a_single_step():
     contacts = contact_impulses.ContactList(
-        np.zeros(1, int),
-        np.ones(1, int),
-        np.zeros((1, 3)),
-        np.array([[0.0, 0.0, -1.0]]),
-        np.zeros(1),
-        np.zeros(1),
+        np.zeros(1, int), np.ones(1, int), np.zeros((1, 3)), np.array([[0.0, 0.0, -1.0]]), np.zeros(1), np.zeros(1)
     )
-    rebound = contact_impulses.ReboundRules(
-        np.zeros(1, int), np.ones(1), np.array([0.3]), np.zeros(1)
-    )
+    rebound = contact_impulses.ReboundRules(np.zeros(1, int), np.ones(1), np.array([0.3]), np.zeros(1))
     target, hit = contact_impulses.target_speeds(contacts, np.array([0.33]), rebound, 0.1, 0.01)
     assert not hit.any() and target[0] == 0.0
 
@@ -310,9 +290,7 @@ def test_what_rolls_on_its_points_does_not_bounce_on_the_next_one():
         np.zeros(1), np.zeros(1),
     )  # fmt: skip
     for feigned, rebounds in ((0.2, True), (0.3, False)):
-        rebound = contact_impulses.ReboundRules(
-            np.zeros(1, int), *np.ones((1, 1)), np.zeros(1), np.array([feigned])
-        )
+        rebound = contact_impulses.ReboundRules(np.zeros(1, int), *np.ones((1, 1)), np.zeros(1), np.array([feigned]))
         _, hit = contact_impulses.target_speeds(contacts, np.array([0.3]), rebound, 0.1, 0.01)
         assert hit[0] == rebounds
 
@@ -320,14 +298,10 @@ def test_what_rolls_on_its_points_does_not_bounce_on_the_next_one():
 def balls_that_touch(count):
     """Balls of 1 kg side by side along x, contacts between neighbours, and how they rebound."""
     still = np.zeros((count, 3))
-    movers = contact_impulses.Movers(
-        np.ones(count), np.zeros((count, 3, 3)), still, still.copy(), still.copy()
-    )
+    movers = contact_impulses.Movers(np.ones(count), np.zeros((count, 3, 3)), still, still.copy(), still.copy())
     first, n = np.arange(count - 1), count - 1
     along = np.tile([1.0, 0.0, 0.0], (n, 1))
-    contacts = contact_impulses.ContactList(
-        first, first + 1, np.zeros((n, 3)), along, np.zeros(n), np.zeros(n)
-    )
+    contacts = contact_impulses.ContactList(first, first + 1, np.zeros((n, 3)), along, np.zeros(n), np.zeros(n))
     return movers, contacts
 
 
@@ -341,9 +315,7 @@ def test_a_blow_runs_through_a_row_of_touching_balls_to_the_last(e):
     count = 6
     movers, contacts = balls_that_touch(count)
     movers.velocity[0, 0] = 2.0
-    rebound = contact_impulses.ReboundRules(
-        np.arange(count - 1), np.full(count - 1, e), *np.zeros((2, count - 1))
-    )
+    rebound = contact_impulses.ReboundRules(np.arange(count - 1), np.full(count - 1, e), *np.zeros((2, count - 1)))
     impulse = contact_impulses.solve_impacts(contacts, movers, rebound, 0.1, 1e-3)
     u = movers.velocity[:, 0] / 2.0
     assert u.sum() == pytest.approx(1.0, rel=1e-12)
@@ -381,9 +353,7 @@ def test_the_friction_loss_is_the_energy_that_is_missing():
     rng = RNG(1)
     movers = some_movers(2, rng)
     contacts = some_contacts(movers, rng)
-    contacts = contacts._replace(
-        normal=contact.unit(contacts.approach(movers) + rng.standard_normal((1, 3)) * 0.3)
-    )
+    contacts = contacts._replace(normal=contact.unit(contacts.approach(movers) + rng.standard_normal((1, 3)) * 0.3))
     before, energy = contacts.approach(movers), kinetic(movers)
     impulse = contact_impulses.solve(contacts, movers, np.zeros(1), 5)
     after = contacts.approach(movers)

@@ -129,9 +129,7 @@ def test_going_on_from_a_saved_state_changes_nothing():
 def crowd():
     """A pile of everything: all laws, a rigid body, contacts, a push, a tall pole."""
     axes = [np.arange(0, size, CELL / 2) for size in (0.03, 0.03, 0.5)]
-    pole = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + np.array(
-        (-0.2, 0, 0.01)
-    )
+    pole = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + np.array((-0.2, 0, 0.01))
     laws = [body(ball((0.11 * k, 0, 0.055), 0.05), law) for k, law in enumerate(Law)]
     stone = ball((0.1, 0.02, 0.16), 0.05)
     duck = ball((0.3, 0.01, 0.16), 0.05)
@@ -221,9 +219,7 @@ def test_two_processes_may_compile_at_once(tmp_path):
         "from corporeal.mpm.cpu.program import CpuProgram\n"
         "CpuProgram(np.zeros(1, WORLD_RECORD.dtype), 1)\n"
     )
-    running = [
-        subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE) for _ in range(2)
-    ]
+    running = [subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE) for _ in range(2)]
     for process in running:
         _, words = process.communicate(timeout=200)
         assert process.returncode == 0, words

@@ -87,13 +87,7 @@ def test_a_rigid_ball_on_a_soft_one_moves_as_in_the_reference(pointed):
     low, high = ball((0, 0, 0.055)), ball((0.02, 0.01, 0.155))
     given = problem(
         body(low, velocity=(0, 0, -0.5)),
-        body(
-            high,
-            velocity=(0.3, 0, -1.5),
-            rigid=True,
-            density=3000.0,
-            surface=high if pointed else np.zeros((0, 3)),
-        ),
+        body(high, velocity=(0.3, 0, -1.5), rigid=True, density=3000.0, surface=high if pointed else np.zeros((0, 3))),
     )
     ours, sure = side_by_side(given, 30)
     assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
@@ -125,9 +119,7 @@ def test_one_shared_field_moves_as_in_the_reference():
 def test_pushes_and_ramped_gravity_enter_as_in_the_reference():
     push = Push((2.0, 0.0, 1.0), 0.0031, 0.0117)
     given = problem(
-        body(ball((0, 0, 0.3)), push=push),
-        body(ball((0.3, 0, 0.3)), push=push, rigid=True),
-        gravity_ramp=0.01,
+        body(ball((0, 0, 0.3)), push=push), body(ball((0.3, 0, 0.3)), push=push, rigid=True), gravity_ramp=0.01
     )
     ours, sure = on_device(given), ReferenceEngine(given)
     for engine in (ours, sure):
@@ -248,9 +240,7 @@ def test_what_a_later_contract_asks_for_is_refused_and_not_left_out():
     class Charged(Problem):
         charge: tuple[float, ...] = ()
 
-    told = {
-        f.name: getattr(problem(body(ball((0, 0, 0.1), 0.02))), f.name) for f in fields(Problem)
-    }
+    told = {f.name: getattr(problem(body(ball((0, 0, 0.1), 0.02))), f.name) for f in fields(Problem)}
     on_device(Charged(**told))
     with pytest.raises(UserError, match="charge"):
         on_device(Charged(**told, charge=(1.0,)))

@@ -194,9 +194,7 @@ def in_task(engine):
     """Which particles are in the block of the task they belong to; each is in one task."""
     a = engine.arrays
     count = flag(engine, layout.FLAG_TASKS)
-    home, first, last = (
-        getattr(a.grid, f"task_{name}").numpy()[:count] for name in ("home", "first", "last")
-    )
+    home, first, last = (getattr(a.grid, f"task_{name}").numpy()[:count] for name in ("home", "first", "last"))
     task = np.repeat(np.arange(count), last - first)
     order = np.concatenate([np.arange(*pair) for pair in zip(first, last, strict=True)])
     assert sorted(order) == list(range(a.particles.count)) and (last - first).max() <= layout.TASK

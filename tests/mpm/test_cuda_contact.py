@@ -74,9 +74,7 @@ def test_a_rigid_block_on_an_incline_slides_as_coulomb_says(friction):
     expected = 0.5 * G * pull * 0.25**2
     # The place is of first order in the step, 1.8 % of the time here at most; the speed is exact.
     assert moved[0] == pytest.approx(expected, rel=0.018, abs=1e-4 * CELL)
-    assert measure.momentum[0, 0] == pytest.approx(
-        measure.mass[0] * G * pull * 0.25, rel=1e-5, abs=1e-4
-    )
+    assert measure.momentum[0, 0] == pytest.approx(measure.mass[0] * G * pull * 0.25, rel=1e-5, abs=1e-4)
     assert np.abs(moved[1:]).max() < 2e-3 * CELL
     if pull:
         grip = friction * measure.mass[0] * G * np.cos(slope)

@@ -41,9 +41,7 @@ def bowl(middle=(0.0, 0.0, HOLLOW), **given):
 def marble(centre, **given):
     one = round_body(centre, RADIUS, **given)
     rows = np.column_stack([one.curvature, np.full((len(one.curvature), 2), 1 / RADIUS)])
-    return body(
-        one.position, rigid=True, surface=one.surface, curvature=rows, velocity=one.velocity[0]
-    )
+    return body(one.position, rigid=True, surface=one.surface, curvature=rows, velocity=one.velocity[0])
 
 
 def in_bowl(lean, **given):

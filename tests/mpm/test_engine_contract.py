@@ -9,14 +9,7 @@ from point_bodies import ball, board, body, problem
 
 from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.core.types import Keyframes
-from corporeal.mpm.engines import (
-    CAPABILITIES,
-    DEFAULT_ENGINE,
-    build_engine,
-    engine_class,
-    require,
-    require_of_class,
-)
+from corporeal.mpm.engines import CAPABILITIES, DEFAULT_ENGINE, build_engine, engine_class, require, require_of_class
 from corporeal.mpm.problem import ENGINES, BodySplit, Engine, InteractiveEngine, VariableLoadEngine
 
 WHOLE = ("cpu", "reference")
@@ -82,9 +75,7 @@ def test_added_bodies_change_nothing_for_the_others_and_are_booked(name, contact
     now, place, count = after.measure(), after.snapshot().position, len(held)
     assert after.time == engine.time and after.steps == engine.steps
     np.testing.assert_allclose(place[:count], held, atol=1e-7)
-    np.testing.assert_allclose(
-        after.grip_point(BOARD, place), engine.grip_point(BOARD, held), atol=1e-7
-    )
+    np.testing.assert_allclose(after.grip_point(BOARD, place), engine.grip_point(BOARD, held), atol=1e-7)
     added = now.potential[MORE:].sum()
     assert now.push_work - before.push_work == pytest.approx(added, rel=1e-9)
     np.testing.assert_array_equal(now.external_impulse[:MORE], before.external_impulse)

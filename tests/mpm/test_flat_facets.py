@@ -29,9 +29,7 @@ def test_a_box_has_six_faces_that_end_at_its_edges():
     top = facets.row[facets.row[:, 2] > 0.5][0]
     mine = facets.point[int(top[9]) : int(top[10])]
     along = np.array([0.0, 0.19, 0.2, 0.225])
-    held = lies_over_facet(
-        mine, top[:3], top[8], np.stack([along, 0 * along, 0.05 + 0 * along], axis=1)
-    )
+    held = lies_over_facet(mine, top[:3], top[8], np.stack([along, 0 * along, 0.05 + 0 * along], axis=1))
     assert held.tolist() == [True, True, True, False]
 
 
@@ -142,9 +140,7 @@ def valley(turned):
         halves.append([(first.position + shift) @ turn.T, (first.surface + shift) @ turn.T, rows])
     points, surface, rows = (np.concatenate(both) for both in zip(*halves, strict=True))
     below = body(points, rigid=True, surface=surface, curvature=rows, density=8000.0, name="valley")
-    ball = round_body(
-        (0.0, 0.01, 0.05 * np.sqrt(2) + 5e-4), velocity=(0.1, 0.4, -0.3), density=2000.0
-    )
+    ball = round_body((0.0, 0.01, 0.05 * np.sqrt(2) + 5e-4), velocity=(0.1, 0.4, -0.3), density=2000.0)
     return (below, ball) if turned else (ball, below)
 
 

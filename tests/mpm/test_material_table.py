@@ -53,13 +53,8 @@ def test_the_numbers_are_those_of_the_field():
     assert table.cone[sand] == pytest.approx(np.sqrt(2) / 3 * np.sin(0.6))
     soft = ~table.rigid
     assert table.modulus[~sand & soft] == pytest.approx(METAL.p_wave_modulus)
-    assert (
-        not table.modulus[table.rigid].any()
-        and (table.flip_damping_rate[table.rigid] == VAST).all()
-    )
-    assert np.array_equal(
-        table.body[row], np.repeat([0, 1], [len(b.position) for b in given.bodies])
-    )
+    assert not table.modulus[table.rigid].any() and (table.flip_damping_rate[table.rigid] == VAST).all()
+    assert np.array_equal(table.body[row], np.repeat([0, 1], [len(b.position) for b in given.bodies]))
 
 
 def test_all_that_share_a_field_forget_alike():
@@ -75,9 +70,7 @@ def test_pressure_is_a_mean_above_a_poissons_ratio_of_two_fifths(poisson, mean):
     """At 0.4 itself engines of different precision decided differently."""
     for young in (1e5, 2.3e6, 1e9):
         stuff = Stuff(young=young, poisson=poisson)
-        table, _ = MaterialTable.of(
-            problem(box((0, 0, 0), (0.04,) * 3, 0.01, stuff=stuff), cell=0.02)
-        )
+        table, _ = MaterialTable.of(problem(box((0, 0, 0), (0.04,) * 3, 0.01, stuff=stuff), cell=0.02))
         assert table.uses_mean_dilatation.all() == table.uses_mean_dilatation.any() == mean
 
 

@@ -11,13 +11,7 @@ from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.physics.grid_spline import stencil
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.mpm.reference.mean_dilatation import group_clusters
-from corporeal.mpm.state import (
-    ParticleConstants,
-    State,
-    elastic_stress,
-    mean_pressure,
-    strain_energy,
-)
+from corporeal.mpm.state import ParticleConstants, State, elastic_stress, mean_pressure, strain_energy
 
 ELASTIC = [Law.NEO_HOOKEAN, Law.COROTATED, Law.HENCKY]
 
@@ -56,9 +50,7 @@ def test_the_force_of_the_mean_pressure_is_the_slope_of_the_stored_energy(law):
 
     def energy(by):
         F = (np.eye(3) + by * gradient) @ rough
-        return strain_energy(
-            matter, F, log_volume_ratio + by * (groups.mean(spread) - spread)
-        ).sum()
+        return strain_energy(matter, F, log_volume_ratio + by * (groups.mean(spread) - spread)).sum()
 
     here, h = replace(start, F=rough, log_volume_ratio=log_volume_ratio), 1e-7
     slope = (energy(h) - energy(-h)) / (2 * h)

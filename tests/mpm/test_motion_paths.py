@@ -44,9 +44,7 @@ def test_a_path_passes_through_its_rows_and_rests_before_and_after():
         np.testing.assert_allclose(found.rotation, frame, atol=1e-12)
     for outside, row in ((0.0, 0.1), (2.0, 0.9)):
         for a, b in zip(
-            prescribed_motion.path_pose(rows, outside),
-            prescribed_motion.path_pose(rows, row),
-            strict=True,
+            prescribed_motion.path_pose(rows, outside), prescribed_motion.path_pose(rows, row), strict=True
         ):
             np.testing.assert_allclose(a, b, atol=1e-12)
 
@@ -55,9 +53,7 @@ def test_what_is_told_to_rest_rests():
     """A monotone cubic overshoots nowhere; an ordinary spline would."""
     rows = prescribed_motion.path_rows(WAVY, PIVOT)
     for time in np.linspace(0.3, 0.4, 11):
-        assert prescribed_motion.path_pose(rows, time).place[0] == pytest.approx(
-            PIVOT[0] + 0.1, abs=1e-12
-        )
+        assert prescribed_motion.path_pose(rows, time).place[0] == pytest.approx(PIVOT[0] + 0.1, abs=1e-12)
 
 
 def test_speeds_of_a_path_are_smooth_and_no_larger_than_said():
@@ -99,9 +95,7 @@ def test_a_path_in_c_is_the_one_in_numpy():
     x = np.stack([p.place for p in before]) + R @ guide.arm
     padded = np.concatenate([np.full((1, guide.rows.shape[1]), np.nan), guide.rows])
     kinds = (wp.float64, wp.float64, wp.vec3d, wp.mat33d)
-    sent = [
-        wp.array(a, dtype=k, device="cpu") for a, k in zip((padded, end, x, R), kinds, strict=True)
-    ]
+    sent = [wp.array(a, dtype=k, device="cpu") for a, k in zip((padded, end, x, R), kinds, strict=True)]
     out = wp.zeros(count, dtype=one_lane.PathMotion, device="cpu")
     arm = wp.vec3d(*guide.arm.tolist())
     wp.launch(follow, count, [sent[0], arm, *sent[1:], out], device="cpu")
@@ -118,12 +112,7 @@ def test_a_path_in_c_is_the_one_in_numpy():
         (problem(replace(mover(), rigid=False), cell=0.025), "is not rigid"),
         (problem(mover(push=Push((1.0, 0.0, 0.0))), cell=0.025), "is pushed too"),
         (
-            problem(
-                mover(),
-                replace(mover(), path=None),
-                cell=0.025,
-                joints=(Joint(0, 1, STILL, 1.0, 1.0),),
-            ),
+            problem(mover(), replace(mover(), path=None), cell=0.025, joints=(Joint(0, 1, STILL, 1.0, 1.0),)),
             "is tied to another body",
         ),
         (problem(mover(), cell=0.025, contact="single"), "shares one velocity field"),
@@ -154,11 +143,7 @@ def gripped():
 @pytest.mark.parametrize("engine", ["cpu", "cuda", "reference"])
 def test_what_two_fingers_close_on_stays_in_the_middle_and_upright(engine):
     """By symmetry; the finger whose contacts were solved last had its way, and tilted it by .7°."""
-    engines = {
-        "cpu": lambda p: CpuEngine(p, threads=1),
-        "cuda": on_device,
-        "reference": ReferenceEngine,
-    }
+    engines = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": on_device, "reference": ReferenceEngine}
     given = gripped()
     run, start = engines[engine](given), given.bodies[0].position
     run.advance(0.1)

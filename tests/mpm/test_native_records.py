@@ -10,12 +10,7 @@ from corporeal.mpm.quiet_warp import wp
 
 wp.set_module_options(COMPILE_OPTIONS)
 
-RECORDS = (
-    *layout.STEP_RECORDS,
-    *layout.CONTACT_RECORDS,
-    layout.SORTING_RECORD,
-    layout.READING_RECORD,
-)
+RECORDS = (*layout.STEP_RECORDS, *layout.CONTACT_RECORDS, layout.SORTING_RECORD, layout.READING_RECORD)
 MIXED = NativeRecord(
     "Mixed",
     ("unsigned char", "tag"),
@@ -78,9 +73,7 @@ def test_a_layout_without_holes_would_be_told_from_it(compiled):
 
 def test_every_thread_has_a_cache_line_of_its_own():
     assert layout.POST_RECORD.dtype.itemsize == 64
-    offset = {
-        name: layout.THREAD_POOL_RECORD.dtype.fields[name][1] for name in ("epoch", "done", "post")
-    }
+    offset = {name: layout.THREAD_POOL_RECORD.dtype.fields[name][1] for name in ("epoch", "done", "post")}
     assert all(place % 64 == 0 for place in offset.values())
 
 

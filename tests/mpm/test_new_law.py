@@ -20,12 +20,7 @@ import corporeal
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parents[1] / "examples" / "11_write_a_law.py"
 NAME, MATERIAL = "saint_venant_kirchhoff", "saint_venant_rubber"
-PLACES = {
-    "materials/library.toml",
-    "mpm/formulas/laws.h",
-    f"mpm/laws/{NAME}.py",
-    "core/types/material_field.py",
-}
+PLACES = {"materials/library.toml", "mpm/formulas/laws.h", f"mpm/laws/{NAME}.py", "core/types/material_field.py"}
 SWING = """
 import json, sys
 from functools import partial
@@ -120,9 +115,7 @@ def test_a_law_that_dispatch_forgets_fails_them(tmp_path):
     assert "test_the_stored_energy_is_that_of_numpy" in done.stdout
 
 
-@pytest.mark.parametrize(
-    "engine", ["reference", *(pytest.param(e, marks=pytest.mark.slow) for e in ("cpu", "cuda"))]
-)
+@pytest.mark.parametrize("engine", ["reference", *(pytest.param(e, marks=pytest.mark.slow) for e in ("cpu", "cuda"))])
 def test_a_bar_of_it_swings_as_theory_and_rubber_do_in_every_engine(engine, larger):
     """On 16 cells a bar seems 3 % longer, whatever its law; an unstressed one would not turn."""
     ours, rubber = json.loads(said(larger, "-c", SWING, engine, MATERIAL, "rubber"))

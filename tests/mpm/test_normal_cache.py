@@ -9,11 +9,7 @@ from corporeal.mpm.constants import NORMAL_CACHE_STEPS
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.reference.engine import ReferenceEngine
 
-ENGINES = {
-    "cpu": lambda given: CpuEngine(given, threads=1),
-    "reference": ReferenceEngine,
-    "cuda": on_device,
-}
+ENGINES = {"cpu": lambda given: CpuEngine(given, threads=1), "reference": ReferenceEngine, "cuda": on_device}
 ROUND_OFF = {"position": 2e-6 * CELL, "velocity": 2e-5, "deformation": 2e-6}
 """What runs on a card may differ by: as from the reference."""
 SAVED = {"cpu": "choices", "reference": "kept.candidate", "cuda": "choices"}

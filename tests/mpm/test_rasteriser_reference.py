@@ -141,9 +141,7 @@ def test_saving_and_restoring_changes_nothing():
         engine.advance(0.02)
     for left, right in ((one.snapshot(), two.snapshot()), (one.measure(), two.measure())):
         for field in dataclasses.fields(left):
-            assert np.array_equal(
-                getattr(left, field.name), getattr(right, field.name), equal_nan=True
-            ), field.name
+            assert np.array_equal(getattr(left, field.name), getattr(right, field.name), equal_nan=True), field.name
     assert one.steps == two.steps
 
 

@@ -27,9 +27,7 @@ def test_a_rotation_turns_by_its_angle_about_its_axis():
     R = rigid.rotation_matrix(np.array([0.0, 0.0, np.pi / 2]))
     assert R @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
     tiny = np.array([1e-9, 2e-9, -1e-9])
-    assert rigid.rotation_matrix(tiny) == pytest.approx(
-        np.eye(3) + rigid.cross_matrix(tiny), abs=1e-17
-    )
+    assert rigid.rotation_matrix(tiny) == pytest.approx(np.eye(3) + rigid.cross_matrix(tiny), abs=1e-17)
     for turn in np.random.default_rng(0).normal(0, 2, (20, 3)):
         R = rigid.rotation_matrix(turn)
         assert R @ R.T == pytest.approx(np.eye(3), abs=1e-14)

@@ -114,10 +114,7 @@ def test_places_are_those_of_numpy_in_either_precision(dtype):
     # As far aside as fields are felt, and at an angle: what is nearly parallel amplifies rounding.
     one, other = (rng.uniform(-0.85, 0.85, (count, 3)) for _ in range(2))
     exact = contact.touching_offset(one, other, normal, 1.0)
-    kernel, kind = {
-        np.float32: (touched_in_single, wp.float32),
-        np.float64: (touched_in_double, wp.float64),
-    }[dtype]
+    kernel, kind = {np.float32: (touched_in_single, wp.float32), np.float64: (touched_in_double, wp.float64)}[dtype]
     sent = [wp.array(v, dtype=wp.vec3d, device="cpu") for v in (one, other, normal)]
     table = wp.array(contact.face_table().astype(dtype), dtype=kind, device="cpu")
     out = wp.zeros(count, dtype=wp.vec3d, device="cpu")

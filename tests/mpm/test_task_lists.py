@@ -29,10 +29,7 @@ THREADS = pytest.mark.parametrize("threads", [1, 2, 3])
 def test_every_block_has_one_task_and_every_task_one_chore(threads):
     tasks = list_particle_tasks(WINDOWS, threads)
     done = [
-        (f, b)
-        for first, last in tasks.chore
-        for f, low, high, _ in tasks.row[first:last]
-        for b in range(low, high)
+        (f, b) for first, last in tasks.chore for f, low, high, _ in tasks.row[first:last] for b in range(low, high)
     ]
     assert len(set(done)) == len(done) == sum(len(w.block) for w in WINDOWS.values())
     assert sorted(tasks.row[:, 3]) == list(range(len(tasks.row)))

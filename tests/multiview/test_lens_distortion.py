@@ -29,7 +29,5 @@ def test_directions_are_unbent():
     lens = Lens(np.array([[80.0, 0, 50], [0, 80.0, 40], [0, 0, 1]]), 100, 80, (-0.2, 0.03))
     points = np.array([[50.0, 40.0], [5.0, 70.0], [95.0, 12.0]])
     np.testing.assert_allclose(
-        distort_directions(lens, undistort_points(lens, points)) @ lens.K[:2, :2].T + lens.K[:2, 2],
-        points,
-        atol=1e-6,
+        distort_directions(lens, undistort_points(lens, points)) @ lens.K[:2, :2].T + lens.K[:2, 2], points, atol=1e-6
     )

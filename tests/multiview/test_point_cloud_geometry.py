@@ -2,11 +2,7 @@ import numpy as np
 import pytest
 
 from corporeal.geometry.mesh_queries import sphere_directions
-from corporeal.multiview.point_cloud_geometry import (
-    medial_ball_thickness,
-    nearest_neighbours,
-    point_normals,
-)
+from corporeal.multiview.point_cloud_geometry import medial_ball_thickness, nearest_neighbours, point_normals
 
 
 def plate(count, size, rng):

@@ -60,24 +60,16 @@ def pictured(camera, textured=True, floor=True):
     place = eye + np.where(seen, t, 0)[..., None] * ray
     cell = np.floor(place * 14 + 0.01).astype(np.int64) % 64
     patch = np.random.default_rng(5).integers(40, 220, (64, 64, 64))
-    grey = (
-        patch[tuple(np.moveaxis(cell, -1, 0))] if textured else np.where(np.isfinite(box), 120, 160)
-    )
+    grey = patch[tuple(np.moveaxis(cell, -1, 0))] if textured else np.where(np.isfinite(box), 120, 160)
     grey = np.where(seen, grey, 250).astype(float)
-    return np.repeat(gaussian_filter(grey, 0.6)[..., None], 3, axis=2).round().astype(
-        np.uint8
-    ), np.isfinite(box)
+    return np.repeat(gaussian_filter(grey, 0.6)[..., None], 3, axis=2).round().astype(np.uint8), np.isfinite(box)
 
 
 def pictures(step=0.2, count=5, **more):
-    eyes = [
-        (2.2 * np.cos(k * step), 2.2 * np.sin(k * step), 1.2 + 0.1 * (k % 2)) for k in range(count)
-    ]
+    eyes = [(2.2 * np.cos(k * step), 2.2 * np.sin(k * step), 1.2 + 0.1 * (k % 2)) for k in range(count)]
     cameras = tuple(looking(np.array(eye)) for eye in eyes)
     made = [pictured(c, **more) for c in cameras]
-    return Views(np.stack([m[0] for m in made]), cameras), np.stack([m[1] for m in made]).astype(
-        np.uint8
-    ) * 255
+    return Views(np.stack([m[0] for m in made]), cameras), np.stack([m[1] for m in made]).astype(np.uint8) * 255
 
 
 @pytest.fixture(scope="module")
@@ -87,10 +79,7 @@ def near():
 
 def posed(views, change):
     return replace(
-        views,
-        cameras=tuple(
-            replace(c, world_from_camera=change(c.world_from_camera)) for c in views.cameras
-        ),
+        views, cameras=tuple(replace(c, world_from_camera=change(c.world_from_camera)) for c in views.cameras)
     )
 
 
@@ -103,9 +92,7 @@ def test_right_poses_are_let_pass(near):
 def test_blurred_and_noisy_pictures_are_let_pass(near):
     noise = np.random.default_rng(0).normal(0, 4, near.rgb.shape)
     rgb = np.stack([gaussian_filter(p.astype(float), (1, 1, 0)) * 0.7 for p in near.rgb]) + noise
-    assert (
-        check_pose_consistency(replace(near, rgb=rgb.clip(0, 255).astype(np.uint8))).doubt is None
-    )
+    assert check_pose_consistency(replace(near, rgb=rgb.clip(0, 255).astype(np.uint8))).doubt is None
 
 
 def test_matrices_for_larger_pictures_are_told_at_which_scale_they_would_agree(near):
@@ -122,9 +109,7 @@ def test_matrices_for_larger_pictures_are_told_at_which_scale_they_would_agree(n
 
 def test_opposite_axes_are_named(near):
     doubt = check_pose_consistency(posed(near, lambda W: W @ OPENGL_FROM_OPENCV_AXES)).doubt
-    assert re.match(
-        r"The poses do not agree .* only \d+% of \d+ points .*px\)\. They would if", doubt
-    )
+    assert re.match(r"The poses do not agree .* only \d+% of \d+ points .*px\)\. They would if", doubt)
     assert "y and z axes were opposite (OpenGL's convention" in doubt
 
 
@@ -149,9 +134,7 @@ def shared_points(monkeypatch):
         places[:20] = rng.uniform(0, 120, (20, 2))  # a third of all matches is wrong
         return places
 
-    pairs = [
-        _MatchedPair(k, (k + 1) % 8, *(seen(cameras[j % 8]) for j in (k, k + 1))) for k in range(8)
-    ]
+    pairs = [_MatchedPair(k, (k + 1) % 8, *(seen(cameras[j % 8]) for j in (k, k + 1))) for k in range(8)]
     monkeypatch.setattr("corporeal.multiview.pose_consistency._pairs", lambda views: pairs)
     return Views(np.zeros((8, HEIGHT, WIDTH, 3), np.uint8), cameras)
 
@@ -159,10 +142,7 @@ def shared_points(monkeypatch):
 WRONG = {
     "OpenGL's": (lambda W: W @ OPENGL_FROM_OPENCV_AXES, "y and z axes were opposite .OpenGL's"),
     "inverted": (np.linalg.inv, "if the matrices were inverted .*, the cameras' axes OpenCV's:"),
-    "both": (
-        lambda W: np.linalg.inv(W @ OPENGL_FROM_OPENCV_AXES),
-        "inverted .*, the cameras' axes OpenGL's:",
-    ),
+    "both": (lambda W: np.linalg.inv(W @ OPENGL_FROM_OPENCV_AXES), "inverted .*, the cameras' axes OpenGL's:"),
     "negated": (lambda W: np.block([[W[:3, :3], -W[:3, 3:]], [W[3:]]]), "behind the cameras"),
 }
 
@@ -211,10 +191,7 @@ MIDDLE = np.array([[0, 0, 2.0], [0, 0, -1], [0, 0, 0]])
     [
         (lambda K: K * [[0.7, 0.7, 1], [1, 0.7, 1], [1, 1, 1]], "about 1.5 times as long"),
         (lambda K: K * [[1.5, 1.5, 1], [1, 1.5, 1], [1, 1, 1]], "about 0.67 times as long"),
-        (
-            lambda K: K + np.array([[0, 0, 16], [0, 0, -12], [0, 0, 0]]),
-            "lay about -16 and +12 pixels",
-        ),
+        (lambda K: K + np.array([[0, 0, 16], [0, 0, -12], [0, 0, 0]]), "lay about -16 and +12 pixels"),
         (lambda K: K, None),
     ],
 )
@@ -296,10 +273,7 @@ def test_thin_legs_are_no_reason_for_doubt():
         draw.circle(tuple(seen[-1][0]), 9, fill=255)
         masks.append(np.asarray(picture))
     assert silhouette_coherence(np.stack(masks), tuple(cameras)) > 0.9
-    assert (
-        silhouette_coherence(np.stack(masks[5:] + masks[:5]), tuple(cameras))
-        < INCOHERENT_HULL_FRACTION
-    )
+    assert silhouette_coherence(np.stack(masks[5:] + masks[:5]), tuple(cameras)) < INCOHERENT_HULL_FRACTION
 
 
 def test_cameras_that_only_turn_are_doubted(near):
@@ -337,10 +311,7 @@ def test_points_behind_the_cameras_are_told():
         replace(
             c,
             world_from_camera=np.block(
-                [
-                    [c.world_from_camera[:3, :3], -c.world_from_camera[:3, 3:]],
-                    [c.world_from_camera[3:]],
-                ]
+                [[c.world_from_camera[:3, :3], -c.world_from_camera[:3, 3:]], [c.world_from_camera[3:]]]
             ),
         )
         for c in (a, b)
@@ -362,7 +333,5 @@ def test_good_matches_are_told_from_random_ones_without_poses():
 def test_poses_of_other_programs_are_let_pass_and_their_opposites_named(shared_assets):
     read = read_posed_photos(shared_assets / "posed" / "trivial", longest=160)
     assert check_pose_consistency(read.views, read.masks).doubt is None
-    wrong = check_pose_consistency(
-        posed(read.views, lambda W: W @ OPENGL_FROM_OPENCV_AXES), read.masks
-    ).doubt
+    wrong = check_pose_consistency(posed(read.views, lambda W: W @ OPENGL_FROM_OPENCV_AXES), read.masks).doubt
     assert "y and z axes were opposite" in wrong

@@ -67,12 +67,7 @@ def test_no_holes_are_seen_where_a_step_of_the_grid_is_more_than_a_pixel(seen):
     low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
     closer = masks[:, low[1] : high[1], low[0] : high[0]]
     closer = np.repeat(np.repeat(closer, 4, axis=1), 4, axis=2)
-    assert (
-        compare_with_hull_of_others(
-            closer, tuple(_cut(c, low, high, 4) for c in cameras)
-        ).filled.min()
-        > 0.96
-    )
+    assert compare_with_hull_of_others(closer, tuple(_cut(c, low, high, 4) for c in cameras)).filled.min() > 0.96
 
 
 def _cut(camera, low, high, finer):

@@ -16,11 +16,7 @@ from corporeal.multiview.similarity_transform import (
 
 def some(rng):
     """Return a similarity, its inverse, and the parts it was made of."""
-    parts = (
-        matrix_from_quaternion(rng.normal(size=4)),
-        float(np.exp(rng.normal())),
-        rng.normal(size=3),
-    )
+    parts = (matrix_from_quaternion(rng.normal(size=4)), float(np.exp(rng.normal())), rng.normal(size=3))
     made = similarity_matrix(*parts)
     return made, np.linalg.inv(made), parts
 
@@ -60,9 +56,7 @@ def test_a_moved_camera_sees_a_moved_point_where_it_was(rng):
         return apply_similarity_to_points(points, from_world)
 
     np.testing.assert_allclose(
-        seen(after, apply_similarity_to_points(points, made)),
-        scale * seen(camera, points),
-        atol=1e-10,
+        seen(after, apply_similarity_to_points(points, made)), scale * seen(camera, points), atol=1e-10
     )
     np.testing.assert_allclose(np.linalg.det(after.world_from_camera), 1)
     (again,) = apply_similarity_to_cameras([after], back)
@@ -74,11 +68,7 @@ def test_gaussians_there_and_back_are_the_same(rng):
     rotation = rng.normal(size=(9, 4))
     rotation /= np.linalg.norm(rotation, axis=1, keepdims=True)
     before = Gaussians(
-        rng.normal(size=(9, 3)),
-        rotation,
-        rng.uniform(0.1, 1, (9, 3)),
-        rng.uniform(size=9),
-        rng.normal(size=(9, 16, 3)),
+        rng.normal(size=(9, 3)), rotation, rng.uniform(0.1, 1, (9, 3)), rng.uniform(size=9), rng.normal(size=(9, 16, 3))
     )
     after = apply_similarity_to_gaussians(apply_similarity_to_gaussians(before, made), back)
     for name in ("mean", "scale", "opacity", "sh"):

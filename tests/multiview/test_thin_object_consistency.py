@@ -32,9 +32,7 @@ def seen(points, camera):
 def around():
     turn = 2 * np.pi * np.arange(COUNT) / COUNT
     eyes = np.stack([2.2 * np.cos(turn), 2.2 * np.sin(turn), np.full(COUNT, 1.4)], axis=1)
-    return [
-        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.5), 48.0, 320, 240)) for e in eyes.tolist()
-    ]
+    return [camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.5), 48.0, 320, 240)) for e in eyes.tolist()]
 
 
 def shaken(camera, rng):

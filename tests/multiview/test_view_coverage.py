@@ -47,7 +47,5 @@ def test_half_of_the_circle_or_a_look_from_above_says_how_deep_it_is():
     middle = np.array(find_viewed_region(few).centre)
     eye = few[0].world_from_camera[:3, 3] - middle
     above = middle + np.linalg.norm(eye) * np.array([0.25, 0.0, 0.97])
-    steep = camera_from_aim(
-        CameraAim(tuple(above), tuple(middle), 48.0, few[0].width, few[0].height)
-    )
+    steep = camera_from_aim(CameraAim(tuple(above), tuple(middle), 48.0, few[0].width, few[0].height))
     assert depth_doubt_text((*few, steep)) is None

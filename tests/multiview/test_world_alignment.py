@@ -44,9 +44,7 @@ def ring(count=24, distance=2.0, low=15, high=60):
 
 def room(rng, floor=2000, things=1500, anywhere=0, noise=0.004):
     """Return points on a floor and on a box that stands on it, and points anywhere."""
-    on_floor = np.concatenate(
-        [rng.uniform(-0.9, 0.9, (floor, 2)), noise * rng.normal(size=(floor, 1))], axis=1
-    )
+    on_floor = np.concatenate([rng.uniform(-0.9, 0.9, (floor, 2)), noise * rng.normal(size=(floor, 1))], axis=1)
     middle = np.array([0, 0, 0.2])
     box = rng.uniform(-0.2, 0.2, (things, 3)) + middle
     side = rng.integers(3, size=things)
@@ -112,9 +110,7 @@ def test_a_file_with_y_up_that_should_have_z_up_is_noticed(rng):
     points, _ = room(rng)
     made = similarity_matrix(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
     found = align_world(
-        apply_similarity_to_cameras(cameras_at(ring()), made),
-        apply_similarity_to_points(points, made),
-        z_up=True,
+        apply_similarity_to_cameras(cameras_at(ring()), made), apply_similarity_to_points(points, made), z_up=True
     )
     assert off(found, made)[0] < 0.1
     assert any("90° from it. The cameras were used" in w for w in found.warnings)
@@ -135,9 +131,7 @@ def test_cameras_that_look_straight_down_are_above(rng):
     eyes = [(x, y, 2.5) for x in (-0.5, 0, 0.5) for y in (-0.5, 0, 0.5)]
     cameras = tuple(c for x, y, z in eyes for c in cameras_at([(x, y, z)], target=(x, y, 0.0)))
     made = somewhere(rng)
-    found = align_world(
-        apply_similarity_to_cameras(cameras, made), apply_similarity_to_points(points, made)
-    )
+    found = align_world(apply_similarity_to_cameras(cameras, made), apply_similarity_to_points(points, made))
     angle, floor = off(found, made)
     assert angle < 0.5
     assert abs(floor) < 0.004
@@ -202,9 +196,7 @@ def test_astray_points_do_not_change_how_things_rest(rng):
 def test_what_somebody_states_goes_before_cameras_and_file(rng):
     points, box = room(rng)
     cameras = cameras_at(ring())
-    found = align_world(
-        cameras, box, z_up=True, of_objects=box, stated=StatedFrame((0.0, -2.0, 0.0))
-    )
+    found = align_world(cameras, box, z_up=True, of_objects=box, stated=StatedFrame((0.0, -2.0, 0.0)))
     np.testing.assert_allclose(found.world_from_file[2, :3], [0, -1, 0], atol=1e-12)
     assert (found.found_by, found.confidence) == ("person", 1.0)
     made = similarity_matrix(matrix_from_quaternion(np.array([1, 0.03, -0.05, 0.02])))
@@ -244,9 +236,7 @@ def angle_from_z(found):
 @pytest.mark.parametrize("heights", [(0, 0), (0, 20), (15, 60), (50, 70), (75, 80)])
 @pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 0.75, 1.0])
 def test_up_is_known_however_many_cameras_were_held_upright(rng, heights, share):
-    exact = estimate_up_direction(
-        some_on_their_sides(cameras_at(ring(24, 2.0, *heights)), share, rng)
-    )
+    exact = estimate_up_direction(some_on_their_sides(cameras_at(ring(24, 2.0, *heights)), share, rng))
     held = cameras_at(ring(24, 2.0, *heights), roll=3, rng=rng)
     by_hand = estimate_up_direction(some_on_their_sides(held, share, rng))
     if share == 1.0 and heights == (0, 0):

@@ -70,9 +70,7 @@ def holds():
     def check(number, quick):
         found = CASES[number].run(quick)
         missed = [c for c in found.checks if not c.met]
-        assert not missed, "\n".join(
-            f"{c.quantity}: {c.value:.5g}, error {c.error:.3g} {c.unit}" for c in missed
-        )
+        assert not missed, "\n".join(f"{c.quantity}: {c.value:.5g}, error {c.error:.3g} {c.unit}" for c in missed)
         return found
 
     return check

@@ -112,12 +112,7 @@ def test_a_blow_runs_through_a_row_and_only_the_last_flies_off(fast_engine):
     """Like Newton's cradle: three balls, gaps wide enough that they meet one after the other."""
     shift, step = np.array([0.11, 0.3, 0.2]) * CELL, 2 * RADIUS + 0.4 * CELL
     balls = [
-        ball(
-            shift + np.array([k * step, 0.0, 0.0]),
-            RADIUS,
-            CELL / 2,
-            velocity=(0.0 if k else SPEED, 0, 0),
-        )
+        ball(shift + np.array([k * step, 0.0, 0.0]), RADIUS, CELL / 2, velocity=(0.0 if k else SPEED, 0, 0))
         for k in range(3)
     ]
     run = fast_engine(problem(*balls, cell=CELL))

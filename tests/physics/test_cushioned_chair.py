@@ -30,9 +30,7 @@ def thrown(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     ball = showcase_scenes.PlacedModel("steel_ball", (0.06, 0.0, 0.55), velocity=(0.0, 0.0, -2.5))
     chair = showcase_scenes.PlacedModel("armchair", without=("back_cushion",))
-    told = showcase_scenes.ShowcaseComposition(
-        "", (chair, ball), view=(1.0, -1.0, 0.4), duration=0.2
-    )
+    told = showcase_scenes.ShowcaseComposition("", (chair, ball), view=(1.0, -1.0, 0.4), duration=0.2)
     patch.setitem(showcase_scenes.SHOWCASE_SCENE_BUILDERS, SCENE, lambda: told)
 
     @cache
@@ -44,9 +42,7 @@ def thrown(tmp_path_factory):
         settings = Settings(fill=FillConfig(stiffness=stiffness))
         silent = lambda verb: lambda fraction, words: None  # noqa: E731
         run_pipeline.run([file], folder, settings, silent, until="simulate")
-        parts, particles = (
-            load(folder / STAGE_FOLDERS[v] / DATA_FILE) for v in ("segment", "fill")
-        )
+        parts, particles = (load(folder / STAGE_FOLDERS[v] / DATA_FILE) for v in ("segment", "fill"))
         video = read_trajectory(folder / STAGE_FOLDERS["simulate"])
         names = [entry.name for entry in parts.catalogue]
         return {name: changes(video, particles.part == k) for k, name in enumerate(names)}
@@ -61,9 +57,7 @@ def changes(video, mine):
     error, squeeze = [], []
     for frame in video.frames:
         now = frame.position[mine].astype(float)
-        shift = np.linalg.norm(
-            fit_rigid_motion(start, now, np.ones(len(now))).undo(now) - start, axis=1
-        )
+        shift = np.linalg.norm(fit_rigid_motion(start, now, np.ones(len(now))).undo(now) - start, axis=1)
         error.append(np.sqrt(np.mean(shift**2)) / box_diagonal(start))
         squeeze.append(mean_of_largest(shift))
     return max(error), max(squeeze)

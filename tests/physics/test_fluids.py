@@ -106,14 +106,7 @@ def test_water_is_not_a_solid(fast_engine):
 def falling_sheet(place, *, cell=0.008):
     """Water one particle thick that slides at .8 m/s and falls onto a floor; place in cells."""
     young, poisson = elastic_moduli(bulk_modulus(1000.0, 0.8))
-    stuff = Stuff(
-        law=Law.FLUID,
-        young=young,
-        poisson=poisson,
-        yield_stress=0.0,
-        consistency=1e-3,
-        flow_index=1.0,
-    )
+    stuff = Stuff(law=Law.FLUID, young=young, poisson=poisson, yield_stress=0.0, consistency=1e-3, flow_index=1.0)
     size = (8 * cell, 8 * cell, 0.5 * cell)
     middle = (0.0, 0.0, (place + 1.75) * cell)
     sheet = box(middle, size, 0.5 * cell, stuff=stuff, velocity=(0.8, 0.0, 0.0))
@@ -152,6 +145,4 @@ def test_engines_agree_on_water_between_walls_that_lie_off_nodes(engines, name):
     for one in (run, exact):
         one.advance(0.005)
     assert run.snapshot().position == pytest.approx(exact.snapshot().position, abs=2e-7)
-    assert run.measure().plane_impulse == pytest.approx(
-        exact.measure().plane_impulse, rel=2e-3, abs=1e-6
-    )
+    assert run.measure().plane_impulse == pytest.approx(exact.measure().plane_impulse, rel=2e-3, abs=1e-6)

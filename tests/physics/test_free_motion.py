@@ -80,12 +80,7 @@ def test_a_rigid_body_spins_as_euler_says(patient_engine):
 
 
 def test_a_body_that_was_saved_goes_on_as_if_nothing_had_happened(engine):
-    setting = problem(
-        a_box(stuff=RUBBER, velocity=(0.1, 0.0, 0.0)),
-        a_ball(rigid=True),
-        cell=CELL,
-        gravity=tuple(G),
-    )
+    setting = problem(a_box(stuff=RUBBER, velocity=(0.1, 0.0, 0.0)), a_ball(rigid=True), cell=CELL, gravity=tuple(G))
     straight = engine(setting)
     straight.advance(0.02)
     saved = straight.save()
@@ -137,8 +132,7 @@ def test_nearly_incompressible_matter_does_not_burst_in_flight(law):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("poisson", "cells", "duration"),
-    [(0.3, 3, 2.0), (0.45, 3, 2.0), (0.499, 3, 2.0), (0.499, 6, 1.0)],
+    ("poisson", "cells", "duration"), [(0.3, 3, 2.0), (0.45, 3, 2.0), (0.499, 3, 2.0), (0.499, 6, 1.0)]
 )
 @pytest.mark.parametrize("law", list(Law))
 def test_nothing_bursts_in_as_many_steps_as_two_seconds_take(law, poisson, cells, duration):

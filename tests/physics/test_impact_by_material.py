@@ -50,10 +50,7 @@ def test_metal_hit_softly_springs_back_and_hit_hard_keeps_a_dent(engine):
 def test_hardening_metal_deforms_less(engine):
     plain = Stuff(law=Law.VON_MISES, yield_stress=1e3)
     tough = Stuff(law=Law.VON_MISES, yield_stress=1e3, hardening=1e5)
-    strain = [
-        thrown_down(engine, stuff, 2.0, 0.02)[0].snapshot().plastic_strain.mean()
-        for stuff in (plain, tough)
-    ]
+    strain = [thrown_down(engine, stuff, 2.0, 0.02)[0].snapshot().plastic_strain.mean() for stuff in (plain, tough)]
     assert strain[1] < 0.7 * strain[0]
 
 
@@ -80,11 +77,7 @@ def test_cohesion_keeps_a_column_standing_that_sand_would_let_slump(fast_engine)
     heights = []
     for cohesion in (0.0, 2000.0):
         soil = Stuff(
-            law=Law.DRUCKER_PRAGER,
-            young=2e5,
-            density=1500.0,
-            friction_angle=np.radians(25.0),
-            cohesion=cohesion,
+            law=Law.DRUCKER_PRAGER, young=2e5, density=1500.0, friction_angle=np.radians(25.0), cohesion=cohesion
         )
         column = cylinder((0.003, 0.002, 0.06), radius, 0.12, cell / 2, stuff=soil)
         run = fast_engine(problem(column, cell=cell, friction=0.6, planes=[floor()], gravity=DOWN))
@@ -99,12 +92,7 @@ def test_a_ball_dents_mud_and_the_dent_stays(fast_engine):
     mud = Stuff(law=Law.VON_MISES, young=2e5, poisson=0.4, density=1600.0, yield_stress=2e3)
     bed = box((0.003, 0.002, 0.04), (0.24, 0.24, 0.08), cell / 2, stuff=mud)
     stone = ball(
-        (0.003, 0.002, 0.145),
-        0.04,
-        cell / 2,
-        stuff=Stuff(density=2500.0),
-        rigid=True,
-        velocity=(0.0, 0.0, -2.0),
+        (0.003, 0.002, 0.145), 0.04, cell / 2, stuff=Stuff(density=2500.0), rigid=True, velocity=(0.0, 0.0, -2.0)
     )
     run = fast_engine(problem(bed, stone, cell=cell, friction=0.5, planes=[floor()], gravity=DOWN))
     count = len(bed.position)

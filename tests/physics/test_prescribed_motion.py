@@ -120,11 +120,7 @@ def lifted(friction, engine):
         bodies.append(box(middle, (0.04, 0.15, 0.15), FINE / 2, rigid=True, path=told))
     table = np.zeros((4, 4))
     table[0, 1:3] = table[1:3, 0] = friction
-    run = engine(
-        problem(
-            *bodies, cell=FINE, friction=table, planes=[floor()], gravity=DOWN, gravity_ramp=0.1
-        )
-    )
+    run = engine(problem(*bodies, cell=FINE, friction=table, planes=[floor()], gravity=DOWN, gravity_ramp=0.1))
     run.advance(0.3)
     start = run.measure()
     run.advance(1.1)
@@ -157,14 +153,7 @@ def test_a_turntable_throws_a_coin_off_where_friction_ends(fast_engine):
     angle = limit * (0.85 * time + 0.15 * time**2)
     first = 0.85 * limit
     told = path(time, turn=angle)
-    slab = box(
-        (radius, 0.0, 0.09),
-        (0.07, 0.07, 0.02),
-        cell / 2,
-        rigid=True,
-        path=told,
-        pivot=(0.0, 0.0, 0.1),
-    )
+    slab = box((radius, 0.0, 0.09), (0.07, 0.07, 0.02), cell / 2, rigid=True, path=told, pivot=(0.0, 0.0, 0.1))
     coin = cylinder(
         (radius, 0.0, 0.1 + height / 2),
         0.02,

@@ -19,9 +19,7 @@ def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
     stuff = Stuff(young=2e5, loss=1.0)
     surface = box_surface(CENTRE, SIZE) if rigid else None
     block = box(CENTRE, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
-    run = patient_engine(
-        problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05)
-    )
+    run = patient_engine(problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05))
     run.advance(0.15)
     m = run.measure()
     moved = (m.centre[0] - CENTRE) / CELL
@@ -36,11 +34,7 @@ def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
 def test_a_stack_of_two_stands(patient_engine):
     low = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
     high = box(np.add(CENTRE, (0, 0, 0.1)), SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
-    run = patient_engine(
-        problem(
-            low, high, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05
-        )
-    )
+    run = patient_engine(problem(low, high, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05))
     run.advance(0.15)
     m = run.measure()
     moved = (m.centre - np.array([CENTRE, np.add(CENTRE, (0, 0, 0.1))])) / CELL
@@ -93,9 +87,7 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
     centre = (0.05, 0.103, 0.052)
     block = box(centre, SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
     run = patient_engine(
-        problem(
-            block, cell=CELL, friction=0.5, planes=[wall], gravity=(-G, 0.0, 0.0), gravity_ramp=0.05
-        )
+        problem(block, cell=CELL, friction=0.5, planes=[wall], gravity=(-G, 0.0, 0.0), gravity_ramp=0.05)
     )
     run.advance(0.12)
     m = run.measure()
@@ -128,16 +120,7 @@ def test_a_block_lies_as_high_wherever_the_floor_is_on_the_grid(fast_engine, rig
         centre = np.add(CENTRE, (0.0, 0.0, off))
         surface = box_surface(tuple(centre), SIZE) if rigid else None
         block = box(centre, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
-        run = fast_engine(
-            problem(
-                block,
-                cell=CELL,
-                friction=0.5,
-                planes=[floor(off)],
-                gravity=DOWN,
-                gravity_ramp=0.05,
-            )
-        )
+        run = fast_engine(problem(block, cell=CELL, friction=0.5, planes=[floor(off)], gravity=DOWN, gravity_ramp=0.05))
         foot = run.snapshot().position[:, 2] < off + CELL / 2
         start = run.snapshot().position[foot, 2].mean()
         run.advance(0.3)

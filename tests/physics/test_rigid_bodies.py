@@ -27,11 +27,7 @@ def steel_ball(centre, **more):
 def test_a_rigid_ball_bounces_to_the_height_its_restitution_says(patient_engine, restitution):
     drop = 0.1
     start = (0.003, 0.002, drop + RADIUS)
-    run = patient_engine(
-        problem(
-            steel_ball(start), cell=CELL, restitution=restitution, planes=[floor()], gravity=DOWN
-        )
-    )
+    run = patient_engine(problem(steel_ball(start), cell=CELL, restitution=restitution, planes=[floor()], gravity=DOWN))
     fall = np.sqrt(2 * drop / G)
     before = run.measure()
     run.advance(fall + 0.005)
@@ -111,9 +107,7 @@ CARDS = [pytest.param("cuda", gap, marks=pytest.mark.slow) for gap in GAPS]
 
 
 @pytest.mark.parametrize(
-    ("patient_engine", "gap"),
-    [*(("cpu", gap) for gap in GAPS), *SURE, *CARDS],
-    indirect=["patient_engine"],
+    ("patient_engine", "gap"), [*(("cpu", gap) for gap in GAPS), *SURE, *CARDS], indirect=["patient_engine"]
 )
 def test_newtons_cradle_passes_a_blow_on_to_the_last_ball(patient_engine, gap):
     u = last_of_a_row(patient_engine, gap, restitution=1.0)
@@ -181,13 +175,7 @@ def test_a_rigid_ball_rolls_down_a_slope_without_slipping(patient_engine):
     surface = ball_surface(start, RADIUS, 4000)
     gravity = (G * np.sin(angle), 0.0, -G * np.cos(angle))
     run = patient_engine(
-        problem(
-            steel_ball(start, surface=surface),
-            cell=CELL,
-            friction=0.5,
-            planes=[floor()],
-            gravity=gravity,
-        )
+        problem(steel_ball(start, surface=surface), cell=CELL, friction=0.5, planes=[floor()], gravity=gravity)
     )
     run.advance(time)
     m = run.measure()

@@ -36,9 +36,7 @@ def falls_on(engine, loss):
     lasts = hertz_contact_time(mass, RADIUS, SPEED, YOUNG / (1 - POISSON**2), HEIGHT)
     foam = Stuff(young=YOUNG, poisson=POISSON, density=DENSITY, loss=loss)
     block = box((0.0, 0.0, HEIGHT / 2), (SIDE, SIDE, HEIGHT), CELL / 2, stuff=foam)
-    block = replace(
-        block, vibration=np.full(len(block.loss), np.pi / lasts / LOSS_BAND_MIDDLE_RATIO)
-    )
+    block = replace(block, vibration=np.full(len(block.loss), np.pi / lasts / LOSS_BAND_MIDDLE_RATIO))
     start, down = (0.0, 0.0, HEIGHT + RADIUS + CELL / 10), (0.0, 0.0, -SPEED)
     hard = Stuff(density=BALL)
     thing = ball(start, RADIUS, CELL / 2, stuff=hard, velocity=down, rigid=True)
@@ -52,9 +50,7 @@ def falls_on(engine, loss):
 def test_a_rigid_ball_loses_its_share_of_the_compliance(fast_engine, ratio, loss):
     """Whichever loses more: a composite of two lossy half-spaces, at three ratios of moduli."""
     rigid = Material("cork", Law.NEO_HOOKEAN, ratio * YOUNG, 0.1, BALL, loss=loss)
-    struck = pair_loss_factor_of_parts(
-        SOFT, ExpectedMotion(SPEED, 0.0, partners=(ImpactPartner(rigid, 1.0),))
-    )
+    struck = pair_loss_factor_of_parts(SOFT, ExpectedMotion(SPEED, 0.0, partners=(ImpactPartner(rigid, 1.0),)))
     theory = series(SOFT, rigid)
     assert struck == pytest.approx(theory, rel=0.1)
     kept = falls_on(fast_engine, struck) / falls_on(fast_engine, 0.0)

@@ -28,9 +28,7 @@ def post(density=1e10, size=(0.02, 0.02, 0.2), **more):
 
 
 def test_a_tethered_crown_swings_at_its_own_frequency_and_keeps_its_energy(fast_engine):
-    run = fast_engine(
-        problem(post(), crown(20.0, velocity=(0.2, 0, 0)), cell=CELL, excluded_pairs=((0, 1),))
-    )
+    run = fast_engine(problem(post(), crown(20.0, velocity=(0.2, 0, 0)), cell=CELL, excluded_pairs=((0, 1),)))
     whole = run.measure().kinetic.sum()
     quarter = 0.5 * np.pi / 20.0
     for turn in range(1, 9):
@@ -43,12 +41,7 @@ def test_a_tethered_crown_swings_at_its_own_frequency_and_keeps_its_energy(fast_
 
 
 def test_a_damped_tether_books_what_its_damper_takes(engine):
-    given = problem(
-        post(1e3),
-        crown(30.0, damping=0.2, velocity=(0.2, 0, 0)),
-        cell=CELL,
-        excluded_pairs=((0, 1),),
-    )
+    given = problem(post(1e3), crown(30.0, damping=0.2, velocity=(0.2, 0, 0)), cell=CELL, excluded_pairs=((0, 1),))
     run = engine(given)
     before = run.measure()
     run.advance(0.05)
@@ -57,9 +50,7 @@ def test_a_damped_tether_books_what_its_damper_takes(engine):
     assert after.viscous_loss > 0.1 * before.kinetic.sum()
     # Within a swing the energy of symplectic Euler goes up and down by ω dt/2, here 2.5 %.
     assert energy + after.viscous_loss == pytest.approx(before.kinetic.sum(), rel=0.02)
-    assert after.momentum.sum(axis=0) == pytest.approx(
-        before.momentum.sum(axis=0), abs=1e-5 * before.momentum.max()
-    )
+    assert after.momentum.sum(axis=0) == pytest.approx(before.momentum.sum(axis=0), abs=1e-5 * before.momentum.max())
     assert after.angular_momentum.sum(axis=0) == pytest.approx(
         before.angular_momentum.sum(axis=0), abs=1e-4 * np.abs(before.angular_momentum).max()
     )
@@ -68,9 +59,7 @@ def test_a_damped_tether_books_what_its_damper_takes(engine):
 def test_a_tethered_crown_hangs_where_it_hung(fast_engine):
     """Its springs bear its weight from the start, and what holds them feels it."""
     held = post(1e3, surface=box_surface((0, 0, 0.1), (0.02, 0.02, 0.2)))
-    given = problem(
-        held, crown(20.0), cell=CELL, planes=(floor(),), gravity=FALL, excluded_pairs=((0, 1),)
-    )
+    given = problem(held, crown(20.0), cell=CELL, planes=(floor(),), gravity=FALL, excluded_pairs=((0, 1),))
     run = fast_engine(given)
     run.advance(0.5)
     measure = run.measure()

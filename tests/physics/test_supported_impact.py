@@ -70,9 +70,7 @@ def test_a_ball_rebounds_from_a_sheet_on_a_floor_as_springs_do(patient_engine, m
     e = [[0, 0.8, 0.8], [0.8, 0, 0.8], [0.8, 0.8, 0]]
     run = struck(patient_engine, [mass], e)
     # Wide and thin, it is pressed on the floor as a layer.
-    wide = impact_support.equivalent_punch_radius(
-        np.hypot(0.3 / np.sqrt(6.0), CELL), SHEET[2], CELL
-    ) / (2.0 * CELL)
+    wide = impact_support.equivalent_punch_radius(np.hypot(0.3 / np.sqrt(6.0), CELL), SHEET[2], CELL) / (2.0 * CELL)
     exact, _ = squeezed.in_springs(squeezed.Case(mass, wide, 0.8, 0.8))
     u = rises(run)
     assert u[0] == pytest.approx(exact, abs=0.03)
@@ -84,9 +82,7 @@ def test_a_ball_rebounds_from_a_sheet_on_a_floor_as_springs_do(patient_engine, m
 
 def test_what_is_thin_and_wide_is_pressed_as_a_layer():
     # A disc of radius a on a layer of thickness h: E pi a^2/h, over 2 E of a punch.
-    assert impact_support.equivalent_punch_radius(0.05, 0.001, 0.0) == pytest.approx(
-        np.pi * 0.05**2 / 0.001 / 2
-    )
+    assert impact_support.equivalent_punch_radius(0.05, 0.001, 0.0) == pytest.approx(np.pi * 0.05**2 / 0.001 / 2)
     assert impact_support.equivalent_punch_radius(0.05, 0.2, 0.0) == 0.05
     # One point of contact spreads over a cell, and is no layer.
     assert impact_support.equivalent_punch_radius(0.01, 1e-4, 0.01) == 0.01

@@ -61,9 +61,7 @@ def test_a_soft_ball_that_settles_loses_little_to_friction(fast_engine):
     """It widens a little on the floor: a few per cent of what it fell, not a third."""
     soft = Stuff(young=2e4, density=900.0, loss=0.3)
     falling = ball((0.003, 0.002, 0.07), 0.05, 0.00625, stuff=soft)
-    run = fast_engine(
-        problem(falling, cell=0.0125, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G))
-    )
+    run = fast_engine(problem(falling, cell=0.0125, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G)))
     before = run.measure()
     run.advance(0.5)
     after = run.measure()
@@ -137,9 +135,7 @@ def test_a_block_without_friction_slides_freely(patient_engine):
 def test_a_thrown_block_stops_after_its_braking_distance(fast_engine):
     """v₀² / 2 μ g."""
     block = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=1e5), velocity=(1.0, 0.0, 0.0))
-    run = fast_engine(
-        problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G))
-    )
+    run = fast_engine(problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G)))
     run.advance(1.0 / (0.5 * G) + 0.1)
     m = run.measure()
     assert m.centre[0, 0] - CENTRE[0] == pytest.approx(1.0 / (2 * 0.5 * G), rel=0.05)

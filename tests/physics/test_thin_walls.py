@@ -16,14 +16,7 @@ FAR = co.box("wood", (0.3, 0.3, 0.2), at=(1.0, 0.0, 0.1), name="far")
 
 
 def mug(base=0.004, wall=0.003, low=HIGH + GAP):
-    outline = [
-        [0, 0],
-        [0.04, 0],
-        [0.04, 0.095],
-        [0.04 - wall, 0.095],
-        [0.04 - wall, base],
-        [0, base],
-    ]
+    outline = [[0, 0], [0.04, 0], [0.04, 0.095], [0.04 - wall, 0.095], [0.04 - wall, base], [0, base]]
     shape = trimesh.creation.revolve(np.array(outline), sections=48)
     corners = np.array(shape.vertices) + np.array([0.0513, 0.0071, low])
     return co.solid("porcelain", corners, shape.faces, name="mug")

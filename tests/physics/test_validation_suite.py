@@ -42,10 +42,7 @@ def test_what_detail_changes_is_measured_on_the_grid_that_the_policy_gives(word,
 
 
 def test_what_differs_too_much_from_fine_is_missed():
-    good, bad = (
-        {"draft": 0.8, "normal": 0.95, "fine": 1.0},
-        {"draft": 0.8, "normal": 1.11, "fine": 1},
-    )
+    good, bad = ({"draft": 0.8, "normal": 0.95, "fine": 1.0}, {"draft": 0.8, "normal": 1.11, "fine": 1})
     met, missed = detail.lines([("good", good), ("bad", bad)])[2:]
     assert met.endswith("| -20 % | -5 % | met |") and "**missed**" in missed
 
@@ -54,9 +51,7 @@ FINE_RUNOUT = 1.33
 """Of 98 % of the sand on 20 cells across the radius, where the policy's fine grid has them."""
 
 
-@pytest.mark.parametrize(
-    ("word", "aim"), [("draft", 0.3), pytest.param("normal", 0.1, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("word", "aim"), [("draft", 0.3), pytest.param("normal", 0.1, marks=pytest.mark.slow)])
 def test_sand_runs_out_on_coarse_grids_about_as_far_as_on_a_fine_one(word, aim):
     (far,) = detail.collapse(word)
     assert far == pytest.approx(FINE_RUNOUT, rel=aim)

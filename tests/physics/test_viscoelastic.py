@@ -29,13 +29,7 @@ def rebound(engine, loss, poisson, cells):
 
 @pytest.mark.parametrize(
     ("poisson", "loss", "theory"),
-    [
-        (0.1, 0.1, 0.872),
-        (0.1, 0.3, 0.665),
-        (0.1, 0.6, 0.450),
-        (0.49, 0.1, 0.872),
-        (0.49, 0.3, 0.665),
-    ],
+    [(0.1, 0.1, 0.872), (0.1, 0.3, 0.665), (0.1, 0.6, 0.450), (0.49, 0.1, 0.872), (0.49, 0.3, 0.665)],
 )
 def test_a_foam_ball_rebounds_as_hereditary_hertz_contact_says(fast_engine, poisson, loss, theory):
     """Lee and Radok (1960), integrated for a loss factor that is flat around the impact.

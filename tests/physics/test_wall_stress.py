@@ -114,9 +114,7 @@ def test_engines_agree_on_honey_that_a_glass_drags_along(engines, name):
     assert expected.angular_momentum[1, 2] > 0.02 * before[0, 2]
     total = expected.angular_momentum.sum(axis=0)
     assert total == pytest.approx(before.sum(axis=0), abs=1e-5 * before[0, 2])
-    assert found.angular_momentum == pytest.approx(
-        expected.angular_momentum, rel=5e-3, abs=2e-3 * before[0, 2]
-    )
+    assert found.angular_momentum == pytest.approx(expected.angular_momentum, rel=5e-3, abs=2e-3 * before[0, 2])
 
 
 def test_the_step_does_not_see_how_stiff_the_wall_layer_is(fast_engine):

@@ -39,9 +39,7 @@ def a_plate(air, size=(0.1, 0.1, 0.02), **more):
     up = np.stack([x, y, np.full(n * n, size[2] / 2)], 1)
     area = np.tile([0.0, 0.0, size[0] * size[1] / n**2], (n * n, 1))
     points = np.concatenate([up, up * [1, 1, -1]])
-    return facing(
-        box((0, 0, 0), size, CELL / 2, **more), points, np.concatenate([area, -area]), air
-    )
+    return facing(box((0, 0, 0), size, CELL / 2, **more), points, np.concatenate([area, -area]), air)
 
 
 def falling(speed, time):
@@ -52,9 +50,7 @@ def falling(speed, time):
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_sphere_falls_through_air_as_its_drag_coefficient_says(fast_engine, rigid):
     """Half a second brings a sphere of C_d = .47 to 53 % of its terminal 8.3 m/s."""
-    run = fast_engine(
-        problem(a_sphere(STILL_AIR, rigid=rigid, stuff=LIGHT), cell=CELL, gravity=FALL)
-    )
+    run = fast_engine(problem(a_sphere(STILL_AIR, rigid=rigid, stuff=LIGHT), cell=CELL, gravity=FALL))
     run.advance(0.5)
     measure = run.measure()
     speed = -measure.momentum[0, 2] / measure.mass[0]
@@ -131,8 +127,7 @@ def test_gusts_are_smooth_bounded_and_always_the_same():
 
 
 @pytest.mark.parametrize(
-    ("stiff", "contact", "spin"),
-    [(False, "multi", 40.0), (True, "multi", 40.0), (True, "single", 0.0)],
+    ("stiff", "contact", "spin"), [(False, "multi", 40.0), (True, "multi", 40.0), (True, "single", 0.0)]
 )
 def test_the_production_engine_is_blown_as_the_reference(stiff, contact, spin):
     air = Wind((9.0, -4.0, 2.0), gust=0.6, start=0.002)

@@ -17,10 +17,7 @@ from glb_maker import Maker, cube
 def models(tmp_path):
     """A duck of 10 cm, a can of 12 cm, a ball of 20 cm; all are cubes that hang somewhere."""
     sizes = {"duck": 0.1, "soda_can": 0.12, "ball": 0.2}
-    return [
-        cube(scale=[x] * 3, translation=[7, 3, -2]).save(tmp_path / f"{name}.glb")
-        for name, x in sizes.items()
-    ]
+    return [cube(scale=[x] * 3, translation=[7, 3, -2]).save(tmp_path / f"{name}.glb") for name, x in sizes.items()]
 
 
 def toml(folder, text):
@@ -168,9 +165,7 @@ def test_several_objects_of_one_file_keep_their_places(tmp_path):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("", True), ("settled = false", False)])
-def test_whether_things_had_come_to_rest_is_said_by_our_file_or_the_scene_file(
-    models, tmp_path, said, meant
-):
+def test_whether_things_had_come_to_rest_is_said_by_our_file_or_the_scene_file(models, tmp_path, said, meant):
     assert not assemble(models).settled
     assert not assemble([toml(tmp_path, 'file = "duck.glb"')]).settled
     (tmp_path / "ours").mkdir()
@@ -218,9 +213,7 @@ def test_objects_that_stand_in_each_other_are_told(models):
     ],
 )
 @pytest.mark.parametrize("everted", [False, True])
-def test_bars_that_cross_overlap_though_neither_holds_a_vertex(
-    tmp_path, first, second, at, told, everted
-):
+def test_bars_that_cross_overlap_though_neither_holds_a_vertex(tmp_path, first, second, at, told, everted):
     for name, size in (("one", first), ("other", second)):
         bar = trimesh.creation.box((size[0], size[2], size[1]))  # glTF's y is up
         if everted:
@@ -275,10 +268,7 @@ def test_options_out_of_reason_are_refused(models, config):
 
 
 def test_real_objects_collide_with_nothing_at_the_start(shared_assets):
-    files = [
-        shared_assets / "objects" / f"{n}.glb"
-        for n in ("vase_smallhouse", "ball_smallhouse", "soda_can_coke")
-    ]
+    files = [shared_assets / "objects" / f"{n}.glb" for n in ("vase_smallhouse", "ball_smallhouse", "soda_can_coke")]
     for stack in (False, True):
         scene = assemble(files, AssembleConfig(stack=stack, drop=0.2))
         assert overlapping_boxes(object_boxes(scene)) == []
@@ -325,7 +315,7 @@ def stl(path, extent):
         ("chair.off", 900.0, 0.9, "in millimetres"),
         ("duck.obj", 2.0, 0.0508, "in inches"),
         ("hammer.stl", 13.0, 0.3302, "in inches"),  # of 13 cm it would be but nearly a hammer
-        ("chair.obj", 3e6, 0.9, "as large as a chair usually is"),
+        ("chair.obj", 3e6, 0.9, "the size that a chair usually is"),
     ],
 )
 def test_a_mesh_without_a_unit_is_as_large_as_such_things_are(tmp_path, name, size, metres, said):
@@ -349,7 +339,7 @@ def test_a_mesh_that_fits_no_unit_is_in_that_of_the_scene_file_s_other_meshes(tm
     """A brick of 5 cm, placed by hand beside others in metres, was made 22 cm large."""
     scene = assemble([placed(tmp_path, ("plank.ply", 0.6), ("pipe.ply", 0.2), ("brick.ply", 0.05))])
     assert [o.real_extent for o in scene.objects] == pytest.approx([0.6, 0.2, 0.05])
-    both = "plank.ply and pipe.ply state no unit: they were taken to be in metres"
+    both = "plank.ply and pipe.ply state no unit: they were read in metres"
     assert any(s.startswith(both) and "20 cm to 60 cm large" in s for s in scene.warnings)
     assert any("brick.ply" in s and "as the other meshes are" in s for s in scene.warnings)
     assert any("but a brick is usually about 22 cm" in s for s in scene.warnings)
@@ -397,9 +387,7 @@ def test_a_mesh_of_no_likely_size_asks_for_its_unit(tmp_path):
 
 def test_a_mesh_may_be_told_which_axis_is_up(tmp_path):
     path = stl(tmp_path / "bracket.stl", 60.0)
-    heights = [
-        np.ptp(object_boxes(assemble([path], up=up))[0], axis=0)[2] for up in (None, "+x", "-y")
-    ]
+    heights = [np.ptp(object_boxes(assemble([path], up=up))[0], axis=0)[2] for up in (None, "+x", "-y")]
     assert heights == pytest.approx([0.02, 0.06, 0.03])
 
 

@@ -116,9 +116,7 @@ def test_what_a_scene_is_made_of_is_written_down(pool, tmp_path):
     made = composed(pool, tmp_path, seed=2, interaction="none")
     said = json.loads((tmp_path / "composition.json").read_text())
     assert [o["name"] for o in said["objects"]] == list(made.names)
-    assert said["interaction"] == "none" and {o["licence"] for o in said["objects"]} == {
-        "CC-BY-4.0"
-    }
+    assert said["interaction"] == "none" and {o["licence"] for o in said["objects"]} == {"CC-BY-4.0"}
     assert not any(o.wind or any(o.velocity) for o in assemble([tmp_path / "scene.toml"]).objects)
 
 

@@ -128,9 +128,7 @@ def test_objects_are_in_the_scenes_order_and_parts_in_the_catalogues():
     made = scene(DUCK, VASE)
     inventory, identity = describe(made), identify_parts(made, substance_hint)
     assert [o.name for o in inventory.objects] == ["duck_0", "vase_0"]
-    assert [p.name for o in inventory.objects for p in o.parts] == [
-        p.name for p in identity.catalogue
-    ]
+    assert [p.name for o in inventory.objects for p in o.parts] == [p.name for p in identity.catalogue]
 
 
 def test_a_person_is_believed_before_the_file(tmp_path):
@@ -156,9 +154,7 @@ def test_a_person_may_say_only_how_it_is_built(tmp_path):
 
 def test_a_person_may_name_pieces_of_an_object_from_pictures(tmp_path):
     path = tmp_path / "said.yaml"
-    path.write_text(
-        "vase_0: { parts: { foot: ABS, bowl: { material: glass, thickness_mm: 3 } } }\n"
-    )
+    path.write_text("vase_0: { parts: { foot: ABS, bowl: { material: glass, thickness_mm: 3 } } }\n")
     config = DescribeConfig(annotations=path)
     said = words(describe(scene(VASE), config, from_pictures=[0]))[("vase_0", "vase")]
     assert [(p.name, p.material) for p in said.pieces] == [("foot", "ABS"), ("bowl", "glass")]
@@ -255,14 +251,9 @@ def test_what_a_model_says_of_a_part_of_unknown_material_is_kept(ask):
     assert (thing.material, thing.structure, thing.answered_by) == (None, "hollow", "unknown")
     assert thing.alternatives == (("ABS", pytest.approx(0.2)), ("steel", pytest.approx(0.1)))
     assert thing.reason == (
-        "The pictures do not show what it is made of: Painted all over. "
-        "No name in the file says what this is made of."
+        "The pictures do not show what it is made of: Painted all over. No name in the file says what this is made of."
     )
-    assert (bucket.material, bucket.structure, bucket.answered_by) == (
-        "steel",
-        "hollow",
-        "metadata",
-    )
+    assert (bucket.material, bucket.structure, bucket.answered_by) == ("steel", "hollow", "metadata")
     assert (thing.built_by, bucket.built_by) == ("model", "model")
     assert bucket.alternatives == (("ABS", pytest.approx(0.2)),)
     assert bucket.reason.endswith("Painted all over. 'steel' in 'steel' names the material steel.")
@@ -354,10 +345,7 @@ def test_what_a_person_has_stated_is_not_asked_for_again(ask, tmp_path):
 
 def test_a_model_that_contradicts_what_the_file_states_is_believed_and_told_once(ask):
     thin = everywhere(0.0)  # soft_PVC's walls: 0.4 mm; the file states 2 mm
-    oracle = Oracle(
-        materials=made_of(part("body", "soft_PVC", "hollow"), part("beak", "ABS", "solid")),
-        placement=thin,
-    )
+    oracle = Oracle(materials=made_of(part("body", "soft_PVC", "hollow"), part("beak", "ABS", "solid")), placement=thin)
     inventory = ask(oracle, DUCK)
     assert words(inventory)[("duck_0", "beak")].material == "ABS"
     assert inventory.warnings == (
@@ -395,10 +383,7 @@ def test_a_weak_model_is_survived_and_said(ask):
     both["ways"].append(both["ways"][0] | {"material": "ceramic"})
     inventory = ask(Oracle(materials=made_of(both), extents=None), VASE)
     (vase,) = inventory.objects[0].parts
-    assert [(w.material, w.probability) for w in vase.hypotheses] == [
-        ("glass", 0.5),
-        ("ceramic", 0.5),
-    ]
+    assert [(w.material, w.probability) for w in vase.hypotheses] == [("glass", 0.5), ("ceramic", 0.5)]
     assert "the probabilities of vase add up to 2 and were divided by it" in inventory.warnings[0]
     one = ask(Oracle(materials=made_of(part("vase", "glass", "sheet", probability=1.0))), VASE)
     assert "one way only was given for every part, as certain" in one.warnings[0]
@@ -448,9 +433,7 @@ def test_values_may_be_asked_for_and_become_the_same_places(ask):
                     "part": "vase",
                     "values": [
                         {"quantity": q, "value": float(low), "reason": "Lowest."}
-                        for q, low in re.findall(
-                            r"^- (\w+): [^:]+: ([\d.e+-]+) to", question.text, flags=re.MULTILINE
-                        )
+                        for q, low in re.findall(r"^- (\w+): [^:]+: ([\d.e+-]+) to", question.text, flags=re.MULTILINE)
                     ],
                 }
             ]
@@ -534,15 +517,10 @@ def test_recorded_answers_replay_without_the_model_and_without_pictures(ask, tmp
         describe(scene(VASE, name="another"), replay(tmp_path))
 
 
-def test_a_recording_outlives_a_longer_library_and_not_a_word_that_is_gone(
-    ask, tmp_path, monkeypatch
-):
+def test_a_recording_outlives_a_longer_library_and_not_a_word_that_is_gone(ask, tmp_path, monkeypatch):
     ask(Oracle(materials=made_of(part("vase", "porcelain"))), VASE, record=tmp_path)
     replayed = replay(tmp_path)
-    monkeypatch.setattr(
-        "corporeal.description.query_scene.part_materials_text",
-        lambda library: "- new: unobtainium",
-    )
+    monkeypatch.setattr("corporeal.description.query_scene.part_materials_text", lambda library: "- new: unobtainium")
     assert words(describe(scene(VASE), replayed))[("vase_0", "vase")].material == "porcelain"
     with pytest.raises(UserError, match="'porcelain' is not in the list of materials"):
         describe(scene(VASE), replayed, library="reference")
@@ -587,9 +565,7 @@ def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path, monk
 
 def everywhere_by_hand(page):
     quantities = re.findall(r"^- (\w+): ", page, flags=re.MULTILINE)
-    values = [
-        {"quantity": q, "fraction": 0.5, "reason": "Middle."} for q in quantities if q != "vase"
-    ]
+    values = [{"quantity": q, "fraction": 0.5, "reason": "Middle."} for q in quantities if q != "vase"]
     return {"parts": [{"part": "vase", "values": values}]}
 
 
@@ -628,9 +604,7 @@ density_kg_m3 = { low = 900, typical = 1000, high = 1100, source = "mine" }
 def test_a_material_of_ones_own_can_be_annotated_and_stated(tmp_path, base):
     (tmp_path / "own.toml").write_text(base + OWN)
     (tmp_path / "said.yaml").write_text("ball_0: Bouncing goo\n")
-    made = scene(
-        ("ball_0", [("a", plain(), {})]), ("toy_0", [("b", plain(), {"substance": "flubber"})])
-    )
+    made = scene(("ball_0", [("a", plain(), {})]), ("toy_0", [("b", plain(), {"substance": "flubber"})]))
     config = DescribeConfig(annotations=tmp_path / "said.yaml")
     ball, toy = describe(made, config, str(tmp_path / "own.toml")).objects
     assert (ball.parts[0].material, ball.parts[0].answered_by) == ("flubber", "annotation")

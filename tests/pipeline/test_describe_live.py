@@ -39,9 +39,7 @@ def _answer(text):
         named = re.search(r"^Parts: (.*)$", text, flags=re.MULTILINE)[1].split("; ")
         shares = {"volume_share": 1 / len(named), "surface_share": 1 / len(named)}
         shares = shares if "volume_share: what lies" in text else {}
-        return {
-            "parts": [part(re.sub(r" \(.*\)$", "", name), "leather", **shares) for name in named]
-        }
+        return {"parts": [part(re.sub(r" \(.*\)$", "", name), "leather", **shares) for name in named]}
     if "Then judge what the whole object weighs" in text:
         a, b, c, unit = re.search(r"are ([\d.]+) × ([\d.]+) × ([\d.]+) (c?m)", text).groups()
         box = float(a) * float(b) * float(c) * (1e-6 if unit == "cm" else 1.0)

@@ -41,10 +41,7 @@ def values(text, factor=None):
         name, rows = block.split(":\n", 1)
         found = re.findall(r"^- (\w+): .*?: ([\d.e+-]+) to ([\d.e+-]+)", rows, flags=re.MULTILINE)
         key = "fraction" if factor is None else "value"
-        said = [
-            {"quantity": q, key: 0.5 if factor is None else float(high) * scale(q, factor)}
-            for q, _, high in found
-        ]
+        said = [{"quantity": q, key: 0.5 if factor is None else float(high) * scale(q, factor)} for q, _, high in found]
         parts.append({"part": name, "values": [row | {"reason": "Usual."} for row in said]})
     return {"parts": parts}
 
@@ -128,11 +125,7 @@ ASKED_AGAIN = {
     "a mass in grams": ("mass", says(weighs(2e7, 4e7, 8e7)), "Answer in kilograms"),
     "a printed weight in another unit": ("mass", says(printed(5e7, "g")), "Check the unit"),
     "words for a unit": ("mass", says(printed(50, "grams")), "unit"),
-    "another word for how it is built": (
-        "materials",
-        says({"parts": [part("jar", "glass", "shell")]}),
-        "built",
-    ),
+    "another word for how it is built": ("materials", says({"parts": [part("jar", "glass", "shell")]}), "built"),
     "prose alone": ("materials", lambda text: "A jar of glass, I should say.", ""),
 }
 

@@ -68,9 +68,7 @@ def interview(tmp_path, monkeypatch):
     return asked
 
 
-@pytest.mark.parametrize(
-    ("name", "at_once"), [*((name, True) for name in FAULTS), ("a mass of 0", False)]
-)
+@pytest.mark.parametrize(("name", "at_once"), [*((name, True) for name in FAULTS), ("a mass of 0", False)])
 def test_a_fault_in_one_of_three_is_asked_for_again_and_all_three_count(interview, name, at_once):
     made, _ = interview(OneOfThree(*FAULTS[name], at_once=at_once))
     (jar,) = made.objects

@@ -225,9 +225,7 @@ def test_a_narrow_sheet_is_as_light_as_its_thick_wall_and_no_hollow_body():
     bent = trimesh.creation.cylinder(0.03, 0.4, sections=24)
     bent.update_faces((bent.triangles_center[:, 1] < 0) & (np.abs(bent.face_normals[:, 2]) < 0.5))
     bent.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
-    scene, parts, field = inputs(
-        thing((put(bent, 0.0), replace(RUBBER, young=1e8), foil)), thing((ball(), RUBBER))
-    )
+    scene, parts, field = inputs(thing((put(bent, 0.0), replace(RUBBER, young=1e8), foil)), thing((ball(), RUBBER)))
     particles = fill(scene, parts, field, FillConfig(detail="draft"))
     treatment, own = particles.treatments[0], particles.part == 0
     assert treatment.kind == "shell"
@@ -605,13 +603,8 @@ def test_what_a_soft_cup_holds_is_as_light_as_it_is():
 def test_pieces_of_one_mesh_weigh_by_their_shares():
     scene, parts, field = inputs(thing((ball(0.05), STEEL)))
     blade = PartDescription("blade", "steel", "solid", volume_share=0.25, surface_share=0.5)
-    handle = PartDescription(
-        "handle", "rubber", "shell", 1e-3, volume_share=0.75, surface_share=0.5
-    )
-    pieces = (
-        PartComponent(blade, STEEL, SOLID),
-        PartComponent(handle, RUBBER, Structure("shell", 1e-3)),
-    )
+    handle = PartDescription("handle", "rubber", "shell", 1e-3, volume_share=0.75, surface_share=0.5)
+    pieces = (PartComponent(blade, STEEL, SOLID), PartComponent(handle, RUBBER, Structure("shell", 1e-3)))
     particles = fill(scene, parts, replace(field, pieces=(pieces,)))
     mesh = ball(0.05)
     wall = mesh.volume * (1 - (0.049 / 0.05) ** 3)
@@ -627,9 +620,7 @@ def test_what_is_filled_falls_as_one_and_its_audit_is_clean(tmp_path):
         thing((put(trimesh.creation.box((0.2, 0.2, 0.1)), 0.0, x=0.4), RUBBER)),
     )
     particles = fill(replace(scene, duration=0.1), parts, field)
-    trajectory = simulate(
-        replace(scene, duration=0.1), particles, field, SimulateConfig(), tmp_path
-    )
+    trajectory = simulate(replace(scene, duration=0.1), particles, field, SimulateConfig(), tmp_path)
     assert np.isfinite(trajectory.ledger.centre).all()
     mass = trajectory.ledger.mass[0]
     assert mass[0] == pytest.approx(particles.mass_real[0], rel=1e-6)

@@ -93,8 +93,7 @@ class Frames(Sequence):
 
 def play(F=TURN, shift=(0.0, 0.0, 0.3), count=3):
     surfaces = tuple(
-        Surface(f"cube_{k}", k, 0, np.asarray(cube(k).vertices), np.asarray(cube(k).faces))
-        for k in (0, 1)
+        Surface(f"cube_{k}", k, 0, np.asarray(cube(k).vertices), np.asarray(cube(k).faces)) for k in (0, 1)
     )
     things = tuple(SceneObject(f"cube_{k}", "cube", 1.0) for k in (0, 1))
     scene = Scene("two", "", things, surfaces, (Finish("green", (0.0, 0.8, 0.0, 1.0)),))
@@ -108,21 +107,13 @@ def play(F=TURN, shift=(0.0, 0.0, 0.3), count=3):
         points, points * 0, np.full(len(points), 1e-3), np.full(len(points), 1e3), thing, thing,
         0.1, (), np.zeros((0, 3)), thing[:0], (1.0, 1.0),
     )  # fmt: skip
-    made = (
-        Material("rubber", Law.NEO_HOOKEAN, 1e6, 0.45, 1e3),
-        Material("steel", Law.COROTATED, 2e11, 0.3, 7850.0),
-    )
+    made = (Material("rubber", Law.NEO_HOOKEAN, 1e6, 0.45, 1e3), Material("steel", Law.COROTATED, 2e11, 0.3, 7850.0))
     pair, words = np.full((3, 3), 0.5), PartDescription("thing", "rubber")
     field = MaterialField(made, (Structure("solid"),) * 2, (words,) * 2, pair, pair)
     trajectory = Trajectory(
-        Path("nowhere"),
-        np.arange(count) / 60,
-        ledger(np.arange(count) / 60),
-        Frames(particles, F, shift, count),
+        Path("nowhere"), np.arange(count) / 60, ledger(np.arange(count) / 60), Frames(particles, F, shift, count)
     )
-    return SimulationResult(
-        PreparedScene(scene, Inventory(()), parts, field, particles), trajectory
-    )
+    return SimulationResult(PreparedScene(scene, Inventory(()), parts, field, particles), trajectory)
 
 
 def made_of(played, gaussians, owner):
@@ -152,9 +143,7 @@ def test_things_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
     np.testing.assert_allclose(one.rgb, two.rgb, atol=5e-6)
     np.testing.assert_allclose(one.alpha, two.alpha, atol=5e-6)
     wrong = replace(after, sh=only.sh)
-    assert np.abs(rasteriser_numba.render(wrong, EYE).rgb - two.rgb).max() > 5e-3, (
-        "colours must turn too"
-    )
+    assert np.abs(rasteriser_numba.render(wrong, EYE).rgb - two.rgb).max() > 5e-3, "colours must turn too"
 
 
 def test_gaussians_follow_particles_of_their_own_object_and_the_rest_stands_still():
@@ -225,9 +214,7 @@ def test_the_picture_follows_the_motion(videos):
 def test_what_stands_still_is_carried_and_lit_once(tmp_path, monkeypatch):
     """As in most videos of photographs that say nothing of what is to happen."""
     carried, carry = [], stage.MovingGaussians.at
-    monkeypatch.setattr(
-        stage.MovingGaussians, "at", lambda *given: carried.append(1) or carry(*given)
-    )
+    monkeypatch.setattr(stage.MovingGaussians, "at", lambda *given: carried.append(1) or carry(*given))
     played = made_of(play(np.eye(3), (0.0, 0.0, 0.0), 5), *together(clad(0), clad(1)))
     render_video(played, SMALL, tmp_path / "still")
     assert len(carried) == 1

@@ -98,9 +98,7 @@ def test_nothing_gets_between_a_pot_and_the_one_that_it_stands_in():
     outer = [(0, 0), (0.16, 0), (0.16, 0.2), (0.157, 0.2), (0.157, 0.003), (0, 0.003)]
     inner = [(r - 0.004 * (r > R), z + 0.005) for r, z in POT]
     made = [(turned(inner), CLAY, WALL), (turned(SHEET), SOIL), (turned(outer), CLAY, WALL)]
-    assert filled(*made).mass_real[1] == pytest.approx(
-        600.0 * cone((R, T + 0.005), (R, LEVEL)), rel=0.02
-    )
+    assert filled(*made).mass_real[1] == pytest.approx(600.0 * cone((R, T + 0.005), (R, LEVEL)), rel=0.02)
 
 
 def test_a_heap_on_a_plate_stays_as_it_is_drawn():

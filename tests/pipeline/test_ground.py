@@ -169,9 +169,7 @@ def spoken(thing, words, library="default"):
 
 
 def test_values_are_where_a_model_placed_them_and_say_so():
-    words = PartDescription(
-        "", "soft_PVC", "shell", margin=0.6, placements=placed(young=0.25, shell_thickness=0.5)
-    )
+    words = PartDescription("", "soft_PVC", "shell", margin=0.6, placements=placed(young=0.25, shell_thickness=0.5))
     field, said = spoken(RIDDLE, words)
     (material,), (structure,) = field.materials, field.structures
     assert material.young == pytest.approx(3.6e6 + 0.25 * (21e6 - 3.6e6))
@@ -184,9 +182,7 @@ def test_values_are_where_a_model_placed_them_and_say_so():
 
 
 def test_a_wide_range_is_placed_in_factors():
-    (foam,) = spoken(RIDDLE, PartDescription("", "seat_foam", placements=placed(young=0.5)))[
-        0
-    ].materials
+    (foam,) = spoken(RIDDLE, PartDescription("", "seat_foam", placements=placed(young=0.5)))[0].materials
     assert foam.young == pytest.approx((10e3 * 150e3) ** 0.5)
 
 
@@ -215,9 +211,7 @@ def test_what_a_person_stated_outranks_what_a_model_placed():
 
 
 def test_a_place_that_nobody_could_choose_is_marked():
-    words = PartDescription(
-        "", "steel", placements={"young": RangePlacement(0.4, "fallback", "No answer.")}
-    )
+    words = PartDescription("", "steel", placements={"young": RangePlacement(0.4, "fallback", "No answer.")})
     (steel,) = spoken(RIDDLE, words)[0].materials
     assert steel.grounds["young"].chosen_by == "fallback"
 
@@ -298,10 +292,7 @@ def test_pieces_are_grounded_each_for_itself():
     field = ground(made, segment(made, told), told)
     ((first, second),) = field.pieces
     assert (first.material.name, first.structure.kind) == ("steel", "solid")
-    assert (
-        second.structure.thickness
-        == materials.find_material("ABS").ranges["shell_thickness"].typical
-    )
+    assert second.structure.thickness == materials.find_material("ABS").ranges["shell_thickness"].typical
     assert second.words.volume_share == 0.8
 
 
@@ -335,22 +326,17 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
     ],
 )
 def test_who_said_how_a_part_is_built_is_named(built_by, who):
-    (solid,) = spoken(RIDDLE, PartDescription("", "steel", "solid", built_by=built_by))[
-        0
-    ].structures
+    (solid,) = spoken(RIDDLE, PartDescription("", "steel", "solid", built_by=built_by))[0].structures
     assert solid.reason == f"{who} that it is solid."
     shell = PartDescription("", "terracotta", "shell", built_by=built_by)
     (usual,) = spoken(RIDDLE, shell)[0].structures
     wall = f"{who} that it has a wall."
     assert usual.reason == (
-        f"{wall} Its thickness, unless its mesh shows it, is the usual 7 mm, in the range of "
-        "terracotta: 4 to 15 mm."
+        f"{wall} Its thickness, unless its mesh shows it, is the usual 7 mm, in the range of terracotta: 4 to 15 mm."
     )
     put = replace(shell, placements={"shell_thickness": RangePlacement(1.0, "model", "Thick.")})
     (here,) = spoken(RIDDLE, put)[0].structures
-    assert here.reason == (
-        f"{wall} A model puts its thickness at 15 mm, in the range of terracotta: 4 to 15 mm."
-    )
+    assert here.reason == (f"{wall} A model puts its thickness at 15 mm, in the range of terracotta: 4 to 15 mm.")
     (stated,) = spoken(RIDDLE, replace(shell, thickness=0.003))[0].structures
     assert stated.reason == f"{wall} Its thickness, 3 mm, is stated."
 

@@ -57,9 +57,7 @@ def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
     assert contents.restitution == pytest.approx(rebound or INFLATED_BALL_RESTITUTION)
     assert contents.loss == pytest.approx(loss_of_restitution(rebound or INFLATED_BALL_RESTITUTION))
     made = ready.particles.treatments[0]
-    grid = GRID_LOSS_FACTOR / MIN_CELLS_FOR_GRID_LOSS**2 + vibration_loss(
-        made.density, 6.0, made.simulated_young_pa
-    )
+    grid = GRID_LOSS_FACTOR / MIN_CELLS_FOR_GRID_LOSS**2 + vibration_loss(made.density, 6.0, made.simulated_young_pa)
     assert made.loss == pytest.approx(contents.loss - grid, abs=0.006)
 
 
@@ -159,9 +157,7 @@ def test_a_sealed_wall_that_the_budget_would_let_be_crushed_is_rigid():
 
 
 def test_reissners_dent_of_a_table_tennis_ball():
-    assert dent_of_hollow_ball(2.2e9, 0.38, 1050, 4e-4, 0.02, 2.44) == pytest.approx(
-        0.027, abs=0.001
-    )
+    assert dent_of_hollow_ball(2.2e9, 0.38, 1050, 4e-4, 0.02, 2.44) == pytest.approx(0.027, abs=0.001)
     assert dent_of_hollow_ball(1e5, 0.38, 1050, 4e-4, 0.02, 2.44) == 1.0
 
 

@@ -52,8 +52,7 @@ def test_a_ball_is_one_thing(cameras):
 
 
 @pytest.mark.parametrize(
-    ("of", "said"),
-    [(anything, "they contradict one another"), (half, "in 12 of 12 photographs they end at")],
+    ("of", "said"), [(anything, "they contradict one another"), (half, "in 12 of 12 photographs they end at")]
 )
 def test_what_is_of_no_thing_is_told(cameras, of, said):
     why, _ = several_objects_reason(drawn(of), cameras)
@@ -92,9 +91,7 @@ def asked(cameras, tmp_path, monkeypatch):
 @pytest.mark.parametrize("of", [anything, half])
 def test_nonsense_is_refused_with_where_it_lies_unless_somebody_wants_to_go_on(asked, of):
     """Half of each picture ended as "the poses do not agree", after a training."""
-    with pytest.raises(
-        BadFileError, match=r"found@.* are not of one object.*masks.*--force"
-    ) as told:
+    with pytest.raises(BadFileError, match=r"found@.* are not of one object.*masks.*--force") as told:
         asked(of)
     assert any("were found by found@" in note for note in told.value.__notes__)
     folder, _, doubts = asked(of, force=True)

@@ -29,10 +29,7 @@ def test_a_stem_that_ends_on_sand_is_drawn_out_into_it():
     scene, parts, field = planted()
     drawn, said = extend_plants_into_ground(scene, parts, field)
     assert lowest(drawn) == pytest.approx([0.0, TOP - 0.2 * HEIGHT])
-    assert (
-        "thing_1 grows from what it stands on" in said[0]
-        and "0.1 m below the visible end" in said[0]
-    )
+    assert "thing_1 grows from what it stands on" in said[0] and "0.1 m below the visible end" in said[0]
     before, after = (np.concatenate([v.vertices for v in s.surfaces]) for s in (scene, drawn))
     moved = before[:, 2] != after[:, 2]
     assert before[moved, 2].max() < TOP + 0.05 * HEIGHT

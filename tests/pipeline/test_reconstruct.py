@@ -50,19 +50,14 @@ def made(splat):
 
 def test_things_come_out_in_metres_on_the_floor(made):
     found, scene = made.found, made.scene
-    assert [(o.name, o.class_name) for o in scene.objects] == [
-        ("crate", "crate"),
-        ("blue pillar", "blue pillar"),
-    ]
+    assert [(o.name, o.class_name) for o in scene.objects] == [("crate", "crate"), ("blue pillar", "blue pillar")]
     assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
     for surface, sides in zip(scene.surfaces, SIDES, strict=True):
         np.testing.assert_allclose(np.ptp(surface.vertices, axis=0), sides, atol=0.02)
         volume = signed_volume(Mesh(surface.vertices, surface.triangles))
         assert volume == pytest.approx(np.prod(sides), rel=0.15)  # their edges are cut off
         assert surface.vertices[:, 2].min() == pytest.approx(0, abs=0.01)
-    back = apply_similarity_to_points(
-        found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file)
-    )
+    back = apply_similarity_to_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
     expected = 2 * np.array(MIDDLES) @ DOWN.T + (0.3, -0.2, 5.0)
     np.testing.assert_allclose(back, expected, atol=0.04)
     between = found.boxes.mean(axis=1)
@@ -77,17 +72,13 @@ def test_every_gaussian_knows_whose_it_is(made):
     assert np.mean(found.object_of_gaussian[red] == 0) > 0.99
     assert np.mean(found.object_of_gaussian[~red] == 1) > 0.99, "undersides, too"
     assert len(found.object_of_point) == found.cloud.count
-    np.testing.assert_array_equal(
-        found.object_of_point, found.object_of_gaussian[found.cloud.gaussian_of_point]
-    )
+    np.testing.assert_array_equal(found.object_of_point, found.object_of_gaussian[found.cloud.gaussian_of_point])
 
 
 def test_surfaces_are_coloured_as_seen(made):
     scene = made.scene
     for surface, colour in zip(scene.surfaces, (RED, BLUE), strict=True):
-        expected = np.where(
-            np.array(colour) <= 0.04045, 0, ((np.array(colour) + 0.055) / 1.055) ** 2.4
-        )
+        expected = np.where(np.array(colour) <= 0.04045, 0, ((np.array(colour) + 0.055) / 1.055) ** 2.4)
         np.testing.assert_allclose(np.median(surface.colours[:, :3], axis=0), expected, atol=0.03)
 
 
@@ -115,8 +106,7 @@ def test_gaussians_follow_their_objects_beside_others(made):
     more = replace(scene, objects=(ball, *scene.objects), surfaces=(scene.surfaces[0], *surfaces))
     there = repose_reconstruction(found, move_scene(more, (0.0, 0.0, 1.0), 2))
     np.testing.assert_array_equal(
-        there.object_of_gaussian,
-        np.where(found.object_of_gaussian < 0, -1, found.object_of_gaussian + 1),
+        there.object_of_gaussian, np.where(found.object_of_gaussian < 0, -1, found.object_of_gaussian + 1)
     )
     np.testing.assert_array_equal(there.object_of_point, found.object_of_point + 1)
     shift = there.gaussians.mean - found.gaussians.mean
@@ -143,10 +133,7 @@ class Seer(PhotoInterview):
 
     def objects(self, pictures):
         assert all(p.dtype == np.uint8 and p.ndim == 3 for p in pictures)
-        return [
-            SeenObject("pillar", "blue", 0.3, "a model (x)"),
-            SeenObject("crate", "red", 0.4, "a model (x)"),
-        ]
+        return [SeenObject("pillar", "blue", 0.3, "a model (x)"), SeenObject("crate", "red", 0.4, "a model (x)")]
 
     def regions(self, pictures, colours, things):
         painted = pictures[1].reshape(-1, 3).astype(int)
@@ -175,9 +162,7 @@ class Enough(Exception):  # noqa: N818
     """All that a test wants to know."""
 
 
-@pytest.mark.parametrize(
-    "lifting", ["uplift", "back-projection", pytest.param("radiance", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("lifting", ["uplift", "back-projection", pytest.param("radiance", marks=pytest.mark.slow)])
 def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, monkeypatch):
     def stopped(cloud, *_):
         raise Enough(cloud)
@@ -206,31 +191,17 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     [
         ({"count": 0}, (), "--count is 0"),
         ({"semantic": "bert"}, (), "Unknown picture encoder 'bert'"),
-        (
-            {"count": 3, "object_names": ("crate",)},
-            (),
-            "--count is 3, but --object-names names 1 objects",
-        ),
+        ({"count": 3, "object_names": ("crate",)}, (), "--count is 3, but --object-names names 1 objects"),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
         ({"floor_at": float("nan")}, (), "--floor-at is nan"),
         ({"training_seed": -1}, (), "--training-seed is -1"),
         ({"apart": "masks"}, (), "is a splat, which has no instance masks"),
-        (
-            {"object_names": ("crate", "pillar")},
-            ("box=1",),
-            "no object 'box'. Choose one of: crate, pil",
-        ),
+        ({"object_names": ("crate", "pillar")}, ("box=1",), "no object 'box'. Choose one of: crate, pil"),
         ({}, ("box=1",), "no object 'box'. Name it with --object-names"),
-        (
-            {"known_distance": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)},
-            (),
-            "distance of the two points is 0 units",
-        ),
+        ({"known_distance": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)}, (), "distance of the two points is 0 units"),
     ],
 )
-def test_options_that_make_no_sense_are_refused_before_anything_is_done(
-    splat, config, extents, told, monkeypatch
-):
+def test_options_that_make_no_sense_are_refused_before_anything_is_done(splat, config, extents, told, monkeypatch):
     monkeypatch.setattr(stage, "turn_upright", None)
     with pytest.raises(UserError, match=told):
         reconstruct(splat, replace(COARSE, **config), extents)

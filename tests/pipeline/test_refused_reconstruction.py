@@ -52,9 +52,7 @@ def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
     (tmp_path / "doubted" / "masks").mkdir(parents=True)
     assert f"rejected, lie in {tmp_path / 'doubted' / 'masks'}" in describe_masks_in(tmp_path)
     (tmp_path / "masks").mkdir()
-    assert f"colours lie in {tmp_path / 'masks'}" in describe_masks_in(tmp_path), (
-        "those that were used"
-    )
+    assert f"colours lie in {tmp_path / 'masks'}" in describe_masks_in(tmp_path), "those that were used"
     assert describe_masks_in(tmp_path).endswith(f"--masks {tmp_path}.")
 
 
@@ -97,24 +95,17 @@ def test_who_goes_on_without_masks_hears_where_doubted_ones_lie(tmp_path, monkey
 
 
 @pytest.mark.parametrize(("count", "refused"), [(None, True), (2, False)])
-def test_two_pieces_seen_from_one_side_are_believed_if_somebody_said_two(
-    monkeypatch, count, refused
-):
+def test_two_pieces_seen_from_one_side_are_believed_if_somebody_said_two(monkeypatch, count, refused):
     """Apart from each other, either may be a piece of the wall behind."""
     views = cameras_around(np.eye(3), 20, (8, 6))[:10]
     mesh = trimesh.creation.box()
-    solid = ClosedSurface(
-        np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((8, 3)), np.zeros(8, int), 0.1
-    )
+    solid = ClosedSurface(np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((8, 3)), np.zeros(8, int), 0.1)
     taken = GaussianScene(ONE, masks=np.ones((len(views), 6, 8), np.bool_))
-    found = FoundObjects(
-        taken, NOTHING, ObjectSurfaces((solid, solid), np.zeros(1, int), np.zeros(0, int))
-    )
+    found = FoundObjects(taken, NOTHING, ObjectSurfaces((solid, solid), np.zeros(1, int), np.zeros(0, int)))
     for other in ("not_worth", "unlike_masks"):
         monkeypatch.setattr(stage, other, lambda *_, **__: None)
     monkeypatch.setattr(
-        "corporeal.reconstruction.surface.reconstruction_acceptance.widest_unseen_angle",
-        lambda _: 200.0,
+        "corporeal.reconstruction.surface.reconstruction_acceptance.widest_unseen_angle", lambda _: 200.0
     )
     assert (stage._reason_not_worth(found, views, False, count) is not None) == refused
     assert stage._reason_not_worth(found, views, True, None) is None, "somebody gave masks"

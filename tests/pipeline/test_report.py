@@ -79,12 +79,8 @@ def test_what_is_inside_is_told_with_how_it_is_built():
 
 def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
     head = PartDescription("head", "steel", volume_share=0.25)
-    words = PartDescription(
-        "hammer", "hardwood", hypotheses=(Hypothesis("ABS", "solid", 0.3),), pieces=(head,)
-    )
-    assert alternative_words(words) == (
-        " Alternatives: ABS (30%). Components: head: steel (25% of the volume)."
-    )
+    words = PartDescription("hammer", "hardwood", hypotheses=(Hypothesis("ABS", "solid", 0.3),), pieces=(head,))
+    assert alternative_words(words) == (" Alternatives: ABS (30%). Components: head: steel (25% of the volume).")
     assert alternative_words(PartDescription("hammer", "hardwood")) == ""
 
 
@@ -99,8 +95,7 @@ def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unkn
     assert "price not known" in usage_words(replace(TOOK, dollars=None))
     by_hand = replace(TOOK, calls=0, models=("by hand, from the sheets",))
     assert usage_words(by_hand) == (
-        "<br>9 questions, answered from the disk by recorded answers (by hand, from the sheets), "
-        "at no cost."
+        "<br>9 questions, answered from the disk by recorded answers (by hand, from the sheets), at no cost."
     )
     assert usage_words(NO_USAGE) == ""
 
@@ -123,16 +118,7 @@ def page(tmp_path):
         video.path.write_bytes(b"")
         particles = fill(made, parts, field)
         report(
-            ReportContent(
-                made,
-                parts,
-                field,
-                particles,
-                video,
-                run_audit(**audit),
-                {},
-                materials.cited_sources(),
-            ),
+            ReportContent(made, parts, field, particles, video, run_audit(**audit), {}, materials.cited_sources()),
             tmp_path / "report.html",
         )
         return (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -148,9 +134,7 @@ def test_every_piece_of_a_mesh_has_its_values_with_range_source_and_reason(page)
     assert "<b>head</b>: steel, 25% of the volume" in told
     assert "It shines." in told and "A dense grade." in told
     assert told.count("<td>density ρ</td>") == 2
-    sources = {
-        r.source for m in ("steel", "ABS") for r in materials.find_material(m).ranges.values()
-    }
+    sources = {r.source for m in ("steel", "ABS") for r in materials.find_material(m).ranges.values()}
     assert sources <= set(re.findall("<dt>([^<]*)</dt>", told))
 
 

@@ -12,12 +12,7 @@ from corporeal.core.types import Law, Material, Scene, SceneObject, Structure, S
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.discretization.discretization_plan import plan_discretization
 from corporeal.discretization.mesh_measures import measure_objects
-from corporeal.discretization.object_scaling import (
-    describe_mass,
-    describe_scales,
-    field_in_scene_scale,
-    part_scales,
-)
+from corporeal.discretization.object_scaling import describe_mass, describe_scales, field_in_scene_scale, part_scales
 from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry, part_at_life_size
 from corporeal.discretization.part_model import infer_part_model
 from corporeal.geometry.scene_transforms import scale_scene
@@ -89,13 +84,9 @@ def test_both_masses_stand_side_by_side(life, large, tmp_path):
     assert f">{describe_mass(125 * real, 5.0)}<" in told
     assert f"{125 * real:.3g} ({real:.3g} in reality)" == describe_mass(125 * real, 5.0)
     assert (
-        "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with "
-        "their object"
+        "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with their object"
     ) in told
-    assert (
-        f"At real size, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick."
-        in told
-    )
+    assert f"At real size, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick." in told
     assert "<td>wall thickness</td>" not in told, "the wall is as stated, not as its material says"
     assert "life-size" not in page(a_can(), life, tmp_path)
     assert "in reality" not in page(a_can(), life, tmp_path).lower()
@@ -119,9 +110,7 @@ def page(scene, made, folder):
     _, parts, field, particles = made
     video = Video(folder / "video.mp4", 24, 64, 64)
     video.path.write_bytes(b"")
-    story = ReportContent(
-        scene, parts, field, particles, video, run_audit(), {}, materials.cited_sources()
-    )
+    story = ReportContent(scene, parts, field, particles, video, run_audit(), {}, materials.cited_sources())
     report(story, folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")
 
@@ -158,9 +147,7 @@ def test_both_masses_are_data(large):
 def test_a_sentence_tells_only_what_is_not_life_size():
     things = (SceneObject("duck_0", "duck", 0.12, 1.85), SceneObject("couch_0", "couch", 2.1, 0.24))
     told = describe_scales((*things, SceneObject("vase_0", "vase", 0.3, 1.001)))
-    assert told.startswith(
-        "Not life-size: duck 0 at 1.85 times its real 12 cm; couch 0 at 0.24 times its real 2.1 m."
-    )
+    assert told.startswith("Not life-size: duck 0 at 1.85 times its real 12 cm; couch 0 at 0.24 times its real 2.1 m.")
     assert "vase" not in told
     assert describe_scales([SceneObject("vase_0", "vase", 0.3)]) == ""
 
@@ -183,14 +170,7 @@ def test_the_real_thing_is_the_same_with_all_its_lengths_over_the_scale():
     wall = Structure("shell", 4e-4)
     real = PartGeometry(0, steel, wall, (0.06, 0.06, 0.1), 2.8e-4, 0.024, diameter=0.01)
     here = PartGeometry(
-        0,
-        steel,
-        replace(wall, thickness=16e-4),
-        (0.24, 0.24, 0.4),
-        64 * 2.8e-4,
-        16 * 0.024,
-        diameter=0.04,
-        scale=4.0,
+        0, steel, replace(wall, thickness=16e-4), (0.24, 0.24, 0.4), 64 * 2.8e-4, 16 * 0.024, diameter=0.04, scale=4.0
     )
     back = part_at_life_size(here)
     assert back.size == pytest.approx(real.size, rel=1e-12)
@@ -208,12 +188,7 @@ def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
     (treated,) = plan_discretization([stick], [gentle], "fine").treatments
     assert treated.kind == "deformable"
     assert "At its real size, 0.2 times this one, it would be judged otherwise" in treated.reason
-    assert (
-        "otherwise"
-        not in plan_discretization([replace(stick, scale=1.0)], [gentle], "fine")
-        .treatments[0]
-        .reason
-    )
+    assert "otherwise" not in plan_discretization([replace(stick, scale=1.0)], [gentle], "fine").treatments[0].reason
     stiff = replace(stick, material=replace(gel, young=1e11))
     assert "otherwise" not in plan_discretization([stiff], [gentle], "fine").treatments[0].reason
 

@@ -21,10 +21,7 @@ from corporeal.reconstruction.features.point_descriptor import point_descriptor
 from corporeal.reconstruction.segment.part_naming import NamedParts
 from sample_scenes import plain, scene
 
-CHAIR = (
-    "chair_0",
-    [("seat", plain("Oak"), {}), ("cushion", plain("Fabric"), {}), ("leg", plain("Oak"), {})],
-)
+CHAIR = ("chair_0", [("seat", plain("Oak"), {}), ("cushion", plain("Fabric"), {}), ("leg", plain("Oak"), {})])
 VASE = ("vase_0", [("mesh", plain(), {})])
 
 
@@ -82,12 +79,8 @@ def seen(made, green):
 
 
 def told(*pieces, vase_by="annotation"):
-    words = PartDescription(
-        "plant", "ceramic", pieces=tuple(PartDescription(n, m) for n, m in pieces)
-    )
-    vase = ObjectDescription(
-        "vase", "vase", (PartDescription("vase", "ceramic", answered_by=vase_by),)
-    )
+    words = PartDescription("plant", "ceramic", pieces=tuple(PartDescription(n, m) for n, m in pieces))
+    vase = ObjectDescription("vase", "vase", (PartDescription("vase", "ceramic", answered_by=vase_by),))
     return Inventory((ObjectDescription("plant", "plant", (words,)), vase))
 
 
@@ -95,11 +88,7 @@ def test_pieces_of_an_object_from_pictures_are_found_on_it():
     made, green = potted()
     words = told(("red pot", "ceramic"), ("green leaves", "leaves-flowers"))
     parts = segment(made, words, found=seen(made, green))
-    assert [(p.name, p.object) for p in parts.catalogue] == [
-        ("red pot", 0),
-        ("green leaves", 0),
-        ("vase", 1),
-    ]
+    assert [(p.name, p.object) for p in parts.catalogue] == [("red pot", 0), ("green leaves", 0), ("vase", 1)]
     mine = parts.part_of_point[: len(green)]
     assert np.mean((mine == 1) == green) > 0.97
     assert np.all(parts.part_of_point[len(green) :] == 2)

@@ -39,10 +39,7 @@ def test_only_what_is_declared_is_a_path():
 
 
 def test_our_own_settings_name_the_files_they_read():
-    assert paths_read(GroundConfig(library="my.toml", field="vomp:here.npz")) == [
-        Path("my.toml"),
-        Path("here.npz"),
-    ]
+    assert paths_read(GroundConfig(library="my.toml", field="vomp:here.npz")) == [Path("my.toml"), Path("here.npz")]
     assert paths_read(GroundConfig(field="one:E=2e6")) == []
     asked = DescribeConfig(annotations=Path("a.yaml"), record=Path("r"), critic="replay:c")
     assert paths_read(asked) == [Path("a.yaml"), Path("c")]

@@ -48,9 +48,7 @@ class Ballistic:
         self.problem, self.steps, self.time = problem, StepStatistics(), 0.0
         self.x = np.concatenate([b.position for b in problem.bodies])
         self.v = np.concatenate([b.velocity for b in problem.bodies])
-        self.owner = np.repeat(
-            np.arange(len(problem.bodies)), [len(b.position) for b in problem.bodies]
-        )
+        self.owner = np.repeat(np.arange(len(problem.bodies)), [len(b.position) for b in problem.bodies])
 
     def advance(self, until: float) -> None:
         if until > Ballistic.interrupt_at:
@@ -152,9 +150,7 @@ def scene_of(heights=(0.1, 0.5), velocity=(0.0, 0.0, 0.0), push=None, duration=0
     shuffle = np.random.default_rng(0).permutation(len(position))
     position, owner = position[shuffle], owner[shuffle]
     count, kinds = len(position), len(heights)
-    objects = tuple(
-        SceneObject(f"cube_{k}", "cube", 0.08, velocity=velocity, push=push) for k in range(kinds)
-    )
+    objects = tuple(SceneObject(f"cube_{k}", "cube", 0.08, velocity=velocity, push=push) for k in range(kinds))
     scene = Scene("cubes", "", objects, (), (), duration=duration, fps=50)
     particles = Particles(
         position=position,
@@ -297,9 +293,7 @@ def test_what_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch):
 
 def problem_of(monkeypatch, tmp_path, asked):
     seen = []
-    monkeypatch.setattr(
-        stage, "build_engine", lambda problem, engine: seen.append(problem) or Ballistic(problem)
-    )
+    monkeypatch.setattr(stage, "build_engine", lambda problem, engine: seen.append(problem) or Ballistic(problem))
     simulate(*asked, SimulateConfig(), tmp_path)
     return seen[0]
 
@@ -322,12 +316,7 @@ def test_friction_with_the_floor_is_that_of_the_part_that_stands_on_it(tmp_path,
     scene, particles, field = scene_of((0.0,))
     low = particles.position[:, 2] < 0.04
     friction = np.array([[0.1, 0.2, 0.3], [0.2, 0.4, 0.9], [0.3, 0.9, 0.0]])
-    particles = replace(
-        particles,
-        part=np.where(low, 1, 0),
-        treatments=(treated(),) * 2,
-        mass_real=(0.256, 0.256),
-    )
+    particles = replace(particles, part=np.where(low, 1, 0), treatments=(treated(),) * 2, mass_real=(0.256, 0.256))
     field = replace(
         field,
         materials=(RUBBER,) * 2,

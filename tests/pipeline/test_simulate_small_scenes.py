@@ -7,21 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.core.types import (
-    Law,
-    Material,
-    MaterialField,
-    PartDescription,
-    Particles,
-    Scene,
-    SceneObject,
-    Structure,
-)
-from corporeal.discretization.discretization_plan import (
-    ExpectedMotion,
-    PartGeometry,
-    plan_discretization,
-)
+from corporeal.core.types import Law, Material, MaterialField, PartDescription, Particles, Scene, SceneObject, Structure
+from corporeal.discretization.discretization_plan import ExpectedMotion, PartGeometry, plan_discretization
 from corporeal.discretization.point_filling import fill_body
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
@@ -42,9 +29,7 @@ def golden_sphere(count):
     """Points spread evenly over the unit sphere (Fibonacci)."""
     k = np.arange(count) + 0.5
     polar, turn = np.arccos(1 - 2 * k / count), np.pi * (1 + 5**0.5) * k
-    return np.stack(
-        [np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1
-    )
+    return np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1)
 
 
 def ball(spacing):
@@ -61,8 +46,7 @@ def balls(materials, heights, velocities=None, duration=0.5):
     count = len(materials)
     volume = np.pi / 6 * SIZE**3
     parts = [
-        PartGeometry(k, m, Structure("solid"), (SIZE,) * 3, volume, np.pi * SIZE**2)
-        for k, m in enumerate(materials)
+        PartGeometry(k, m, Structure("solid"), (SIZE,) * 3, volume, np.pi * SIZE**2) for k, m in enumerate(materials)
     ]
     chosen = plan_discretization(parts, [ExpectedMotion(speed, 9.81)] * count, "draft")
     one = ball(chosen.cell / 2)
@@ -85,9 +69,7 @@ def balls(materials, heights, velocities=None, duration=0.5):
         object_of_surface=np.repeat(np.array(rigid, dtype=np.int64), len(skin)),
         mass_real=tuple(float(volume * rho) for rho in density),
     )
-    objects = tuple(
-        SceneObject(f"ball_{k}", "ball", SIZE, velocity=v) for k, v in enumerate(velocities)
-    )
+    objects = tuple(SceneObject(f"ball_{k}", "ball", SIZE, velocity=v) for k, v in enumerate(velocities))
     scene = Scene("balls", "", objects, (), (), duration=duration, fps=60)
     table = np.full((count + 1, count + 1), 0.6)
     field = MaterialField(

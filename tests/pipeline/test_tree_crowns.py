@@ -11,12 +11,7 @@ from skimage.measure import marching_cubes
 from test_fill import LEAVES, SOLID, WOOD, a_potted_plant, inputs, put, thing
 
 from corporeal.core.types import Structure
-from corporeal.discretization.foliage import (
-    find_rooted_wood,
-    leaf_frequencies,
-    root_joint,
-    weigh_bulk_foliage,
-)
+from corporeal.discretization.foliage import find_rooted_wood, leaf_frequencies, root_joint, weigh_bulk_foliage
 from corporeal.discretization.mesh_measures import measure_objects
 from corporeal.discretization.part_model import infer_part_model
 from corporeal.geometry.mesh import Mesh

@@ -85,9 +85,7 @@ def play(shape, motion, count=6):
     pair = np.full((2, 2), 0.5)
     field = MaterialField((rubber,), (Structure("solid"),), (words,), pair, pair)
     frames = Frames(points, motion, count)
-    trajectory = Trajectory(
-        Path("nowhere"), np.arange(count) / 60, ledger(np.arange(count) / 60), frames
-    )
+    trajectory = Trajectory(Path("nowhere"), np.arange(count) / 60, ledger(np.arange(count) / 60), frames)
     prepared = PreparedScene(scene, Inventory(()), parts, field, particles)
     return SimulationResult(prepared, trajectory)
 
@@ -120,9 +118,7 @@ def test_a_video_has_all_frames_and_any_browser_plays_it(tmp_path):
 def test_the_video_carries_whom_to_thank_for_what_is_seen(tmp_path):
     played = play(cube(), spin, 2)
     scene = played.prepared.scene
-    things = [
-        replace(scene.objects[0], credit=c) for c in ("CC0; Ada", "MIT;\0 Bo", "CC0; Ada", "")
-    ]
+    things = [replace(scene.objects[0], credit=c) for c in ("CC0; Ada", "MIT;\0 Bo", "CC0; Ada", "")]
     thanked = replace(played.prepared, scene=replace(scene, objects=tuple(things)))
     made = render_video(replace(played, prepared=thanked), SMALL, tmp_path)
     probe = subprocess.run(
@@ -152,22 +148,16 @@ def test_what_does_not_move_does_not_flicker(tmp_path):
     assert all(np.array_equal(s, stills[0]) for s in stills)
 
 
-@pytest.mark.parametrize(
-    ("speed", "casts"), [(0.0, 1), (1e-3, 1), (4.0, 6)], ids=["still", "unseen", "seen"]
-)
+@pytest.mark.parametrize(("speed", "casts"), [(0.0, 1), (1e-3, 1), (4.0, 6)], ids=["still", "unseen", "seen"])
 def test_what_stands_still_is_cast_once(tmp_path, monkeypatch, speed, casts):
     made, cast = [], VideoRaycaster._cast
     monkeypatch.setattr(VideoRaycaster, "_cast", lambda *given: made.append(1) or cast(*given))
-    render_video(
-        play(cube(), lambda t: (np.eye(3), np.array([0, speed * t, 0.0]))), SMALL, tmp_path
-    )
+    render_video(play(cube(), lambda t: (np.eye(3), np.array([0, speed * t, 0.0]))), SMALL, tmp_path)
     assert len(made) == casts
 
 
 def test_the_whole_motion_stays_in_the_picture(tmp_path):
-    made = render_video(
-        play(cube(), lambda t: (np.eye(3), np.array([0, 4 * t, 0.0]))), SMALL, tmp_path
-    )
+    made = render_video(play(cube(), lambda t: (np.eye(3), np.array([0, 4 * t, 0.0]))), SMALL, tmp_path)
     for picture in video_file.read_frames(made.path, [0, 3, 5]):
         seen = red(picture)
         assert seen.sum() > 50
@@ -218,8 +208,7 @@ def test_a_slow_video_is_longer_and_every_picture_knows_its_time(tmp_path):
 def test_the_time_is_written_into_the_picture_where_it_is_asked_for(tmp_path):
     still = play(cube(), lambda t: (np.eye(3), np.zeros(3)), 2)
     with_time, without = (
-        render_video(still, replace(SMALL, stills=True, caption=c), tmp_path / str(c))
-        for c in (True, False)
+        render_video(still, replace(SMALL, stills=True, caption=c), tmp_path / str(c)) for c in (True, False)
     )
     paths = [m.path.parent / "stills" / "00001.png" for m in (with_time, without)]
     a, b = (np.asarray(Image.open(path)) for path in paths)

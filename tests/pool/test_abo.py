@@ -38,9 +38,7 @@ def root(tmp_path):
             file.parent.mkdir(parents=True)
             file.write_bytes(plain_ball(radius))
     (root / "3dmodels" / "metadata").mkdir()
-    (root / "3dmodels" / "metadata" / "3dmodels.csv.gz").write_bytes(
-        gzip.compress(table.getvalue().encode())
-    )
+    (root / "3dmodels" / "metadata" / "3dmodels.csv.gz").write_bytes(gzip.compress(table.getvalue().encode()))
     listings = [
         {
             "item_id": "B01",
@@ -70,9 +68,7 @@ def test_models_become_assets_with_product_types_and_attribution(root, tmp_path)
         "abo_B03": ("object", "abo:B03", "CC-BY-4.0", True),
     }
     ottoman = pool.asset("abo_B01")
-    assert ottoman.credit == (
-        "CC-BY-4.0; Round Ottoman, Blue, Amazon Berkeley Objects (c) Amazon.com"
-    )
+    assert ottoman.credit == ("CC-BY-4.0; Round Ottoman, Blue, Amazon Berkeley Objects (c) Amazon.com")
     assert ottoman.extent == pytest.approx(0.8)
 
 
@@ -100,16 +96,8 @@ def test_what_was_not_unpacked_is_passed_over_and_a_path_leads_nowhere_else(root
     [
         ("3dmodels/metadata/3dmodels.csv.gz", b"no gzip", "cannot be read"),
         ("3dmodels/metadata/3dmodels.csv.gz", gzip.compress(b"a,b\n1,2\n", mtime=0), "no columns"),
-        (
-            "listings/metadata/listings_0.json.gz",
-            gzip.compress(b'{"3dmodel_id"', mtime=0)[:-6],
-            "cannot",
-        ),
-        (
-            "listings/metadata/listings_0.json.gz",
-            gzip.compress(b'{"3dmodel_id"', mtime=0),
-            "cannot be read",
-        ),
+        ("listings/metadata/listings_0.json.gz", gzip.compress(b'{"3dmodel_id"', mtime=0)[:-6], "cannot"),
+        ("listings/metadata/listings_0.json.gz", gzip.compress(b'{"3dmodel_id"', mtime=0), "cannot be read"),
     ],
 )
 def test_a_broken_table_is_named(root, file, data, said):

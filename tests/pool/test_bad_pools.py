@@ -137,9 +137,7 @@ def test_what_is_said_to_be_in_metres_and_is_a_kilometre_large_stays_outside(tmp
     assert "metric = no" in said["chair"] and "1e+03 m large" in said["thing"]
 
 
-@pytest.mark.parametrize(
-    ("size", "said"), [(1e-9, "units large"), (1e7, "units large"), (1e9, "impossible places")]
-)
+@pytest.mark.parametrize(("size", "said"), [(1e-9, "units large"), (1e7, "units large"), (1e9, "impossible places")])
 def test_sizes_that_single_precision_cannot_place_stay_outside(tmp_path, size, said):
     put(tmp_path / "in", x=plain_ball(size))
     assert said in reasons(index_pool([tmp_path / "in"], tmp_path / "pool"))["x"]

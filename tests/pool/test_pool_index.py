@@ -65,9 +65,7 @@ def test_the_class_is_the_tables_then_the_folders_then_the_files(tmp_path):
     save(tmp_path / "in" / "mug" / "x2.glb", plain_ball(0.051))
     save(tmp_path / "in" / "tea_pot.glb", plain_ball(0.1))
     table = tmp_path / "said.csv"
-    table.write_text(
-        "file, class, licence, attribution, metric\nin/mug/x2.glb, Soda_Can, MIT, Bo, no\n"
-    )
+    table.write_text("file, class, licence, attribution, metric\nin/mug/x2.glb, Soda_Can, MIT, Bo, no\n")
     pool = index_pool([tmp_path / "in"], tmp_path / "pool", with_table(table))
     classes = {a.name: a.class_name for a in pool.assets}
     assert classes == {"mug_x1": "mug", "mug_x2": "soda can", "tea_pot": "tea pot"}
@@ -161,9 +159,7 @@ def test_names_are_made_unique(tmp_path):
 def test_nothing_is_judged_twice_and_what_changed_is_judged_again(tmp_path, monkeypatch):
     judged = []
     real = gate_verdicts.judge_file
-    monkeypatch.setattr(
-        gate_verdicts, "judge_file", lambda f, *a: judged.append(f.name) or real(f, *a)
-    )
+    monkeypatch.setattr(gate_verdicts, "judge_file", lambda f, *a: judged.append(f.name) or real(f, *a))
     for k in range(3):
         save(tmp_path / "in" / f"ball{k}.glb", plain_ball(0.1 + 0.01 * k))
     save(tmp_path / "in" / "bad.glb", b"glTF")
@@ -196,9 +192,7 @@ def test_an_interrupted_run_goes_on_where_it_was(tmp_path, monkeypatch):
         index_pool([tmp_path / "in"], tmp_path / "pool")
     log = tmp_path / "pool" / gate_verdicts.VERDICTS_FILE
     log.write_bytes(log.read_bytes()[:-10])  # killed while it wrote
-    monkeypatch.setattr(
-        gate_verdicts, "judge_file", lambda f, *a: judged.append(f.name) or real(f, *a)
-    )
+    monkeypatch.setattr(gate_verdicts, "judge_file", lambda f, *a: judged.append(f.name) or real(f, *a))
     pool = index_pool([tmp_path / "in"], tmp_path / "pool")
     assert judged == [f"ball{k}.glb" for k in (0, 1, 1, 2, 3)]
     assert len(pool.assets) == 4
@@ -269,10 +263,7 @@ def test_companions_count_as_content_and_a_gltf_becomes_a_glb(tmp_path):
     assert asset.file.suffix == ".glb" and asset.class_name == "ball"
     (read,) = read_glb(asset.file).surfaces
     np.testing.assert_allclose(np.ptp(read.vertices, axis=0).max(), 0.2, rtol=1e-6)
-    save(
-        folder / "ball.bin",
-        (2 * vertices).astype("<f4").tobytes() + triangles.astype("<u4").tobytes(),
-    )
+    save(folder / "ball.bin", (2 * vertices).astype("<f4").tobytes() + triangles.astype("<u4").tobytes())
     assert index_pool([folder], tmp_path / "pool").assets[0].extent == pytest.approx(0.4)
 
 
@@ -299,9 +290,7 @@ def test_the_progress_names_every_file(tmp_path):
     for k in range(4):
         save(tmp_path / "in" / f"ball{k}.glb", plain_ball(0.1 + 0.01 * k))
     told = []
-    index_pool(
-        [tmp_path / "in"], tmp_path / "pool", progress=lambda f, words: told.append((f, words))
-    )
+    index_pool([tmp_path / "in"], tmp_path / "pool", progress=lambda f, words: told.append((f, words)))
     assert told == [(k / 4, f"ball{k}.glb") for k in range(4)] + [(1.0, "")]
 
 

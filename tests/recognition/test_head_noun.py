@@ -90,9 +90,7 @@ def test_goods_before_the_vessel_are_not_the_thing():
     ],
 )
 def test_furniture_is_moulded_of_plastic_and_of_tubes_where_it_is_of_metal(said, material, wall):
-    assert hollow_wall_thickness(name_tokens(said), material) == (
-        None if wall is None else pytest.approx(wall)
-    )
+    assert hollow_wall_thickness(name_tokens(said), material) == (None if wall is None else pytest.approx(wall))
 
 
 def test_what_only_describes_stays_in_front_of_what_a_thing_is_of():

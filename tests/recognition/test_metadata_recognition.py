@@ -5,12 +5,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.core.types import Finish, PartDescription, SceneObject
-from corporeal.recognition.lexicon import (
-    lexicon_terms,
-    metal_materials,
-    mouldable_materials,
-    name_tokens,
-)
+from corporeal.recognition.lexicon import lexicon_terms, metal_materials, mouldable_materials, name_tokens
 from corporeal.recognition.metadata_recognition import (
     FileEvidence,
     gather_file_evidence,
@@ -94,16 +89,7 @@ def test_no_container_is_made_of_what_flows(name):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "ice cream scoop",
-        "napkin ring",
-        "rubber stamp",
-        "apple bowl",
-        "bread plate",
-        "soap dish",
-        "nail gun",
-    ],
+    "name", ["ice cream scoop", "napkin ring", "rubber stamp", "apple bowl", "bread plate", "soap dish", "nail gun"]
 )
 def test_what_is_before_a_noun_of_any_material_is_its_purpose(name):
     assert seen("mesh", name).material is None
@@ -337,9 +323,7 @@ def plural(word):
 
 
 def test_many_of_a_thing_are_of_what_one_is_of():
-    known = {
-        term.phrase[0] for term in lexicon_terms() if len(term.phrase) == 1 and term.kind == "thing"
-    }
+    known = {term.phrase[0] for term in lexicon_terms() if len(term.phrase) == 1 and term.kind == "thing"}
     apart = {word for word in known if name_tokens(plural(word)) != name_tokens(word)}
     assert apart <= {"battery", "branch"}, "batteries and branches have rows of their own"
 
@@ -369,10 +353,7 @@ def test_plurals_that_change_the_end_of_a_word_are_read(name, counts):
 
 def test_what_all_parts_are_called_says_nothing_of_one():
     said = told("sofa", ("velvet_sofa_legs", "a"), ("velvet_sofa_fabric", "b"))
-    assert {k: v.material for k, v in said.items()} == {
-        "velvet_sofa_legs": "wood",
-        "velvet_sofa_fabric": "cotton",
-    }
+    assert {k: v.material for k, v in said.items()} == {"velvet_sofa_legs": "wood", "velvet_sofa_fabric": "cotton"}
     said = told("holder", ("glass_lantern_foot", "a"), ("glass_lantern_glass", "b"))
     assert said["glass_lantern_glass"].material == "glass"
     assert said["glass_lantern_foot"].material is None, "the glass is the other part's"
@@ -454,9 +435,7 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
 )
 def test_what_is_hollow_by_what_it_is_has_a_wall(thing, structure):
     known = about("mesh", thing)
-    assert (
-        infer_hollow_structure(recognise_part(known), known, lambda _: True).structure == structure
-    )
+    assert infer_hollow_structure(recognise_part(known), known, lambda _: True).structure == structure
 
 
 @pytest.mark.parametrize(
@@ -513,9 +492,7 @@ def test_a_word_that_only_says_of_what_kind_leaves_no_doubt(surface, thing, mate
         ("rubber_ball", "ball", "ball.glb", "steel", "steel"),
     ],
 )
-def test_what_a_person_calls_an_object_wins_over_the_name_of_its_file(
-    name, words, file, surface, material
-):
+def test_what_a_person_calls_an_object_wins_over_the_name_of_its_file(name, words, file, surface, material):
     """A "rubber_ball" whose shape was read from steel_ball.ply was of steel."""
     thing = SceneObject(name, words, 0.1, source=f"shapes/{file}")
     assert recognise_part(replace(about(surface, words), thing=thing)).material == material
@@ -536,12 +513,7 @@ def test_a_large_statue_of_metal_is_cast_around_a_core():
 def test_a_hollow_thing_of_what_has_no_walls_is_left_alone():
     known = about("mesh", "plasticine box")
     assert recognise_part(known).material == "plasticine"
-    assert (
-        infer_hollow_structure(
-            recognise_part(known), known, lambda name: name != "plasticine"
-        ).structure
-        is None
-    )
+    assert infer_hollow_structure(recognise_part(known), known, lambda name: name != "plasticine").structure is None
 
 
 def test_what_is_said_of_how_it_is_built_outranks_what_it_is():
@@ -596,8 +568,7 @@ def test_a_substance_behind_the_thing_is_what_it_is_made_of():
 
 
 @pytest.mark.parametrize(
-    ("thing", "material"),
-    [("Stone and Beam stoneware vase", "ceramic"), ("stone stoneware", None)],
+    ("thing", "material"), [("Stone and Beam stoneware vase", "ceramic"), ("stone stoneware", None)]
 )
 def test_of_two_substances_the_one_beside_the_thing_is_meant(thing, material):
     assert seen("mesh", thing).material == material

@@ -56,11 +56,7 @@ def test_parts_never_cross_objects_and_names_in_one_object_differ():
     finishes = [Finish("", (1.0, 0.0, 0.0, 1.0)), Finish("", (0.0, 0.0, 1.0, 1.0))]
     surfaces = [("node1", 0, 0, {}), ("node2", 0, 1, {}), ("node1", 1, 0, {})]
     found = identify_parts(scene(finishes, surfaces, ("hammer_0", "hammer_1")))
-    assert [(p.name, p.object) for p in found.catalogue] == [
-        ("hammer part 1", 0),
-        ("hammer part 2", 0),
-        ("hammer", 1),
-    ]
+    assert [(p.name, p.object) for p in found.catalogue] == [("hammer part 1", 0), ("hammer part 2", 0), ("hammer", 1)]
 
 
 def test_names_that_speak_of_different_matter_part_what_shares_a_finish():

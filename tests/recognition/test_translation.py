@@ -50,17 +50,7 @@ def test_a_thing_is_known_by_its_name_in_another_language(said, english):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "baseball",
-        "without",
-        "douglas fir",
-        "plate of the day",
-        "hammer head",
-        "vessel",
-        "carpet",
-        "tonne",
-    ],
+    "name", ["baseball", "without", "douglas fir", "plate of the day", "hammer head", "vessel", "carpet", "tonne"]
 )
 def test_english_names_stay_as_they_are(name):
     assert translate_words(name.split()) == name.split()
@@ -80,9 +70,7 @@ def test_no_foreign_word_means_two_things():
 
 def test_most_things_have_a_usual_size_or_weight():
     """A translation is there to be judged by: only a few say no more than what a thing is like."""
-    unknown = {
-        t for t in TABLES["things"] if not (typical_extent(t) or typical_bulk_density(t, 1.0))
-    }
+    unknown = {t for t in TABLES["things"] if not (typical_extent(t) or typical_bulk_density(t, 1.0))}
     assert unknown <= {"toy"}
 
 

@@ -1,12 +1,7 @@
 import pytest
 
 from corporeal.recognition.parts_by_name import name_words
-from corporeal.recognition.readable_names import (
-    everyday_words,
-    numbered_names,
-    safe_name,
-    unique_names,
-)
+from corporeal.recognition.readable_names import everyday_words, numbered_names, safe_name, unique_names
 from corporeal.recognition.typical_extents import extent_warning, typical_extent
 
 
@@ -94,8 +89,7 @@ def test_a_class_is_found_by_its_noun(name, entry):
 def test_only_implausible_sizes_are_doubted():
     assert extent_warning("duck_0", "rubber duck", 0.1) is None
     assert extent_warning("duck_0", "rubber duck", 1.65) == (
-        "duck_0 is 1.65 m large, but a rubber duck is usually about 10 cm. "
-        "Set its size with --extent duck_0=0.1."
+        "duck_0 is 1.65 m large, but a rubber duck is usually about 10 cm. Set its size with --extent duck_0=0.1."
     )
     assert "an armchair" in (extent_warning("a", "armchair", 112.0) or "")
     assert extent_warning("thing", "widget", 1.0) is None

@@ -57,10 +57,7 @@ def test_follow_goes_along_with_what_moves_and_forgets_what_stands():
         for b in (0, 1):
             assert seen(follow.at(t), reel.boxes[f, b])[1], (f, b)
     assert follow.aim.eye != follow.at(1.0).eye
-    assert (
-        seen(follow.at(0.0), reel.boxes[0, 2])[0] > 1
-        or not seen(follow.at(0.0), reel.boxes[0, 2])[1]
-    )
+    assert seen(follow.at(0.0), reel.boxes[0, 2])[0] > 1 or not seen(follow.at(0.0), reel.boxes[0, 2])[1]
 
 
 def test_wide_stands_still():
@@ -92,9 +89,7 @@ def test_the_first_contact_is_that_of_two_objects_or_else_with_the_floor():
     floor = first_contact(type(told)(**{**vars(told), "first_contact": when}), 2)
     assert floor == FirstContact(0.2, (0,))
     when[1, 0, 1] = when[1, 1, 0] = 0.3
-    assert first_contact(type(told)(**{**vars(told), "first_contact": when}), 2) == FirstContact(
-        0.3, (0, 1)
-    )
+    assert first_contact(type(told)(**{**vars(told), "first_contact": when}), 2) == FirstContact(0.3, (0, 1))
     nothing = np.full_like(when, np.nan)
     assert first_contact(type(told)(**{**vars(told), "first_contact": nothing}), 2) is None
 

@@ -41,9 +41,7 @@ def look(s, camera=None, quality="draft", **kwargs):
 
 def test_the_same_scene_gives_the_same_bytes_with_any_number_of_threads():
     s = RayScene(scene([ball()]))
-    assert np.array_equal(
-        render_image(s, front(), "draft", threads=1), render_image(s, front(), "draft", threads=3)
-    )
+    assert np.array_equal(render_image(s, front(), "draft", threads=1), render_image(s, front(), "draft", threads=3))
 
 
 def test_a_ball_is_red_lit_from_above_and_stands_in_its_own_shadow():

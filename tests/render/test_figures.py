@@ -39,9 +39,7 @@ def row_of_blocks(count, names=None):
         name = names[k] if names else f"material_number_{k}_of_a_long_name"
         law = list(Law)[k % len(Law)]
         made.append(Material(name, law, 10.0 ** (4 + k % 8), 0.1 + 0.01 * k, 100.0 + 300 * k))
-    scene = Scene(
-        "row", "", (SceneObject("row_0", "row", 1.0),), tuple(surfaces), (Finish("plain"),)
-    )
+    scene = Scene("row", "", (SceneObject("row_0", "row", 1.0),), tuple(surfaces), (Finish("plain"),))
     part = np.repeat(np.arange(count), [len(s.triangles) for s in surfaces])
     catalogue = tuple(Part(f"block_{k}", 0, "node") for k in range(count))
     parts = Parts(part * 0, part, np.ones(len(part)), catalogue)
@@ -72,11 +70,7 @@ def apart(one, other):
 @pytest.mark.parametrize("count", [1, 2, 30])
 def test_no_label_covers_another(tmp_path, monkeypatch, count):
     drawn, place = [], figures.panel_legend
-    monkeypatch.setattr(
-        figures,
-        "panel_legend",
-        lambda *asked: drawn.append((asked[2], place(*asked))) or drawn[-1][1],
-    )
+    monkeypatch.setattr(figures, "panel_legend", lambda *asked: drawn.append((asked[2], place(*asked))) or drawn[-1][1])
     fields_figure(*row_of_blocks(count), tmp_path / "fields.png", COARSE)
     wide, high = figures.SHEET_PANEL_SIZE_PX
     pictures = [(x, y, x + wide, y + high) for (x, y), _ in drawn]
@@ -128,9 +122,7 @@ def test_a_material_has_the_same_colour_in_every_scene():
     assert np.linalg.norm(np.subtract(wood, paper)) > 0.3
     names = ("steel", "rubber", "hardwood", "glass", "mud", "ceramic")
     for a, b in itertools.combinations(names, 2):
-        assert (
-            np.linalg.norm(np.subtract(*(colours.distinct_colours([n])[0] for n in (a, b)))) > 0.08
-        )
+        assert np.linalg.norm(np.subtract(*(colours.distinct_colours([n])[0] for n in (a, b)))) > 0.08
 
 
 def test_turbo_runs_from_the_lowest_to_the_highest_on_a_logarithmic_scale():

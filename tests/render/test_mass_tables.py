@@ -2,13 +2,7 @@
 
 from dataclasses import replace
 
-from corporeal.core.types import (
-    AnsweredMass,
-    MassEvidence,
-    MassPosterior,
-    PrintedFact,
-    WeighedHypothesis,
-)
+from corporeal.core.types import AnsweredMass, MassEvidence, MassPosterior, PrintedFact, WeighedHypothesis
 from corporeal.render.mass_tables import mass_table
 
 WAYS = tuple(WeighedHypothesis(f"way {k}", 0.5 - 0.1 * k, 0.2, 1.0 + k) for k in range(3))

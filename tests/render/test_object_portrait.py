@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.render.object_portrait import (
-    PART_COLOURS,
-    PortraitOptions,
-    part_colour_names,
-    render_portraits,
-)
+from corporeal.render.object_portrait import PART_COLOURS, PortraitOptions, part_colour_names, render_portraits
 
 BOX = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
 SIDES = np.array(
@@ -33,9 +28,7 @@ SMALL = PortraitOptions(count=3, size=48)
 
 def test_an_object_is_pictured_alone_and_where_it_stands_does_not_matter():
     alone = render_portraits(scene(block(0, 0, (0, 0, 0))), [0], SMALL)
-    crowded = render_portraits(
-        scene(block(1, 1, (0.1, 0, 1)), block(0, 0, (7, -3, 2))), [None, 0], SMALL
-    )
+    crowded = render_portraits(scene(block(1, 1, (0.1, 0, 1)), block(0, 0, (7, -3, 2))), [None, 0], SMALL)
     assert [p.shape for p in alone] == [(48, 48, 3)] * 3
     for one, other in zip(alone, crowded, strict=True):
         assert np.abs(one.astype(int) - other).mean() < 1.0
@@ -45,10 +38,7 @@ def test_views_differ_follow_the_seed_and_are_the_same_again():
     thing = scene(block(0, 0, (0, 0, 0)), block(0, 1, (0.2, 0.3, 1), 0.4))
     pictures = render_portraits(thing, [0, 0], SMALL)
     assert len({p.tobytes() for p in pictures}) == 3
-    assert all(
-        np.array_equal(a, b)
-        for a, b in zip(pictures, render_portraits(thing, [0, 0], SMALL), strict=True)
-    )
+    assert all(np.array_equal(a, b) for a, b in zip(pictures, render_portraits(thing, [0, 0], SMALL), strict=True))
     other = render_portraits(thing, [0, 0], PortraitOptions(3, 48, seed=1))
     assert any(not np.array_equal(a, b) for a, b in zip(pictures, other, strict=True))
 
@@ -70,10 +60,7 @@ def test_every_part_has_a_colour_with_a_name():
 
 @pytest.mark.parametrize("count", [1, 8])
 def test_as_many_views_as_asked_for(count):
-    assert (
-        len(render_portraits(scene(block(0, 0, (0, 0, 0))), [0], PortraitOptions(count, 16)))
-        == count
-    )
+    assert len(render_portraits(scene(block(0, 0, (0, 0, 0))), [0], PortraitOptions(count, 16))) == count
     assert PortraitOptions(count, 16).words == f"{count} of 8 views, 16 px, seed 0"
 
 

@@ -69,9 +69,7 @@ def test_a_normal_in_two_bytes_is_within_a_degree_and_a_half():
     n = np.random.default_rng(2).normal(size=(20_000, 3))
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     n[:6] = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
-    angle = np.degrees(
-        np.arccos(np.clip((decode_octahedral(encode_octahedral(n)) * n).sum(axis=1), -1, 1))
-    )
+    angle = np.degrees(np.arccos(np.clip((decode_octahedral(encode_octahedral(n)) * n).sum(axis=1), -1, 1)))
     assert angle.max() < 1.5
 
 
@@ -128,9 +126,7 @@ def test_the_page_plays_every_scene_of_the_showcase_as_its_video_does(name):
     prepared = co.prepare_scene(co.showcase_scene(name))
     cast = bind_scene(prepared)
     frames = [bent(prepared.particles, t) for t in (0.0, 0.5, 1.0)]
-    header, data = read(
-        pack_recording(prepared.scene, prepared.parts, cast, record_frames(cast, frames), {}, None)
-    )
+    header, data = read(pack_recording(prepared.scene, prepared.parts, cast, record_frames(cast, frames), {}, None))
     assert_played(cast, frames, header, data)
 
 
@@ -145,9 +141,7 @@ def test_stress_is_kept_and_the_scale_ends_at_its_largest(played):
     assert stress is not None and stress.max() > 0
     rigid = played.prepared.particles.object == 1
     assert (stress[rigid] == 0).all()
-    np.testing.assert_array_equal(
-        stress_bytes(np.array([0.0, 0.25, 1.0, 2.0]), 1.0), [0, 128, 255, 255]
-    )
+    np.testing.assert_array_equal(stress_bytes(np.array([0.0, 0.25, 1.0, 2.0]), 1.0), [0, 128, 255, 255])
 
 
 def test_a_thing_that_only_turns_leaves_nothing_but_its_pose(played):

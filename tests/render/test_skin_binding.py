@@ -121,9 +121,7 @@ def test_a_part_does_not_follow_its_neighbour():
     low, high = grid_of((0, 0, 0), (1, 1, 1), 0.2), grid_of((0, 0, 1), (1, 1, 2), 0.2)
     points = np.vstack([low, high])
     owner = np.repeat([0, 1], [len(low), len(high)])
-    skin = bind_vertices(
-        s, parts_of(s, [0, 1]), cloud(points, owner, owner), np.array([False, False])
-    )
+    skin = bind_vertices(s, parts_of(s, [0, 1]), cloud(points, owner, owner), np.array([False, False]))
     frame = moved(points, np.eye(3))
     frame.position[owner == 1, 2] += 0.5
     place, _ = skin.pose(frame)
@@ -153,9 +151,7 @@ def test_the_picture_of_a_stretch_is_bounded_and_never_mirrored():
     assert stretch.min() > 0.4 - 1e-9 and stretch.max() < 2.5 + 1e-9
     assert (np.linalg.det(shown) > 0).all()
     mild = np.eye(3) + 0.1 * rng.normal(size=(50, 3, 3))
-    assert np.abs(limit_stretch(mild, (0.4, 2.5)) - mild).max() < 1e-12, (
-        "mild stretch is shown as it is"
-    )
+    assert np.abs(limit_stretch(mild, (0.4, 2.5)) - mild).max() < 1e-12, "mild stretch is shown as it is"
 
 
 @pytest.mark.parametrize("limits", [(0.3, 3.0), (0.7, 1.4)])

@@ -17,9 +17,7 @@ from corporeal.render.secondary_rays import LightSampler
 from corporeal.render.video_raycaster import VideoRaycaster
 
 LEAF = Finish(
-    "leaf",
-    texture=np.tile([[[0, 150, 0, 255], [0, 150, 0, 0]]], (32, 16, 1)).astype(np.uint8),
-    alpha_mode="MASK",
+    "leaf", texture=np.tile([[[0, 150, 0, 255], [0, 150, 0, 0]]], (32, 16, 1)).astype(np.uint8), alpha_mode="MASK"
 )
 PANE = Finish("pane", (0.9, 0.05, 0.05, 0.5), alpha_mode="BLEND")
 SHINY = Finish("shiny", (0.9, 0.9, 0.9, 1.0), roughness=0.1, metallic=1.0)
@@ -65,9 +63,7 @@ def test_a_picture_hangs_neither_on_threads_nor_on_the_one_before():
 
 def test_the_empty_studio_hangs_on_no_band():
     near = front()
-    tall = CameraAim(
-        near.eye, near.target, 30.0, 64, 240
-    )  # so that rows beside one another are alike
+    tall = CameraAim(near.eye, near.target, 30.0, 64, 240)  # so that rows beside one another are alike
 
     def cast(*band: int) -> tuple[np.ndarray, ...]:
         caster = VideoRaycaster(*band)
@@ -88,9 +84,7 @@ def test_a_camera_that_moves_sees_another_floor():
 
 
 def test_surfaces_that_are_not_shown_still_throw_shadows():
-    hidden = (
-        VideoRaycaster().picture(stage("a red ball").shadows(), front(), "draft", 1).astype(int)
-    )
+    hidden = VideoRaycaster().picture(stage("a red ball").shadows(), front(), "draft", 1).astype(int)
     bare = VideoRaycaster().picture(stage("nothing"), front(), "draft", 1).astype(int)
     shown = VideoRaycaster().picture(stage("a red ball"), front(), "draft", 1).astype(int)
     assert (bare - hidden).max() > 30
@@ -142,9 +136,7 @@ def test_no_triangle_is_seen_beside_the_tiles_that_it_could_be_seen_in(name, eye
     seen = there.hit(rays.origin, rays.direction)[0].reshape(aim.height, aim.width) >= 0
     size = aim.width, aim.height
     marked = shadow_culling.tiles_with_surfaces(there, job.eye, job.frame, job.tangent, size)
-    pixels = np.repeat(np.repeat(marked, TILE_PX, axis=0), TILE_PX, axis=1)[
-        : aim.height, : aim.width
-    ]
+    pixels = np.repeat(np.repeat(marked, TILE_PX, axis=0), TILE_PX, axis=1)[: aim.height, : aim.width]
     assert seen.any()
     assert not (seen & ~pixels).any()
     if eye[1] < -5:

@@ -13,10 +13,7 @@ def thing(*names):
 
 SCENE = SimpleNamespace(objects=thing("can_0", "can_01", "lid"))
 PARTS = SimpleNamespace(
-    catalogue=[
-        SimpleNamespace(name=n, object=o)
-        for n, o in (("body", 0), ("lid", 0), ("body", 1), ("lid", 2))
-    ]
+    catalogue=[SimpleNamespace(name=n, object=o) for n, o in (("body", 0), ("lid", 0), ("body", 1), ("lid", 2))]
 )
 
 

@@ -21,9 +21,7 @@ def lowest(thing, pose):
 
 @pytest.mark.parametrize("size", [0.02, 0.3, 10.0])
 def test_a_box_of_any_size_rests_at_half_its_height(size):
-    (pose,), certificate = settle_bodies(
-        [box(size, 0.8 * size, 0.6 * size)], "scatter", 1, 1e-3 * size
-    )
+    (pose,), certificate = settle_bodies([box(size, 0.8 * size, 0.6 * size)], "scatter", 1, 1e-3 * size)
     assert pose.position[2] == pytest.approx(0.3 * size, abs=2e-6 * size)
     assert certificate.drift_m < 1e-5 * size
     assert certificate.attempts == 1
@@ -98,9 +96,7 @@ def test_the_last_reason_is_said():
 
 
 def test_flat_and_tiny_things_settle_too():
-    sheet = trimesh.Trimesh(
-        [[0, 0, 0], [0.4, 0, 0], [0.4, 0.3, 0], [0, 0.3, 0]], [[0, 1, 2], [0, 2, 3]]
-    )
+    sheet = trimesh.Trimesh([[0, 0, 0], [0.4, 0, 0], [0.4, 0.3, 0], [0, 0.3, 0]], [[0, 1, 2], [0, 2, 3]])
     things = [body(sheet, "sheet"), box(0.004, 0.004, 0.004)]
     poses, certificate = settle_bodies(things, "scatter", 0, 1e-4)
     assert certificate.objects == 2
@@ -141,9 +137,7 @@ def test_many_scenes_do_not_pile_up_in_memory():
         pytest.skip("this system does not tell how much memory a process takes")
     at = {}
     for number in range(24):
-        settle_bodies(
-            [box(0.3, 0.2, 0.1), ball(0.1), bowl()], ("scatter", "onto")[number % 2], number, 1e-2
-        )
+        settle_bodies([box(0.3, 0.2, 0.1), ball(0.1), bowl()], ("scatter", "onto")[number % 2], number, 1e-2)
         at[number] = taken()
     assert at[23][0] - at[11][0] < 8
     assert at[23][1] == at[11][1]

@@ -26,10 +26,7 @@ SIDE, GAP, G = 0.2, 0.06, 9.81
 
 def row(*masses, gap=GAP):
     """Cubes of one size in a line along x, each as heavy as said [kg]."""
-    cubes = [
-        replace(box(SIDE, SIDE, SIDE, name=f"cube_{k}"), density=m / SIDE**3)
-        for k, m in enumerate(masses)
-    ]
+    cubes = [replace(box(SIDE, SIDE, SIDE, name=f"cube_{k}"), density=m / SIDE**3) for k, m in enumerate(masses)]
     poses = [BodyPose((k * (SIDE + gap), 0.0, SIDE / 2)) for k in range(len(masses))]
     return SettledBodies(cubes, poses)
 
@@ -69,9 +66,7 @@ def test_a_chain_begins_at_the_heavy_end_and_reaches_the_other(masses):
     assert masses[blow.mover] == masses[heaviest] and blow.mover in (0, len(masses) - 1)
     assert np.linalg.norm(blow.velocity) <= MAX_START_SPEED_RATIO * sqrt(G * SIDE)
     met = preview_contacts(still, {blow.mover: blow.velocity}, 2.0)
-    assert impact_hops([(m.a, m.b) for m in met], [blow.mover]) == {
-        abs(blow.mover - k): k for k in range(len(masses))
-    }
+    assert impact_hops([(m.a, m.b) for m in met], [blow.mover]) == {abs(blow.mover - k): k for k in range(len(masses))}
     assert blow.arrives == pytest.approx(met[-1].instant)
 
 

@@ -9,11 +9,7 @@ from bodies import body, bowl, table
 
 from corporeal.core.errors import UserError
 from corporeal.geometry import convex_decomposition as room
-from corporeal.geometry.convex_decomposition import (
-    cells_hull_volume,
-    cut_by_plane,
-    decompose_convex,
-)
+from corporeal.geometry.convex_decomposition import cells_hull_volume, cut_by_plane, decompose_convex
 
 
 def ring():
@@ -131,10 +127,7 @@ def test_soup_is_cut_too():
 def test_cutting_triangles_keeps_their_area():
     sphere = trimesh.creation.icosphere(2)
     below, above = cut_by_plane(sphere.triangles, 1, 0.3)
-    area = [
-        0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum()
-        for t in (below, above)
-    ]
+    area = [0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1).sum() for t in (below, above)]
     assert sum(area) == pytest.approx(sphere.area, rel=1e-12)
     assert below[:, :, 1].max() <= 0.3 <= above[:, :, 1].min()
 

@@ -22,17 +22,13 @@ def test_only_what_is_named_is_raised_and_thrown():
     assert scene.objects[1].velocity == (1.0, 0.0, -2.5)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "0.5", "duck=", "duck=-1", "duck=nan", "duck=1e9", "duck=1,2"]
-)
+@pytest.mark.parametrize("text", ["", "0.5", "duck=", "duck=-1", "duck=nan", "duck=1e9", "duck=1,2"])
 def test_a_lift_that_is_none_is_refused_with_an_example(text):
     with pytest.raises(UserError, match=r"duck=0\.5"):
         parse_lift(text)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "duck=1", "duck=1,2", "duck=a,b,c", "duck=inf,0,0", "d=90,90,0"]
-)
+@pytest.mark.parametrize("text", ["", "duck=1", "duck=1,2", "duck=a,b,c", "duck=inf,0,0", "d=90,90,0"])
 def test_a_velocity_that_is_none_is_refused_with_an_example(text):
     with pytest.raises(UserError, match="duck=1,0,-2"):
         parse_initial_velocity(text)

@@ -72,11 +72,7 @@ def test_what_falls_hangs_above_its_own_place_and_what_lay_on_it_stays_above():
 def test_a_thing_falls_onto_another_from_above_its_top():
     (entry,) = begun((ROW[0][:2], ROW[1][:2]), "fall-onto", 0).entries
     assert entry.name == "a" and entry.position[:2] == (0, 0)
-    assert (
-        0.3 + FALL_HEIGHT_SIZES_RANGE[0] * 0.2
-        <= entry.position[2]
-        <= 0.3 + FALL_HEIGHT_SIZES_RANGE[1] * 0.2
-    )
+    assert 0.3 + FALL_HEIGHT_SIZES_RANGE[0] * 0.2 <= entry.position[2] <= 0.3 + FALL_HEIGHT_SIZES_RANGE[1] * 0.2
 
 
 def test_what_something_rests_on_is_not_taken_away():
@@ -94,9 +90,7 @@ def test_a_thing_that_slides_arrives_at_the_speed_that_was_drawn():
     start = entry.velocity[0]
     arrival = sqrt(start**2 - 2 * UNKNOWN_FRICTION * GRAVITY * gap)
     assert entry.name == "a" and entry.velocity[1:] == (0, 0)
-    assert (
-        IMPACT_SPEED_RATIO_RANGE[0] <= arrival / sqrt(GRAVITY * 0.3) <= IMPACT_SPEED_RATIO_RANGE[1]
-    )
+    assert IMPACT_SPEED_RATIO_RANGE[0] <= arrival / sqrt(GRAVITY * 0.3) <= IMPACT_SPEED_RATIO_RANGE[1]
 
 
 def test_what_is_sent_is_heavy_enough_to_be_felt():
@@ -138,9 +132,7 @@ def test_a_box_moves_in_the_wind_that_friction_or_its_foot_cannot_hold(height, w
     weight = thing.mass * GRAVITY
     pressure = {
         "slides": rough * weight / (FLAT_PLATE_DRAG_COEFFICIENT * side * height),
-        "falls over": weight
-        * (side / 2)
-        / (FLAT_PLATE_DRAG_COEFFICIENT * side * height * height / 2),
+        "falls over": weight * (side / 2) / (FLAT_PLATE_DRAG_COEFFICIENT * side * height * height / 2),
     }
     assert pressure[way] == min(pressure.values())
     expected = sqrt(2 * pressure[way] / AIR_DENSITY_KG_M3)
@@ -171,10 +163,7 @@ def test_wind_is_as_strong_as_the_easiest_thing_needs_and_no_storm_is_too_strong
     velocity = np.array(action.entries[0].wind.velocity)
     speed = np.linalg.norm(velocity)
     needed = wind_threshold(foam, BodyPose((1, 0, 0.1)), velocity[:2] / speed)
-    assert (
-        WIND_SPEED_RATIO_RANGE[0] <= speed / needed <= WIND_SPEED_RATIO_RANGE[1]
-        and speed < MAX_WIND_SPEED_M_S / 2
-    )
+    assert WIND_SPEED_RATIO_RANGE[0] <= speed / needed <= WIND_SPEED_RATIO_RANGE[1] and speed < MAX_WIND_SPEED_M_S / 2
     assert begun(stood((stone, 0, 0)), "wind", 0) is None
 
 

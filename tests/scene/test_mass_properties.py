@@ -16,9 +16,7 @@ def roll(inertial=None):
     mesh = trimesh.creation.cylinder(0.1, 0.4, sections=36)
     mesh.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
     vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces)
-    return SettlingBody(
-        "roll", vertices, triangles, (ConvexPiece(vertices, triangles),), inertial=inertial
-    )
+    return SettlingBody("roll", vertices, triangles, (ConvexPiece(vertices, triangles),), inertial=inertial)
 
 
 def test_cubes_add_up_to_a_box():
@@ -26,9 +24,7 @@ def test_cubes_add_up_to_a_box():
     axes = [side * (np.arange(n) + 0.5 - n / 2) for n in (10, 20, 30)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     mass = np.full(len(points), 2.0 / len(points))
-    made = cubes_mass_properties(
-        points + np.array([1.0, 2.0, 3.0]), mass, np.full(len(points), side)
-    )
+    made = cubes_mass_properties(points + np.array([1.0, 2.0, 3.0]), mass, np.full(len(points), side))
     assert made.mass == pytest.approx(2.0)
     assert np.allclose(made.centre, [1.0, 2.0, 3.0])
     square = np.square([0.1, 0.2, 0.3])

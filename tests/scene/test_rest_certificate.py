@@ -93,9 +93,7 @@ def on_a_wedge(grip):
     wedge, slab = replace(wedge, grips={"slab": grip}), replace(slab, grips={"wedge": grip})
     up = np.array([-np.sin(SLOPE), 0.0, np.cos(SLOPE)])
     half = SLOPE / 2
-    lying = BodyPose(
-        tuple(np.array([0.0, 0.0, 0.178]) + 0.02001 * up), (np.cos(half), 0.0, -np.sin(half), 0.0)
-    )
+    lying = BodyPose(tuple(np.array([0.0, 0.0, 0.178]) + 0.02001 * up), (np.cos(half), 0.0, -np.sin(half), 0.0))
     return [wedge, slab], [BodyPose((0.0, 0.0, 0.0)), lying]
 
 
@@ -118,10 +116,7 @@ def test_a_smooth_foot_does_not_hold_on_the_floor():
     engine.let_roll()
     engine.harden()
     engine.send(0, np.array([1.0, 0.0]))
-    start, times = (
-        engine.poses()[0].position[0],
-        round(0.2 / engine.unit**0.5 / HARD_CONTACT_STEP_S),
-    )
+    start, times = (engine.poses()[0].position[0], round(0.2 / engine.unit**0.5 / HARD_CONTACT_STEP_S))
     for _ in range(times):
         engine.step()
     gone = engine.poses()[0].position[0] - start

@@ -16,18 +16,9 @@ from corporeal.scene.scene_composition import (
     write_composition,
 )
 
-DUCK = ComposedObject(
-    "duck_0", "duck", "rubber_duck", "showcase", "00ff", "CC0", "", 0.08, "table", "usual", 0.5
-)
+DUCK = ComposedObject("duck_0", "duck", "rubber_duck", "showcase", "00ff", "CC0", "", 0.08, "table", "usual", 0.5)
 MADE = SceneComposition(
-    7,
-    "onto",
-    "blender",
-    "fall",
-    "the duck falls",
-    (DUCK,),
-    SceneSizing(gamma=0.5),
-    ("It is small.",),
+    7, "onto", "blender", "fall", "the duck falls", (DUCK,), SceneSizing(gamma=0.5), ("It is small.",)
 )
 
 

@@ -66,9 +66,7 @@ def test_the_job_says_what_falls_in_lengths_and_masses_that_suit_bullet(fake, tm
     assert [b["mass"] for b in job["bodies"]] == pytest.approx([4, 1], rel=1e-4)
     assert job["bodies"][1]["quaternion"] == pytest.approx(TURN)
     unit = 2 * 0.4
-    assert job["bodies"][1]["position"] == pytest.approx(
-        np.array([1, 0, 0.3]) / unit * BLENDER_SCENE_SIZE
-    )
+    assert job["bodies"][1]["position"] == pytest.approx(np.array([1, 0, 0.3]) / unit * BLENDER_SCENE_SIZE)
     (piece,) = job["bodies"][0]["pieces"]
     assert np.ptp(piece["vertices"], axis=0) == pytest.approx(np.array([0.4, 0.2, 0.2]) * 12.5)
     assert np.sum(job["friction"] ** 2) == pytest.approx(0.6)

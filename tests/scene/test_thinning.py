@@ -29,9 +29,7 @@ def test_nothing_of_the_original_sticks_out(name, most):
     assert (original.vertices @ planes[:, :3].T + planes[:, 3]).max() < 1e-7
     # It stands where it stood: the upright box is the same.
     for side in (np.min, np.max):
-        np.testing.assert_allclose(
-            side(few.vertices, axis=0), side(original.vertices, axis=0), atol=1e-7
-        )
+        np.testing.assert_allclose(side(few.vertices, axis=0), side(original.vertices, axis=0), atol=1e-7)
     assert few.volume > original.volume
 
 

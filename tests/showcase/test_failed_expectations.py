@@ -9,19 +9,13 @@ from faulty_runs import PLANTED, happened, spoiled
 
 from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS
 from corporeal.pipeline import run_pipeline
-from corporeal.showcase.scene_expectations import (
-    FAULTY_RUNS,
-    SCENE_EXPECTATIONS,
-    compare_with_expectations,
-)
+from corporeal.showcase.scene_expectations import FAULTY_RUNS, SCENE_EXPECTATIONS, compare_with_expectations
 
 SHORT = ("steel-and-rubber", "ketchup-stops", "honey-poured")
 
 
 def test_faults_are_simulated_or_planted():
-    assert set(PLANTED) | set(SIMULATED_CONTROLS) >= {
-        d.spoiled_by for row in SCENE_EXPECTATIONS.values() for d in row
-    }
+    assert set(PLANTED) | set(SIMULATED_CONTROLS) >= {d.spoiled_by for row in SCENE_EXPECTATIONS.values() for d in row}
     assert set(PLANTED) < set(FAULTY_RUNS)
 
 

@@ -57,9 +57,7 @@ def test_a_prop_has_its_real_size_and_matter(models, name):
     low, high = model.bounds()
     assert low[2] == pytest.approx(0, abs=1e-4), "it stands on the floor"
     assert 1e3 * (high - low) == pytest.approx(size, abs=1)
-    assert 1e6 * sum(
-        prop_soundness.measure_soundness(p).matter for p in model.parts
-    ) == pytest.approx(matter, rel=0.02)
+    assert 1e6 * sum(prop_soundness.measure_soundness(p).matter for p in model.parts) == pytest.approx(matter, rel=0.02)
 
 
 @pytest.mark.parametrize("name", TABLE)

@@ -24,10 +24,7 @@ def pair(separated=True, gap=3.0):
 
 def chain(order, vase=0.0, chair=0.0, **pairs):
     names = ("vase_0|ball_0", "vase_0|armchair_0", "ball_0|armchair_0")
-    objects = {
-        "vase_0": object_outcome(shape_error_max=vase),
-        "armchair_0": object_outcome(shape_error_max=chair),
-    }
+    objects = {"vase_0": object_outcome(shape_error_max=vase), "armchair_0": object_outcome(shape_error_max=chair)}
     return outcome(objects, {n: pairs.get(n, pair()) for n in names}, order)
 
 
@@ -86,10 +83,7 @@ def balls(steel=None, rubber=None):
     """What happens at draft, but for what is said of either ball."""
     as_it_was = object_outcome(fall_m=0.50, rebound_ratio=0.384)
     high = object_outcome(fall_m=0.50, rebound_ratio=0.670)
-    made = {
-        "steel_ball_0": replace(as_it_was, **(steel or {})),
-        "rubber_ball_0": replace(high, **(rubber or {})),
-    }
+    made = {"steel_ball_0": replace(as_it_was, **(steel or {})), "rubber_ball_0": replace(high, **(rubber or {}))}
     return {e.sentence: e.met for e in compare_with_expectations("steel-and-rubber", outcome(made))}
 
 
@@ -102,9 +96,7 @@ def test_a_fall_must_be_as_high_as_the_scene_says(fall):
     assert balls(steel={"fall_m": fall})["The steel ball strikes as after its fall"] is False
 
 
-@pytest.mark.parametrize(
-    ("steel", "rubber"), [(0.67, 0.38), (0.5, 0.55), (0.11, 0.95), (0.0, 0.56), (None, 0.67)]
-)
+@pytest.mark.parametrize(("steel", "rubber"), [(0.67, 0.38), (0.5, 0.55), (0.11, 0.95), (0.0, 0.56), (None, 0.67)])
 def test_exchanged_level_or_impossible_rebounds_fail(steel, rubber):
     found = balls({"rebound_ratio": steel}, {"rebound_ratio": rubber})
     assert not all(found.values())
@@ -116,13 +108,9 @@ def test_exchanged_level_or_impossible_rebounds_fail(steel, rubber):
 def duck_on_can(depth=0.027, distance=0.004, largest=0.015, end=0.0008, fall=2.0):
     duck = object_outcome(length_m=0.117, shape_error_max=largest, shape_error_end=end, fall_m=fall)
     can = object_outcome(
-        dent_depth_m=depth,
-        dent_depth_dx=depth / 0.0083,
-        dent_from_contact_m={"rubber_duck_0": distance},
+        dent_depth_m=depth, dent_depth_dx=depth / 0.0083, dent_from_contact_m={"rubber_duck_0": distance}
     )
-    found = compare_with_expectations(
-        "duck-on-can", outcome({"rubber_duck_0": duck, "soda_can_0": can})
-    )
+    found = compare_with_expectations("duck-on-can", outcome({"rubber_duck_0": duck, "soda_can_0": can}))
     return {e.sentence for e in found if not e.met}
 
 
@@ -169,9 +157,7 @@ def test_an_expectation_reads_as_words():
     assert (can[1].value, can[1].target) == ("2.5 grid cells", "above 1 grid cell")
 
 
-@pytest.mark.parametrize(
-    ("depth", "cell", "seen"), [(0.03, 0.011, True), (0.01, 0.011, False), (0.07, 0.011, False)]
-)
+@pytest.mark.parametrize(("depth", "cell", "seen"), [(0.03, 0.011, True), (0.01, 0.011, False), (0.07, 0.011, False)])
 def test_an_imprint_is_deeper_than_a_cell_and_swallows_nobody(depth, cell, seen):
     objects = {
         "mud_pile_0": object_outcome(dent_depth_m=depth, dent_depth_dx=depth / cell),
@@ -201,16 +187,10 @@ def heap(squashed=1.0):
 
 
 @pytest.mark.parametrize(("squashed", "met"), [(1.0, True), (0.7, False)])
-def test_the_heap_of_theory_meets_what_is_expected_of_ketchup_and_a_flat_one_does_not(
-    squashed, met
-):
+def test_the_heap_of_theory_meets_what_is_expected_of_ketchup_and_a_flat_one_does_not(squashed, met):
     points = heap(squashed)
-    found = object_outcome(
-        reach_m=level_reach(points, 0.0), height_m=vertical_extent(points, points, 0.0)
-    )
-    radius, volume = compare_with_expectations(
-        "ketchup-stops", outcome({"ketchup_0": found}, {}, [])
-    )
+    found = object_outcome(reach_m=level_reach(points, 0.0), height_m=vertical_extent(points, points, 0.0))
+    radius, volume = compare_with_expectations("ketchup-stops", outcome({"ketchup_0": found}, {}, []))
     assert radius.met and volume.met is met
 
 
@@ -224,7 +204,5 @@ def test_a_column_that_lies_flat_is_as_high_as_its_matter(flat):
 
 
 def test_a_glass_whose_water_does_not_move_by_itself_spills_none():
-    one = compare_with_expectations(
-        "water-knocked-over", outcome({"tumbler_0": object_outcome()}, {}, [])
-    )
+    one = compare_with_expectations("water-knocked-over", outcome({"tumbler_0": object_outcome()}, {}, []))
     assert [(e.value, e.met) for e in one[1:]] == [("it did not happen", False)] * 2

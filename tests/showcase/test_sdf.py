@@ -10,9 +10,7 @@ from corporeal.showcase.snowman import snowman
 
 
 def everywhere(f, axes, step):
-    return f(np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)).reshape(
-        [len(a) for a in axes]
-    )
+    return f(np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)).reshape([len(a) for a in axes])
 
 
 def test_a_surface_is_the_same_where_its_field_is_asked_everywhere(monkeypatch):

@@ -19,13 +19,8 @@ def written(models, tmp_path_factory):
     """Every scene as its own GLB says it: name → scene."""
     folder = tmp_path_factory.mktemp("showcase")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(
-            showcase_scenes, "PROP_BUILDERS", {name: partial(models.get, name) for name in models}
-        )
-        return {
-            name: assemble([write_showcase(name, folder)])
-            for name in showcase_scenes.SHOWCASE_SCENE_BUILDERS
-        }
+        patched.setattr(showcase_scenes, "PROP_BUILDERS", {name: partial(models.get, name) for name in models})
+        return {name: assemble([write_showcase(name, folder)]) for name in showcase_scenes.SHOWCASE_SCENE_BUILDERS}
 
 
 @pytest.fixture(scope="module")

@@ -18,9 +18,7 @@ NAMES = list(showcase_scenes.SHOWCASE_SCENE_BUILDERS)
 
 @pytest.fixture(autouse=True)
 def props_made_once(models, monkeypatch):
-    monkeypatch.setattr(
-        showcase_scenes, "PROP_BUILDERS", {name: partial(models.get, name) for name in models}
-    )
+    monkeypatch.setattr(showcase_scenes, "PROP_BUILDERS", {name: partial(models.get, name) for name in models})
 
 
 @pytest.fixture
@@ -79,9 +77,7 @@ def test_a_scene_is_whole_and_short(scene, name):
 def test_the_same_code_builds_the_same_scene(monkeypatch):
     first = showcase_scenes.build_showcase_scene("duck-on-mud")
     monkeypatch.setattr(showcase_scenes, "PROP_BUILDERS", PROP_BUILDERS)
-    for a, b in zip(
-        first.surfaces, showcase_scenes.build_showcase_scene("duck-on-mud").surfaces, strict=True
-    ):
+    for a, b in zip(first.surfaces, showcase_scenes.build_showcase_scene("duck-on-mud").surfaces, strict=True):
         assert np.array_equal(a.vertices, b.vertices)
         assert np.array_equal(a.triangles, b.triangles)
 

@@ -60,9 +60,7 @@ def test_on_a_single_grid_the_vase_sticks_to_the_ball(story, tmp_path):
 
     A single field knows no pairs, so its booked contacts say nothing: the gaps over time do.
     """
-    settings = Settings(
-        assemble=AssembleConfig(duration=LONG_ENOUGH), simulate=SimulateConfig(contact="single")
-    )
+    settings = Settings(assemble=AssembleConfig(duration=LONG_ENOUGH), simulate=SimulateConfig(contact="single"))
     glued = tell("vase-ball-armchair", tmp_path, settings)
     assert glued.audit.nan_count == glued.audit.particles_out_of_domain == 0
     vase_to_ball = glued.gap(0, 1)

@@ -21,22 +21,10 @@ from corporeal.core.types import (
     Structure,
     note_kind,
 )
-from corporeal.simulation.audit import (
-    audit,
-    energy_growth,
-    impact_gain,
-    impact_loss,
-    momentum_residual,
-    unbooked_loss,
-)
+from corporeal.simulation.audit import audit, energy_growth, impact_gain, impact_loss, momentum_residual, unbooked_loss
 from corporeal.simulation.audit_messages import breach_messages
 from corporeal.simulation.outcome import measure_outcome
-from corporeal.simulation.trajectory_files import (
-    FrameLayout,
-    gather_ledgers,
-    write_frame,
-    write_layout,
-)
+from corporeal.simulation.trajectory_files import FrameLayout, gather_ledgers, write_frame, write_layout
 
 CELL, FPS, STEPS = 0.01, 50, 41
 SCENE = Scene(
@@ -50,9 +38,7 @@ SCENE = Scene(
     duration=(STEPS - 1) / FPS,
 )
 CLAY = Material("clay", Law.VON_MISES, 5e6, 0.4, 1700.0, yield_stress=1e5)
-TREATMENT = Discretization(
-    "deformable", 5e6, 5e6, 0.4, 1700.0, 1e5, None, 0.1, 1.0, 60.0, 1e-4, "Deformable."
-)
+TREATMENT = Discretization("deformable", 5e6, 5e6, 0.4, 1700.0, 1e5, None, 0.1, 1.0, 60.0, 1e-4, "Deformable.")
 HIT = 0.2
 """The stone strikes at this time [s], at x = y = 0.02 m."""
 
@@ -176,9 +162,7 @@ def test_the_imprint_is_where_the_stone_struck(seen):
 def test_the_same_imprint_in_sand_is_measured_at_its_surface(story, seen):
     scene, particles, field, trajectory = story
     sand = replace(CLAY, law=Law.DRUCKER_PRAGER, yield_stress=None, friction_angle=0.6)
-    lump = measure_outcome(
-        scene, particles, replace(field, materials=(sand, CLAY)), trajectory
-    ).objects["clay_0"]
+    lump = measure_outcome(scene, particles, replace(field, materials=(sand, CLAY)), trajectory).objects["clay_0"]
     assert lump.dent_depth_m == pytest.approx(0.02, rel=0.05)
     np.testing.assert_allclose(lump.dent_place[:2], [0.02, 0.02], atol=0.003)
     assert lump.rim_height_m == pytest.approx(0.0, abs=1e-3)
@@ -282,10 +266,7 @@ def test_what_is_one_particle_has_no_shape_that_could_change(story):
     alone = np.append(np.flatnonzero(particles.object == 0), -1)
     rows = ("position", "velocity", "volume", "density", "object", "part")
     few = replace(particles, **{n: getattr(particles, n)[alone] for n in rows})
-    frames = [
-        replace(f, position=f.position[alone], deformation=f.deformation[alone])
-        for f in told.frames
-    ]
+    frames = [replace(f, position=f.position[alone], deformation=f.deformation[alone]) for f in told.frames]
     seen = measure_outcome(scene, few, field, replace(told, frames=frames))
     assert seen.objects["stone_0"].shape_error_max == 0.0
 

@@ -15,9 +15,7 @@ from sample_findings import object_outcome, outcome, pair_outcome, part_audit, r
 
 WHOLE = run_audit(
     parts=(part_audit(), part_audit(object=None, real_mass_kg=None)),
-    settling=SettlingOutcome(
-        0.5, True, (SettledObjectOutcome("a_0", (0.0, 0.0, -0.01), 1.0, 0.02),)
-    ),
+    settling=SettlingOutcome(0.5, True, (SettledObjectOutcome("a_0", (0.0, 0.0, -0.01), 1.0, 0.02),)),
     warnings=("Objects sink.", Note("a.jpg was left out.", NoteKind.LEFT_OUT)),
     outcome=outcome(
         {"a_0": object_outcome(dent_place=(0.0, 1.0, 2.0), dent_from_contact_m={"floor": None})},
@@ -40,9 +38,7 @@ def test_an_audit_is_read_back_as_it_was(tmp_path):
 
 
 def test_a_kind_that_there_is_not_is_refused(tmp_path):
-    store.write_json(
-        tmp_path / AUDIT_FILE, store.to_plain(WHOLE) | {"kind_of_warning": ["dire", "doubt"]}
-    )
+    store.write_json(tmp_path / AUDIT_FILE, store.to_plain(WHOLE) | {"kind_of_warning": ["dire", "doubt"]})
     with pytest.raises(BadFileError, match="'dire' is not a NoteKind"):
         read_run_audit(tmp_path)
 
@@ -65,7 +61,5 @@ def test_what_cannot_be_read_says_how_to_make_it_again(tmp_path, harm):
 
 
 def test_keys_of_a_newer_version_are_passed_over():
-    thing = {
-        f.name: getattr(WHOLE.settling.objects[0], f.name) for f in fields(SettledObjectOutcome)
-    }
+    thing = {f.name: getattr(WHOLE.settling.objects[0], f.name) for f in fields(SettledObjectOutcome)}
     assert from_plain(SettledObjectOutcome, thing | {"colour": "red"}) == WHOLE.settling.objects[0]

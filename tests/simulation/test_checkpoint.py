@@ -9,12 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from corporeal.simulation import checkpoint, trajectory_files
-from corporeal.simulation.checkpoint import (
-    CHECKPOINT_FILE,
-    PREVIOUS_CHECKPOINT_FILE,
-    Checkpoints,
-    fingerprint,
-)
+from corporeal.simulation.checkpoint import CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE, Checkpoints, fingerprint
 
 STATE = {"place": np.arange(12.0).reshape(4, 3), "clock": np.float64(0.5)}
 
@@ -22,9 +17,7 @@ STATE = {"place": np.arange(12.0).reshape(4, 3), "clock": np.float64(0.5)}
 def a_folder(path, done):
     """A run with ``done`` frames."""
     for number in range(done):
-        trajectory_files.write_arrays(
-            trajectory_files.frame_path(path, number), {"time": np.float64(number)}
-        )
+        trajectory_files.write_arrays(trajectory_files.frame_path(path, number), {"time": np.float64(number)})
     return path
 
 
@@ -47,9 +40,7 @@ def test_the_newest_state_comes_back_bit_by_bit(tmp_path):
 
 def test_there_are_never_more_than_two_and_none_at_the_end(tmp_path):
     found = kept(tmp_path, 1, 2, 3, 4)
-    assert sorted(p.name for p in tmp_path.glob("*.npz")) == sorted(
-        [CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE]
-    )
+    assert sorted(p.name for p in tmp_path.glob("*.npz")) == sorted([CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE])
     found.forget()
     assert not list(tmp_path.glob("*.npz"))
 
@@ -60,9 +51,7 @@ def test_a_damaged_one_is_named_and_the_one_before_is_used(tmp_path, caplog, har
     data = bytearray((tmp_path / CHECKPOINT_FILE).read_bytes())
     if harm == "flipped":
         data[data.index(STATE["place"].tobytes()) + 9] ^= 0x01
-    (tmp_path / CHECKPOINT_FILE).write_bytes(
-        {"half": data[: len(data) // 2], "empty": b""}.get(harm, data)
-    )
+    (tmp_path / CHECKPOINT_FILE).write_bytes({"half": data[: len(data) // 2], "empty": b""}.get(harm, data))
     newest = found.newest()
     done, state = newest.done, newest.state
     assert done == 2

@@ -39,9 +39,7 @@ def row(time, elastic, touched=np.nan, work=0.0):
 @cache
 def nothing():
     """Ledger of two objects on one plane that never moved."""
-    given = problem(
-        *(box((x, 0, 1), (0.04,) * 3, 0.02) for x in (0.0, 1.0)), cell=0.04, planes=[floor()]
-    )
+    given = problem(*(box((x, 0, 1), (0.04,) * 3, 0.02) for x in (0.0, 1.0)), cell=0.04, planes=[floor()])
     run = CpuEngine(given, threads=1)
     return ledger_row(given, run.snapshot(), run.measure(), run.steps)
 
@@ -90,9 +88,7 @@ def test_a_ball_that_falls_bounces_and_rings_passes():
 
 def test_the_audit_says_who_gained_and_from_when_on():
     rows = [row(0.1 * k, 0.0 if k < 3 else 5.0, touched=0.0) for k in range(6)]
-    ledger = Ledger(
-        **{f.name: np.stack([getattr(r, f.name) for r in rows]) for f in fields(Ledger)}
-    )
+    ledger = Ledger(**{f.name: np.stack([getattr(r, f.name) for r in rows]) for f in fields(Ledger)})
     balance = (ledger.kinetic + ledger.elastic).sum(axis=1)
     found = energy_gain(ledger, NAMES, balance, allowed=0.06)
     assert (found.object, found.frame, found.time) == ("block", 3, pytest.approx(0.3))

@@ -46,8 +46,7 @@ def test_turning_costs_no_stress_and_swelling_has_no_equivalent_stress(problem):
 
 def test_stress_survives_the_disk_to_the_precision_of_half_floats(tmp_path):
     played = co.simulate_scene(
-        co.build_scene(co.ball("seat_foam", radius=0.04, at=(0, 0, 0.05)), duration=0.05),
-        folder=tmp_path,
+        co.build_scene(co.ball("seat_foam", radius=0.04, at=(0, 0, 0.05)), duration=0.05), folder=tmp_path
     )
     posed = co.pose_problem(played.prepared)
     frame = played.trajectory.frames[-1]

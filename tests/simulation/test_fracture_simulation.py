@@ -10,11 +10,7 @@ import corporeal as co
 from corporeal.core.errors import UserError
 from corporeal.core.types import Surface
 from corporeal.discretization.discretization_plan import QualityPreset
-from corporeal.geometry.voronoi_fragments import (
-    cut_fragments,
-    fragment_cells,
-    fragment_seeds,
-)
+from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
 from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.pipeline.stages.fill import fill
 from corporeal.pipeline.stages.simulate import SimulateConfig

@@ -49,9 +49,7 @@ def plate(thickness, strength=170e6):
     return BrittlePart("plate", GLASS, strength, 0.014, thickness, 0.12)
 
 
-@pytest.mark.parametrize(
-    ("thickness", "bore", "broke"), [(6e-3, 0.4, 0.5), (4e-3, 0.3, 0.4)], ids=["6 mm", "4 mm"]
-)
+@pytest.mark.parametrize(("thickness", "bore", "broke"), [(6e-3, 0.4, 0.5), (4e-3, 0.3, 0.4)], ids=["6 mm", "4 mm"])
 def test_plates_of_glass_break_where_they_did_in_1876(thickness, bore, broke):
     """One strength for both thicknesses, 15 % in stress: the library's."""
     sheet = plate(thickness)

@@ -13,12 +13,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.simulation.audit_messages import surface_warnings
 from corporeal.simulation.mesh_gaps import distance_within, refine_mesh, surface_pairs
-from corporeal.simulation.trajectory_files import (
-    FrameLayout,
-    gather_ledgers,
-    write_frame,
-    write_layout,
-)
+from corporeal.simulation.trajectory_files import FrameLayout, gather_ledgers, write_frame, write_layout
 
 THICK = 0.002
 """Of the plate [m]: a fifth of a cell."""
@@ -32,9 +27,7 @@ def surface(mesh, number):
 
 def filled(mesh, spacing=CELL / 2):
     low, high = mesh.bounds
-    axes = [
-        np.arange(a + spacing / 4, b, min(spacing, b - a)) for a, b in zip(low, high, strict=True)
-    ]
+    axes = [np.arange(a + spacing / 4, b, min(spacing, b - a)) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     return points[mesh.contains(points)]
 
@@ -91,9 +84,7 @@ def video(tmp_path):
             F = np.tile(np.eye(3), (count, 1, 1))
             away = np.linalg.norm(points[1][:, None] + place - target[None], axis=2).min()
             gap = np.array([[np.inf, away], [away, np.inf]])
-            book = replace(
-                row(0.0), time=np.array(k / FPS), centre=np.stack([target.mean(0), place]), gap=gap
-            )
+            book = replace(row(0.0), time=np.array(k / FPS), centre=np.stack([target.mean(0), place]), gap=gap)
             write_frame(tmp_path, k, Frame(k / FPS, now, F), layout, book)
         return surface_pairs(scene, particles, gather_ledgers(tmp_path, len(way)))
 

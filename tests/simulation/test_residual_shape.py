@@ -21,9 +21,7 @@ TURN = Rotation.from_rotvec([0.4, 1.9, -0.7]).as_matrix()
 def shape_error(start, now):
     """RMS distance after the best rigid fit over the bounding box's diagonal [-]."""
     fit = fit_rigid_motion(start, now, np.ones(len(start)))
-    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / box_diagonal(
-        start
-    )
+    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / box_diagonal(start)
 
 
 def pressed(points):
@@ -101,6 +99,4 @@ def test_how_far_a_share_of_a_body_goes_does_not_grow_with_the_number_of_its_poi
     """Leaves swing the farther the farther out they are: few swing far."""
     few, many = (RNG.exponential(0.01, size=n) for n in (1250, 40_000))
     assert upper_percentile(many) == pytest.approx(upper_percentile(few), rel=0.15)
-    assert mean_of_largest(many) > 1.3 * mean_of_largest(few), (
-        "the control: a fixed number of the largest"
-    )
+    assert mean_of_largest(many) > 1.3 * mean_of_largest(few), "the control: a fixed number of the largest"

@@ -37,9 +37,7 @@ def test_several_named_pieces_of_a_file_are_said_to_stay_together():
     assert "4 named pieces (boards, book 0, book 1, …)" in said and "--objects nodes" in said
     assert run_hints(many, seen(**FALLS), divided=True) == (), "it was asked for"
     two = replace(many.objects[0], name="book_0")
-    assert (
-        run_hints(replace(many, objects=(*many.objects, two)), seen(**FALLS), divided=False) == ()
-    )
+    assert run_hints(replace(many, objects=(*many.objects, two)), seen(**FALLS), divided=False) == ()
     assert run_hints(shelf("Mesh_01", "Mesh_02"), seen(**FALLS), divided=False) == ()
 
 

@@ -12,18 +12,12 @@ from corporeal.simulation.summary_text import (
 )
 from sample_findings import run_audit
 
-PIECES = Note(
-    "can: nobody looked what it is made up of. --vlm or --annotations name pieces.",
-    NoteKind.ASSUMED,
-)
+PIECES = Note("can: nobody looked what it is made up of. --vlm or --annotations name pieces.", NoteKind.ASSUMED)
 UNKNOWN = Note(
-    "axe is of unknown material; plastics-PP is assumed. State its material with --annotations.",
-    NoteKind.GRAVE,
+    "axe is of unknown material; plastics-PP is assumed. State its material with --annotations.", NoteKind.GRAVE
 )
 DEPTH = "Objects penetrate each other by up to 2.0 grid cells: a finer --detail reduces it."
-GONE = Note(
-    "2 of 10 photographs do not fit the others and were left out: c.jpg, d.jpg.", NoteKind.LEFT_OUT
-)
+GONE = Note("2 of 10 photographs do not fit the others and were left out: c.jpg, d.jpg.", NoteKind.LEFT_OUT)
 
 
 def test_the_gravest_comes_first_and_each_once():

@@ -54,9 +54,7 @@ def splashed(points, share):
 
 
 def mark_of(points, **changes):
-    return surface_mark(
-        **{"start": BED, "now": [points], "cell": CELL, "threshold": CELL} | changes
-    )
+    return surface_mark(**{"start": BED, "now": [points], "cell": CELL, "threshold": CELL} | changes)
 
 
 def test_a_bowl_is_as_deep_and_as_wide_as_it_was_stamped():
@@ -73,9 +71,7 @@ def test_grains_that_splashed_far_make_no_deeper_mark_as_they_make_a_deeper_dent
     """A quarter of a percent of the grains end .1 to .2 m away, as in the showcase's heap."""
     points = splashed(stamped(BED), 0.0025)
     assert mark_of(points).depth == pytest.approx(DEPTH, abs=0.3 * CELL)
-    assert residual_dent(BED, [points], CELL).depth > 4 * DEPTH, (
-        "the control: it follows the grains"
-    )
+    assert residual_dent(BED, [points], CELL).depth > 4 * DEPTH, "the control: it follows the grains"
 
 
 def test_grains_in_the_air_above_a_bowl_neither_fill_it_nor_are_a_rim():
@@ -141,7 +137,5 @@ def test_a_pinch_of_grains_has_no_surface():
         ({"law": Law.VON_MISES, "yield_stress": 1e5}, False),
     ],
 )
-def test_grains_and_pastes_are_measured_at_their_surface_and_plasticine_by_its_matter(
-    changes, marked
-):
+def test_grains_and_pastes_are_measured_at_their_surface_and_plasticine_by_its_matter(changes, marked):
     assert keeps_surface_mark(replace(SAND, **changes)) is marked

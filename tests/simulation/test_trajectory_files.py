@@ -31,9 +31,7 @@ def written(folder, count=3):
         deformation = np.eye(3) + 0.2 * rng.standard_normal((5, 3, 3))
         deformation[[1, 2]] = turn
         frame = Frame(time=k / 60, position=rng.standard_normal((5, 3)), deformation=deformation)
-        write_frame(
-            folder, k, frame, LAYOUT, ledger(frame.time, 3, kinetic=np.array([1.0, 2.0, k]))
-        )
+        write_frame(folder, k, frame, LAYOUT, ledger(frame.time, 3, kinetic=np.array([1.0, 2.0, k])))
         frames.append(frame)
     return frames
 

@@ -67,9 +67,7 @@ def test_the_page_is_given_what_there_is_to_play(server, small_run):
 
 
 def test_a_token_is_asked_for_and_kept_in_a_cookie(small_run):
-    with serving(
-        make_app(SiteOptions(RunStore((), small_run.parent)), AccessPolicy(token=TOKEN))
-    ) as server:
+    with serving(make_app(SiteOptions(RunStore((), small_run.parent)), AccessPolicy(token=TOKEN))) as server:
         assert server.ask("/runs").status == 401
         assert server.ask("/runs?token=wrong").status == 401
         assert server.ask("/runs", Cookie="corporeal=wrong").status == 401
@@ -95,17 +93,8 @@ def test_only_another_machines_address_demands_a_token():
 def test_the_address_says_how_to_come_in():
     assert address_words(ListenAddress(), 8321, AccessPolicy())[0] == "http://127.0.0.1:8321/"
     assert "ssh -L 8321:127.0.0.1:8321" in address_words(ListenAddress(), 8321, AccessPolicy())[1]
-    assert (
-        f"?token={TOKEN}"
-        in address_words(ListenAddress("10.1.2.3"), 80, AccessPolicy(token=TOKEN))[0]
-    )
+    assert f"?token={TOKEN}" in address_words(ListenAddress("10.1.2.3"), 80, AccessPolicy(token=TOKEN))[0]
 
 
 def test_a_hosts_name_is_read_without_its_port():
-    assert [host_name(h) for h in ("a:1", "[::1]:2", "A.b", "x]", "")] == [
-        "a",
-        "::1",
-        "a.b",
-        "",
-        "",
-    ]
+    assert [host_name(h) for h in ("a:1", "[::1]:2", "A.b", "x]", "")] == ["a", "::1", "a.b", "", ""]

@@ -13,13 +13,7 @@ from corporeal.discretization.live_quality import (
     LiveDemand,
     choose_live_quality,
 )
-from corporeal.viewer.commands import (
-    MAX_GRAVITY_M_S2,
-    MAX_GRIP_FREQUENCY_HZ,
-    MAX_POINT_M,
-    Command,
-    parse_command,
-)
+from corporeal.viewer.commands import MAX_GRAVITY_M_S2, MAX_GRIP_FREQUENCY_HZ, MAX_POINT_M, Command, parse_command
 
 
 def order(**given):
@@ -73,31 +67,22 @@ def test_a_live_quality_fits_into_its_share_of_the_threads(count, threads):
     cost = EACH * particles * found.steps_per_second
     assert MIN_STEPS_PER_SECOND <= found.steps_per_second <= MAX_STEPS_PER_SECOND
     assert cost <= MAX_STEP_TIME_FRACTION * threads * 1.001 or (
-        found.cells_across == LIVE_CELLS_ACROSS[-1]
-        and found.steps_per_second == MIN_STEPS_PER_SECOND
+        found.cells_across == LIVE_CELLS_ACROSS[-1] and found.steps_per_second == MIN_STEPS_PER_SECOND
     )
 
 
 def test_spare_time_buys_cells_and_then_steps():
     few, many = choose_live_quality(demand(500), 4), choose_live_quality(demand(30_000), 2)
-    assert (
-        few.cells_across == LIVE_CELLS_ACROSS[0] and few.steps_per_second > 2 * MIN_STEPS_PER_SECOND
-    )
+    assert few.cells_across == LIVE_CELLS_ACROSS[0] and few.steps_per_second > 2 * MIN_STEPS_PER_SECOND
     assert many.cells_across < few.cells_across
     finer = choose_live_quality(demand(30_000), 4)
     assert (finer.cells_across, finer.steps_per_second) > (many.cells_across, 0)
 
 
 def test_what_moves_fast_is_simulated_coarser_as_its_steps_cannot_be_saved():
-    slow, fast = (
-        choose_live_quality(demand(2_000), 2),
-        choose_live_quality(demand(2_000, motion=5.0), 2),
-    )
+    slow, fast = (choose_live_quality(demand(2_000), 2), choose_live_quality(demand(2_000, motion=5.0), 2))
     assert fast.cells_across < slow.cells_across
 
 
 def test_what_takes_few_steps_as_it_is_needs_no_coarser_cells():
-    assert (
-        choose_live_quality(demand(4_000, motion=5.0, steps=500.0), 2).cells_across
-        == LIVE_CELLS_ACROSS[0]
-    )
+    assert choose_live_quality(demand(4_000, motion=5.0, steps=500.0), 2).cells_across == LIVE_CELLS_ACROSS[0]

@@ -10,13 +10,7 @@ from corporeal.viewer.commands import Command, parse_command
 from corporeal.viewer.interaction_controller import RECORDED_ADD, InteractionController
 from corporeal.viewer.live_assets import LiveAssets
 from corporeal.viewer.live_simulation import LiveSimulation, live_editor_of
-from corporeal.viewer.replay import (
-    InteractionRecord,
-    drop_events,
-    read_record,
-    write_record,
-    write_replays,
-)
+from corporeal.viewer.replay import InteractionRecord, drop_events, read_record, write_record, write_replays
 from corporeal.viewer.run_store import RunStore
 
 BALL, STONE, NEW = 0, 1, 2
@@ -119,9 +113,7 @@ def test_a_replay_at_draft_drops_it_at_the_same_time(small_run, live, tmp_path):
     assert read_record(tmp_path / "touches.json") == done
     ((when, one),) = drop_events(done)
     assert when == pytest.approx(3 / 60) and one.thing == THING
-    write_replays(
-        tmp_path, lambda share, words: None, small_run, tmp_path / "touches.json", [small_run]
-    )
+    write_replays(tmp_path, lambda share, words: None, small_run, tmp_path / "touches.json", [small_run])
     for contact in ("multi", "single"):
         data = (tmp_path / f"{contact}.take").read_bytes()
         header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
@@ -140,9 +132,7 @@ def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
         with pytest.raises(UserError, match=word):
             live._do(Command("add", thing=thing, point=SPOT, to=(0.0, 0.0, 0.1)))
     with pytest.raises(UserError, match="no room"):
-        live.hands.obey(
-            Command(RECORDED_ADD, thing=THING, point=(0.7, 0.0, 0.03), to=(0.0, 0.0, 0.1))
-        )
+        live.hands.obey(Command(RECORDED_ADD, thing=THING, point=(0.7, 0.0, 0.03), to=(0.0, 0.0, 0.1)))
     assert len(live.hands.engine.problem.bodies) == 2 and live.hands.touches == []
     live._both(1 / 60)
     with pytest.raises(UserError):

@@ -81,9 +81,7 @@ class Plain:
 
 def test_the_reference_engine_is_pulled_blown_at_and_joined_in_a_live_session(results, tmp_path):
     made = LiveInput(results, "draft", engine="reference")
-    live = LiveSimulation(
-        live_editor_of(made, 1, LiveAssets(RunStore((), tmp_path)).find), 1, made.engine
-    )
+    live = LiveSimulation(live_editor_of(made, 1, LiveAssets(RunStore((), tmp_path)).find), 1, made.engine)
     hands = live.hands
     assert isinstance(hands.engine, ReferenceEngine)
     assert hands.engine.snapshot().position.shape[0] < 2000
@@ -128,9 +126,7 @@ def test_a_visitor_of_such_a_run_is_sent_pictures(results):
         room.close()
 
 
-def test_an_engine_of_which_nothing_more_is_known_is_watched_and_says_what_it_cannot(
-    results, monkeypatch
-):
+def test_an_engine_of_which_nothing_more_is_known_is_watched_and_says_what_it_cannot(results, monkeypatch):
     monkeypatch.setitem(ENGINES, "plain", f"{__name__}:Plain")
     made = LiveInput(results, "draft", engine="plain")
     live = LiveSimulation(live_editor_of(made, 1), 1, made.engine)

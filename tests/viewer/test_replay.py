@@ -10,11 +10,7 @@ from corporeal.discretization.discretization_plan import QUALITY_PRESETS
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.pipeline.stages.ground import GroundConfig
 from corporeal.viewer.commands import Command
-from corporeal.viewer.interaction_controller import (
-    RECORDED_GRAB,
-    InteractionController,
-    InteractionEvent,
-)
+from corporeal.viewer.interaction_controller import RECORDED_GRAB, InteractionController, InteractionEvent
 from corporeal.viewer.live_edit import LiveEditor
 from corporeal.viewer.live_simulation import LiveSimulation, live_editor_of, no_assets
 from corporeal.viewer.replay import (
@@ -69,9 +65,7 @@ def test_the_control_beside_is_at_the_same_instant_and_was_pulled_as_well(touche
              for e in (here, there)]  # fmt: skip
     assert min(risen) > 0.01
     assert touched.twin.touches == []
-    alone = InteractionController(
-        touched.posed, replace(touched.posed.problem, contact="single"), 1
-    )
+    alone = InteractionController(touched.posed, replace(touched.posed.problem, contact="single"), 1)
     alone.replay(touched.hands.touches)
     np.testing.assert_array_equal(alone.engine.snapshot().position, there.snapshot().position)
 
@@ -138,12 +132,7 @@ def test_a_replay_that_nobody_asked_for_is_not_found(small_run):
     shelf = RunStore((), small_run.parent)
     replays = ReplayJobs(shelf, LiveSession(shelf.made))
     with serving(make_app(SiteOptions(shelf), LOCAL, replays.routes())) as server:
-        for path in (
-            "/replays/x",
-            "/replayed/x",
-            "/replayed/x/multi",
-            "/replayed/..%2f..%2fx/multi",
-        ):
+        for path in ("/replays/x", "/replayed/x", "/replayed/x/multi", "/replayed/..%2f..%2fx/multi"):
             assert server.ask(path).status == 404
         assert server.order("/replay/stop", id="x").status == 400
         assert server.ask("/replay", "POST", b"{}").status == 403

@@ -84,9 +84,7 @@ def test_what_a_killed_server_left_is_done_by_the_next(scene_file, tmp_path):
         {"asked": asked("c", scene_file, "fill"), "settings": Settings()},
     ]
     store.write_json(runs / QUEUE_FILE, rows)
-    server = subprocess.Popen(
-        [sys.executable, "-c", SERVER, str(runs)], stdout=subprocess.PIPE, text=True
-    )
+    server = subprocess.Popen([sys.executable, "-c", SERVER, str(runs)], stdout=subprocess.PIPE, text=True)
     assert server.stdout is not None and server.stdout.readline() == "up\n"
     end = time.monotonic() + 60
     while '"running"' not in (runs / QUEUE_FILE).read_text() and time.monotonic() < end:
@@ -121,9 +119,7 @@ def test_a_change_is_another_run_with_annotations(small_run):
     made = read_run(small_run)
     before = sorted(p.name for p in small_run.rglob("*"))
     change = {"0": {"material": "steel"}, "1": {"values": {"density": 2650.0}}}
-    job, settings = prepare_changed_run(
-        small_run, made, {"parts": change, "detail": "normal", "drop": 0.5}
-    )
+    job, settings = prepare_changed_run(small_run, made, {"parts": change, "detail": "normal", "drop": 0.5})
     assert job.name == "drop-2" and job.inputs[0].endswith("drop.glb")
     assert (settings.fill.detail, settings.assemble.drop) == ("normal", 0.5)
     assert settings.describe.annotations is not None

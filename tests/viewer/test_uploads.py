@@ -91,9 +91,7 @@ def server(tmp_path):
     runs.mkdir()
     # The disk of who runs this may be nearly full.
     inbox = UploadInbox(runs, UploadLimits(free_disk_bytes=0))
-    with serving(
-        make_app(SiteOptions(RunStore((), runs), works=True), LOCAL, (upload_route(inbox),))
-    ) as made:
+    with serving(make_app(SiteOptions(RunStore((), runs), works=True), LOCAL, (upload_route(inbox),))) as made:
         made.runs, made.inbox = runs, inbox
         yield made
 

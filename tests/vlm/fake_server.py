@@ -67,9 +67,7 @@ def _handler(server):
 
         def do_POST(self):
             body = json.loads(self.rfile.read(int(self.headers["content-length"])))
-            step = server.step(
-                Request(self.path, {k.lower(): v for k, v in self.headers.items()}, body)
-            )
+            step = server.step(Request(self.path, {k.lower(): v for k, v in self.headers.items()}, body))
             time.sleep(step.get("sleep", 0))
             status = step.get("status", 200)
             said = _answer(self.path, body, step) if status == 200 else _error(step)
@@ -105,11 +103,7 @@ def _answer(path, body, step):
         "created": 1,
         "model": body["model"],
         "choices": [
-            {
-                "index": k,
-                "finish_reason": "stop",
-                "message": {"role": "assistant", "content": said},
-            }
+            {"index": k, "finish_reason": "stop", "message": {"role": "assistant", "content": said}}
             for k, said in enumerate([text, *step.get("more", [])])
         ],
         "usage": {"prompt_tokens": 1200, "completion_tokens": 80, "total_tokens": 1280},
@@ -135,17 +129,7 @@ def _anthropic(body, text):
 
 def _google(text):
     return {
-        "candidates": [
-            {
-                "content": {"role": "model", "parts": [{"text": text}]},
-                "finishReason": "STOP",
-                "index": 0,
-            }
-        ],
-        "usageMetadata": {
-            "promptTokenCount": 1200,
-            "candidatesTokenCount": 80,
-            "totalTokenCount": 1280,
-        },
+        "candidates": [{"content": {"role": "model", "parts": [{"text": text}]}, "finishReason": "STOP", "index": 0}],
+        "usageMetadata": {"promptTokenCount": 1200, "candidatesTokenCount": 80, "totalTokenCount": 1280},
         "modelVersion": "fake",
     }

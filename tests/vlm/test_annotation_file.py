@@ -17,10 +17,7 @@ def test_what_is_said_of_an_object_holds_for_all_its_parts(tmp_path):
 
 
 def test_what_is_said_of_a_part_comes_before_what_is_said_of_its_object(tmp_path):
-    said = told(
-        tmp_path,
-        "duck_0:\n  material: soft_PVC\n  thickness_mm: 2\n  parts:\n    beak: ABS\n",
-    )
+    said = told(tmp_path, "duck_0:\n  material: soft_PVC\n  thickness_mm: 2\n  parts:\n    beak: ABS\n")
     assert said[("duck_0", "body")].thickness == pytest.approx(0.002)
     assert said[("duck_0", "beak")] == PartAnnotation("ABS")
 
@@ -28,25 +25,16 @@ def test_what_is_said_of_a_part_comes_before_what_is_said_of_its_object(tmp_path
 def test_pieces_of_what_nobody_told_apart_may_be_named(tmp_path):
     (tmp_path / "said.yaml").write_text("vase_0: {parts: {foot: wood, bowl: glass}}\n")
     said = read_annotations(tmp_path / "said.yaml", SCENE, free=["vase_0"])
-    assert said == {
-        ("vase_0", "foot"): PartAnnotation("wood"),
-        ("vase_0", "bowl"): PartAnnotation("glass"),
-    }
+    assert said == {("vase_0", "foot"): PartAnnotation("wood"), ("vase_0", "bowl"): PartAnnotation("glass")}
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ("duk_0: ABS", "there is no object called 'duk_0'. There are: duck_0, vase_0."),
-        (
-            "duck_0: {parts: {sole: ABS}}",
-            "there is no part of 'duck_0' called 'sole'. There are: body, beak.",
-        ),
+        ("duck_0: {parts: {sole: ABS}}", "there is no part of 'duck_0' called 'sole'. There are: body, beak."),
         ("duck_0: {stuff: ABS}", "unknown key 'stuff'"),
-        (
-            "duck_0: {structure: holey}",
-            "Choose one of: solid, shell, sheet, hollow, filled, packed",
-        ),
+        ("duck_0: {structure: holey}", "Choose one of: solid, shell, sheet, hollow, filled, packed"),
         ("duck_0: {thickness_mm: thin}", "thickness_mm must be a number"),
         ("duck_0: {thickness_mm: -1}", "above 0"),
         ("duck_0: {thickness_mm: .nan}", "must be a number"),

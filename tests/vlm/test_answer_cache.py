@@ -216,10 +216,7 @@ def test_a_killed_process_leaves_a_whole_cache_that_two_others_go_on_with(tmp_pa
 
     with FakeServer(slow) as server:
         code = WORKER.format(
-            tests=[str(p) for p in Path(__file__).parents[:2]],
-            url=server.url,
-            folder=str(tmp_path),
-            count=COUNT,
+            tests=[str(p) for p in Path(__file__).parents[:2]], url=server.url, folder=str(tmp_path), count=COUNT
         )
         start = [sys.executable, "-c", code]
         first = subprocess.Popen(start)

@@ -24,9 +24,7 @@ from corporeal.vlm.interpret_answers import evidence_from_answer, part_hypothese
 from scripted_model import decomposed, part
 
 NAMES = AllowedNames(
-    {"steel": "steel", "Steel": "steel", "sand": "sand"}.get,
-    {"water": "water"}.get,
-    lambda name: name == "steel",
+    {"steel": "steel", "Steel": "steel", "sand": "sand"}.get, {"water": "water"}.get, lambda name: name == "steel"
 )
 
 
@@ -80,10 +78,7 @@ def complaints(*parts, wanted=("a",), shared=False):
         (part("a", "steel", "packed", solidity=0.01), "needs a solidity"),
         (part("a", "steel", probability=0.0), "must be above 0"),
         ({"part": "a", "ways": []}, "Give 1 to 6 ways"),
-        (
-            part("a", "steel", alternatives=[{"material": "stone", "probability": 0.1}]),
-            "'stone' is not",
-        ),
+        (part("a", "steel", alternatives=[{"material": "stone", "probability": 0.1}]), "'stone' is not"),
     ],
 )
 def test_materials_are_from_the_lists_and_builds_make_sense(said, complaint):
@@ -120,10 +115,7 @@ def test_places_are_asked_for_once_each_and_values_stay_inside():
 
     assert values(("young", 1.0), ("density", 30.0)) == []
     assert values(("young", 1.0 - 1e-7), ("density", 30.0)) == []
-    assert (
-        "young is 3.1, outside the measured range 1 to 3"
-        in values(("young", 3.1), ("density", 30))[0]
-    )
+    assert "young is 3.1, outside the measured range 1 to 3" in values(("young", 3.1), ("density", 30))[0]
     assert "give exactly these quantities" in values(("young", 2.0))[0]
     assert "give exactly these quantities" in values(("young", 2.0), ("young", 2.0))[0]
     with pytest.raises(ValueError, match="less than or equal to 1"):
@@ -160,18 +152,14 @@ def ways(*probabilities):
     return {"part": "a", "ways": [row | {"reason": ""} for row in rows]}
 
 
-@pytest.mark.parametrize(
-    ("probabilities", "shares"), [((1, 1, 1), (1 / 3,) * 3), ((0.6, 0.4), (0.6, 0.4))]
-)
+@pytest.mark.parametrize(("probabilities", "shares"), [((1, 1, 1), (1 / 3,) * 3), ((0.6, 0.4), (0.6, 0.4))])
 def test_probabilities_that_add_up_to_3_are_divided_by_it_and_that_is_said(probabilities, shares):
     answer = MaterialsAnswer.model_validate({"parts": [ways(*probabilities)]})
     assert materials_complaints(answer, ["a"], NAMES, False) == []
     found = [way.probability for way in part_hypotheses(answer.parts[0], NAMES)]
     assert found == pytest.approx(shares)
     said = [] if sum(probabilities) <= 1 else ["the probabilities of a add up to 3 and were"]
-    assert [
-        clause[: len(told)] for clause, told in zip(weakness_notes(answer), said, strict=True)
-    ] == said
+    assert [clause[: len(told)] for clause, told in zip(weakness_notes(answer), said, strict=True)] == said
 
 
 def test_one_way_only_given_as_certain_is_said():

@@ -11,19 +11,11 @@ from pydantic import BaseModel
 import corporeal
 from corporeal.core.errors import UserError
 from corporeal.vlm import AnswerSchema, Question, UnansweredError, VlmClient, connect_vlm
-from corporeal.vlm.api_clients import (
-    AnthropicClient,
-    GoogleClient,
-    OllamaClient,
-    OpenAIClient,
-    RetryPolicy,
-)
+from corporeal.vlm.api_clients import AnthropicClient, GoogleClient, OllamaClient, OpenAIClient, RetryPolicy
 
 QUICK = RetryPolicy(tries=3, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
 PICTURES = tuple(np.full((8, 8, 3), shade, np.uint8) for shade in (0, 100, 200))
-ASKED = Question(
-    "colours", "What colour is each part? Parts: seat, legs.", "s/chair", "3", PICTURES
-)
+ASKED = Question("colours", "What colour is each part? Parts: seat, legs.", "s/chair", "3", PICTURES)
 NAMES = ("legs", "seat")
 COLOURS = ("red", "blue")
 
@@ -255,16 +247,11 @@ def test_every_provider_answers_in_its_own_format(kind, name, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("kind", "name"),
-    [(AnthropicClient, "claude-sonnet-5-5"), (GoogleClient, "gemini-3.1-pro-preview")],
+    ("kind", "name"), [(AnthropicClient, "claude-sonnet-5-5"), (GoogleClient, "gemini-3.1-pro-preview")]
 )
 @pytest.mark.parametrize(
     "first",
-    [
-        {"content": said(share=1.7)},
-        {"status": 429, "headers": {"Retry-After": "0"}},
-        {"status": 503},
-    ],
+    [{"content": said(share=1.7)}, {"status": 429, "headers": {"Retry-After": "0"}}, {"status": 503}],
     ids=["out of range", "429", "503"],
 )
 def test_the_other_providers_recover_too(kind, name, first):

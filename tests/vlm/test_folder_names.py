@@ -97,18 +97,11 @@ def test_sizes_of_what_nobody_named_can_be_stated():
     check_stated_extents(["object=0.2"], [], "banana")
     with pytest.raises(UserError, match="no object 'duck'"):
         check_stated_extents(["duck=0.2"], [], "banana")
-    assert (
-        decide_metric_scale(
-            {"axe": 2.0}, [object_of_usual_size("axe")], ["object=0.5"]
-        ).metres_per_unit
-        == 0.25
-    )
+    assert decide_metric_scale({"axe": 2.0}, [object_of_usual_size("axe")], ["object=0.5"]).metres_per_unit == 0.25
 
 
 def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):
-    (said,) = [
-        w for w in made(tmp_path, "one", object_names=("banana",)).found.warnings if "large" in w
-    ]
+    (said,) = [w for w in made(tmp_path, "one", object_names=("banana",)).found.warnings if "large" in w]
     assert said == (
         "How large it is was not stated: assumed as large as a banana usually is, 19 cm. "
         "State a size with --extent banana=METRES."

@@ -4,11 +4,7 @@ import pytest
 
 from corporeal.core.types import SceneObject
 from corporeal.pipeline.stages.describe import describe
-from corporeal.recognition.metadata_recognition import (
-    FileEvidence,
-    infer_hollow_structure,
-    recognise_part,
-)
+from corporeal.recognition.metadata_recognition import FileEvidence, infer_hollow_structure, recognise_part
 from corporeal.recognition.stated_properties import apply_stated_wall
 from corporeal.vlm.annotation_file import PartAnnotation
 from corporeal.vlm.annotation_file import apply_structure_annotation as annotated

@@ -30,8 +30,7 @@ FIELDS_OF = {
 """Version of a schema → digest of its fields, without names and docstrings of classes. Where a test
 fails here, raise the version of the schema and write its own digest down beside the new version."""
 SCHEMAS = sorted(
-    [kind for kind in vars(corporeal.vlm.answer_schemas).values() if hasattr(kind, "SCHEMA")]
-    + [Verdict],
+    [kind for kind in vars(corporeal.vlm.answer_schemas).values() if hasattr(kind, "SCHEMA")] + [Verdict],
     key=lambda kind: kind.SCHEMA,
 )
 
@@ -79,13 +78,8 @@ def test_names_and_docstrings_do_not_count_and_fields_do():
 
 
 def test_every_prompt_states_a_version_of_its_own():
-    found = [
-        files("corporeal.description").joinpath("prompts", f"{task}.md") for task in INTERVIEW_TASKS
-    ]
-    found += [
-        files("corporeal.vlm").joinpath("prompts", f"{t}.md")
-        for t in ("sizes", "things", "regions")
-    ]
+    found = [files("corporeal.description").joinpath("prompts", f"{task}.md") for task in INTERVIEW_TASKS]
+    found += [files("corporeal.vlm").joinpath("prompts", f"{t}.md") for t in ("sizes", "things", "regions")]
     found += [files("corporeal.lab.evaluation.judge").joinpath("video.md")]
     prompts = [read_prompt(file) for file in found]
     assert len({prompt.version for prompt in prompts}) == len(prompts)

@@ -135,9 +135,7 @@ def test_each_answer_is_paid_for_once_and_the_first_is_that_of_one(tmp_path):
     with FakeServer(several) as server:
 
         def model():
-            return CachingClient(
-                OpenAIClient(f"fake-model@{server.url}", QUICK), "fake", {}, tmp_path
-            )
+            return CachingClient(OpenAIClient(f"fake-model@{server.url}", QUICK), "fake", {}, tmp_path)
 
         assert numbers([model().ask(ASKED, Heavy, check)]) == [1]
         more = model()

@@ -14,13 +14,7 @@ from corporeal.recognition.typical_extents import typical_extent
 from corporeal.vlm.answer_checks import size_complaints
 from corporeal.vlm.answer_schemas import SizeAnswer
 from corporeal.vlm.human_client import PendingQuestionsError
-from corporeal.vlm.real_sizes import (
-    UNKNOWN_EXTENT_M,
-    ClassSize,
-    ClassSizes,
-    estimate_real_extent,
-    find_class_sizes,
-)
+from corporeal.vlm.real_sizes import UNKNOWN_EXTENT_M, ClassSize, ClassSizes, estimate_real_extent, find_class_sizes
 
 RECORDED = Path(__file__).parents[1] / "recordings" / "sizes"
 COUCH = {"smallest": 1.3, "usual": 2.1, "largest": 3.2, "reason": "Three people sit on it."}
@@ -150,9 +144,7 @@ def test_a_recording_is_checked_like_a_model(tmp_path):
 # ---------------------------------------------------------------- file, class, or nobody
 
 
-DUCKS = ClassSizes(
-    {"duck": ClassSize("duck", 0.05, 0.12, 0.6, "recording", "by hand", "A bath toy.")}
-)
+DUCKS = ClassSizes({"duck": ClassSize("duck", 0.05, 0.12, 0.6, "recording", "by hand", "A bath toy.")})
 
 
 def test_a_file_in_metres_is_believed():
@@ -207,7 +199,5 @@ def test_the_table_knows_every_class_of_the_real_assets(shared_assets):
         if row["metric_scale"].startswith("yes"):
             size = ClassSize("", known.low, known.usual, known.high, "table", "", "")
             sizes = ClassSizes({row["category"]: size})
-            real = estimate_real_extent(
-                "x", row["category"], float(row["max_extent_m"]), True, sizes
-            )
+            real = estimate_real_extent("x", row["category"], float(row["max_extent_m"]), True, sizes)
             assert real.warnings == (), row["file"]

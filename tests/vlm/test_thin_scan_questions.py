@@ -60,13 +60,9 @@ class Noting:
 def about_materials(drawing, text):
     """The question about materials as it is put of what a mesh draws."""
     model = Noting({"parts": []})
-    subject = InterviewSubject(
-        "s", FACTS["name"], FACTS["class_name"], FACTS["sides"], drawn=drawing
-    )
+    subject = InterviewSubject("s", FACTS["name"], FACTS["class_name"], FACTS["sides"], drawn=drawing)
     prompts = {"materials": read_prompt(text)}
-    Interview(model, model, prompts, replace(subject, count=4)).materials(
-        {"thing": ""}, NAMES, {}, shared=False
-    )
+    Interview(model, model, prompts, replace(subject, count=4)).materials({"thing": ""}, NAMES, {}, shared=False)
     return model.asked[0].prompt
 
 
@@ -170,13 +166,8 @@ def test_a_share_far_from_what_a_fine_scan_draws_is_told():
 
 def test_a_share_goes_to_its_part_and_to_the_piece_that_matters_most():
     said = ThicknessAnswer.model_validate({"parts": [HALF]})
-    pieces = (
-        PartDescription("handle", "nylon", volume_share=0.6),
-        PartDescription("blade", "steel", volume_share=0.4),
-    )
-    whole = apply_real_shares(
-        PartDescription("scissors", "nylon", pieces=pieces), said, "recording"
-    )
+    pieces = (PartDescription("handle", "nylon", volume_share=0.6), PartDescription("blade", "steel", volume_share=0.4))
+    whole = apply_real_shares(PartDescription("scissors", "nylon", pieces=pieces), said, "recording")
     assert whole.swelling is None
     assert [p.swelling and p.swelling.likely for p in whole.pieces] == [None, 0.5]
     alone = apply_real_shares(PartDescription("blade", "steel"), said, "recording").swelling

@@ -33,13 +33,9 @@ from corporeal.core.version import __version__
 Inputs = Annotated[
     tuple[Path, ...],
     tyro.conf.Positional,
-    tyro.conf.arg(
-        metavar="SCENE ...", help="Models, photographs with poses, a splat, or a scene.toml."
-    ),
+    tyro.conf.arg(metavar="SCENE ...", help="Models, photographs with poses, a splat, or a scene.toml."),
 ]
-Folder = Annotated[
-    Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help="The folder of a run.")
-]
+Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help="The folder of a run.")]
 MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FILE")
 
 
@@ -75,16 +71,14 @@ def command_run() -> None:
 
     first = ("detail", "vlm", "annotations", "drop", "object-names", "out")
     asked = parse(Run, "run", command_run.__doc__, first=first)
-    _run_stages(
-        list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where
-    )
+    _run_stages(list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where)
 
 
 def command_demo() -> None:
     """Run one of the showcase scenes, end to end; needs no files, no key, no GPU.
 
-    The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a
-    GLB, and then run like any other.
+    The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a GLB, and then run like
+    any other.
     """
     from corporeal.pipeline.settings.settings import Settings
     from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS, view_direction
@@ -108,9 +102,7 @@ def command_demo() -> None:
         path = write_cached_showcase(asked.scene, folder / "input")
     settings = asked.settings
     if settings.video.view is None:
-        settings = replace(
-            settings, video=replace(settings.video, view=view_direction(asked.scene))
-        )
+        settings = replace(settings, video=replace(settings.video, view=view_direction(asked.scene)))
     _run_stages([path], folder, settings, where)
 
 
@@ -124,8 +116,7 @@ def command_status() -> None:
 
     rows = stage_states(parse(Status, "status", command_status.__doc__).run)
     show_table(
-        ("verb", "state", "seconds"),
-        [(r.verb, r.state, "" if r.seconds is None else f"{r.seconds:.1f}") for r in rows],
+        ("verb", "state", "seconds"), [(r.verb, r.state, "" if r.seconds is None else f"{r.seconds:.1f}") for r in rows]
     )
 
 
@@ -137,8 +128,7 @@ def command_materials() -> None:
     class Menu:
         words: tyro.conf.Positional[tuple[str, ...]] = ()
         library: str = "default"
-        """"default", "reference" (the 22 materials as first published), or the path of a TOML
-        file."""
+        """"default", "reference" (the 22 materials as first published), or the path of a TOML file."""
 
     asked = parse(Menu, "materials", command_materials.__doc__)
     if not asked.words:
@@ -182,11 +172,7 @@ def _redo_command(verb: str) -> Callable[[], None]:
         shape = Redo
         if known:
             shape = dataclass(frozen=True)(
-                type(
-                    "Redo",
-                    (),
-                    {"__annotations__": {"run": Folder, "config": type(config)}, "config": config},
-                )
+                type("Redo", (), {"__annotations__": {"run": Folder, "config": type(config)}, "config": config})
             )
         words = f"Redo `{verb}` of a run with other settings, and all later stages."
         asked = parse(shape, verb, words, first=FIRST_OPTIONS.get(verb, ()))
@@ -210,18 +196,14 @@ def command_assemble() -> None:
 def command_simulate() -> None:
     """Redo `simulate` of a run with other settings, or over the ranges: --samples N.
 
-    With --samples N an ensemble is simulated beside the run's own simulation: N sets of values are
-    drawn from the measured ranges and the stated alternatives. ensemble.json and ensemble.png in
-    the run's folder hold the spread of rebounds, dents and displacements.
+    With --samples N an ensemble is simulated beside the run's own simulation: N sets of values are drawn from the
+    measured ranges and the stated alternatives. ensemble.json and ensemble.png in the run's folder hold the spread of
+    rebounds, dents and displacements.
     """
     from corporeal.pipeline.run_pipeline import read_run_request
     from corporeal.pipeline.stages.simulate import SimulateConfig
 
-    known = (
-        read_run_request(Path(sys.argv[2])).settings.simulate
-        if _names_a_run()
-        else SimulateConfig()
-    )
+    known = read_run_request(Path(sys.argv[2])).settings.simulate if _names_a_run() else SimulateConfig()
 
     @dataclass(frozen=True)
     class Simulate:
@@ -278,16 +260,7 @@ FIRST_OPTIONS = {
     "video": ("quality", "width", "height", "speed", "view", "colour-by"),
 }
 """Options of a command that are listed first in its help."""
-REDO_COMMANDS = (
-    "reconstruct",
-    "assemble",
-    "describe",
-    "segment",
-    "ground",
-    "fill",
-    "simulate",
-    "video",
-)
+REDO_COMMANDS = ("reconstruct", "assemble", "describe", "segment", "ground", "fill", "simulate", "video")
 REDO_COMMANDS = (*REDO_COMMANDS, "report")
 COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
 COMMANDS |= {"assemble": command_assemble, "simulate": command_simulate}
@@ -308,12 +281,7 @@ def _scene_name(path: Path) -> str:
 
 
 def _run_stages(
-    inputs: list[Path],
-    folder: Path,
-    settings: Any,
-    where: RunFolder,
-    until: str = "report",
-    again: bool = False,
+    inputs: list[Path], folder: Path, settings: Any, where: RunFolder, until: str = "report", again: bool = False
 ) -> None:
     """Run all stages up to ``until``; run ``again`` even if its settings are unchanged."""
     from corporeal.cli.validate_settings import validate_settings
@@ -335,10 +303,7 @@ def _run_stages(
 
 
 def _usage() -> str:
-    lines = [
-        f"corporeal {__version__}: measured materials for 3D scenes, and their simulation.",
-        "",
-    ]
+    lines = [f"corporeal {__version__}: measured materials for 3D scenes, and their simulation.", ""]
     for name, verb in COMMANDS.items():
         first = (verb.__doc__ or "").strip().splitlines()[0]
         lines.append(f"  corporeal {name:10} {first}")
@@ -391,8 +356,7 @@ def _report_crash(error: Exception) -> int:
     path = Path("corporeal-crash.txt")
     path.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
     print(
-        f"corporeal: internal error ({type(error).__name__}: {error}). The details are in "
-        f"{path}; please report them.",
+        f"corporeal: internal error ({type(error).__name__}: {error}). The details are in {path}; please report them.",
         file=sys.stderr,
     )
     return 1

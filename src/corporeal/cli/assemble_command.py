@@ -18,10 +18,9 @@ from corporeal.scene.scene_composition import read_certificate, read_composition
 def compose_from_pool() -> None:
     """Compose a scene at rest from a pool of models, ready to run.
 
-    Classes and assets are drawn at random, scaled, placed without overlap and dropped to rest; a
-    certificate states the remaining drift and overlap, and an interaction is chosen. The folder
-    holds scene.glb (at rest), scene.toml (the interaction), certificate.json, composition.json and
-    views/ (posed pictures).
+    Classes and assets are drawn at random, scaled, placed without overlap and dropped to rest; a certificate states the
+    remaining drift and overlap, and an interaction is chosen. The folder holds scene.glb (at rest), scene.toml (the
+    interaction), certificate.json, composition.json and views/ (posed pictures).
 
         corporeal assemble --from models/ --classes duck "soda can" --seed 7
         corporeal run scenes/duck-soda_can-7/scene.toml
@@ -72,10 +71,7 @@ def _pool(sources: tuple[Path, ...], out: Path, tell: Any) -> AssetPool:
 
 def _show(folder: Path) -> None:
     made, certificate = read_composition(folder), read_certificate(folder)
-    rows = [
-        (o.name, o.asset, _length(o.real_extent_m), o.said_by, _length(o.extent_m))
-        for o in made.objects
-    ]
+    rows = [(o.name, o.asset, _length(o.real_extent_m), o.said_by, _length(o.extent_m)) for o in made.objects]
     show_table(("object", "asset", "real size", "size from", "size in the scene"), rows)
     for warning in made.warnings:
         print(f"! {warning}")

@@ -37,17 +37,15 @@ def _index() -> None:
 
     @dataclass(frozen=True)
     class Index:
-        folders: Annotated[
-            tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")
-        ] = ()
+        folders: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")] = ()
         """Searched recursively."""
         pool: Folder = DEFAULT_POOL
         """The pool's folder."""
         origin: Annotated[CandidateOrigin, tyro.conf.arg(name="from")] = "folders"
         """Kind of source: plain folders, the cache of the package objaverse, or Amazon Berkeley Objects."""
         csv: Path | None = None
-        """Table with columns file, class and, where known, licence, attribution, metric (whether
-        lengths are metres: yes or no), extent_m, source."""
+        """Table with columns file, class and, where known, licence, attribution, metric (whether lengths are metres:
+        yes or no), extent_m, source."""
         objaverse: WantedModels = field(default_factory=WantedModels)
         gate: GateConfig = field(default_factory=GateConfig)
 
@@ -105,13 +103,7 @@ def _list() -> None:
 
 
 def _row(a: PoolAsset) -> tuple[str, ...]:
-    return (
-        a.class_name,
-        a.name,
-        a.size,
-        f"{a.triangles:,}",
-        re.split(r" \(|;", a.licence)[0],
-    )
+    return (a.class_name, a.name, a.size, f"{a.triangles:,}", re.split(r" \(|;", a.licence)[0])
 
 
 def _of_class(pool: AssetPool, class_name: str) -> Sequence[PoolAsset]:
@@ -129,9 +121,7 @@ def _show() -> None:
 
     @dataclass(frozen=True)
     class Show:
-        names: Annotated[
-            tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="NAME ...")
-        ] = ()
+        names: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="NAME ...")] = ()
         pool: Folder = DEFAULT_POOL
         """The pool's folder."""
         class_name: Annotated[str, tyro.conf.arg(name="class")] = ""

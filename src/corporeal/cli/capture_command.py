@@ -13,8 +13,8 @@ from corporeal.core.terminal import progress_bars
 def command_capture() -> None:
     """Render posed views of a scene: colour, depth, normals and object ids.
 
-    SCENE is what `corporeal run` takes. The folder gets transforms.json, as instant-ngp and
-    nerfstudio read it, and the pictures.
+    SCENE is what `corporeal run` takes. The folder gets transforms.json, as instant-ngp and nerfstudio read it, and the
+    pictures.
     """
     from corporeal.io.photos.transforms_json import write_views
     from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
@@ -22,9 +22,7 @@ def command_capture() -> None:
 
     @dataclass(frozen=True)
     class Capture:
-        inputs: Annotated[
-            tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")
-        ]
+        inputs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")]
         out: Path = Path("views")
         """Output folder."""
         assemble: AssembleConfig = field(default_factory=AssembleConfig)

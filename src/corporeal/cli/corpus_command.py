@@ -27,8 +27,8 @@ class WorkerOptions:
     on: Literal["local", "ray"] = "local"
     """Execution backend: processes of this machine, or a Ray cluster (extra [cluster])."""
     address: str = ""
-    """Address of a Ray cluster, "auto" for the one of this machine; by default a local one is
-    started. The corpus must be on a file system shared by all machines.
+    """Address of a Ray cluster, "auto" for the one of this machine; by default a local one is started. The corpus must
+    be on a file system shared by all machines.
     """
     gpus: float = 0.0
     """Share of a GPU per scene on Ray."""
@@ -45,9 +45,9 @@ def _assemble() -> None:
         corporeal corpus assemble corpus/ --pool pool/
         corporeal corpus assemble showcase/ --preset seven
 
-    Classes, models, numbers of objects and interactions are balanced. Each scene is made in its own
-    process and written to CORPUS/scenes atomically. Repeat the command to resume an interrupted
-    corpus and to retry failed scenes. CORPUS/manifest.json holds the state of each scene.
+    Classes, models, numbers of objects and interactions are balanced. Each scene is made in its own process and written
+    to CORPUS/scenes atomically. Repeat the command to resume an interrupted corpus and to retry failed scenes.
+    CORPUS/manifest.json holds the state of each scene.
     """
     from corporeal.discretization.object_scaling import SceneSizing
     from corporeal.lab.corpus.assemble_corpus import Sources, assemble_corpus
@@ -92,9 +92,8 @@ def _run() -> None:
 
         corporeal corpus run corpus/ --detail draft --workers 4
 
-    CORPUS/runs/<scene> is a run like any other. A failing scene doesn't stop the others. Repeat the
-    command to resume: finished scenes are skipped, and an interrupted simulation continues from its
-    checkpoint.
+    CORPUS/runs/<scene> is a run like any other. A failing scene doesn't stop the others. Repeat the command to resume:
+    finished scenes are skipped, and an interrupted simulation continues from its checkpoint.
     """
     from corporeal.lab.corpus.run_corpus import RunConfig, run_corpus
     from corporeal.pipeline.settings.settings import Settings

@@ -38,13 +38,7 @@ class CheckResult:
 
 def check_installation() -> list[CheckResult]:
     """Check engines, libraries, encoder and keys; a broken part is a result, never an exception."""
-    checks: list[Callable[[], list[CheckResult]]] = [
-        _machine,
-        _engines,
-        _libraries,
-        _encoder,
-        _keys,
-    ]
+    checks: list[Callable[[], list[CheckResult]]] = [_machine, _engines, _libraries, _encoder, _keys]
     return [finding for check in checks for finding in check()]
 
 
@@ -54,9 +48,7 @@ def _machine() -> list[CheckResult]:
     return [
         CheckResult("system", True, system),
         CheckResult("processor", True, _cores(usable_cores(), os.cpu_count() or 1)),
-        CheckResult(
-            "disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."
-        ),
+        CheckResult("disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."),
     ]
 
 
@@ -104,9 +96,7 @@ def _encoder() -> list[CheckResult]:
 
         path = imageio_ffmpeg.get_ffmpeg_version()
     except Exception as error:  # as above
-        return [
-            CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")
-        ]
+        return [CheckResult("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for videos).")]
     return [CheckResult("ffmpeg", True, f"{path}, a separate program, for videos")]
 
 
@@ -119,9 +109,7 @@ def _keys() -> list[CheckResult]:
     )
     installed = find_spec("pydantic_ai") is not None
     client = f"pydantic-ai {version('pydantic-ai-slim')}" if installed else "not installed"
-    install = (
-        "" if installed else "pip install 'corporeal[models]', to ask models over the network."
-    )
+    install = "" if installed else "pip install 'corporeal[models]', to ask models over the network."
     return [
         CheckResult("model client", installed, client, install),
         CheckResult("model keys", bool(present), found, "" if present else advice),

@@ -24,14 +24,10 @@ Folder = Annotated[
     tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
 ]
 Runs = Annotated[
-    Path | None,
-    tyro.conf.Positional,
-    tyro.conf.arg(metavar="FOLDER", help="Runs, as evaluate dynamics leaves them."),
+    Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="Runs, as evaluate dynamics leaves them.")
 ]
 Target = Annotated[
-    str,
-    tyro.conf.Positional,
-    tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.'),
+    str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.')
 ]
 
 
@@ -49,9 +45,9 @@ def _folder(folder: Path | None, what: str) -> Path:
 def evaluate_mass() -> None:
     """Predict masses, and compare them with measured ones where --truth gives them.
 
-    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, optionally, fill
-    (solid, hollow, full), by which errors are grouped. Without --truth, masses are only predicted.
-    A folder in the layout of ABO-500 needs no CSV: choose its --split.
+    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, optionally, fill (solid, hollow,
+    full), by which errors are grouped. Without --truth, masses are only predicted. A folder in the layout of ABO-500
+    needs no CSV: choose its --split.
     """
     from corporeal.description.describe_config import DescribeConfig
     from corporeal.lab.evaluation import mass_evaluation, mass_report, measured_masses
@@ -74,14 +70,10 @@ def evaluate_mass() -> None:
 
     first = ("truth", "vlm", "anonymous", "split", "json", "figure")
     asked = parse(Mass, "evaluate mass", evaluate_mass.__doc__, words=2, first=first)
-    objects = measured_masses.objects_to_weigh(
-        _folder(asked.folder, "mass"), asked.truth, asked.split
-    )
+    objects = measured_masses.objects_to_weigh(_folder(asked.folder, "mass"), asked.truth, asked.split)
     with progress_bars() as tell:
         done = tell("evaluate")
-        found = mass_evaluation.predict_masses(
-            objects, asked.describe, asked.ground, asked.how, done
-        )
+        found = mass_evaluation.predict_masses(objects, asked.describe, asked.ground, asked.how, done)
     result = mass_evaluation.compare_masses(found)
     _show(mass_report.mass_tables(result))
     if asked.json is not None:
@@ -93,8 +85,7 @@ def evaluate_mass() -> None:
 def evaluate_materials() -> None:
     """Compare recognised materials with those that --truth TOML accepts.
 
-    FOLDER holds models; the table lists, per file and part, the accepted materials, the likeliest
-    first.
+    FOLDER holds models; the table lists, per file and part, the accepted materials, the likeliest first.
     """
     from corporeal.description.describe_config import DescribeConfig
     from corporeal.lab.evaluation import material_evaluation
@@ -113,16 +104,12 @@ def evaluate_materials() -> None:
     first = ("truth", "vlm", "annotations", "record", "json", "library")
     asked = parse(Materials, "evaluate materials", evaluate_materials.__doc__, words=2, first=first)
     if asked.truth is None:
-        raise UserError(
-            f"No ground truth. Give --truth TOML. {material_evaluation.TRUTH_FILE_ADVICE}"
-        )
+        raise UserError(f"No ground truth. Give --truth TOML. {material_evaluation.TRUTH_FILE_ADVICE}")
     library = asked.ground.library
     truth = material_evaluation.read_material_truth(asked.truth, library)
     folder = _folder(asked.folder, "materials")
     with progress_bars() as tell:
-        rows = material_evaluation.evaluate_materials(
-            folder, truth, asked.describe, library, tell("evaluate")
-        )
+        rows = material_evaluation.evaluate_materials(folder, truth, asked.describe, library, tell("evaluate"))
     _show(material_evaluation.recognition_tables(rows))
     if asked.json is not None:
         store.write_json(asked.json, material_evaluation.recognition_record(rows))
@@ -131,8 +118,8 @@ def evaluate_materials() -> None:
 def evaluate_parts() -> None:
     """Compare the parts found in pictures of models with the files' own nodes and materials.
 
-    Each model is rendered from all sides and segmented in the visible points; default: four models
-    of the showcase. --structural dinov2 --semantic clip selects learned features.
+    Each model is rendered from all sides and segmented in the visible points; default: four models of the showcase.
+    --structural dinov2 --semantic clip selects learned features.
     """
     from corporeal.description.describe_config import DescribeConfig
     from corporeal.lab.evaluation import parts_evaluation, parts_figure
@@ -147,9 +134,7 @@ def evaluate_parts() -> None:
         """Output file for rows and errors (JSON)."""
         figure: Path | None = None
         """Output file for a picture of the parts (PNG)."""
-        look: parts_evaluation.PartsEvaluationConfig = field(
-            default_factory=parts_evaluation.PartsEvaluationConfig
-        )
+        look: parts_evaluation.PartsEvaluationConfig = field(default_factory=parts_evaluation.PartsEvaluationConfig)
         clusters: PartsConfig = field(default_factory=PartsConfig)
         describe: DescribeConfig = field(default_factory=DescribeConfig)
 
@@ -170,8 +155,8 @@ def evaluate_parts() -> None:
 def evaluate_objects() -> None:
     """Compare the objects segmented in pictures of settled scenes with the scenes' own.
 
-    FOLDER holds scenes that `assemble` wrote. Objects are segmented in points on the visible
-    surfaces, or in Gaussians: --points-from gaussians.
+    FOLDER holds scenes that `assemble` wrote. Objects are segmented in points on the visible surfaces, or in Gaussians:
+    --points-from gaussians.
     """
     from corporeal.lab.evaluation import objects_evaluation, objects_figure
 
@@ -189,9 +174,7 @@ def evaluate_objects() -> None:
     first = ("points-from", "surface-points", "pictures", "kept", "json", "figure")
     asked = parse(Objects, "evaluate objects", evaluate_objects.__doc__, words=2, first=first)
     with progress_bars() as tell:
-        found = objects_evaluation.evaluate_objects(
-            _folder(asked.folder, "objects"), asked.scenes, tell("evaluate")
-        )
+        found = objects_evaluation.evaluate_objects(_folder(asked.folder, "objects"), asked.scenes, tell("evaluate"))
     rows = [judged.row for judged in found]
     _show(objects_evaluation.objects_tables(rows))
     if asked.json is not None:
@@ -206,10 +189,9 @@ def evaluate_dynamics() -> None:
         corporeal evaluate dynamics showcase --against single capped one
         corporeal evaluate dynamics corpus/ --against vomp:fields/ --json d.json
 
-    TARGET is "showcase" or a corpus whose scenes are assembled. Each run is written to
-    OUT/SCENE/METHOD in its own process; repeat the command to resume. A failed run is a row. With
-    --judge a vision-language model judges videos of the runs, after a test with control videos;
-    corporeal evaluate judge OUT does the same later.
+    TARGET is "showcase" or a corpus whose scenes are assembled. Each run is written to OUT/SCENE/METHOD in its own
+    process; repeat the command to resume. A failed run is a row. With --judge a vision-language model judges videos of
+    the runs, after a test with control videos; corporeal evaluate judge OUT does the same later.
     """
     from corporeal.jobs.executor import Executor
     from corporeal.lab.evaluation.dynamics import dynamics_tables
@@ -235,8 +217,8 @@ def evaluate_dynamics() -> None:
         docs: Path | None = None
         """Also write the measured rows as a documentation page (Markdown)."""
         judge: str = NO_MODEL
-        """Model that also judges videos of the runs, as --vlm: see evaluate judge. Writes
-        OUT/judge.html and judge.json; --record keeps the answers for replay.
+        """Model that also judges videos of the runs, as --vlm: see evaluate judge. Writes OUT/judge.html and
+        judge.json; --record keeps the answers for replay.
         """
         looks: int = 1
         """Number of looks at each video, each from another side: 1 to 3."""
@@ -256,10 +238,7 @@ def evaluate_dynamics() -> None:
         hands = Executor(worker_factory(asked.crew, out), tell("evaluate"), log_event)
         found = evaluate(asked.target, out, asked.how, asked.settings, hands)
     _show(dynamics_tables.dynamics_tables(found))
-    for sentence in (
-        *dynamics_tables.ranking_sentences(found),
-        *dynamics_tables.missing_references(found),
-    ):
+    for sentence in (*dynamics_tables.ranking_sentences(found), *dynamics_tables.missing_references(found)):
         console.print(sentence, markup=False, highlight=False)
     _write_dynamics(found, asked, out)
     if asked.judge != NO_MODEL:  # pages and answers are written beside the runs
@@ -287,9 +266,9 @@ def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
 def evaluate_judge() -> None:
     """Judge videos of runs with a vision-language model that is validated on control videos.
 
-    FOLDER holds runs SCENE/METHOD, written by evaluate dynamics. Controls are the run "ours" with
-    one known fault each. For a law of physics the judge counts only if its answers detect the
-    controls of that law; else the tables say that this judge cannot tell.
+    FOLDER holds runs SCENE/METHOD, written by evaluate dynamics. Controls are the run "ours" with one known fault each.
+    For a law of physics the judge counts only if its answers detect the controls of that law; else the tables say that
+    this judge cannot tell.
     """
     from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
 

@@ -18,10 +18,9 @@ def command_export() -> None:
 
         corporeal export runs/duck-on-mud --to usd mjcf glb
 
-    SOURCE is the folder of a run; or a scene that is not simulated yet, as `corporeal run` takes
-    it; or a corpus that was run. Each target has its own folder in RUN/export; export.json lists
-    what a format cannot represent, and the errors. h5, abc and --check need the extra export: pip
-    install 'corporeal[export]'.
+    SOURCE is the folder of a run; or a scene that is not simulated yet, as `corporeal run` takes it; or a corpus that
+    was run. Each target has its own folder in RUN/export; export.json lists what a format cannot represent, and the
+    errors. h5, abc and --check need the extra export: pip install 'corporeal[export]'.
     """
     from corporeal.export.export_scene import DEFAULT_TARGETS, export_scene
     from corporeal.export.export_target import ExportConfig, ExportTarget

@@ -1,7 +1,7 @@
 """Layout of a command's help: common options first, all others under "more".
 
-Settings are nested dataclasses. Their fields are distributed to flat dataclasses, one for each
-heading of the help; the settings are rebuilt from what was parsed.
+Settings are nested dataclasses. Their fields are distributed to flat dataclasses, one for each heading of the help; the
+settings are rebuilt from what was parsed.
 """
 
 import ast

@@ -15,10 +15,9 @@ from corporeal.core.terminal import progress_bars
 def command_masks() -> None:
     """Grow masks of photographs with poses, from a point or a box in one of them.
 
-    Segmentation in one photograph uses colours and edges; the visual hull propagates it to the
-    others. Without a point or a box it begins at the cameras' common focus. The masks are PNG files
-    with the names of the photographs; check and correct them, and give them to `corporeal run
-    --masks`.
+    Segmentation in one photograph uses colours and edges; the visual hull propagates it to the others. Without a point
+    or a box it begins at the cameras' common focus. The masks are PNG files with the names of the photographs; check
+    and correct them, and give them to `corporeal run --masks`.
     """
     from corporeal.io.input_files import lacks_poses, scene_name
     from corporeal.io.photos.posed_photos import MASK_FOLDERS

@@ -11,9 +11,7 @@ from corporeal.cli.help_layout import lay_out
 from corporeal.core.errors import UnknownChoiceError
 
 
-def parse(
-    kind: Any, verb: str, description: str | None, words: int = 1, first: Sequence[str] = ()
-) -> Any:
+def parse(kind: Any, verb: str, description: str | None, words: int = 1, first: Sequence[str] = ()) -> Any:
     """Read the command line into ``kind``; its nested settings become plain flags.
 
     Args:

@@ -21,8 +21,8 @@ from corporeal.vlm.annotation_file import read_annotation_mapping
 def validate_settings(folder: Path, settings: Settings) -> None:
     """Raise for settings that cannot work: a model without its key, a missing library.
 
-    Settings that the run in ``folder`` already has are not validated again: its answers may be
-    stored, so that no model is needed.
+    Settings that the run in ``folder`` already has are not validated again: its answers may be stored, so that no model
+    is needed.
 
     Raises:
         UserError: A key, library or choice is missing or unknown.

@@ -40,8 +40,8 @@ class ViewOptions:
 def command_view() -> None:
     """View a run in a browser: rotate, colour, inspect every part.
 
-    Two runs are shown side by side with one timeline and camera; without a run, all are listed.
-    Needs the extra `viewer`: pip install 'corporeal[viewer]'.
+    Two runs are shown side by side with one timeline and camera; without a run, all are listed. Needs the extra
+    `viewer`: pip install 'corporeal[viewer]'.
     """
     asked = parse(ViewOptions, "view", command_view.__doc__)
     absent = [name for name in REQUIRED_PACKAGES if find_spec(name) is None]
@@ -62,13 +62,7 @@ def _show(asked: ViewOptions) -> None:
     from corporeal.viewer.run_exports import RunExports
     from corporeal.viewer.run_requests import RunRequests
     from corporeal.viewer.run_store import RunStore
-    from corporeal.viewer.server import (
-        ListenAddress,
-        access_policy_of,
-        address_words,
-        open_listener,
-        serve,
-    )
+    from corporeal.viewer.server import ListenAddress, access_policy_of, address_words, open_listener, serve
     from corporeal.viewer.web_app import SiteOptions, make_app
 
     names = _names(asked)
@@ -79,12 +73,7 @@ def _show(asked: ViewOptions) -> None:
     room = LiveSession(shelf.made, (things := LiveAssets(shelf)).find)
     work = None if asked.read_only or asked.runs else RunRequests(shelf, asked.out)
     replays = ReplayJobs(shelf, room)
-    live = (
-        live_route(room),
-        *RunExports(shelf).routes(),
-        *replays.routes(),
-        *asset_routes(things, room),
-    )
+    live = (live_route(room), *RunExports(shelf).routes(), *replays.routes(), *asset_routes(things, room))
     more = () if asked.read_only else (*live, *(work.routes() if work else ()))
     app = make_app(SiteOptions(shelf, names, asked.read_only, work is not None), door, more)
     try:

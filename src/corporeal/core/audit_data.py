@@ -1,9 +1,8 @@
 """Data of the audit of a finished simulation: outcome and violations.
 
-Computed in ``trajectory.outcome`` and ``trajectory.audit``, kept as ``audit.json`` (``trajectory.
-audit_file``), whose keys are the names of the fields below. All quantities are SI; a name ends in
-its unit where JSON needs one: ``_m``, ``_s``, ``_deg``, ``_kg``, and ``_dx`` for grid cells. None
-stands for what did not happen.
+Computed in ``trajectory.outcome`` and ``trajectory.audit``, kept as ``audit.json`` (``trajectory. audit_file``), whose
+keys are the names of the fields below. All quantities are SI; a name ends in its unit where JSON needs one: ``_m``,
+``_s``, ``_deg``, ``_kg``, and ``_dx`` for grid cells. None stands for what did not happen.
 """
 
 from collections.abc import Iterable, Mapping
@@ -34,8 +33,8 @@ class ObjectOutcome:
     dent_depth_m: float
     """Of the largest dent that is left at the end, from averages over the last 0.3 s [m].
 
-    Of what holds together: how far a patch of its material went from where it was (``trajectory.
-    residual_shape``). Of grains and pastes: how deep the free surface fell (``surface_mark``).
+    Of what holds together: how far a patch of its material went from where it was (``trajectory. residual_shape``). Of
+    grains and pastes: how deep the free surface fell (``surface_mark``).
     """
     dent_depth_dx: float
     """[cells]"""
@@ -47,8 +46,7 @@ class ObjectOutcome:
     dent_from_contact_m: Mapping[str, float | None]
     """Other body → distance of the dent's centroid from where the two first touched [m]."""
     deepest_squeeze_m: float
-    """Displacement that a hundredth of the particles exceed once rigid motion is removed, at any
-    time [m]."""
+    """Displacement that a hundredth of the particles exceed once rigid motion is removed, at any time [m]."""
     moved_m: Vector
     """Displacement of the centre of mass [m]."""
     moved_level_m: float
@@ -66,15 +64,14 @@ class ObjectOutcome:
     rebound_ratio: float | None
     """Rebound over fall [-]."""
     reach_m: float | None = None
-    """Level distance from its middle within which 98 % of its mass lie at the end, and a quarter
-    cell [m]."""
+    """Level distance from its middle within which 98 % of its mass lie at the end, and a quarter cell [m]."""
     height_m: float | None = None
     """Of its top over its bottom at the end, a particle's own size included [m]."""
     left_vessel: float | None = None
     """Share of it that is outside of the vessel that held it [-]; None: none did."""
     rim_height_m: float | None = None
-    """By how much the surface of grains or paste rose where it rose most [m]; None: it holds
-    together, or the run is from before this was measured."""
+    """By how much the surface of grains or paste rose where it rose most [m]; None: it holds together, or the run is
+    from before this was measured."""
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
 """Conversion of plain JSON data to frozen dataclasses.
 
-The inverse of ``store.plain``: what was written to a file is read by the names of fields, not by
-strings. Keys that no field has are ignored, so that a reader declares only what it needs, and a
-field with a default may be absent, as in tables that are written manually.
+The inverse of ``store.plain``: what was written to a file is read by the names of fields, not by strings. Keys that no
+field has are ignored, so that a reader declares only what it needs, and a field with a default may be absent, as in
+tables that are written manually.
 """
 
 from collections.abc import Mapping
@@ -20,8 +20,8 @@ def from_plain(kind: type[T], data: Mapping[str, Any]) -> T:
     """Make a dataclass from plain data.
 
     Args:
-        kind: A dataclass whose fields are numbers, strings, paths, enums, dataclasses, or tuples,
-            lists and mappings by name of these.
+        kind: A dataclass whose fields are numbers, strings, paths, enums, dataclasses, or tuples, lists and mappings by
+            name of these.
         data: Field → value; null stands for a number that is not finite.
 
     Raises:

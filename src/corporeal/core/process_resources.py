@@ -32,10 +32,10 @@ def usable_cores(quota: Path = CPU_QUOTA_FILE) -> int:
 def keep_freed_memory() -> bool:
     """Let arrays reuse what others freed instead of asking the system for each; whether it does.
 
-    Usual is that every large array is fresh memory of the system, which has to empty each page of
-    it at the first touch, and that threads have memory apart (arenas), most of which goes back to
-    the system when it is freed, whatever is to be kept; here they share one. Where the C library is
-    not glibc, or the environment has a ``MALLOC_`` setting of its own, nothing is changed.
+    Usual is that every large array is fresh memory of the system, which has to empty each page of it at the first
+    touch, and that threads have memory apart (arenas), most of which goes back to the system when it is freed, whatever
+    is to be kept; here they share one. Where the C library is not glibc, or the environment has a ``MALLOC_`` setting
+    of its own, nothing is changed.
     """
     if any(name.startswith("MALLOC_") for name in os.environ):
         return False
@@ -50,9 +50,9 @@ def keep_freed_memory() -> bool:
 def relax_garbage_collection() -> None:
     """Let Python look for unused cycles of objects after every 50,000, not 700.
 
-    Modules and materials are hundreds of thousands of objects that stay, and each search goes
-    through many of them: 2 % of the demo. Large arrays are in no cycles. When the process ends,
-    Python would search all of them several times more; the system takes their memory back anyway.
+    Modules and materials are hundreds of thousands of objects that stay, and each search goes through many of them: 2 %
+    of the demo. Large arrays are in no cycles. When the process ends, Python would search all of them several times
+    more; the system takes their memory back anyway.
     """
     gc.set_threshold(GC_THRESHOLD_OBJECTS, *gc.get_threshold()[1:])
     atexit.register(gc.freeze)

@@ -1,8 +1,8 @@
 """Markers that declare which settings name files, by the type of the field, and which are options.
 
-A field of type ``Path`` or ``Path | None`` names a file or folder that is read. A field of type
-``str`` names one only if its annotation carries ``ReadsPath``; a path that is written carries
-``WritesPath``. All other values are never looked up on the disk.
+A field of type ``Path`` or ``Path | None`` names a file or folder that is read. A field of type ``str`` names one only
+if its annotation carries ``ReadsPath``; a path that is written carries ``WritesPath``. All other values are never
+looked up on the disk.
 """
 
 from dataclasses import dataclass, fields

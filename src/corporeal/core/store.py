@@ -1,8 +1,8 @@
 """Storage of stage results with freshness keys.
 
-A stage's folder holds ``data.npz`` (the result), and ``meta.json`` with its freshness key, its
-configuration and its seconds. ``meta.json`` is written last, by an atomic rename: a folder without
-it is unfinished, whatever else lies in it.
+A stage's folder holds ``data.npz`` (the result), and ``meta.json`` with its freshness key, its configuration and its
+seconds. ``meta.json`` is written last, by an atomic rename: a folder without it is unfinished, whatever else lies in
+it.
 """
 
 import errno
@@ -67,8 +67,7 @@ def disk_errors(path: Path) -> Iterator[None]:
         if error.errno not in reasons:
             raise
         raise DiskError(
-            f"Cannot write {path}: {reasons[error.errno]}, then run the same command again: "
-            "finished stages are kept."
+            f"Cannot write {path}: {reasons[error.errno]}, then run the same command again: finished stages are kept."
         ) from error
 
 
@@ -160,8 +159,7 @@ def write_bytes(path: Path, data: bytes) -> None:
 def whole_folder(folder: Path) -> Iterator[Path]:
     """Fill a folder that appears whole or not at all; what was there before goes only then.
 
-    The caller keeps others out of the folder above (``lock_folder``): what a killed process left
-    there is removed.
+    The caller keeps others out of the folder above (``lock_folder``): what a killed process left there is removed.
 
     Yields:
         An empty folder to write into.
@@ -231,15 +229,7 @@ def _to_plain_leaf(value: Any) -> Any:
 
 # ---------------------------------------------------------------- anything that flows ↔ npz
 
-UNREADABLE = (
-    OSError,
-    ValueError,
-    KeyError,
-    TypeError,
-    EOFError,
-    RuntimeError,
-    zipfile.BadZipFile,
-)
+UNREADABLE = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile)
 """What loading a damaged file, or one with other fields, may raise."""
 
 
@@ -274,9 +264,7 @@ def load(path: Path) -> Any:
             tree = json.loads(bytes(file[TREE_ARRAY]).decode())
             return _decode(tree, file)
     except UNREADABLE as error:
-        raise BadFileError(
-            path, f"cannot be read ({error}).", "Delete the folder it is in and run again."
-        ) from error
+        raise BadFileError(path, f"cannot be read ({error}).", "Delete the folder it is in and run again.") from error
 
 
 def _encode(value: Any, arrays: dict[str, Any]) -> Any:
@@ -389,9 +377,7 @@ def read_meta(folder: Path) -> ResultMeta:
     """
     data = read_json(folder / META_FILE)
     if not isinstance(data, dict):
-        raise BadFileError(
-            folder / META_FILE, "is not the description of a result.", "Remove the folder."
-        )
+        raise BadFileError(folder / META_FILE, "is not the description of a result.", "Remove the folder.")
     return from_plain(ResultMeta, data)
 
 

@@ -19,8 +19,8 @@ ProgressOfStage = Callable[[str], Callable[[float, str], None]]
 LOG_INTERVAL_S = 30.0
 """Seconds between two lines of a log on one stage [s]."""
 LOG_START_DELAY_S = 2.0
-"""Seconds after which a log says that a stage began: what is over before then is not worth a line,
-and an error stands alone [s].
+"""Seconds after which a log says that a stage began: what is over before then is not worth a line, and an error stands
+alone [s].
 """
 MIN_FRACTION_FOR_ESTIMATE = 0.05
 """Share of a stage after which the remaining time is shown [-]."""
@@ -28,19 +28,12 @@ MINUTE_S, HOUR_S, SHORT_DURATION_S = 60.0, 3600.0, 90.0
 """[s]; short times are shown in seconds."""
 
 
-def show_table(
-    heads: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None
-) -> None:
+def show_table(heads: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
     """Print a table whose words are taken as they are."""
     print_table(heads, rows, Console(), title)
 
 
-def print_table(
-    heads: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    where: Console,
-    title: str | None = None,
-) -> None:
+def print_table(heads: Sequence[str], rows: Sequence[Sequence[str]], where: Console, title: str | None = None) -> None:
     """Print a table whose words are taken as they are, to a certain console."""
     table = Table(*map(escape, heads), title=title and escape(title), box=None)
     for row in rows:
@@ -96,8 +89,8 @@ class StageProgress:
     fraction: float = 0.0
     words: str = ""
     first: tuple[float, float] | None = None
-    """Time of the first report [s], and the fraction that was done then: what an interrupted run
-    left counts for no speed.
+    """Time of the first report [s], and the fraction that was done then: what an interrupted run left counts for no
+    speed.
     """
 
     def told(self, fraction: float, words: str, now: float) -> None:
@@ -109,9 +102,7 @@ class StageProgress:
         """Return how far it is, and how long it will last if it goes on as it did."""
         left = f", about {duration_words(self._left(now))} left" if self._speed(now) > 0 else ""
         words = f": {self.words}" if self.words else ""
-        return (
-            f"{self.verb} {self.fraction:.0%} after {duration_words(now - self.begun)}{left}{words}"
-        )
+        return f"{self.verb} {self.fraction:.0%} after {duration_words(now - self.begun)}{left}{words}"
 
     def _speed(self, now: float) -> float:
         """Return the share that is done in a second; 0: unknown yet [1/s]."""
@@ -176,12 +167,7 @@ class _LoggedStage:
     """A stage of which something is said every so often, whether or not it tells anything."""
 
     def __init__(
-        self,
-        doing: StageProgress,
-        say: Callable[[str], None],
-        now: Callable[[], float],
-        soon: float,
-        every: float,
+        self, doing: StageProgress, say: Callable[[str], None], now: Callable[[], float], soon: float, every: float
     ) -> None:
         self.doing, self._say, self._now = doing, say, now
         self._soon, self._every = soon, every

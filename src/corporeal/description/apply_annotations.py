@@ -5,24 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from corporeal import materials
-from corporeal.core.types import (
-    PartDescription,
-    Scene,
-)
+from corporeal.core.types import PartDescription, Scene
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.describe_from_file import OPEN_WARE_MARK
 from corporeal.discretization.open_vessel_walls import NamedObject, with_usual_vessel_wall
 from corporeal.recognition.lexicon import name_tokens
 from corporeal.recognition.parts_by_name import PartsByName
-from corporeal.vlm.annotation_file import (
-    PartAnnotation,
-    annotated_pieces,
-    apply_structure_annotation,
-    read_annotations,
-)
-from corporeal.vlm.interpret_answers import (
-    merge_pieces,
-)
+from corporeal.vlm.annotation_file import PartAnnotation, annotated_pieces, apply_structure_annotation, read_annotations
+from corporeal.vlm.interpret_answers import merge_pieces
 
 GEOMETRIC_SHARE_FIELDS = ("volume_share", "surface_share")
 OPEN_WARE_FIELDS = ("structure", "built_by", "wall_unseen")
@@ -30,11 +20,7 @@ OPEN_WARE_FIELDS = ("structure", "built_by", "wall_unseen")
 
 
 def load_annotations(
-    scene: Scene,
-    identity: PartsByName,
-    config: DescribeConfig,
-    library: str,
-    from_pictures: Collection[int],
+    scene: Scene, identity: PartsByName, config: DescribeConfig, library: str, from_pictures: Collection[int]
 ) -> dict[tuple[str, str], PartAnnotation]:
     """Read the annotation file, by object and part, with the library's spelling of names.
 
@@ -45,8 +31,7 @@ def load_annotations(
     if config.annotations is None:
         return {}
     names = {
-        obj.name: [p.name for p in identity.catalogue if p.object == number]
-        for number, obj in enumerate(scene.objects)
+        obj.name: [p.name for p in identity.catalogue if p.object == number] for number, obj in enumerate(scene.objects)
     }
     whole = [obj.name for number, obj in enumerate(scene.objects) if number in from_pictures]
     read = read_annotations(Path(config.annotations), names, whole)
@@ -55,10 +40,7 @@ def load_annotations(
 
 def _with_library_names(one: PartAnnotation, library: str) -> PartAnnotation:
     """Write the names of materials as the library spells them."""
-    named = [
-        n and materials.find_material_or_default(n, library).name
-        for n in (one.material, one.contents)
-    ]
+    named = [n and materials.find_material_or_default(n, library).name for n in (one.material, one.contents)]
     return replace(one, material=named[0], contents=named[1])
 
 
@@ -80,10 +62,7 @@ def apply_annotations(
 
 
 def _apply_annotation(
-    annotation: PartAnnotation | None,
-    words: PartDescription,
-    path: Path | None,
-    called: NamedObject,
+    annotation: PartAnnotation | None, words: PartDescription, path: Path | None, called: NamedObject
 ) -> PartDescription:
     """Override a description by an annotation; fields that it leaves open stay.
 
@@ -98,22 +77,14 @@ def _apply_annotation(
         return words
     where = f"Stated in {Path(str(path)).name}."
     if annotation.material is not None:
-        found = PartDescription(
-            words.name, annotation.material, None, None, "annotation", 1.0, where
-        )
+        found = PartDescription(words.name, annotation.material, None, None, "annotation", 1.0, where)
         is_open = (words.structure, words.built_by) == OPEN_WARE_MARK
         kept = GEOMETRIC_SHARE_FIELDS + OPEN_WARE_FIELDS if is_open else GEOMETRIC_SHARE_FIELDS
         words = replace(found, **{s: getattr(words, s) for s in kept})
         if is_open:
             words = with_usual_vessel_wall(words, called)
-    if (
-        annotation.material is not None
-        or annotation.structure is not None
-        or annotation.contents is not None
-    ):
+    if annotation.material is not None or annotation.structure is not None or annotation.contents is not None:
         words = replace(words, hypotheses=())  # a person is certain
-    known = (
-        (*materials.parse_quantity_key(key), value) for key, value in annotation.values.items()
-    )
+    known = ((*materials.parse_quantity_key(key), value) for key, value in annotation.values.items())
     values = {field: value * factor for field, factor, value in known}
     return replace(apply_structure_annotation(annotation, words), values=values)

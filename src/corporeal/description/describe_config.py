@@ -18,12 +18,12 @@ class DescribeConfig:
     annotations: Path | None = None
     """YAML file with materials of parts; it takes precedence over every other answer."""
     vlm: Annotated[str, ReadsPath(prefixes=("replay",))] = "metadata"
-    """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL",
-    "google:MODEL", "ollama:MODEL", or "openai:MODEL@http://host/v1" for any compatible server.
-    "ask:FOLDER": you answer. "replay:FOLDER": recorded answers."""
+    """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL", "google:MODEL", "ollama:MODEL",
+    or "openai:MODEL@http://host/v1" for any compatible server. "ask:FOLDER": you answer. "replay:FOLDER": recorded
+    answers."""
     critic: Annotated[str, ReadsPath(prefixes=("replay",))] = ""
-    """Model that ranks proposed decompositions into parts, as --vlm; "": the same model, or a
-    cheaper one of OpenAI's."""
+    """Model that ranks proposed decompositions into parts, as --vlm; "": the same model, or a cheaper one of
+    OpenAI's."""
     record: Annotated[Path | None, WritesPath()] = None
     """Folder to record every answer in, for --vlm replay:FOLDER."""
     sampling: Literal["fraction", "value"] = "fraction"
@@ -35,12 +35,12 @@ class DescribeConfig:
     view_seed: int = 0
     """Seed of the choice of views."""
     direct: bool = True
-    """Also ask a model, without the library, what is printed on each object and what it weighs.
-    This reweights hypotheses, and sets no value.
+    """Also ask a model, without the library, what is printed on each object and what it weighs. This reweights
+    hypotheses, and sets no value.
     """
     answers: int = 1
-    """Number of answers to each question about materials, values and mass (self-consistency).
-    Masses are pooled over them with equal weights; parts are asked for once.
+    """Number of answers to each question about materials, values and mass (self-consistency). Masses are pooled over
+    them with equal weights; parts are asked for once.
     """
     parallel: int = 4
     """Number of concurrent questions, in objects."""

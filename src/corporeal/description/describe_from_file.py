@@ -6,14 +6,7 @@ from functools import partial
 
 from corporeal import materials
 from corporeal.core.errors import UnknownChoiceError, UserError
-from corporeal.core.types import (
-    MeasuredRange,
-    ObjectDescription,
-    PartDescription,
-    Provenance,
-    Scene,
-    Surface,
-)
+from corporeal.core.types import MeasuredRange, ObjectDescription, PartDescription, Provenance, Scene, Surface
 from corporeal.discretization.open_vessel_walls import (
     NamedObject,
     hollow_if_too_thick,
@@ -21,15 +14,9 @@ from corporeal.discretization.open_vessel_walls import (
     with_usual_vessel_wall,
 )
 from corporeal.materials.quantities import QUANTITIES
-from corporeal.materials.range_placement import (
-    library_entry,
-)
+from corporeal.materials.range_placement import library_entry
 from corporeal.recognition.contents_from_name import apply_named_contents
-from corporeal.recognition.metadata_recognition import (
-    gather_file_evidence,
-    infer_hollow_structure,
-    recognise_part,
-)
+from corporeal.recognition.metadata_recognition import gather_file_evidence, infer_hollow_structure, recognise_part
 from corporeal.recognition.name_priors import usual_inflation, usual_rebound
 from corporeal.recognition.parts_by_name import PartsByName
 from corporeal.recognition.stated_properties import (
@@ -48,11 +35,7 @@ OPEN_WARE_MARK = ("sheet", "metadata")
 
 
 def parts_from_file(
-    scene: Scene,
-    identity: PartsByName,
-    library: str,
-    from_pictures: Collection[int],
-    unasked: bool,
+    scene: Scene, identity: PartsByName, library: str, from_pictures: Collection[int], unasked: bool
 ) -> list[list[PartDescription]]:
     """Describe each part of each object by the file: stated, or recognised from names.
 
@@ -80,9 +63,7 @@ def parts_from_file(
         if unasked and not pictured:
             found = sheet_if_drawn_full(hollow_if_too_thick(found, seen, library), seen, library)
         if not pictured:
-            found = apply_named_contents(
-                found, seen, found.material is None or walls(found.material)
-            )
+            found = apply_named_contents(found, seen, found.material is None or walls(found.material))
         by = "metadata" if found.material else "unknown"
         found = replace(found, name=entry.name, answered_by=by)
         found = apply_stated_wall(found, stated_thickness(seen.surfaces))
@@ -100,9 +81,7 @@ def parts_from_file(
 
 def open_ware_notes(objects: Sequence[ObjectDescription]) -> tuple[str, ...]:
     """Return notes on objects from pictures that are open ware by name."""
-    made = [
-        (o.name, p) for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN_WARE_MARK
-    ]
+    made = [(o.name, p) for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN_WARE_MARK]
     return tuple(
         f"{name}: pictures may not show its inside. By its name it is open ware, with a wall along "
         f"its outside {_wall_text(part)}, and empty; annotate structure and thickness_mm if that "

@@ -1,10 +1,9 @@
 """Pooling of several answers on one object with equal weights.
 
-Wang, Wei, Schuurmans, Le, Chi, Narang, Chowdhery and Zhou (2022), *Self-consistency improves chain
-of thought reasoning in language models*, arXiv:2203.11171, sample several answers and take a vote.
-Answers here are distributions, so they are mixed instead: a linear opinion pool (Stone 1961) with
-equal weights. Draws take one answer whole, with its own values; what is pooled here is the
-description that is shown, and that the scene is computed with.
+Wang, Wei, Schuurmans, Le, Chi, Narang, Chowdhery and Zhou (2022), *Self-consistency improves chain of thought reasoning
+in language models*, arXiv:2203.11171, sample several answers and take a vote. Answers here are distributions, so they
+are mixed instead: a linear opinion pool (Stone 1961) with equal weights. Draws take one answer whole, with its own
+values; what is pooled here is the description that is shown, and that the scene is computed with.
 """
 
 from collections import Counter
@@ -52,9 +51,7 @@ def pool_answers(thing: ObjectDescription, answers: Sequence[ObjectAnswer]) -> O
     return replace(thing, parts=parts, evidence=evidence, answers=tuple(answers))
 
 
-def _in_piece_order(
-    parts: Sequence[PartDescription], like: Sequence[PartDescription]
-) -> tuple[PartDescription, ...]:
+def _in_piece_order(parts: Sequence[PartDescription], like: Sequence[PartDescription]) -> tuple[PartDescription, ...]:
     """Put every part's pieces in the order of the first answer's."""
     found = []
     for part, first in zip(parts, like, strict=True):
@@ -78,10 +75,7 @@ def _pool_part(same: Sequence[PartDescription]) -> PartDescription:
             _pool_leaf([one.pieces[k] for one in same]),
             inside=commonest[k][0],
             missing=commonest[k][1],
-            **{
-                name: _mean([getattr(one.pieces[k], name) for one in agreed])
-                for name in SHARE_FIELDS
-            },
+            **{name: _mean([getattr(one.pieces[k], name) for one in agreed]) for name in SHARE_FIELDS},
         )
         for k in range(len(commonest))
     ]
@@ -102,10 +96,7 @@ def _pool_leaf(same: Sequence[PartDescription]) -> PartDescription:
         places = [one.placements for one in same]
         return replace(first, placements=_pool_placements(places, [1.0] * len(same)))
     ways = _merge_hypotheses([way for one in same for way in one.hypotheses], len(same))
-    led = next(
-        (one for one in same if _hypothesis_key(one.hypotheses[0]) == _hypothesis_key(ways[0])),
-        first,
-    )
+    led = next((one for one in same if _hypothesis_key(one.hypotheses[0]) == _hypothesis_key(ways[0])), first)
     kept = {name: getattr(first, name) for name in ("swelling", *SHARE_FIELDS, "inside", "missing")}
     found = replace(apply_hypothesis(led, ways[0]), hypotheses=ways, **kept)
     if found.answered_by in LOOKING_SOURCES or ways[0].material is None:
@@ -134,15 +125,11 @@ def _merge_group(group: Sequence[Hypothesis], count: int) -> Hypothesis:
         probability=sum(way.probability for way in group) / count,
         fill=_weighted_mean(group, lambda way: way.fill),
         solidity=_weighted_mean(group, lambda way: way.solidity),
-        placements=_pool_placements(
-            [way.placements for way in group], [way.probability for way in group]
-        ),
+        placements=_pool_placements([way.placements for way in group], [way.probability for way in group]),
     )
 
 
-def _weighted_mean(
-    group: Sequence[Hypothesis], share: Callable[[Hypothesis], float | None]
-) -> float | None:
+def _weighted_mean(group: Sequence[Hypothesis], share: Callable[[Hypothesis], float | None]) -> float | None:
     """Return the mean of a field over the hypotheses that state it, weighted by probability."""
     known = [(value, way.probability) for way in group if (value := share(way)) is not None]
     if not known:

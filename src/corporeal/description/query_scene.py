@@ -31,11 +31,7 @@ from corporeal.description.describe_from_file import has_wall_thickness, stated_
 from corporeal.description.pool_answers import pool_answers
 from corporeal.discretization.drawn_thickness import measure_drawn_shape
 from corporeal.discretization.mesh_measures import oriented_box_size
-from corporeal.materials.material_candidates import (
-    QuantityChoice,
-    content_materials_text,
-    part_materials_text,
-)
+from corporeal.materials.material_candidates import QuantityChoice, content_materials_text, part_materials_text
 from corporeal.materials.range_placement import (
     QuantityJudgement,
     library_entry,
@@ -80,8 +76,7 @@ def repeat_interview(
 ) -> list[ObjectAnswer]:
     """Return the descriptions of one object by ``count`` answers.
 
-    Answers with an unusable reply are left out with a warning; if all are, the first is used,
-    completed from the file.
+    Answers with an unusable reply are left out with a warning; if all are, the first is used, completed from the file.
 
     Args:
         interview: Of the object.
@@ -132,9 +127,7 @@ def _judge_mass(interview: Interview, direct: bool) -> MassEvidence | None:
     return evidence_from_answer(*weighs) if weighs else None
 
 
-def _warn_of_left_out_answers(
-    interview: Interview, whole: Sequence[ObjectAnswer], count: int
-) -> None:
+def _warn_of_left_out_answers(interview: Interview, whole: Sequence[ObjectAnswer], count: int) -> None:
     """Warn of answers that are left out, without repetition."""
     warnings = list(dict.fromkeys(interview.warnings))
     if len(whole) < count:
@@ -151,9 +144,7 @@ OfferedChoices = Mapping[str, Mapping[str, QuantityChoice]]
 def hypotheses_by_name(words: PartDescription) -> dict[str, PartDescription]:
     """Return the hypotheses of a part by the names used in questions; the first is the part."""
     others = enumerate(words.hypotheses[1:], 1)
-    return {words.name: words} | {
-        hypothesis_name(words.name, k): apply_hypothesis(words, w) for k, w in others
-    }
+    return {words.name: words} | {hypothesis_name(words.name, k): apply_hypothesis(words, w) for k, w in others}
 
 
 def make_placement_offer(
@@ -179,11 +170,7 @@ def placements_from_answer(
     """Read an answer: part → quantity → where in its range the value lies."""
     read = placements_from_values if isinstance(answer, ValueAnswer) else placements_from_fractions
     return {
-        p.part: read(
-            {v.quantity: QuantityJudgement(v.number, v.reason) for v in p.values},
-            by,
-            offered[p.part],
-        )
+        p.part: read({v.quantity: QuantityJudgement(v.number, v.reason) for v in p.values}, by, offered[p.part])
         for p in answer.parts
     }
 
@@ -208,17 +195,10 @@ class SceneQuery:
         self.model, self.critic = model, critic
         folder = files("corporeal.description").joinpath("prompts")
         self.prompts = {t: read_prompt(folder.joinpath(f"{t}.md")) for t in INTERVIEW_TASKS}
-        self.lists = {
-            "materials": part_materials_text(library),
-            "contents": content_materials_text(library),
-        }
+        self.lists = {"materials": part_materials_text(library), "contents": content_materials_text(library)}
         self.names = AllowedNames(
-            partial(
-                library_spelling, library_name=library, offered=materials.part_materials(library)
-            ),
-            partial(
-                library_spelling, library_name=library, offered=materials.content_materials(library)
-            ),
+            partial(library_spelling, library_name=library, offered=materials.part_materials(library)),
+            partial(library_spelling, library_name=library, offered=materials.content_materials(library)),
             partial(has_wall_thickness, library),
         )
 
@@ -232,8 +212,7 @@ class SceneQuery:
         times = self.config.answers
         doing = "asking" if times == 1 else f"asking, {times} answers each"
         jobs: list[Callable] = [
-            partial(self._object, number, interviews[number], file[number], annotations)
-            for number in range(count)
+            partial(self._object, number, interviews[number], file[number], annotations) for number in range(count)
         ]
         results = thread_map(
             [*jobs, lambda: sizes.extents(classes) if classes else {}],
@@ -258,16 +237,11 @@ class SceneQuery:
                 made = stated_material(own, self.library)
                 name = made and library_entry(str(made.material), self.library).name
                 put = placed_wall_thickness(believed[entry.name], self.library)
-                clauses.append(
-                    contradiction_with_file(believed[entry.name], name, stated_thickness(own), put)
-                )
+                clauses.append(contradiction_with_file(believed[entry.name], name, stated_thickness(own), put))
         against_file = "; ".join(filter(None, clauses))
         if not against_file:
             return ""
-        return Note(
-            f"{words.name}: {against_file}. The latter was used; --annotations decides.",
-            NoteKind.ASSUMED,
-        )
+        return Note(f"{words.name}: {against_file}. The latter was used; --annotations decides.", NoteKind.ASSUMED)
 
     def _about(self, subject: InterviewSubject) -> Interview:
         return Interview(self.model, self.critic, self.prompts, subject)
@@ -281,9 +255,7 @@ class SceneQuery:
         first = next(k for k, p in enumerate(self.identity.catalogue) if p.object == number)
         own = [
             int(part) - first if surface.object == number else None
-            for part, surface in zip(
-                self.identity.part_of_surface, self.scene.surfaces, strict=True
-            )
+            for part, surface in zip(self.identity.part_of_surface, self.scene.surfaces, strict=True)
         ]
         surfaces = [s for s in self.scene.surfaces if s.object == number]
         corners = np.concatenate([s.vertices for s in surfaces])
@@ -372,15 +344,8 @@ class SceneQuery:
 
     def _placed(self, interview: Interview, words: list[PartDescription]) -> list[PartDescription]:
         """Ask for the place of each open value in its measured range, for all hypotheses."""
-        parts = {
-            name: way
-            for leaf in leaf_parts(words)
-            for name, way in hypotheses_by_name(leaf).items()
-        }
-        offered = {
-            name: quantity_choices(way, self.library, weighing=name != way.name)
-            for name, way in parts.items()
-        }
+        parts = {name: way for leaf in leaf_parts(words) for name, way in hypotheses_by_name(leaf).items()}
+        offered = {name: quantity_choices(way, self.library, weighing=name != way.name) for name, way in parts.items()}
         offered = {name: found for name, found in offered.items() if found}
         if not offered:
             return words

@@ -11,32 +11,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from corporeal.core.types import (
-    Discretization,
-    Law,
-    Material,
-    MaterialField,
-    Particles,
-    Scene,
-    Wall,
-)
+from corporeal.core.types import Discretization, Law, Material, MaterialField, Particles, Scene, Wall
 from corporeal.discretization.filled_shells import acting_material
 from corporeal.discretization.impact_restitution import restitutions_at_impact
 from corporeal.discretization.layered_sheets import part_proportions
 from corporeal.discretization.rolling_resistance import rolling_resistance_lengths
 from corporeal.geometry.scene_transforms import underside_centre
 from corporeal.mpm.physics.body_distance import pair_gaps
-from corporeal.mpm.problem import (
-    FLOOR,
-    NO_WIND_FACES,
-    Body,
-    Joint,
-    Plane,
-    Problem,
-    Tether,
-    WettedSurface,
-    WindFaces,
-)
+from corporeal.mpm.problem import FLOOR, NO_WIND_FACES, Body, Joint, Plane, Problem, Tether, WettedSurface, WindFaces
 
 ZERO_VELOCITY = (0.0, 0.0, 0.0)
 GRAVITY_RAMP_S = 0.1
@@ -57,23 +39,18 @@ class ModelMapping:
 
 
 def build_model(
-    scene: Scene,
-    particles: Particles,
-    field: MaterialField,
-    contact: Literal["multi", "single"] = "multi",
+    scene: Scene, particles: Particles, field: MaterialField, contact: Literal["multi", "single"] = "multi"
 ) -> ModelMapping:
     """Build the problem that an engine solves.
 
-    One body per object, in the scene's order; an object with rigid inclusions gives its soft body and
-    then each inclusion.
+    One body per object, in the scene's order; an object with rigid inclusions gives its soft body and then each
+    inclusion.
     """
     pieces = divide_into_pieces(particles, len(scene.objects))
     bodies = tuple(build_body(scene, particles, field, piece) for piece in pieces)
     weights = part_surface_weights(particles, pieces)
     footing = footing_weights(particles, pieces, weights)
-    bounces = restitutions_at_impact(
-        field, particles.treatments, part_proportions(particles, field)
-    )
+    bounces = restitutions_at_impact(field, particles.treatments, part_proportions(particles, field))
 
     def averaged(table: np.ndarray) -> np.ndarray:
         return add_wall_rows(average_pair_table(table, weights, footing), len(scene.walls))
@@ -83,9 +60,7 @@ def build_model(
         cell=particles.cell,
         friction=averaged(field.friction),
         restitution=averaged(bounces.restitution),
-        restitution_law=np.stack(
-            [averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1
-        ),
+        restitution_law=np.stack([averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1),
         planes=(FLOOR, *(plane_of_wall(w) for w in scene.walls)),
         gravity=scene.gravity,
         gravity_ramp=GRAVITY_RAMP_S if starts_settled(scene, particles) else 0.0,
@@ -94,10 +69,7 @@ def build_model(
         joints=plant_joints(particles, pieces),
         excluded_pairs=never_touching_pieces(pieces),
         rolling_resistance=rolling_resistance_lengths(
-            bodies,
-            [field.materials[int(share.argmax())] for share in weights],
-            field.floor,
-            1 + len(scene.walls),
+            bodies, [field.materials[int(share.argmax())] for share in weights], field.floor, 1 + len(scene.walls)
         ),
     )
     return ModelMapping(
@@ -144,9 +116,7 @@ def divide_into_pieces(particles: Particles, objects: int) -> list[BodyPiece]:
         soft, inclusion = len(pieces), mine[stiff[mine]]
         pieces.append(BodyPiece(k, False, mine[~stiff[mine]], points[:0]))
         found = label_rigid_inclusions(
-            particles.position[inclusion],
-            particles.surface[points],
-            SAME_INCLUSION_DISTANCE_CELLS * particles.cell,
+            particles.position[inclusion], particles.surface[points], SAME_INCLUSION_DISTANCE_CELLS * particles.cell
         )
         pieces += [
             BodyPiece(k, True, inclusion[found.of_particle == c], points[found.of_point == c], soft)
@@ -179,17 +149,13 @@ def label_rigid_inclusions(
     """
     label = label_clusters(np.concatenate([position, surface]), reach)
     filled, joined = np.unique(label[: len(position)], return_inverse=True)
-    owner = (
-        nearest_label(position, surface, joined) if len(surface) else np.zeros(0, dtype=np.int64)
-    )
+    owner = nearest_label(position, surface, joined) if len(surface) else np.zeros(0, dtype=np.int64)
     known = np.isin(label[len(position) :], filled)
     owner[known] = np.searchsorted(filled, label[len(position) :][known])
     return RigidInclusionLabels(joined, owner)
 
 
-def divide_plant(
-    particles: Particles, number: int, crown: Int[np.ndarray, " N"], first: int
-) -> list[BodyPiece]:
+def divide_plant(particles: Particles, number: int, crown: Int[np.ndarray, " N"], first: int) -> list[BodyPiece]:
     """Take a plant apart: pot and soil, the wood that stands in it where it does, leaves.
 
     Args:
@@ -205,9 +171,7 @@ def divide_plant(
     wood = [r.part for r in particles.roots if r.object == number]
     swings = np.isin(particles.part[rest], wood).astype(np.int64)
     owner = nearest_label(particles.position[rest], particles.surface[points], swings)
-    found = [
-        BodyPiece(number, True, rest[swings == c], points[owner == c]) for c in np.unique(swings)
-    ]
+    found = [BodyPiece(number, True, rest[swings == c], points[owner == c]) for c in np.unique(swings)]
     holder = first + len(found) - 1
     return [*found, BodyPiece(number, False, crown, points[:0], holder=holder)]
 
@@ -285,9 +249,7 @@ def piece_wetted_surface(particles: Particles, piece: BodyPiece) -> WettedSurfac
     own = particles.object_of_wetted == piece.object
     if not piece.rigid or not own.any():
         return None
-    return WettedSurface(
-        particles.wetted_point[own].astype(float), particles.wetted_normal[own].astype(float)
-    )
+    return WettedSurface(particles.wetted_point[own].astype(float), particles.wetted_normal[own].astype(float))
 
 
 def leaf_tethers(particles: Particles, field: MaterialField, piece: BodyPiece) -> Tether | None:
@@ -305,13 +267,11 @@ def exposed_piece_faces(particles: Particles, mine: Int[np.ndarray, " N"]) -> Wi
     return WindFaces(area=particles.face[own].astype(float), particle=bearer)
 
 
-def constitutive_numbers(
-    material: Material, treatment: Discretization, extent: float
-) -> dict[str, float]:
+def constitutive_numbers(material: Material, treatment: Discretization, extent: float) -> dict[str, float]:
     """Constitutive numbers of one part; what the treatment scaled, scales its companions.
 
-    The hardening modulus is a stiffness and follows E; cohesion is a strength and follows
-    √(E_sim/E), as the yield stress does.
+    The hardening modulus is a stiffness and follows E; cohesion is a strength and follows √(E_sim/E), as the yield
+    stress does.
     """
     softer, leafy = treatment.simulated_young_pa / treatment.young_pa, treatment.kind == "foliage"
     return {
@@ -341,9 +301,7 @@ def slowest_vibration_rad_s(treatment: Discretization, extent: float) -> float:
 def part_surface_weights(particles: Particles, pieces: list[BodyPiece]) -> Float[np.ndarray, "B K"]:
     """Share of each part in its body's surface [-], taken as volume^(2/3)."""
     parts = len(particles.treatments)
-    volume = np.stack(
-        [np.bincount(particles.part[p.members], particles.volume[p.members], parts) for p in pieces]
-    )
+    volume = np.stack([np.bincount(particles.part[p.members], particles.volume[p.members], parts) for p in pieces])
     area = volume ** (2 / 3)
     return area / area.sum(axis=1, keepdims=True)
 
@@ -362,9 +320,7 @@ def footing_weights(
 
 
 def average_pair_table(
-    table: Float[np.ndarray, "K+1 K+1"],
-    weights: Float[np.ndarray, "B K"],
-    footing: Float[np.ndarray, "B K"],
+    table: Float[np.ndarray, "K+1 K+1"], weights: Float[np.ndarray, "B K"], footing: Float[np.ndarray, "B K"]
 ) -> Float[np.ndarray, "B+1 B+1"]:
     """Average a table over parts into one over bodies and the floor."""
     between = weights @ table[:-1, :-1] @ weights.T
@@ -409,9 +365,7 @@ def standing_objects(scene: Scene, particles: Particles) -> set[int]:
     found = {b for b, x in enumerate(bodies) if x[:, 2].min() < near}
     found |= {b for b, thing in enumerate(scene.objects) if thing.path is not None}
     while True:
-        carried = {
-            b for b in range(len(bodies)) for a in found if b not in found and gap[a, b] < near
-        }
+        carried = {b for b in range(len(bodies)) for a in found if b not in found and gap[a, b] < near}
         if not carried:
             return found
         found |= carried

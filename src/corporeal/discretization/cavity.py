@@ -12,8 +12,8 @@ from corporeal.discretization.open_cavity import is_below_rim
 VESSEL_SAMPLES_COUNT = 20_000
 """Points thrown into a vessel's box to measure how much goes in."""
 MIN_OPEN_HOLLOW_RATIO = 0.5
-"""A hollow that is open up to the rim is what a vessel fills if it is more than this share of the
-material [-]: less, as over a can's lid or a candle's wax, is the empty end of what is full.
+"""A hollow that is open up to the rim is what a vessel fills if it is more than this share of the material [-]: less,
+as over a can's lid or a candle's wax, is the empty end of what is full.
 """
 
 
@@ -36,20 +36,16 @@ class Cavity:
 def is_vessel(member: MeasuredPart) -> bool:
     """Whether the cavity lies between the faces of the mesh instead of behind all of them.
 
-    A bowl too wide to be told from a body by what is blocked around its hollow is told by how much
-    goes into that.
+    A bowl too wide to be told from a body by what is blocked around its hollow is told by how much goes into that.
     """
     apart = member.build is not MeshKind.BODY or member.volume == 0
     return apart or member.hollow > MIN_OPEN_HOLLOW_RATIO * member.volume
 
 
-def measure_cavity(
-    anatomy: MeasuredObject, member: MeasuredPart, thickness: float, rng: np.random.Generator
-) -> Cavity:
+def measure_cavity(anatomy: MeasuredObject, member: MeasuredPart, thickness: float, rng: np.random.Generator) -> Cavity:
     """Measure the cavity inside a wall.
 
-    Behind a closed outer surface it is all that lies deeper than the wall; a vessel's reaches up to
-    its rim.
+    Behind a closed outer surface it is all that lies deeper than the wall; a vessel's reaches up to its rim.
 
     Args:
         anatomy: The object.
@@ -60,9 +56,7 @@ def measure_cavity(
     """
     if is_vessel(member):
         box = np.prod(np.ptp(part_corners(member), axis=0))
-        points = keep_below_rim(
-            anatomy, member, random_box_points(member, VESSEL_SAMPLES_COUNT, rng)
-        )
+        points = keep_below_rim(anatomy, member, random_box_points(member, VESSEL_SAMPLES_COUNT, rng))
         return Cavity(points, float(box) * len(points) / VESSEL_SAMPLES_COUNT)
     probes = anatomy.probes[anatomy.part_of_probe == member.part]
     deep = member.shape.closest(probes)[0] > thickness
@@ -84,9 +78,7 @@ def part_corners(member: MeasuredPart) -> Float[np.ndarray, "N 3"]:
     return np.concatenate([m.corners.reshape(-1, 3) for m in (member.body, member.sheet)])
 
 
-def random_box_points(
-    member: MeasuredPart, count: int, rng: np.random.Generator
-) -> Float[np.ndarray, "count 3"]:
+def random_box_points(member: MeasuredPart, count: int, rng: np.random.Generator) -> Float[np.ndarray, "count 3"]:
     """Points at random in a part's upright box [m]."""
     corners = part_corners(member)
     low, high = corners.min(axis=0), corners.max(axis=0)

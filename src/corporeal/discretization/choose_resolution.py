@@ -48,9 +48,7 @@ class MeasuredScene:
     """Of each object that lies loose in another, that other."""
 
 
-def choose_resolution(
-    bodies: MeasuredScene, accuracy: SimulationAccuracy
-) -> tuple[MeasuredScene, DiscretizationPlan]:
+def choose_resolution(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> tuple[MeasuredScene, DiscretizationPlan]:
     """Choose grid spacing and treatments, and make walls of thin plates.
 
     A plate thinner than two cells is a wall, whoever called it solid; with it the cell may grow,
@@ -75,19 +73,13 @@ def choose_resolution(
 def _plan_scene(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> DiscretizationPlan:
     anatomies = enumerate(bodies.anatomies)
     geometries = {m.part: _part_geometry(m, bodies, n) for n, a in anatomies for m in a.members}
-    ordered = add_compression_strain(
-        bodies, [geometries[k] for k in sorted(geometries)], accuracy.seed
-    )
+    ordered = add_compression_strain(bodies, [geometries[k] for k in sorted(geometries)], accuracy.seed)
     masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
     moved = expected_motions(bodies.scene, bodies.anatomies, masses, accuracy.seed, bodies.vessels)
-    return plan_discretization(
-        ordered, moved, accuracy.detail, accuracy.stiffness, bodies.field.floor
-    )
+    return plan_discretization(ordered, moved, accuracy.detail, accuracy.stiffness, bodies.field.floor)
 
 
-def add_compression_strain(
-    bodies: MeasuredScene, parts: list[PartGeometry], seed: int
-) -> list[PartGeometry]:
+def add_compression_strain(bodies: MeasuredScene, parts: list[PartGeometry], seed: int) -> list[PartGeometry]:
     """Add the strain that prescribed motion forces on parts.
 
     The parts of an object share its pressure: the stiffer a part, the less it strains.
@@ -138,9 +130,7 @@ def _part_geometry(member: MeasuredPart, bodies: MeasuredScene, number: int) -> 
     )
 
 
-def thin_plate_thicknesses(
-    bodies: MeasuredScene, chosen: DiscretizationPlan, seed: int
-) -> dict[int, float]:
+def thin_plate_thicknesses(bodies: MeasuredScene, chosen: DiscretizationPlan, seed: int) -> dict[int, float]:
     """Thickness of each solid part that bends and is a plate thinner than two cells [m]."""
     found = {}
     members = (m for a in bodies.anatomies for m in a.members)

@@ -12,8 +12,8 @@ from corporeal.geometry.point_sampling import poisson_disk_subset, sample_surfac
 
 MAX_CONTACT_POINTS, EXTREME_DIRECTIONS_COUNT, MAX_LOWEST_CORNERS = 5000, 600, 2000
 LOWEST_CAP_HEIGHT_FRACTION = 0.02
-"""Every corner of the hull up to this high over the lowest counts [of its height]: what is round
-stands on small faces, and it would roll on if some of their corners were missing."""
+"""Every corner of the hull up to this high over the lowest counts [of its height]: what is round stands on small faces,
+and it would roll on if some of their corners were missing."""
 
 
 def sample_contact_points(
@@ -21,8 +21,7 @@ def sample_contact_points(
 ) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S 12"]]:
     """Cover the outside evenly, at most ``MAX_CONTACT_POINTS`` points, the farthest corners first [m].
 
-    The corners in ``EXTREME_DIRECTIONS_COUNT`` directions and the lowest make the object rest
-    exactly.
+    The corners in ``EXTREME_DIRECTIONS_COUNT`` directions and the lowest make the object rest exactly.
 
     Args:
         anatomy: The object.
@@ -30,8 +29,7 @@ def sample_contact_points(
         rng: Source of the samples.
 
     Returns:
-        The points, on the round surface that the mesh stands for, and how it curves there: see
-        ``geometry.roundness``.
+        The points, on the round surface that the mesh stands for, and how it curves there: see ``geometry.roundness``.
 
     """
     corners = extreme_corners(anatomy.vertices)
@@ -45,9 +43,7 @@ def sample_contact_points(
     points = np.concatenate(samples) if samples else np.zeros((0, 3))
     points = points[rng.permutation(len(points))]
     points = points[poisson_disk_subset(points, distance, corners)]
-    points, curvature = curve_points(
-        join_meshes(faces), np.concatenate([corners, points])[:MAX_CONTACT_POINTS]
-    )
+    points, curvature = curve_points(join_meshes(faces), np.concatenate([corners, points])[:MAX_CONTACT_POINTS])
     return points[:MAX_CONTACT_POINTS], curvature[:MAX_CONTACT_POINTS]
 
 
@@ -57,9 +53,7 @@ def extreme_corners(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "E 
         hull = vertices[ConvexHull(vertices).vertices]
     except QhullError:  # flat
         hull = vertices
-    directions = np.concatenate(
-        [sphere_directions(EXTREME_DIRECTIONS_COUNT), np.eye(3), -np.eye(3)]
-    )
+    directions = np.concatenate([sphere_directions(EXTREME_DIRECTIONS_COUNT), np.eye(3), -np.eye(3)])
     chosen = np.unique(np.argmax(hull @ directions.T, axis=0))
     height = hull[:, 2] - hull[:, 2].min()
     lowest = np.flatnonzero(height <= LOWEST_CAP_HEIGHT_FRACTION * height.max())

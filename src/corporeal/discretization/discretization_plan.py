@@ -1,17 +1,16 @@
 """Discretization of each part: rigid, deformable or shell, with its parameters.
 
-One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
-is rigid, by itself or as the inclusion of softer parts; everything else keeps its true stiffness; thin
-walls are thickened with the stiffness that counts and the areal mass kept; only a step budget may
-compress wave speeds, in their order. What would sag far more than in reality, as soft as thick
-walls and the step budget make it, is rigid after all.
+One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex is rigid, by itself
+or as the inclusion of softer parts; everything else keeps its true stiffness; thin walls are thickened with the
+stiffness that counts and the areal mass kept; only a step budget may compress wave speeds, in their order. What would
+sag far more than in reality, as soft as thick walls and the step budget make it, is rigid after all.
 
 Limits on the stiffness of parts that prescribed motion compresses, with warnings.
 
-What a displacement is forced on has its shape at any stiffness, and only the force is as wrong as
-its stiffness. So a part that the step budget softens stays deformable, and the factor is said. What
-would be softened out of all proportion is hard: in reality it would stop, or break, what presses
-it, which prescribed motion cannot do. It is rigid, at the cost of a rigid one, and that is said.
+What a displacement is forced on has its shape at any stiffness, and only the force is as wrong as its stiffness. So a
+part that the step budget softens stays deformable, and the factor is said. What would be softened out of all proportion
+is hard: in reality it would stop, or break, what presses it, which prescribed motion cannot do. It is rigid, at the
+cost of a rigid one, and that is said.
 """
 
 from collections.abc import Sequence
@@ -32,12 +31,7 @@ from corporeal.discretization.impact_frequency import tune_loss_to_impacts
 from corporeal.discretization.impact_slabs import mark_thin_floor_sheets, slabs_nearer_to_rigid
 from corporeal.discretization.impact_vibration import compensate_vibration_loss
 from corporeal.discretization.pair_damping import find_impact_partners
-from corporeal.discretization.part_geometry import (
-    ExpectedMotion,
-    PartGeometry,
-    RigidityVerdict,
-    is_grain_on_grid,
-)
+from corporeal.discretization.part_geometry import ExpectedMotion, PartGeometry, RigidityVerdict, is_grain_on_grid
 from corporeal.discretization.rigidity import MAX_INVISIBLE_STRAIN, judge_rigidity
 from corporeal.discretization.step_budget import (
     MIN_WAVE_SPEED_RATIO,
@@ -73,9 +67,7 @@ def too_stiff_to_compress(
     """
     hard = {
         k: true.wave_speed
-        for k, (part, verdict, true, made) in enumerate(
-            zip(parts, verdicts, unslowed, slowed, strict=True)
-        )
+        for k, (part, verdict, true, made) in enumerate(zip(parts, verdicts, unslowed, slowed, strict=True))
         if _only_soft_by_compression(verdict)
         and part.pressed
         and made.simulated_young_pa < MIN_STIFFNESS_RATIO * true.simulated_young_pa
@@ -91,15 +83,11 @@ def too_stiff_to_compress(
 
 def _only_soft_by_compression(verdict: RigidityVerdict) -> bool:
     """Return whether a part would be rigid if nothing pressed it."""
-    return not verdict.rigid and verdict.pressed >= MAX_INVISIBLE_STRAIN > max(
-        verdict.weight, verdict.impact
-    )
+    return not verdict.rigid and verdict.pressed >= MAX_INVISIBLE_STRAIN > max(verdict.weight, verdict.impact)
 
 
 def warn_of_wrong_compression(
-    parts: Sequence[PartGeometry],
-    unslowed: Sequence[Discretization],
-    made: Sequence[Discretization],
+    parts: Sequence[PartGeometry], unslowed: Sequence[Discretization], made: Sequence[Discretization]
 ) -> list[str]:
     """Warn where the force on what presses a part cannot be right, and say by how much.
 
@@ -114,11 +102,7 @@ def warn_of_wrong_compression(
         if part.pressed < MAX_INVISIBLE_STRAIN:
             continue
         name = f"Object {part.object + 1} of the scene"
-        share = (
-            treatment.simulated_young_pa / true.simulated_young_pa
-            if true.simulated_young_pa > 0.0
-            else 1.0
-        )
+        share = treatment.simulated_young_pa / true.simulated_young_pa if true.simulated_young_pa > 0.0 else 1.0
         if treatment.kind == "rigid":
             told.append(
                 f"{name} is pressed by about {part.pressed:.2g} of its thickness by prescribed "
@@ -223,10 +207,7 @@ def plan_discretization(
             told = (*draft.plan.warnings, *warn_of_wrong_compression(parts, draft.unslowed, laid))
             tuned = tune_loss_to_impacts(parts, motions, laid)
             return replace(draft.plan, treatments=tuned, warnings=told)
-        verdicts = [
-            replace(v, rigid=True, reason=why[k]) if k in why else v
-            for k, v in enumerate(judged.verdicts)
-        ]
+        verdicts = [replace(v, rigid=True, reason=why[k]) if k in why else v for k, v in enumerate(judged.verdicts)]
         judged = replace(judged, verdicts=verdicts)
 
 
@@ -251,9 +232,7 @@ def _plan_with_verdicts(
     verdicts, foliage_parts = judged.verdicts, judged.foliage_parts
     # The grid resolves what deforms.
     capped = stiffness == "capped"
-    yields = [
-        not v.rigid or (capped and not p.prescribed) for v, p in zip(verdicts, parts, strict=True)
-    ]
+    yields = [not v.rigid or (capped and not p.prescribed) for v, p in zip(verdicts, parts, strict=True)]
     soft = [p for p, deforms in zip(parts, yields, strict=True) if deforms]
     cell = quality.cell or choose_cell(parts, soft, quality)
     # What deforms decides whether what does not is a body of its own or an inclusion in one.
@@ -265,18 +244,13 @@ def _plan_with_verdicts(
     ]
     across = {k: object_side_range(soft, k)[0] / cell for k in {p.object for p in soft}}
     treatments = unslowed = [
-        effective_parameters(
-            p, v, motions[p.object], GridResolution(cell, across.get(p.object, 0.0)), r
-        )
+        effective_parameters(p, v, motions[p.object], GridResolution(cell, across.get(p.object, 0.0)), r)
         for p, v, r in zip(parts, verdicts, roles, strict=True)
     ]
     # Waves are slowed to what the step budget allows.
     warnings = [*warn_of_unresolved(soft, cell)]
     if stiffness == "capped":
-        treatments = [
-            cap_stiffness(part_as_contents(p), t, cell)
-            for p, t in zip(parts, treatments, strict=True)
-        ]
+        treatments = [cap_stiffness(part_as_contents(p), t, cell) for p, t in zip(parts, treatments, strict=True)]
         warnings.append("Stiffness is capped by the published rule: a control, not a prediction.")
     else:
         unslowed = slow_subgrid_parts(parts, treatments, cell)
@@ -317,21 +291,16 @@ def object_side_range(parts: Sequence[PartGeometry], number: int) -> tuple[float
     return max(s[0] for s in sizes), max(s[2] for s in sizes)
 
 
-def choose_cell(
-    parts: Sequence[PartGeometry], soft: Sequence[PartGeometry], quality: QualityPreset
-) -> float:
+def choose_cell(parts: Sequence[PartGeometry], soft: Sequence[PartGeometry], quality: QualityPreset) -> float:
     """Grid spacing dx [m]: the smallest deformable object resolved, the largest affordable.
 
-    Of an object with a rigid inclusion its soft parts count. Where nothing deforms, all objects do.
-    What is rigid and may be touched is at least a cell wide, as far as that is affordable.
+    Of an object with a rigid inclusion its soft parts count. Where nothing deforms, all objects do. What is rigid and
+    may be touched is at least a cell wide, as far as that is affordable.
     """
     seen = soft or parts
     sizes = [object_side_range(seen, k) for k in sorted({p.object for p in seen})]
     cell = max(
-        min(
-            min(short for short, _ in sizes) / quality.cells_across,
-            narrowest_rigid_width(parts, soft),
-        ),
+        min(min(short for short, _ in sizes) / quality.cells_across, narrowest_rigid_width(parts, soft)),
         max(long for _, long in sizes) / quality.cells_along,
     )
     while particles_needed_count(parts, cell) > quality.particles:

@@ -10,14 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 from corporeal.discretization.mesh_kind import wall_thickness_behind
 from corporeal.discretization.mesh_measures import is_nearly_closed
 from corporeal.discretization.open_cavity import volume_below_rim
-from corporeal.geometry.mesh import (
-    Mesh,
-    TriangleSurface,
-    join_meshes,
-    orient_outward,
-    signed_volume,
-    weld_mesh,
-)
+from corporeal.geometry.mesh import Mesh, TriangleSurface, join_meshes, orient_outward, signed_volume, weld_mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 
 MIN_SCAN_TRIANGLES, MAX_SCAN_EDGE_LOG_SPREAD = 3000, 0.6
@@ -27,8 +20,8 @@ MAX_HOLLOW_HULL_FRACTION = 0.75
 MIN_VOLUME_LOG_DOUBT = 0.1
 """A scan is thin where its edges alone leave the logarithm of its volume open by so much [-]."""
 MIN_LUMP_WALL_RATIO = 2.5
-"""A mean thickness over the usual wall, from which a vessel may be a lump [-]: walls are drawn up
-to twice as thick as they are, and a filled saucer, the flattest ware, is 2.9 times as thick."""
+"""A mean thickness over the usual wall, from which a vessel may be a lump [-]: walls are drawn up to twice as thick as
+they are, and a filled saucer, the flattest ware, is 2.9 times as thick."""
 MIN_DRAWN_HOLLOW_FRACTION = 0.5
 """Of what a vessel encloses: as much room below its rim shows that its hollow is drawn [-]."""
 THICKNESS_PERCENTILES = (10, 25, 50)
@@ -42,8 +35,7 @@ class ThinScan:
     edge: float
     """Median edge [m]."""
     behind: tuple[float, float, float]
-    """Distance to the opposite face behind the surface [m]: a tenth, a quarter and half of it have
-    it as near."""
+    """Distance to the opposite face behind the surface [m]: a tenth, a quarter and half of it have it as near."""
     doubt: float
     """Standard deviation of the logarithm of the volume that its edges leave open [-]."""
 
@@ -106,9 +98,7 @@ def is_drawn_as_lump(surfaces: Sequence[TriangleSurface], wall: float, scale: fl
     volume, shape = abs(signed_volume(mesh)), QueryMesh(mesh)
     if not 2 * volume / float(mesh.areas.sum()) > MIN_LUMP_WALL_RATIO * wall * scale:
         return False
-    return (
-        volume_below_rim(shape, mesh, np.random.default_rng(0)) < MIN_DRAWN_HOLLOW_FRACTION * volume
-    )
+    return volume_below_rim(shape, mesh, np.random.default_rng(0)) < MIN_DRAWN_HOLLOW_FRACTION * volume
 
 
 def _as_closed_mesh(surfaces: Sequence[TriangleSurface]) -> Mesh | None:

@@ -2,10 +2,10 @@
 
 Plants: crowns of leaves, and parts that do not visibly bend.
 
-With true wood a plant hardly flexes: what sways is its root ball in soft potting soil and its
-leaves on their stalks. So where everything but the leaves stays rigid, the crown is a body of its
-own without stress, each of its particles on a damped spring to the wood, and the give of the soil
-is in a sprung joint at the root. Where the wood does bend, none of this applies.
+With true wood a plant hardly flexes: what sways is its root ball in soft potting soil and its leaves on their stalks.
+So where everything but the leaves stays rigid, the crown is a body of its own without stress, each of its particles on
+a damped spring to the wood, and the give of the soil is in a sprung joint at the root. Where the wood does bend, none
+of this applies.
 """
 
 from collections.abc import Sequence
@@ -60,9 +60,7 @@ class PartVerdicts:
     """Numbers of parts."""
 
 
-def judge_plants(
-    parts: Sequence[PartGeometry], verdicts: Sequence[RigidityVerdict]
-) -> PartVerdicts:
+def judge_plants(parts: Sequence[PartGeometry], verdicts: Sequence[RigidityVerdict]) -> PartVerdicts:
     """Make potted soil rigid, and find the crowns of leaves.
 
     Args:
@@ -103,9 +101,9 @@ class GridResolution:
 def remaining_loss_factor(part: PartGeometry, motion: ExpectedMotion, across: float) -> float:
     """Loss factor that is left to the material of what is struck, beside the grid's own share [-].
 
-    Contact at nodes and transfers take a share of an impact themselves. It counts on what the
-    material has to take, so that both together are what was measured. A solid loses for what is
-    rigid and meets it, too; a wall is dented so much more easily that it does not matter.
+    Contact at nodes and transfers take a share of an impact themselves. It counts on what the material has to take, so
+    that both together are what was measured. A solid loses for what is rigid and meets it, too; a wall is dented so
+    much more easily that it does not matter.
 
     Args:
         part: What is struck, as its contents where those are simulated.
@@ -128,11 +126,7 @@ def is_dented_as_hertz(part: PartGeometry) -> bool:
 
 
 def effective_parameters(
-    part: PartGeometry,
-    verdict: RigidityVerdict,
-    motion: ExpectedMotion,
-    resolved: GridResolution,
-    role: PartRole,
+    part: PartGeometry, verdict: RigidityVerdict, motion: ExpectedMotion, resolved: GridResolution, role: PartRole
 ) -> Discretization:
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
     cell = resolved.cell
@@ -195,9 +189,7 @@ class ThickeningFactors:
     """Factor on the density [-]."""
 
 
-def choose_thickening(
-    part: PartGeometry, role: PartRole, thick: float, speed: float
-) -> ThickeningFactors:
+def choose_thickening(part: PartGeometry, role: PartRole, thick: float, speed: float) -> ThickeningFactors:
     """Choose the factors that keep bending and mass where a part is simulated ``thick`` [m]."""
     wall = wall_thickening_ratio(part, thick)
     young, strength, density = wall_factors(part, wall, speed)
@@ -218,9 +210,7 @@ def liquid_stiffness_numbers(part: PartGeometry, motion: ExpectedMotion) -> tupl
     return elastic_moduli(bulk_modulus(part.material.density, speed))
 
 
-def foliage_parameters(
-    part: PartGeometry, verdict: RigidityVerdict, motion: ExpectedMotion
-) -> Discretization:
+def foliage_parameters(part: PartGeometry, verdict: RigidityVerdict, motion: ExpectedMotion) -> Discretization:
     """Give foliage no stress of its own."""
     return Discretization(
         kind="foliage",
@@ -258,10 +248,7 @@ def scale_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
     here, life = judge_rigidity(part, motion), judge_rigidity(part_at_life_size(part), motion)
     if here.rigid == life.rigid:
         return ""
-    return (
-        f" At its real size, {1 / part.scale:.3g} times this one, it would be judged otherwise: "
-        f"{life.reason}."
-    )
+    return f" At its real size, {1 / part.scale:.3g} times this one, it would be judged otherwise: {life.reason}."
 
 
 def rod_reason(ratio: float) -> str:
@@ -298,9 +285,7 @@ def bar_reason(part: PartGeometry, simulated: float) -> str:
 
 def partner_reason(part: PartGeometry, motion: ExpectedMotion) -> str:
     """Describe what else a part loses for; "" where it is nothing."""
-    names = sorted(
-        {p.material.name for p in motion.partners if takes_part_in_impact(part.material, p)}
-    )
+    names = sorted({p.material.name for p in motion.partners if takes_part_in_impact(part.material, p)})
     if not names or not is_dented_as_hertz(part) or CONSTITUTIVE_LAWS[part.material.law].loose:
         return ""
     return (
@@ -321,6 +306,5 @@ def wall_reason(part: PartGeometry, ratio: float, speed: float) -> str:
         kept = "the stiffness with which it dents" if dents else "its bending stiffness"
         lost = "in its plane it is softer"
     return (
-        f" Its wall is simulated {1 / ratio:.3g} times as thick, with {kept} and its mass kept; "
-        f"{lost} than in reality."
+        f" Its wall is simulated {1 / ratio:.3g} times as thick, with {kept} and its mass kept; {lost} than in reality."
     )

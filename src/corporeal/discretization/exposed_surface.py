@@ -19,8 +19,8 @@ def exposed_faces(
 ) -> tuple[Float[np.ndarray, "A 3"], Int[np.ndarray, " A"]]:
     """Share the exposed surface among the points inside.
 
-    Every small piece of the mesh goes to the nearest point; pieces of one point that look the same
-    way are one face, so that an edge keeps the faces on both of its sides.
+    Every small piece of the mesh goes to the nearest point; pieces of one point that look the same way are one face, so
+    that an edge keeps the faces on both of its sides.
 
     Args:
         anatomy: The object.

@@ -32,14 +32,12 @@ class PouredBody:
     """Height of its surface [m]."""
 
 
-def fill_to_volume(
-    anatomy: MeasuredObject, member: MeasuredPart, thickness: float, volume: float
-) -> PouredBody | None:
+def fill_to_volume(anatomy: MeasuredObject, member: MeasuredPart, thickness: float, volume: float) -> PouredBody | None:
     """Fill a vessel's hollow from its bottom; None: it has no room for so much.
 
-    The hollow is sampled as a signed distance from the vessel's material, cut off at the level, and
-    meshed where it changes its sign (marching cubes: Lorensen and Cline 1987). What lies nearer to
-    the wall than the last sample is outside.
+    The hollow is sampled as a signed distance from the vessel's material, cut off at the level, and meshed where it
+    changes its sign (marching cubes: Lorensen and Cline 1987). What lies nearer to the wall than the last sample is
+    outside.
 
     Args:
         anatomy: The object.
@@ -53,9 +51,7 @@ def fill_to_volume(
     step = float((high - low).max()) / VESSEL_SAMPLES_ALONG_SIDE
     axes = [np.arange(a - 1.5 * step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    depth = hollow_distance(anatomy, member, thickness, points.reshape(-1, 3)).reshape(
-        points.shape[:3]
-    )
+    depth = hollow_distance(anatomy, member, thickness, points.reshape(-1, 3)).reshape(points.shape[:3])
     depth = limit_to_thin_wall(depth, depth > 0.0, step)
     height = points[..., 2]
     if volume <= 0.0 or positive_volume(depth, step) < volume:
@@ -88,17 +84,12 @@ def limit_to_thin_wall(
 
 def sample_isosurface(inside: np.ndarray, step: float, first: Float[np.ndarray, "3"]) -> Mesh:
     """Surface where samples change their sign, ``step`` [m] apart from ``first`` [m] on."""
-    vertices, triangles, _, _ = marching_cubes(
-        inside, 0.0, spacing=(step,) * 3, gradient_direction="ascent"
-    )
+    vertices, triangles, _, _ = marching_cubes(inside, 0.0, spacing=(step,) * 3, gradient_direction="ascent")
     return Mesh(np.asarray(vertices, np.float64) + first, np.asarray(triangles, np.int64))
 
 
 def hollow_distance(
-    anatomy: MeasuredObject,
-    member: MeasuredPart,
-    thickness: float,
-    points: Float[np.ndarray, "N 3"],
+    anatomy: MeasuredObject, member: MeasuredPart, thickness: float, points: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, " N"]:
     """Distance of points in the hollow from its wall [m]; negative outside of it."""
     if not is_vessel(member):

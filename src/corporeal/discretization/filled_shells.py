@@ -1,7 +1,7 @@
 """Treatment of filled shells under impact.
 
-Liquids and grains in a full, closed container move with the wall as one rigid mass. What keeps its
-own shape (stuffing, foam, jelly) is simulated by its own law, with the wall's mass around it.
+Liquids and grains in a full, closed container move with the wall as one rigid mass. What keeps its own shape (stuffing,
+foam, jelly) is simulated by its own law, with the wall's mass around it.
 """
 
 from collections.abc import Callable
@@ -40,9 +40,7 @@ def part_as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
     density = mean_density(part) if inflated else inner.density * part.structure.fill
     spread = replace(inner, density=density)
     if part.structure.gauge_pressure is not None:
-        blow = equivalent_solid(
-            part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2
-        )
+        blow = equivalent_solid(part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2)
         loss = inner.loss if part.structure.rebound is not None else blow.loss
         spread = replace(spread, young=blow.young_pa, loss=loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
@@ -83,9 +81,7 @@ def bulk_mass(part: PartGeometry) -> float:
 
 
 def judge_filled_shell(
-    part: PartGeometry,
-    motion: ExpectedMotion,
-    judge: Callable[[PartGeometry, ExpectedMotion], RigidityVerdict],
+    part: PartGeometry, motion: ExpectedMotion, judge: Callable[[PartGeometry, ExpectedMotion], RigidityVerdict]
 ) -> RigidityVerdict:
     """Return whether wall and contents move as one rigid body, and why."""
     structure, inner = part.structure, part.structure.contents
@@ -107,17 +103,14 @@ def judge_filled_shell(
         reason = f"{inside.reason}; it is simulated as its {inner.name}, the wall's mass around it"
         return replace(inside, reason=reason)
     reason = (
-        f"it is filled with {inner.name}, which does not flow in this model: wall and contents "
-        "move as one rigid mass"
+        f"it is filled with {inner.name}, which does not flow in this model: wall and contents move as one rigid mass"
     )
     if structure.fill < NEARLY_FULL_FRACTION:
         reason += f", and dents into its empty {1 - structure.fill:.0%} are not modelled"
     return replace(wall, rigid=True, reason=reason)
 
 
-def acting_material(
-    material: Material, structure: Structure, treatment: Discretization
-) -> Material:
+def acting_material(material: Material, structure: Structure, treatment: Discretization) -> Material:
     """Return the material whose law a part follows: a soft filled part follows its contents'."""
     soft = structure.contents is not None and treatment.kind == "deformable"
     return structure.contents if soft and structure.contents else material

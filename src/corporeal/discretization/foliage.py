@@ -7,15 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.core.types import (
-    Material,
-    MaterialField,
-    Particles,
-    PlantRoot,
-    Scene,
-    Structure,
-    Vector,
-)
+from corporeal.core.types import Material, MaterialField, Particles, PlantRoot, Scene, Structure, Vector
 from corporeal.discretization.mesh_kind import connected_pieces
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.part_model import PartModel
@@ -35,8 +27,8 @@ USUAL_LEAF_LENGTH_M = 0.08
 MAX_LEAF_THICKNESS_M = 3e-3
 """What is thicker in the mean is more than one leaf, even as leaves are drawn [m]."""
 LEAF_AREA_PER_CROWN_SURFACE = 0.75
-"""Area of leaves over that of the surface that pictures make of a crown: half where a leaf shows
-both its faces, all where it covers others."""
+"""Area of leaves over that of the surface that pictures make of a crown: half where a leaf shows both its faces, all
+where it covers others."""
 MAX_LEAF_FREQUENCY_RAD_S = 300.0
 """Springs are no stiffer [rad/s]: a leaf's own weight moves them by a tenth of a millimetre."""
 LEAF_CENTRE_SHIFT_RATIO = 0.4
@@ -63,16 +55,14 @@ def count_leaves(member: MeasuredPart, material: Material, made: PartModel, scal
         return 0
     if made.leaves:
         return round(made.leaves / ((USUAL_LEAF_LENGTH_M * scale) ** 2 / 3))
-    return sum(
-        int(connected_pieces(m).max()) + 1 for m in (member.body, member.sheet) if len(m.triangles)
-    )
+    return sum(int(connected_pieces(m).max()) + 1 for m in (member.body, member.sheet) if len(m.triangles))
 
 
 def is_bulk_foliage(member: MeasuredPart, scale: float) -> bool:
     """Whether foliage's surface does not show one leaf from another.
 
-    Pictures, and coarse models, show a crown as one body of thickened and joined leaves: most of
-    its surface is in pieces longer than a leaf is, and thicker.
+    Pictures, and coarse models, show a crown as one body of thickened and joined leaves: most of its surface is in
+    pieces longer than a leaf is, and thicker.
     """
     if not len(member.body.triangles):
         return False
@@ -83,12 +73,7 @@ def is_bulk_foliage(member: MeasuredPart, scale: float) -> bool:
 
 
 def weigh_bulk_foliage(
-    made: PartModel,
-    anatomy: MeasuredObject,
-    member: MeasuredPart,
-    field: MaterialField,
-    tissue: Material,
-    scale: float,
+    made: PartModel, anatomy: MeasuredObject, member: MeasuredPart, field: MaterialField, tissue: Material, scale: float
 ) -> PartModel:
     """Weigh a crown in bulk by the area of its leaves, m = ρ t A, and not by its volume.
 
@@ -207,9 +192,8 @@ class RootedWood:
 def find_rooted_wood(anatomy: MeasuredObject, materials: tuple[Material, ...]) -> RootedWood | None:
     """Return which wood stands in which soil; None: nothing stands in soil.
 
-    The wood's foot is in the soil, and it rises above it. Where the surface of either ends, as what
-    pictures show does, the foot is taken to reach halfway down from where most of the soil shows to
-    the object's lowest point.
+    The wood's foot is in the soil, and it rises above it. Where the surface of either ends, as what pictures show does,
+    the foot is taken to reach halfway down from where most of the soil shows to the object's lowest point.
     """
     soils = [m for m in anatomy.members if CONSTITUTIVE_LAWS[materials[m.part].law].granular]
     for soil in soils:
@@ -278,11 +262,7 @@ def root_joint(
 
 
 def with_plant_springs(
-    scene: Scene,
-    particles: Particles,
-    anatomies: list[MeasuredObject],
-    field: MaterialField,
-    tissue: Material,
+    scene: Scene, particles: Particles, anatomies: list[MeasuredObject], field: MaterialField, tissue: Material
 ) -> Particles:
     """Put leaves on springs, and what bears them into its soil."""
     leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]

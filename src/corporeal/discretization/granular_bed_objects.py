@@ -2,8 +2,8 @@
 
 Granular beds: material below a drawn surface, down to the walls of its container.
 
-Models and pictures show only the top surface of contents. Grains and liquids do not rest on air, so
-they fill the space between that surface and the container.
+Models and pictures show only the top surface of contents. Grains and liquids do not rest on air, so they fill the space
+between that surface and the container.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -25,17 +25,8 @@ from corporeal.discretization.fill_level import (
     sample_isosurface,
 )
 from corporeal.discretization.mesh_kind import MeshKind
-from corporeal.discretization.mesh_measures import (
-    MeasuredObject,
-    MeasuredPart,
-    measure_assembled,
-    oriented_box_size,
-)
-from corporeal.discretization.open_cavity import (
-    HORIZONTAL_DIRECTIONS_COUNT,
-    blocked_direction_count,
-    is_blocked,
-)
+from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, measure_assembled, oriented_box_size
+from corporeal.discretization.open_cavity import HORIZONTAL_DIRECTIONS_COUNT, blocked_direction_count, is_blocked
 from corporeal.discretization.part_model import infer_structure, part_specification
 from corporeal.geometry.mesh import Mesh, join_meshes, open_edge_ratio, signed_volume, weld_mesh
 from corporeal.geometry.mesh_queries import QueryMesh
@@ -81,9 +72,7 @@ class HoldingWall:
         """Its open sheets."""
         return QueryMesh(self.member.sheet) if len(self.member.sheet.triangles) else None
 
-    def room(
-        self, points: Float[np.ndarray, "N 3"], inside: Bool[np.ndarray, " N"]
-    ) -> Float[np.ndarray, " N"]:
+    def room(self, points: Float[np.ndarray, "N 3"], inside: Bool[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
         """Distance from its material [m].
 
         Args:
@@ -120,14 +109,11 @@ def holding_wall_of(member: MeasuredPart, field: MaterialField, top: QueryMesh) 
     return HoldingWall(bare, hollow=True, thickness=made.thickness, half=0.5 * made.sheet)
 
 
-def find_granular_bed(
-    anatomy: MeasuredObject, member: MeasuredPart, field: MaterialField
-) -> GranularBed | None:
+def find_granular_bed(anatomy: MeasuredObject, member: MeasuredPart, field: MaterialField) -> GranularBed | None:
     """Find what a part of granular material fills; None: it is drawn whole, or nothing holds it.
 
-    That is what is free of other parts' material, hangs together below the drawn surface, and has
-    their faces below and, but for one crack, all around. Beside the surface its nearest height
-    counts.
+    That is what is free of other parts' material, hangs together below the drawn surface, and has their faces below
+    and, but for one crack, all around. Beside the surface its nearest height counts.
     """
     others = [m for m in anatomy.members if m is not member]
     if not others or any(field.structures[m.part].contents for m in others):
@@ -263,15 +249,10 @@ class _BedSearch:
     def held(self, points: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Whether there are faces below and, but for one crack, all around."""
         found = is_blocked([self.faces], points, np.array([0.0, 0.0, -1.0]))
-        found[found] = (
-            blocked_direction_count([self.faces, self.top], points[found])
-            >= HORIZONTAL_DIRECTIONS_COUNT - 1
-        )
+        found[found] = blocked_direction_count([self.faces, self.top], points[found]) >= HORIZONTAL_DIRECTIONS_COUNT - 1
         return found
 
-    def together(
-        self, grid: np.ndarray, room: np.ndarray, held: np.ndarray, step: float
-    ) -> Bool[np.ndarray, "X Y Z"]:
+    def together(self, grid: np.ndarray, room: np.ndarray, held: np.ndarray, step: float) -> Bool[np.ndarray, "X Y Z"]:
         """Keep what hangs together below the drawn surface, without going through a face."""
         core = held & (room > 0.5 * step)
         pieces = np.asarray(label(core, connectivity=1))
@@ -320,9 +301,7 @@ def loose_matter_parts(field: MaterialField) -> set[int]:
     return {k for k, m in enumerate(field.materials) if CONSTITUTIVE_LAWS[m.law].loose}
 
 
-def fill_all_beds(
-    anatomies: Sequence[MeasuredObject], field: MaterialField
-) -> list[MeasuredObject]:
+def fill_all_beds(anatomies: Sequence[MeasuredObject], field: MaterialField) -> list[MeasuredObject]:
     """Let the granular material of every object fill what holds it.
 
     Args:
@@ -334,21 +313,16 @@ def fill_all_beds(
     return [with_beds(a, find_beds(a, field, loose)) for a in anatomies]
 
 
-def find_beds(
-    anatomy: MeasuredObject, field: MaterialField, loose: Collection[int]
-) -> dict[int, GranularBed]:
+def find_beds(anatomy: MeasuredObject, field: MaterialField, loose: Collection[int]) -> dict[int, GranularBed]:
     """Find the bed of each part of granular material that has one."""
-    found = {
-        m.part: find_granular_bed(anatomy, m, field) for m in anatomy.members if m.part in loose
-    }
+    found = {m.part: find_granular_bed(anatomy, m, field) for m in anatomy.members if m.part in loose}
     return {part: bed for part, bed in found.items() if bed is not None}
 
 
 def with_beds(anatomy: MeasuredObject, beds: Mapping[int, GranularBed]) -> MeasuredObject:
     """Put beds in place of what is drawn of them.
 
-    What is drawn stays a face of the object where it closes it; all other parts stay as they are: a
-    bed takes up air.
+    What is drawn stays a face of the object where it closes it; all other parts stay as they are: a bed takes up air.
     """
     if not beds:
         return anatomy
@@ -363,13 +337,10 @@ def with_beds(anatomy: MeasuredObject, beds: Mapping[int, GranularBed]) -> Measu
     shape = QueryMesh(Mesh(vertices, triangles))
     added = [np.full(len(m.triangles), part) for part, m in body.items()]
     alone = [
-        _part_as_bed(m, beds[m.part].holder, body[m.part], shape) if m.part in body else m
-        for m in anatomy.members
+        _part_as_bed(m, beds[m.part].holder, body[m.part], shape) if m.part in body else m for m in anatomy.members
     ]
     of_triangle = np.concatenate([of_face, *added])
-    return measure_assembled(
-        vertices, shape, of_triangle, alone, np.random.default_rng(BED_PROBE_SEED)
-    )
+    return measure_assembled(vertices, shape, of_triangle, alone, np.random.default_rng(BED_PROBE_SEED))
 
 
 def _without_parts(

@@ -17,24 +17,16 @@ HERTZ_CONTACT_TIME_COEFFICIENT = 2.94
 """How long a ball touches what it dents, over the greatest dent by its speed (Hertz) [-]."""
 
 
-def hertz_contact_time(
-    mass: float, radius: float, speed: float, plane: float, most: float
-) -> float:
+def hertz_contact_time(mass: float, radius: float, speed: float, plane: float, most: float) -> float:
     """How long a ball touches a layer that it dents [s]: 2.94 δ/v; arguments: ``hertz_dent_of_layer``."""
-    return (
-        HERTZ_CONTACT_TIME_COEFFICIENT
-        * hertz_dent_of_layer(mass, radius, speed, plane, most)
-        / speed
-    )
+    return HERTZ_CONTACT_TIME_COEFFICIENT * hertz_dent_of_layer(mass, radius, speed, plane, most) / speed
 
 
-def hertz_dent_of_layer(
-    mass: float, radius: float, speed: float, plane: float, most: float
-) -> float:
+def hertz_dent_of_layer(mass: float, radius: float, speed: float, plane: float, most: float) -> float:
     """How much nearer a ball draws to a layer that it strikes [m].
 
-    δ = (15 m v²/(16 E* √R))^(2/5) of a half-space (Johnson, Contact Mechanics, 1985, §11.4), and no
-    more than the layer is thick.
+    δ = (15 m v²/(16 E* √R))^(2/5) of a half-space (Johnson, Contact Mechanics, 1985, §11.4), and no more than the layer
+    is thick.
 
     Args:
         mass: Of the ball [kg].

@@ -1,9 +1,9 @@
 """Frequency of damping of soft mats, set by the impacts on them.
 
-Branches keep a loss factor over one decade (``mpm.physics.branches``). A ball that strikes touches
-for two to three half periods of its own slowest vibration, which lie in it. A mat is struck in one
-place: the impact lasts as long as what strikes it takes to dent it, whatever the mat's length, and
-its slowest vibration, slower the longer it is, would leave that outside.
+Branches keep a loss factor over one decade (``mpm.physics.branches``). A ball that strikes touches for two to three
+half periods of its own slowest vibration, which lie in it. A mat is struck in one place: the impact lasts as long as
+what strikes it takes to dent it, whatever the mat's length, and its slowest vibration, slower the longer it is, would
+leave that outside.
 """
 
 from collections.abc import Sequence
@@ -13,12 +13,7 @@ from math import exp, log, pi, sqrt
 from corporeal.core.types import Discretization
 from corporeal.discretization.filled_shells import bulk_mass
 from corporeal.discretization.hertz_indentation import hertz_contact_time
-from corporeal.discretization.part_geometry import (
-    ExpectedMotion,
-    ObjectLanding,
-    PartGeometry,
-    is_flat_wall,
-)
+from corporeal.discretization.part_geometry import ExpectedMotion, ObjectLanding, PartGeometry, is_flat_wall
 from corporeal.discretization.step_budget import is_dented_by_impact
 from corporeal.mpm.constants import LOSS_BAND_HIGH_RATIO, LOSS_BAND_LOW_RATIO
 
@@ -46,20 +41,16 @@ class _ImpactOnMat:
         """
         plane = 1.0 / (self.compliance + impact_compliance(treatment))
         thick = treatment.thickness or part.size[0]
-        return pi / hertz_contact_time(
-            self.landing.mass, self.radius, self.landing.speed, plane, thick
-        )
+        return pi / hertz_contact_time(self.landing.mass, self.radius, self.landing.speed, plane, thick)
 
 
 def tune_loss_to_impacts(
-    parts: Sequence[PartGeometry],
-    motions: Sequence[ExpectedMotion],
-    treatments: Sequence[Discretization],
+    parts: Sequence[PartGeometry], motions: Sequence[ExpectedMotion], treatments: Sequence[Discretization]
 ) -> tuple[Discretization, ...]:
     """Centre the loss of soft mats on the first impacts of what falls on them, where those are known.
 
-    Of several the mean of the logarithms counts, by their energies. What falls harder itself keeps
-    its slowest vibration, and so does what is as high as it is wide.
+    Of several the mean of the logarithms counts, by their energies. What falls harder itself keeps its slowest
+    vibration, and so does what is as high as it is wide.
 
     Args:
         parts: All of the scene's.
@@ -76,9 +67,7 @@ def tune_loss_to_impacts(
         falls = own is not None and own.energy >= energy
         if taken and not falls and is_lossy_mat(part, treatment):
             logs = (b.landing.energy * log(b.frequency(part, treatment)) for b in taken)
-            treatment = replace(
-                treatment, vibration=exp(sum(logs) / energy) / LOSS_BAND_MIDDLE_RATIO
-            )
+            treatment = replace(treatment, vibration=exp(sum(logs) / energy) / LOSS_BAND_MIDDLE_RATIO)
         found.append(treatment)
     return tuple(found)
 
@@ -90,9 +79,7 @@ def is_lossy_mat(part: PartGeometry, treatment: Discretization) -> bool:
 
 
 def impacts_on_objects(
-    parts: Sequence[PartGeometry],
-    motions: Sequence[ExpectedMotion],
-    treatments: Sequence[Discretization],
+    parts: Sequence[PartGeometry], motions: Sequence[ExpectedMotion], treatments: Sequence[Discretization]
 ) -> dict[int, list[_ImpactOnMat]]:
     """Collect what falls onto every object."""
     found: dict[int, list[_ImpactOnMat]] = {}
@@ -101,9 +88,7 @@ def impacts_on_objects(
         if lands is None or lands.energy <= 0.0 or not own:
             continue
         largest = max(own, key=lambda n: bulk_mass(parts[n]))
-        blow = _ImpactOnMat(
-            lands, 0.5 * parts[largest].size[1], impact_compliance(treatments[largest])
-        )
+        blow = _ImpactOnMat(lands, 0.5 * parts[largest].size[1], impact_compliance(treatments[largest]))
         found.setdefault(lands.onto, []).append(blow)
     return found
 

@@ -27,9 +27,7 @@ class PairRestitutions:
 
 
 def restitutions_at_impact(
-    field: MaterialField,
-    treatments: Sequence[Discretization],
-    shapes: Mapping[int, PartProportions] | None = None,
+    field: MaterialField, treatments: Sequence[Discretization], shapes: Mapping[int, PartProportions] | None = None
 ) -> PairRestitutions:
     """Carry the restitution of all pairs of parts and the floor to the speeds of their impacts.
 
@@ -52,8 +50,7 @@ def restitutions_at_impact(
     solid = [*(s.kind == "solid" for s in field.structures), True]
     speeds = [*(t.impact_speed for t in treatments), 0.0]
     strikers = [
-        ImpactBody(known[m.name], m, whole) if m.name in known else None
-        for m, whole in zip(bodies, solid, strict=True)
+        ImpactBody(known[m.name], m, whole) if m.name in known else None for m, whole in zip(bodies, solid, strict=True)
     ]
     for i, one in enumerate(strikers):
         for j, other in enumerate(strikers[: i + 1]):
@@ -70,9 +67,7 @@ def restitutions_at_impact(
     return PairRestitutions(table, laws)
 
 
-def _restitution_of_pair(
-    one: ImpactBody, other: ImpactBody, speed: float, drawn: float
-) -> RestitutionLaw:
+def _restitution_of_pair(one: ImpactBody, other: ImpactBody, speed: float, drawn: float) -> RestitutionLaw:
     """Carry the restitution that two bodies have at ``NOMINAL_IMPACT_SPEED_M_S`` to the speed of their impact."""
     nominal = materials.pair_restitution(one, other, NOMINAL_IMPACT_SPEED_M_S).value
     law = materials.pair_restitution_law(one, other, speed)
@@ -81,9 +76,5 @@ def _restitution_of_pair(
         ratio = drawn / nominal
         value = min(1.0, ratio * law.value) if speed != NOMINAL_IMPACT_SPEED_M_S else drawn
     return replace(
-        law,
-        value=value,
-        slope=ratio * law.slope,
-        least=min(law.least, value),
-        most=min(1.0, ratio * law.most),
+        law, value=value, slope=ratio * law.slope, least=min(law.least, value), most=min(1.0, ratio * law.most)
     )

@@ -1,11 +1,10 @@
 """Slabs and sheets on the floor that would be indented much too deeply.
 
-A ball that is dented more than twice as deep as in reality is rigid instead (``step_budget``). So
-is a slab that lies on the floor and is softened by the step budget, and a flat sheet that the grid
-makes thicker, where what falls on it is rigid: what it loses then depends on the grid, and rounds
-of impacts know that the floor holds it, so that both rebound by their coefficient of restitution. A
-sheet thinner than half a cell, as of paper, is so whatever falls on it: it would be a mattress of
-two cells between a ball and the floor.
+A ball that is dented more than twice as deep as in reality is rigid instead (``step_budget``). So is a slab that lies
+on the floor and is softened by the step budget, and a flat sheet that the grid makes thicker, where what falls on it is
+rigid: what it loses then depends on the grid, and rounds of impacts know that the floor holds it, so that both rebound
+by their coefficient of restitution. A sheet thinner than half a cell, as of paper, is so whatever falls on it: it would
+be a mattress of two cells between a ball and the floor.
 """
 
 from collections.abc import Sequence
@@ -29,14 +28,12 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 MAX_DENT_RATIO = 2.0
 """Dent as simulated over that of life, from which rigid is nearer to the truth [-]."""
 MAX_MAT_THICKNESS_RATIO = 4.0
-"""Thickness of a sheet as simulated, two cells at least, over that of life, up to which it is a mat
-to what is soft and falls on it [-]; one that is thinner than half a cell is nothing of its own."""
+"""Thickness of a sheet as simulated, two cells at least, over that of life, up to which it is a mat to what is soft and
+falls on it [-]; one that is thinner than half a cell is nothing of its own."""
 
 
 def slabs_nearer_to_rigid(
-    parts: Sequence[PartGeometry],
-    motions: Sequence[ExpectedMotion],
-    treatments: Sequence[Discretization],
+    parts: Sequence[PartGeometry], motions: Sequence[ExpectedMotion], treatments: Sequence[Discretization]
 ) -> dict[int, str]:
     """Return which slabs and sheets on the floor are nearer to life as rigid ones.
 
@@ -82,14 +79,12 @@ def slabs_nearer_to_rigid(
 
 
 def mark_thin_floor_sheets(
-    parts: Sequence[PartGeometry],
-    motions: Sequence[ExpectedMotion],
-    treatments: Sequence[Discretization],
+    parts: Sequence[PartGeometry], motions: Sequence[ExpectedMotion], treatments: Sequence[Discretization]
 ) -> tuple[Discretization, ...]:
     """Mark rigid flat sheets on the floor that are thinner than half a cell.
 
-    A tenth of a millimetre of paper stores nothing of an impact, and the next step may lead through
-    it to the floor: what it is made of says nothing of the rebound.
+    A tenth of a millimetre of paper stores nothing of an impact, and the next step may lead through it to the floor:
+    what it is made of says nothing of the rebound.
 
     Args:
         parts: All of the scene's.

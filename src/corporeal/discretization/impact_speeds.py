@@ -72,9 +72,9 @@ def expected_motions(
 ) -> list[ExpectedMotion]:
     """Estimate every object's speed at impact.
 
-    Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add
-    horizontally. What may be hit by another object is hit at the difference of their horizontal
-    velocities, and at the larger of their speeds of fall.
+    Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add horizontally. What may
+    be hit by another object is hit at the difference of their horizontal velocities, and at the larger of their speeds
+    of fall.
 
     Args:
         scene: The objects, gravity, and what acts on each object.
@@ -88,10 +88,7 @@ def expected_motions(
     drops = fall_heights([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
     # Each object by itself.
     horizontal, fall, forced = [], [], []
-    single = [
-        drive_of_object(obj, anatomies[k], masses[k], scene.duration)
-        for k, obj in enumerate(scene.objects)
-    ]
+    single = [drive_of_object(obj, anatomies[k], masses[k], scene.duration) for k, obj in enumerate(scene.objects)]
     drives = share_vessel_drives(single, masses, vessels)
     for obj, height, drive in zip(scene.objects, drops.height, drives, strict=True):
         velocity = np.array(obj.velocity) + drive.velocity
@@ -133,9 +130,7 @@ def share_vessel_drives(
     return found
 
 
-def drive_of_object(
-    obj: SceneObject, anatomy: MeasuredObject, mass: float, duration: float
-) -> ExternalDrive:
+def drive_of_object(obj: SceneObject, anatomy: MeasuredObject, mass: float, duration: float) -> ExternalDrive:
     """Estimate what push and wind do to an object: wind makes it no faster than the air.
 
     Args:

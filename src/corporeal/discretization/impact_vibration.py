@@ -1,16 +1,14 @@
 """Energy lost to vibration in hard impacts of balls, subtracted from the material's loss.
 
-Loss factor and restitution are equivalent in hereditary Hertz contact (``materials.rebound``),
-which holds where an impact is slow against the waves in the ball. An impact of ρ v²/E = 0.1 dents
-it by two thirds of its radius and leaves it vibrating, and it comes back as if its loss factor were
-larger by 0.09. A solid ball does that in reality, too, and there is nothing to mend where it is as
-stiff here. It is too much
+Loss factor and restitution are equivalent in hereditary Hertz contact (``materials.rebound``), which holds where an
+impact is slow against the waves in the ball. An impact of ρ v²/E = 0.1 dents it by two thirds of its radius and leaves
+it vibrating, and it comes back as if its loss factor were larger by 0.09. A solid ball does that in reality, too, and
+there is nothing to mend where it is as stiff here. It is too much
 
-- where the step budget has softened it: what it loses here beyond what it does in reality is taken
-off
+- where the step budget has softened it: what it loses here beyond what it does in reality is taken off
   its loss factor;
-- where it stands for a wall with air behind it, whose loss factor was made from its rebound, or is
-  that of the wall: the solid rings instead of them.
+- where it stands for a wall with air behind it, whose loss factor was made from its rebound, or is that of the wall:
+  the solid rings instead of them.
 """
 
 from collections.abc import Sequence
@@ -24,8 +22,8 @@ from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.mpm.physics.time_step_limits import stable_step
 
 VIBRATION_LOSS_COEFFICIENT = 0.87
-"""Loss factor that vibrations take of an impact, over ρ v²/E [-]: measured on balls of 8 to 20
-cells, ρ v²/E of 0.001 to 0.1, ν of 0.2 and 0.41, loss factors from 0.05 to 0.4 (decision discretize-rigid-parts).
+"""Loss factor that vibrations take of an impact, over ρ v²/E [-]: measured on balls of 8 to 20 cells, ρ v²/E of 0.001
+to 0.1, ν of 0.2 and 0.41, loss factors from 0.05 to 0.4 (decision discretize-rigid-parts).
 """
 MAX_IMPACT_NUMBER = 0.1
 """ρ v²/E up to which it was measured [-]; what is struck harder counts as struck so."""
@@ -71,9 +69,7 @@ def compensate_vibration_loss(
         lands = motions[part.object].landing
         if lands is not None and lands.speed > 0.0 and lands.onto not in soft:
             if _is_elastic_ball(part, made):
-                made = _lower_loss_factor(
-                    made, _excess_vibration_loss(part, true, made, lands.speed), cell
-                )
+                made = _lower_loss_factor(made, _excess_vibration_loss(part, true, made, lands.speed), cell)
         found.append(made)
     return found
 
@@ -85,9 +81,7 @@ def _is_elastic_ball(part: PartGeometry, made: Discretization) -> bool:
     return made.kind == "deformable" and elastic and is_dented_by_impact(part) and made.loss > 0.0
 
 
-def _excess_vibration_loss(
-    part: PartGeometry, true: Discretization, made: Discretization, speed: float
-) -> float:
+def _excess_vibration_loss(part: PartGeometry, true: Discretization, made: Discretization, speed: float) -> float:
     """Loss factor [-] that vibrations take beyond those of life."""
     here = vibration_loss(made.density, speed, made.simulated_young_pa)
     if part.structure.inflated:

@@ -7,11 +7,7 @@ import numpy as np
 
 from corporeal.core.types import Material, MaterialField, Particles
 from corporeal.discretization.mesh_measures import oriented_box_size
-from corporeal.discretization.part_geometry import (
-    MIN_COMPACT_SIDE_RATIO,
-    ObjectLanding,
-    PartGeometry,
-)
+from corporeal.discretization.part_geometry import MIN_COMPACT_SIDE_RATIO, ObjectLanding, PartGeometry
 from corporeal.materials.contact_pairs import RestitutionLaw, series_restitution
 from corporeal.materials.flat_crush import (
     ImpactingBall,
@@ -21,11 +17,7 @@ from corporeal.materials.flat_crush import (
     layered_materials,
 )
 from corporeal.materials.loss_restitution import loss_of_restitution
-from corporeal.materials.restitution_speed import (
-    MIN_CARRIED_RESTITUTION,
-    is_stated_by_person,
-    material_at_speed,
-)
+from corporeal.materials.restitution_speed import MIN_CARRIED_RESTITUTION, is_stated_by_person, material_at_speed
 
 
 @dataclass(frozen=True)
@@ -73,11 +65,7 @@ def part_proportions(particles: Particles, field: MaterialField) -> dict[int, Pa
 
 
 def layered_restitution_law(
-    field: MaterialField,
-    shapes: Mapping[int, PartProportions],
-    pair: tuple[int, int],
-    speed: float,
-    packed: float,
+    field: MaterialField, shapes: Mapping[int, PartProportions], pair: tuple[int, int], speed: float, packed: float
 ) -> RestitutionLaw | None:
     """Return how a ball rebounds from a sheet of layers that it strikes; None: they are none.
 
@@ -95,15 +83,11 @@ def layered_restitution_law(
             continue
         struck = _layered_sheet(other, field.materials[sheet])
         if struck and one.is_compact:
-            return crush_restitution_law(
-                _ball_of(one, field.materials[ball]), struck, speed, packed
-            )
+            return crush_restitution_law(_ball_of(one, field.materials[ball]), struck, speed, packed)
     return None
 
 
-def layered_loss_factor(
-    ball: PartGeometry, lands: ObjectLanding, sheet: PartGeometry
-) -> float | None:
+def layered_loss_factor(ball: PartGeometry, lands: ObjectLanding, sheet: PartGeometry) -> float | None:
     """Loss factor of a soft ball and a rigid sheet of layers that it falls on [-]; None: of none.
 
     Args:
@@ -128,9 +112,5 @@ def _ball_of(shape: PartProportions, material: Material) -> ImpactingBall:
 
 def _layered_sheet(shape: PartProportions, material: Material) -> LayeredSheet | None:
     """Return the weak direction's data of a layered sheet; None: none, or the restitution is annotated."""
-    weak = (
-        shape.is_sheet
-        and material.name in layered_materials()
-        and not is_stated_by_person(material, "restitution")
-    )
+    weak = shape.is_sheet and material.name in layered_materials() and not is_stated_by_person(material, "restitution")
     return LayeredSheet(material, shape.size[0]) if weak else None

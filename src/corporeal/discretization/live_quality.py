@@ -10,11 +10,11 @@ from corporeal.mpm.constants import COURANT
 LIVE_CELLS_ACROSS = (8, 7, 6, 5, 4)
 """Cells across the smallest deformable object, the finest first."""
 MAX_STEP_TIME_FRACTION = 0.4
-"""Of the threads' time that steps may take as they cost before anything touches: once it does they
-cost about twice as much (2.1 to 2.4 times in the first two showcase scenes)."""
+"""Of the threads' time that steps may take as they cost before anything touches: once it does they cost about twice as
+much (2.1 to 2.4 times in the first two showcase scenes)."""
 LIVE_WAVE_SPEED_RATIO = 4.0
-"""Waves run at least so many times faster than anything moves [-]; a run asks for 10, at which the
-duck on mud takes 2.3 times the steps. What is softer for it is said in the page."""
+"""Waves run at least so many times faster than anything moves [-]; a run asks for 10, at which the duck on mud takes
+2.3 times the steps. What is softer for it is said in the page."""
 SUFFICIENT_STEPS_PER_SECOND = 3e3
 """Steps per simulated second below which coarser cells are better, where cells can be coarser."""
 MIN_STEPS_PER_SECOND = 1e3
@@ -28,8 +28,8 @@ class LiveDemand:
     """What a filled scene asks of whoever steps it."""
 
     cost: float
-    """CPU seconds of a step, as it was filled: measured, as few particles in many cells cost more
-    each than many in few."""
+    """CPU seconds of a step, as it was filled: measured, as few particles in many cells cost more each than many in
+    few."""
     cells: int
     """Across the smallest deformable object, as it was filled."""
     cell: float
@@ -84,10 +84,7 @@ def choose_live_quality(demand: LiveDemand, threads: int) -> QualityPreset:
         """Return the steps per simulated second that fit."""
         return MAX_STEP_TIME_FRACTION * threads / demand.step_cost(cells)
 
-    cells = next(
-        (c for c in LIVE_CELLS_ACROSS if steps_at(c) >= demand.least_steps(c)),
-        LIVE_CELLS_ACROSS[-1],
-    )
+    cells = next((c for c in LIVE_CELLS_ACROSS if steps_at(c) >= demand.least_steps(c)), LIVE_CELLS_ACROSS[-1])
     # Loss stiffens: that many more steps are taken than the budget counts.
     steps = min(max(steps_at(cells) / demand.stiffened, MIN_STEPS_PER_SECOND), MAX_STEPS_PER_SECOND)
     coarse = QUALITY_PRESETS["draft"]
@@ -95,9 +92,7 @@ def choose_live_quality(demand: LiveDemand, threads: int) -> QualityPreset:
     return QualityPreset(cells, along, coarse.particles, steps, float("inf"), LIVE_WAVE_SPEED_RATIO)
 
 
-def limit_live_steps(
-    quality: QualityPreset, demand: LiveDemand, cell: float, threads: int
-) -> QualityPreset:
+def limit_live_steps(quality: QualityPreset, demand: LiveDemand, cell: float, threads: int) -> QualityPreset:
     """Return a quality with fewer steps where its cells turned out finer than it asked for.
 
     What is rigid is at least a cell wide, whatever the budget: then only steps can be saved.

@@ -33,8 +33,7 @@ def connected_pieces(mesh: Mesh) -> Int[np.ndarray, " T"]:
     """Give each triangle the number of its connected piece."""
     f = mesh.triangles
     links = coo_matrix(
-        (np.ones(2 * len(f)), (f[:, [0, 1]].ravel(), f[:, [1, 2]].ravel())),
-        shape=(len(mesh.vertices),) * 2,
+        (np.ones(2 * len(f)), (f[:, [0, 1]].ravel(), f[:, [1, 2]].ravel())), shape=(len(mesh.vertices),) * 2
     )
     label = connected_components(links, directed=False)[1][f[:, 0]]
     return np.unique(label, return_inverse=True)[1].reshape(-1)
@@ -47,9 +46,7 @@ def open_sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
     """
     corners, areas = mesh.corners, mesh.areas
     area = np.bincount(piece, areas)
-    middle = np.stack(
-        [np.bincount(piece, areas * corners.mean(axis=1)[:, k]) / area for k in range(3)], axis=1
-    )
+    middle = np.stack([np.bincount(piece, areas * corners.mean(axis=1)[:, k]) / area for k in range(3)], axis=1)
     a, b, c = np.swapaxes(corners - middle[piece][:, None], 0, 1)
     volume = np.abs(np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6))
     edges, owner = boundary_edges(mesh, piece)
@@ -71,9 +68,7 @@ def longest_rim_length(mesh: Mesh) -> float:
     return float(np.bincount(loop, length).max())
 
 
-def mesh_kind_of(
-    shape: QueryMesh, size: tuple[float, float, float], rng: np.random.Generator
-) -> MeshKind:
+def mesh_kind_of(shape: QueryMesh, size: tuple[float, float, float], rng: np.random.Generator) -> MeshKind:
     """Tell a body from a thin wall and an open vessel.
 
     Two opinions on what is inside: the winding number, and whether at least 24 of 26 directions
@@ -94,11 +89,7 @@ def mesh_kind_of(
         return MeshKind.BODY
     volume = inside.mean() * float(np.prod(high - low))
     thin = 2 * volume / float(mesh.areas.sum()) < MAX_WALL_THICKNESS_FRACTION * size[0]
-    if (
-        thin
-        and np.mean(wall_thickness_behind(shape, rng) < 2 * MAX_WALL_THICKNESS_FRACTION * size[0])
-        > 0.6
-    ):
+    if thin and np.mean(wall_thickness_behind(shape, rng) < 2 * MAX_WALL_THICKNESS_FRACTION * size[0]) > 0.6:
         return MeshKind.WALL
     open_vessel = shared < 0.6 * either and longest_rim_length(mesh) > size[1]
     return MeshKind.SHEET if open_vessel else MeshKind.BODY
@@ -107,19 +98,13 @@ def mesh_kind_of(
 def _with_support_plane(mesh: Mesh, low: np.ndarray, high: np.ndarray) -> QueryMesh:
     """Add what it stands on, so that a missing underside does not count as an opening."""
     z = low[2] - 1e-4 * (high[2] - low[2])
-    floor = np.array(
-        [[low[0], low[1], z], [high[0], low[1], z], [high[0], high[1], z], [low[0], high[1], z]]
-    )
+    floor = np.array([[low[0], low[1], z], [high[0], low[1], z], [high[0], high[1], z], [low[0], high[1], z]])
     n = len(mesh.vertices)
     faces = np.array([[n, n + 1, n + 2], [n, n + 2, n + 3]])
-    return QueryMesh(
-        Mesh(np.concatenate([mesh.vertices, floor]), np.concatenate([mesh.triangles, faces]))
-    )
+    return QueryMesh(Mesh(np.concatenate([mesh.vertices, floor]), np.concatenate([mesh.triangles, faces])))
 
 
-def wall_thickness_behind(
-    shape: QueryMesh, rng: np.random.Generator, count: int = 2000
-) -> Float[np.ndarray, " count"]:
+def wall_thickness_behind(shape: QueryMesh, rng: np.random.Generator, count: int = 2000) -> Float[np.ndarray, " count"]:
     """Thickness behind random points of the surface [m], straight down; inf: nothing behind."""
     points, triangle = sample_surface(shape.mesh, count, rng)
     inward = -shape.mesh.normals[triangle]
@@ -132,8 +117,8 @@ def inner_face_fraction(
 ) -> float:
     """Share of a part's surface that is the inner face of a wall whose outer face is there, too.
 
-    What has another face close behind it that sees at least half as much again of the open: the
-    inside of a shade, or of a vase as far down as pictures show it.
+    What has another face close behind it that sees at least half as much again of the open: the inside of a shade, or
+    of a vase as far down as pictures show it.
 
     Args:
         shape: All that encloses something.

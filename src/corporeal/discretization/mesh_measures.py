@@ -39,8 +39,8 @@ from corporeal.geometry.point_sampling import scatter_points
 def oriented_box_size(points: Float[np.ndarray, "N 3"]) -> tuple[float, float, float]:
     """Extents of the smallest box around the points, shortest first [m].
 
-    The box of least volume over frames that stand on a face of the convex hull and are turned to
-    one of that face's edges, beside the world's and the principal frame.
+    The box of least volume over frames that stand on a face of the convex hull and are turned to one of that face's
+    edges, beside the world's and the principal frame.
     """
     centred = points - points.mean(axis=0)
     _, _, principal = np.linalg.svd(centred[:: max(1, len(centred) // 20000)], full_matrices=False)
@@ -251,9 +251,7 @@ def measure_object(
     build = np.where(open_sheets(mesh, piece), MeshKind.SHEET, MeshKind.BODY) if len(kept) else kept
     for group in piece_group_masks(piece, part, build != MeshKind.SHEET):
         shape = QueryMesh(mesh.only(group))
-        build[group] = mesh_kind_of(
-            shape, oriented_box_size(shape.mesh.corners.reshape(-1, 3)), rng
-        )
+        build[group] = mesh_kind_of(shape, oriented_box_size(shape.mesh.corners.reshape(-1, 3)), rng)
     solid = build != MeshKind.SHEET
     shape = QueryMesh(mesh.only(solid)) if solid.any() else None
     closed = {k: is_nearly_closed(mesh.only(solid & (part == k))) for k in np.unique(part)}
@@ -292,9 +290,7 @@ def measure_assembled(
         return label_points(points, shape, part_of_triangle, [m for m in alone if m.closed])
 
     owner = owner_of(probes)
-    members = tuple(
-        m if m.volume else _with_probed_volume(m, owner, spacing, owner_of, rng) for m in alone
-    )
+    members = tuple(m if m.volume else _with_probed_volume(m, owner, spacing, owner_of, rng) for m in alone)
     return MeasuredObject(
         shape=shape,
         skin=outer_skin(shape, rng) if shape is not None else None,
@@ -306,13 +302,11 @@ def measure_assembled(
     )
 
 
-def detach_open_pieces(
-    mesh: Mesh, part: Int[np.ndarray, " T"], piece: Int[np.ndarray, " T"]
-) -> Int[np.ndarray, " T"]:
+def detach_open_pieces(mesh: Mesh, part: Int[np.ndarray, " T"], piece: Int[np.ndarray, " T"]) -> Int[np.ndarray, " T"]:
     """Take what is open off a part that is closed by itself and shares vertices with it.
 
-    A disc of soil whose rim is one with a line on its pot's inside has three faces at each edge
-    there, and would make an open sheet of both.
+    A disc of soil whose rim is one with a line on its pot's inside has three faces at each edge there, and would make
+    an open sheet of both.
     """
     found = piece.copy()
     pairs = np.unique(np.column_stack([piece, part]), axis=0)
@@ -382,9 +376,7 @@ def label_points(
         result[near[member.shape.inside(points[near])]] = member.part
     left = np.flatnonzero(result < 0)
     faces = rest if len(rest) else np.arange(len(part_of_triangle))
-    result[left] = part_of_triangle[
-        faces[QueryMesh(shape.mesh.only(faces)).closest(points[left])[1]]
-    ]
+    result[left] = part_of_triangle[faces[QueryMesh(shape.mesh.only(faces)).closest(points[left])[1]]]
     return result
 
 
@@ -397,15 +389,12 @@ def _with_probed_volume(
 ) -> MeasuredPart:
     """Count the probes; where the mesh is closed and agrees, its own exact volume is better.
 
-    A closed part that few of the object's probes hit has some of its own: its mesh may overlap
-    itself, or hold or share what is another's. Where it is too thin for many of those too, it
-    agrees within three standard errors.
+    A closed part that few of the object's probes hit has some of its own: its mesh may overlap itself, or hold or share
+    what is another's. Where it is too thin for many of those too, it agrees within three standard errors.
     """
     exact, margin = abs(signed_volume(member.body)) if member.closed else 0.0, 0.03
     if exact > 0 and (owner == member.part).sum() < MIN_PROBES_PER_PART:
-        spacing = max(
-            (exact / PART_PROBES_COUNT) ** (1 / 3), member.body.extent / MAX_PART_PROBES_ALONG
-        )
+        spacing = max((exact / PART_PROBES_COUNT) ** (1 / 3), member.body.extent / MAX_PART_PROBES_ALONG)
         # From a stream of its own: nothing else that is drawn depends on it.
         owner = owner_of(scatter_points(member.shape, spacing, rng.spawn(1)[0]))
         margin = max(margin, 3 * (spacing**3 / exact) ** 0.5)
@@ -480,8 +469,7 @@ def refuse_buried_objects(scene: Scene, anatomies: list[MeasuredObject], cell: f
         lowest = float(anatomy.vertices[:, 2].min())
         if lowest < -cell:
             raise UserError(
-                f"Object {obj.name!r} reaches {-lowest:.3g} m below the floor. "
-                "Raise its position by as much."
+                f"Object {obj.name!r} reaches {-lowest:.3g} m below the floor. Raise its position by as much."
             )
         for k, wall in enumerate(scene.walls):
             depth = float(((np.array(wall.point) - anatomy.vertices) @ np.array(wall.normal)).max())

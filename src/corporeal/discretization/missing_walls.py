@@ -1,8 +1,8 @@
 """Missing walls below soft material, where one surface is drawn of both.
 
-Pictures show no border inside an object: of a couch's base they show sides and underside, of its
-seat the top. What is soft bridges no hollow, so that the base has a top below its seat. What is
-stiff does, as a slab on a cabinet and the cork of a jar.
+Pictures show no border inside an object: of a couch's base they show sides and underside, of its seat the top. What is
+soft bridges no hollow, so that the base has a top below its seat. What is stiff does, as a slab on a cabinet and the
+cork of a jar.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,15 +15,8 @@ from corporeal.core.types import GRAVITY_M_S2, Material, MaterialField
 from corporeal.discretization.cavity import is_vessel, part_corners
 from corporeal.discretization.fill_level import sample_isosurface
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, oriented_box_size
-from corporeal.discretization.part_model import (
-    infer_structure,
-    part_specification,
-    piece_specifications,
-)
-from corporeal.discretization.rigidity import (
-    MAX_INVISIBLE_STRAIN,
-    cantilever_tip_deflection_ratio,
-)
+from corporeal.discretization.part_model import infer_structure, part_specification, piece_specifications
+from corporeal.discretization.rigidity import MAX_INVISIBLE_STRAIN, cantilever_tip_deflection_ratio
 from corporeal.geometry.mesh import Mesh, join_meshes, weld_mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
@@ -57,14 +50,10 @@ class MissingWall:
 def _is_limp_over_span(material: Material, span: float, depth: float) -> bool:
     """Return whether a bar of some material would visibly bend by its own weight, held at one end."""
     load = material.density * GRAVITY_M_S2
-    return (
-        cantilever_tip_deflection_ratio(load, material.young, span, depth) >= MAX_INVISIBLE_STRAIN
-    )
+    return cantilever_tip_deflection_ratio(load, material.young, span, depth) >= MAX_INVISIBLE_STRAIN
 
 
-def close_all_missing_walls(
-    anatomies: Sequence[MeasuredObject], field: MaterialField
-) -> list[MeasuredObject]:
+def close_all_missing_walls(anatomies: Sequence[MeasuredObject], field: MaterialField) -> list[MeasuredObject]:
     """Close every hollow wall of all objects below what is soft and lies on it.
 
     Args:
@@ -100,9 +89,7 @@ def find_missing_walls(
     return found
 
 
-def with_missing_walls(
-    anatomy: MeasuredObject, lids: Mapping[int, Sequence[MissingWall]]
-) -> MeasuredObject:
+def with_missing_walls(anatomy: MeasuredObject, lids: Mapping[int, Sequence[MissingWall]]) -> MeasuredObject:
     """Let walls go on along their borders; volumes and what is inside stay as they are."""
     if not lids:
         return anatomy
@@ -112,15 +99,11 @@ def with_missing_walls(
         lid = join_meshes([b.mesh for b in own])
         rows[part] = lid.triangles + len(vertices)
         vertices = np.concatenate([vertices, lid.vertices])
-    members = [
-        _closed_part(m, vertices, rows[m.part]) if m.part in rows else m for m in anatomy.members
-    ]
+    members = [_closed_part(m, vertices, rows[m.part]) if m.part in rows else m for m in anatomy.members]
     return replace(anatomy, members=tuple(members), vertices=vertices)
 
 
-def _closed_part(
-    member: MeasuredPart, vertices: Float[np.ndarray, "V 3"], lid: Int[np.ndarray, "T 3"]
-) -> MeasuredPart:
+def _closed_part(member: MeasuredPart, vertices: Float[np.ndarray, "V 3"], lid: Int[np.ndarray, "T 3"]) -> MeasuredPart:
     body = Mesh(vertices, np.concatenate([member.body.triangles, lid]))
     return replace(member, body=body, lid=Mesh(vertices, lid))
 
@@ -129,10 +112,7 @@ def is_one_faced_wall(member: MeasuredPart, field: MaterialField) -> bool:
     """Whether a part is an empty wall of which one face is drawn, and that not all around."""
     if not member.volume > 0 or member.closed or len(piece_specifications(member.part, field)) > 1:
         return False
-    structure, made = (
-        field.structures[member.part],
-        infer_structure(member, part_specification(member.part, field)),
-    )
+    structure, made = (field.structures[member.part], infer_structure(member, part_specification(member.part, field)))
     empty = structure.contents is None and not structure.holds
     return empty and made.thickness > 0 and not made.modelled and not is_vessel(member)
 
@@ -142,16 +122,14 @@ def _may_sag_over(member: MeasuredPart, field: MaterialField, width: float) -> b
     material = field.materials[member.part]
     solid = field.structures[member.part].kind == "solid" and member.volume > 0
     one, flows = solid and not member.closed, CONSTITUTIVE_LAWS[material.law].loose
-    return (
-        one and not flows and _is_limp_over_span(material, width, MIN_LOAD_DEPTH_FRACTION * width)
-    )
+    return one and not flows and _is_limp_over_span(material, width, MIN_LOAD_DEPTH_FRACTION * width)
 
 
 def find_borders(anatomy: MeasuredObject, member: MeasuredPart) -> tuple[MissingWall, ...]:
     """Find where other parts lie on one: where faces of both are equally near.
 
-    That is meshed as where the difference of two distances changes its sign (marching cubes), and
-    kept inside what the object encloses, where it faces up.
+    That is meshed as where the difference of two distances changes its sign (marching cubes), and kept inside what the
+    object encloses, where it faces up.
     """
     others, shape = [m for m in anatomy.members if m.part != member.part], anatomy.shape
     if not others or shape is None:
@@ -163,9 +141,7 @@ def find_borders(anatomy: MeasuredObject, member: MeasuredPart) -> tuple[Missing
     axes = [np.arange(a - step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     points = grid.reshape(-1, 3)
-    farther = (_distance_to_parts([member], points) - _distance_to_parts(others, points)).reshape(
-        grid.shape[:3]
-    )
+    farther = (_distance_to_parts([member], points) - _distance_to_parts(others, points)).reshape(grid.shape[:3])
     if not farther.min() < 0 < farther.max():
         return ()
     mesh = sample_isosurface(-farther, step, grid[0, 0, 0])
@@ -174,19 +150,15 @@ def find_borders(anatomy: MeasuredObject, member: MeasuredPart) -> tuple[Missing
     inside = shape.inside(middles)
     mesh, middles = mesh.only(inside), middles[inside]
     nearest = np.argmin([_distance_to_parts([m], middles) for m in others], axis=0)
-    found = [
-        _border_mesh(anatomy, member, m, mesh.only(nearest == k)) for k, m in enumerate(others)
-    ]
+    found = [_border_mesh(anatomy, member, m, mesh.only(nearest == k)) for k, m in enumerate(others)]
     return tuple(b for b in found if b is not None)
 
 
-def _border_mesh(
-    anatomy: MeasuredObject, lower: MeasuredPart, upper: MeasuredPart, mesh: Mesh
-) -> MissingWall | None:
+def _border_mesh(anatomy: MeasuredObject, lower: MeasuredPart, upper: MeasuredPart, mesh: Mesh) -> MissingWall | None:
     """Lay a border on the plane through the line where faces of both meet: boards are flat.
 
-    What is half way between faces dips and bulges, and counts as far as it covers that plane.
-    Heights are fitted by least squares, z = a + b x + c y.
+    What is half way between faces dips and bulges, and counts as far as it covers that plane. Heights are fitted by
+    least squares, z = a + b x + c y.
     """
     line = shared_seam(anatomy, lower.part, upper.part)
     if anatomy.shape is None or not len(mesh.triangles) or len(line) < 3:
@@ -203,9 +175,7 @@ def _border_mesh(
     return MissingWall(flat, upper.part, oriented_box_size(flat.corners.reshape(-1, 3))[1], depth)
 
 
-def _distance_to_parts(
-    members: Sequence[MeasuredPart], points: Float[np.ndarray, "N 3"]
-) -> Float[np.ndarray, " N"]:
+def _distance_to_parts(members: Sequence[MeasuredPart], points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
     """Distance to the nearest face of some parts [m]."""
     mesh = join_meshes([part for m in members for part in (m.body, m.sheet)])
     return QueryMesh(mesh).closest(points)[0]

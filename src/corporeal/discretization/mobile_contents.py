@@ -57,17 +57,11 @@ def sample_wetted_points(
     """
     faces = [f for m in anatomy.members for f in part_wetted_faces(m, makes[m.part])]
     area = sum(float(mesh.areas.sum()) for mesh, _, _ in faces)
-    distance = max(
-        WETTED_SPACING_CELLS * cell, float(np.sqrt(0.69 * area / MAX_SAMPLED_WETTED_POINTS))
-    )
+    distance = max(WETTED_SPACING_CELLS * cell, float(np.sqrt(0.69 * area / MAX_SAMPLED_WETTED_POINTS)))
     points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for mesh, depth, side in faces:
         count = int(
-            np.clip(
-                DARTS_PER_POINT * mesh.areas.sum() / distance**2,
-                50,
-                DARTS_PER_POINT * MAX_SAMPLED_WETTED_POINTS,
-            )
+            np.clip(DARTS_PER_POINT * mesh.areas.sum() / distance**2, 50, DARTS_PER_POINT * MAX_SAMPLED_WETTED_POINTS)
         )
         found, triangle = sample_surface(mesh, count, rng)
         normal = mesh.normals[triangle]
@@ -107,16 +101,12 @@ def mobile_content_parts(field: MaterialField) -> list[int]:
 
 
 def pour_contents(
-    scene: Scene,
-    parts: Parts,
-    field: MaterialField,
-    anatomies: Sequence[MeasuredObject],
-    seed: int,
+    scene: Scene, parts: Parts, field: MaterialField, anatomies: Sequence[MeasuredObject], seed: int
 ) -> tuple[VesselContents, ...]:
     """Return what moves in vessels, each as an object of its own.
 
-    The vessel's push acts on all that it was to move: its wall is pushed as much harder. A mass
-    that its file states is shared out.
+    The vessel's push acts on all that it was to move: its wall is pushed as much harder. A mass that its file states is
+    shared out.
 
     Args:
         scene: Without them.
@@ -174,9 +164,7 @@ def _emptied_vessel(vessel: SceneObject, mass: float, rest: float) -> SceneObjec
     return replace(vessel, push=push, mass=stated)
 
 
-def _contents_object(
-    vessel: SceneObject, name: str, lies: PouredBody, mass: float, rest: float
-) -> SceneObject:
+def _contents_object(vessel: SceneObject, name: str, lies: PouredBody, mass: float, rest: float) -> SceneObject:
     extent = float(np.ptp(lies.mesh.vertices, axis=0).max())
     return SceneObject(
         name=f"{vessel.name}_{name}",
@@ -205,9 +193,7 @@ def _contents_words(name: str, wall: PartDescription) -> PartDescription:
     )
 
 
-def pour_loose_contents(
-    scene: Scene, parts: Parts, field: MaterialField, seed: int
-) -> tuple[VesselContents, ...]:
+def pour_loose_contents(scene: Scene, parts: Parts, field: MaterialField, seed: int) -> tuple[VesselContents, ...]:
     """Return what moves in vessels that it does not fill; the field's lengths are real ones."""
     if not mobile_content_parts(field):
         return ()

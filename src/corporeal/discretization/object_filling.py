@@ -52,9 +52,7 @@ class ObjectFilling:
 
     def only(self, chosen: np.ndarray) -> "ObjectFilling":
         """Return the chosen points."""
-        return ObjectFilling(
-            self.points[chosen], self.volumes[chosen], self.part[chosen], self.sheet[chosen]
-        )
+        return ObjectFilling(self.points[chosen], self.volumes[chosen], self.part[chosen], self.sheet[chosen])
 
 
 def fill_object(
@@ -81,17 +79,11 @@ def fill_object(
         face = member.body
         if recipe.rod is not None:
             points = rod_section_points(recipe.rod, recipe.thick, spacing)
-            lumps.append(
-                _lump_point(PointFilling(points, np.ones(len(points))), member, sheet=False)
-            )
+            lumps.append(_lump_point(PointFilling(points, np.ones(len(points))), member, sheet=False))
         elif recipe.depth == 0 and len(face.triangles):
             outer = outer_wall_face(anatomy, member)
             lumps.append(
-                _lump_point(
-                    fill_wall(outer, spacing, _fitting_face(outer, recipe.wall), rng),
-                    member,
-                    sheet=False,
-                )
+                _lump_point(fill_wall(outer, spacing, _fitting_face(outer, recipe.wall), rng), member, sheet=False)
             )
         elif len(face.triangles) and not (lumps[0].part == member.part).any():
             lumps.append(_lump_point(fill_wall(face, spacing, 0.0, rng), member, sheet=False))
@@ -101,9 +93,7 @@ def fill_object(
         if recipe.vessel:
             lumps.append(_fill_vessel(anatomy, member, recipe, spacing * (1 + coarse), rng))
         if member.sheet_area > 1e-3 * member.body_area:
-            filling = fill_wall(
-                member.sheet, spacing, _fitting_face(member.sheet, recipe.sheet), rng
-            )
+            filling = fill_wall(member.sheet, spacing, _fitting_face(member.sheet, recipe.sheet), rng)
             lumps.append(_lump_point(filling, member, sheet=True))
     return ObjectFilling(
         np.concatenate([p.points for p in lumps]),
@@ -126,11 +116,7 @@ def _lump_point(filling: PointFilling, member: MeasuredPart, *, sheet: bool) -> 
 
 
 def _fill_vessel(
-    anatomy: MeasuredObject,
-    member: MeasuredPart,
-    recipe: FillRecipe,
-    spacing: float,
-    rng: np.random.Generator,
+    anatomy: MeasuredObject, member: MeasuredPart, recipe: FillRecipe, spacing: float, rng: np.random.Generator
 ) -> ObjectFilling:
     points = vessel_points(anatomy, member, spacing, rng)
     points = points[points[:, 2] <= recipe.level]
@@ -138,12 +124,7 @@ def _fill_vessel(
 
 
 def _fill_bodies(
-    anatomy: MeasuredObject,
-    recipes: dict[int, FillRecipe],
-    spacing: float,
-    rng: np.random.Generator,
-    *,
-    coarse: bool,
+    anatomy: MeasuredObject, recipes: dict[int, FillRecipe], spacing: float, rng: np.random.Generator, *, coarse: bool
 ) -> ObjectFilling:
     nothing = np.zeros(0, dtype=np.int64)
     if anatomy.shape is None or anatomy.skin is None or not len(anatomy.skin.numbers):
@@ -193,19 +174,14 @@ def outer_wall_face(anatomy: MeasuredObject, member: MeasuredPart) -> Mesh:
 
 
 def reference_points(
-    anatomy: MeasuredObject,
-    member: MeasuredPart,
-    wall: float,
-    rng: np.random.Generator,
-    count: int = 20_000,
+    anatomy: MeasuredObject, member: MeasuredPart, wall: float, rng: np.random.Generator, count: int = 20_000
 ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "M 3"]]:
     """Points spread as a part's material truly is, for its centre and inertia.
 
     Args:
         anatomy: The object.
         member: The part.
-        wall: True wall thickness of a shell whose mesh shows one face only [m]; 0: a solid, or a
-            wall with both faces.
+        wall: True wall thickness of a shell whose mesh shows one face only [m]; 0: a solid, or a wall with both faces.
         rng: Source of the samples.
         count: How many on each surface.
 

@@ -3,15 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import (
-    Material,
-    MaterialField,
-    Note,
-    NoteKind,
-    PartDescription,
-    Scene,
-    SceneObject,
-)
+from corporeal.core.types import Material, MaterialField, Note, NoteKind, PartDescription, Scene, SceneObject
 from corporeal.discretization.mesh_measures import MeasuredObject, oriented_box_size
 from corporeal.discretization.part_model import THICKNESS_FROM_MESH, PartModel, scale_part_mass
 from corporeal.materials.quantities import QUANTITIES
@@ -41,8 +33,7 @@ def scale_to_stated_masses(
         makes: How every part is made.
 
     Returns:
-        How every part is made, and a sentence for each object that its materials and its shape
-        would give another mass.
+        How every part is made, and a sentence for each object that its materials and its shape would give another mass.
 
     Raises:
         UserError: No material is as dense as that.
@@ -71,9 +62,7 @@ def scale_to_stated_masses(
     return made, tuple(warnings)
 
 
-def warn_of_implausible_masses(
-    scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]
-) -> list[str]:
+def warn_of_implausible_masses(scene: Scene, anatomies: Sequence[MeasuredObject], masses: Sequence[float]) -> list[str]:
     """Return which objects are too heavy or too light for the room that they take.
 
     Args:
@@ -107,10 +96,7 @@ def warn_of_masses_not_as_named(
     """
     doubts = (
         mass_from_name_warning(
-            obj.name,
-            sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
-            obj.name,
-            obj.stem,
+            obj.name, sum(masses[m.part] for m in anatomy.members) / obj.scale**3, obj.name, obj.stem
         )
         for obj, anatomy in zip(scene.objects, anatomies, strict=True)
     )
@@ -124,15 +110,12 @@ def _real_lengths(sides: tuple[float, float, float], scale: float) -> tuple[floa
 
 
 def warn_of_thick_walls(
-    scene: Scene,
-    anatomies: Sequence[MeasuredObject],
-    makes: Mapping[int, PartModel],
-    field: MaterialField,
+    scene: Scene, anatomies: Sequence[MeasuredObject], makes: Mapping[int, PartModel], field: MaterialField
 ) -> list[str]:
     """Return warnings of walls that weigh too much, since their thickness is the mesh's.
 
-    Meshes often draw walls too thick: a bin of polypropylene had 9 mm. Sheet materials that fill a
-    block are reported, too.
+    Meshes often draw walls too thick: a bin of polypropylene had 9 mm. Sheet materials that fill a block are reported,
+    too.
 
     Args:
         scene: The objects.
@@ -149,9 +132,7 @@ def warn_of_thick_walls(
     return [sentence for sentence in doubts if sentence]
 
 
-def _thick_wall_text(
-    obj: SceneObject, made: PartModel, words: PartDescription, material: Material
-) -> str:
+def _thick_wall_text(obj: SceneObject, made: PartModel, words: PartDescription, material: Material) -> str:
     """Describe an implausibly thick wall whose thickness is the mesh's; "": plausible."""
     ground = material.grounds.get("shell_thickness")
     if ground is None or words.answered_by not in UNSEEN_MATERIAL_SOURCES:
@@ -172,9 +153,7 @@ def _thick_wall_text(
     )
 
 
-def _thick_block_text(
-    obj: SceneObject, made: PartModel, words: PartDescription, thickest: float
-) -> str:
+def _thick_block_text(obj: SceneObject, made: PartModel, words: PartDescription, thickest: float) -> str:
     """State that what comes in sheets is a block; "": it may be some sheets on one another."""
     through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
     if through <= MAX_PLAUSIBLE_SHEET_LAYERS * thickest:

@@ -1,9 +1,8 @@
 """Relative scaling of objects in a scene, walls included.
 
-A duck beside a couch is a dot. A power law between 0 (all of one size) and 1 (true relative sizes)
-brings objects nearer to each other and keeps their order. An object that is not life-size is the
-real one with all its lengths scaled, walls included: made of the same material, it weighs scale³
-times as much.
+A duck beside a couch is a dot. A power law between 0 (all of one size) and 1 (true relative sizes) brings objects
+nearer to each other and keeps their order. An object that is not life-size is the real one with all its lengths scaled,
+walls included: made of the same material, it weighs scale³ times as much.
 """
 
 import math
@@ -46,9 +45,7 @@ class SceneSizing:
 DEFAULT_SCENE_SIZING = SceneSizing()
 
 
-def scene_extents(
-    real: Sequence[float], sizing: SceneSizing = DEFAULT_SCENE_SIZING
-) -> Float[np.ndarray, " N"]:
+def scene_extents(real: Sequence[float], sizing: SceneSizing = DEFAULT_SCENE_SIZING) -> Float[np.ndarray, " N"]:
     """Return the largest extent of each of N objects in their scene [m].
 
     e_i = s_i^γ / max_j s_j^γ · f L
@@ -133,11 +130,7 @@ def describe_scales(objects: Sequence[SceneObject]) -> str:
 
 def describe_mass(mass: float, scale: float) -> str:
     """Write a mass in the scene [kg], and in brackets that of the real object where it differs."""
-    return (
-        f"{mass:.3g} ({mass / scale**3:.3g} in reality)"
-        if is_not_life_size(scale)
-        else f"{mass:.3g}"
-    )
+    return f"{mass:.3g} ({mass / scale**3:.3g} in reality)" if is_not_life_size(scale) else f"{mass:.3g}"
 
 
 def _centimetres_text(metres: float) -> str:

@@ -36,9 +36,7 @@ def is_below_rim(
     return found
 
 
-def blocked_direction_count(
-    shapes: Sequence[QueryMesh], points: Float[np.ndarray, "N 3"]
-) -> Int[np.ndarray, " N"]:
+def blocked_direction_count(shapes: Sequence[QueryMesh], points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     """In how many of ``HORIZONTAL_DIRECTIONS_COUNT`` level directions something lies."""
     found = np.zeros(len(points), dtype=np.int64)
     for turn in 2 * np.pi * np.arange(HORIZONTAL_DIRECTIONS_COUNT) / HORIZONTAL_DIRECTIONS_COUNT:

@@ -1,7 +1,6 @@
 """Area of the sheet that open ware is formed from, independent of its hollow.
 
-Reconstructions show the outside of a bowl well, and its plain inside hardly, so only the outside is
-measured.
+Reconstructions show the outside of a bowl well, and its plain inside hardly, so only the outside is measured.
 """
 
 from dataclasses import dataclass
@@ -55,11 +54,10 @@ def vessel_sheet_area(shape: QueryMesh, part: Mesh, rng: np.random.Generator) ->
 def find_vessel_outside(shape: QueryMesh, part: Mesh, rng: np.random.Generator) -> VesselOutside:
     """Tell the outside of open ware, mouth upward, from its inside and from what fills it.
 
-    A face counts by what it sees of the open at its own height and below, all of it if that is half
-    of what lies before it: walls and bottom do. The inside of a hollow sees the open above alone,
-    and counts nothing. A roof that slopes by β counts 1 - cos β, so that what closes a mouth adds
-    the area that it has more than the mouth. Where a wide mouth lies at the very top, what closes
-    in on it from outside is wall, too.
+    A face counts by what it sees of the open at its own height and below, all of it if that is half of what lies before
+    it: walls and bottom do. The inside of a hollow sees the open above alone, and counts nothing. A roof that slopes by
+    β counts 1 - cos β, so that what closes a mouth adds the area that it has more than the mouth. Where a wide mouth
+    lies at the very top, what closes in on it from outside is wall, too.
     """
     points, triangle = sample_surface(part, VESSEL_SURFACE_SAMPLES, rng)
     normals = part.normals[triangle]
@@ -90,10 +88,7 @@ def _openness(
 
 
 def _normal_evenness(
-    points: Float[np.ndarray, "N 3"],
-    normals: Float[np.ndarray, "N 3"],
-    seen: Float[np.ndarray, " N"],
-    reach: float,
+    points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"], seen: Float[np.ndarray, " N"], reach: float
 ) -> Float[np.ndarray, " N"]:
     """Return each normal's cosine with the mean of those near it that look the same way [-]."""
     near = KDTree(points).query_pairs(reach, output_type="ndarray")
@@ -107,9 +102,7 @@ def _normal_evenness(
     return np.divide(along, length, out=np.zeros(len(points)), where=length > 0).clip(0.0)
 
 
-def _is_beside_mouth(
-    points: Float[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]
-) -> Bool[np.ndarray, " N"]:
+def _is_beside_mouth(points: Float[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
     """Return which places lie outside of a mouth at the top, in plan; none if none is wide enough.
 
     What is wider at its foot than at its top is a cover: its top is no mouth.

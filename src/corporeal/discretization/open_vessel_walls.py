@@ -24,19 +24,17 @@ from corporeal.recognition.metadata_recognition import FileEvidence
 from corporeal.recognition.parts_by_name import name_words as written
 
 MAX_SOLID_THICKNESS_RATIO = 5.0
-"""A mean thickness over the greatest measured wall of its substance, from which an object is drawn
-as it looks from outside [-]: of objects of which a name tells the substance alone, solid ones reach
-3 (beams, a gun barrel), and those that turned out hollow begin at 9 (decision mass-by-name).
+"""A mean thickness over the greatest measured wall of its substance, from which an object is drawn as it looks from
+outside [-]: of objects of which a name tells the substance alone, solid ones reach 3 (beams, a gun barrel), and those
+that turned out hollow begin at 9 (decision mass-by-name).
 """
 
 
-def hollow_if_too_thick(
-    words: PartDescription, seen: FileEvidence, library: str
-) -> PartDescription:
+def hollow_if_too_thick(words: PartDescription, seen: FileEvidence, library: str) -> PartDescription:
     """Give a one-part object a wall if only its substance is known and it is too thick.
 
-    Metal, glass, plastic and ceramics come as sheets, castings and mouldings: a "brass samovar" of
-    17 kg is none. Open ware that is drawn full, as it looks from outside, is no block either.
+    Metal, glass, plastic and ceramics come as sheets, castings and mouldings: a "brass samovar" of 17 kg is none. Open
+    ware that is drawn full, as it looks from outside, is no block either.
 
     Args:
         words: What was recognised of a part.
@@ -47,15 +45,11 @@ def hollow_if_too_thick(
     named = [name.words for name in seen.general if name.words]
     if words.material is None or words.structure is not None or not seen.alone or not named:
         return words
-    if words.material not in formed_materials() or any(
-        names_solid_object(tokens) for tokens in named
-    ):
+    if words.material not in formed_materials() or any(names_solid_object(tokens) for tokens in named):
         return words
     if not all(names_unknown_object(tokens) or names_open_vessel(tokens) for tokens in named):
         return words
-    if not any(
-        substance_terms(tokens) for tokens in named
-    ):  # a part of a machine: "link_2", of "steel"
+    if not any(substance_terms(tokens) for tokens in named):  # a part of a machine: "link_2", of "steel"
         return words
     thickest = MAX_SOLID_THICKNESS_RATIO * _greatest_wall(words.material, library)
     thickness = mean_drawn_thickness(seen.surfaces, seen.thing.scale)
@@ -128,8 +122,8 @@ def with_usual_vessel_wall(words: PartDescription, called: NamedObject) -> PartD
 def usual_vessel_wall(material: str | None, called: NamedObject) -> OpenVesselWall | None:
     """Return the wall of open ware that is called so; None: not known.
 
-    Where walls grow with the longest side they are interpolated between sizes in logarithms, and
-    are those of the least and the largest beyond.
+    Where walls grow with the longest side they are interpolated between sizes in logarithms, and are those of the least
+    and the largest beyond.
 
     Args:
         material: What it is of.
@@ -149,13 +143,11 @@ def usual_vessel_wall(material: str | None, called: NamedObject) -> OpenVesselWa
     return OpenVesselWall(thickness, f"{row['why']}, at {called.extent * 100:.0f} cm")
 
 
-def sheet_if_drawn_full(
-    words: PartDescription, seen: FileEvidence, library: str
-) -> PartDescription:
+def sheet_if_drawn_full(words: PartDescription, seen: FileEvidence, library: str) -> PartDescription:
     """Replace open ware whose mesh fills its hollow by a sheet along its outside.
 
-    A wall with both faces is as it is drawn, and so are a stack, what is a closed wall whatever it
-    is called, and what need not be hollow: a bowl of wood, a steel plate.
+    A wall with both faces is as it is drawn, and so are a stack, what is a closed wall whatever it is called, and what
+    need not be hollow: a bowl of wood, a steel plate.
 
     Args:
         words: What was recognised of a part.
@@ -171,11 +163,7 @@ def sheet_if_drawn_full(
     named = [name.words for name in seen.general]
     known = usual_vessel_wall(words.material, NamedObject(named, seen.extent))
     wall = known.thickness if known else None
-    if (
-        wall is None
-        and words.material in formed_materials()
-        and not any(map(names_solid_object, named))
-    ):
+    if wall is None and words.material in formed_materials() and not any(map(names_solid_object, named)):
         wall = usual_wall_thickness(words.material, library)
     if not wall or not is_drawn_as_lump(seen.surfaces, wall, seen.thing.scale):
         return words
@@ -186,8 +174,4 @@ def sheet_if_drawn_full(
 def _is_no_single_vessel(name: TokenisedName) -> bool:
     """Return whether a name is not that of one piece of ware that is open by what it is."""
     tokens = name.words
-    return (
-        not names_open_vessel(tokens)
-        or names_hollow_object(tokens)
-        or names_several_objects(written(name.text))
-    )
+    return not names_open_vessel(tokens) or names_hollow_object(tokens) or names_several_objects(written(name.text))

@@ -1,13 +1,12 @@
 """Damping of contact pairs: the deformable side takes the loss of the rigid side, too.
 
-One force presses both sides of a contact and their dents add up, so that each stores energy in
-proportion to its compliance (1 - ν²)/E, and loses of that what its own loss factor says. A rigid
-body and a plane store none here. Their part of the loss, by the real moduli of both, is given to
-the material that does deform: the loss factor of two in series is the mean of theirs, weighted by
-their compliance.
+One force presses both sides of a contact and their dents add up, so that each stores energy in proportion to its
+compliance (1 - ν²)/E, and loses of that what its own loss factor says. A rigid body and a plane store none here. Their
+part of the loss, by the real moduli of both, is given to the material that does deform: the loss factor of two in
+series is the mean of theirs, weighted by their compliance.
 
-A part has one loss factor for all that it meets. That of its first impacts is taken, straight down,
-by their energies; what strikes it otherwise finds the same.
+A part has one loss factor for all that it meets. That of its first impacts is taken, straight down, by their energies;
+what strikes it otherwise finds the same.
 """
 
 from collections.abc import Sequence
@@ -26,10 +25,7 @@ MIN_COMPLIANCE_FRACTION = 0.01
 
 
 def find_impact_partners(
-    parts: Sequence[PartGeometry],
-    motions: Sequence[ExpectedMotion],
-    rigid: Sequence[bool],
-    floor: Material | None,
+    parts: Sequence[PartGeometry], motions: Sequence[ExpectedMotion], rigid: Sequence[bool], floor: Material | None
 ) -> list[ExpectedMotion]:
     """Tell every object what meets it in the first impacts and is rigid all through.
 
@@ -64,10 +60,7 @@ def largest_part_of(parts: Sequence[PartGeometry], number: int) -> PartGeometry:
 
 def takes_part_in_impact(material: Material, partner: ImpactPartner) -> bool:
     """Return whether a partner would, in reality, take more than a negligible share of an impact."""
-    return (
-        partner.loss is not None
-        or compliance_share(partner.material, material) >= MIN_COMPLIANCE_FRACTION
-    )
+    return partner.loss is not None or compliance_share(partner.material, material) >= MIN_COMPLIANCE_FRACTION
 
 
 def pair_loss_factor_of_parts(struck: Material, motion: ExpectedMotion) -> float:

@@ -9,19 +9,15 @@ from math import inf, pi
 from corporeal.core.types import GRAVITY_M_S2, Material, Structure
 from corporeal.discretization.hertz_indentation import dent_of_hollow_ball
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
-from corporeal.mpm.physics.time_step_limits import (
-    closed_wall_factors,
-    limp_wall_factors,
-    thin_wall_factors,
-)
+from corporeal.mpm.physics.time_step_limits import closed_wall_factors, limp_wall_factors, thin_wall_factors
 
 MAX_SUBGRID_CELLS_COUNT, MAX_SUBGRID_LENGTH_CELLS = 8.0, 5.0
-"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a subgrid part:
-its own stiffness cannot be seen."""
+"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a subgrid part: its own
+stiffness cannot be seen."""
 
 MIN_COMPACT_SIDE_RATIO = 0.5
-"""Least shortest over longest side of what bounces as a ball does [-]; what is thinner than so much
-of its width is a sheet."""
+"""Least shortest over longest side of what bounces as a ball does [-]; what is thinner than so much of its width is a
+sheet."""
 MIN_TUBE_SLENDERNESS = 8.0
 """Least length over diameter of a tube."""
 
@@ -142,17 +138,14 @@ def is_grain_on_grid(part: PartGeometry, cell: float) -> bool:
 
 def is_subgrid_part(part: PartGeometry, cell: float) -> bool:
     """Whether the grid cannot show the part's own stiffness."""
-    return (
-        part.volume < MAX_SUBGRID_CELLS_COUNT * cell**3
-        and part.size[2] < MAX_SUBGRID_LENGTH_CELLS * cell
-    )
+    return part.volume < MAX_SUBGRID_CELLS_COUNT * cell**3 and part.size[2] < MAX_SUBGRID_LENGTH_CELLS * cell
 
 
 def part_width(part: PartGeometry) -> float:
     """Width of the part [m]: its shortest side, or less where it is bent or branched.
 
-    6 V/A is the side of the cube (the diameter of the sphere) with the part's volume per area; it
-    says nothing when the mesh models the wall itself, inside and outside.
+    6 V/A is the side of the cube (the diameter of the sphere) with the part's volume per area; it says nothing when the
+    mesh models the wall itself, inside and outside.
     """
     spread = 6 * part.volume / part.area if part.area > 0 else 0.0
     thickness = part.structure.thickness or 0.0
@@ -177,8 +170,8 @@ def wall_thickening_ratio(part: PartGeometry, simulated: float) -> float:
 def tube_diameter(part: PartGeometry) -> float:
     """Diameter of a wall rolled into a long tube [m], which bends as a bar does; 0: it is none.
 
-    d = 4 V/A, and the tube is A/(π d) long: of a plate, rolled up in thought, that is many times
-    its own length, and of a tube with a few branches or bends little more.
+    d = 4 V/A, and the tube is A/(π d) long: of a plate, rolled up in thought, that is many times its own length, and of
+    a tube with a few branches or bends little more.
     """
     thickness = part.structure.thickness or 0.0
     if part.structure.kind != "shell" or part.area <= 0:
@@ -186,9 +179,7 @@ def tube_diameter(part: PartGeometry) -> float:
     diameter = 4 * part.volume / part.area
     long, rolled = part.size[2], part.area / (pi * diameter) if diameter > 0 else inf
     hollow = diameter > 4 * thickness
-    return (
-        diameter if hollow and MIN_TUBE_SLENDERNESS * diameter < long and rolled < 3 * long else 0.0
-    )
+    return diameter if hollow and MIN_TUBE_SLENDERNESS * diameter < long and rolled < 3 * long else 0.0
 
 
 def is_flat_wall(part: PartGeometry) -> bool:
@@ -198,15 +189,15 @@ def is_flat_wall(part: PartGeometry) -> bool:
 
 
 MIN_FOLDED_DENT_RATIO = 5.0
-"""Depth over thickness from which the dent of a closed wall is facets and folds [-]: to about that
-depth it is round (Fitch 1968; Vaziri and Mahadevan, PNAS 105 (2008) 7913; recalled)."""
+"""Depth over thickness from which the dent of a closed wall is facets and folds [-]: to about that depth it is round
+(Fitch 1968; Vaziri and Mahadevan, PNAS 105 (2008) 7913; recalled)."""
 
 
 def wall_factors(part: PartGeometry, ratio: float, speed: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) of a part's wall, by how it gives way.
 
-    A closed wall answers by its indentation stiffness; an open one bends, but what is limp only
-    resists in its plane; and what flows (a can) folds along plastic hinges.
+    A closed wall answers by its indentation stiffness; an open one bends, but what is limp only resists in its plane;
+    and what flows (a can) folds along plastic hinges.
 
     Args:
         part: Which.
@@ -235,8 +226,8 @@ def is_folding_wall(part: PartGeometry, speed: float) -> bool:
 def is_limp_wall(part: PartGeometry, ratio: float) -> bool:
     """Return whether a wall hangs down as cloth does, even as stiff in bending as it becomes.
 
-    With its stiffness in the plane kept, a wall t/r thick bends r² times less than the real one:
-    the end of a strip would sink by 3 ρ g L⁴/(2 E t²) r², which must be more than its length.
+    With its stiffness in the plane kept, a wall t/r thick bends r² times less than the real one: the end of a strip
+    would sink by 3 ρ g L⁴/(2 E t²) r², which must be more than its length.
     """
     thickness, material = part.structure.thickness, part.material
     if part.structure.kind != "shell" or not thickness:

@@ -7,20 +7,9 @@ from math import exp, log
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.core.types import (
-    Discretization,
-    Material,
-    MaterialField,
-    PartDescription,
-    ScanThickening,
-    Structure,
-)
+from corporeal.core.types import Discretization, Material, MaterialField, PartDescription, ScanThickening, Structure
 from corporeal.discretization.cavity import is_vessel, measure_cavity
-from corporeal.discretization.mesh_kind import (
-    MAX_WALL_THICKNESS_FRACTION,
-    MeshKind,
-    wall_thickness_behind,
-)
+from corporeal.discretization.mesh_kind import MAX_WALL_THICKNESS_FRACTION, MeshKind, wall_thickness_behind
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.object_filling import FillRecipe
 
@@ -39,8 +28,8 @@ THICKNESS_FROM_JUDGE = {
 SAME_THICKNESS_TOLERANCE = 0.05
 """Relative difference of two thicknesses that needs no telling."""
 MAX_BOTH_FACES_THICKNESS_RATIO = 4.0
-"""A sheet drawn less than this many times as thick as it is shows both its faces: a plate, a blade.
-What is drawn thicker shows its outside only: a cup that a scan has filled."""
+"""A sheet drawn less than this many times as thick as it is shows both its faces: a plate, a blade. What is drawn
+thicker shows its outside only: a cup that a scan has filled."""
 NORMAL_90_PERCENT_WIDTH_SIGMAS = 3.29
 """Width of the interval that holds 90 % of a normal distribution, in standard deviations."""
 MIN_EYE_LOG_SIGMA = 0.2
@@ -53,8 +42,8 @@ MIN_HOLLOW_SHELL_CELLS = 6
 class VolumeLeeway:
     """One draw of the volume that a mesh leaves open.
 
-    That is of solids, of what is behind a closed wall, and of a wall that is as thick as the mesh
-    draws it, between two faces that a scan has moved apart.
+    That is of solids, of what is behind a closed wall, and of a wall that is as thick as the mesh draws it, between two
+    faces that a scan has moved apart.
     """
 
     larger: float = 1.0
@@ -166,17 +155,14 @@ def infer_part_model(
 ) -> PartModel:
     """Return how a part is made, with what is behind its wall and all that shares its mesh.
 
-    Pieces share the mesh by their stated shares of its volume and surface; the part then weighs
-    what they weigh together, and is otherwise as the piece that matters most.
+    Pieces share the mesh by their stated shares of its volume and surface; the part then weighs what they weigh
+    together, and is otherwise as the piece that matters most.
     """
     whole = part_specification(member.part, field)
     made = infer_structure(member, whole)
     every = piece_specifications(member.part, field)
     makes = [infer_structure(member, row) for row in every]
-    holds = [
-        infer_held_contents(anatomy, member, m, row, rng)
-        for m, row in zip(makes, every, strict=True)
-    ]
+    holds = [infer_held_contents(anatomy, member, m, row, rng) for m, row in zip(makes, every, strict=True)]
     body, sheet = sum(m.body_mass for m in makes), sum(m.sheet_mass for m in makes)
     alone = made.body_mass + made.sheet_mass
     density = made.density
@@ -223,14 +209,10 @@ def part_specification(part: int, field: MaterialField) -> PieceSpecification:
 def piece_specifications(part: int, field: MaterialField) -> list[PieceSpecification]:
     """Return how each piece that shares a part's mesh is built: mostly the part alone."""
     pieces = field.pieces[part] if field.pieces else ()
-    return [PieceSpecification(p.structure, p.material, p.words) for p in pieces] or [
-        part_specification(part, field)
-    ]
+    return [PieceSpecification(p.structure, p.material, p.words) for p in pieces] or [part_specification(part, field)]
 
 
-def part_with_contents(
-    made: PartModel, member: MeasuredPart, holds: Sequence[HeldContents]
-) -> PartModel:
+def part_with_contents(made: PartModel, member: MeasuredPart, holds: Sequence[HeldContents]) -> PartModel:
     """Put what was found behind the walls of a part's pieces into one."""
     if not holds:
         return made
@@ -246,11 +228,7 @@ def part_with_contents(
 
 
 def infer_held_contents(
-    anatomy: MeasuredObject,
-    member: MeasuredPart,
-    made: PartModel,
-    piece: PieceSpecification,
-    rng: np.random.Generator,
+    anatomy: MeasuredObject, member: MeasuredPart, made: PartModel, piece: PieceSpecification, rng: np.random.Generator
 ) -> HeldContents | None:
     """Describe what is behind a wall; None: nothing but air.
 
@@ -267,9 +245,7 @@ def infer_held_contents(
     return HeldContents(mass, inner, structure.fill if structure.loose else 1.0, lies, level)
 
 
-def volume_behind_wall(
-    member: MeasuredPart, made: PartModel, piece: PieceSpecification, room: float
-) -> float:
+def volume_behind_wall(member: MeasuredPart, made: PartModel, piece: PieceSpecification, room: float) -> float:
     """Volume of the cavity inside a wall [m³]: all that its outer surface encloses, less the wall.
 
     Args:
@@ -289,16 +265,14 @@ def volume_behind_wall(
 def infer_structure(member: MeasuredPart, piece: PieceSpecification) -> PartModel:
     """Return how thick a part's walls are and what they weigh.
 
-    Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ V (1 - (1 - A t / (n V))^n) with the
-    area A of one face: not of the inside of a shade, whose outside counts; about ρ A t where it is
-    thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
-    is 2 V / A thick unless stated or judged otherwise: thin walls are drawn too thick, in scans as
-    in models; of open ware from pictures, whose inside may be plain, only if the usual thickness of
-    such walls is unknown. Such ware weighs ρ A t with the area of its outside
-    (``open_ware.sheet_area``), whatever is drawn in its hollow. Open sheets weigh ρ A t. Of a
-    piece, its shares of V and A count, less the volume of what lies inside it; a piece that the
-    mesh lacks is not bounded by the mesh. Of what is packed of parts and air, the share that is
-    matter counts; of what a scan draws too thick, the share that is real.
+    Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ V (1 - (1 - A t / (n V))^n) with the area A of one face:
+    not of the inside of a shade, whose outside counts; about ρ A t where it is thin. n says how its outside closes in
+    (``Member.closing``). A wall whose mesh shows both faces is 2 V / A thick unless stated or judged otherwise: thin
+    walls are drawn too thick, in scans as in models; of open ware from pictures, whose inside may be plain, only if the
+    usual thickness of such walls is unknown. Such ware weighs ρ A t with the area of its outside
+    (``open_ware.sheet_area``), whatever is drawn in its hollow. Open sheets weigh ρ A t. Of a piece, its shares of V
+    and A count, less the volume of what lies inside it; a piece that the mesh lacks is not bounded by the mesh. Of what
+    is packed of parts and air, the share that is matter counts; of what a scan draws too thick, the share that is real.
     """
     structure, material, words = piece.structure, piece.material, piece.words
     wall = member.build is MeshKind.WALL
@@ -315,16 +289,12 @@ def infer_structure(member: MeasuredPart, piece: PieceSpecification) -> PartMode
         thickness, whose = shown, THICKNESS_FROM_MESH
     face = _face_area(member, words, walled or wall) * words.surface_share
     volume = member.volume * words.volume_share if not only_sheet else face * sheet
-    narrowing = (
-        member.narrowing(thickness) if walled and not is_unseen_open_vessel(member, words) else 1.0
-    )
+    narrowing = member.narrowing(thickness) if walled and not is_unseen_open_vessel(member, words) else 1.0
     if not wall and _draws_both_faces(words, volume, thickness * face):
         face, narrowing = 0.5 * face, 1.0
     sheets = member.sheet_area * words.surface_share
     if walled and not only_sheet:
-        matter = min(
-            face * thickness * narrowing, np.inf if words.missing or member.measured else volume
-        )
+        matter = min(face * thickness * narrowing, np.inf if words.missing or member.measured else volume)
     else:
         own = max(volume - member.volume * words.inner_share, 0.0)
         matter = _real_fraction(words) * structure.solidity * own
@@ -369,8 +339,7 @@ def _real_fraction(words: PartDescription) -> float:
 
 
 MAX_PLATE_BEHIND_RATIO = 1.5
-"""Half of a plate's surface has its other face nearer behind it than this, over 2 V/A; a rod's has
-it twice as far."""
+"""Half of a plate's surface has its other face nearer behind it than this, over 2 V/A; a rod's has it twice as far."""
 
 
 def plate_thickness(member: MeasuredPart, made: PartModel, rng: np.random.Generator) -> float:
@@ -393,8 +362,8 @@ def plate_thickness(member: MeasuredPart, made: PartModel, rng: np.random.Genera
 def plate_as_wall(made: PartModel, thickness: float) -> PartModel:
     """Take a solid plate of some thickness [m] for the wall that it is: its mesh shows both faces.
 
-    It weighs the same. On a grid of cells wider than half its thickness only a wall keeps its
-    bending stiffness and is felt by what touches it.
+    It weighs the same. On a grid of cells wider than half its thickness only a wall keeps its bending stiffness and is
+    felt by what touches it.
     """
     return replace(
         made,
@@ -409,11 +378,7 @@ def plate_as_wall(made: PartModel, thickness: float) -> PartModel:
 
 def _draws_both_faces(words: PartDescription, volume: float, wall: float) -> bool:
     """Return whether the mesh draws both faces of an open sheet, whose wall along all would be so."""
-    return (
-        _is_open_sheet(words)
-        and not words.wall_unseen
-        and 2 * volume < MAX_BOTH_FACES_THICKNESS_RATIO * wall
-    )
+    return _is_open_sheet(words) and not words.wall_unseen and 2 * volume < MAX_BOTH_FACES_THICKNESS_RATIO * wall
 
 
 def is_unseen_open_vessel(member: MeasuredPart, words: PartDescription) -> bool:
@@ -455,14 +420,10 @@ def thickness_judge(words: PartDescription) -> str:
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")
-    return (
-        placed.chosen_by if placed is not None and placed.chosen_by in THICKNESS_FROM_JUDGE else ""
-    )
+    return placed.chosen_by if placed is not None and placed.chosen_by in THICKNESS_FROM_JUDGE else ""
 
 
-def fill_recipe(
-    member: MeasuredPart, made: PartModel, treatment: Discretization, cell: float
-) -> FillRecipe:
+def fill_recipe(member: MeasuredPart, made: PartModel, treatment: Discretization, cell: float) -> FillRecipe:
     """Return where a part's material lies on this grid; leaves are one layer."""
     if treatment.kind == "foliage":
         return FillRecipe(0.0, 0.0, 0.0)
@@ -496,8 +457,7 @@ def describe_held_contents(made: PartModel) -> str:
         return ""
     litres = f"{made.held.room * 1e3:.3g} l"
     return (
-        f", around {made.held.mass:.3g} kg of {structure.contents.name} that take up "
-        f"{structure.fill:.0%} of {litres}"
+        f", around {made.held.mass:.3g} kg of {structure.contents.name} that take up {structure.fill:.0%} of {litres}"
     )
 
 
@@ -513,9 +473,7 @@ def describe_wall(made: PartModel) -> str:
     return wall
 
 
-def describe_fill(
-    member: MeasuredPart, made: PartModel, treatment: Discretization, cell: float
-) -> str:
+def describe_fill(member: MeasuredPart, made: PartModel, treatment: Discretization, cell: float) -> str:
     """Describe in words what the fill is."""
     springs = "leaves on springs" if treatment.kind == "foliage" else ""
     if made.leaves:

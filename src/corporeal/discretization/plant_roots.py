@@ -32,9 +32,7 @@ class _RootlessPlant:
     """Which vertices of each of the scene's surfaces are its wood's."""
 
 
-def extend_plants_into_ground(
-    scene: Scene, parts: Parts, field: MaterialField
-) -> tuple[Scene, tuple[str, ...]]:
+def extend_plants_into_ground(scene: Scene, parts: Parts, field: MaterialField) -> tuple[Scene, tuple[str, ...]]:
     """Let plants whose foot ends on another object's sand or soil reach down into it.
 
     Returns:
@@ -76,9 +74,7 @@ def _vertices_of(scene: Scene, parts: Parts, chosen: list[int]) -> list[np.ndarr
     return masks
 
 
-def _extra_foot_depth(
-    scene: Scene, parts: Parts, field: MaterialField, plant: _RootlessPlant
-) -> float:
+def _extra_foot_depth(scene: Scene, parts: Parts, field: MaterialField, plant: _RootlessPlant) -> float:
     """Return how much deeper a plant's foot is than its surface [m]; 0: it ends in no ground.
 
     It does where the ground about it is as high as its lowest point.
@@ -92,17 +88,9 @@ def _extra_foot_depth(
         if part.object == plant.number or not CONSTITUTIVE_LAWS[field.materials[k].law].granular:
             continue
         ground = join_meshes(scene.surfaces).only(parts.part_of_point == k)
-        if len(foot) and abs(_ground_height(ground, foot) - low) < DRAWN_FOOT_HEIGHT_FRACTION * (
-            high - low
-        ):
+        if len(foot) and abs(_ground_height(ground, foot) - low) < DRAWN_FOOT_HEIGHT_FRACTION * (high - low):
             bottom = float(ground.corners[..., 2].min())
-            return max(
-                min(
-                    GUESSED_BURIED_DEPTH_RATIO * (high - low),
-                    MAX_FOOT_DEPTH_FRACTION * (low - bottom),
-                ),
-                0.0,
-            )
+            return max(min(GUESSED_BURIED_DEPTH_RATIO * (high - low), MAX_FOOT_DEPTH_FRACTION * (low - bottom)), 0.0)
     return 0.0
 
 
@@ -121,9 +109,7 @@ def _ground_height(ground: Mesh, foot: Float[np.ndarray, "N 3"]) -> float:
         start = np.column_stack([middle + reach * around, np.full(GROUND_DIRECTIONS_COUNT, top)])
         fall = shape.reach(start, np.tile([0.0, 0.0, -1.0], (GROUND_DIRECTIONS_COUNT, 1)))
         fall = fall[np.isfinite(fall)]
-        heights.append(
-            top - float(np.median(fall)) if len(fall) > GROUND_DIRECTIONS_COUNT / 2 else np.nan
-        )
+        heights.append(top - float(np.median(fall)) if len(fall) > GROUND_DIRECTIONS_COUNT / 2 else np.nan)
     return max(heights) if np.isfinite(heights).all() else np.nan
 
 
@@ -135,10 +121,7 @@ def _extended_scene(scene: Scene, plant: _RootlessPlant, depth: float) -> Scene:
     for surface, mask in zip(scene.surfaces, plant.wood, strict=True):
         vertices = surface.vertices.copy()
         share = np.clip(
-            (low + DRAWN_FOOT_HEIGHT_FRACTION * height - vertices[:, 2])
-            / (DRAWN_FOOT_HEIGHT_FRACTION * height),
-            0,
-            1,
+            (low + DRAWN_FOOT_HEIGHT_FRACTION * height - vertices[:, 2]) / (DRAWN_FOOT_HEIGHT_FRACTION * height), 0, 1
         )
         vertices[:, 2] -= depth * share * mask
         surfaces.append(replace(surface, vertices=vertices) if mask.any() else surface)

@@ -43,8 +43,8 @@ def fill_body(
 ) -> PointFilling:
     """Fill a body, or the wall below its surface.
 
-    Where it is thinner than ``spacing``, one layer of points in its middle replaces the fill, so
-    that stalks and slats have no gaps. What has material all through is divided among its points.
+    Where it is thinner than ``spacing``, one layer of points in its middle replaces the fill, so that stalks and slats
+    have no gaps. What has material all through is divided among its points.
 
     Args:
         shape: The body.
@@ -61,9 +61,7 @@ def fill_body(
     depth, foot = np.full(len(points), np.inf), np.zeros_like(points)
     ask = np.isfinite(limit) | skin.may_be_within(2 * spacing, points)
     depth[ask], _, foot[ask] = skin.closest(points[ask])
-    points, limit, depth, foot = _subset_filling(
-        (depth < limit) | (limit == np.inf), points, limit, depth, foot
-    )
+    points, limit, depth, foot = _subset_filling((depth < limit) | (limit == np.inf), points, limit, depth, foot)
     narrow = depth < spacing
     inward = (points - foot)[narrow] / np.maximum(depth[narrow], 1e-300)[:, None]
     narrow[narrow] = depth[narrow] + skin.reach(points[narrow] + 1e-9 * inward, inward) < spacing
@@ -73,13 +71,9 @@ def fill_body(
     middle, through = _subset_filling(there, middle, through)
     lost = float(narrow.sum()) * spacing**3
     points, limit = points[~narrow], limit[~narrow]
-    middle, through = _subset_filling(
-        poisson_disk_subset(middle, 0.6 * spacing, points), middle, through
-    )
+    middle, through = _subset_filling(poisson_disk_subset(middle, 0.6 * spacing, points), middle, through)
     each = lost / max(len(middle), 1)
-    if each < MIN_POINT_VOLUME_FRACTION * spacing**3 and len(
-        points
-    ):  # only sharp edges: nothing to speak of
+    if each < MIN_POINT_VOLUME_FRACTION * spacing**3 and len(points):  # only sharp edges: nothing to speak of
         middle, through = middle[:0], through[:0]
     everything = np.concatenate([points, middle])
     held = np.arange(len(everything)) >= len(points)
@@ -103,8 +97,8 @@ def _mean_volumes_by_thickness(
 ) -> Float[np.ndarray, " N"]:
     """Return points the mean volume [m³] of those where the body is about as thick [m].
 
-    Of what is this thin, one point has few samples. All of them together would say that a twig
-    weighs as much as the same length of the trunk.
+    Of what is this thin, one point has few samples. All of them together would say that a twig weighs as much as the
+    same length of the trunk.
     """
     likeness = np.floor(np.log(np.maximum(through, 1e-300)) / np.log(SAME_THICKNESS_RATIO))
     _, group = np.unique(likeness, return_inverse=True)
@@ -133,13 +127,11 @@ def fill_narrow_body(
     return middle[apart], through[apart]
 
 
-def fill_wall(
-    face: Mesh, spacing: float, thickness: float, rng: np.random.Generator
-) -> PointFilling:
+def fill_wall(face: Mesh, spacing: float, thickness: float, rng: np.random.Generator) -> PointFilling:
     """Layers of points below one face of a wall; one layer in the face when it is a thin sheet.
 
-    Candidates are moved down along both the triangles' and the vertices' normals, so that layers
-    close around sharp edges, and kept where the face is nowhere nearer than the layer is deep.
+    Candidates are moved down along both the triangles' and the vertices' normals, so that layers close around sharp
+    edges, and kept where the face is nowhere nearer than the layer is deep.
     """
     layers = max(1, round(thickness / spacing))
     depths = (np.arange(layers) + 0.5) * thickness / layers if thickness >= spacing else [0.0]
@@ -159,9 +151,7 @@ def fill_wall(
     points = np.concatenate(found)
     if not len(points):  # crumpled more tightly than it is thick
         return fill_wall(face, spacing, 0.0, rng)
-    return PointFilling(
-        points, np.full(len(points), area * (thickness or spacing) / max(len(points), 1))
-    )
+    return PointFilling(points, np.full(len(points), area * (thickness or spacing) / max(len(points), 1)))
 
 
 def match_moments(
@@ -172,11 +162,10 @@ def match_moments(
 ) -> Float[np.ndarray, " N"]:
     """Adjust masses so that mass, centre and inertia equal those of a reference.
 
-    The smallest relative change m_i (1 + Σ_k λ_k φ_k(x_i)) over the ten monomials φ up to second
-    order that leaves every point a tenth of its mass: points that would keep less keep that, and
-    the others are solved again. Points that cannot carry the inertia so have the right centre at
-    least; those that cannot carry that either, too few or all to one side, are returned with the
-    right mass only, and so is what stands for a single point.
+    The smallest relative change m_i (1 + Σ_k λ_k φ_k(x_i)) over the ten monomials φ up to second order that leaves
+    every point a tenth of its mass: points that would keep less keep that, and the others are solved again. Points that
+    cannot carry the inertia so have the right centre at least; those that cannot carry that either, too few or all to
+    one side, are returned with the right mass only, and so is what stands for a single point.
 
     Returns:
         Masses [kg].

@@ -60,9 +60,9 @@ def weigh_points(
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """Volume [m³] and simulated density [kg/m³] of every point of an object.
 
-    A thickened wall keeps the treatment's density, so its volume follows from its mass; a solid
-    keeps its true volume; foliage fills its crown's; what is filled is as dense in the middle as
-    its contents. A rigid part's masses are adjusted to its true centre and inertia.
+    A thickened wall keeps the treatment's density, so its volume follows from its mass; a solid keeps its true volume;
+    foliage fills its crown's; what is filled is as dense in the middle as its contents. A rigid part's masses are
+    adjusted to its true centre and inertia.
     """
     volume, density = np.zeros(len(packing.points)), np.ones(len(packing.points))
     rng = np.random.default_rng(4)
@@ -110,17 +110,12 @@ def _true_mass_points(
 
 
 def _held_masses_and_volumes(
-    anatomy: MeasuredObject,
-    member: MeasuredPart,
-    packing: ObjectFilling,
-    made: PartModel,
-    cell: float,
+    anatomy: MeasuredObject, member: MeasuredPart, packing: ObjectFilling, made: PartModel, cell: float
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """Mass [kg] and volume [m³] of a filled part's points: wall and contents apart.
 
-    Behind a closed surface the outermost points bear the wall, at least half a cell deep, and all
-    below the level what lies there; of a vessel those between its faces do. What is inflated is one
-    solid.
+    Behind a closed surface the outermost points bear the wall, at least half a cell deep, and all below the level what
+    lies there; of a vessel those between its faces do. What is inflated is one solid.
     """
     assert made.held is not None
     points, volumes = packing.points, packing.volumes
@@ -132,19 +127,13 @@ def _held_masses_and_volumes(
         low, room = ~wall, made.held.room
         parts = [(wall, made.volume - room), (low, room * made.held.fill)]
         least = 1e-9 * made.volume
-        whole = _spread_totals(
-            volumes, [_PointTotal(m, max(v, least)) for m, v in parts if m.any()]
-        )
+        whole = _spread_totals(volumes, [_PointTotal(m, max(v, least)) for m, v in parts if m.any()])
     else:
         depth = member.shape.closest(points)[0]
         wall = depth <= max(made.thickness, 0.5 * cell, depth.min())
-        whole = _spread_totals(
-            volumes, [_PointTotal(np.ones(len(points), dtype=bool), made.volume)]
-        )
+        whole = _spread_totals(volumes, [_PointTotal(np.ones(len(points), dtype=bool), made.volume)])
     if made.structure.inflated:
-        return _spread_totals(
-            volumes, [_PointTotal(np.ones(len(points), dtype=bool), made.mass)]
-        ), whole
+        return _spread_totals(volumes, [_PointTotal(np.ones(len(points), dtype=bool), made.mass)]), whole
     loads = [(wall, made.body_mass + made.sheet_mass), (low, made.held.mass)]
     mass = _spread_totals(volumes, [_PointTotal(m if m.any() else ~m, load) for m, load in loads])
     return np.maximum(mass, 1e-6 * made.mass / len(mass)), whole

@@ -1,15 +1,14 @@
 """Compression by prescribed motion, estimated before the simulation.
 
-A prescribed path forces a displacement on objects that cannot give way: between a path and the
-floor, a wall or another path. Along the direction in which those two come closer to each other, all
-free objects between them are pushed together as rigid bodies, one up to the next, as far as they
-go: the least sum of gaps from one to the other is how far they may come. What they come farther, s,
-is taken up by what lies in between as by springs in series: it bears p = s / Σ (L_k/E_k), and
-strains by p/E, so that a block of steel under a ball of rubber stays what it is. What can go away
-(a block before a pusher) is pressed by nothing.
+A prescribed path forces a displacement on objects that cannot give way: between a path and the floor, a wall or another
+path. Along the direction in which those two come closer to each other, all free objects between them are pushed
+together as rigid bodies, one up to the next, as far as they go: the least sum of gaps from one to the other is how far
+they may come. What they come farther, s, is taken up by what lies in between as by springs in series: it bears p = s /
+Σ (L_k/E_k), and strains by p/E, so that a block of steel under a ball of rubber stays what it is. What can go away (a
+block before a pusher) is pressed by nothing.
 
-Objects are pushed together from where they start, and are not turned: what is first brought
-elsewhere, or tips off its support, is judged as if it had stayed.
+Objects are pushed together from where they start, and are not turned: what is first brought elsewhere, or tips off its
+support, is judged as if it had stayed.
 """
 
 from dataclasses import dataclass
@@ -99,9 +98,7 @@ class PlacedObject:
         """Take points of space to where they were on the object at the start."""
         return self.origin + (points - self.place) @ self.rotation
 
-    def reach(
-        self, points: Float[np.ndarray, "P 3"], along: Float[np.ndarray, "3"]
-    ) -> Float[np.ndarray, " P"]:
+    def reach(self, points: Float[np.ndarray, "P 3"], along: Float[np.ndarray, "3"]) -> Float[np.ndarray, " P"]:
         """Distance to the object from points along a unit vector [m]; inf: they miss it."""
         ahead = np.tile(along @ self.rotation, (len(points), 1))
         return self.thing.shape.reach(self.back(points), ahead)
@@ -111,9 +108,7 @@ class PlacedObject:
         return self.out(self.thing.points(along @ self.rotation))
 
 
-def place_along_path(
-    thing: SampledObject, path: Keyframes, pivot: Vector, times: np.ndarray
-) -> list[PlacedObject]:
+def place_along_path(thing: SampledObject, path: Keyframes, pivot: Vector, times: np.ndarray) -> list[PlacedObject]:
     """Return where an object with a path is at some times [s].
 
     Args:
@@ -138,9 +133,7 @@ class Clearance:
     """Where they would touch, on the upper one [m]."""
 
 
-def measure_clearance(
-    lower: PlacedObject, upper: PlacedObject, along: Float[np.ndarray, "3"]
-) -> Clearance:
+def measure_clearance(lower: PlacedObject, upper: PlacedObject, along: Float[np.ndarray, "3"]) -> Clearance:
     """Measure how far ``lower`` can go along a unit vector until it touches ``upper``."""
     best = Clearance(np.inf, np.zeros(3))
     for one, other, way in ((lower, upper, along), (upper, lower, -along)):
@@ -157,10 +150,7 @@ def measure_clearance(
 
 
 def one_way_distances(
-    points: Float[np.ndarray, "P 3"],
-    other: PlacedObject,
-    way: Float[np.ndarray, "3"],
-    inward: float,
+    points: Float[np.ndarray, "P 3"], other: PlacedObject, way: Float[np.ndarray, "3"], inward: float
 ) -> Float[np.ndarray, " P"]:
     """Distance from points to another object [m], asked from a little inside."""
     return other.reach(points - inward * way, way) - inward
@@ -228,9 +218,7 @@ def compression_pressures(
         path = scene.objects[k].path
         assert path is not None
         pressers.append(place_along_path(things[k], path, underside_centre(scene, k), times))
-    heap = FreeObjects(
-        [PlacedObject.at_start(things[k]) for k in free], [compliances[k] for k in free]
-    )
+    heap = FreeObjects([PlacedObject.at_start(things[k]) for k in free], [compliances[k] for k in free])
     for k, pressure in zip(free, heap.pressed(pressers, compression_planes(scene)), strict=True):
         found[k] = pressure
     return found
@@ -263,9 +251,7 @@ class FreeObjects:
     compliances: list[float]
     """1/E [1/Pa]"""
 
-    def pressed(
-        self, pressers: list[PresserPath], planes: list[CompressionPlane]
-    ) -> Float[np.ndarray, " F"]:
+    def pressed(self, pressers: list[PresserPath], planes: list[CompressionPlane]) -> Float[np.ndarray, " F"]:
         """Return the greatest pressure on each [Pa]."""
         greatest = np.zeros(len(self.objects))
         for plane in planes:
@@ -283,10 +269,7 @@ class FreeObjects:
         ways = []
         for thing in self.objects:
             middle = thing.thing.middle
-            there = [
-                np.array([p.out(presser[0].back(middle)) for p in presser])
-                for presser in (lower, upper)
-            ]
+            there = [np.array([p.out(presser[0].back(middle)) for p in presser]) for presser in (lower, upper)]
             ways.extend(np.diff(there[0] - there[1], axis=0))
         ways.sort(key=lambda way: -float(np.linalg.norm(way)))
         chosen: list[np.ndarray] = []
@@ -299,15 +282,11 @@ class FreeObjects:
         return chosen
 
     def _between(
-        self,
-        lower: CompressionPlane | PresserPath,
-        upper: PresserPath,
-        along: Float[np.ndarray, "3"],
+        self, lower: CompressionPlane | PresserPath, upper: PresserPath, along: Float[np.ndarray, "3"]
     ) -> Float[np.ndarray, " F"]:
         """Return the greatest pressure on each free object between two [Pa].
 
-        From each instant on, as long as both stay over an object, they are followed as if they did
-        not meet anything.
+        From each instant on, as long as both stay over an object, they are followed as if they did not meet anything.
         """
         stacked = self._stacked(along)
         greatest = np.zeros(len(self.objects))
@@ -332,11 +311,7 @@ class FreeObjects:
         return greatest
 
     def _side(
-        self,
-        side: CompressionPlane | PresserPath,
-        t: int,
-        along: Float[np.ndarray, "3"],
-        upper: bool,
+        self, side: CompressionPlane | PresserPath, t: int, along: Float[np.ndarray, "3"], upper: bool
     ) -> "CompressionSide":
         """Measure how far one of the two is from every free object."""
         if isinstance(side, CompressionPlane):
@@ -344,9 +319,7 @@ class FreeObjects:
             return CompressionSide(None, gaps, [True] * len(gaps), 1.0)
         there = side[t]
         gaps = [
-            measure_clearance(thing, there, along)
-            if upper
-            else measure_clearance(there, thing, along)
+            measure_clearance(thing, there, along) if upper else measure_clearance(there, thing, along)
             for thing in self.objects
         ]
         shadows = [overlap_along(there, thing, along) for thing in self.objects]
@@ -395,9 +368,7 @@ class CompressionSide:
         """Distances [m]; inf: it goes past the object."""
         return np.array([c.gap for c in self.clearances])
 
-    def followed(
-        self, later: "CompressionSide", along: Float[np.ndarray, "3"]
-    ) -> Float[np.ndarray, " F"]:
+    def followed(self, later: "CompressionSide", along: Float[np.ndarray, "3"]) -> Float[np.ndarray, " F"]:
         """Distances later on, below zero where it would be inside of an object [m].
 
         Args:
@@ -445,10 +416,7 @@ class StackedGaps:
         up, down = self.gaps + high[None], low[:, None] + self.gaps
         last, first = np.argmin(up, axis=1), np.argmin(down, axis=0)
         before = self.soft[first] + self.beyond[first, number]  # with its own
-        return CompressionGap(
-            down[first, number] + up[number, last],
-            before + self.beyond[number, last],
-        )
+        return CompressionGap(down[first, number] + up[number, last], before + self.beyond[number, last])
 
 
 def comes_closer(presser: PresserPath, normal: Float[np.ndarray, "3"]) -> bool:

@@ -20,9 +20,7 @@ MAX_INVISIBLE_STRAIN = 5e-3
 """Half a percent, of strain or of a shift over a length, is not seen."""
 
 
-def cantilever_tip_deflection_ratio(
-    load: float, young: float, length: float, depth: float
-) -> float:
+def cantilever_tip_deflection_ratio(load: float, young: float, length: float, depth: float) -> float:
     """Shift of the tip of a bar that is held at one end, over its length [-].
 
     δ/L = 3 ρ a L³ / (2 E h²) (Euler–Bernoulli, a solid bar).
@@ -40,16 +38,14 @@ def cantilever_tip_deflection_ratio(
 def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdict:
     """Return whether a part would yield or visibly flex.
 
-    ε = max(v/c, ρ a L/E, tip shift of a cantilever / L, what prescribed motion presses it by) and
-    v_y = σ_y/(ρ c); rigid when ε is below half a percent and v below v_y. A thin wall is judged by
-    its mapped values at a tenth of the part's width, which is the wall the finest detail would
-    simulate: so the verdict depends neither on the detail nor on what else is in the scene, but for
-    what presses it. A tube is judged as the bar that it is.
+    ε = max(v/c, ρ a L/E, tip shift of a cantilever / L, what prescribed motion presses it by) and v_y = σ_y/(ρ c);
+    rigid when ε is below half a percent and v below v_y. A thin wall is judged by its mapped values at a tenth of the
+    part's width, which is the wall the finest detail would
+    simulate: so the verdict depends neither on the detail nor on what else is in the scene, but for what presses it. A
+    tube is judged as the bar that it is.
     """
     if part.prescribed:
-        return RigidityVerdict(
-            0.0, inf, True, "the motion of its object is prescribed, as one rigid body"
-        )
+        return RigidityVerdict(0.0, inf, True, "the motion of its object is prescribed, as one rigid body")
     if part.structure.holds:
         reason = f"its contents, {part.structure.holds}, move by themselves and its wall holds them"
         return RigidityVerdict(0.0, inf, True, reason)

@@ -1,7 +1,7 @@
 """Rods: parts that are long and thin everywhere, straight or bent, with their centreline.
 
-A part is a rod when slices across its longest direction are single round patches of nearly one
-size. Branches, loops, hairpins, flat strips and strong taper are not found here.
+A part is a rod when slices across its longest direction are single round patches of nearly one size. Branches, loops,
+hairpins, flat strips and strong taper are not found here.
 """
 
 from dataclasses import dataclass
@@ -18,13 +18,13 @@ MIN_ROD_SLENDERNESS = 8.0
 ROD_SLICES_COUNT = 40
 ROD_PROBES_COUNT = 8000
 MAX_SECTION_SPREAD_RATIO = 1.25
-"""Largest ratio of a slice's diameter by its spread to that by its area: 1 for a disc, 1.14 for a
-strip twice as wide as thick."""
+"""Largest ratio of a slice's diameter by its spread to that by its area: 1 for a disc, 1.14 for a strip twice as wide
+as thick."""
 MAX_DIAMETER_DEVIATION_FRACTION = 0.3
 """Largest deviation of a slice's diameter from the mean, over the mean."""
 SECTION_RING_RADIUS_RATIO = 0.354
-"""Radius of the ring of six points that stands for a section, over its simulated diameter: the
-second moment of area is then that of the disc."""
+"""Radius of the ring of six points that stands for a section, over its simulated diameter: the second moment of area is
+then that of the disc."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,7 @@ def find_rod(member: MeasuredPart, rng: np.random.Generator) -> Rod | None:
     axis = np.linalg.svd(probes - middle, full_matrices=False)[2][0]
     along = (probes - middle) @ axis
     low, high = float(along.min()), float(along.max())
-    slice_of = np.minimum(
-        ((along - low) / (high - low) * ROD_SLICES_COUNT).astype(np.int64), ROD_SLICES_COUNT - 1
-    )
+    slice_of = np.minimum(((along - low) / (high - low) * ROD_SLICES_COUNT).astype(np.int64), ROD_SLICES_COUNT - 1)
     count = np.bincount(slice_of, minlength=ROD_SLICES_COUNT)
     if count.min() < 8:
         return None

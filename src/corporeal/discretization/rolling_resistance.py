@@ -1,11 +1,10 @@
 """Rolling resistance: offset c of the contact force of every pair [m], from their loss factors.
 
-What rolls presses in before it and is pushed back behind it by less, by what its material and the
-other one lose. The moment of that is c N, with c = 3/16 α a under a ball and 2/(3π) α a under a
-cylinder, a the radius or half the width of the contact and α the share of the energy that a cycle
-takes (Tabor 1955, "The mechanism of rolling friction", Proc. R. Soc. A 229; Greenwood, Minshall and
-Tabor 1961, "Hysteresis losses in rolling and sliding friction"; Johnson, Contact Mechanics, §9.4).
-Roughness and dirt, which brake hard balls on hard floors more than that (Cross 2016, "Coulomb's law
+What rolls presses in before it and is pushed back behind it by less, by what its material and the other one lose. The
+moment of that is c N, with c = 3/16 α a under a ball and 2/(3π) α a under a cylinder, a the radius or half the width of
+the contact and α the share of the energy that a cycle takes (Tabor 1955, "The mechanism of rolling friction", Proc. R.
+Soc. A 229; Greenwood, Minshall and Tabor 1961, "Hysteresis losses in rolling and sliding friction"; Johnson, Contact
+Mechanics, §9.4). Roughness and dirt, which brake hard balls on hard floors more than that (Cross 2016, "Coulomb's law
 for rolling friction", Am. J. Phys. 84), are in no material here, so that c is a lower bound.
 """
 
@@ -78,18 +77,16 @@ def rolling_resistance_lengths(
                 found = rolling_resistance_length(roller, materials[a], materials[c])
                 table[a, c] = table[c, a] = found if lighter else table[a, c]
         if floor is not None:
-            table[a, count:] = table[count:, a] = rolling_resistance_length(
-                roller, materials[a], floor
-            )
+            table[a, count:] = table[count:, a] = rolling_resistance_length(roller, materials[a], floor)
     return table
 
 
 def rolling_resistance_length(roller: RollingBody, own: Material, other: Material) -> float:
     """Give c [m] of what rolls under its own weight.
 
-    Each of the two stores energy in proportion to its compliance (1 - ν²)/E, and loses 1 - e² of it
-    with e what a ball of it keeps in an impact (``materials.rebound``). Hertz: a³ = 3 N R/(4 E*) of
-    a ball, a² = 4 N R/(π L E*) of a cylinder.
+    Each of the two stores energy in proportion to its compliance (1 - ν²)/E, and loses 1 - e² of it with e what a ball
+    of it keeps in an impact (``materials.rebound``). Hertz: a³ = 3 N R/(4 E*) of a ball, a² = 4 N R/(π L E*) of a
+    cylinder.
     """
     soft = [plane_strain_compliance(m) if m.young > 0 else 0.0 for m in (own, other)]
     taken = [1.0 - restitution_of_loss(min(m.loss, 2.0)) ** 2 for m in (own, other)]
@@ -99,9 +96,5 @@ def rolling_resistance_length(roller: RollingBody, own: Material, other: Materia
     share = sum(s * t for s, t in zip(soft, taken, strict=True)) / both
     pressed = roller.weight * roller.radius * both
     if roller.length > 0.0:
-        return (
-            CYLINDER_ROLLING_COEFFICIENT
-            * share
-            * min(sqrt(4.0 * pressed / (pi * roller.length)), roller.radius)
-        )
+        return CYLINDER_ROLLING_COEFFICIENT * share * min(sqrt(4.0 * pressed / (pi * roller.length)), roller.radius)
     return BALL_ROLLING_COEFFICIENT * share * min((0.75 * pressed) ** (1.0 / 3.0), roller.radius)

@@ -1,7 +1,7 @@
 """Step budget: reduction of wave speeds if the allowed number of time steps does not suffice.
 
-First the bulk modulus of nearly incompressible materials is reduced, which is hardly visible; then
-Young's modulus. Parts that would then be deformed much more than in reality become rigid.
+First the bulk modulus of nearly incompressible materials is reduced, which is hardly visible; then Young's modulus.
+Parts that would then be deformed much more than in reality become rigid.
 
 Also the published rule, a cap that does not keep the order: a control only.
 """
@@ -13,11 +13,7 @@ from math import sqrt
 from scipy.optimize import brentq
 
 from corporeal.core.types import Discretization
-from corporeal.discretization.hertz_indentation import (
-    dent_of_hollow_ball,
-    hertz_dent_of_ball,
-    yield_mark_of_ball,
-)
+from corporeal.discretization.hertz_indentation import dent_of_hollow_ball, hertz_dent_of_ball, yield_mark_of_ball
 from corporeal.discretization.part_geometry import (
     MIN_COMPACT_SIDE_RATIO,
     ExpectedMotion,
@@ -79,18 +75,14 @@ MIN_WAVE_SPEED_RATIO = 10.0
 def counted_wave_speed(treatment: Discretization) -> float:
     """Wave speed that the step budget counts [m/s].
 
-    Loss stiffens: up to a loss factor of 0.3 the steps that it takes are given, beyond that waves
-    are slowed for it.
+    Loss stiffens: up to a loss factor of 0.3 the steps that it takes are given, beyond that waves are slowed for it.
     """
     free = sqrt(stiffening(treatment.loss, treatment.poisson))
     return treatment.wave_speed / min(MAX_LOSS_STEP_FACTOR, free)
 
 
 def fit_step_budget(
-    treatments: Sequence[Discretization],
-    cell: float,
-    steps: float,
-    outrun: float = MIN_WAVE_SPEED_RATIO,
+    treatments: Sequence[Discretization], cell: float, steps: float, outrun: float = MIN_WAVE_SPEED_RATIO
 ) -> BudgetedTreatments:
     """Compress stiffness where the step budget would be exceeded; its order is kept.
 
@@ -109,8 +101,7 @@ def fit_step_budget(
     fitted = [
         slow_waves(
             t,
-            t.wave_speed
-            * sqrt(compress_young(t.simulated_young_pa, knee, power) / t.simulated_young_pa),
+            t.wave_speed * sqrt(compress_young(t.simulated_young_pa, knee, power) / t.simulated_young_pa),
             cell,
             because,
         )
@@ -118,13 +109,8 @@ def fit_step_budget(
         else t
         for t in treatments
     ]
-    changed = sum(
-        a.simulated_young_pa != b.simulated_young_pa
-        for a, b in zip(treatments, fitted, strict=True)
-    )
-    softer = (
-        "is simulated softer than it is" if changed == 1 else "are simulated softer than they are"
-    )
+    changed = sum(a.simulated_young_pa != b.simulated_young_pa for a, b in zip(treatments, fitted, strict=True))
+    softer = "is simulated softer than it is" if changed == 1 else "are simulated softer than they are"
     warning = (
         f"{changed} of {len(fitted)} parts {softer}, to stay within {steps:,.0f} steps per second; "
         "the order of stiffness is kept. A finer --detail has a larger budget."
@@ -135,8 +121,8 @@ def fit_step_budget(
 def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) -> Discretization:
     """Lower Poisson's ratio of what is nearly incompressible until its waves keep to a limit.
 
-    E stays, and with it the order of stiffness: from ν = 0.49 to 0.41 Hertz's force falls by 9 %,
-    the wave speed to 0.37. Nothing of it shows but a volume that strains by less than the shape.
+    E stays, and with it the order of stiffness: from ν = 0.49 to 0.41 Hertz's force falls by 9 %, the wave speed to
+    0.37. Nothing of it shows but a volume that strains by less than the shape.
 
     Args:
         treatment: Of any part.
@@ -191,10 +177,9 @@ def parts_nearer_to_rigid(
 ) -> dict[int, str]:
     """Return which parts would be simulated so much too soft that rigid is nearer to the truth.
 
-    Rigid is nearer where the strain is off by more than all that there is of it in reality. No
-    strain counts as more than 1, at which all shape is lost. Of a solid that yields the lasting
-    dent counts. What flows has to do so at any stiffness; sheets, rods and hollow objects keep
-    bending when struck.
+    Rigid is nearer where the strain is off by more than all that there is of it in reality. No strain counts as more
+    than 1, at which all shape is lost. Of a solid that yields the lasting dent counts. What flows has to do so at any
+    stiffness; sheets, rods and hollow objects keep bending when struck.
 
     Returns:
         Number of the part → why, in a clause.
@@ -213,11 +198,7 @@ def parts_nearer_to_rigid(
 
 
 def _too_soft_reason(
-    part: PartGeometry,
-    motion: ExpectedMotion,
-    verdict: RigidityVerdict,
-    true: Discretization,
-    soft: Discretization,
+    part: PartGeometry, motion: ExpectedMotion, verdict: RigidityVerdict, true: Discretization, soft: Discretization
 ) -> str:
     """Return why rigid is nearer to the truth than as soft as a part would be simulated; "": no."""
     if true.impact_speed >= verdict.yield_speed:
@@ -255,9 +236,7 @@ class _BallDents:
     simulated: float
 
 
-def _ball_dents(
-    part: PartGeometry, true: Discretization, soft: Discretization
-) -> _BallDents | None:
+def _ball_dents(part: PartGeometry, true: Discretization, soft: Discretization) -> _BallDents | None:
     """Return how deep an impact dents a solid or a sealed wall; None: it bends in another way.
 
     Other walls are open, or their restitution is that of solids: they stay soft.
@@ -277,9 +256,7 @@ def _ball_dents(
     return _BallDents(*(dent_of_hollow_ball(*wall, radius, speed) for wall in (real, slow)))
 
 
-def _yield_marks(
-    part: PartGeometry, true: Discretization, soft: Discretization
-) -> _BallDents | None:
+def _yield_marks(part: PartGeometry, true: Discretization, soft: Discretization) -> _BallDents | None:
     """Return how deep an impact marks a compact solid that yields; None: it bends in another way."""
     solid = soft.kind == "deformable" and part.structure.kind == "solid"
     if not (solid and is_dented_by_impact(part) and true.yield_stress and soft.yield_stress):
@@ -289,11 +266,7 @@ def _yield_marks(
 
 
 def _sags_too_far(
-    part: PartGeometry,
-    motion: ExpectedMotion,
-    verdict: RigidityVerdict,
-    true: Discretization,
-    soft: Discretization,
+    part: PartGeometry, motion: ExpectedMotion, verdict: RigidityVerdict, true: Discretization, soft: Discretization
 ) -> bool:
     """Return whether a part sags by more than twice as much as in reality.
 
@@ -303,9 +276,7 @@ def _sags_too_far(
     """
     pull = motion.driven if part.burden else motion.acceleration
     squashed = soft.density * pull * part.size[2] / soft.simulated_young_pa
-    sags = min(
-        1.0, max(squashed, verdict.weight * true.simulated_young_pa / soft.simulated_young_pa)
-    )
+    sags = min(1.0, max(squashed, verdict.weight * true.simulated_young_pa / soft.simulated_young_pa))
     return sags - min(1.0, verdict.weight) > max(verdict.weight, MAX_INVISIBLE_STRAIN)
 
 
@@ -316,21 +287,19 @@ def is_dented_by_impact(part: PartGeometry) -> bool:
 
 
 MIN_WALL_HOLD_FRACTION = 0.25
-"""A flat wall that holds less than this share of what it holds in reality when stretched is nearer
-to life as a rigid one: its dent, as √(1/hold), would be more than twice as deep as in reality.
+"""A flat wall that holds less than this share of what it holds in reality when stretched is nearer to life as a rigid
+one: its dent, as √(1/hold), would be more than twice as deep as in reality.
 """
 
 
 def walls_that_tear(
-    parts: Sequence[PartGeometry],
-    verdicts: Sequence[RigidityVerdict],
-    treatments: Sequence[Discretization],
+    parts: Sequence[PartGeometry], verdicts: Sequence[RigidityVerdict], treatments: Sequence[Discretization]
 ) -> dict[int, str]:
     """Return which flat ductile walls would tear as they are simulated, and why they are rigid.
 
-    A plate that is struck stops what strikes it by being stretched: the energy of a dent of depth w
-    is π σ_y t w² (a membrane in the shape of a cone). A thickened wall keeps its bending strength,
-    and so holds only σ_sim t_sim / (σ_y t), which the step budget lowers further.
+    A plate that is struck stops what strikes it by being stretched: the energy of a dent of depth w is π σ_y t w² (a
+    membrane in the shape of a cone). A thickened wall keeps its bending strength, and so holds only σ_sim t_sim / (σ_y
+    t), which the step budget lowers further.
     """
     found = {}
     for k, (part, verdict, treatment) in enumerate(zip(parts, verdicts, treatments, strict=True)):
@@ -347,9 +316,7 @@ def walls_that_tear(
     return found
 
 
-def slow_waves(
-    treatment: Discretization, speed: float, cell: float, because: str
-) -> Discretization:
+def slow_waves(treatment: Discretization, speed: float, cell: float, because: str) -> Discretization:
     """Slow a deformable part's waves down to ``speed`` [m/s], and say why."""
     if treatment.kind == "rigid" or speed >= treatment.wave_speed:
         return treatment

@@ -1,8 +1,8 @@
 """Curvature of surfaces at points where triangles approximate a round shape.
 
-A ball of triangles rolls on corners, and loses speed at each as a wheel without a rim does (McGeer
-1990, "Passive dynamic walking"): a fifth in a second. So every point gets the radii of curvature
-that the mesh says, and between its points the body is as round as they.
+A ball of triangles rolls on corners, and loses speed at each as a wheel without a rim does (McGeer 1990, "Passive
+dynamic walking"): a fifth in a second. So every point gets the radii of curvature that the mesh says, and between its
+points the body is as round as they.
 """
 
 import numpy as np
@@ -16,18 +16,18 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 
 MAX_SMOOTH_EDGE_ANGLE_DEG = 16.0
-"""Edges that turn by more than this are edges of the body [deg]; the others stand for something
-round. 24 sides or 320 faces are round, 80 faces are a polyhedron."""
+"""Edges that turn by more than this are edges of the body [deg]; the others stand for something round. 24 sides or 320
+faces are round, 80 faces are a polyhedron."""
 MAX_FACE_WIDTH_RATIO = 3.0
-"""Faces stand for something round where one is at most so many times as wide as the other, over
-their edge; a wide face beside a narrow one is flat, and the narrow one rounds its edge."""
+"""Faces stand for something round where one is at most so many times as wide as the other, over their edge; a wide face
+beside a narrow one is flat, and the narrow one rounds its edge."""
 MIN_CURVED_ANGLE_DEG = 0.1
 """Triangles that turn by less than this [deg] are one flat face."""
 MIN_CURVED_ANGLE_RAD = 2e-3
 """What turns by less than this from one point to the next is straight [rad]."""
 REACH_NEIGHBOUR_NUMBER, REACH_NEIGHBOUR_RATIO = 6, 1.2
-"""A point stands for what is nearer than so many times the distance to its sixth neighbour [-]:
-nearly twice what lies between it and the next, so that no direction is left out."""
+"""A point stands for what is nearer than so many times the distance to its sixth neighbour [-]: nearly twice what lies
+between it and the next, so that no direction is left out."""
 SURROUND_NEIGHBOURS_COUNT, MAX_SURROUND_GAP_RAD = 12, 2.6
 """Something round ends where all of so many neighbours leave a larger angle open [rad]."""
 AT_CORNER_DISTANCE_FRACTION = 1e-6
@@ -58,8 +58,7 @@ def curve_points(
     inside = np.flatnonzero(~is_corner)
     found = [_curvature_on_faces(curved, points[inside], reach[inside])]
     found += [
-        _curvature_at_corner(curved, points[k], reach[k], curved.around(vertex[k]))
-        for k in np.flatnonzero(is_corner)
+        _curvature_at_corner(curved, points[k], reach[k], curved.around(vertex[k])) for k in np.flatnonzero(is_corner)
     ]
     # Corners first, as they were given: the lowest make the object rest exactly.
     place = np.concatenate([p for p, _ in (*found[1:], found[0])])
@@ -74,9 +73,7 @@ def point_reach(points: Float[np.ndarray, "S 3"]) -> Float[np.ndarray, " S"]:
     return REACH_NEIGHBOUR_RATIO * away[:, REACH_NEIGHBOUR_NUMBER]
 
 
-def is_surrounded(
-    curvature: Float[np.ndarray, "S 12"], points: Float[np.ndarray, "S 3"]
-) -> Bool[np.ndarray, " S"]:
+def is_surrounded(curvature: Float[np.ndarray, "S 12"], points: Float[np.ndarray, "S 3"]) -> Bool[np.ndarray, " S"]:
     """Whether what is round around a point goes on on all sides, by where its neighbours look.
 
     Along an arc they look both ways, on a dome all around.
@@ -93,9 +90,7 @@ def is_surrounded(
     order = np.sort(np.where(near, angle, np.nanmin(angle, axis=1, initial=9.0)[:, None]), axis=1)
     turn = np.diff(order, axis=1, append=order[:, :1] + 2 * np.pi).max(axis=1)
     dome = curvature[:, 6] > 0.0
-    return is_round(curvature) & np.where(
-        dome, near.any(axis=1) & (turn < MAX_SURROUND_GAP_RAD), both
-    )
+    return is_round(curvature) & np.where(dome, near.any(axis=1) & (turn < MAX_SURROUND_GAP_RAD), both)
 
 
 class MeshCurvature:
@@ -150,13 +145,11 @@ class MeshCurvature:
             np.add.at(total, self.group[:, k], np.cross(a, b) / np.maximum(size, 1e-300)[:, None])
         return _unit_normals(total)[self.group]
 
-    def principal(
-        self, triangle: Int[np.ndarray, " N"]
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def principal(self, triangle: Int[np.ndarray, " N"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Larger and smaller curvature of triangles [1/m], and the direction of the larger.
 
-        S e = ΔN along the edges by least squares (Rusinkiewicz 2004, "Estimating curvatures and
-        their derivatives on triangle meshes").
+        S e = ΔN along the edges by least squares (Rusinkiewicz 2004, "Estimating curvatures and their derivatives on
+        triangle meshes").
         """
         p, n = self.mesh.vertices[self.mesh.triangles[triangle]], self.normal[triangle]
         u = _unit_normals(p[:, 1] - p[:, 0])
@@ -165,9 +158,7 @@ class MeshCurvature:
         turn = np.einsum("tij,tkj->tki", frame, np.roll(n, -1, axis=1) - n)
         x, y = edge[..., 0], edge[..., 1]
         zero = np.zeros_like(x)
-        rows = np.concatenate(
-            [np.stack([x, y, zero], axis=2), np.stack([zero, x, y], axis=2)], axis=1
-        )
+        rows = np.concatenate([np.stack([x, y, zero], axis=2), np.stack([zero, x, y], axis=2)], axis=1)
         told = np.concatenate([turn[..., 0], turn[..., 1]], axis=1)
         a, b, c = np.einsum("tij,tj->ti", np.linalg.pinv(rows), told).T
         value, vector = np.linalg.eigh(np.stack([np.stack([a, b], 1), np.stack([b, c], 1)], 1))

@@ -14,17 +14,9 @@ from skimage.measure import label
 from corporeal.core.types import MaterialField
 from corporeal.discretization.fill_level import sample_isosurface
 from corporeal.discretization.mesh_kind import MeshKind
-from corporeal.discretization.mesh_measures import (
-    MeasuredObject,
-    measure_assembled,
-    oriented_box_size,
-)
+from corporeal.discretization.mesh_measures import MeasuredObject, measure_assembled, oriented_box_size
 from corporeal.discretization.open_vessel_sheet import find_vessel_outside
-from corporeal.discretization.part_model import (
-    infer_structure,
-    is_unseen_open_vessel,
-    part_specification,
-)
+from corporeal.discretization.part_model import infer_structure, is_unseen_open_vessel, part_specification
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 
@@ -38,9 +30,7 @@ SHELL_PROBE_SEED = 11
 """Of the places and probes that are asked."""
 
 
-def hollow_all_vessels(
-    anatomies: Sequence[MeasuredObject], field: MaterialField
-) -> list[MeasuredObject]:
+def hollow_all_vessels(anatomies: Sequence[MeasuredObject], field: MaterialField) -> list[MeasuredObject]:
     """Leave of open ware from pictures what lies along its outside, if it is drawn as a lump.
 
     What shows a wall with two faces keeps them.
@@ -84,18 +74,15 @@ def _hollow_vessel(anatomy: MeasuredObject, field: MaterialField) -> MeasuredObj
 def vessel_shell_surface(shape: QueryMesh, part: Mesh, thickness: float) -> Mesh:
     """Return the surface of what lies no deeper than a wall [m] below the outside of open ware.
 
-    Places of a grid are asked how deep they lie in the material and how far they are from the
-    outside; where the lesser of depth and what is left of the wall changes its sign it is meshed
-    (``pouring.meshed``). Bubbles that nothing leads into are filled, crumbs are left out.
+    Places of a grid are asked how deep they lie in the material and how far they are from the outside; where the lesser
+    of depth and what is left of the wall changes its sign it is meshed (``pouring.meshed``). Bubbles that nothing leads
+    into are filled, crumbs are left out.
     """
     outer = _outside_triangles(shape, part)
     corners = part.corners.reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = high - low
-    step = max(
-        float(size.max()) / MAX_GRID_POINTS_ALONG_SIDE,
-        float(np.prod(size) / MAX_SHELL_GRID_POINTS) ** (1 / 3),
-    )
+    step = max(float(size.max()) / MAX_GRID_POINTS_ALONG_SIDE, float(np.prod(size) / MAX_SHELL_GRID_POINTS) ** (1 / 3))
     wall = max(thickness, MIN_WALL_GRID_STEPS * step)
     counts = np.ceil(size / step).astype(int) + 5
     start = low - 2 * step
@@ -114,9 +101,7 @@ def vessel_shell_surface(shape: QueryMesh, part: Mesh, thickness: float) -> Mesh
         return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     field = np.where(_loose_crumbs(field > 0), -step, field)
     # A surface right through a place of the grid would touch itself there.
-    return sample_isosurface(
-        np.where(np.abs(field) < 1e-3 * step, -1e-3 * step, field), step, start
-    )
+    return sample_isosurface(np.where(np.abs(field) < 1e-3 * step, -1e-3 * step, field), step, start)
 
 
 def _outside_triangles(shape: QueryMesh, part: Mesh) -> Mesh:

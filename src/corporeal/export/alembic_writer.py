@@ -1,7 +1,7 @@
 """A scene as Alembic: the vertices of every surface at every frame, for video and effects tools.
 
-Alembic does not define axes or orientation; the convention is +Y up and clockwise faces. Written
-with alembic3d, an unofficial build of PyAlembic under a name of its own.
+Alembic does not define axes or orientation; the convention is +Y up and clockwise faces. Written with alembic3d, an
+unofficial build of PyAlembic under a name of its own.
 """
 
 # The library is optional.
@@ -38,9 +38,7 @@ def write_alembic(asked: ExportRequest, folder: Path) -> WrittenTarget:
     try:
         from alembic3d import Abc, AbcCoreAbstract, AbcGeom
     except ImportError as error:
-        raise UserError(
-            "Alembic needs alembic3d. Install it with: pip install 'corporeal[export]'."
-        ) from error
+        raise UserError("Alembic needs alembic3d. Install it with: pip install 'corporeal[export]'.") from error
     scene = asked.scene
     shapes = asked.motion.shapes(scene.solids)
     # The library ends the process where the disk is full.

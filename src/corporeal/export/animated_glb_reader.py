@@ -57,9 +57,7 @@ class AnimatedGlb:
             return points @ whole[:3, :3].T + whole[:3, 3]
         at_rest = {"scale": [1, 1, 1], "rotation": [0, 0, 0, 1], "translation": [0, 0, 0]} | node
         now = {
-            path: self.tracks[number, path][frame]
-            if (number, path) in self.tracks
-            else at_rest[path]
+            path: self.tracks[number, path][frame] if (number, path) in self.tracks else at_rest[path]
             for path in ("scale", "rotation", "translation")
         }
         x, y, z, w = now["rotation"]

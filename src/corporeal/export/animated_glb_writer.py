@@ -1,7 +1,7 @@
 """A scene as one animated GLB: rigid objects move as nodes, soft ones by a few morph targets.
 
-Morph targets are modes of the shapes (``export/animated_glb_writer.py``), kept as normalised 16 and 8 bit
-integers (KHR_mesh_quantization): a video takes a sixth of what keyframes of all vertices would.
+Morph targets are modes of the shapes (``export/animated_glb_writer.py``), kept as normalised 16 and 8 bit integers
+(KHR_mesh_quantization): a video takes a sixth of what keyframes of all vertices would.
 """
 
 from dataclasses import dataclass, replace
@@ -46,9 +46,9 @@ class ShapeModes:
 def fit_shape_modes(shapes: Float[np.ndarray, "F V 3"], tolerance: float, most: int) -> ShapeModes:
     """Take the fewest leading singular vectors of the shapes that keep the tolerance.
 
-    The singular value decomposition gives the r shapes with the least sum of squares (Eckart and
-    Young 1936); r grows until the largest error is small enough. It is taken of the F × F products
-    of shapes, block by block, so that long videos of large meshes fit into memory.
+    The singular value decomposition gives the r shapes with the least sum of squares (Eckart and Young 1936); r grows
+    until the largest error is small enough. It is taken of the F × F products of shapes, block by block, so that long
+    videos of large meshes fit into memory.
 
     Args:
         shapes: Vertices at every frame [m]; may lie on the disk.
@@ -64,10 +64,7 @@ def fit_shape_modes(shapes: Float[np.ndarray, "F V 3"], tolerance: float, most: 
         products += away @ away.T
     size, left = np.linalg.eigh(products)
     left = left[:, ::-1][:, size[::-1] > MIN_MODE_EIGENVALUE_RATIO * max(size[-1], 0.0)][:, :most]
-    count = max(
-        (_modes_needed(_deviations_from_mean(shapes, b), left, tolerance) for b in blocks),
-        default=0,
-    )
+    count = max((_modes_needed(_deviations_from_mean(shapes, b), left, tolerance) for b in blocks), default=0)
     left = left[:, :count]
     low, span = left.min(axis=0), np.maximum(np.ptp(left, axis=0), 1e-12)
     base, targets, error = np.empty((vertices, 3)), np.empty((count, vertices, 3)), 0.0
@@ -130,9 +127,7 @@ def write_animated_glb(asked: ExportRequest, folder: Path) -> WrittenTarget:
     """
     low, high = TOLERANCE_RANGE
     if not low <= asked.config.tolerance <= high:
-        raise UserError(
-            f"--tolerance is {asked.config.tolerance:g} m. Give a length from {low:g} to {high:g}."
-        )
+        raise UserError(f"--tolerance is {asked.config.tolerance:g} m. Give a length from {low:g} to {high:g}.")
     video = _AnimatedGlbDocument(asked)
     write_bytes(folder / GLB_FILE_NAME, video.whole())
     return WrittenTarget(tuple(video.unsaid), video.measured)

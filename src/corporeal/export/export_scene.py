@@ -54,9 +54,7 @@ def finished_runs(corpus: Path) -> list[Path]:
     return found
 
 
-def export_dataset(
-    corpus: Path, targets: Sequence[ExportTarget], out: Path, config: ExportConfig
-) -> ExportRecord:
+def export_dataset(corpus: Path, targets: Sequence[ExportTarget], out: Path, config: ExportConfig) -> ExportRecord:
     """Write one data set of all finished runs of a corpus for each target.
 
     Args:
@@ -77,9 +75,7 @@ def export_dataset(
                 written: WrittenTarget = write(folder, _export_requests(runs, config))
             files = sorted(str(p.relative_to(out)) for p in (out / target).iterdir())
             names = f"Runs in this order: {', '.join(r.name for r in runs)}."
-            rows[target] = TargetRecord(
-                0.0, tuple(files), (*written.unsaid, names), written.measured
-            )
+            rows[target] = TargetRecord(0.0, tuple(files), (*written.unsaid, names), written.measured)
         record = ExportRecord(str(corpus), (), rows)
         write_record(out, record)
     return record
@@ -113,12 +109,12 @@ def export_scene(
     """Write a scene for other tools.
 
     Args:
-        source: The folder of a run; a scene's file, of which only one instant is known; the same in
-            memory; or a corpus that was run, whose runs make one data set (h5, npz) and have all
-            other targets each in a folder of its name.
+        source: The folder of a run; a scene's file, of which only one instant is known; the same in memory; or a corpus
+            that was run, whose runs make one data set (h5, npz) and have all other targets each in a folder of its
+            name.
         targets: Names from ``EXPORT_WRITERS``.
-        out: Where the targets' folders and ``export.json`` go; None: SOURCE/export of a run or a
-            corpus, NAME-export of a scene called NAME.
+        out: Where the targets' folders and ``export.json`` go; None: SOURCE/export of a run or a corpus, NAME-export of
+            a scene called NAME.
         config: The instant, what can deform, tolerances.
         progress: Called with the fraction done and a description.
 
@@ -126,8 +122,7 @@ def export_scene(
         What was written, also kept in ``export.json``; of a corpus, of its data set.
 
     Raises:
-        UserError: There is no such run or target, nothing could be written, a library is missing,
-            or the disk refuses.
+        UserError: There is no such run or target, nothing could be written, a library is missing, or the disk refuses.
 
     """
     for target in targets:
@@ -143,11 +138,7 @@ def export_scene(
 
 
 def _export_targets(
-    asked: ExportRequest,
-    name: str,
-    targets: Sequence[ExportTarget],
-    folder: Path,
-    progress: ExportProgress,
+    asked: ExportRequest, name: str, targets: Sequence[ExportTarget], folder: Path, progress: ExportProgress
 ) -> ExportRecord:
     with store.lock_folder(folder), store.disk_errors(folder):
         rows = {}
@@ -162,11 +153,7 @@ def _export_targets(
 
 
 def _export_corpus(
-    corpus: Path,
-    targets: Sequence[ExportTarget],
-    out: Path,
-    config: ExportConfig,
-    progress: ExportProgress,
+    corpus: Path, targets: Sequence[ExportTarget], out: Path, config: ExportConfig, progress: ExportProgress
 ) -> ExportRecord:
     each: list[ExportTarget] = [t for t in targets if not EXPORT_WRITERS[t].write_dataset]
     runs = finished_runs(corpus)
@@ -211,11 +198,7 @@ def _request_of_scene(prepared: PreparedScene, config: ExportConfig) -> ExportRe
 def _default_folder(source: str | Path | SimulationResult | PreparedScene, name: str) -> Path:
     if isinstance(source, str | Path):
         path = Path(source)
-        return (
-            path / EXPORT_FOLDER
-            if (path / RUN_FILE).exists()
-            else Path(f"{scene_name(path)}-{EXPORT_FOLDER}")
-        )
+        return path / EXPORT_FOLDER if (path / RUN_FILE).exists() else Path(f"{scene_name(path)}-{EXPORT_FOLDER}")
     return Path(f"{name}-{EXPORT_FOLDER}")
 
 
@@ -233,8 +216,6 @@ def _write_target(asked: ExportRequest, target: ExportTarget, out: Path) -> Targ
     return replace(row, checked=found.measured, doubts=found.doubts)
 
 
-def _target_record(
-    asked: ExportRequest, written: WrittenTarget, out: Path, target: str
-) -> TargetRecord:
+def _target_record(asked: ExportRequest, written: WrittenTarget, out: Path, target: str) -> TargetRecord:
     files = sorted(str(p.relative_to(out)) for p in (out / target).rglob("*") if p.is_file())
     return TargetRecord(asked.scene.time, tuple(files), written.unsaid, written.measured)

@@ -72,9 +72,7 @@ def read_record(path: Path) -> ExportRecord:
     try:
         return from_plain(ExportRecord, found)
     except (ValueError, TypeError, AttributeError) as error:
-        raise BadFileError(
-            path, f"is not a record of an export ({error}).", "Delete it."
-        ) from error
+        raise BadFileError(path, f"is not a record of an export ({error}).", "Delete it.") from error
 
 
 ExportTarget = Literal["usd", "mjcf", "urdf", "glb", "splats", "h5", "npz", "abc"]
@@ -86,27 +84,11 @@ _WRITERS = (
     Writer("usd", "corporeal.export.usd_writer:write_usd", f"{_CHECKS}:check_usd", "pxr"),
     Writer("mjcf", "corporeal.export.mjcf_writer:write_mjcf", f"{_CHECKS}:check_mjcf"),
     Writer("urdf", "corporeal.export.urdf_writer:write_urdf", f"{_CHECKS}:check_urdf"),
-    Writer(
-        "glb", "corporeal.export.animated_glb_writer:write_animated_glb", f"{_CHECKS}:check_glb"
-    ),
-    Writer(
-        "splats",
-        "corporeal.export.usd_splats:write_splat_sequence",
-        f"{_CHECKS}:check_splats",
-    ),
+    Writer("glb", "corporeal.export.animated_glb_writer:write_animated_glb", f"{_CHECKS}:check_glb"),
+    Writer("splats", "corporeal.export.usd_splats:write_splat_sequence", f"{_CHECKS}:check_splats"),
     Writer("h5", f"{_ARRAYS}:write_h5", f"{_CHECKS}:check_h5", "h5py", f"{_ARRAYS}:save_h5"),
-    Writer(
-        "npz",
-        f"{_ARRAYS}:write_npz",
-        f"{_CHECKS}:check_without_reader",
-        write_dataset=f"{_ARRAYS}:save_npz",
-    ),
-    Writer(
-        "abc",
-        "corporeal.export.alembic_writer:write_alembic",
-        f"{_CHECKS}:check_alembic",
-        "alembic3d",
-    ),
+    Writer("npz", f"{_ARRAYS}:write_npz", f"{_CHECKS}:check_without_reader", write_dataset=f"{_ARRAYS}:save_npz"),
+    Writer("abc", "corporeal.export.alembic_writer:write_alembic", f"{_CHECKS}:check_alembic", "alembic3d"),
 )
 EXPORT_WRITERS: dict[str, Writer] = {writer.name: writer for writer in _WRITERS}
 """Target → its writer, which is a ``TargetWriter``."""
@@ -119,15 +101,15 @@ class ExportConfig:
     at: str = "start"
     """The instant that simulators start from: start, end, or seconds."""
     soft: SoftRepresentation = "particles"
-    """How simulators get what can deform: material points (USD), tetrahedra (USD, MJCF), or not at
-    all. MJCF knows no material points and takes tetrahedra for them."""
+    """How simulators get what can deform: material points (USD), tetrahedra (USD, MJCF), or not at all. MJCF knows no
+    material points and takes tetrahedra for them."""
     tolerance: float = 1e-3
     """Largest error of a vertex in the GLB video [m]."""
     friction_for: TargetEngine = "physx"
     """Whose rule makes one friction of two where a format has no pairs."""
     hull_vertices: int = 0
-    """Largest number of corners of a convex collider in USD, 64 for PhysX on a GPU: hulls of more
-    are enclosed in coarser ones. 0: hulls stay as they are, so that what is settled stays put.
+    """Largest number of corners of a convex collider in USD, 64 for PhysX on a GPU: hulls of more are enclosed in
+    coarser ones. 0: hulls stay as they are, so that what is settled stays put.
     """
     check: bool = False
     """Open the files again with real readers and measure what they hold."""

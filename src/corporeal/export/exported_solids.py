@@ -1,7 +1,7 @@
 """Format-independent input of writers: solids and their interactions.
 
-The frame of a ``ExportedSolid`` has its origin in the centre of mass at the exported instant and
-the axes of the world, so that no writer has an offset or a rotation to get wrong.
+The frame of a ``ExportedSolid`` has its origin in the centre of mass at the exported instant and the axes of the world,
+so that no writer has an offset or a rotation to get wrong.
 """
 
 from dataclasses import dataclass, field

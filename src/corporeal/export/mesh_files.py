@@ -15,9 +15,7 @@ from corporeal.geometry.convex_hull import ConvexPiece
 
 
 def format_obj(
-    vertices: Float[np.ndarray, "V 3"],
-    triangles: Int[np.ndarray, "T 3"],
-    uv: Float[np.ndarray, "V 2"] | None = None,
+    vertices: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, "T 3"], uv: Float[np.ndarray, "V 2"] | None = None
 ) -> str:
     """Return the file's text.
 

@@ -1,9 +1,9 @@
 """A scene as MJCF for MuJoCo: ``scene.xml`` with meshes beside it.
 
-Every two shapes that may meet are an explicit contact pair with the friction of the two materials;
-MuJoCo itself would take the larger of two coefficients. The floor meets convex hulls, objects meet
-one another with their convex pieces. Restitution e is a damping ratio: a linear spring of damping
-ratio ζ returns e = exp(-π ζ / √(1 - ζ²)) of a speed. What can deform is a flex of tetrahedra.
+Every two shapes that may meet are an explicit contact pair with the friction of the two materials; MuJoCo itself would
+take the larger of two coefficients. The floor meets convex hulls, objects meet one another with their convex pieces.
+Restitution e is a damping ratio: a linear spring of damping ratio ζ returns e = exp(-π ζ / √(1 - ζ²)) of a speed. What
+can deform is a flex of tetrahedra.
 """
 
 import json
@@ -32,8 +32,8 @@ from corporeal.recognition.readable_names import single_line_text
 
 MJCF_FILE_NAME = "scene.xml"
 CONTACT_TIME_S = 4e-3
-"""1/ω of a contact's spring [s]: what meets at a speed v sinks in by about v/ω; the step must be a
-quarter of it. At twice the stiffness piles of light objects come apart.
+"""1/ω of a contact's spring [s]: what meets at a speed v sinks in by about v/ω; the step must be a quarter of it. At
+twice the stiffness piles of light objects come apart.
 """
 TIME_STEP_S = CONTACT_TIME_S / 4
 FLEX_CONTACT_TIME_S = 8e-3
@@ -154,9 +154,7 @@ def _planes(world: ET.Element, scene: PhysicalScene) -> list[_PairGeom]:
     return [_PairGeom(name, -1, -1, "ground") for name, _, _ in planes]
 
 
-def _rigid_body(
-    solid: ExportedSolid, folder: Path, assets: ET.Element, world: ET.Element
-) -> list[_PairGeom]:
+def _rigid_body(solid: ExportedSolid, folder: Path, assets: ET.Element, world: ET.Element) -> list[_PairGeom]:
     body = ET.SubElement(world, "body", name=solid.name, pos=xml_numbers(solid.origin))
     ET.SubElement(body, "freejoint")
     I = solid.inertia  # noqa: E741
@@ -164,12 +162,7 @@ def _rigid_body(
     inertial = {"pos": "0 0 0", "mass": xml_numbers([solid.mass]), "fullinertia": xml_numbers(six)}
     ET.SubElement(body, "inertial", inertial)
     for name, finish in write_surfaces(solid, folder).items():
-        seen = {
-            "group": VISUAL_GROUP,
-            "contype": "0",
-            "conaffinity": "0",
-            "material": f"look_{finish}",
-        }
+        seen = {"group": VISUAL_GROUP, "contype": "0", "conaffinity": "0", "material": f"look_{finish}"}
         _mesh(assets, body, name, "shell", seen)
     geoms = []
     shapes = [(f"{solid.name}_piece_{k}", c, "things") for k, c in enumerate(solid.pieces)]
@@ -184,13 +177,9 @@ def _rigid_body(
     return geoms
 
 
-def _mesh(
-    assets: ET.Element, body: ET.Element, name: str, inertia: str, attributes: dict[str, str]
-) -> None:
+def _mesh(assets: ET.Element, body: ET.Element, name: str, inertia: str, attributes: dict[str, str]) -> None:
     ET.SubElement(assets, "mesh", name=name, file=f"{name}.obj", inertia=inertia)
-    ET.SubElement(
-        body, "geom", {"name": name, "type": "mesh", "mesh": name, "mass": "0"} | attributes
-    )
+    ET.SubElement(body, "geom", {"name": name, "type": "mesh", "mesh": name, "mass": "0"} | attributes)
 
 
 def _flex(solid: ExportedSolid, scene: PhysicalScene, world: ET.Element) -> None:
@@ -210,10 +199,7 @@ def _flex(solid: ExportedSolid, scene: PhysicalScene, world: ET.Element) -> None
         element=" ".join(map(str, mesh.corners.ravel().tolist())),
     )
     poisson = min(matter.treatment.poisson, MAX_FLEX_POISSON_RATIO)
-    elastic = {
-        "young": xml_numbers([matter.treatment.simulated_young_pa]),
-        "poisson": xml_numbers([poisson]),
-    }
+    elastic = {"young": xml_numbers([matter.treatment.simulated_young_pa]), "poisson": xml_numbers([poisson])}
     ET.SubElement(item, "elasticity", elastic | {"damping": xml_numbers([FLEX_DAMPING_S])})
     ET.SubElement(
         item,
@@ -222,9 +208,7 @@ def _flex(solid: ExportedSolid, scene: PhysicalScene, world: ET.Element) -> None
         contype=FLEX_CONTACT_BIT,
         conaffinity=FLEX_CONTACT_BIT,
         solref=xml_numbers([FLEX_CONTACT_TIME_S, 1.0]),
-        friction=xml_numbers(
-            [scene.friction[solid.heaviest, -1], TORSIONAL_FRICTION_M, ROLLING_FRICTION_M]
-        ),
+        friction=xml_numbers([scene.friction[solid.heaviest, -1], TORSIONAL_FRICTION_M, ROLLING_FRICTION_M]),
     )
 
 
@@ -273,9 +257,7 @@ def _not_written(asked: ExportRequest) -> list[str]:
             sentences.append(f"All of {solid.title} has the modulus of {matter.name}.")
         if matter.treatment.poisson > MAX_FLEX_POISSON_RATIO:
             ratio = f"{matter.treatment.poisson:.3g}"
-            sentences.append(
-                f"Poisson's ratio of {matter.name} is {MAX_FLEX_POISSON_RATIO} in MuJoCo, not {ratio}."
-            )
+            sentences.append(f"Poisson's ratio of {matter.name} is {MAX_FLEX_POISSON_RATIO} in MuJoCo, not {ratio}.")
     if scene.settled:
         sentences.append("No restitution: in MuJoCo resting objects would creep.")
     return sentences

@@ -1,13 +1,12 @@
 """Particle trajectories for learning: HDF5 of LagrangeBench, NPZ of geoelements/gns.
 
-Both loaders take positions and the kind of each particle. HDF5 has beside them what no other data
-set does: mass, volume, moduli, law, object, part, deformation gradients, and where every number
-comes from.
+Both loaders take positions and the kind of each particle. HDF5 has beside them what no other data set does: mass,
+volume, moduli, law, object, part, deformation gradients, and where every number comes from.
 
 A run as arrays of particles with the type numbers of learning data sets.
 
-Kinds are those of DeepMind's data sets (Sanchez-Gonzalez et al. 2020): 0 rigid, 6 sand, 7 goop; 8
-is ours, for metal. 3 is an obstacle to both loaders, and never used.
+Kinds are those of DeepMind's data sets (Sanchez-Gonzalez et al. 2020): 0 rigid, 6 sand, 7 goop; 8 is ours, for metal. 3
+is an obstacle to both loaders, and never used.
 """
 
 import json
@@ -25,13 +24,7 @@ from corporeal.core.types import Discretization, Law
 from corporeal.export.export_target import ExportRequest, NothingToWriteError, WrittenTarget
 from corporeal.simulation.simulation_result import SimulationResult
 
-GNS_PARTICLE_TYPES = {
-    Law.COROTATED: 7,
-    Law.NEO_HOOKEAN: 7,
-    Law.HENCKY: 7,
-    Law.DRUCKER_PRAGER: 6,
-    Law.VON_MISES: 8,
-}
+GNS_PARTICLE_TYPES = {Law.COROTATED: 7, Law.NEO_HOOKEAN: 7, Law.HENCKY: 7, Law.DRUCKER_PRAGER: 6, Law.VON_MISES: 8}
 RIGID_PARTICLE_TYPE = 0
 
 
@@ -255,9 +248,7 @@ def import_hdf5() -> Any:
     try:
         import h5py
     except ImportError as error:
-        raise UserError(
-            "HDF5 needs h5py. Install it with: pip install 'corporeal[export]'."
-        ) from error
+        raise UserError("HDF5 needs h5py. Install it with: pip install 'corporeal[export]'.") from error
     return h5py
 
 
@@ -268,9 +259,7 @@ def add_run(file: Any, number: int, table: ParticleTable, played: SimulationResu
     packed = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
     group.create_dataset("position", data=table.position, chunks=(1, particles, 3), **packed)
     shape = (frames, particles, 3, 3)
-    gradient = group.create_dataset(
-        "deformation", shape, np.float16, chunks=(1, *shape[1:]), **packed
-    )
+    gradient = group.create_dataset("deformation", shape, np.float16, chunks=(1, *shape[1:]), **packed)
     for k, frame in enumerate(played.trajectory.frames):
         gradient[k] = frame.deformation.astype(np.float16)
     group.create_dataset("particle_type", data=table.kind)

@@ -16,13 +16,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.store import to_plain
 from corporeal.core.types import PartDescription, Particles, Surface
 from corporeal.discretization.object_scaling import part_scales
-from corporeal.export.exported_solids import (
-    ConvexCollider,
-    ExportedSolid,
-    MaterialPoints,
-    PartMaterial,
-    PhysicalScene,
-)
+from corporeal.export.exported_solids import ConvexCollider, ExportedSolid, MaterialPoints, PartMaterial, PhysicalScene
 from corporeal.export.scene_motion import SceneMotion
 from corporeal.export.unsupported_features import unsupported_features
 from corporeal.geometry.convex_decomposition import decompose_convex
@@ -37,8 +31,7 @@ from corporeal.simulation.simulation_result import PreparedScene
 def identifiers(titles: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """Return ASCII identifiers, each once: letters, digits and underscores, no digit in front.
 
-    Accents are dropped; letters of other alphabets become underscores, and a name of nothing else
-    becomes ``thing``.
+    Accents are dropped; letters of other alphabets become underscores, and a name of nothing else becomes ``thing``.
 
     Args:
         titles: As people call objects.
@@ -61,17 +54,7 @@ FLAT_HULL_THICKNESS_FRACTION = 1e-4
 """Of the extent: thickness that the hull of a flat object is given."""
 STRUCTURE_FIELDS = ("structure", "thickness", "contents", "fill")
 """Fields of ``PartDescription`` that say how a part is built."""
-RESERVED_NAMES = (
-    "World",
-    "Looks",
-    "Matter",
-    "Physics",
-    "Floor",
-    "Floors",
-    "Hulls",
-    "Pieces",
-    "floor",
-)
+RESERVED_NAMES = ("World", "Looks", "Matter", "Physics", "Floor", "Floors", "Hulls", "Pieces", "floor")
 """Names that our files use for other objects."""
 
 
@@ -120,9 +103,7 @@ def _part_materials(prepared: PreparedScene) -> tuple[PartMaterial, ...]:
     listed = materials_json(prepared.field, prepared.parts, *heavy)["parts"]
     catalogue = prepared.parts.catalogue
     field = prepared.field
-    rows = zip(
-        catalogue, field.materials, prepared.particles.treatments, listed, field.words, strict=True
-    )
+    rows = zip(catalogue, field.materials, prepared.particles.treatments, listed, field.words, strict=True)
     return tuple(
         PartMaterial(
             part.name,
@@ -183,9 +164,7 @@ def _solid(prepared: PreparedScene, motion: SceneMotion, number: int, name: str)
         velocity=motion.velocity(number),
         spin=motion.spin(number),
         parts=_parts_by_mass(particles, own),
-        surfaces=tuple(
-            _posed_surface(scene.surfaces[n], motion, n, whole.centre) for n in surfaces
-        ),
+        surfaces=tuple(_posed_surface(scene.surfaces[n], motion, n, whole.centre) for n in surfaces),
         surface_numbers=tuple(surfaces),
         part_of_surface=_parts_of_surfaces(prepared, surfaces),
         provenance=_provenance(prepared, motion, number),
@@ -200,9 +179,7 @@ def _parts_by_mass(particles: Particles, own: Int[np.ndarray, " N"]) -> tuple[in
     return tuple(sorted(set(part.tolist()), key=lambda k: -float(mass[part == k].sum())))
 
 
-def _posed_surface(
-    surface: Surface, motion: SceneMotion, number: int, origin: np.ndarray
-) -> Surface:
+def _posed_surface(surface: Surface, motion: SceneMotion, number: int, origin: np.ndarray) -> Surface:
     vertices, normals = motion.surface_now(number)
     kept = None if surface.normals is None else normals
     return replace(surface, vertices=vertices - origin, normals=kept)
@@ -230,14 +207,10 @@ def _with_colliders(
     pieces = decompose_convex(mesh.vertices, mesh.triangles)
     near = KDTree(particles.position[own])
     parts = [int(particles.part[own[near.query(p.centre)[1]]]) for p in pieces]
-    hull = convex_hull_of(
-        mesh.vertices, FLAT_HULL_THICKNESS_FRACTION * float(np.ptp(mesh.vertices, axis=0).max())
-    )
+    hull = convex_hull_of(mesh.vertices, FLAT_HULL_THICKNESS_FRACTION * float(np.ptp(mesh.vertices, axis=0).max()))
 
     def here(piece: ConvexPiece) -> ConvexPiece:
-        return ConvexPiece(
-            motion.placed(solid.number, piece.vertices) - solid.origin, piece.triangles
-        )
+        return ConvexPiece(motion.placed(solid.number, piece.vertices) - solid.origin, piece.triangles)
 
     return replace(
         solid,

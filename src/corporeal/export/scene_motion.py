@@ -278,9 +278,7 @@ def _particle_velocity(particles: Particles, trajectory: Trajectory, now: int) -
 
 def _scene_skin(prepared: PreparedScene) -> SkinBinding:
     field, parts = prepared.field, prepared.parts
-    return bind_vertices(
-        prepared.scene, parts, prepared.particles, granular_parts(field), fluid_parts(field)
-    )
+    return bind_vertices(prepared.scene, parts, prepared.particles, granular_parts(field), fluid_parts(field))
 
 
 # ---------------------------------------------------------------- of a scene before any simulation
@@ -291,9 +289,7 @@ def motion_of_scene(prepared: PreparedScene) -> SceneMotion:
     particles, scene = prepared.particles, prepared.scene
     posed = build_model(scene, particles, prepared.field)
     count = len(scene.objects)
-    bodies: list[Int[np.ndarray, " N"]] = [
-        np.flatnonzero(posed.object_of_body == k) for k in range(count)
-    ]
+    bodies: list[Int[np.ndarray, " N"]] = [np.flatnonzero(posed.object_of_body == k) for k in range(count)]
     rigid = np.array([len(b) == 1 and bool(posed.rigid[b[0]]) for b in bodies])
     mass = [particles.mass * (particles.object == k) for k in range(count)]
     turn = np.where(rigid[:, None, None], np.eye(3), np.nan)

@@ -34,9 +34,7 @@ def simplify_colliders(scene: PhysicalScene, most: int) -> tuple[PhysicalScene, 
     if most == 0:
         return scene, 0.0
     if most < ENCLOSING_BOX_CORNERS:
-        raise UserError(
-            f"--hull-vertices is {most}. A hull needs {ENCLOSING_BOX_CORNERS}; 0 leaves all as it is."
-        )
+        raise UserError(f"--hull-vertices is {most}. A hull needs {ENCLOSING_BOX_CORNERS}; 0 leaves all as it is.")
     thickened = [0.0]
 
     def few(collider: ConvexCollider) -> ConvexCollider:
@@ -46,8 +44,5 @@ def simplify_colliders(scene: PhysicalScene, most: int) -> tuple[PhysicalScene, 
             thickened.append(float(held.closest(made.vertices)[0].max()))
         return replace(collider, shape=made)
 
-    solids = tuple(
-        replace(s, pieces=tuple(map(few, s.pieces)), hull=s.hull and few(s.hull))
-        for s in scene.solids
-    )
+    solids = tuple(replace(s, pieces=tuple(map(few, s.pieces)), hull=s.hull and few(s.hull)) for s in scene.solids)
     return replace(scene, solids=solids), max(thickened)

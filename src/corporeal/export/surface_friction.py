@@ -29,8 +29,8 @@ def surface_friction(
 ) -> SurfaceFriction:
     """Fit one coefficient per part, by least squares over the pairs that can meet.
 
-    Products and geometric means are fitted in logarithms. A maximum is no linear function: each
-    part gets the least friction that it has with anything, so that no pair is rougher than ours.
+    Products and geometric means are fitted in logarithms. A maximum is no linear function: each part gets the least
+    friction that it has with anything, so that no pair is rougher than ours.
 
     Args:
         pairs: Friction of every two parts; the last row and column are the floor.

@@ -8,9 +8,7 @@ from corporeal.core.types import Particles, Scene
 from corporeal.export.scene_motion import SceneMotion
 
 
-def unsupported_features(
-    scene: Scene, particles: Particles, motion: SceneMotion
-) -> tuple[str, ...]:
+def unsupported_features(scene: Scene, particles: Particles, motion: SceneMotion) -> tuple[str, ...]:
     """Name pushes, winds, paths and objects of several bodies, which every format leaves out."""
     return tuple(_feature_sentences(scene, particles, motion))
 

@@ -12,14 +12,7 @@ import numpy as np
 from corporeal.core.store import write_json
 from corporeal.export.export_target import ExportRequest, NothingToWriteError, WrittenTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
-from corporeal.export.mesh_files import (
-    MESH_FOLDER,
-    write_collider,
-    write_surfaces,
-    write_xml,
-    xml_comment,
-    xml_numbers,
-)
+from corporeal.export.mesh_files import MESH_FOLDER, write_collider, write_surfaces, write_xml, xml_comment, xml_numbers
 
 PLACEMENTS_FILE_NAME = "placements.json"
 
@@ -34,9 +27,7 @@ def write_urdf(asked: ExportRequest, folder: Path) -> WrittenTarget:
     scene = asked.scene
     rigid = [s for s in scene.solids if s.rigid]
     if not rigid:
-        raise NothingToWriteError(
-            f"Nothing of {scene.title} is rigid, and URDF has rigid bodies only."
-        )
+        raise NothingToWriteError(f"Nothing of {scene.title} is rigid, and URDF has rigid bodies only.")
     for solid in rigid:
         write_xml(folder / f"{solid.name}.urdf", _robot(solid, scene, folder))
     write_json(folder / PLACEMENTS_FILE_NAME, {s.name: _placement(s) for s in rigid})

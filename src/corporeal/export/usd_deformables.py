@@ -1,13 +1,12 @@
 """Deformable bodies in USD: material points for MPM, and tetrahedra for finite elements.
 
-Schemas: Newton's ``newton-usd-schemas`` (points, per-part subsets with MPM materials); the AOUSD
-proposal for deformables under both names that readers look for, ``physics:`` (Newton) and
-``omniphysics:`` (PhysX). OpenUSD itself does not know them yet; they are applied by name.
+Schemas: Newton's ``newton-usd-schemas`` (points, per-part subsets with MPM materials); the AOUSD proposal for
+deformables under both names that readers look for, ``physics:`` (Newton) and ``omniphysics:`` (PhysX). OpenUSD itself
+does not know them yet; they are applied by name.
 
 Tetrahedral mesh of the volume filled by points: grid cells cut into six tetrahedra (Kuhn 1960).
 
-All cells are cut alike, along the diagonal from (0, 0, 0) to (1, 1, 1), so that neighbours share
-whole faces.
+All cells are cut alike, along the diagonal from (0, 0, 0) to (1, 1, 1), so that neighbours share whole faces.
 """
 
 from itertools import permutations
@@ -17,12 +16,7 @@ from jaxtyping import Float, Int
 
 from corporeal.core.types import Law
 from corporeal.export.export_target import SoftRepresentation
-from corporeal.export.exported_solids import (
-    ExportedSolid,
-    PartMaterial,
-    PhysicalScene,
-    TetrahedralMesh,
-)
+from corporeal.export.exported_solids import ExportedSolid, PartMaterial, PhysicalScene, TetrahedralMesh
 from corporeal.io.usd.usda_writer import (
     UsdPrim,
     usda_floats,
@@ -66,18 +60,14 @@ def voxel_tetrahedra(
     """
     low = points.min(axis=0) - 1e-3 * side
     cell = np.unique(np.floor((points - low) / side).astype(np.int64), axis=0)
-    corners, number = np.unique(
-        (cell[:, None] + CELL_CORNERS).reshape(-1, 3), axis=0, return_inverse=True
-    )
+    corners, number = np.unique((cell[:, None] + CELL_CORNERS).reshape(-1, 3), axis=0, return_inverse=True)
     return low + side * corners, number.reshape(-1, 8)[:, KUHN_TETRAHEDRA].reshape(-1, 4)
 
 
 def tetrahedra_outer_faces(corners: Int[np.ndarray, "T 4"]) -> Int[np.ndarray, "F 3"]:
     """Return the faces that belong to one tetrahedron only, anticlockwise seen from outside."""
     faces = corners[:, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]].reshape(-1, 3)
-    _, first, count = np.unique(
-        np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True
-    )
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[np.sort(first[count == 1])]
 
 
@@ -127,11 +117,7 @@ def tetrahedra_prim(solid: ExportedSolid, scene: PhysicalScene) -> UsdPrim:
     prim.set("float3[]", "extent", usda_vectors(_box(mesh.points, 0.0)))
     prim.set("point3f[]", "points", usda_vectors(mesh.points))
     prim.set("uniform token", "purpose", usda_string("guide"))
-    prim.set(
-        "int3[]",
-        "surfaceFaceVertexIndices",
-        usda_integer_vectors(tetrahedra_outer_faces(mesh.corners)),
-    )
+    prim.set("int3[]", "surfaceFaceVertexIndices", usda_integer_vectors(tetrahedra_outer_faces(mesh.corners)))
     prim.set("int4[]", "tetVertexIndices", usda_integer_vectors(mesh.corners))
     return prim
 
@@ -159,9 +145,7 @@ def make_deformable(solid: ExportedSolid, materials: str, soft: SoftRepresentati
     for space in USD_DIALECTS[:2]:
         prim.set("float", f"{space}:mass", usda_number(solid.mass))
     prim.add(_material_points_physics(solid, materials))
-    mesh = prim.add(
-        UsdPrim("", "tetrahedra", [*VOLUME_APIS, "PhysicsCollisionAPI", "MaterialBindingAPI"])
-    )
+    mesh = prim.add(UsdPrim("", "tetrahedra", [*VOLUME_APIS, "PhysicsCollisionAPI", "MaterialBindingAPI"]))
     bind_physics_material(mesh, f"{materials}/part_{solid.heaviest}")
     prim.variant_set, prim.chosen = "simulated", soft
     prim.variants = {
@@ -194,9 +178,7 @@ def set_deformable_material(prim: UsdPrim, matter: PartMaterial) -> None:
     """Say E and ν as simulated in every dialect that is read today, and how it yields."""
     prim.schemas += DEFORMABLE_MATERIAL_APIS
     for space in USD_DIALECTS:
-        prim.set(
-            "float", f"{space}:youngsModulus", usda_number(matter.treatment.simulated_young_pa)
-        )
+        prim.set("float", f"{space}:youngsModulus", usda_number(matter.treatment.simulated_young_pa))
         prim.set("float", f"{space}:poissonsRatio", usda_number(matter.treatment.poisson))
     for name, value in newton_yield_parameters(matter).items():
         prim.set("float", f"newton:mpm:{name}", usda_number(value))

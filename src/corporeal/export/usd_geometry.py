@@ -1,7 +1,7 @@
 """The layer ``geometry.usda``: shapes and appearance without physics.
 
-Schemas: UsdGeom, UsdShade, UsdPreviewSurface 2.6. Subdivision is ``none``, else a viewer would
-round every mesh (Catmull–Clark is the default); st runs up where glTF's v runs down.
+Schemas: UsdGeom, UsdShade, UsdPreviewSurface 2.6. Subdivision is ``none``, else a viewer would round every mesh
+(Catmull–Clark is the default); st runs up where glTF's v runs down.
 """
 
 from collections.abc import Iterator
@@ -77,28 +77,20 @@ def _surface(name: str, surface: Surface, scene: PhysicalScene) -> UsdPrim:
     prim = UsdPrim("Mesh", name, ["MaterialBindingAPI"], [usda_display_name(surface.name)])
     _fill(prim, surface.vertices, surface.triangles)
     if surface.normals is not None:
-        prim.lines.append(
-            _with_interpolation(f"normal3f[] normals = {usda_vectors(surface.normals)}", "vertex")
-        )
+        prim.lines.append(_with_interpolation(f"normal3f[] normals = {usda_vectors(surface.normals)}", "vertex"))
     if surface.uv is not None:
         up = np.column_stack([surface.uv[:, 0], 1 - surface.uv[:, 1]])
-        prim.lines.append(
-            _with_interpolation(f"texCoord2f[] primvars:st = {usda_vectors(up)}", "vertex")
-        )
+        prim.lines.append(_with_interpolation(f"texCoord2f[] primvars:st = {usda_vectors(up)}", "vertex"))
     if surface.colours is not None:
         base = np.asarray(scene.finishes[surface.finish].colour[:3])
         shown = usda_vectors(surface.colours[:, :3] * base)
-        prim.lines.append(
-            _with_interpolation(f"color3f[] primvars:displayColor = {shown}", "vertex")
-        )
+        prim.lines.append(_with_interpolation(f"color3f[] primvars:displayColor = {shown}", "vertex"))
     prim.relate("material:binding", [f"/{WORLD_PRIM}/Looks/{look_name(surface)}"])
     return prim
 
 
 def _fill(prim: UsdPrim, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    prim.set(
-        "float3[]", "extent", usda_vectors(np.array([vertices.min(axis=0), vertices.max(axis=0)]))
-    )
+    prim.set("float3[]", "extent", usda_vectors(np.array([vertices.min(axis=0), vertices.max(axis=0)])))
     prim.set("int[]", "faceVertexCounts", usda_integers(np.full(len(triangles), 3)))
     prim.set("int[]", "faceVertexIndices", usda_integers(triangles))
     prim.set("point3f[]", "points", usda_vectors(vertices))

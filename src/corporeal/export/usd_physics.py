@@ -1,8 +1,8 @@
 """The layer ``physics.usda``: physics as overrides of the geometry layer.
 
-Schemas: UsdPhysics. Readers take one friction a surface: ours, which belong to pairs, are fitted
-(``friction.py``). The floor meets convex hulls and objects meet one another with their convex
-pieces, so that nothing is carried by a hollow's cover.
+Schemas: UsdPhysics. Readers take one friction a surface: ours, which belong to pairs, are fitted (``friction.py``). The
+floor meets convex hulls and objects meet one another with their convex pieces, so that nothing is carried by a hollow's
+cover.
 """
 
 from typing import Any
@@ -20,11 +20,7 @@ from corporeal.export.surface_friction import (
     SurfaceFriction,
     surface_friction,
 )
-from corporeal.export.usd_deformables import (
-    bind_physics_material,
-    make_deformable,
-    set_deformable_material,
-)
+from corporeal.export.usd_deformables import bind_physics_material, make_deformable, set_deformable_material
 from corporeal.export.usd_geometry import WORLD_PRIM, named_colliders, solid_path, surface_name
 from corporeal.io.usd.usd_bodies import CUSTOM_DATA_KEY
 from corporeal.io.usd.usda_writer import (
@@ -52,8 +48,8 @@ CONVEX_COLLIDER_APIS = (
 ALL_HULL_CORNERS = -1
 """Newton: all corners of a hull."""
 CONTACT_GAP_M = 2e-3
-"""What is farther apart than two of these is no contact yet [m]. By default Newton takes 0.1 m: a
-scene then has more contacts than its solvers keep, and objects fall through the floor.
+"""What is farther apart than two of these is no contact yet [m]. By default Newton takes 0.1 m: a scene then has more
+contacts than its solvers keep, and objects fall through the floor.
 """
 CONTACT_DIRECTIONS = 6
 """Directions in which a contact resists: also against turning and rolling."""
@@ -83,14 +79,10 @@ def physics_prims(scene: PhysicalScene, engine: TargetEngine, soft: SoftRepresen
     for group in _groups(scene, [g.name for g in grounds]):
         world.add(group)
     for solid in scene.solids:
-        body = world.add(
-            _rigid(solid) if solid.rigid else make_deformable(solid, MATERIALS_PATH, soft)
-        )
+        body = world.add(_rigid(solid) if solid.rigid else make_deformable(solid, MATERIALS_PATH, soft))
         body.metadata.append(usda_custom_data(CUSTOM_DATA_KEY, solid.provenance))
         for number_, part in zip(solid.surface_numbers, solid.part_of_surface, strict=True):
-            bind_physics_material(
-                body.add(UsdPrim("", surface_name(number_))), f"{MATERIALS_PATH}/part_{part}"
-            )
+            bind_physics_material(body.add(UsdPrim("", surface_name(number_))), f"{MATERIALS_PATH}/part_{part}")
     return world
 
 
@@ -110,9 +102,7 @@ def _simulation(scene: PhysicalScene, engine: TargetEngine, found: SurfaceFricti
     size = float(np.linalg.norm(scene.gravity))
     down = np.asarray(scene.gravity) / size if size else np.array([0.0, 0.0, -1.0])
     about = {"friction_for": engine, "largest_error": found.misfit, "order": "parts, then floor"}
-    prim = UsdPrim(
-        "PhysicsScene", "Physics", ["NewtonMPMSceneAPI"], [usda_custom_data(CUSTOM_DATA_KEY, about)]
-    )
+    prim = UsdPrim("PhysicsScene", "Physics", ["NewtonMPMSceneAPI"], [usda_custom_data(CUSTOM_DATA_KEY, about)])
     prim.set("float", "newton:mpm:voxelSize", usda_number(scene.cell))
     prim.set("vector3f", "physics:gravityDirection", usda_vector(down))
     prim.set("float", "physics:gravityMagnitude", usda_number(size))
@@ -135,10 +125,7 @@ def _surface(name: str, friction: float, restitution: float, engine: TargetEngin
 def _matter(number_: int, matter: PartMaterial, friction: float, engine: TargetEngine) -> UsdPrim:
     restitution = matter.material.restitution
     prim = _surface(f"part_{number_}", friction, restitution, engine)
-    prim.metadata += [
-        usda_display_name(matter.name),
-        usda_custom_data(CUSTOM_DATA_KEY, matter.provenance),
-    ]
+    prim.metadata += [usda_display_name(matter.name), usda_custom_data(CUSTOM_DATA_KEY, matter.provenance)]
     prim.set("float", "physics:density", usda_number(matter.treatment.density))
     if matter.treatment.kind != "rigid":
         set_deformable_material(prim, matter)

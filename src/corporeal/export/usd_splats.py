@@ -1,8 +1,8 @@
 """Gaussians over time as OpenUSD: ``splats.usda``, one field of particles for each object.
 
-Schema: UsdVol's ParticleField3DGaussianSplat (OpenUSD 26.03 and later). Scales, opacities and
-harmonics as 3D Gaussian splatting has them: standard deviations [m], opacity in [0, 1], and the
-coefficients of each particle one after the other, colour = 0.5 + Σ sh Y.
+Schema: UsdVol's ParticleField3DGaussianSplat (OpenUSD 26.03 and later). Scales, opacities and harmonics as 3D Gaussian
+splatting has them: standard deviations [m], opacity in [0, 1], and the coefficients of each particle one after the
+other, colour = 0.5 + Σ sh Y.
 """
 
 from collections.abc import Iterator
@@ -36,21 +36,13 @@ from corporeal.simulation.moving_gaussians import MovingGaussians, moving_gaussi
 SPLATS_FILE_NAME = "splats.usda"
 BOX_SIGMAS = 3.0
 """Of the largest standard deviation: how far a box reaches around the means."""
-SAMPLED_ATTRIBUTES = {
-    "positions": ("point3f[]", 3),
-    "orientations": ("quatf[]", 4),
-    "scales": ("float3[]", 3),
-}
+SAMPLED_ATTRIBUTES = {"positions": ("point3f[]", 3), "orientations": ("quatf[]", 4), "scales": ("float3[]", 3)}
 """Attribute that is sampled → its type and width."""
 write_vectors = partial(usda_vectors, digits=6)
 
 
 def write_splats(
-    scene: PhysicalScene,
-    motion: SceneMotion,
-    moving: MovingGaussians,
-    owner: Int[np.ndarray, " N"],
-    folder: Path,
+    scene: PhysicalScene, motion: SceneMotion, moving: MovingGaussians, owner: Int[np.ndarray, " N"], folder: Path
 ) -> None:
     """Write all Gaussians: those of objects with samples, those of none standing still.
 
@@ -75,10 +67,7 @@ def write_splats(
         if not len(own):
             continue
         parts = {"parts": [scene.matter[k].provenance for k in solid.parts]}
-        about = [
-            usda_display_name(solid.title),
-            usda_custom_data(CUSTOM_DATA_KEY, solid.provenance | parts),
-        ]
+        about = [usda_display_name(solid.title), usda_custom_data(CUSTOM_DATA_KEY, solid.provenance | parts)]
         thing = world.add(UsdPrim("Xform", solid.name, metadata=about))
         field = thing.add(_field("splats", moving.gaussians, own))
         for name, (kind, _) in SAMPLED_ATTRIBUTES.items():
@@ -102,9 +91,7 @@ def write_splats(
 def _posed(motion: SceneMotion, moving: MovingGaussians) -> dict[str, np.ndarray]:
     """Pose all Gaussians at every frame; they stay on the disk."""
     count, frames = moving.gaussians.count, len(motion.time)
-    held = {
-        name: disk_array((frames, count, width)) for name, (_, width) in SAMPLED_ATTRIBUTES.items()
-    }
+    held = {name: disk_array((frames, count, width)) for name, (_, width) in SAMPLED_ATTRIBUTES.items()}
     for k, frame in enumerate(motion.frames):
         for rows, values in zip(held.values(), _arrays(moving.at(frame)), strict=True):
             rows[k] = values

@@ -1,8 +1,7 @@
 """A scene as OpenUSD in text: ``sim.usda`` to simulate, ``video.usda`` to show.
 
-``geometry.usda`` has the shapes, ``physics.usda`` what simulates, ``motion.usda`` the samples.
-Never samples and physics in one stage: a simulated body with samples contradicts itself, and
-readers of physics take defaults.
+``geometry.usda`` has the shapes, ``physics.usda`` what simulates, ``motion.usda`` the samples. Never samples and
+physics in one stage: a simulated body with samples contradicts itself, and readers of physics take defaults.
 """
 
 from functools import partial
@@ -12,11 +11,7 @@ from corporeal.core.version import __version__
 from corporeal.export.export_target import ExportRequest, WrittenTarget
 from corporeal.export.exported_solids import ExportedSolid, PhysicalScene
 from corporeal.export.scene_motion import PosedSurfaces, SceneMotion
-from corporeal.export.simplify_colliders import (
-    PHYSX_GPU_MAX_CORNERS,
-    simplify_colliders,
-    solid_colliders,
-)
+from corporeal.export.simplify_colliders import PHYSX_GPU_MAX_CORNERS, simplify_colliders, solid_colliders
 from corporeal.export.usd_geometry import WORLD_PRIM, geometry_prims, surface_name
 from corporeal.export.usd_physics import fit_friction, physics_prims
 from corporeal.io.usd.usda_writer import UsdLayer, UsdPrim, usda_string, usda_vector, usda_vectors
@@ -52,18 +47,12 @@ def _shapes(solid: ExportedSolid, shapes: PosedSurfaces) -> UsdPrim:
         corners = ([v.min(axis=0), v.max(axis=0)] for v in vertices)
         mesh.sample("float3[]", "extent", (write_points(c - solid.origin) for c in corners))
         if surface.normals is not None:
-            mesh.lines.append(
-                f"normal3f[] normals (\n    interpolation = {usda_string('vertex')}\n)"
-            )
+            mesh.lines.append(f"normal3f[] normals (\n    interpolation = {usda_string('vertex')}\n)")
             mesh.sample("normal3f[]", "normals", map(write_normals, normals))
     return prim
 
 
-GEOMETRY_FILE_NAME, PHYSICS_FILE_NAME, MOTION_FILE_NAME = (
-    "geometry.usda",
-    "physics.usda",
-    "motion.usda",
-)
+GEOMETRY_FILE_NAME, PHYSICS_FILE_NAME, MOTION_FILE_NAME = ("geometry.usda", "physics.usda", "motion.usda")
 SIMULATION_FILE_NAME, VIDEO_FILE_NAME = "sim.usda", "video.usda"
 
 
@@ -72,9 +61,7 @@ def write_usd(asked: ExportRequest, folder: Path) -> WrittenTarget:
     config = asked.config
     scene, thickened = simplify_colliders(asked.scene, config.hull_vertices)
     _write(folder / GEOMETRY_FILE_NAME, scene, geometry_prims(scene, folder, config.soft))
-    _write(
-        folder / PHYSICS_FILE_NAME, scene, physics_prims(scene, config.friction_for, config.soft)
-    )
+    _write(folder / PHYSICS_FILE_NAME, scene, physics_prims(scene, config.friction_for, config.soft))
     _compose(folder / SIMULATION_FILE_NAME, scene, (PHYSICS_FILE_NAME, GEOMETRY_FILE_NAME), 0)
     if asked.motion.moves:
         last = len(asked.motion.time) - 1
@@ -93,10 +80,7 @@ def _most_corners(scene: PhysicalScene) -> int:
 
 
 def _not_written(asked: ExportRequest, corners: int) -> list[str]:
-    sentences = [
-        "Friction of pairs is fitted by one coefficient a part; all pairs are in the customData "
-        "of /World."
-    ]
+    sentences = ["Friction of pairs is fitted by one coefficient a part; all pairs are in the customData of /World."]
     soft = [s.title for s in asked.scene.solids if not s.rigid]
     if soft and asked.config.soft == "none":
         sentences.append(f"{', '.join(soft)} can deform and is not simulated.")
@@ -115,10 +99,7 @@ def _not_written(asked: ExportRequest, corners: int) -> list[str]:
 
 
 def _write(path: Path, scene: PhysicalScene, world: UsdPrim, last: int = 0) -> None:
-    _save(
-        path,
-        UsdLayer(WORLD_PRIM, float(scene.fps), last, comment=_scene_comment(scene), prims=[world]),
-    )
+    _save(path, UsdLayer(WORLD_PRIM, float(scene.fps), last, comment=_scene_comment(scene), prims=[world]))
 
 
 def _compose(path: Path, scene: PhysicalScene, layers: tuple[str, ...], last: int) -> None:

@@ -1,8 +1,8 @@
 """Registration of points of unknown frame and unit to a surface: axis rotation, scale, shift.
 
-Of the 24 rotations that take axes to axes the first whose misfit is within a tenth of the best is
-taken, the usual ones first; scale and shift follow from the bounding boxes. Objects that look alike
-under such a turn (a cube, a ball) may be registered wrongly, and nothing here notices.
+Of the 24 rotations that take axes to axes the first whose misfit is within a tenth of the best is taken, the usual ones
+first; scale and shift follow from the bounding boxes. Objects that look alike under such a turn (a cube, a ball) may be
+registered wrongly, and nothing here notices.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ class RegisteredPoints:
     position: Float[np.ndarray, "N 3"]
     """[m]"""
     misfit: float
-    """Mean distance of the surface from the nearest point, plus that of the points from its box,
-    over its diagonal [-]."""
+    """Mean distance of the surface from the nearest point, plus that of the points from its box, over its diagonal
+    [-]."""
     spacing: float
     """Median distance of neighbouring points [m]."""
 
@@ -67,9 +67,7 @@ def register_points(
     box = np.stack([surface.min(axis=0), surface.max(axis=0)])
     tried = [_fit_scale_and_shift(points @ turn.T, looked, box) for turn in axis_turns()]
     best = min(misfit for misfit, _ in tried)
-    misfit, placed = next(
-        t for t in tried if t[0] <= SAME_MISFIT_RATIO * best + SAME_MISFIT_TOLERANCE
-    )
+    misfit, placed = next(t for t in tried if t[0] <= SAME_MISFIT_RATIO * best + SAME_MISFIT_TOLERANCE)
     if misfit > MAX_REGISTRATION_MISFIT:
         what = f"does not fit the scene: its points miss the surface by {misfit:.0%} of its size."
         raise BadFileError(path, what, "Is it a file of another object?")

@@ -6,14 +6,14 @@ vomp:PATH pixie:PATH table:PATH  a file of the whole scene, or a folder with one
 
 Pixie's points: ``mapped_preds.ply`` or ``world_mapped_preds.ply``.
 
-Columns x, y, z, density [kg/m³], E [Pa], nu and material_id beside colours
-(pixie/voxel/map_pred_to_coords.py, MIT); the names of the ids are those of its simulator
-(MATERIAL_ID_TO_NAME in mpm_solver_warp.py), 7 being the background of its training.
+Columns x, y, z, density [kg/m³], E [Pa], nu and material_id beside colours (pixie/voxel/map_pred_to_coords.py, MIT);
+the names of the ids are those of its simulator (MATERIAL_ID_TO_NAME in mpm_solver_warp.py), 7 being the background of
+its training.
 
 VoMP's voxels: the npz that its ``save_materials`` writes.
 
-``voxel_data`` is a structured array of x, y, z in the frame and unit of the mesh file,
-youngs_modulus [Pa], poissons_ratio and density [kg/m³] (vomp/inference/utils.py, Apache-2.0).
+``voxel_data`` is a structured array of x, y, z in the frame and unit of the mesh file, youngs_modulus [Pa],
+poissons_ratio and density [kg/m³] (vomp/inference/utils.py, Apache-2.0).
 """
 
 import csv
@@ -51,9 +51,7 @@ def read_vomp(path: Path) -> SampledField:
         raise BadFileError(path, what, VOMP_WRITE_AGAIN) from error
     except (AttributeError, TypeError, IndexError) as error:  # an npy file: one array, no names
         raise BadFileError(path, "is no npz file.", VOMP_WRITE_AGAIN) from error
-    missing = [
-        n for n in ("x", "y", "z", *VOMP_COLUMNS.values()) if n not in (rows.dtype.names or ())
-    ]
+    missing = [n for n in ("x", "y", "z", *VOMP_COLUMNS.values()) if n not in (rows.dtype.names or ())]
     if missing:
         raise BadFileError(path, f"voxel_data has no {', '.join(missing)}.", VOMP_WRITE_AGAIN)
     rows = rows.reshape(-1)
@@ -84,9 +82,7 @@ def read_pixie(path: Path) -> SampledField:
     rows = read_ply_elements(path, memoryview(path.read_bytes())).get("vertex", {})
     missing = [n for n in ("x", "y", "z", "material_id", *PIXIE_COLUMNS.values()) if n not in rows]
     if missing:
-        raise BadFileError(
-            path, f"its vertices have no {', '.join(missing)}.", f"Name {PIXIE_FILE_NAMES}."
-        )
+        raise BadFileError(path, f"its vertices have no {', '.join(missing)}.", f"Name {PIXIE_FILE_NAMES}.")
     number = rows["material_id"].astype(float)
     known = np.isin(number, range(len(PIXIE_KINDS)))
     if not known.all():
@@ -123,9 +119,7 @@ def read_field_table(path: Path) -> SampledField:
     told = {ours: theirs for ours, theirs in TABLE_COLUMNS.items() if theirs in names}
     if not told or not {"x", "y", "z"} <= set(names):
         raise BadFileError(path, "lacks columns.", TABLE_HEADER_HELP)
-    rows = np.array(
-        [_line_numbers(path, k, line, len(names)) for k, line in enumerate(body, start=2)]
-    )
+    rows = np.array([_line_numbers(path, k, line, len(names)) for k, line in enumerate(body, start=2)])
     rows = rows.reshape(-1, len(names))
     column = {name: rows[:, k] for k, name in enumerate(names)}
     return SampledField(
@@ -140,13 +134,9 @@ def _line_numbers(path: Path, number: int, line: list[str], width: int) -> list[
     try:
         values = [float(cell) for cell in line]
     except ValueError as error:
-        raise BadFileError(
-            path, f"line {number} holds a cell that is no number.", TABLE_HEADER_HELP
-        ) from error
+        raise BadFileError(path, f"line {number} holds a cell that is no number.", TABLE_HEADER_HELP) from error
     if len(values) != width:
-        raise BadFileError(
-            path, f"line {number} has {len(values)} cells, not {width}.", TABLE_HEADER_HELP
-        )
+        raise BadFileError(path, f"line {number} has {len(values)} cells, not {width}.", TABLE_HEADER_HELP)
     return values
 
 
@@ -161,9 +151,7 @@ PHYSGAUSSIAN_UNIFORM = {"young": 2e6, "poisson": 0.4, "density": 200.0}
 """PhysGaussian's config/ficus_config.json [SI]."""
 OMNIPHYSGS_UNIFORM = {"young": 2e6, "poisson": 0.4, "density": 1000.0}
 """OmniPhysGS: buffers of elasticity.py, which its training does not change [SI]."""
-FIELD_SPECIFICATION_HELP = (
-    "Use one, one:E=2e6,nu=.4,rho=200, omniphysgs, vomp:PATH, pixie:PATH or table:PATH.csv."
-)
+FIELD_SPECIFICATION_HELP = "Use one, one:E=2e6,nu=.4,rho=200, omniphysgs, vomp:PATH, pixie:PATH or table:PATH.csv."
 
 
 @dataclass(frozen=True)
@@ -219,9 +207,7 @@ def parse_field_specification(spec: str) -> UniformField | FieldFiles | None:
         return None
     if kind == "one":
         return UniformField(
-            "one material",
-            PHYSGAUSSIAN_UNIFORM | (_parse_field_numbers(spec, rest) if colon else {}),
-            False,
+            "one material", PHYSGAUSSIAN_UNIFORM | (_parse_field_numbers(spec, rest) if colon else {}), False
         )
     if spec == "omniphysgs":
         return UniformField("OmniPhysGS", OMNIPHYSGS_UNIFORM, True)
@@ -246,8 +232,6 @@ def _parse_field_numbers(spec: str, text: str) -> dict[str, float]:
             value = float("nan")
         low, high = FIELD_VALUE_BOUNDS.get(name or "", (0.0, 0.0))
         if name is None or not low < value < high:
-            raise UserError(
-                f"--field {spec}: {pair!r} is not a valid number. {FIELD_SPECIFICATION_HELP}"
-            )
+            raise UserError(f"--field {spec}: {pair!r} is not a valid number. {FIELD_SPECIFICATION_HELP}")
         found[name] = value
     return found

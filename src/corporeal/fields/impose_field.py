@@ -1,7 +1,7 @@
 """Imposing another method's field: its medians per part.
 
-What the other method does not tell (yield stress, friction, walls, contents) is borrowed from ours
-and marked so. A part that the field does not resolve keeps our numbers altogether.
+What the other method does not tell (yield stress, friction, walls, contents) is borrowed from ours and marked so. A
+part that the field does not resolve keeps our numbers altogether.
 """
 
 from collections.abc import Mapping
@@ -12,16 +12,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import (
-    Law,
-    Material,
-    MaterialField,
-    MeasuredRange,
-    Parts,
-    Provenance,
-    Scene,
-    Structure,
-)
+from corporeal.core.types import Law, Material, MaterialField, MeasuredRange, Parts, Provenance, Scene, Structure
 from corporeal.fields.field_registration import RegisteredPoints, register_points
 from corporeal.fields.field_specification import UniformField, parse_field_specification
 from corporeal.fields.sampled_field import SampledField
@@ -109,9 +100,7 @@ def _sum_up_part(field: SampledField, sample: np.ndarray, covered: float) -> Par
 
 CHOSEN_BY_FIELD, CHOSEN_BY_LIBRARY = "field", "borrowed"
 """Who chose a value: the other method, or we, where it tells none."""
-BORROWED_NUMBERS_NOTE = (
-    f"Values that the other method does not give are ours, marked {CHOSEN_BY_LIBRARY}."
-)
+BORROWED_NUMBERS_NOTE = f"Values that the other method does not give are ours, marked {CHOSEN_BY_LIBRARY}."
 POINTS_PER_PART = 400
 """Points on a part's surface that its numbers are summed up over."""
 REGISTRATION_SURFACE_POINTS = 4000
@@ -123,8 +112,8 @@ LAW_OF_PIXIE_KIND: Mapping[str, tuple[Law, str]] = {
     "sand": (Law.DRUCKER_PRAGER, "sand"),
     "snow": (Law.DRUCKER_PRAGER, "snow"),
 }
-"""Kind of Pixie → our law, and whose strength stands in where our own material has none. What is
-"stationary" keeps our law and is judged like any part."""
+"""Kind of Pixie → our law, and whose strength stands in where our own material has none. What is "stationary" keeps our
+law and is judged like any part."""
 FIELD_RANGE_SOURCE = "field"
 """Source of a band that a field spans, where the library has no range."""
 
@@ -190,10 +179,7 @@ def _sample_mesh(mesh: Mesh, count: int) -> np.ndarray:
 def _with_uniform_field(found: MaterialField, field: UniformField) -> MaterialField:
     note = f"Numbers are those of {field.method}: a baseline, not a prediction. {BORROWED_NUMBERS_NOTE}"
     reason = f"{field.method} has it so everywhere"
-    made = [
-        _replaced_value(m, dict(field.value), {n: reason for n in field.value})
-        for m in found.materials
-    ]
+    made = [_replaced_value(m, dict(field.value), {n: reason for n in field.value}) for m in found.materials]
     if field.keeps_laws:
         return replace(found, materials=tuple(made), pieces=(), notes=(*found.notes, note))
     solid = Structure("solid", None, f"{field.method}: everything is solid.")
@@ -239,9 +225,7 @@ def _with_part_numbers(
             continue
         ours = materials[k]
         materials[k] = _imposed_material(ours, part.name, numbers, method)
-        outside += sum(
-            n in ours.grounds and v not in ours.grounds[n].range for n, v in numbers.value.items()
-        )
+        outside += sum(n in ours.grounds and v not in ours.grounds[n].range for n, v in numbers.value.items())
         if pieces:
             pieces[k] = ()
     count = _FieldUse(len(materials) - len(kept), outside, tuple(kept))
@@ -257,9 +241,7 @@ def _field_note(method: str, count: _FieldUse) -> str:
     return said + (f" Ours are kept in: {'; '.join(count.kept)}." if count.kept else "")
 
 
-def _imposed_material(
-    ours: Material, part: str, numbers: PartFieldNumbers, method: str
-) -> Material:
+def _imposed_material(ours: Material, part: str, numbers: PartFieldNumbers, method: str) -> Material:
     reasons = {}
     for name, (low, high) in numbers.band.items():
         reasons[name] = (
@@ -289,9 +271,7 @@ def _under_law(law: Law, material: Material, stand_in: str) -> Material:
     return replace(material, law=law, grounds=material.grounds | grounds, **values)
 
 
-def _replaced_value(
-    ours: Material, value: Mapping[str, float], reasons: Mapping[str, str]
-) -> Material:
+def _replaced_value(ours: Material, value: Mapping[str, float], reasons: Mapping[str, str]) -> Material:
     grounds = {name: replace(g, chosen_by=CHOSEN_BY_LIBRARY) for name, g in ours.grounds.items()}
     for name, number in value.items():
         known = ours.grounds.get(name)

@@ -44,8 +44,8 @@ def floor_shifts(boxes: AxisBoxes) -> BoxShifts:
 def lift_heights(boxes: AxisBoxes, drop: float) -> Float[np.ndarray, " N"]:
     """Return how far each box rises to hang ``drop`` of its size above what supports it [m].
 
-    A box rests on those whose footprint it shares and whose base is lower, so it rises with them;
-    boxes with shared footprint and base rise together, as they may be hooked into each other.
+    A box rests on those whose footprint it shares and whose base is lower, so it rises with them; boxes with shared
+    footprint and base rise together, as they may be hooked into each other.
     """
     own = drop * (boxes[:, 1] - boxes[:, 0]).max(axis=1)
     base = boxes[:, 0, 2]

@@ -41,9 +41,7 @@ SHEET_THICKNESS_FRACTION = 4e-3
 
 
 def decompose_convex(
-    vertices: Float[np.ndarray, "V 3"],
-    triangles: Int[np.ndarray, "T 3"],
-    cache: Path | None = None,
+    vertices: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, "T 3"], cache: Path | None = None
 ) -> tuple[ConvexPiece, ...]:
     """Cut a mesh into convex pieces.
 
@@ -74,9 +72,7 @@ def decompose_convex(
 def _cached_pieces(unit: np.ndarray, triangles: np.ndarray, cache: Path | None) -> tuple:
     if cache is None:
         return _cut_convex(unit, triangles)
-    name = hashlib.sha256(
-        bytes([DECOMPOSITION_VERSION]) + unit.tobytes() + triangles.tobytes()
-    ).hexdigest()
+    name = hashlib.sha256(bytes([DECOMPOSITION_VERSION]) + unit.tobytes() + triangles.tobytes()).hexdigest()
     path = cache / f"{name[:24]}.npz"
     if path.exists():
         try:
@@ -114,9 +110,7 @@ class _CellGrid:
     @classmethod
     def of(cls, mesh: Mesh) -> "_CellGrid":
         low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-        side = float(
-            np.clip(np.prod(np.maximum(high - low, 0.02)) / GRID_CELLS_COUNT, 0, 1) ** (1 / 3)
-        )
+        side = float(np.clip(np.prod(np.maximum(high - low, 0.02)) / GRID_CELLS_COUNT, 0, 1) ** (1 / 3))
         side = min(max(side, MIN_CELL_SIDE_FRACTION), MAX_CELL_SIDE_FRACTION)
         counts = np.maximum(np.ceil((high - low) / side - 1e-9), 1).astype(np.int64)
         origin = 0.5 * (low + high - counts * side)
@@ -176,18 +170,14 @@ class _BoxContent:
         step[axis] = k
         height = grid.origin[axis] + (self.low[axis] + k) * grid.side
         under, over = cut_by_plane(self.corners, axis, float(height))
-        return _BoxContent.trimmed(below, self.low, under), _BoxContent.trimmed(
-            above, self.low + step, over
-        )
+        return _BoxContent.trimmed(below, self.low, under), _BoxContent.trimmed(above, self.low + step, over)
 
     def hull(self, grid: "_CellGrid") -> ConvexPiece | None:
         """Enclose its triangles and its middles inside; None: only a line of either."""
         box = tuple(slice(a, a + n) for a, n in zip(self.low, self.filled.shape, strict=True))
         middles = grid.origin + (self.low + np.argwhere(grid.inside[box]) + 0.5) * grid.side
         try:
-            return convex_hull_of(
-                np.concatenate([self.corners.reshape(-1, 3), middles]), SHEET_THICKNESS_FRACTION
-            )
+            return convex_hull_of(np.concatenate([self.corners.reshape(-1, 3), middles]), SHEET_THICKNESS_FRACTION)
         except UserError:
             return None
 

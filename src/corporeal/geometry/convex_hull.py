@@ -29,14 +29,12 @@ class RestingPose:
     """How far the object rolled [rad]."""
 
 
-def find_resting_pose(
-    points: Float[np.ndarray, "N 3"], up: Float[np.ndarray, "3"]
-) -> RestingPose | None:
+def find_resting_pose(points: Float[np.ndarray, "N 3"], up: Float[np.ndarray, "3"]) -> RestingPose | None:
     """Return how a rigid object would lie after rolling slowly down from where it was put.
 
-    The height of the centre of mass over the lowest point, c · u − min_i v_i · u, falls along its
-    steepest slope to the nearest minimum over directions u: there the lowest points support it. The
-    points weigh all the same. None: they span no body.
+    The height of the centre of mass over the lowest point, c · u − min_i v_i · u, falls along its steepest slope to the
+    nearest minimum over directions u: there the lowest points support it. The points weigh all the same. None: they
+    span no body.
     """
     body = points[:: max(1, len(points) // MAX_RESTING_POINTS)]
     centre = body.mean(axis=0)
@@ -120,9 +118,7 @@ def convex_hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> ConvexP
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError) as error:
-        raise UserError("it has no surface: its points are fewer than three, or on a line") from (
-            error
-        )
+        raise UserError("it has no surface: its points are fewer than three, or on a line") from (error)
     triangles = hull.simplices
     a, b, c = np.swapaxes(points[triangles], 0, 1)
     inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
@@ -143,13 +139,11 @@ def _thickened_points(points: np.ndarray, thinnest: float) -> np.ndarray:
     return np.concatenate([points - shift, points + shift])
 
 
-def tip_angle(
-    hull: ConvexPiece, centre: Float[np.ndarray, "3"], down: Float[np.ndarray, "3"]
-) -> float:
+def tip_angle(hull: ConvexPiece, centre: Float[np.ndarray, "3"], down: Float[np.ndarray, "3"]) -> float:
     """How far a body must be tilted before it falls over [rad]; 0 where it does not stand at all.
 
-    The least angle, over the edges of the polygon it stands on, by which its centre of mass must
-    turn to be above the edge.
+    The least angle, over the edges of the polygon it stands on, by which its centre of mass must turn to be above the
+    edge.
 
     Args:
         hull: The body's.
@@ -181,13 +175,10 @@ class StandingStance:
     """Area of what is level at its top [m²]: what other objects can stand on."""
 
 
-def standing_stances(
-    hull: ConvexPiece, centre: Float[np.ndarray, "3"]
-) -> tuple[StandingStance, StandingStance]:
+def standing_stances(hull: ConvexPiece, centre: Float[np.ndarray, "3"]) -> tuple[StandingStance, StandingStance]:
     """Return how a body stands upright, and how it stands best of all.
 
-    Feet are seldom even: upright is any face of the hull that looks down to within
-        ``UPRIGHT_LEAN_RAD``.
+    Feet are seldom even: upright is any face of the hull that looks down to within ``UPRIGHT_LEAN_RAD``.
     """
     a, b, c = np.swapaxes(hull.vertices[hull.triangles], 0, 1)
     vector = 0.5 * np.cross(b - a, c - a)
@@ -224,9 +215,9 @@ SAME_PLANE_TOLERANCE = 1e-6
 def simplify_convex(hull: ConvexPiece, most: int) -> ConvexPiece:
     """Enclose a convex body in one of at most so many corners.
 
-    The body stays inside: what is left of it is cut from its upright box by planes of its own
-    faces, always the one that the farthest corner is most beyond. So it stands on the same floor
-    and against the same walls, and large flat faces stay exactly where they were.
+    The body stays inside: what is left of it is cut from its upright box by planes of its own faces, always the one
+    that the farthest corner is most beyond. So it stands on the same floor and against the same walls, and large flat
+    faces stay exactly where they were.
 
     Args:
         hull: What.

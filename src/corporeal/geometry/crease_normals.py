@@ -17,9 +17,8 @@ MAX_SMOOTHED_FAN_TRIANGLES = 64
 def add_crease_normals(surface: Surface) -> Surface:
     """Return a surface with normals; vertices on sharp edges are split, one copy for each side.
 
-    A corner's normal is the mean by area over those triangles around its place that are not turned
-    from its own triangle by more than ``CREASE_ANGLE_DEG``. A surface that has normals is returned
-    as it is.
+    A corner's normal is the mean by area over those triangles around its place that are not turned from its own
+    triangle by more than ``CREASE_ANGLE_DEG``. A surface that has normals is returned as it is.
     """
     if surface.normals is not None or not len(surface.triangles):
         return surface
@@ -27,9 +26,7 @@ def add_crease_normals(surface: Surface) -> Surface:
     area = np.cross(b - a, c - a)
     flat = _unit_or_up(area)
     total = area.repeat(3, axis=0)
-    for first, second in _corner_pairs_at_place(
-        _place_numbers(surface.vertices)[surface.triangles].reshape(-1)
-    ):
+    for first, second in _corner_pairs_at_place(_place_numbers(surface.vertices)[surface.triangles].reshape(-1)):
         one, other = first // 3, second // 3
         alike = np.einsum("pi,pi->p", flat.take(one, axis=0), flat.take(other, axis=0))
         smooth = alike > np.cos(np.radians(CREASE_ANGLE_DEG))

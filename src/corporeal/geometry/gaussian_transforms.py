@@ -38,22 +38,12 @@ def rotation_to_z_up(up: UpAxis) -> Float[np.ndarray, "3 3"]:
 
 def chosen_up_axis(asked: UpAxisChoice) -> UpAxis | None:
     """Return the axis that a person named; None: they leave it to the file."""
-    names: dict[UpAxisChoice, UpAxis] = {
-        "x": "+x",
-        "y": "+y",
-        "z": "+z",
-        "-x": "-x",
-        "-y": "-y",
-        "-z": "-z",
-    }
+    names: dict[UpAxisChoice, UpAxis] = {"x": "+x", "y": "+y", "z": "+z", "-x": "-x", "-y": "-y", "-z": "-z"}
     return names.get(asked)
 
 
 def transform_gaussians(
-    gaussians: Gaussians,
-    rotation: Float[np.ndarray, "3 3"],
-    scale: float = 1.0,
-    shift: Vector = (0.0, 0.0, 0.0),
+    gaussians: Gaussians, rotation: Float[np.ndarray, "3 3"], scale: float = 1.0, shift: Vector = (0.0, 0.0, 0.0)
 ) -> Gaussians:
     """Return the same scene after x → scale · R x + shift; its colours turn with it."""
     kind = gaussians.mean.dtype
@@ -61,9 +51,7 @@ def transform_gaussians(
     return replace(
         gaussians,
         mean=mean.astype(kind),
-        rotation=quaternion_product(quaternion_from_matrix(rotation), gaussians.rotation).astype(
-            kind
-        ),
+        rotation=quaternion_product(quaternion_from_matrix(rotation), gaussians.rotation).astype(kind),
         scale=(scale * gaussians.scale).astype(kind),
         sh=rotate_sh(gaussians.sh, rotation),
     )
@@ -109,9 +97,7 @@ def _finite_rows(raw: Gaussians) -> Bool[np.ndarray, " N"]:
 
 
 def _huge_rows(raw: Gaussians) -> Bool[np.ndarray, " N"]:
-    return (np.abs(raw.mean).max(axis=1) >= MAX_COORDINATE_UNITS) | (
-        raw.scale.max(axis=1) >= MAX_COORDINATE_UNITS
-    )
+    return (np.abs(raw.mean).max(axis=1) >= MAX_COORDINATE_UNITS) | (raw.scale.max(axis=1) >= MAX_COORDINATE_UNITS)
 
 
 def _single_precision(values: np.ndarray) -> np.ndarray:

@@ -8,8 +8,7 @@ import numpy as np
 def collect_segment_crossings(starts, ends, vertices, triangles, met):
     """Count the triangles that ways meet (``met`` is empty), or write them down.
 
-    Möller and Trumbore 1997. Ways are taken as short: of triangles beside all of them, none is
-    asked.
+    Möller and Trumbore 1997. Ways are taken as short: of triangles beside all of them, none is asked.
 
     Args:
         starts: Of the ways (N, 3) [m].
@@ -32,11 +31,7 @@ def collect_segment_crossings(starts, ends, vertices, triangles, met):
     for t in range(len(triangles)):
         beside = False
         for a in range(3):
-            x, y, z = (
-                vertices[triangles[t, 0], a],
-                vertices[triangles[t, 1], a],
-                vertices[triangles[t, 2], a],
-            )
+            x, y, z = (vertices[triangles[t, 0], a], vertices[triangles[t, 1], a], vertices[triangles[t, 2], a])
             beside = beside or max(x, y, z) < low[a] or min(x, y, z) > high[a]
             corner[0, a], corner[1, a], corner[2, a] = x, y - x, z - x
         if beside:

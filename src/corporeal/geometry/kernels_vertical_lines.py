@@ -1,8 +1,8 @@
 """Plumb lines through triangles. Loops compiled by numba.
 
-Whether a triangle's shadow on the floor covers a place is decided edge by edge, each looked at from
-its vertex of lower number: triangles that share it get the same answer, however numbers round. What
-is added up over a closed mesh is then exactly 0.
+Whether a triangle's shadow on the floor covers a place is decided edge by edge, each looked at from its vertex of lower
+number: triangles that share it get the same answer, however numbers round. What is added up over a closed mesh is then
+exactly 0.
 """
 
 import numba
@@ -20,9 +20,7 @@ def triangle_covers(vertices, triangle, x, y):
         below = vertices[p, 1] <= y
         if below == (vertices[q, 1] <= y):
             continue
-        side = (vertices[p, 0] - x) * (vertices[q, 1] - y) - (
-            (vertices[q, 0] - x) * (vertices[p, 1] - y)
-        )
+        side = (vertices[p, 0] - x) * (vertices[q, 1] - y) - ((vertices[q, 0] - x) * (vertices[p, 1] - y))
         # Crossed upwards to the right of the place, or downwards.
         if below and side > 0:
             around += sign

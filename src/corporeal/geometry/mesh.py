@@ -80,8 +80,7 @@ def join_meshes(pieces: Sequence[TriangleSurface]) -> Mesh:
     triangles = [p.triangles + k for p, k in zip(pieces, starts, strict=False)]
     none = np.zeros((0, 3))
     return Mesh(
-        np.concatenate([none, *(p.vertices for p in pieces)]),
-        np.concatenate([none.astype(np.int64), *triangles]),
+        np.concatenate([none, *(p.vertices for p in pieces)]), np.concatenate([none.astype(np.int64), *triangles])
     )
 
 
@@ -93,14 +92,12 @@ def weld_mesh(
 ) -> tuple[Mesh, Int[np.ndarray, " kept"]]:
     """Join vertices that coincide and drop triangles without area and repeated ones.
 
-    Exporters split vertices at texture seams and write two-sided faces twice; both break winding
-    numbers.
+    Exporters split vertices at texture seams and write two-sided faces twice; both break winding numbers.
 
     Args:
         vertices: [m]
         triangles: Vertex numbers.
-        part: Triangles of different parts are never repeats: where two parts meet, both have a
-            face.
+        part: Triangles of different parts are never repeats: where two parts meet, both have a face.
         tolerance: Of the diagonal of the box.
 
     Returns:
@@ -141,10 +138,9 @@ def signed_triangle_volumes(mesh: Mesh) -> Float[np.ndarray, " T"]:
 def inward_area_loss_rate(mesh: Mesh) -> float:
     """Return how fast a surface loses area as it moves inward, halved, at first [m].
 
-    V(t) = A t - C t² + ... is what lies within t of it. For smooth ones C is the integral of the
-    mean curvature (Steiner 1840); an edge between faces that turn by θ adds its length times
-    tan(θ/2), as where two boards meet, and one that is hollow takes θ/2 away. Sharper than 90°
-    counts as that.
+    V(t) = A t - C t² + ... is what lies within t of it. For smooth ones C is the integral of the mean curvature
+    (Steiner 1840); an edge between faces that turn by θ adds its length times tan(θ/2), as where two boards meet, and
+    one that is hollow takes θ/2 away. Sharper than 90° counts as that.
     """
     f = mesh.triangles
     ends = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
@@ -200,10 +196,7 @@ def orient_outward(mesh: Mesh) -> Mesh:
     mesh = Mesh(mesh.vertices, turned)
     volume, closed = _patch_volumes(mesh, patch)
     if volume[closed].sum() < 0:
-        mesh, volume = (
-            Mesh(mesh.vertices, _flip_triangles(turned, np.ones(len(turned), bool))),
-            -volume,
-        )
+        mesh, volume = (Mesh(mesh.vertices, _flip_triangles(turned, np.ones(len(turned), bool))), -volume)
     wrong = closed & (volume < 0)
     right = closed & (volume > 0)
     if wrong.any() and right.any():
@@ -228,9 +221,7 @@ def _patch_volumes(mesh: Mesh, patch: np.ndarray) -> tuple[np.ndarray, np.ndarra
     """
     corners, areas = mesh.corners, mesh.areas
     total = np.bincount(patch, areas)
-    middle = np.stack(
-        [np.bincount(patch, areas * corners.mean(axis=1)[:, k]) / total for k in range(3)], axis=1
-    )
+    middle = np.stack([np.bincount(patch, areas * corners.mean(axis=1)[:, k]) / total for k in range(3)], axis=1)
     a, b, c = np.swapaxes(corners - middle[patch][:, None], 0, 1)
     volume = np.bincount(patch, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
     edges, owner = boundary_edges(mesh, patch)

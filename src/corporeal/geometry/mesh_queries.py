@@ -2,9 +2,9 @@
 
 Ray casting with Embree; hits are refined in double precision.
 
-What Embree finds is met again in double precision, in the plane of its triangle. The mesh is blown
-up to a diagonal of 100 first, so that its size in metres does not matter. The rules are those of
-trimesh (``ray.ray_pyembree``), whose import alone takes .4 s of processor time.
+What Embree finds is met again in double precision, in the plane of its triangle. The mesh is blown up to a diagonal of
+100 first, so that its size in metres does not matter. The rules are those of trimesh (``ray.ray_pyembree``), whose
+import alone takes .4 s of processor time.
 """
 
 from dataclasses import dataclass
@@ -72,9 +72,7 @@ class RayCaster:
         ray = np.flatnonzero(triangle >= 0)
         return self._met(origin, way, ray, triangle[ray])
 
-    def _met(
-        self, origin: RayPoints, way: RayPoints, ray: np.ndarray, triangle: np.ndarray
-    ) -> RayHits:
+    def _met(self, origin: RayPoints, way: RayPoints, ray: np.ndarray, triangle: np.ndarray) -> RayHits:
         """Meet the planes of triangles, one a ray; rays that graze their triangle are left out."""
         normal = self._normal[triangle]
         height = _dot_rows(self._corner[triangle] - origin[ray], normal)
@@ -109,8 +107,8 @@ def _dot_rows(a: RayPoints, b: RayPoints) -> Float[np.ndarray, " N"]:
 MAX_POINTS_PER_TRIANGLE_BRUTE = 0.05
 """Points over triangles up to which faces above and below them are looked for one by one."""
 MAX_OPEN_EDGES_BRUTE = 1000
-"""Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of
-faces takes 2 to 100 µs, the most where faces lie upon each other."""
+"""Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of faces takes 2 to 100
+µs, the most where faces lie upon each other."""
 
 
 class SegmentCrossings(NamedTuple):
@@ -169,8 +167,8 @@ class QueryMesh:
     def winding(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
         """Generalised winding number: about ±1 inside, about 0 outside.
 
-        Exact where few edges are open; else after Barill et al. 2018, *Fast winding numbers for
-        soups and clouds*, as in libigl.
+        Exact where few edges are open; else after Barill et al. 2018, *Fast winding numbers for soups and clouds*, as
+        in libigl.
         """
         if not len(points) or not len(self.mesh.triangles):
             return np.zeros(len(points))
@@ -199,9 +197,7 @@ class QueryMesh:
             found[order] = answer
         return np.sqrt(squared), triangle, point
 
-    def may_be_within(
-        self, reach: float, points: Float[np.ndarray, "N 3"]
-    ) -> Bool[np.ndarray, " N"]:
+    def may_be_within(self, reach: float, points: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Find the points that could be nearer to the surface than ``reach`` [m].
 
         Asked once per cube of side ``reach``: much faster than the distance of every point.
@@ -220,9 +216,7 @@ class QueryMesh:
             hits += self.hit(points, np.tile(direction, (len(points), 1))) >= 0
         return hits
 
-    def reach(
-        self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
-    ) -> Float[np.ndarray, " N"]:
+    def reach(self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
         """Distance to the first hit along each ray [m]; inf: none."""
         length = np.full(len(origins), np.inf)
         if len(origins):
@@ -230,9 +224,7 @@ class QueryMesh:
             length[ray] = np.einsum("ij,ij->i", place - origins[ray], directions[ray])
         return length
 
-    def crossings(
-        self, starts: Float[np.ndarray, "N 3"], ends: Float[np.ndarray, "N 3"]
-    ) -> SegmentCrossings:
+    def crossings(self, starts: Float[np.ndarray, "N 3"], ends: Float[np.ndarray, "N 3"]) -> SegmentCrossings:
         """Every triangle that short ways from ``starts`` to ``ends`` [m] go through."""
         first, last = (np.ascontiguousarray(x, dtype=np.float64) for x in (starts, ends))
         vertices, triangles, found = self.mesh.vertices, self.mesh.triangles, np.zeros((0, 4))
@@ -243,9 +235,7 @@ class QueryMesh:
         whole = found.astype(np.int64)
         return SegmentCrossings(whole[:, 0], found[:, 1], whole[:, 2], whole[:, 3])
 
-    def hit(
-        self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
-    ) -> Int[np.ndarray, " N"]:
+    def hit(self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
         """First triangle along each ray; -1: none."""
         return self._rays.first(origins, directions)
 
@@ -266,9 +256,7 @@ def sphere_directions(count: int) -> Float[np.ndarray, "count 3"]:
     i = np.arange(count) + 0.5
     polar = np.arccos(1 - 2 * i / count)
     turn = np.pi * (1 + 5**0.5) * i
-    return np.stack(
-        [np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1
-    )
+    return np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1)
 
 
 def random_rotation(rng: np.random.Generator) -> Float[np.ndarray, "3 3"]:

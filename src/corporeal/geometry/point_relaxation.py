@@ -64,9 +64,9 @@ def relax_points(
 ) -> Float[np.ndarray, "N 3"]:
     """Spread points evenly inside, the outermost layer half a spacing below the surface.
 
-    Repulsion between neighbours alternates with the surface, which draws the nearest layer to half
-    a spacing of depth and leaves nothing shallower. A stair-stepped lattice would act as teeth in
-    contact; a layer that follows the face does not.
+    Repulsion between neighbours alternates with the surface, which draws the nearest layer to half a spacing of depth
+    and leaves nothing shallower. A stair-stepped lattice would act as teeth in contact; a layer that follows the face
+    does not.
 
     Args:
         points: Where to start, inside [m].
@@ -86,17 +86,13 @@ def relax_points(
     limit = np.maximum(limit - 0.5 * spacing, 0.5 * spacing)
     if not free.any():
         return points
-    candidates = np.flatnonzero(
-        free & (np.isfinite(limit) | outer.may_be_within(4 * spacing, points))
-    )
+    candidates = np.flatnonzero(free & (np.isfinite(limit) | outer.may_be_within(4 * spacing, points)))
     near, deep = candidates, FreeDistances(points.copy(), np.zeros(len(points)))
     # Repulsion in rounds; the surface is looked up once a round, and draws from the third on.
     for turn in range(RELAX_ROUNDS):
         asked = candidates[~deep.still(points[candidates], candidates)] if turn % 3 == 0 else near
         distance, skin = _nearest_surface(points, asked, outer, spacing)
-        far = np.where(
-            limit[asked] == np.inf, skin.depth(points) - UNFELT_DEPTH_SPACINGS * spacing, 0.0
-        )
+        far = np.where(limit[asked] == np.inf, skin.depth(points) - UNFELT_DEPTH_SPACINGS * spacing, 0.0)
         deep.note(points, asked, far)
         near = asked[(distance < 2 * spacing) | (distance > limit[asked] - spacing)]
         for _ in range(RELAX_STEPS_PER_ROUND):
@@ -124,26 +120,19 @@ def _nearest_surface(
     return distance, NearestSurface(which, foot, inward)
 
 
-def _apply_surface(
-    points: np.ndarray, skin: NearestSurface, spacing: float, limit: np.ndarray, *, draw: bool
-) -> None:
+def _apply_surface(points: np.ndarray, skin: NearestSurface, spacing: float, limit: np.ndarray, *, draw: bool) -> None:
     """Apply the surface to the points, in place."""
     depth = skin.depth(points)
     half = 0.5 * spacing
     wanted = depth
     if draw:
-        wanted = np.where(
-            depth < SURFACE_PULL_DEPTH_SPACINGS * spacing, depth + 0.3 * (half - depth), depth
-        )
+        wanted = np.where(depth < SURFACE_PULL_DEPTH_SPACINGS * spacing, depth + 0.3 * (half - depth), depth)
     wanted = np.clip(wanted, half, limit[skin.which])
     points[skin.which] += (wanted - depth)[:, None] * skin.inward
 
 
 def keep_points_inside(
-    points: Float[np.ndarray, "N 3"],
-    start: Float[np.ndarray, "N 3"],
-    shape: QueryMesh,
-    lost: Int[np.ndarray, " M"],
+    points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], shape: QueryMesh, lost: Int[np.ndarray, " M"]
 ) -> Float[np.ndarray, "N 3"]:
     """Take back, by halves and then wholly, which of some points ended outside; in place.
 

@@ -2,11 +2,10 @@
 
 Inside test of a mesh along parallel columns: exact where the mesh is closed.
 
-A ray that is shot at triangles one after the other passes between two of them, and misses the
-second of two faces in one plane, as where a cushion lies on its frame. Here triangles are drawn
-onto the plane that the columns stand on, as a raster is, and every edge is decided once: all
-triangles that share it get the same answer, however numbers round. What a column enters it leaves,
-as long as edges are walked as often one way as the other.
+A ray that is shot at triangles one after the other passes between two of them, and misses the second of two faces in
+one plane, as where a cushion lies on its frame. Here triangles are drawn onto the plane that the columns stand on, as a
+raster is, and every edge is decided once: all triangles that share it get the same answer, however numbers round. What
+a column enters it leaves, as long as edges are walked as often one way as the other.
 """
 
 from collections.abc import Iterator
@@ -23,8 +22,8 @@ from corporeal.geometry.mesh_queries import QueryMesh, random_rotation
 MAX_SLAB_CUBES = 4_000_000
 """Cubes that are looked at together."""
 MAX_UNCLEAR_COLUMNS_FRACTION = 0.1
-"""Share of the columns up to which those near a hole are asked point by point: all take 0.3 µs a
-point, and blocks ask about a tenth of them."""
+"""Share of the columns up to which those near a hole are asked point by point: all take 0.3 µs a point, and blocks ask
+about a tenth of them."""
 
 
 @dataclass(frozen=True)
@@ -71,9 +70,7 @@ class HoleShadow:
     high: Float[np.ndarray, " 2"]
     """[m]"""
 
-    def over(
-        self, columns: Float[np.ndarray, "C 2"], lattice: CubeLattice
-    ) -> Bool[np.ndarray, " C"]:
+    def over(self, columns: Float[np.ndarray, "C 2"], lattice: CubeLattice) -> Bool[np.ndarray, " C"]:
         """Whether each column, in cubes, stands in the shadow."""
         place = lattice.low[:2] + columns * lattice.spacing
         return np.logical_and.reduce((place > self.low) & (place < self.high), axis=1)
@@ -86,10 +83,9 @@ NO_HOLE_SHADOW = HoleShadow(np.full(2, np.inf), np.full(2, -np.inf))
 def hole_shadow_of(shape: QueryMesh, lattice: CubeLattice) -> HoleShadow | None:
     """Find where columns must be asked point by point; None: in too many places.
 
-    A cap from the middle of all open edges to each closes the mesh. Wherever a column crosses mesh
-    and cap as often one way as the other, the winding number differs from the count of crossings
-    below by the solid angle of the cap over 4π. That is below a half, so changes nothing, farther
-    from the cap than the root of its area over 2π.
+    A cap from the middle of all open edges to each closes the mesh. Wherever a column crosses mesh and cap as often one
+    way as the other, the winding number differs from the count of crossings below by the solid angle of the cap over
+    4π. That is below a half, so changes nothing, farther from the cap than the root of its area over 2π.
     """
     rim, excess = shape.open_edges
     if shape.closed or not len(rim):
@@ -135,9 +131,7 @@ class ColumnCrossings:
 
 
 def column_crossings(
-    vertices: Float[np.ndarray, "V 3"],
-    triangles: Int[np.ndarray, "T 3"],
-    columns: Float[np.ndarray, "nx ny 2"],
+    vertices: Float[np.ndarray, "V 3"], triangles: Int[np.ndarray, "T 3"], columns: Float[np.ndarray, "nx ny 2"]
 ) -> ColumnCrossings:
     """Find where columns along the third axis cross a mesh.
 
@@ -151,9 +145,7 @@ def column_crossings(
     kernels.collect_crossings(vertices, triangles, columns, count, np.zeros((0, 2)))
     first = np.concatenate([[0], np.cumsum(count)])
     met = np.zeros((first[-1], 2))
-    kernels.collect_crossings(
-        vertices, triangles, columns, first[:-1].reshape(count.shape).copy(), met
-    )
+    kernels.collect_crossings(vertices, triangles, columns, first[:-1].reshape(count.shape).copy(), met)
     kernels.sort_crossings(first, met)
     return ColumnCrossings(first, met[:, 0].copy(), met[:, 1].astype(np.int64))
 
@@ -180,9 +172,7 @@ def points_wound_around(
     return column, layer
 
 
-def scatter_points(
-    shape: QueryMesh, spacing: float, rng: np.random.Generator
-) -> Float[np.ndarray, "N 3"]:
+def scatter_points(shape: QueryMesh, spacing: float, rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
     """One jittered point per cube of ``spacing``, where it falls inside the shape.
 
     The cubes stand in a random frame, so that no row of them follows a face. Each point stands
@@ -222,8 +212,8 @@ def _scatter_by_columns(
 ) -> np.ndarray:
     """Count surfaces along one line per column of cubes: exact for closed meshes, and fast.
 
-    Where the mesh is wound so that a column does not leave it as often as it enters, or near a
-    hole, its points are asked one by one.
+    Where the mesh is wound so that a column does not leave it as often as it enters, or near a hole, its points are
+    asked one by one.
     """
     nx, ny, nz = lattice.counts
     column = np.indices((nx, ny)).transpose(1, 2, 0) + rng.uniform(0, 1, (nx, ny, 2))
@@ -243,16 +233,14 @@ def _scatter_by_columns(
     return np.concatenate([points, asked[shape.inside(asked)]])
 
 
-def _scatter_by_blocks(
-    shape: QueryMesh, lattice: CubeLattice, rng: np.random.Generator
-) -> np.ndarray:
+def _scatter_by_blocks(shape: QueryMesh, lattice: CubeLattice, rng: np.random.Generator) -> np.ndarray:
     """Ask the winding number at every point, but only once in blocks the surface stays out of."""
     blocks = np.indices(tuple(-(-lattice.counts // 4))).reshape(3, -1).T * 4
     middles = lattice.world(blocks + 2.0)
     distance = shape.closest(middles)[0]
     mixed = distance < 2 * np.sqrt(3) * lattice.spacing
-    # A surface of area A at least d away fills at most A / d² of the 4π seen from a point: beyond
-    # this the winding number is below a half, and thin objects leave most of their box beyond it.
+    # A surface of area A at least d away fills at most A / d² of the 4π seen from a point: beyond this the winding
+    # number is below a half, and thin objects leave most of their box beyond it.
     whole = ~mixed & (distance**2 < shape.mesh.areas.sum() / (2 * np.pi))
     whole[whole] = shape.inside(middles[whole])
     offsets = np.indices((4, 4, 4)).reshape(3, -1).T
@@ -323,9 +311,7 @@ def _throw_darts(points, cells, before, distance, head):
             for i in range(-1, 2):
                 for j in range(-1, 2):
                     for k in range(-1, 2):
-                        q = head[
-                            _bucket_of(cells[p, 0] + i, cells[p, 1] + j, cells[p, 2] + k, len(head))
-                        ]
+                        q = head[_bucket_of(cells[p, 0] + i, cells[p, 1] + j, cells[p, 2] + k, len(head))]
                         while q >= 0 and free:
                             d = points[p] - points[q]
                             free = d[0] ** 2 + d[1] ** 2 + d[2] ** 2 >= distance**2
@@ -344,27 +330,21 @@ def _throw_darts_in_cells(points: np.ndarray, before: int, distance: float) -> n
     return _throw_darts(np.ascontiguousarray(points), cells, before, distance, head)
 
 
-def repulsion(
-    points: Float[np.ndarray, "N 3"], reach: float, gain: float = 0.2
-) -> Float[np.ndarray, "N 3"]:
+def repulsion(points: Float[np.ndarray, "N 3"], reach: float, gain: float = 0.2) -> Float[np.ndarray, "N 3"]:
     """Displacement of every point away from its neighbours.
 
     Δ_i = gain Σ_j (reach - l_ij) d_ij / l_ij over neighbours nearer than ``reach`` [m].
     """
     low = points.min(axis=0)
     # A far stray point must not make the table of cells large; wider cells are only slower.
-    width = max(
-        reach, float(np.prod(np.ptp(points, axis=0) + reach) / (64 * len(points) + 1e6)) ** (1 / 3)
-    )
+    width = max(reach, float(np.prod(np.ptp(points, axis=0) + reach) / (64 * len(points) + 1e6)) ** (1 / 3))
     cells = np.floor((points - low) / width).astype(np.int64) + 1
     shape = cells.max(axis=0) + 2
     key = (cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2]
     order = np.argsort(key, kind="stable")
     start = np.zeros(int(np.prod(shape)) + 1, np.int64)
     np.cumsum(np.bincount(key, minlength=len(start) - 1), out=start[1:])
-    moved = _repulsion_in_cells(
-        points[order], key[order], start, (shape[1] * shape[2], shape[2]), reach
-    )
+    moved = _repulsion_in_cells(points[order], key[order], start, (shape[1] * shape[2], shape[2]), reach)
     result = np.empty_like(moved)
     result[order] = gain * moved
     return result

@@ -7,8 +7,8 @@ volume is the midpoint rule: exact for whatever is linear within cells, so for m
 
 Nearest neighbours of evenly spaced points: by cells, and by a tree for distant queries.
 
-Cells one spacing wide hold about one point each: some thirty distances settle which is nearest, in
-a fifth of the time that a tree of points takes. The answer is the same.
+Cells one spacing wide hold about one point each: some thirty distances settle which is nearest, in a fifth of the time
+that a tree of points takes. The answer is the same.
 """
 
 from collections.abc import Callable
@@ -46,9 +46,7 @@ class PointCells:
     def nearest(self, places: Float[np.ndarray, "M 3"]) -> Int[np.ndarray, " M"]:
         """Which point is nearest to each place."""
         found = np.full(len(places), -1, np.int64)
-        kernels_nearest.nearest_in_cells(
-            places, self.points, self.low, self.width, self.counts, self.first, found
-        )
+        kernels_nearest.nearest_in_cells(places, self.points, self.low, self.width, self.counts, self.first, found)
         far = np.flatnonzero(found < 0)
         if len(far):
             found[far] = KDTree(self.points).query(places[far])[1]
@@ -105,9 +103,7 @@ def centroidal_points(
         return points, np.zeros(0)
     table = sort_into_cells(points, spacing)
     count, total = np.zeros(len(points)), np.zeros_like(points)
-    for samples in scatter_points_by_slab(
-        shape, spacing / SAMPLES_PER_SPACING, np.random.default_rng(5)
-    ):
+    for samples in scatter_points_by_slab(shape, spacing / SAMPLES_PER_SPACING, np.random.default_rng(5)):
         if empty is not None:
             samples = samples[~empty(samples)]
         owner = table.nearest(samples)
@@ -117,6 +113,4 @@ def centroidal_points(
     moved = np.flatnonzero((count > 0) & ~held)
     centre = points.copy()
     centre[moved] = total[moved] / count[moved, None]
-    return keep_points_inside(centre, points, shape, moved), count * (
-        spacing / SAMPLES_PER_SPACING
-    ) ** 3
+    return keep_points_inside(centre, points, shape, moved), count * (spacing / SAMPLES_PER_SPACING) ** 3

@@ -72,9 +72,7 @@ def matrix_from_quaternion(q: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"
     )
 
 
-def quaternion_product(
-    a: Float[np.ndarray, "4"], b: Float[np.ndarray, "N 4"]
-) -> Float[np.ndarray, "N 4"]:
+def quaternion_product(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
     """Return the quaternions of turning by each b, then by a."""
     w, x, y, z = a
     left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])

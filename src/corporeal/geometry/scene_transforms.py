@@ -27,9 +27,7 @@ def surfaces_bounding_box(surfaces: Sequence[Surface]) -> Float[np.ndarray, "2 3
 
 def object_boxes(scene: Scene) -> Float[np.ndarray, "N 2 3"]:
     """Return the box of every object [m]."""
-    return np.stack(
-        [surfaces_bounding_box(_surfaces_of_object(scene, k)) for k in range(len(scene.objects))]
-    )
+    return np.stack([surfaces_bounding_box(_surfaces_of_object(scene, k)) for k in range(len(scene.objects))])
 
 
 def underside_centre(scene: Scene, k: int) -> Vector:
@@ -80,9 +78,7 @@ def scale_to_life_size(scene: Scene) -> Scene:
     for k, thing in enumerate(scene.objects):
         if thing.scale != 1:
             foot = np.array(underside_centre(scene, k))
-            scene = _reshape_object(
-                scene, k, lambda x, foot=foot, thing=thing: foot + (x - foot) / thing.scale
-            )
+            scene = _reshape_object(scene, k, lambda x, foot=foot, thing=thing: foot + (x - foot) / thing.scale)
     return replace(scene, objects=tuple(replace(o, scale=1.0) for o in scene.objects))
 
 
@@ -104,11 +100,7 @@ def overlapping_objects(scene: Scene) -> list[tuple[int, int]]:
     Vertices alone do not tell: of two bars that cross, none lies in the other.
     """
     pairs = box_placement.overlapping_boxes(object_boxes(scene))
-    return [
-        (a, b)
-        for a, b in pairs
-        if _surface_reaches_into(scene, a, b) or _surface_reaches_into(scene, b, a)
-    ]
+    return [(a, b) for a, b in pairs if _surface_reaches_into(scene, a, b) or _surface_reaches_into(scene, b, a)]
 
 
 def is_object_inside(scene: Scene, a: int, b: int) -> bool:
@@ -135,13 +127,8 @@ def _points_within(points: Float[np.ndarray, "N 3"], scene: Scene, a: int, b: in
     for s in _surfaces_of_object(scene, b):
         squared = igl.point_mesh_squared_distance(points[held], s.vertices, s.triangles)[0]
         depth[held] = np.minimum(depth[held], np.sqrt(squared))
-    sizes = [
-        float(np.ptp(surfaces_bounding_box(_surfaces_of_object(scene, k)), axis=0).max())
-        for k in (a, b)
-    ]
-    return bool(
-        np.mean(held & (depth > MAX_SINK_DEPTH_FRACTION * min(sizes))) > MAX_TOUCHING_FRACTION
-    )
+    sizes = [float(np.ptp(surfaces_bounding_box(_surfaces_of_object(scene, k)), axis=0).max()) for k in (a, b)]
+    return bool(np.mean(held & (depth > MAX_SINK_DEPTH_FRACTION * min(sizes))) > MAX_TOUCHING_FRACTION)
 
 
 def _points_on_triangles(surfaces: Sequence[Surface]) -> Float[np.ndarray, "N 3"]:
@@ -159,8 +146,5 @@ def _surfaces_of_object(scene: Scene, k: int) -> list[Surface]:
 def _reshape_object(scene: Scene, k: int | None, change) -> Scene:
     return replace(
         scene,
-        surfaces=tuple(
-            replace(s, vertices=change(s.vertices)) if k in (None, s.object) else s
-            for s in scene.surfaces
-        ),
+        surfaces=tuple(replace(s, vertices=change(s.vertices)) if k in (None, s.object) else s for s in scene.surfaces),
     )

@@ -1,10 +1,9 @@
 """Real spherical harmonics of 3D Gaussian splatting, and their rotation.
 
-Band l has 2l + 1 functions; they follow each other by band and within it by order -l … l. Signs
-include the Condon–Shortley phase: Y_1 = 0.4886 (-y, z, -x).
+Band l has 2l + 1 functions; they follow each other by band and within it by order -l … l. Signs include the
+Condon–Shortley phase: Y_1 = 0.4886 (-y, z, -x).
 
-The polynomials are those of Sloan, "Stupid Spherical Harmonics Tricks" (2008), appendix A2, up to
-degree 3.
+The polynomials are those of Sloan, "Stupid Spherical Harmonics Tricks" (2008), appendix A2, up to degree 3.
 """
 
 import numpy as np
@@ -31,13 +30,11 @@ def sh_basis(directions: Float[np.ndarray, "N 3"], degree: int) -> Float[np.ndar
     return np.stack([y_k for band in bands for y_k in band], axis=-1)
 
 
-def rotate_sh(
-    sh: Float[np.ndarray, "N K 3"], rotation: Float[np.ndarray, "3 3"]
-) -> Float[np.ndarray, "N K 3"]:
+def rotate_sh(sh: Float[np.ndarray, "N K 3"], rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "N K 3"]:
     """Return the coefficients of the same colours after the object they belong to was rotated.
 
-    The new function is f'(d) = f(R^T d). Each band turns within itself: its matrix is found from
-    more directions than it has functions, which is exact to rounding.
+    The new function is f'(d) = f(R^T d). Each band turns within itself: its matrix is found from more directions than
+    it has functions, which is exact to rounding.
     """
     degree = SH_DEGREE_OF_COUNT[sh.shape[1]]
     points = _fibonacci_directions(32)

@@ -21,9 +21,7 @@ FRAGMENT_CREASE_ANGLE_DEG = 30.0
 FragmentPoints = Float[np.ndarray, "N 3"]
 
 
-def fragment_seeds(
-    points: FragmentPoints, blow: Float[np.ndarray, "3"], rng: np.random.Generator
-) -> FragmentPoints:
+def fragment_seeds(points: FragmentPoints, blow: Float[np.ndarray, "3"], rng: np.random.Generator) -> FragmentPoints:
     """Choose points of an object whose cells are its pieces, densely near the impact.
 
     The chance of a point falls with its squared distance from the impact. Cells of fewer than
@@ -52,9 +50,7 @@ def fragment_cells(points: FragmentPoints, seed: Float[np.ndarray, "S 3"]) -> In
     return np.asarray(KDTree(seed).query(points)[1], dtype=np.int64)
 
 
-def cut_fragments(
-    surface: Surface, wall: float, seed: Float[np.ndarray, "S 3"]
-) -> tuple[Surface, ...] | None:
+def cut_fragments(surface: Surface, wall: float, seed: Float[np.ndarray, "S 3"]) -> tuple[Surface, ...] | None:
     """Cut what a surface encloses into the cells of some points; None: it encloses nothing.
 
     Texture and colours go with the outside, and are drawn out over what is new.

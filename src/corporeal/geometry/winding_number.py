@@ -1,10 +1,10 @@
 """Generalised winding number by a vertical ray and boundary edges.
 
-Dropped from a point, a line meets faces: into the shape or out of it. That sum is the winding
-number where no edge is open. From there on it counts what a curtain, hung from every open edge down
-to infinity, would close; seen from the point that is a triangle of directions to the edge's ends
-and straight down, whose solid angle is known. Equal to Jacobson et al. 2013, *Robust inside-outside
-segmentation using generalized winding numbers*, exactly; and it asks few faces of many.
+Dropped from a point, a line meets faces: into the shape or out of it. That sum is the winding number where no edge is
+open. From there on it counts what a curtain, hung from every open edge down to infinity, would close; seen from the
+point that is a triangle of directions to the edge's ends and straight down, whose solid angle is known. Equal to
+Jacobson et al. 2013, *Robust inside-outside segmentation using generalized winding numbers*, exactly; and it asks few
+faces of many.
 """
 
 from dataclasses import dataclass
@@ -34,8 +34,8 @@ class VerticalLineTable:
     """Of each cell, in ``face``."""
     face: Int[np.ndarray, " F"]
     box: Float[np.ndarray, "F 5"]
-    """Of each, as it stands in ``face``: least and greatest x, then y, and least height [m], by
-    which they are in order within a cell."""
+    """Of each, as it stands in ``face``: least and greatest x, then y, and least height [m], by which they are in order
+    within a cell."""
     rim: Int[np.ndarray, "E 2"]
     """Edges that are walked more often one way than the other."""
     excess: Int[np.ndarray, " E"]
@@ -79,9 +79,7 @@ def vertical_line_table(mesh: Mesh, open_edges: OpenEdges | None = None) -> Vert
     while True:
         from_cell = ((low - start) / width).astype(np.int64)
         to_cell = ((high - start) / width).astype(np.int64)
-        if (np.prod(to_cell - from_cell + 1, axis=1)).sum() <= MAX_TABLE_ENTRIES_PER_FACE * len(
-            low
-        ):
+        if (np.prod(to_cell - from_cell + 1, axis=1)).sum() <= MAX_TABLE_ENTRIES_PER_FACE * len(low):
             break
         width *= 2
     counts = to_cell.max(axis=0) + 1
@@ -127,7 +125,5 @@ def _faces_by_cell(
     face = np.empty(int(first[-1]), np.int64)
     # Within a cell the order is that in which faces are laid into it: from the lowest up.
     upwards = np.argsort(lowest, kind="stable")
-    kernels.write_faces_in_cells(
-        from_cell, to_cell, int(counts[1]), upwards, first[:-1].copy(), face
-    )
+    kernels.write_faces_in_cells(from_cell, to_cell, int(counts[1]), upwards, first[:-1].copy(), face)
     return first, face

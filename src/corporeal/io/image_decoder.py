@@ -27,9 +27,7 @@ def decode_image(data: bytes, side: int = MAX_IMAGE_SIDE_PX) -> UInt8[np.ndarray
     return _decode_checked(data, lambda picture: as_reduced_array(picture, side))
 
 
-def as_reduced_array(
-    picture: Image.Image, side: int = MAX_IMAGE_SIDE_PX
-) -> UInt8[np.ndarray, "H W C"]:
+def as_reduced_array(picture: Image.Image, side: int = MAX_IMAGE_SIDE_PX) -> UInt8[np.ndarray, "H W C"]:
     """Return an opened picture as ``decode_image`` returns its bytes.
 
     Raises:

@@ -156,8 +156,7 @@ def images_in_folder(folder: Path) -> list[Path]:
     return sorted(
         p
         for p in found
-        if _has_suffix(p, (*READABLE_IMAGE_SUFFIXES, *HEIC_SUFFIXES, *UNREAD_IMAGE_SUFFIXES))
-        and p.is_file()
+        if _has_suffix(p, (*READABLE_IMAGE_SUFFIXES, *HEIC_SUFFIXES, *UNREAD_IMAGE_SUFFIXES)) and p.is_file()
     )
 
 
@@ -191,16 +190,12 @@ def unread_images_note(photographs: Sequence[Path]) -> list[str]:
         return []
     known = {file.stem for file in photographs}
     folder = photographs[0].parent
-    others = sorted(
-        p for p in folder.iterdir() if _has_suffix(p, UNREAD_IMAGE_SUFFIXES) and p.stem not in known
-    )
+    others = sorted(p for p in folder.iterdir() if _has_suffix(p, UNREAD_IMAGE_SUFFIXES) and p.stem not in known)
     if not others:
         return []
     kinds = ", ".join(sorted({p.suffix[1:].upper() for p in others}))
     count = "1 more picture is" if len(others) == 1 else f"{len(others)} more pictures are"
-    what = (
-        f"{count} of a kind that is not read ({kinds}), such as {single_line_text(others[0].name)}"
-    )
+    what = f"{count} of a kind that is not read ({kinds}), such as {single_line_text(others[0].name)}"
     return [f"{what}: convert what is to be used to JPEG."]
 
 
@@ -238,9 +233,7 @@ def unused_nested_images_note(folder: Path, photographs: Sequence[Path]) -> list
     if not more:
         return []
     one = len(more) == 1
-    count, left = (
-        ("1 more picture lies", "was") if one else (f"{len(more)} more pictures lie", "were")
-    )
+    count, left = ("1 more picture lies", "was") if one else (f"{len(more)} more pictures lie", "were")
     where = single_line_text(str(more[0].relative_to(folder)))
     return [
         Note(

@@ -1,8 +1,8 @@
 """Keyframes of prescribed motion: rows of time, position and optionally orientation.
 
-A row is ``t, x, y, z`` [s, m]; with three more numbers a rotation vector since the first row
-[degrees] (for a turn about one axis: the angle about it, as many times around as wanted), with four
-more a unit quaternion w, x, y, z of which the change since the first row counts.
+A row is ``t, x, y, z`` [s, m]; with three more numbers a rotation vector since the first row [degrees] (for a turn
+about one axis: the angle about it, as many times around as wanted), with four more a unit quaternion w, x, y, z of
+which the change since the first row counts.
 """
 
 import csv
@@ -35,9 +35,7 @@ FailCallback = Callable[[str, str], NoReturn]
 """Raises an error: what is wrong, what to do next."""
 
 
-def keyframes_from_rows(
-    rows: Sequence[Sequence[object]], fail: FailCallback
-) -> tuple[Vector, Keyframes]:
+def keyframes_from_rows(rows: Sequence[Sequence[object]], fail: FailCallback) -> tuple[Vector, Keyframes]:
     """Return where a path begins [m], and how it goes on from there.
 
     Args:
@@ -48,10 +46,7 @@ def keyframes_from_rows(
     table = _checked_rows(rows, fail)
     time, place = table[:, 0], table[:, 1:4]
     if time[0] < 0.0 or time[-1] > MAX_KEYFRAME_TIME_S:
-        fail(
-            f"its times run from {time[0]:g} to {time[-1]:g} s.",
-            f"Give 0 to {MAX_KEYFRAME_TIME_S:g} s.",
-        )
+        fail(f"its times run from {time[0]:g} to {time[-1]:g} s.", f"Give 0 to {MAX_KEYFRAME_TIME_S:g} s.")
     late = np.flatnonzero(np.diff(time) <= 0.0)
     if len(late):
         k = int(late[0]) + 1
@@ -62,9 +57,7 @@ def keyframes_from_rows(
     turn = _row_rotation_vectors(table[:, 4:], fail)
     shift = place - place[0]
     return _vector(place[0]), Keyframes(
-        time=tuple(time.tolist()),
-        shift=tuple(_vector(row) for row in shift),
-        turn=tuple(_vector(row) for row in turn),
+        time=tuple(time.tolist()), shift=tuple(_vector(row) for row in shift), turn=tuple(_vector(row) for row in turn)
     )
 
 
@@ -110,23 +103,14 @@ def _checked_rows(rows: Sequence[Sequence[object]], fail: FailCallback) -> Float
         number = isinstance(row, list) and all(
             isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) for x in row
         )
-        if not number or len(row) not in (
-            ROW_LENGTH_POSITION,
-            ROW_LENGTH_ROTATION_VECTOR,
-            ROW_LENGTH_QUATERNION,
-        ):
+        if not number or len(row) not in (ROW_LENGTH_POSITION, ROW_LENGTH_ROTATION_VECTOR, ROW_LENGTH_QUATERNION):
             fail(f"row {k + 1} is {str(row)[:40]}.", KEYFRAME_ROWS_ADVICE)
         if len(row) != len(rows[0]):
-            fail(
-                f"row {k + 1} has {len(row)} numbers, the first {len(rows[0])}.",
-                KEYFRAME_ROWS_ADVICE,
-            )
+            fail(f"row {k + 1} has {len(row)} numbers, the first {len(rows[0])}.", KEYFRAME_ROWS_ADVICE)
     return np.array(rows, float)
 
 
-def _refuse_fast(
-    time: Float[np.ndarray, " N"], way: Float[np.ndarray, " N1"], fail: FailCallback
-) -> None:
+def _refuse_fast(time: Float[np.ndarray, " N"], way: Float[np.ndarray, " N1"], fail: FailCallback) -> None:
     speed = way / np.diff(time)
     if len(speed) and speed.max() > MAX_KEYFRAME_SPEED_M_S:
         k = int(np.argmax(speed))
@@ -134,9 +118,7 @@ def _refuse_fast(
         fail(what, f"Give metres and seconds, at most {MAX_KEYFRAME_SPEED_M_S:g} m/s.")
 
 
-def _row_rotation_vectors(
-    columns: Float[np.ndarray, "N O"], fail: FailCallback
-) -> Float[np.ndarray, "N 3"]:
+def _row_rotation_vectors(columns: Float[np.ndarray, "N O"], fail: FailCallback) -> Float[np.ndarray, "N 3"]:
     """Rotation vector of every row from the row before [rad]; that of the first is zero."""
     turn = np.zeros((len(columns), 3))
     if columns.shape[1] == ROW_LENGTH_ROTATION_VECTOR - ROW_LENGTH_POSITION:
@@ -154,13 +136,9 @@ def _row_rotation_vectors(
     return turn
 
 
-def _relative_rotation_vector(
-    a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3"]:
+def _relative_rotation_vector(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     """Turn from one rotation vector to another: their difference, where they have one axis."""
-    if np.linalg.norm(np.cross(a, b)) <= MAX_PARALLEL_AXES_SINE * np.linalg.norm(
-        a
-    ) * np.linalg.norm(b):
+    if np.linalg.norm(np.cross(a, b)) <= MAX_PARALLEL_AXES_SINE * np.linalg.norm(a) * np.linalg.norm(b):
         return b - a
     return _rotation_vector(_rotation_matrix(b) @ _rotation_matrix(a).T)
 
@@ -195,9 +173,7 @@ def rows_from_keyframes(start: Vector, path: Keyframes) -> tuple[tuple[float, ..
     if turn.any():
         about = turn[np.argmax(np.linalg.norm(turn, axis=1))]
         askew = np.linalg.norm(np.cross(turn, about), axis=1)
-        if np.all(
-            askew <= MAX_PARALLEL_AXES_SINE * np.linalg.norm(turn, axis=1) * np.linalg.norm(about)
-        ):
+        if np.all(askew <= MAX_PARALLEL_AXES_SINE * np.linalg.norm(turn, axis=1) * np.linalg.norm(about)):
             columns.append(np.degrees(whole))
         else:
             columns.append(_row_quaternions(turn))

@@ -18,18 +18,13 @@ from corporeal.io.input_files import input_kind, separate_input_error
 from corporeal.io.length_units import METRES_OF_LENGTH_UNIT, LengthUnit
 from corporeal.io.mesh.mesh_loader import load_mesh
 from corporeal.io.object_grouping import group_pieces_into_objects
-from corporeal.io.photos.photo_file_names import (
-    HEIC_SUFFIXES,
-    READABLE_IMAGE_SUFFIXES,
-    UNREAD_IMAGE_SUFFIXES,
-)
+from corporeal.io.photos.photo_file_names import HEIC_SUFFIXES, READABLE_IMAGE_SUFFIXES, UNREAD_IMAGE_SUFFIXES
 from corporeal.io.registry import reader_of, suffixes_of
 
 BLENDER_CONVERT_SCRIPTS = {
     ".fbx": "import bpy; bpy.ops.wm.read_factory_settings(use_empty=True); "
     "bpy.ops.import_scene.fbx(filepath={0!r}); bpy.ops.export_scene.gltf(filepath={1!r})",
-    ".blend": "import bpy; bpy.ops.wm.open_mainfile(filepath={0!r}); "
-    "bpy.ops.export_scene.gltf(filepath={1!r})",
+    ".blend": "import bpy; bpy.ops.wm.open_mainfile(filepath={0!r}); bpy.ops.export_scene.gltf(filepath={1!r})",
 }
 """What Blender does to write a GLB of what nothing else reads."""
 
@@ -45,21 +40,16 @@ class MeshFrame:
 
 
 FRAME_AS_STATED = MeshFrame()
-PHOTOGRAPH_ADVICE = (
-    "Take 40 to 80 photographs from all around, and name the folder that they lie in."
-)
+PHOTOGRAPH_ADVICE = "Take 40 to 80 photographs from all around, and name the folder that they lie in."
 
 
-def load_model(
-    path: Path, objects: ObjectGrouping = "auto", frame: MeshFrame = FRAME_AS_STATED
-) -> LoadedModel:
+def load_model(path: Path, objects: ObjectGrouping = "auto", frame: MeshFrame = FRAME_AS_STATED) -> LoadedModel:
     """Read one file, +Z up.
 
     Args:
         path: A model; its companions must lie beside it.
-        objects: As ``glb.read_glb`` has it; of mesh files only USD states bodies for "auto". Where
-            the file does not state its objects, "auto" finds them as ``group_pieces_into_objects``
-            has it.
+        objects: As ``glb.read_glb`` has it; of mesh files only USD states bodies for "auto". Where the file does not
+            state its objects, "auto" finds them as ``group_pieces_into_objects`` has it.
         frame: Of mesh files; glTF states both.
 
     Raises:
@@ -87,9 +77,7 @@ def _read_by_suffix(path: Path, objects: ObjectGrouping, frame: MeshFrame) -> Lo
     mesh = load_mesh(path, objects, frame.up)
     if frame.unit == "auto":
         return LoadedModel(mesh.scene, mesh.ours, mesh.metric, mesh.stated)
-    scene = convert_scene_unit(
-        mesh.scene, METRES_OF_LENGTH_UNIT[frame.unit] / mesh.scene.metres_per_unit
-    )
+    scene = convert_scene_unit(mesh.scene, METRES_OF_LENGTH_UNIT[frame.unit] / mesh.scene.metres_per_unit)
     return LoadedModel(scene, ours=False, stated=mesh.stated)
 
 
@@ -106,9 +94,7 @@ def _not_read_error(path: Path) -> UserError:
         command = f'blender --background --python-expr "{words}"'
         return BadFileError(path, f"{kind} is read by Blender only.", f"Convert it: {command}")
     if kind == ".gif":
-        return BadFileError(
-            path, "is a GIF.", f"Convert it to MP4 if it moves. {PHOTOGRAPH_ADVICE}"
-        )
+        return BadFileError(path, "is a GIF.", f"Convert it to MP4 if it moves. {PHOTOGRAPH_ADVICE}")
     if kind in READABLE_IMAGE_SUFFIXES and not _is_readable_image(path):
         from corporeal.io.photos.image_loader import (
             unreadable_reason,  # with it come lenses, which models lack
@@ -116,14 +102,10 @@ def _not_read_error(path: Path) -> UserError:
 
         return BadFileError(path, f"{unreadable_reason(path)}.", PHOTOGRAPH_ADVICE)
     if kind in READABLE_IMAGE_SUFFIXES and _is_animated_image(path):
-        return BadFileError(
-            path, "is a picture that moves.", f"Convert it to MP4. {PHOTOGRAPH_ADVICE}"
-        )
+        return BadFileError(path, "is a picture that moves.", f"Convert it to MP4. {PHOTOGRAPH_ADVICE}")
     if kind in (*READABLE_IMAGE_SUFFIXES, *HEIC_SUFFIXES, *UNREAD_IMAGE_SUFFIXES):
         return BadFileError(path, "is a single picture, which shows no depth.", PHOTOGRAPH_ADVICE)
-    return BadFileError(
-        path, f"is not a model ({readable_model_formats()} are read).", "Convert it to .glb."
-    )
+    return BadFileError(path, f"is not a model ({readable_model_formats()} are read).", "Convert it to .glb.")
 
 
 def readable_model_formats() -> str:
@@ -133,10 +115,7 @@ def readable_model_formats() -> str:
 
 def _is_readable_image(path: Path) -> bool:
     """Whether a file begins as a picture that is read."""
-    with (
-        suppress(Exception),
-        Image.open(path, formats=IMAGE_FORMATS),
-    ):  # Pillow raises almost anything
+    with suppress(Exception), Image.open(path, formats=IMAGE_FORMATS):  # Pillow raises almost anything
         return True
     return False
 

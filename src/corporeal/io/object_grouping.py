@@ -1,7 +1,7 @@
 """Grouping of a file's pieces into objects.
 
-Pieces that touch are one object, as the legs and the seat of a chair are, unless their names say
-that each is an object by itself, as a cup and its saucer are. Why so: decision objects-counting.
+Pieces that touch are one object, as the legs and the seat of a chair are, unless their names say that each is an object
+by itself, as a cup and its saucer are. Why so: decision objects-counting.
 """
 
 import re
@@ -18,18 +18,14 @@ from corporeal.core.types import Scene
 from corporeal.geometry import box_placement
 from corporeal.geometry.mesh import Mesh, join_meshes
 from corporeal.geometry.point_sampling import sample_surface
-from corporeal.geometry.scene_transforms import (
-    is_object_inside,
-    object_boxes,
-    surfaces_bounding_box,
-)
+from corporeal.geometry.scene_transforms import is_object_inside, object_boxes, surfaces_bounding_box
 from corporeal.io.mesh.raw_mesh import MAX_PIECES
 from corporeal.recognition.readable_names import everyday_words
 from corporeal.recognition.typical_extents import class_name_words, typical_extent
 
 TOUCH_GAP_FRACTION = 0.05
-"""Pieces closer than this touch, over the longest side of the smaller: models have gaps where
-objects are glued, and pieces that hang in the air are farther apart than that [-].
+"""Pieces closer than this touch, over the longest side of the smaller: models have gaps where objects are glued, and
+pieces that hang in the air are farther apart than that [-].
 """
 SURFACE_SAMPLES_PER_PIECE = 1500
 """Points on a piece, beside its vertices, whose distances to another are measured."""
@@ -62,11 +58,7 @@ def _group_of_piece(scene: Scene) -> np.ndarray:
         (a, b)
         for a, b in box_placement.overlapping_boxes(grown)
         if _are_touching(meshes[a], meshes[b], min(margins[a], margins[b]))
-        and not (
-            things[a]
-            and things[b]
-            and not (is_object_inside(scene, a, b) or is_object_inside(scene, b, a))
-        )
+        and not (things[a] and things[b] and not (is_object_inside(scene, a, b) or is_object_inside(scene, b, a)))
     ]
     rows, columns = np.array(bound, dtype=int).reshape(-1, 2).T
     graph = coo_array((np.ones(len(bound)), (rows, columns)), shape=(count, count))
@@ -82,9 +74,7 @@ def _surface_gap(a: Mesh, b: Mesh) -> float:
     """Return the distance from points of ``a`` to the surface of ``b`` [m]."""
     spread = sample_surface(a, SURFACE_SAMPLES_PER_PIECE, np.random.default_rng(0))[0]
     corners = a.vertices[:: max(1, len(a.vertices) // SURFACE_SAMPLES_PER_PIECE)]
-    squared = igl.point_mesh_squared_distance(
-        np.concatenate([corners, spread]), b.vertices, b.triangles
-    )[0]
+    squared = igl.point_mesh_squared_distance(np.concatenate([corners, spread]), b.vertices, b.triangles)[0]
     return float(np.sqrt(np.min(squared)))
 
 
@@ -94,8 +84,8 @@ def _surface_gap(a: Mesh, b: Mesh) -> float:
 def _are_named_as_objects(scene: Scene) -> list[bool]:
     """Tell of each piece whether its name says that it is an object by itself.
 
-    It does where its noun is a known object and not that of the whole: "cup" in tea_set.glb, but
-    not "lamp glass" in a file called lamp, nor where all others are of a lamp, too.
+    It does where its noun is a known object and not that of the whole: "cup" in tea_set.glb, but not "lamp glass" in a
+    file called lamp, nor where all others are of a lamp, too.
     """
     whole = _whole_words(scene)
     return [_is_named_as_object(o.class_name, whole) for o in scene.objects]
@@ -111,8 +101,8 @@ def _is_named_as_object(name: str, whole: frozenset[str]) -> bool:
 def _whole_words(scene: Scene) -> frozenset[str]:
     """Return the known objects that the file's name or all its pieces' names speak of.
 
-    A file called "bricks", or pieces that differ by their numbers alone, speak of several objects
-    of one kind and not of a whole.
+    A file called "bricks", or pieces that differ by their numbers alone, speak of several objects of one kind and not
+    of a whole.
     """
     stem = everyday_words(Path(scene.source).stem)
     said = {w for w in re.findall(r"[^\W\d_]+", stem.lower()) if w in class_name_words(w)}

@@ -1,7 +1,6 @@
 """PLY as a container: elements with columns of numbers, in text or in bytes of either order.
 
-Turk, "The PLY Polygon File Format" (1994). Lists (the faces of meshes) are not read, nor is what
-comes after them.
+Turk, "The PLY Polygon File Format" (1994). Lists (the faces of meshes) are not read, nor is what comes after them.
 """
 
 import io
@@ -85,9 +84,7 @@ def kind_of_ply(data: bytes | memoryview) -> PlyKind:
         return "splat"
     rows = [line.split() for line in head.splitlines()]
     counts = {r[1]: r[2] for r in rows if len(r) == 3 and r[0] == b"element"}
-    if b"chunk" in counts or SPLAT_PLY_PROPERTIES <= {
-        r[-1] for r in rows if r[:1] == [b"property"]
-    }:
+    if b"chunk" in counts or SPLAT_PLY_PROPERTIES <= {r[-1] for r in rows if r[:1] == [b"property"]}:
         return "splat"
     filled = any(counts.get(name, b"0") != b"0" for name in (b"face", b"tristrips"))
     return "mesh" if filled else "points"
@@ -122,9 +119,7 @@ def _parse_header(path: Path, data: memoryview) -> tuple[str, list[PlyElement], 
     lines = head[: end.start()].decode("latin-1").splitlines()
     words = [line.split() for line in lines[1:]]
     words = [w for w in words if w and w[0] not in ("comment", "obj_info")]
-    order = next(
-        (BYTE_ORDER_OF_PLY_FORMAT.get(w[1]) for w in words if w[0] == "format" and len(w) > 1), None
-    )
+    order = next((BYTE_ORDER_OF_PLY_FORMAT.get(w[1]) for w in words if w[0] == "format" and len(w) > 1), None)
     if order is None:
         raise BadFileError(path, "its PLY header states no known format.", PLY_EXPORT_ADVICE)
     elements: list[PlyElement] = []
@@ -143,13 +138,7 @@ def _parse_element(path: Path, words: list[str]) -> PlyElement:
 
 
 def _with_property(path: Path, element: PlyElement, words: list[str]) -> PlyElement:
-    kind = (
-        "list"
-        if words[1:2] == ["list"]
-        else DTYPE_OF_PLY_TYPE.get(words[1])
-        if len(words) == 3
-        else None
-    )
+    kind = "list" if words[1:2] == ["list"] else DTYPE_OF_PLY_TYPE.get(words[1]) if len(words) == 3 else None
     if kind is None or words[-1] in dict(element.properties):
         raise BadFileError(path, f"its header is bad: {' '.join(words)[:80]!r}.", PLY_EXPORT_ADVICE)
     return PlyElement(element.name, element.count, (*element.properties, (words[-1], kind)))

@@ -1,8 +1,8 @@
 """The formats that are read, one row each, and the types of the rows of readers and writers.
 
-A row is all that the package has to know of a format: which files are told from it by name, which
-suffixes errors list, how a file is recognised by its content, and which function reads it. Nothing
-is imported before a file asks for it. Writers are listed in ``export.export_target``.
+A row is all that the package has to know of a format: which files are told from it by name, which suffixes errors list,
+how a file is recognised by its content, and which function reads it. Nothing is imported before a file asks for it.
+Writers are listed in ``export.export_target``.
 """
 
 from collections.abc import Iterator
@@ -39,11 +39,10 @@ class Reader:
     """In lower case, with the dot."""
     read: str
     signatures: tuple[bytes, ...] = ()
-    """First bytes of its files, white space left out. A splat that has one is of this format, or
-    broken."""
+    """First bytes of its files, white space left out. A splat that has one is of this format, or broken."""
     matches: str = ""
-    """Bytes of a file → whether it is of this format; where there is no signature, or where several
-    formats share a suffix."""
+    """Bytes of a file → whether it is of this format; where there is no signature, or where several formats share a
+    suffix."""
     usual_up: UpAxis = "+y"
     """Axis that points up in files that do not state it."""
     folder_files: tuple[str, ...] = ()
@@ -75,9 +74,7 @@ class Writer:
 
 _TRIMESH, _COMPANIONS = "corporeal.io.mesh.mesh_trimesh", "corporeal.io.mesh.mesh_companions"
 _USD, _SPLAT = "corporeal.io.usd.usd_meshes", "corporeal.io.splat"
-SCENE_TOML_READER = Reader(
-    "scene file", "scene", (".toml",), "corporeal.io.scene_toml:read_scene_file"
-)
+SCENE_TOML_READER = Reader("scene file", "scene", (".toml",), "corporeal.io.scene_toml:read_scene_file")
 GLTF_READER = Reader(
     "glTF",
     "model",
@@ -88,9 +85,7 @@ GLTF_READER = Reader(
 READERS: tuple[Reader, ...] = (
     SCENE_TOML_READER,
     GLTF_READER,
-    Reader(
-        "OBJ", "mesh", (".obj",), f"{_TRIMESH}:read_obj", companions=f"{_COMPANIONS}:obj_companions"
-    ),
+    Reader("OBJ", "mesh", (".obj",), f"{_TRIMESH}:read_obj", companions=f"{_COMPANIONS}:obj_companions"),
     Reader(
         "PLY",
         "mesh",
@@ -102,14 +97,7 @@ READERS: tuple[Reader, ...] = (
     ),
     Reader("STL", "mesh", (".stl",), f"{_TRIMESH}:read_stl", usual_up="+z"),
     Reader("OFF", "mesh", (".off",), f"{_TRIMESH}:read_off", usual_up="+z"),
-    Reader(
-        "3MF",
-        "mesh",
-        (".3mf",),
-        f"{_TRIMESH}:read_3mf",
-        packages=("lxml", "networkx"),
-        extra="meshes",
-    ),
+    Reader("3MF", "mesh", (".3mf",), f"{_TRIMESH}:read_3mf", packages=("lxml", "networkx"), extra="meshes"),
     Reader(
         "DAE",
         "mesh",
@@ -187,9 +175,7 @@ def reader_of(path: Path, *kinds: ReaderKind) -> Reader | None:
 
     """
     suffix = path.suffix.lower()
-    fitting = [
-        r for r in readers_of(*kinds) if suffix in r.suffixes or path.name in r.folder_files[:1]
-    ]
+    fitting = [r for r in readers_of(*kinds) if suffix in r.suffixes or path.name in r.folder_files[:1]]
     if len(fitting) < 2:
         return fitting[0] if fitting else None
     head = _file_head(path)

@@ -43,10 +43,7 @@ from corporeal.io import keyframes
 
 SCENE_KEYS = ("file", "duration", "fps", "gravity", "settled", "object", "wall")
 WALL_KEYS = ("point", "normal")
-OBJECT_KEYS = (
-    *("name", "file", "class", "extent", "position", "velocity", "push", "wind"),
-    *("path", "follows"),
-)
+OBJECT_KEYS = (*("name", "file", "class", "extent", "position", "velocity", "push", "wind"), *("path", "follows"))
 KEYS_STATED_BY_PATH = ("position", "velocity", "push", "wind")
 """Fields that an object with a path must not have."""
 PUSH_KEYS = ("acceleration", "from", "to")
@@ -122,9 +119,7 @@ def write_scene_file(path: Path, scene: SceneFile) -> None:
 
 def _lines(scene: SceneFile) -> Iterator[str]:
     folder = scene.path.parent
-    head = {
-        name: getattr(scene, name) for name in ("file", "duration", "fps", "gravity", "settled")
-    }
+    head = {name: getattr(scene, name) for name in ("file", "duration", "fps", "gravity", "settled")}
     yield from _pairs(head, folder)
     for entry in scene.objects:
         yield from ("", "[[object]]")
@@ -145,9 +140,7 @@ def _rows_of(entry: ObjectEntry) -> dict[str, Any]:
         "velocity": entry.velocity,
     }
     if entry.path is not None:
-        rows["path"] = keyframes.rows_from_keyframes(
-            rows.pop("position") or (0.0, 0.0, 0.0), entry.path
-        )
+        rows["path"] = keyframes.rows_from_keyframes(rows.pop("position") or (0.0, 0.0, 0.0), entry.path)
     if entry.push is not None:
         rows["push"] = {"acceleration": entry.push.acceleration} | _format_window(entry.push)
     if entry.wind is not None:
@@ -246,10 +239,7 @@ def _path(table: "_TomlTable") -> tuple[Vector | None, Keyframes | None]:
 
 def _wall(table: "_TomlTable") -> Wall:
     table.only(WALL_KEYS)
-    point, normal = (
-        table.vector("point", MAX_SCENE_DISTANCE_M),
-        table.vector("normal", MAX_SCENE_DISTANCE_M),
-    )
+    point, normal = (table.vector("point", MAX_SCENE_DISTANCE_M), table.vector("normal", MAX_SCENE_DISTANCE_M))
     if point is None or normal is None:
         table.fail("it needs a point and a normal.", "Give both as [x, y, z].")
     size = math.hypot(*normal)

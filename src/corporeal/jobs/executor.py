@@ -38,9 +38,7 @@ class Executor:
     """Told what happens."""
 
 
-def execute_jobs(
-    folder: Path, verb: CorpusVerb, jobs: Sequence[Job], hands: Executor
-) -> dict[str, ManifestRow]:
+def execute_jobs(folder: Path, verb: CorpusVerb, jobs: Sequence[Job], hands: Executor) -> dict[str, ManifestRow]:
     """Do all jobs that are not done; return what became of each.
 
     A job that fails is noted and left; one whose process dies is tried once more. An interrupt

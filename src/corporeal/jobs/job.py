@@ -1,14 +1,13 @@
 """A job: work on one scene in its own process, here or on another machine.
 
-A job's folder is finished when it holds ``meta.json`` with the job's key, written last. A job that
-can be resumed works in its folder; any other works beside it and the finished folder is put in
-place by one rename. So whatever is killed at whatever moment, what is finished is whole, is
-recognised, and is not done again.
+A job's folder is finished when it holds ``meta.json`` with the job's key, written last. A job that can be resumed works
+in its folder; any other works beside it and the finished folder is put in place by one rename. So whatever is killed at
+whatever moment, what is finished is whole, is recognised, and is not done again.
 
 State of all jobs: ``manifest.json``, and ``corpus.log`` with events.
 
-The manifest says nothing that the folders do not: which results are finished is read from them, so
-that a process killed between the two loses nothing.
+The manifest says nothing that the folders do not: which results are finished is read from them, so that a process
+killed between the two loses nothing.
 """
 
 import os
@@ -148,9 +147,7 @@ class JobManifest:
         self.others = {name: row for name, row in before.items() if name not in self.rows}
         self._write()
 
-    def set(
-        self, job: Job, status: JobStatus, error: str = "", seconds: float | None = None
-    ) -> None:
+    def set(self, job: Job, status: JobStatus, error: str = "", seconds: float | None = None) -> None:
         """Note what became of a job, in the manifest and in the log."""
         row = replace(self.rows[job.name], status=status, error=error, seconds=seconds)
         row = replace(row, attempts=row.attempts + (status == "running"))
@@ -162,10 +159,7 @@ class JobManifest:
     def log(self, words: str) -> None:
         """Append a line to ``corpus.log``."""
         stamp = time.strftime("%Y-%m-%dT%H:%M:%S")
-        with (
-            disk_errors(self.folder),
-            (self.folder / CORPUS_LOG_FILE).open("a", encoding="utf-8") as file,
-        ):
+        with disk_errors(self.folder), (self.folder / CORPUS_LOG_FILE).open("a", encoding="utf-8") as file:
             file.write(f"{stamp} {self.verb} {' '.join(words.split())}\n")
 
     def count(self, status: JobStatus) -> int:

@@ -93,9 +93,7 @@ class LocalWorkerPool:
         process.stdout.close()
         with suppress(BrokenPipeError):
             process.stdin.close()
-        died = JobEvent(
-            job, "died", words=f"{exit_reason(code)} Its log is in {LOG_FOLDER}/{name}.log."
-        )
+        died = JobEvent(job, "died", words=f"{exit_reason(code)} Its log is in {LOG_FOLDER}/{name}.log.")
         return self.last.pop(name, died)
 
     def stop(self) -> None:
@@ -158,6 +156,4 @@ def local_executor(
 
     """
     slots = slots or max(1, usable_cores() // threads)
-    return Executor(
-        lambda: local_worker_pool(slots, threads, Path(folder) / LOG_FOLDER), progress, say
-    )
+    return Executor(lambda: local_worker_pool(slots, threads, Path(folder) / LOG_FOLDER), progress, say)

@@ -1,8 +1,7 @@
 """Jobs on a Ray cluster, or on a temporary local one.
 
-Each job is a task in a process of its own, as on this machine. The corpus must lie where every
-machine sees it under the same path. Ray's own retries are off: what a dead worker means is decided
-in one place, for every kind of worker.
+Each job is a task in a process of its own, as on this machine. The corpus must lie where every machine sees it under
+the same path. Ray's own retries are off: what a dead worker means is decided in one place, for every kind of worker.
 """
 
 import logging
@@ -53,11 +52,7 @@ class RayWorkerPool:
             wrong = self.ray.get(ref)
         except self.ray.exceptions.RayError as error:
             return JobEvent(job, "died", words=f"Its process died: {_first_line(error)}")
-        return (
-            JobEvent(job, "finished", 1.0)
-            if wrong is None
-            else JobEvent(job, "failed", words=wrong)
-        )
+        return JobEvent(job, "finished", 1.0) if wrong is None else JobEvent(job, "failed", words=wrong)
 
     def stop(self) -> None:
         """Cancel every task, which interrupts it, and give it a while."""
@@ -88,9 +83,7 @@ def _check_address(address: str) -> None:
     try:
         socket.create_connection((host, int(port)), timeout=CLUSTER_ANSWER_TIMEOUT_S).close()
     except (OSError, OverflowError) as error:
-        raise UserError(
-            f"Cannot use Ray at {address}: {error}. Start it there with: ray start --head."
-        ) from error
+        raise UserError(f"Cannot use Ray at {address}: {error}. Start it there with: ray start --head.") from error
 
 
 @contextmanager
@@ -111,9 +104,7 @@ def ray_worker_pool(slots: int, threads: int, gpus: float, address: str) -> Iter
     try:
         import ray
     except ModuleNotFoundError:
-        raise UserError(
-            '--on ray needs Ray. Install it with: pip install "corporeal[cluster]".'
-        ) from None
+        raise UserError('--on ray needs Ray. Install it with: pip install "corporeal[cluster]".') from None
     _check_address(address)
     folder = None if address else tempfile.mkdtemp(prefix="ray-")
     options: dict[str, Any] = {"address": address} if address else {

@@ -1,8 +1,8 @@
 """The process of one job: ``python -m corporeal.jobs.worker_process``, started by ``local``.
 
-The job comes pickled on the standard input, which stays open as long as the one who started it
-lives: when it closes, the parent is gone, and the process ends at once. What there is to tell goes
-out as lines of JSON. A first interrupt lets the job keep what it has.
+The job comes pickled on the standard input, which stays open as long as the one who started it lives: when it closes,
+the parent is gone, and the process ends at once. What there is to tell goes out as lines of JSON. A first interrupt
+lets the job keep what it has.
 """
 
 import json
@@ -39,9 +39,7 @@ def main() -> int:
     try:
         packed = pickle.load(sys.stdin.buffer)
         threading.Thread(target=_watch_parent, daemon=True).start()
-        error = attempt_job(
-            packed, _throttle(lambda done, words: send(WorkerMessage("progress", done, words)))
-        )
+        error = attempt_job(packed, _throttle(lambda done, words: send(WorkerMessage("progress", done, words))))
     except KeyboardInterrupt:
         return EXIT_STOPPED
     send(WorkerMessage("finished", 1.0) if error is None else WorkerMessage("failed", words=error))

@@ -75,9 +75,7 @@ BULK_LOSS_GROUPS = frozenset(("soft", "elastomer", "foam", "food"))
 """Groups of what loses in its bulk alone: loss factor and restitution tell of the same."""
 
 
-def pair_restitution(
-    a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT_SPEED_M_S
-) -> Restitution:
+def pair_restitution(a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT_SPEED_M_S) -> Restitution:
     """Restitution of two bodies: the most particular measured pair, else a rule.
 
     What was measured are solid balls on solid bodies, so it holds for what is solid. A value that
@@ -93,11 +91,7 @@ def pair_restitution(
     """
     solid = a.solid and b.solid
     told = any(is_stated_by_person(s.material, "restitution") for s in (a, b))
-    row = (
-        _closest_row(a.entry.kin, b.entry.kin, measured_restitution_pairs)
-        if solid and not told
-        else None
-    )
+    row = _closest_row(a.entry.kin, b.entry.kin, measured_restitution_pairs) if solid and not told else None
     if row is not None:
         low, typical, high = row["restitution"]
         most = yield_restitution(*_yielding_materials(a, b), speed)
@@ -136,13 +130,11 @@ FULL_YIELD_SPEED_M_S = 1e4
 """At which every metal yields [m/s]."""
 
 
-def pair_restitution_law(
-    a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT_SPEED_M_S
-) -> RestitutionLaw:
+def pair_restitution_law(a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT_SPEED_M_S) -> RestitutionLaw:
     """Return how restitution changes about the speed of an impact, as ``pair_restitution`` gives it.
 
-    Metals are as elastic as their bulk up to the speed at which they yield. The line of a rated
-    ball, which is exact for it alone, is the chord from this speed to a quarter of it.
+    Metals are as elastic as their bulk up to the speed at which they yield. The line of a rated ball, which is exact
+    for it alone, is the chord from this speed to a quarter of it.
 
     Args:
         a: One body.
@@ -161,10 +153,7 @@ def pair_restitution_law(
 
 def _yielding_materials(a: ImpactBody, b: ImpactBody) -> tuple[Material, Material]:
     """Both materials; what is no metal is crushed or creeps, and does not yield as one."""
-    one, other = (
-        s.material if s.entry.group == "metal" else replace(s.material, yield_stress=None)
-        for s in (a, b)
-    )
+    one, other = (s.material if s.entry.group == "metal" else replace(s.material, yield_stress=None) for s in (a, b))
     return one, other
 
 
@@ -172,11 +161,7 @@ def _choose_rule(a: ImpactBody, b: ImpactBody) -> Callable[[Material, Material],
     """Choose the rule for two solids by where they lose."""
     if _is_smooth(a) and _is_smooth(b):
         return _bulk_restitution
-    return (
-        _soft_pair_restitution
-        if {a.entry.group, b.entry.group} <= BULK_LOSS_GROUPS
-        else series_restitution
-    )
+    return _soft_pair_restitution if {a.entry.group, b.entry.group} <= BULK_LOSS_GROUPS else series_restitution
 
 
 def _is_smooth(body: ImpactBody) -> bool:
@@ -191,8 +176,8 @@ def _bulk_restitution(a: Material, b: Material) -> float:
 def _soft_pair_restitution(a: Material, b: Material) -> float:
     """Restitution of two bodies that are soft and lossy in their bulk, both [-].
 
-    Their loss factors add up, each by its share of the compliance (``contact_loss_factor``). Of
-    each the loss factor is that of its rebound from something rigid, whatever is drawn for either.
+    Their loss factors add up, each by its share of the compliance (``contact_loss_factor``). Of each the loss factor is
+    that of its rebound from something rigid, whatever is drawn for either.
     """
     of_a = compliance_share(a, b)
     losses = [loss_of_restitution(max(m.restitution, MIN_CARRIED_RESTITUTION)) for m in (a, b)]
@@ -202,8 +187,8 @@ def _soft_pair_restitution(a: Material, b: Material) -> float:
 def compliance_share(a: Material, b: Material) -> float:
     """Share of the compliance of a contact, and so of the energy in it, that is ``a``'s [-].
 
-    One force presses both and their dents add up, so that 1/E* = (1 - ν_a²)/E_a + (1 - ν_b²)/E_b
-    (Hertz; Johnson, Contact Mechanics, 1985, §4.2), and each stores its part of the sum.
+    One force presses both and their dents add up, so that 1/E* = (1 - ν_a²)/E_a + (1 - ν_b²)/E_b (Hertz; Johnson,
+    Contact Mechanics, 1985, §4.2), and each stores its part of the sum.
     """
     stiff_a, stiff_b = (m.young / (1.0 - m.poisson**2) for m in (a, b))
     return stiff_b / (stiff_a + stiff_b)
@@ -266,10 +251,6 @@ def _friction_by_rule(a: MaterialEntry, b: MaterialEntry) -> Friction:
     default = Material.friction  # a library without friction, such as "reference"
     plain = MeasuredRange(default, default, default, "engineering-estimate")
     one, other = (e.ranges.get("friction", plain) for e in (a, b))
-    low, typical, high = (
-        combine_friction(getattr(one, at), getattr(other, at)) for at in ("low", "typical", "high")
-    )
-    reason = (
-        f"rule: square root of {one.typical:.2g} ({a.name}) times {other.typical:.2g} ({b.name})"
-    )
+    low, typical, high = (combine_friction(getattr(one, at), getattr(other, at)) for at in ("low", "typical", "high"))
+    reason = f"rule: square root of {one.typical:.2g} ({a.name}) times {other.typical:.2g} ({b.name})"
     return Friction(MeasuredRange(low, typical, high, f"{one.source}+{other.source}"), None, reason)

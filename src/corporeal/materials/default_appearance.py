@@ -93,9 +93,7 @@ def default_finish(*names: str) -> Finish:
         if name in LIQUID_COLOURS:
             written, opacity = LIQUID_COLOURS[name]
             mode = "BLEND" if opacity < 1.0 else "OPAQUE"
-            return Finish(
-                names[0], _colour(written, opacity), roughness=LIQUID_ROUGHNESS, alpha_mode=mode
-            )
+            return Finish(names[0], _colour(written, opacity), roughness=LIQUID_ROUGHNESS, alpha_mode=mode)
         if name in METAL_COLOURS:
             shine = _colour(METAL_COLOURS[name])
             return Finish(names[0], shine, metallic=1.0, roughness=METAL_ROUGHNESS)

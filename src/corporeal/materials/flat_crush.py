@@ -1,9 +1,8 @@
 """Restitution of layered sheets under flat crush.
 
-Corrugated board is stiff in its plane and weak across its flutes, which fold at a pressure that
-hardly changes until they lie flat (flat crush). An impact that presses harder than that is work
-against this pressure, on the volume that is crushed, and lost; what is stored meanwhile in the ball
-and in the sheet comes back.
+Corrugated board is stiff in its plane and weak across its flutes, which fold at a pressure that hardly changes until
+they lie flat (flat crush). An impact that presses harder than that is work against this pressure, on the volume that is
+crushed, and lost; what is stored meanwhile in the ball and in the sheet comes back.
 """
 
 import tomllib
@@ -22,8 +21,8 @@ from corporeal.materials.loss_restitution import restitution_of_loss
 from corporeal.materials.restitution_speed import material_at_speed, plane_strain_compliance
 
 PACKED_STRAIN_FACTOR = 1.4
-"""A cellular solid is packed at a strain of 1 - 1.4 of its relative density (Gibson and Ashby,
-Cellular Solids, 1997, §4.3; recalled)."""
+"""A cellular solid is packed at a strain of 1 - 1.4 of its relative density (Gibson and Ashby, Cellular Solids, 1997,
+§4.3; recalled)."""
 MAX_CONTACT_RADIUS_RATIO = 1.0
 """Radius of a contact over the ball's, at most [-]."""
 
@@ -127,13 +126,10 @@ def material_across_layers(sheet: Material) -> Material:
     return replace(sheet, young=young, restitution=restitution_of_loss(sheet.loss), poisson=0.0)
 
 
-def crush_restitution(
-    ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float
-) -> float:
+def crush_restitution(ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float) -> float:
     """Restitution of a ball on a sheet that lies on something hard [-].
 
-    Where the sheet is not thick enough to take all of an impact, the rest of it rebounds from what
-    is packed.
+    Where the sheet is not thick enough to take all of an impact, the rest of it rebounds from what is packed.
 
     Args:
         ball: What strikes.
@@ -161,9 +157,7 @@ def crush_restitution(
     return sqrt(min(back, returned / blow))
 
 
-def crush_restitution_law(
-    ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float
-) -> RestitutionLaw:
+def crush_restitution_law(ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float) -> RestitutionLaw:
     """Return how the restitution of a ball on a sheet changes about the speed of an impact.
 
     The power of the speed is that between this speed and a quarter of it.
@@ -175,9 +169,7 @@ def crush_restitution_law(
         packed: As in ``crush_restitution``.
 
     """
-    whole, slower, now = (
-        crush_restitution(ball, sheet, v, packed) for v in (0.0, 0.25 * speed, speed)
-    )
+    whole, slower, now = (crush_restitution(ball, sheet, v, packed) for v in (0.0, 0.25 * speed, speed))
     power = max(0.0, log(slower / now) / log(4.0)) if min(slower, now) > 0.0 else 0.0
     return RestitutionLaw(now, speed, 0.0, power, 0.0, max(now, whole))
 

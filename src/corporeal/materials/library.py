@@ -1,7 +1,7 @@
 """Lookup of materials in the default library or a user's.
 
-A user's file replaces the default library; one that starts with ``extends = "default"`` is merged
-into it. Merging is by material: a table of the file replaces its namesake whole.
+A user's file replaces the default library; one that starts with ``extends = "default"`` is merged into it. Merging is
+by material: a table of the file replaces its namesake whole.
 """
 
 import re

@@ -26,8 +26,7 @@ class MaterialEntry:
     ranges: Mapping[str, MeasuredRange]
     """Field name of ``types.Material`` → measured range."""
     group: str = ""
-    """Metal, mineral, granular, fibrous, polymer, elastomer, foam, food, liquid, bulk (what lies in
-    containers)."""
+    """Metal, mineral, granular, fibrous, polymer, elastomer, foam, food, liquid, bulk (what lies in containers)."""
     family: str = ""
     """The material whose measured friction it shares."""
     published: str = ""
@@ -44,14 +43,10 @@ class MaterialEntry:
         """Names under which a measured pair may list it, most particular first."""
         return tuple(n for n in (self.name, self.family, self.group) if n)
 
-    def typical(
-        self, reason: str = "the usual value in the measured range"
-    ) -> dict[str, Provenance]:
+    def typical(self, reason: str = "the usual value in the measured range") -> dict[str, Provenance]:
         """Ground every number at its typical value."""
         return {
-            name: Provenance(
-                r.typical, r, "typical", reason if r.low < r.high else "a single value"
-            )
+            name: Provenance(r.typical, r, "typical", reason if r.low < r.high else "a single value")
             for name, r in self.ranges.items()
         }
 
@@ -148,12 +143,7 @@ def is_estimate(key: str) -> bool:
 
 def cited_sources() -> dict[str, str]:
     """Every source key that a value of the shipped libraries carries, with what it stands for."""
-    ranges = [
-        r
-        for name in SHIPPED_LIBRARY_FILES
-        for e in shipped_library(name).values()
-        for r in e.ranges.values()
-    ]
+    ranges = [r for name in SHIPPED_LIBRARY_FILES for e in shipped_library(name).values() for r in e.ranges.values()]
     return {key: citation(key) for key in sorted({r.source for r in ranges} | set(source_table()))}
 
 

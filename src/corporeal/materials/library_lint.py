@@ -15,12 +15,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Law
 from corporeal.materials.library_entry import DESCRIPTION_KEYS, POISSON_LIMIT
 from corporeal.materials.loss_restitution import restitution_range_of_loss
-from corporeal.materials.quantities import (
-    QUANTITIES,
-    SI_OF_KEY_UNIT,
-    example_keys,
-    parse_quantity_key,
-)
+from corporeal.materials.quantities import QUANTITIES, SI_OF_KEY_UNIT, example_keys, parse_quantity_key
 from corporeal.materials.value_plausibility import default_namesake, range_doubt, yield_strain_doubt
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
@@ -31,16 +26,7 @@ LAWS_OF_FIELD = {
     for field in asked.fields
 }
 """Fields that only these laws read."""
-MATERIAL_GROUPS = (
-    "metal",
-    "mineral",
-    "granular",
-    "soft",
-    "fibrous",
-    "polymer",
-    "elastomer",
-    "foam",
-)
+MATERIAL_GROUPS = ("metal", "mineral", "granular", "soft", "fibrous", "polymer", "elastomer", "foam")
 MATERIAL_GROUPS += ("food", "liquid", "bulk")
 LOSS_CHECKED_GROUPS = ("soft", "fibrous", "polymer", "elastomer", "foam", "food")
 """Groups whose impacts are lost in the bulk: loss and restitution tell of the same."""
@@ -69,9 +55,7 @@ class LibraryProblem:
         return f"{where}{table}{key}{self.what} {self.advice}".strip()
 
 
-def lint_library(
-    text: str, sources: Mapping[str, Any], bases: tuple[str, ...]
-) -> list[LibraryProblem]:
+def lint_library(text: str, sources: Mapping[str, Any], bases: tuple[str, ...]) -> list[LibraryProblem]:
     """Return every mistake in the text of a library; empty when there is none.
 
     Args:
@@ -208,12 +192,7 @@ def _law(found: _ProblemFinder, name: str, row: dict) -> Law | None:
     if "law" not in row:
         found.tell(name, "", "has no law.", f"Add law = one of: {_list(laws)}.")
     elif row["law"] not in laws:
-        found.tell(
-            name,
-            "law",
-            f"{row['law']!r} is not a constitutive law.",
-            f"Write one of: {_list(laws)}.",
-        )
+        found.tell(name, "law", f"{row['law']!r} is not a constitutive law.", f"Write one of: {_list(laws)}.")
     else:
         return Law[row["law"].upper()]
     return None
@@ -228,9 +207,7 @@ def _check_words(found: _ProblemFinder, name: str, row: dict) -> None:
         what = "has no group, so its values cannot be compared with those of similar materials."
         found.tell(name, "", what, f"Add group = one of: {_list(MATERIAL_GROUPS)}.")
     elif isinstance(group, str) and group and group not in MATERIAL_GROUPS:
-        found.tell(
-            name, "group", f"{group!r} is not a group.", f"Write one of: {_list(MATERIAL_GROUPS)}."
-        )
+        found.tell(name, "group", f"{group!r} is not a group.", f"Write one of: {_list(MATERIAL_GROUPS)}.")
 
 
 def _field(found: _ProblemFinder, name: str, key: str) -> str | None:
@@ -263,9 +240,7 @@ def _check_needs(found: _ProblemFinder, name: str, law: Law | None, fields: set[
     spelt = {parse_quantity_key(key)[0]: key for key in example_keys()}
     for field in needs:
         if field not in fields:
-            because = (
-                f" ({law.name.lower()} reads it)" if law and field not in REQUIRED_FIELDS else ""
-            )
+            because = f" ({law.name.lower()} reads it)" if law and field not in REQUIRED_FIELDS else ""
             what = f"has no {QUANTITIES[field].words.lower()}{because}."
             found.tell(name, "", what, f"Add {spelt[field]}.")
     some = () if law is None else CONSTITUTIVE_LAWS[law].needs_one_of
@@ -289,9 +264,7 @@ def _check_cell(found: _ProblemFinder, at: _NumberPlace, cell: Any, known: set[s
         found.tell(at.table, at.key, f"is {cell!r}, not a range.", form)
         return False
     for key in set(cell) - set(RANGE_KEYS):
-        found.tell(
-            at.table, at.key, f"has an unknown entry {key!r}.", f"A range has: {_list(RANGE_KEYS)}."
-        )
+        found.tell(at.table, at.key, f"has an unknown entry {key!r}.", f"A range has: {_list(RANGE_KEYS)}.")
     _check_source(found, at, cell.get("source"), known)
     if "note" in cell and not (isinstance(cell["note"], str) and cell["note"].strip()):
         found.tell(at.table, at.key, f"has the note {cell['note']!r}.", "Write it in words.")
@@ -321,17 +294,13 @@ def _check_sizes(found: _ProblemFinder, row: _MaterialRow, fields: dict[str, _Ra
             found.tell(row.name, cell.key, what, advice)
         elif field == "poisson" and high >= POISSON_LIMIT:
             what = f"reaches {high:g}: 0.5 is incompressible."
-            found.tell(
-                row.name, cell.key, what, "For nearly incompressible materials use 0.49 to 0.499."
-            )
+            found.tell(row.name, cell.key, what, "For nearly incompressible materials use 0.49 to 0.499.")
         elif not cell.unusual:
             doubted = range_doubt(cell.key, (low, high), row.name, row.group, row.law)
             if doubted:
                 found.tell(row.name, cell.key, doubted.what, doubted.advice)
     _check_rebound(found, row, fields)
-    doubted = yield_strain_doubt(
-        {f: c.entries["typical"] * parse_quantity_key(c.key)[1] for f, c in fields.items()}
-    )
+    doubted = yield_strain_doubt({f: c.entries["typical"] * parse_quantity_key(c.key)[1] for f, c in fields.items()})
     if doubted and not any(p.table == row.name for p in found.problems):
         strength, stiffness = fields["yield_stress"], fields["young"]
         if not (strength.unusual or stiffness.unusual):

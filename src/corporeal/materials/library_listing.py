@@ -80,9 +80,7 @@ def _unit(field: str, value: float) -> str:
     return "" if unit == "-" else f" {unit}"
 
 
-def _measured_pairs_text(
-    title: str, key: str, known: Mapping[frozenset[str], dict], entry: MaterialEntry
-) -> list[str]:
+def _measured_pairs_text(title: str, key: str, known: Mapping[frozenset[str], dict], entry: MaterialEntry) -> list[str]:
     """List the measured pairs of this material or its group."""
     rows = []
     for names, row in known.items():
@@ -110,9 +108,9 @@ def materials_json(
 ) -> dict:
     """Return the materials of all parts as plain data, with the grounds of every value [SI].
 
-    A part whose mesh several objects share has ``pieces``; its own values, with which it moves, are
-    those of the piece that matters most, and it weighs what its pieces weigh together. Lengths are
-    those of the real object, whatever its scale in the scene.
+    A part whose mesh several objects share has ``pieces``; its own values, with which it moves, are those of the piece
+    that matters most, and it weighs what its pieces weigh together. Lengths are those of the real object, whatever its
+    scale in the scene.
 
     Args:
         field: What they are made of.
@@ -129,10 +127,7 @@ def materials_json(
     mixtures = {"masses": [_mass_json(m) for m in field.mixtures]} if field.mixtures else {}
     return mixtures | {
         "units": {q.field: q.unit for q in QUANTITIES.values()},
-        "parts": [
-            part | own
-            for part, own in zip(rows_of_parts, heavy or [{}] * len(rows_of_parts), strict=True)
-        ],
+        "parts": [part | own for part, own in zip(rows_of_parts, heavy or [{}] * len(rows_of_parts), strict=True)],
         "friction": field.friction.round(4).tolist(),
         "restitution": field.restitution.round(4).tolist(),
         "order": "rows and columns are the parts in order, then the floor and the walls",
@@ -146,11 +141,7 @@ def _mass_json(mixture: MassPosterior) -> dict:
 
 
 def _part_json(
-    part: Part,
-    material: Material,
-    made: Structure,
-    words: PartDescription,
-    pieces: tuple[PartComponent, ...],
+    part: Part, material: Material, made: Structure, words: PartDescription, pieces: tuple[PartComponent, ...]
 ) -> dict:
     row = {"name": part.name, "object": part.object, "found_by": part.found_by}
     row |= _made_json(material, made, words)
@@ -250,8 +241,5 @@ def _scale(field: str, value: float) -> tuple[float, str]:
 
 def _row(entry: MaterialEntry) -> tuple[str, ...]:
     cells = (entry.ranges.get(field) for field in LISTING_FIELDS)
-    written = (
-        range_text(f, r.low, r.typical, r.high) if r else ""
-        for f, r in zip(LISTING_FIELDS, cells, strict=True)
-    )
+    written = (range_text(f, r.low, r.typical, r.high) if r else "" for f, r in zip(LISTING_FIELDS, cells, strict=True))
     return (entry.name, entry.law.name.lower(), *written)

@@ -1,9 +1,8 @@
 """Relation of loss factor and restitution of balls.
 
-A ball that meets a rigid plane loses in its bulk what its loss factor says. Hereditary Hertz
-contact (Lee and Radok 1960, "The contact problem for viscoelastic bodies"; Ting 1966 for the way
-back) with a loss factor that hardly depends on the frequency gives a restitution that depends on
-that factor alone, whatever the ball's size, speed and stiffness.
+A ball that meets a rigid plane loses in its bulk what its loss factor says. Hereditary Hertz contact (Lee and Radok
+1960, "The contact problem for viscoelastic bodies"; Ting 1966 for the way back) with a loss factor that hardly depends
+on the frequency gives a restitution that depends on that factor alone, whatever the ball's size, speed and stiffness.
 """
 
 from math import exp, log, sqrt

@@ -71,10 +71,7 @@ class QuantityChoice:
         scale = ", logarithmic scale" if is_logarithmic(self.range) else ""
         where = f"place {fraction_of(self.range, self.range.typical):.2f}"
         unit = f" {self.unit}" if self.unit else ""
-        lines = [
-            f"{QUANTITIES[self.field].words}: {low:.6g} to {high:.6g}{unit}{scale}; usually "
-            f"{usual:.6g} ({where})"
-        ]
+        lines = [f"{QUANTITIES[self.field].words}: {low:.6g} to {high:.6g}{unit}{scale}; usually {usual:.6g} ({where})"]
         lines += [f"  - {use}: {a:.6g} to {b:.6g}{unit}" for use, a, b in self.uses]
         return "\n".join(lines)
 
@@ -97,9 +94,7 @@ def _unit(field: str, value: float) -> tuple[float, str]:
     unit = QUANTITIES[field].unit
     if unit == "Pa":
         return next(((f, u) for f, u in PRESSURE_UNITS_PA if value >= f), (1.0, "Pa"))
-    return {"rad": (1 / degrees(1.0), "°"), "m": (1e-3, "mm"), "-": (1.0, "")}.get(
-        unit, (1.0, unit)
-    )
+    return {"rad": (1 / degrees(1.0), "°"), "m": (1e-3, "mm"), "-": (1.0, "")}.get(unit, (1.0, unit))
 
 
 def part_materials_text(library_name: str) -> str:

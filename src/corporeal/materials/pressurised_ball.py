@@ -1,15 +1,14 @@
 """Air sealed behind a wall: inflated balls as soft solids.
 
-A limp skin that is pressed flat by x bears F = p A, with the area A = π (2 R x - x²) of the flat
-and the pressure p of the air behind it. Hertz's force on a solid ball, 4/3 E* √R x^(3/2), is the
-same at x = R/5, a firm bounce, for E = 9 p (ν = 0.2); its contact time is then within 15 % of the
-limp ball's from a light bounce to a kick. On a grid the skin itself would be ten times too thick:
-it would stretch, or dent by itself as stiffly as the air does.
+A limp skin that is pressed flat by x bears F = p A, with the area A = π (2 R x - x²) of the flat and the pressure p of
+the air behind it. Hertz's force on a solid ball, 4/3 E* √R x^(3/2), is the same at x = R/5, a firm bounce, for E = 9 p
+(ν = 0.2); its contact time is then within 15 % of the limp ball's from a light bounce to a kick. On a grid the skin
+itself would be ten times too thick: it would stretch, or dent by itself as stiffly as the air does.
 
 Where the skin dents less easily than the air behind it is pressed (Reissner's k = 4 E t²/(R √(3 (1
-- ν²))) against 2π R p) but is elastic, a racquetball, both are springs side by side, and air bears
-the more of an impact the harder it is: ``equivalent_solid``. What flows when it is dented, a table
-tennis ball, and what leaks, a rubber duck, stays a wall.
+- ν²))) against 2π R p) but is elastic, a racquetball, both are springs side by side, and air bears the more of an
+impact the harder it is: ``equivalent_solid``. What flows when it is dented, a table tennis ball, and what leaks, a
+rubber duck, stays a wall.
 """
 
 from dataclasses import dataclass, replace
@@ -36,8 +35,8 @@ SOLID_BALL_STIFFNESS_RATIO = 0.8
 HEAT_RATIO = 1.4
 """γ of air [-]."""
 INFLATED_BALL_RESTITUTION = 0.8
-"""Of inflated balls on a hard floor [-]: the middle of what rules ask, with the drag of air taken
-off: footballs .82–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
+"""Of inflated balls on a hard floor [-]: the middle of what rules ask, with the drag of air taken off: footballs
+.82–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
 RULED_RESTITUTION_TOLERANCE = 0.04
 """How far from the middle of their range rules let a ball rebound [-]."""
 ESTIMATE_SOURCE = "engineering-estimate"
@@ -71,9 +70,8 @@ def pressed_gauge_pressure(gauge: float, squeeze: float = REFERENCE_SQUEEZE_RATI
 def wall_stiffness(skin: Material, thickness: float, radius: float) -> float:
     """Force over depth where a spherical wall is dented, k = 4 E t²/(R √(3 (1 - ν²))) [N/m].
 
-    Reissner, Stresses and small displacements of shallow spherical shells, J. Math. Phys. 25
-    (1946). A thick wall is dented where it is touched, too: never more than
-    ``SOLID_BALL_STIFFNESS_RATIO`` E R.
+    Reissner, Stresses and small displacements of shallow spherical shells, J. Math. Phys. 25 (1946). A thick wall is
+    dented where it is touched, too: never more than ``SOLID_BALL_STIFFNESS_RATIO`` E R.
     """
     thin = 4.0 * skin.young * thickness**2 / (radius * sqrt(3.0 * (1.0 - skin.poisson**2)))
     return thin / (1.0 + thin / (SOLID_BALL_STIFFNESS_RATIO * skin.young * radius))
@@ -89,9 +87,7 @@ def is_carried_by_air(gauge: float, skin: Material, thickness: float, radius: fl
         radius: Of the ball [m].
 
     """
-    return 2.0 * pi * radius * pressed_gauge_pressure(gauge) > wall_stiffness(
-        skin, thickness, radius
-    )
+    return 2.0 * pi * radius * pressed_gauge_pressure(gauge) > wall_stiffness(skin, thickness, radius)
 
 
 @dataclass(frozen=True)
@@ -118,9 +114,7 @@ class InflatedBall:
     def air_energy(self, squeeze: float) -> float:
         """Return the work on the air inside less that of the air outside [J]."""
         volume, lost = 4.0 / 3.0 * pi * self.radius**3, lost_volume_fraction(squeeze)
-        inside = (ATMOSPHERIC_PRESSURE_PA + self.gauge_pressure) * (
-            (1.0 - lost) ** (1.0 - HEAT_RATIO) - 1.0
-        )
+        inside = (ATMOSPHERIC_PRESSURE_PA + self.gauge_pressure) * ((1.0 - lost) ** (1.0 - HEAT_RATIO) - 1.0)
         return volume * (inside / (HEAT_RATIO - 1.0) - ATMOSPHERIC_PRESSURE_PA * lost)
 
     def squeeze(self, energy: float) -> float:
@@ -147,9 +141,8 @@ class EquivalentSolid:
 def equivalent_solid(ball: InflatedBall, energy: float) -> EquivalentSolid:
     """Young's modulus and loss factor of the solid that resists an impact as wall and air do.
 
-    Hertz's force 4/3 E* √R x^(3/2) is that of wall and air, k x + p A, at the depth at which both
-    have stored the impact (of a light one: at ``REFERENCE_SQUEEZE_RATIO``). Air loses nothing; the
-    wall loses of what it stores.
+    Hertz's force 4/3 E* √R x^(3/2) is that of wall and air, k x + p A, at the depth at which both have stored the
+    impact (of a light one: at ``REFERENCE_SQUEEZE_RATIO``). Air loses nothing; the wall loses of what it stores.
 
     Args:
         ball: What is struck.
@@ -158,15 +151,10 @@ def equivalent_solid(ball: InflatedBall, energy: float) -> EquivalentSolid:
     """
     depth = max(ball.squeeze(energy), REFERENCE_SQUEEZE_RATIO)
     flat = pi * ball.radius**2 * (2.0 * depth - depth**2)
-    force = (
-        ball.spring * depth * ball.radius
-        + pressed_gauge_pressure(ball.gauge_pressure, depth) * flat
-    )
+    force = ball.spring * depth * ball.radius + pressed_gauge_pressure(ball.gauge_pressure, depth) * flat
     plane = force / (4.0 / 3.0 * ball.radius**2 * depth**1.5)
     wall, air = ball.wall_energy(depth), ball.air_energy(depth)
-    return EquivalentSolid(
-        plane * (1.0 - SEALED_AIR_POISSON_RATIO**2), ball.skin.loss * wall / (wall + air)
-    )
+    return EquivalentSolid(plane * (1.0 - SEALED_AIR_POISSON_RATIO**2), ball.skin.loss * wall / (wall + air))
 
 
 def inflated_ball_material(ball: InflatedBall) -> Material:
@@ -183,9 +171,7 @@ def inflated_ball_material(ball: InflatedBall) -> Material:
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "as of a ball full of air"),
         "density": _ground(density, density, density, "air at this pressure"),
         "restitution": _ground(0.0, bounces, 1.0, "the wall's share of the loss"),
-        "loss": _ground(
-            0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"
-        ),
+        "loss": _ground(0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"),
     }
     return _material(f"air at {ball.gauge_pressure / 1e3:.3g} kPa behind {skin.name}", values)
 
@@ -202,13 +188,9 @@ def sealed_air_material(gauge: float) -> Material:
     why = f"a limp ball at {gauge / 1e3:.3g} kPa presses as a solid of nine times the pressure does"
     values = {
         "young": _ground(0.85 * young, young, 1.15 * young, why),
-        "poisson": _ground(
-            0.1, SEALED_AIR_POISSON_RATIO, 0.3, "air lets itself be pressed together"
-        ),
+        "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "air lets itself be pressed together"),
         "density": _ground(density, density, density, "air at this pressure"),
-        "restitution": _ground(
-            0.73, INFLATED_BALL_RESTITUTION, 0.88, "what rules of sports ask of inflated balls"
-        ),
+        "restitution": _ground(0.73, INFLATED_BALL_RESTITUTION, 0.88, "what rules of sports ask of inflated balls"),
         "loss": _ground(
             loss_of_restitution(0.88),
             loss_of_restitution(INFLATED_BALL_RESTITUTION),
@@ -222,9 +204,8 @@ def sealed_air_material(gauge: float) -> Material:
 def sealed_wall_material(skin: Material) -> Material:
     """Let a sealed wall that is struck too lightly to be seen to flex rebound as its bulk does.
 
-    A material's restitution is that of solid bodies whose point of contact yields. A closed wall is
-    dented over a wide place instead, and gives back what its loss factor leaves. One that a person
-    stated stays.
+    A material's restitution is that of solid bodies whose point of contact yields. A closed wall is dented over a wide
+    place instead, and gives back what its loss factor leaves. One that a person stated stays.
     """
     if is_stated_by_person(skin, "restitution"):
         return skin
@@ -239,8 +220,8 @@ def sealed_wall_material(skin: Material) -> Material:
 def solid_with_ruled_restitution(material: Material, rebound: float | None) -> Material:
     """Let a solid ball that is struck as a rigid body rebound as its rules ask, if there are any.
 
-    Its loss factor stays: what is hard does not lose its rebound in its bulk. A restitution that a
-    person stated stays, too.
+    Its loss factor stays: what is hard does not lose its rebound in its bulk. A restitution that a person stated stays,
+    too.
 
     Args:
         material: What it is made of.

@@ -74,9 +74,7 @@ def parse_quantity_key(key: str) -> tuple[str, float]:
         field = FIELD_OF_KEY_STEM.get(stem, stem)
         if stem != key and field in QUANTITIES and QUANTITIES[field].unit == unit:
             return field, factor
-    raise UserError(
-        f"Unknown quantity {key!r}. The unit is in the key: {', '.join(example_keys())}."
-    )
+    raise UserError(f"Unknown quantity {key!r}. The unit is in the key: {', '.join(example_keys())}.")
 
 
 def example_keys() -> list[str]:

@@ -15,12 +15,7 @@ from corporeal.core.errors import UnknownChoiceError
 from corporeal.core.types import WALLED_KINDS, MeasuredRange, PartDescription, RangePlacement
 from corporeal.materials.library import find_material, library, library_counterpart
 from corporeal.materials.library_entry import MaterialEntry
-from corporeal.materials.material_candidates import (
-    QuantityChoice,
-    fraction_of,
-    quantity_choice,
-    value_at_fraction,
-)
+from corporeal.materials.material_candidates import QuantityChoice, fraction_of, quantity_choice, value_at_fraction
 
 CONSISTENCY_RATIO = 1.5
 """By what factor a set may leave what the grades have."""
@@ -71,14 +66,10 @@ def value_contradictions(
     return found
 
 
-def _clause(
-    bond: QuantityBond, ranges: Mapping[str, MeasuredRange], values: Mapping[str, float]
-) -> str:
+def _clause(bond: QuantityBond, ranges: Mapping[str, MeasuredRange], values: Mapping[str, float]) -> str:
     strong, by = ranges[bond.strong], ranges[bond.by]
     ratio = values[bond.strong] / values[bond.by] ** bond.power
-    grades = [
-        getattr(strong, end) / getattr(by, end) ** bond.power for end in ("low", "typical", "high")
-    ]
+    grades = [getattr(strong, end) / getattr(by, end) ** bond.power for end in ("low", "typical", "high")]
     low, high = min(grades) / CONSISTENCY_RATIO, max(grades) * CONSISTENCY_RATIO
     if low <= ratio <= high:
         return ""
@@ -90,15 +81,7 @@ def _clause(
     )
 
 
-PLACED_FIELDS = (
-    "young",
-    "poisson",
-    "density",
-    "yield_stress",
-    "friction_angle",
-    "cohesion",
-    "shell_thickness",
-)
+PLACED_FIELDS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion", "shell_thickness")
 """Fields of ``Material`` that use and treatment decide; the others keep their usual value."""
 MASS_FIELDS = ("density", "shell_thickness")
 """Those of them that a mass hangs on."""
@@ -110,9 +93,7 @@ CONTENTS_DENSITY_FIELD = "contents_density"
 def library_entry(name: str, library_name: str = "default") -> MaterialEntry:
     """Look a material up; a smaller library gives what stands for it there."""
     entries = library(library_name)
-    return (
-        entries[name] if name in entries else library_counterpart(find_material(name), library_name)
-    )
+    return entries[name] if name in entries else library_counterpart(find_material(name), library_name)
 
 
 def contents_entry(name: str, library_name: str = "default") -> MaterialEntry:
@@ -147,14 +128,10 @@ def quantity_choices(
     walled = words.structure in WALLED_KINDS and words.thickness is None
     placed = MASS_FIELDS if weighing else PLACED_FIELDS
     fields = [f for f in placed if f in entry.ranges and (walled or f != "shell_thickness")]
-    offered = {
-        f: quantity_choice(entry.name, f, entry.ranges[f]) for f in fields if f not in words.values
-    }
+    offered = {f: quantity_choice(entry.name, f, entry.ranges[f]) for f in fields if f not in words.values}
     if words.contents is not None:
         inside = contents_entry(words.contents, library_name)
-        offered[CONTENTS_DENSITY_FIELD] = quantity_choice(
-            inside.name, "density", inside.ranges["density"]
-        )
+        offered[CONTENTS_DENSITY_FIELD] = quantity_choice(inside.name, "density", inside.ranges["density"])
     return {f: c for f, c in offered.items() if c.range.low < c.range.high}
 
 
@@ -168,18 +145,14 @@ class QuantityJudgement:
 
 
 def placements_from_fractions(
-    judged: Mapping[str, QuantityJudgement],
-    by: PlacementSource,
-    offered: Mapping[str, QuantityChoice],
+    judged: Mapping[str, QuantityJudgement], by: PlacementSource, offered: Mapping[str, QuantityChoice]
 ) -> dict[str, RangePlacement]:
     """Take fractions, each with its reason, as they are."""
     return {f: RangePlacement(j.number, by, j.reason) for f, j in judged.items() if f in offered}
 
 
 def placements_from_values(
-    judged: Mapping[str, QuantityJudgement],
-    by: PlacementSource,
-    offered: Mapping[str, QuantityChoice],
+    judged: Mapping[str, QuantityJudgement], by: PlacementSource, offered: Mapping[str, QuantityChoice]
 ) -> dict[str, RangePlacement]:
     """Find the place of values, each in the unit that was offered and with its reason."""
     placed = {}
@@ -192,10 +165,7 @@ def placements_from_values(
 
 def usual_placements(offered: Mapping[str, QuantityChoice], why: str) -> dict[str, RangePlacement]:
     """Place everything where it usually lies, because no model could be asked."""
-    return {
-        f: RangePlacement(fraction_of(c.range, c.range.typical), "fallback", why)
-        for f, c in offered.items()
-    }
+    return {f: RangePlacement(fraction_of(c.range, c.range.typical), "fallback", why) for f, c in offered.items()}
 
 
 def placed_wall_thickness(words: PartDescription, library_name: str = "default") -> float | None:
@@ -203,9 +173,7 @@ def placed_wall_thickness(words: PartDescription, library_name: str = "default")
     placed = words.placements.get("shell_thickness")
     if words.material is None or placed is None or placed.chosen_by == "fallback":
         return None
-    return value_at_fraction(
-        library_entry(words.material, library_name).ranges["shell_thickness"], placed.fraction
-    )
+    return value_at_fraction(library_entry(words.material, library_name).ranges["shell_thickness"], placed.fraction)
 
 
 def placement_contradictions(
@@ -213,15 +181,11 @@ def placement_contradictions(
 ) -> dict[str, str]:
     """Return which of a part's values do not fit each other: field → why, in a clause.
 
-    Only placed or stated values can be corrected: what was not asked of a way, as the stiffness of
-    all but the likeliest, contradicts nothing.
+    Only placed or stated values can be corrected: what was not asked of a way, as the stiffness of all but the
+    likeliest, contradicts nothing.
     """
     if words.material is None:
         return {}
     entry = library_entry(words.material, library_name)
-    chosen = {
-        f: value_at_fraction(r, placements[f].fraction)
-        for f, r in entry.ranges.items()
-        if f in placements
-    }
+    chosen = {f: value_at_fraction(r, placements[f].fraction) for f, r in entry.ranges.items() if f in placements}
     return value_contradictions(entry.group, entry.ranges, chosen | words.values)

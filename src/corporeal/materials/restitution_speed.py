@@ -1,8 +1,8 @@
 """How restitution falls with the speed of an impact.
 
-Two laws, by what takes the energy. A wound, foamed or rubber ball loses more of a harder impact, in
-proportion to its speed: e(v) = e_r - s (v - v_r), with the speed v_r at which its restitution was
-rated. A metal yields where it is struck: e ∝ v^(-1/4) (Johnson, Contact Mechanics, 1985, §11.5).
+Two laws, by what takes the energy. A wound, foamed or rubber ball loses more of a harder impact, in proportion to its
+speed: e(v) = e_r - s (v - v_r), with the speed v_r at which its restitution was rated. A metal yields where it is
+struck: e ∝ v^(-1/4) (Johnson, Contact Mechanics, 1985, §11.5).
 """
 
 import tomllib
@@ -64,9 +64,7 @@ def material_at_speed(material: Material, speed: float) -> Material:
     if not is_stated_by_person(material, "restitution"):
         changed["restitution"] = _bound_restitution(material.restitution + gained)
     if not is_stated_by_person(material, "loss"):
-        changed["loss"] = loss_of_restitution(
-            _bound_restitution(restitution_of_loss(material.loss) + gained)
-        )
+        changed["loss"] = loss_of_restitution(_bound_restitution(restitution_of_loss(material.loss) + gained))
     return replace(material, **changed)
 
 
@@ -78,8 +76,8 @@ def plane_strain_compliance(material: Material) -> float:
 def yield_restitution(a: Material, b: Material, speed: float) -> float:
     """Restitution of two bodies of which at least one yields where it is struck [-], at most 1.
 
-    e = 3.8 (Y/E*)^(1/2) (½ m v²/Y R³)^(-1/8) of a ball (Johnson, Contact Mechanics, 1985, eq.
-    11.43; recalled), with the yield stress Y of the weaker and ½ m v²/Y R³ = 2/3 π ρ v²/Y.
+    e = 3.8 (Y/E*)^(1/2) (½ m v²/Y R³)^(-1/8) of a ball (Johnson, Contact Mechanics, 1985, eq. 11.43; recalled), with
+    the yield stress Y of the weaker and ½ m v²/Y R³ = 2/3 π ρ v²/Y.
 
     Args:
         a: One material.

@@ -23,9 +23,7 @@ class ValueDoubt:
     advice: str
 
 
-def range_doubt(
-    key: str, span: tuple[float, float], name: str, group: str, law: Law | None
-) -> ValueDoubt | None:
+def range_doubt(key: str, span: tuple[float, float], name: str, group: str, law: Law | None) -> ValueDoubt | None:
     """Describe what is implausible about a range and what to do, or None.
 
     Args:
@@ -71,9 +69,7 @@ def default_namesake(name: str) -> MaterialEntry | None:
     return None
 
 
-def _expected_bounds(
-    field: str, name: str, group: str, law: Law | None
-) -> tuple[tuple[float, float], str]:
+def _expected_bounds(field: str, name: str, group: str, law: Law | None) -> tuple[tuple[float, float], str]:
     """Return what may be true of ``field``, and of whom that was learnt."""
     quantity = QUANTITIES[field]
     world = (quantity.low, quantity.high)
@@ -84,22 +80,15 @@ def _expected_bounds(
         return world, "anything in this world"
     ranges = [entry.ranges[field] for entry in alike]
     low, high = min(r.low for r in ranges), max(r.high for r in ranges)
-    return (
-        max(low / PLAUSIBLE_RANGE_FACTOR, world[0]),
-        min(high * PLAUSIBLE_RANGE_FACTOR, world[1]),
-    ), whose
+    return (max(low / PLAUSIBLE_RANGE_FACTOR, world[0]), min(high * PLAUSIBLE_RANGE_FACTOR, world[1])), whose
 
 
-def _similar_materials(
-    field: str, name: str, group: str, law: Law | None
-) -> tuple[list[MaterialEntry], str]:
+def _similar_materials(field: str, name: str, group: str, law: Law | None) -> tuple[list[MaterialEntry], str]:
     """Return the namesake in the default library; else those of its group and law."""
     own = default_namesake(name)
     if own and field in own.ranges:
         return [own], f"our {own.name}"
-    alike = [
-        e for e in shipped_library("default").values() if group and (e.group, e.law) == (group, law)
-    ]
+    alike = [e for e in shipped_library("default").values() if group and (e.group, e.law) == (group, law)]
     return [e for e in alike if field in e.ranges], f"any {group}"
 
 

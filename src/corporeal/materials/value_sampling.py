@@ -1,9 +1,9 @@
 """Sampling of consistent material values from the measured ranges.
 
-A value is drawn from a triangle on its range's own scale, whose peak is the chosen value. It spans
-the whole range if none was chosen, half of the way to either end where a model did, and nothing
-where a person stated it. Within one material the stiffer grade is also the stronger, and in porous
-and granular material the denser; what is of one material in one object is of one grade.
+A value is drawn from a triangle on its range's own scale, whose peak is the chosen value. It spans the whole range if
+none was chosen, half of the way to either end where a model did, and nothing where a person stated it. Within one
+material the stiffer grade is also the stronger, and in porous and granular material the denser; what is of one material
+in one object is of one grade.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,13 +33,7 @@ from corporeal.materials.library_entry import MaterialEntry
 from corporeal.materials.material_candidates import fraction_of, value_at_fraction
 from corporeal.materials.range_placement import CONTENTS_DENSITY_FIELD, library_entry
 
-RANGE_SPAN_OF_SOURCE = {
-    "typical": 1.0,
-    "fallback": 1.0,
-    "model": 0.5,
-    "recording": 0.5,
-    "annotation": 0.0,
-}
+RANGE_SPAN_OF_SOURCE = {"typical": 1.0, "fallback": 1.0, "model": 0.5, "recording": 0.5, "annotation": 0.0}
 RANGE_SPAN_OF_SOURCE |= {"field": 0.0}
 """How far towards the ends of its range a value is drawn, by who chose it."""
 GRADE_CORRELATION = 0.9
@@ -59,9 +53,9 @@ SHARE_LOG_STD = 0.2
 MAX_MOUTH_INFLATION_PA = 10_000.0
 """What a person can blow up without a pump, above the air around [Pa]: lungs press no harder."""
 NAMED_WALL_LOG_STD = 0.45
-"""Standard deviation of the logarithm of a wall that is only usual of objects of that name: half
-the interquartile range of what 62 named objects weigh in reality over what they weighed with such
-walls, in deviations (.46); the median distance of 11 of published mass gives .43 (decision mass-by-name).
+"""Standard deviation of the logarithm of a wall that is only usual of objects of that name: half the interquartile
+range of what 62 named objects weigh in reality over what they weighed with such walls, in deviations (.46); the median
+distance of 11 of published mass gives .43 (decision mass-by-name).
 """
 MAX_INNER_VOLUME_FRACTION = 0.99
 """Of what encloses them, all that lies inside takes up at most [-]."""
@@ -79,21 +73,16 @@ def triangular_quantile(quantile: float, low: float, peak: float, high: float) -
 def draw_hypotheses(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
     """Sample a hypothesis for every part by their probabilities.
 
-    Ways that share a reading of the object ("imitation") are drawn together. Unrecognised parts may
-    be of any of the library's materials. Where several answers were given, one of them is drawn
-    first, since its ways and its values fit each other.
+    Ways that share a reading of the object ("imitation") are drawn together. Unrecognised parts may be of any of the
+    library's materials. Where several answers were given, one of them is drawn first, since its ways and its values fit
+    each other.
     """
-    return replace(
-        inventory,
-        objects=tuple(_draw_object(thing, rng, library) for thing in inventory.objects),
-    )
+    return replace(inventory, objects=tuple(_draw_object(thing, rng, library) for thing in inventory.objects))
 
 
 def take_answer(inventory: Inventory, number: int) -> Inventory:
     """Let every object be as one of the answers about it says; they are taken in turn."""
-    return replace(
-        inventory, objects=tuple(_with_answer(thing, number) for thing in inventory.objects)
-    )
+    return replace(inventory, objects=tuple(_with_answer(thing, number) for thing in inventory.objects))
 
 
 def _with_answer(thing: ObjectDescription, number: int) -> ObjectDescription:
@@ -103,9 +92,7 @@ def _with_answer(thing: ObjectDescription, number: int) -> ObjectDescription:
     return replace(thing, parts=account.parts, answers=())
 
 
-def _draw_object(
-    thing: ObjectDescription, rng: np.random.Generator, library: str
-) -> ObjectDescription:
+def _draw_object(thing: ObjectDescription, rng: np.random.Generator, library: str) -> ObjectDescription:
     if thing.answers:
         thing = _with_answer(thing, int(rng.integers(len(thing.answers))))
     read = ""  # the reading that the first part of the object to have any was drawn with
@@ -154,11 +141,7 @@ def _substitute_material(words: PartDescription, name: str, library: str) -> Par
     walled = words.structure in WALLED_KINDS and words.thickness is None
     if walled and "shell_thickness" not in library_entry(name, library).ranges:
         return words
-    kept = {
-        f: p
-        for f, p in words.placements.items()
-        if f in ("shell_thickness", CONTENTS_DENSITY_FIELD)
-    }
+    kept = {f: p for f, p in words.placements.items() if f in ("shell_thickness", CONTENTS_DENSITY_FIELD)}
     reason = f"It may be {name} instead of something unknown."
     return replace(words, material=name, placements=kept, values={}, reason=reason)
 
@@ -204,26 +187,17 @@ def sample_material_field(
 
     """
     grades = GradeDraws(rng, {})
-    made = [
-        _draw_material(m, owner, grades, library)
-        for m, owner in zip(field.materials, object_of_part, strict=True)
-    ]
+    made = [_draw_material(m, owner, grades, library) for m, owner in zip(field.materials, object_of_part, strict=True)]
     words = tuple(
-        _draw_shares(_draw_wall(w, owner, grades), rng)
-        for w, owner in zip(field.words, object_of_part, strict=True)
+        _draw_shares(_draw_wall(w, owner, grades), rng) for w, owner in zip(field.words, object_of_part, strict=True)
     )
     structures = tuple(
         _draw_structure(s, m, w, owner, grades, library)
         for s, m, w, owner in zip(field.structures, made, words, object_of_part, strict=True)
     )
     pieces = tuple(
-        tuple(
-            _draw_piece(p, piece, owner, grades, library)
-            for p, piece in zip(group, w.pieces, strict=True)
-        )
-        for group, w, owner in zip(
-            field.pieces or ((),) * len(made), words, object_of_part, strict=True
-        )
+        tuple(_draw_piece(p, piece, owner, grades, library) for p, piece in zip(group, w.pieces, strict=True))
+        for group, w, owner in zip(field.pieces or ((),) * len(made), words, object_of_part, strict=True)
     )
     ground = library_entry(floor, library)
     bodies = [*made, _draw_material(ground.pick(ground.typical()), -1, grades, library)]
@@ -234,9 +208,7 @@ def sample_material_field(
         structures=structures,
         words=words,
         friction=_draw_friction(field, entries, grades),
-        restitution=_draw_restitution(
-            [ImpactBody(*s) for s in zip(entries, bodies, solid, strict=True)], grades
-        ),
+        restitution=_draw_restitution([ImpactBody(*s) for s in zip(entries, bodies, solid, strict=True)], grades),
         pieces=pieces if field.pieces else (),
         floor=bodies[-1],
     )
@@ -245,12 +217,7 @@ def sample_material_field(
 def _draw_material(material: Material, owner: int, grades: GradeDraws, library: str) -> Material:
     porous = _material_group(material.name, library) in POROUS_GROUPS
     grounds = {
-        f: _draw_ground(
-            g,
-            grades.quantile(
-                owner, material.name, f, f in GRADE_FIELDS or _is_porous_density(f, porous)
-            ),
-        )
+        f: _draw_ground(g, grades.quantile(owner, material.name, f, f in GRADE_FIELDS or _is_porous_density(f, porous)))
         for f, g in material.grounds.items()
     }
     return replace(material, grounds=grounds, **{f: g.value for f, g in grounds.items()})
@@ -279,12 +246,7 @@ def _value_at_quantile(r: MeasuredRange, chosen: float, quantile: float, span: f
 
 
 def _draw_structure(
-    structure: Structure,
-    material: Material,
-    words: PartDescription,
-    owner: int,
-    grades: GradeDraws,
-    library: str,
+    structure: Structure, material: Material, words: PartDescription, owner: int, grades: GradeDraws, library: str
 ) -> Structure:
     if structure.inflated:  # its air is as rules and makers ask, and no material of a library
         return replace(structure, thickness=words.thickness or structure.thickness)
@@ -356,9 +318,7 @@ def _draw_shares(words: PartDescription, rng: np.random.Generator) -> PartDescri
     return replace(words, pieces=pieces)
 
 
-def _draw_friction(
-    field: MaterialField, entries: Sequence[MaterialEntry], grades: GradeDraws
-) -> np.ndarray:
+def _draw_friction(field: MaterialField, entries: Sequence[MaterialEntry], grades: GradeDraws) -> np.ndarray:
     """Draw the friction of every pair in its published range; what a person stated stays."""
     stated = [_is_friction_stated(m.grounds) for m in field.materials] + [False]
     drawn = np.array(field.friction)

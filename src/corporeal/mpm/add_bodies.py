@@ -45,10 +45,7 @@ def adopt_running_conditions(problem: Problem, running: Problem) -> Problem:
         running: What was simulated until now.
 
     """
-    blown = [
-        replace(body, wind=old.wind)
-        for body, old in zip(problem.bodies, running.bodies, strict=False)
-    ]
+    blown = [replace(body, wind=old.wind) for body, old in zip(problem.bodies, running.bodies, strict=False)]
     return replace(
         problem,
         bodies=(*blown, *problem.bodies[len(blown) :]),

@@ -1,7 +1,7 @@
 """Bodies that come to a running problem, or break: an engine is followed by another one.
 
-An engine says how it is built anew and what it takes over of the one before. What is the same in
-all of them is here: the problem after it, who is whole, what stays held, what is booked.
+An engine says how it is built anew and what it takes over of the one before. What is the same in all of them is here:
+the problem after it, who is whole, what stays held, what is booked.
 """
 
 from abc import abstractmethod
@@ -47,6 +47,6 @@ class EngineBodyChanges(EngineInteraction):
     def _successor(self, problem: Problem, change: BodyChange) -> Self:
         """Build an engine of the same kind and options that goes on from here.
 
-        Its time, steps, books and the bodies that are whole are as here. All other bodies are where
-        the problem says, nothing is held, and contacts are looked for anew in the next step.
+        Its time, steps, books and the bodies that are whole are as here. All other bodies are where the problem says,
+        nothing is held, and contacts are looked for anew in the next step.
         """

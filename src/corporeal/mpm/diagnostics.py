@@ -1,8 +1,7 @@
 """Diagnostics of all engines: current particles, and sums of the ledger.
 
-An engine gives its particles and their sums, as it keeps them. What is the same in all of them is
-here: rigid bodies, which are known better than their particles, the energy in springs, and the
-books.
+An engine gives its particles and their sums, as it keeps them. What is the same in all of them is here: rigid bodies,
+which are known better than their particles, the energy in springs, and the books.
 """
 
 from abc import ABC, abstractmethod
@@ -62,8 +61,8 @@ class BodySums:
     ) -> "BodySums":
         """Add up particles.
 
-        L = Σ m (x × v + dx²/4 axial(C)), E = ½ Σ m (|v|² + dx²/4 ‖C‖²): a particle's affine motion
-        is that of its quadratic spline (Jiang et al. 2015).
+        L = Σ m (x × v + dx²/4 axial(C)), E = ½ Σ m (|v|² + dx²/4 ‖C‖²): a particle's affine motion is that of its
+        quadratic spline (Jiang et al. 2015).
 
         Args:
             matter: What never changes of them.

@@ -1,8 +1,7 @@
 """External interaction with bodies between two advances.
 
-An engine says how it changes velocities, takes grips and places bodies. What is the same in all of
-them is here: what an impact does, what takes hold of what, what a start from another engine's state
-takes over, and what is booked of it.
+An engine says how it changes velocities, takes grips and places bodies. What is the same in all of them is here: what
+an impact does, what takes hold of what, what a start from another engine's state takes over, and what is booked of it.
 """
 
 from abc import abstractmethod
@@ -46,9 +45,7 @@ class EngineInteraction(EngineReadout):
             self._add_velocity(body, hold.particle, hold.share[:, None] * given / mass[:, None])
         self._enter(body, given, float(self.measure().kinetic[body] - before))
 
-    def attach_spring(
-        self, body: int, point: Vector | None, target: Vector, stiffness: float
-    ) -> None:
+    def attach_spring(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
         """Pull on a body by a spring until released: see ``problem.InteractiveEngine``."""
         check_grip(self.problem, body, point, target)
         hold = None if point is None else self._hold(body, point)
@@ -56,9 +53,7 @@ class EngineInteraction(EngineReadout):
         self.grips = updated_grips(self.grips, body, hold, np.array(target), stiffness, total)
         self._take_grips()
 
-    def grip_point(
-        self, body: int, position: Float[np.ndarray, "P 3"]
-    ) -> Float[np.ndarray, "3"] | None:
+    def grip_point(self, body: int, position: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "3"] | None:
         """Where a body is held now [m], or None: see ``problem.InteractiveEngine``."""
         if body not in self.grips:
             return None
@@ -100,15 +95,11 @@ class EngineInteraction(EngineReadout):
     # ------------------------------------------------------------ accessors
 
     @abstractmethod
-    def _add_velocity(
-        self, body: int, particle: Int[np.ndarray, " H"], gained: Float[np.ndarray, "H 3"]
-    ) -> None:
+    def _add_velocity(self, body: int, particle: Int[np.ndarray, " H"], gained: Float[np.ndarray, "H 3"]) -> None:
         """Add to the velocities [m/s] of some particles of a body that bends."""
 
     @abstractmethod
-    def _add_momentum(
-        self, body: int, momentum: Float[np.ndarray, "3"], angular: Float[np.ndarray, "3"]
-    ) -> None:
+    def _add_momentum(self, body: int, momentum: Float[np.ndarray, "3"], angular: Float[np.ndarray, "3"]) -> None:
         """Add to the momentum [N s] of a rigid body, and to that about its centre [N m s]."""
 
     @abstractmethod

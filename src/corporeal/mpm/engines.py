@@ -37,9 +37,7 @@ def engine_class(engine: str) -> type[Engine]:
     return registry.load_backend("engine", engine, ENGINES)
 
 
-def build_engine(
-    problem: Problem, engine: str = DEFAULT_ENGINE, threads: int | None = None
-) -> Engine:
+def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE, threads: int | None = None) -> Engine:
     """Return an engine at time 0 of a problem.
 
     Args:
@@ -77,6 +75,5 @@ def require_of_class(engine: type[Engine], capability: type) -> None:
     """
     if not issubclass(engine, capability):
         raise UserError(
-            f"The engine {engine.name!r} cannot {CAPABILITIES[capability]}. "
-            f"Use the engine {DEFAULT_ENGINE}."
+            f"The engine {engine.name!r} cannot {CAPABILITIES[capability]}. Use the engine {DEFAULT_ENGINE}."
         )

@@ -27,8 +27,7 @@ class EngineLedger:
     plastic_loss: Float[np.ndarray, ""]
     """[J]"""
     viscous_loss: Float[np.ndarray, ""]
-    """Taken by joints' dampers, and the work on Maxwell branches: what they hold now is no loss
-    [J]."""
+    """Taken by joints' dampers, and the work on Maxwell branches: what they hold now is no loss [J]."""
     first_contact: Float[np.ndarray, "N N"]
     """[s]; nan: none yet."""
     last_contact: Float[np.ndarray, "N N"]

@@ -1,7 +1,7 @@
 """Table of substances, shared by all engines.
 
-What a problem says of each particle (E, ν, σ_y, φ, c …) becomes here, once, the numbers that laws
-and loops read (μ, λ, the cone, the FLIP damping rate …). Particles carry the number of a row.
+What a problem says of each particle (E, ν, σ_y, φ, c …) becomes here, once, the numbers that laws and loops read (μ, λ,
+the cone, the FLIP damping rate …). Particles carry the number of a row.
 """
 
 from dataclasses import dataclass, fields
@@ -57,8 +57,8 @@ class MaterialTable:
     fast_time: Float[np.ndarray, " M"]
     """T of the faster one [s]"""
     flip_damping_rate: Float[np.ndarray, " M"]
-    """Rate at which what the grid cannot see is forgotten [1/s]: one for all that share the
-    particle's field, or momentum would not be kept; ``VAST`` where APIC is kept."""
+    """Rate at which what the grid cannot see is forgotten [1/s]: one for all that share the particle's field, or
+    momentum would not be kept; ``VAST`` where APIC is kept."""
     density: Float[np.ndarray, " M"]
     """ρ [kg/m³]"""
     rigid: Bool[np.ndarray, " M"]
@@ -210,14 +210,10 @@ def _refuse_unknown(body: Body) -> None:
     unknown = sorted(set(np.unique(body.law).tolist()) - {law.value for law in Law})
     if unknown:
         menu = ", ".join(f"{law.value} ({law.name.lower()})" for law in Law)
-        raise SimulationError(
-            f"{body.name!r} has the unknown law {unknown[0]}. Give one of: {menu}."
-        )
+        raise SimulationError(f"{body.name!r} has the unknown law {unknown[0]}. Give one of: {menu}.")
 
 
-def _unique_rows(
-    rows: Float[np.ndarray, "P C"],
-) -> tuple[Float[np.ndarray, "M C"], Int[np.ndarray, " P"]]:
+def _unique_rows(rows: Float[np.ndarray, "P C"]) -> tuple[Float[np.ndarray, "M C"], Int[np.ndarray, " P"]]:
     """Different rows, and which of them each row is; neighbours are mostly equal."""
     new = np.r_[True, (rows[1:] != rows[:-1]).any(axis=1)]
     unique, index = np.unique(rows[new], axis=0, return_inverse=True)

@@ -4,8 +4,8 @@
     rows = np.zeros(4, TETHER.dtype)
     text = TETHER.text
 
-What Python and the C++ compiler make of a declaration is asserted by the compiler for the size, and
-by a test for every member.
+What Python and the C++ compiler make of a declaration is asserted by the compiler for the size, and by a test for every
+member.
 """
 
 import re
@@ -30,16 +30,13 @@ _MEMBER_PATTERN = re.compile(r"(?P<kind>\w[\w ]*\w)(?P<pointer> \*)?(?P<shape>(\
 class NativeRecord:
     """One struct: its name, its layout in NumPy, and its text in C++."""
 
-    def __init__(
-        self, name: str, *rows: tuple[str, str], within: Sequence["NativeRecord"] = ()
-    ) -> None:
+    def __init__(self, name: str, *rows: tuple[str, str], within: Sequence["NativeRecord"] = ()) -> None:
         """Declare a struct.
 
         Args:
             name: In C++.
-            rows: Its members in order: a type, and the names of the members that have it. A type is
-                one of ``NUMPY_TYPE_NAMES`` or of ``within``, or anything followed by `` *``;
-                ``[n]`` after it makes arrays.
+            rows: Its members in order: a type, and the names of the members that have it. A type is one of
+                ``NUMPY_TYPE_NAMES`` or of ``within``, or anything followed by `` *``; ``[n]`` after it makes arrays.
             within: Records that are members of this one.
 
         Raises:
@@ -48,18 +45,12 @@ class NativeRecord:
         """
         self.name = name
         inner = NUMPY_TYPE_NAMES | {record.name: record.dtype for record in within}
-        members = [
-            (member, *_parsed_member(kind, inner))
-            for kind, names in rows
-            for member in names.split()
-        ]
+        members = [(member, *_parsed_member(kind, inner)) for kind, names in rows for member in names.split()]
         self.dtype = np.dtype(members, align=True)
         self.text = _struct_text(name, rows, self.dtype)
 
 
-def _parsed_member(
-    kind: str, inner: dict[str, str | np.dtype]
-) -> tuple[str | np.dtype, tuple[int, ...]]:
+def _parsed_member(kind: str, inner: dict[str, str | np.dtype]) -> tuple[str | np.dtype, tuple[int, ...]]:
     """Type and shape of a member in NumPy."""
     found = _MEMBER_PATTERN.fullmatch(kind)
     if found is None or not (found["pointer"] or found["kind"] in inner):

@@ -102,9 +102,7 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
-    curvature: Float[np.ndarray, "S2 Columns"] = field(
-        default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
-    )
+    curvature: Float[np.ndarray, "S2 Columns"] = field(default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS)))
     """How the surface curves at those points, see ``types.CURVATURE_COLUMNS``; none: they are corners."""
     wetted_surface: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
@@ -158,19 +156,19 @@ class Problem:
     courant: float = COURANT
     """Largest fraction of a cell that a wave may cross in one step."""
     bonds: tuple[tuple[int, int], ...] = ()
-    """Rigid inclusions: (inclusion, soft), a rigid and a deformable body of one object. The first holds
-    what of the soft body lies inside it, and the two are never in contact."""
+    """Rigid inclusions: (inclusion, soft), a rigid and a deformable body of one object. The first holds what of the
+    soft body lies inside it, and the two are never in contact."""
     joints: tuple[Joint, ...] = ()
     """Between rigid bodies."""
     excluded_pairs: tuple[tuple[int, int], ...] = ()
     """Bodies of one object that are never in contact with each other."""
     rolling_resistance: Float[np.ndarray, "BW BW"] | None = None
-    """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
-    on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
+    """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling on planes and rigid
+    bodies. Symmetric; None: nothing brakes what rolls."""
     restitution_law: Float[np.ndarray, "BW BW 5"] | None = None
-    """How e of every pair changes with the speed of an impact: at which it is ``restitution``
-    [m/s], slope [s/m], exponent [-], least and most: see ``physics.impact_support.restitution_at_speed``. None: it is
-    the same at all speeds.
+    """How e of every pair changes with the speed of an impact: at which it is ``restitution`` [m/s], slope [s/m],
+    exponent [-], least and most: see ``physics.impact_support.restitution_at_speed``. None: it is the same at all
+    speeds.
     """
 
     @property
@@ -189,11 +187,7 @@ class Problem:
     @property
     def has_rolling_resistance(self) -> bool:
         """Whether anything brakes what rolls."""
-        return (
-            self.contact == "multi"
-            and self.rolling_resistance is not None
-            and bool(self.rolling_resistance.any())
-        )
+        return self.contact == "multi" and self.rolling_resistance is not None and bool(self.rolling_resistance.any())
 
 
 @dataclass(frozen=True)
@@ -247,8 +241,8 @@ class Diagnostics:
     friction_loss: float
     """[J]"""
     impact_loss: float
-    """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of
-    the grid, whose mass stops at once [J]."""
+    """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of the grid, whose
+    mass stops at once [J]."""
     impact_of_pair: Float[np.ndarray, "B+W B+W"]
     """The same of each pair, symmetric [J]; below 0: contact gave it energy."""
     plastic_loss: float
@@ -301,9 +295,9 @@ class BodySplit:
 class Engine(Protocol):
     """What every solver of one problem does.
 
-    Its class is called with the problem and with ``threads``, how many threads it may use on the
-    CPU (None: as it likes), and stands in ``ENGINES``. What only some engines can do follows as
-    protocols of methods alone; ``engines.require`` asks for them.
+    Its class is called with the problem and with ``threads``, how many threads it may use on the CPU (None: as it
+    likes), and stands in ``ENGINES``. What only some engines can do follows as protocols of methods alone;
+    ``engines.require`` asks for them.
     """
 
     name: str
@@ -321,8 +315,8 @@ class Engine(Protocol):
         """Step until exactly ``until`` [s], choosing steps by stability.
 
         Raises:
-            SimulationError: A particle is not finite or left the domain; the message says which
-                body, when, and what to do. The state is that of the last good check.
+            SimulationError: A particle is not finite or left the domain; the message says which body, when, and what to
+                do. The state is that of the last good check.
 
         """
         ...
@@ -358,8 +352,8 @@ class Engine(Protocol):
     def start_from(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
         """Put some bodies, before the first step, where they were in another engine's ``save``.
 
-        A warm start: place, strain and history are taken over; how they move is what the problem
-        says. Both engines' problems have the same bodies but for velocities and forces.
+        A warm start: place, strain and history are taken over; how they move is what the problem says. Both engines'
+        problems have the same bodies but for velocities and forces.
         """
         ...
 
@@ -368,9 +362,8 @@ class Engine(Protocol):
 class InteractiveEngine(Protocol):
     """An engine whose bodies can be touched from outside between two advances.
 
-    A touch reaches the particles within two cells of a point, less with the distance; of a rigid
-    body it is exact. It is in the ledger as external impulse and work, but not in what ``save``
-    keeps.
+    A touch reaches the particles within two cells of a point, less with the distance; of a rigid body it is exact. It
+    is in the ledger as external impulse and work, but not in what ``save`` keeps.
     """
 
     def apply_impulse(self, body: int, point: Vector, impulse: Vector) -> None:
@@ -382,9 +375,7 @@ class InteractiveEngine(Protocol):
         """
         ...
 
-    def attach_spring(
-        self, body: int, point: Vector | None, target: Vector, stiffness: float
-    ) -> None:
+    def attach_spring(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
         """Pull on a body by a damped spring until released.
 
         Args:
@@ -399,9 +390,7 @@ class InteractiveEngine(Protocol):
         """
         ...
 
-    def grip_point(
-        self, body: int, position: Float[np.ndarray, "P 3"]
-    ) -> Float[np.ndarray, "3"] | None:
+    def grip_point(self, body: int, position: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "3"] | None:
         """Where a body is held now [m]; None: it is not held.
 
         Args:
@@ -443,8 +432,8 @@ class BodyAddingEngine(Protocol):
     def with_added_bodies(self, problem: Problem) -> Engine:
         """Return an engine that goes on from here with more bodies; nothing changes for the others.
 
-        Gravity, winds and what is held stay as they are. The potential energy of the new bodies is
-        booked as work from outside.
+        Gravity, winds and what is held stay as they are. The potential energy of the new bodies is booked as work from
+        outside.
 
         Args:
             problem: With the new bodies, as they start, after all others.
@@ -463,8 +452,7 @@ class BodySplittingEngine(Protocol):
     def with_split_body(self, split: BodySplit) -> Engine:
         """Return an engine that goes on from here with a body in pieces.
 
-        Mass, momentum and the books are shared out among them (``splitting``). What held the body
-        lets go.
+        Mass, momentum and the books are shared out among them (``splitting``). What held the body lets go.
         """
         ...
 

@@ -70,9 +70,7 @@ def split_problem(problem: Problem, split: BodySplit) -> Problem:
         bodies=(*bodies, *pieces[1:]),
         friction=problem.friction[np.ix_(rows, rows)],
         restitution=problem.restitution[np.ix_(rows, rows)],
-        restitution_law=None
-        if problem.restitution_law is None
-        else problem.restitution_law[np.ix_(rows, rows)],
+        restitution_law=None if problem.restitution_law is None else problem.restitution_law[np.ix_(rows, rows)],
         rolling_resistance=None
         if problem.rolling_resistance is None
         else problem.rolling_resistance[np.ix_(rows, rows)],

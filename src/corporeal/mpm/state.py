@@ -56,9 +56,7 @@ class ParticleConstants:
         bodies = problem.bodies
         substances, kind = MaterialTable.of(problem)
         volume = np.concatenate([np.asarray(b.volume, np.float64) for b in bodies])
-        masses = [
-            rigid.mass_and_inertia(b.position, b.volume * b.density, b.volume) for b in bodies
-        ]
+        masses = [rigid.mass_and_inertia(b.position, b.volume * b.density, b.volume) for b in bodies]
         centre = np.stack([m.centre for m in masses])
         return cls(
             body=substances.body[kind],
@@ -69,9 +67,7 @@ class ParticleConstants:
             total=np.array([m.total for m in masses]),
             centre=centre,
             inertia=np.stack([m.inertia for m in masses]),
-            arm=np.concatenate(
-                [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
-            ),
+            arm=np.concatenate([b.position - m.centre for b, m in zip(bodies, masses, strict=True)]),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
             curvature=tuple(surface_curvature(b) for b in bodies),
         )
@@ -337,9 +333,7 @@ class State:
             motion=np.where(stiff[:, None], still, self.motion),
         )
 
-    def moving(
-        self, motion: Velocities, matter: ParticleConstants, bodies: Collection[int]
-    ) -> "State":
+    def moving(self, motion: Velocities, matter: ParticleConstants, bodies: Collection[int]) -> "State":
         """Return the same place with other motion of some bodies."""
         mine, body = self._of(matter, bodies)
         return replace(
@@ -350,18 +344,13 @@ class State:
             spin_momentum=np.where(body[:, None], motion.spin_momentum, self.spin_momentum),
         ).follow_rigid(matter)
 
-    def placed_as(
-        self, there: "State", matter: ParticleConstants, bodies: Collection[int]
-    ) -> "State":
+    def placed_as(self, there: "State", matter: ParticleConstants, bodies: Collection[int]) -> "State":
         """Return the same motion with some bodies where, and as strained as, they are there.
 
         Whatever they were strained by there was long ago: their branches have forgotten it.
         """
         mine, body = self._of(matter, bodies)
-        taken = {
-            name: mine
-            for name in ("position", "F", "motion", "plastic", "volume", "log_volume_ratio")
-        }
+        taken = {name: mine for name in ("position", "F", "motion", "plastic", "volume", "log_volume_ratio")}
         taken |= {name: body for name in ("centre", "rotation")}
         found = {}
         for name, chosen in taken.items():
@@ -374,11 +363,7 @@ class State:
         return replace(self, **found).follow_rigid(matter)
 
     def continuing(
-        self,
-        there: "State",
-        then: ParticleConstants,
-        matter: ParticleConstants,
-        whole: Collection[int],
+        self, there: "State", then: ParticleConstants, matter: ParticleConstants, whole: Collection[int]
     ) -> "State":
         """Return this state with whole bodies, and the time, as they were in another problem.
 
@@ -402,9 +387,7 @@ class State:
             found[name] = here
         return replace(self, **found)
 
-    def _of(
-        self, matter: ParticleConstants, bodies: Collection[int]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _of(self, matter: ParticleConstants, bodies: Collection[int]) -> tuple[np.ndarray, np.ndarray]:
         """Which particles and which bodies are meant."""
         body = np.isin(np.arange(len(self.centre)), list(bodies))
         return body[matter.body], body
@@ -448,17 +431,13 @@ def mean_pressure(matter: ParticleConstants, state: State) -> Float[np.ndarray, 
     return out
 
 
-def mean_volume(
-    F: Float[np.ndarray, "P 3 3"], log_volume_ratio: Float[np.ndarray, " P"]
-) -> Float[np.ndarray, " P"]:
+def mean_volume(F: Float[np.ndarray, "P 3 3"], log_volume_ratio: Float[np.ndarray, " P"]) -> Float[np.ndarray, " P"]:
     """J̄ = J exp(log_volume_ratio) [-]."""
     return determinant(F) * np.exp(log_volume_ratio)
 
 
 def strain_energy(
-    matter: ParticleConstants,
-    F: Float[np.ndarray, "P 3 3"],
-    log_volume_ratio: Float[np.ndarray, " P"],
+    matter: ParticleConstants, F: Float[np.ndarray, "P 3 3"], log_volume_ratio: Float[np.ndarray, " P"]
 ) -> Float[np.ndarray, " P"]:
     """Elastic energy of each particle [J] at F and the log_volume_ratio of its mean dilatation."""
     m, out = matter, np.zeros(len(F))
@@ -468,9 +447,7 @@ def strain_energy(
     return m.volume * out
 
 
-def return_to_yield_surface(
-    matter: ParticleConstants, state: State, dt: float
-) -> tuple[State, float]:
+def return_to_yield_surface(matter: ParticleConstants, state: State, dt: float) -> tuple[State, float]:
     """Bring what flows back to what it can bear after a step of dt [s]; give the energy lost [J].
 
     What takes any shape keeps no other motion than its elastic one.

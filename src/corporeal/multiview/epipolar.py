@@ -22,16 +22,12 @@ def fundamental_matrix(a: Camera, b: Camera) -> Float[np.ndarray, "3 3"]:
     b_from_a = np.linalg.inv(b.world_from_camera) @ a.world_from_camera
     shift = a.world_from_camera[:3, 3] - b.world_from_camera[:3, 3]
     here = np.abs([c.world_from_camera[:3, 3] for c in (a, b)]).max()
-    x, y, z = (
-        b_from_a[:3, 3] if np.abs(shift).max() > SAME_PLACE_DISTANCE_RATIO * here else np.zeros(3)
-    )
+    x, y, z = b_from_a[:3, 3] if np.abs(shift).max() > SAME_PLACE_DISTANCE_RATIO * here else np.zeros(3)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.linalg.inv(b.K).T @ across @ b_from_a[:3, :3] @ np.linalg.inv(a.K)
 
 
-def sampson_distance(
-    F: Float[np.ndarray, "3 3"], a: ImagePoints, b: ImagePoints
-) -> Float[np.ndarray, " N"]:
+def sampson_distance(F: Float[np.ndarray, "3 3"], a: ImagePoints, b: ImagePoints) -> Float[np.ndarray, " N"]:
     """Return how far matches are from agreeing, to first order their reprojection error [px].
 
     |x_b^T F x_a| / sqrt((F x_a)_1² + (F x_a)_2² + (F^T x_b)_1² + (F^T x_b)_2²), eq. 11.9; infinite
@@ -45,22 +41,14 @@ def sampson_distance(
     return np.where(slope > 0, error, np.inf)
 
 
-def depths_of_match(
-    a: Camera, b: Camera, x: ImagePoints, y: ImagePoints
-) -> Float[np.ndarray, "N 2"]:
+def depths_of_match(a: Camera, b: Camera, x: ImagePoints, y: ImagePoints) -> Float[np.ndarray, "N 2"]:
     """Return how far ahead of each camera the point of a match lies [m]; negative: behind.
 
     Linear triangulation, section 12.2.
     """
     P, Q = projection_matrix(a), projection_matrix(b)
     rows = np.stack(
-        [
-            x[:, :1] * P[2] - P[0],
-            x[:, 1:] * P[2] - P[1],
-            y[:, :1] * Q[2] - Q[0],
-            y[:, 1:] * Q[2] - Q[1],
-        ],
-        axis=1,
+        [x[:, :1] * P[2] - P[0], x[:, 1:] * P[2] - P[1], y[:, :1] * Q[2] - Q[0], y[:, 1:] * Q[2] - Q[1]], axis=1
     )
     rows /= np.linalg.norm(rows, axis=2, keepdims=True)
     world = np.linalg.svd(rows)[2][:, 3]

@@ -66,9 +66,9 @@ def match_features(a: ImageFeatures, b: ImageFeatures) -> tuple[np.ndarray, np.n
 
 def image_likeness(pictures: UInt8[np.ndarray, "V H W 3"]) -> Float[np.ndarray, "V V"]:
     """Return how alike pictures are as a whole, at most 1; a picture is not like itself."""
-    thumbs = np.stack(
-        [_resized_picture(p, (THUMBNAIL_SIDE_PX, THUMBNAIL_SIDE_PX)).ravel() for p in pictures]
-    ).astype(np.float64)
+    thumbs = np.stack([_resized_picture(p, (THUMBNAIL_SIDE_PX, THUMBNAIL_SIDE_PX)).ravel() for p in pictures]).astype(
+        np.float64
+    )
     thumbs -= thumbs.mean(axis=0)
     thumbs /= np.maximum(np.linalg.norm(thumbs, axis=1, keepdims=True), 1e-9)
     alike = thumbs @ thumbs.T

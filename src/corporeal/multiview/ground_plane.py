@@ -1,7 +1,7 @@
 """Robust estimation of the ground plane from points.
 
-RANSAC (Fischler & Bolles 1981) with the truncated loss of MSAC (Torr & Zisserman 2000), refined by
-reweighted least squares. Points below a plane speak against it: nothing is under a floor.
+RANSAC (Fischler & Bolles 1981) with the truncated loss of MSAC (Torr & Zisserman 2000), refined by reweighted least
+squares. Points below a plane speak against it: nothing is under a floor.
 """
 
 from dataclasses import dataclass
@@ -64,8 +64,8 @@ class GroundSearch:
     eyes: Float[np.ndarray, "V 3"]
     """Where cameras are; none may be."""
     middle: Float[np.ndarray, "3"] | None = None
-    """What objects are about. Then it is enough that the ground carries what is within one radius
-    of it: a wall behind stands beside the patch that is seen of the floor."""
+    """What objects are about. Then it is enough that the ground carries what is within one radius of it: a wall behind
+    stands beside the patch that is seen of the floor."""
 
 
 def find_ground_plane(
@@ -84,9 +84,7 @@ def find_ground_plane(
             best, most = plane, score
     return (
         best
-        if best is not None
-        and most > MIN_GROUND_POINT_FRACTION / 2
-        and _is_ground_plane(many, best, search)
+        if best is not None and most > MIN_GROUND_POINT_FRACTION / 2 and _is_ground_plane(many, best, search)
         else None
     )
 
@@ -115,9 +113,7 @@ def _candidate_planes(points: np.ndarray, search: GroundSearch, rng: np.random.G
     return [(normals[k], offsets[k]) for k in np.argsort(-scores, kind="stable")[:5]]
 
 
-def _refined_plane(
-    points: np.ndarray, normal: np.ndarray, offset: float, search: GroundSearch
-) -> GroundPlane:
+def _refined_plane(points: np.ndarray, normal: np.ndarray, offset: float, search: GroundSearch) -> GroundPlane:
     """Fit a plane to the points near it, again and again (Tukey's biweight)."""
     near = INITIAL_TOLERANCE_RADII * search.radius
     for _ in range(12):

@@ -52,10 +52,7 @@ def distort_directions(lens: Lens, xy: Float[np.ndarray, "N 2"]) -> Float[np.nda
     scale = 1 + sum(k * r2 ** (n + 1) for n, k in enumerate(lens.radial))
     p1, p2 = lens.tangential
     return np.stack(
-        [
-            x * scale + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-            y * scale + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
-        ],
+        [x * scale + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * scale + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y],
         axis=-1,
     )
 
@@ -74,8 +71,8 @@ def undistort_image(
 ) -> tuple[np.ndarray, Float[np.ndarray, "3 3"]]:
     """Return the picture as a pinhole camera would have taken it, and that camera's K.
 
-    It has the same size and principal point, and shows as much as it can without an empty border.
-    Colours (8 bits) are interpolated, numbers (32 bits) are not.
+    It has the same size and principal point, and shows as much as it can without an empty border. Colours (8 bits) are
+    interpolated, numbers (32 bits) are not.
 
     Raises:
         ValueError: The lens bends more than that allows.

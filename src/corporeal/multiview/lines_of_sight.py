@@ -1,9 +1,8 @@
 """Free space along lines of sight from cameras to observed points.
 
-Structure from motion says of each of its points which pictures show it. Labatut, Pons and Keriven,
-"Efficient multi-view reconstruction of large-scale scenes using interest points, Delaunay
-triangulation and graph cuts" (ICCV 2007), carve space by that; here it empties what silhouettes
-cannot: the mouth of a vessel seen from above.
+Structure from motion says of each of its points which pictures show it. Labatut, Pons and Keriven, "Efficient
+multi-view reconstruction of large-scale scenes using interest points, Delaunay triangulation and graph cuts" (ICCV
+2007), carve space by that; here it empties what silhouettes cannot: the mouth of a vessel seen from above.
 """
 
 from collections.abc import Sequence
@@ -19,8 +18,8 @@ from corporeal.core.types import Camera
 MIN_EMPTYING_VIEWS = 2
 """Views whose lines must pass through a cell for it to be empty."""
 SAME_FACE_DISTANCE_CELLS = 8.0
-"""Points that are nearer together [cells], and neighbours in a picture, are taken to be on one
-face: what is before it is empty, too. Objects that stand on a face show points of their own.
+"""Points that are nearer together [cells], and neighbours in a picture, are taken to be on one face: what is before it
+is empty, too. Objects that stand on a face show points of their own.
 """
 
 
@@ -45,11 +44,7 @@ class LinesOfSight:
         return self.points[self.point[self.view == view]]
 
     def emptied(
-        self,
-        cameras: Sequence[Camera],
-        low: Float[np.ndarray, "3"],
-        side: float,
-        shape: tuple[int, ...],
+        self, cameras: Sequence[Camera], low: Float[np.ndarray, "3"], side: float, shape: tuple[int, ...]
     ) -> Bool[np.ndarray, "X Y Z"]:
         """Return which cubic cells lines of several views pass through, or next to.
 
@@ -67,9 +62,7 @@ class LinesOfSight:
         for k, camera in enumerate(cameras):
             ends = self.seen_by(k)
             if len(ends):
-                ends = np.concatenate(
-                    [ends, _places_between(ends, camera, SAME_FACE_DISTANCE_CELLS * side)]
-                )
+                ends = np.concatenate([ends, _places_between(ends, camera, SAME_FACE_DISTANCE_CELLS * side)])
                 passed = np.zeros(shape, np.bool_)
                 eye = camera.world_from_camera[:3, 3]
                 march_lines((ends - low) / side, (eye - low) / side, passed)
@@ -77,9 +70,7 @@ class LinesOfSight:
         return votes >= MIN_EMPTYING_VIEWS
 
 
-def _places_between(
-    ends: Float[np.ndarray, "M 3"], camera: Camera, apart: float
-) -> Float[np.ndarray, "T 3"]:
+def _places_between(ends: Float[np.ndarray, "M 3"], camera: Camera, apart: float) -> Float[np.ndarray, "T 3"]:
     """Return places between points that are neighbours in a picture, and near each other."""
     local = (ends - camera.world_from_camera[:3, 3]) @ camera.world_from_camera[:3, :3]
     ahead = local[:, 2] > 0

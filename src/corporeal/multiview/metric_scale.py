@@ -31,8 +31,8 @@ class MetricScale:
     metres_per_unit: float
     """[m]"""
     source: Literal["file", "distance", "extent", "nobody"]
-    """The file's kind is in metres; two points whose distance is known; how large such an object is
-    as a rule, stated or by a model; a default size.
+    """The file's kind is in metres; two points whose distance is known; how large such an object is as a rule, stated
+    or by a model; a default size.
     """
     reason: str
     """In one sentence."""
@@ -62,8 +62,8 @@ def choose_metric_scale(
 ) -> MetricScale:
     """Return the scale that the best witness names, and what the others say against it.
 
-    In this order: a measured distance, stated sizes of objects, a file in metres, how large such
-    objects usually are, and for want of all a neutral stand-in.
+    In this order: a measured distance, stated sizes of objects, a file in metres, how large such objects usually are,
+    and for want of all a neutral stand-in.
 
     Args:
         distance: Of two points, or of cameras.
@@ -113,9 +113,7 @@ def scale_from_extents(extents: Sequence[ObjectExtent]) -> MetricScale | None:
 def _stand_in_scale(size: float) -> MetricScale:
     scale = _scale_ratio(NEUTRAL_SCENE_SIZE_M, size, "The whole")
     words = f"Its scale is unknown: the whole was assumed to be {NEUTRAL_SCENE_SIZE_M:g} m."
-    warning = Note(
-        f"{words} State the size of one object with --extent NAME=METRES.", NoteKind.ASSUMED
-    )
+    warning = Note(f"{words} State the size of one object with --extent NAME=METRES.", NoteKind.ASSUMED)
     return MetricScale(scale, "nobody", words, (warning,))
 
 
@@ -156,9 +154,7 @@ def scale_from_distance(a: Vector, b: Vector, metres: float) -> MetricScale:
     return MetricScale(scale, "distance", words)
 
 
-def stated_metric_scale(
-    per_unit: float | None, points: MeasuredDistance | None, who: str
-) -> MetricScale | None:
+def stated_metric_scale(per_unit: float | None, points: MeasuredDistance | None, who: str) -> MetricScale | None:
     """Return the measured unit of a file; None: not measured.
 
     Args:
@@ -171,9 +167,7 @@ def stated_metric_scale(
 
     """
     if per_unit is not None and points is not None:
-        raise UserError(
-            "--metres-per-unit and --known-distance exclude each other. Give one of them."
-        )
+        raise UserError("--metres-per-unit and --known-distance exclude each other. Give one of them.")
     if points is not None:
         found = scale_from_distance(points[:3], points[3:6], points[6])
         per_unit, reason = found.metres_per_unit, f"{found.reason[:-1]}, {who} said."
@@ -183,9 +177,7 @@ def stated_metric_scale(
         reason = f"One unit of the file is {per_unit:.4g} m, {who} said."
     if not MIN_METRES_PER_UNIT <= per_unit <= 1 / MIN_METRES_PER_UNIT:
         said = "--metres-per-unit" if points is None else "--known-distance: one unit"
-        raise UserError(
-            f"{said} is {per_unit:.4g} m. It must be from {MIN_METRES_PER_UNIT:g} to 1e+06 m."
-        )
+        raise UserError(f"{said} is {per_unit:.4g} m. It must be from {MIN_METRES_PER_UNIT:g} to 1e+06 m.")
     return MetricScale(per_unit, "distance", reason)
 
 

@@ -10,12 +10,12 @@ SIGMA_PER_MEDIAN_DEVIATION = 1.4826
 
 
 MIN_BALL_TOUCH_ANGLE_RAD = np.radians(60.0)
-"""A ball whose two touching points stand less than this apart, seen from its middle, touches noise
-or a blunt edge, not another side (Peters, "Geographical point cloud modelling with the 3D medial
-axis transform", 2018, takes 20° to 32°). It is twice the tilt from the one point to the other."""
+"""A ball whose two touching points stand less than this apart, seen from its middle, touches noise or a blunt edge, not
+another side (Peters, "Geographical point cloud modelling with the 3D medial axis transform", 2018, takes 20° to 32°).
+It is twice the tilt from the one point to the other."""
 MAX_FITTED_BALLS = 8000
-"""Points at which balls are fitted; others take the nearest one's. From the middle of what is round
-all points are equally near, and each search visits them all."""
+"""Points at which balls are fitted; others take the nearest one's. From the middle of what is round all points are
+equally near, and each search visits them all."""
 KDTREE_LEAF_SIZE = 128
 """Points that such a search looks at one by one, quicker than it would sort them out."""
 MAX_BALL_ITERATIONS = 30
@@ -30,9 +30,7 @@ def nearest_neighbours(position: Float[np.ndarray, "N 3"], count: int) -> Int[np
 
 
 def point_normals(
-    position: Float[np.ndarray, "N 3"],
-    near: Int[np.ndarray, "N k"],
-    towards: Float[np.ndarray, "N 3"],
+    position: Float[np.ndarray, "N 3"], near: Int[np.ndarray, "N k"], towards: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, "N 3"]:
     """Return unit normals: the direction of least spread among neighbours (Hoppe et al. 1992).
 
@@ -59,8 +57,8 @@ def medial_ball_thickness(
 ) -> Float[np.ndarray, " N"]:
     """Return the diameter of the largest ball inside that touches the surface here [m].
 
-    Balls shrink until they hold no point (Ma, Bae and Choi, "3D medial axis point approximation
-    using nearest neighbors and the normal field", 2012). Nothing is thicker than the points' box is
+    Balls shrink until they hold no point (Ma, Bae and Choi, "3D medial axis point approximation using nearest neighbors
+    and the normal field", 2012). Nothing is thicker than the points' box is
     long: where the other side was not seen, that is the answer.
 
     Args:
@@ -76,9 +74,7 @@ def medial_ball_thickness(
     return 2 * radius[who]
 
 
-def _medial_ball_radii(
-    tree: KDTree, position: np.ndarray, rows: np.ndarray, normal: np.ndarray
-) -> np.ndarray:
+def _medial_ball_radii(tree: KDTree, position: np.ndarray, rows: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Return the radius of the ball at some of the points."""
     radius = np.full(len(rows), np.linalg.norm(np.ptp(position, axis=0)) / 2)
     active = np.arange(len(rows))

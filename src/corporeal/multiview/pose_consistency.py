@@ -1,8 +1,8 @@
 """Whether camera poses agree with the pictures, and under which convention they would.
 
-Points that pictures share, found without the poses, must meet under them (epipolar geometry). Where
-pictures share too few, because they were taken far apart or of smooth objects, silhouettes must
-belong to one object. Where there are none either, nothing can be said.
+Points that pictures share, found without the poses, must meet under them (epipolar geometry). Where pictures share too
+few, because they were taken far apart or of smooth objects, silhouettes must belong to one object. Where there are none
+either, nothing can be said.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from corporeal.core.types import Camera, Note, NoteKind, Views
-from corporeal.multiview.epipolar import (
-    consensus_fraction,
-    depths_of_match,
-    fundamental_matrix,
-    sampson_distance,
-)
-from corporeal.multiview.feature_matching import (
-    FEATURE_IMAGE_SIDE_PX,
-    detect_features,
-    image_likeness,
-    match_features,
-)
+from corporeal.multiview.epipolar import consensus_fraction, depths_of_match, fundamental_matrix, sampson_distance
+from corporeal.multiview.feature_matching import FEATURE_IMAGE_SIDE_PX, detect_features, image_likeness, match_features
 from corporeal.multiview.silhouette_coherence import silhouette_coherence
 
 SEED_PICTURES_COUNT = 5
@@ -35,16 +25,16 @@ MIN_MATCHES_PER_PAIR, MIN_MATCHES_OF_ALL_PAIRS = 20, 40
 MIN_AGREEING_FRACTION = 0.2
 """Share of matches: right poses give 0.3 to 0.9, wrong ones 0 to 0.1."""
 HOPELESS_AGREEING_FRACTION = 0.1
-"""Share of good matches below which the poses are certainly wrong, whether or not it is known what
-would put them right."""
+"""Share of good matches below which the poses are certainly wrong, whether or not it is known what would put them
+right."""
 MIN_IMPROVEMENT_FACTOR = 1.4
 """A change must raise the share by this factor; right poses cannot be bettered by 1.1 …"""
 MIN_IMPROVEMENT_SIGMAS = 3.0
-"""… and the number of matches that agree by this many of its standard deviations: of few matches
-several agree with any poses by chance, and nine changes are tried."""
+"""… and the number of matches that agree by this many of its standard deviations: of few matches several agree with any
+poses by chance, and nine changes are tried."""
 MIN_CONSENSUS_FRACTION = 0.45
-"""Share of a pair's matches that some cameras explain: then they are good matches, whatever the
-poses. Of random ones some cameras explain 0.1 to 0.4."""
+"""Share of a pair's matches that some cameras explain: then they are good matches, whatever the poses. Of random ones
+some cameras explain 0.1 to 0.4."""
 COHERENT_HULL_FRACTION, INCOHERENT_HULL_FRACTION = 0.9, 0.8
 """Shares of silhouettes that their hull fills."""
 OPENGL_FROM_OPENCV_AXES = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -55,8 +45,8 @@ PRINCIPAL_POINT_SHIFTS_FRACTION = (-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.1
 MIN_MATCHES_FOR_LENS = 100
 """Good matches from which on single numbers of a lens can be told."""
 MIN_FOCAL_GAIN_FACTOR, MIN_PRINCIPAL_POINT_GAIN_FACTOR = 1.15, 1.25
-"""Factors by which matches must meet more closely under another lens; 1.3 and 2 for focal lengths
-off by a half and principal points off by a tenth, at most 0.93 and 1.0 for right ones."""
+"""Factors by which matches must meet more closely under another lens; 1.3 and 2 for focal lengths off by a half and
+principal points off by a tenth, at most 0.93 and 1.0 for right ones."""
 HALF_WEIGHT_ERROR_TOLERANCES = 0.25
 """Error at which a match counts half, in tolerances."""
 
@@ -74,13 +64,12 @@ class PoseConsistency:
     share: float
     """Of the matches that agree with the poses, or of silhouettes that their hull fills."""
     error: float
-    """Median error of all matches under the poses, to first order their reprojection error [px];
-    NaN where there are none."""
+    """Median error of all matches under the poses, to first order their reprojection error [px]; NaN where there are
+    none."""
     doubt: str | None
     """What seems wrong, in a sentence or two; None: nothing does."""
     hopeless: bool = False
-    """Nothing can be learned under these poses: good matches do not agree, or all is seen from one
-    place."""
+    """Nothing can be learned under these poses: good matches do not agree, or all is seen from one place."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +80,7 @@ class _MatchedPair:
     y: np.ndarray
 
 
-def check_pose_consistency(
-    views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None
-) -> PoseConsistency:
+def check_pose_consistency(views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None) -> PoseConsistency:
     """Compare poses with pictures: some seconds at most, whatever their number and size."""
     eyes = np.array([c.world_from_camera[:3, 3] for c in views.cameras])
     if np.ptp(eyes, axis=0).max(initial=0) == 0:
@@ -111,12 +98,8 @@ def check_pose_consistency(
     if proven or change or (count >= MIN_MATCHES_OF_ALL_PAIRS and share >= MIN_AGREEING_FRACTION):
         found = f"{share:.0%} of {count} points agree with them"
         if share < MIN_AGREEING_FRACTION or change is not None:
-            hopeless = share < HOPELESS_AGREEING_FRACTION or (
-                share < MIN_AGREEING_FRACTION and change is not None
-            )
-            hopeless |= change in dict(
-                _matrix_conventions()
-            )  # one of two is right, nothing between
+            hopeless = share < HOPELESS_AGREEING_FRACTION or (share < MIN_AGREEING_FRACTION and change is not None)
+            hopeless |= change in dict(_matrix_conventions())  # one of two is right, nothing between
             doubt = _doubt_text(found, error, change)
             return PoseConsistency("matches", count, share, error, doubt, bool(proven) and hopeless)
         doubt = _points_behind_doubt(pairs, views.cameras)
@@ -171,11 +154,7 @@ def _better_convention(pairs: list[_MatchedPair], views: Views, share: float) ->
     best = max(shares, key=lambda name: shares[name])
     count = sum(len(p.x) for p in pairs)
     spread = np.sqrt((shares[best] + share) / count)
-    needed = max(
-        MIN_AGREEING_FRACTION,
-        MIN_IMPROVEMENT_FACTOR * share,
-        share + MIN_IMPROVEMENT_SIGMAS * spread,
-    )
+    needed = max(MIN_AGREEING_FRACTION, MIN_IMPROVEMENT_FACTOR * share, share + MIN_IMPROVEMENT_SIGMAS * spread)
     return best if shares[best] >= needed else None
 
 
@@ -199,10 +178,7 @@ def _matrix_conventions() -> list[tuple[str, CameraChange]]:
     return [
         (opposite, posed(lambda W: W @ OPENGL_FROM_OPENCV_AXES)),
         (f"{inverse}, the cameras' axes OpenCV's", posed(np.linalg.inv)),
-        (
-            f"{inverse}, the cameras' axes OpenGL's",
-            posed(lambda W: np.linalg.inv(W) @ OPENGL_FROM_OPENCV_AXES),
-        ),
+        (f"{inverse}, the cameras' axes OpenGL's", posed(lambda W: np.linalg.inv(W) @ OPENGL_FROM_OPENCV_AXES)),
     ]
 
 
@@ -226,9 +202,7 @@ def _pairs(views: Views) -> list[_MatchedPair]:
 
 
 def _match_errors_px(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> np.ndarray:
-    every = [
-        sampson_distance(fundamental_matrix(cameras[p.a], cameras[p.b]), p.x, p.y) for p in pairs
-    ]
+    every = [sampson_distance(fundamental_matrix(cameras[p.a], cameras[p.b]), p.x, p.y) for p in pairs]
     return np.concatenate([np.zeros(0), *every])
 
 
@@ -237,9 +211,7 @@ def _agreeing_fraction(errors: np.ndarray, cameras: tuple[Camera, ...]) -> float
 
 
 def _match_tolerance_px(cameras: tuple[Camera, ...]) -> float:
-    return MATCH_TOLERANCE_PX * max(
-        1.0, max(cameras[0].width, cameras[0].height) / FEATURE_IMAGE_SIDE_PX
-    )
+    return MATCH_TOLERANCE_PX * max(1.0, max(cameras[0].width, cameras[0].height) / FEATURE_IMAGE_SIDE_PX)
 
 
 def _consistent_pairs(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> list[_MatchedPair]:
@@ -268,13 +240,11 @@ def _fraction_in_front(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -
 def _lens_doubt(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> str | None:
     """Say under which other lens good matches would meet clearly more closely.
 
-    Cameras that look at one place nearly agree whatever their focal length: only how closely
-    matches meet tells, not how many do.
+    Cameras that look at one place nearly agree whatever their focal length: only how closely matches meet tells, not
+    how many do.
     """
     now = _match_closeness(pairs, cameras)
-    focal = {
-        f: _match_closeness(pairs, _with_other_lens(cameras, f)) / now for f in FOCAL_LENGTH_FACTORS
-    }
+    focal = {f: _match_closeness(pairs, _with_other_lens(cameras, f)) / now for f in FOCAL_LENGTH_FACTORS}
     middle = {
         (x, y): _match_closeness(pairs, _with_other_lens(cameras, 1.0, x, y)) / now
         for x in PRINCIPAL_POINT_SHIFTS_FRACTION
@@ -298,15 +268,11 @@ def _lens_doubt(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> str |
 
 def _match_closeness(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> float:
     """Return how closely matches meet, from 0 to 1: the mean of 1 / (1 + (error / close)²)."""
-    off = _match_errors_px(pairs, cameras) / (
-        HALF_WEIGHT_ERROR_TOLERANCES * _match_tolerance_px(cameras)
-    )
+    off = _match_errors_px(pairs, cameras) / (HALF_WEIGHT_ERROR_TOLERANCES * _match_tolerance_px(cameras))
     return max(float(np.mean(1 / (1 + off**2))), 1e-9)
 
 
-def _with_other_lens(
-    cameras: tuple[Camera, ...], factor: float, x: float = 0.0, y: float = 0.0
-) -> tuple[Camera, ...]:
+def _with_other_lens(cameras: tuple[Camera, ...], factor: float, x: float = 0.0, y: float = 0.0) -> tuple[Camera, ...]:
     """Return cameras with a longer focal length, and the principal point elsewhere."""
     stretch = np.array([[factor, factor, 1], [1, factor, 1], [1, 1, 1.0]])
     shift = [np.array([[0, 0, x * c.width], [0, 0, y * c.height], [0, 0, 0]]) for c in cameras]
@@ -327,16 +293,11 @@ def _masks_doubt(masks: np.ndarray, cameras: tuple[Camera, ...]) -> str | None:
     )
 
 
-def _check_by_silhouettes(
-    cameras: tuple[Camera, ...], masks: np.ndarray, count: int, error: float
-) -> PoseConsistency:
+def _check_by_silhouettes(cameras: tuple[Camera, ...], masks: np.ndarray, count: int, error: float) -> PoseConsistency:
     share = silhouette_coherence(masks, cameras)
     doubt = None
     if share < INCOHERENT_HULL_FRACTION:
-        shares = {
-            n: silhouette_coherence(masks, tuple(change(c) for c in cameras))
-            for n, change in _camera_changes()
-        }
+        shares = {n: silhouette_coherence(masks, tuple(change(c) for c in cameras)) for n, change in _camera_changes()}
         best = max(shares, key=lambda name: shares[name])
         change = best if shares[best] >= COHERENT_HULL_FRACTION else None
         doubt = _doubt_text(f"{share:.0%} of the silhouettes fit together", float("nan"), change)
@@ -347,9 +308,5 @@ def _doubt_text(found: str, error: float, change: str | None) -> str:
     median = "" if np.isnan(error) else f" (median error {error:.1f} px)"
     first = f"The poses do not agree with the pictures: only {found}{median}. "
     if change:
-        return Note(
-            f"{first}They would if {change}: is the file in the wrong convention?", NoteKind.GRAVE
-        )
-    return Note(
-        f"{first}Check the order of the pictures, the focal length and the poses.", NoteKind.GRAVE
-    )
+        return Note(f"{first}They would if {change}: is the file in the wrong convention?", NoteKind.GRAVE)
+    return Note(f"{first}Check the order of the pictures, the focal length and the poses.", NoteKind.GRAVE)

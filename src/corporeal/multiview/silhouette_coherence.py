@@ -1,8 +1,7 @@
 """Silhouette coherence of the visual hull.
 
-Under the right poses the part of space that all silhouettes allow fills each of them. After
-Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration under circular motion"
-(2007).
+Under the right poses the part of space that all silhouettes allow fills each of them. After Hernández, Schmitt &
+Cipolla, "Silhouette coherence for camera calibration under circular motion" (2007).
 """
 
 from dataclasses import dataclass
@@ -22,15 +21,15 @@ HULL_GRID_POINTS_PER_EDGE = 64
 HULL_HALF_EDGE_RADII = 1.3
 """Half edge of that cube, in radii of the object as the cameras see it."""
 MIN_MASK_FILLED_FRACTION = 0.9
-"""Share of a mask that one solid must fill, the median of all views. Visual hulls: 1.00 under right
-poses of two real sets, .85 under those of the card that an axe head lay on before and after it was
-turned over. Closed surfaces: .94 and more, .84 of a helmet whose masks hold pieces of the wall."""
+"""Share of a mask that one solid must fill, the median of all views. Visual hulls: 1.00 under right poses of two real
+sets, .85 under those of the card that an axe head lay on before and after it was turned over. Closed surfaces: .94 and
+more, .84 of a helmet whose masks hold pieces of the wall."""
 MASK_THRESHOLD_U8 = 127
 """What a mask must exceed."""
 MIN_OUTSIDE_VIEWS, MIN_OUTSIDE_VIEWS_FRACTION = 2, 0.1
-"""So many views, and so large a share of those that look, must see a place beside their masks for
-it to be outside, where outlines are off by some pixels. Half of that share eats objects (12 % of
-four balls where outlines err by 10 of 640 px, against 5 %), twice of it leaves a fifth too much."""
+"""So many views, and so large a share of those that look, must see a place beside their masks for it to be outside,
+where outlines are off by some pixels. Half of that share eats objects (12 % of four balls where outlines err by 10 of
+640 px, against 5 %), twice of it leaves a fifth too much."""
 
 
 @dataclass(frozen=True)
@@ -43,9 +42,7 @@ class SilhouetteComparison:
     """Share of the mask that the shape fills."""
 
 
-def mask_overlap_and_fill(
-    shown: Bool[np.ndarray, "h w"], mask: Bool[np.ndarray, "h w"]
-) -> tuple[float, float]:
+def mask_overlap_and_fill(shown: Bool[np.ndarray, "h w"], mask: Bool[np.ndarray, "h w"]) -> tuple[float, float]:
     """Return the overlap of a shape with a mask, and how much of the mask it fills; NaN: empty."""
     if not mask.any():
         return float("nan"), float("nan")
@@ -54,8 +51,7 @@ def mask_overlap_and_fill(
 
 
 def is_outside_silhouettes(
-    beside: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
-    looking: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
+    beside: Int[np.ndarray, " N"] | Float[np.ndarray, " N"], looking: Int[np.ndarray, " N"] | Float[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
     """Return which places are outside, by how many views look there and see them beside masks."""
     return (beside >= MIN_OUTSIDE_VIEWS) & (beside >= MIN_OUTSIDE_VIEWS_FRACTION * looking)
@@ -72,14 +68,10 @@ def silhouette_coherence(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camer
         cells.append(cell)
         near = np.asarray(binary_dilation(mask), bool)  # nothing is lost for being thin
         allowed &= (cell < 0) | near.ravel()[cell]
-    return float(
-        np.median([_filled_fraction(m, c[allowed]) for m, c in zip(coarse, cells, strict=True)])
-    )
+    return float(np.median([_filled_fraction(m, c[allowed]) for m, c in zip(coarse, cells, strict=True)]))
 
 
-def hull_grid_points(
-    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]
-) -> Float[np.ndarray, "N 3"]:
+def hull_grid_points(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> Float[np.ndarray, "N 3"]:
     """Return points of a cubic grid that holds what silhouettes show."""
     aims = [_silhouette_aim(mask, camera) for mask, camera in zip(masks, cameras, strict=True)]
     centre = _nearest_to_rays(aims)
@@ -88,9 +80,7 @@ def hull_grid_points(
     return centre + np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3)
 
 
-def pixels_of_points(
-    points: Float[np.ndarray, "N 3"], camera: Camera, shape: tuple[int, ...]
-) -> Int[np.ndarray, " N"]:
+def pixels_of_points(points: Float[np.ndarray, "N 3"], camera: Camera, shape: tuple[int, ...]) -> Int[np.ndarray, " N"]:
     """Return which pixel of a small picture shows each point; -1: none."""
     P = projection_matrix(camera)
     u, v, depth = (points @ P[:, :3].T + P[:, 3]).T
@@ -101,9 +91,7 @@ def pixels_of_points(
     return np.where(seen, row * shape[1] + column, -1).astype(np.int64)
 
 
-def shrink_mask(
-    mask: UInt8[np.ndarray, "H W"], side: int = COHERENCE_IMAGE_SIDE_PX
-) -> Bool[np.ndarray, "h w"]:
+def shrink_mask(mask: UInt8[np.ndarray, "H W"], side: int = COHERENCE_IMAGE_SIDE_PX) -> Bool[np.ndarray, "h w"]:
     """Return a mask as silhouettes are compared, no side longer than ``side``."""
     share = min(1.0, side / max(mask.shape))
     size = (max(1, round(mask.shape[1] * share)), max(1, round(mask.shape[0] * share)))

@@ -1,14 +1,13 @@
 """Views whose silhouettes contradict those of all others: their poses, or their masks, are wrong.
 
-A camera that was placed on the wrong piece of a repeating pattern has an ordinary reprojection
-error; only what it shows of the object is not where the others see it. The visual hull is carved
-with each view left out, and forgives a few of the rest, so that one wrong view does not carve away
-what the right ones agree on.
+A camera that was placed on the wrong piece of a repeating pattern has an ordinary reprojection error; only what it
+shows of the object is not where the others see it. The visual hull is carved with each view left out, and forgives a
+few of the rest, so that one wrong view does not carve away what the right ones agree on.
 
 Detection of inverted masks.
 
-Programs differ in what white means. Inverted masks contradict neither the pictures nor one another:
-together they show the surroundings without the object.
+Programs differ in what white means. Inverted masks contradict neither the pictures nor one another: together they show
+the surroundings without the object.
 """
 
 from dataclasses import dataclass
@@ -39,9 +38,8 @@ def find_cropped_masks(masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, " V
 
 
 MIN_INVERTED_BORDER_FRACTION = 0.5
-"""Share of a picture's border, and of what all cameras look at, in the median picture: an object
-that pictures cut off on most of their sides is still where they look, and what has a hole there is
-not cut off on most.
+"""Share of a picture's border, and of what all cameras look at, in the median picture: an object that pictures cut off
+on most of their sides is still where they look, and what has a hole there is not cut off on most.
 """
 CENTRE_HALF_SIDE_WIDTHS = 0.05
 """Half the side of the square about what all cameras look at, in widths of the picture."""
@@ -60,15 +58,10 @@ def are_masks_inverted(masks: Bool[np.ndarray, "V H W"], cameras: tuple[Camera, 
     around = np.median(masks[:, frame].mean(axis=1))
     place = np.array([*find_viewed_region(cameras).centre, 1.0])
     middles = [_centre_mask_fraction(m, c, place) for m, c in zip(masks, cameras, strict=True)]
-    return bool(
-        around > MIN_INVERTED_BORDER_FRACTION
-        and np.median(middles) < 1 - MIN_INVERTED_BORDER_FRACTION
-    )
+    return bool(around > MIN_INVERTED_BORDER_FRACTION and np.median(middles) < 1 - MIN_INVERTED_BORDER_FRACTION)
 
 
-def _centre_mask_fraction(
-    mask: Bool[np.ndarray, "H W"], camera: Camera, place: np.ndarray
-) -> float:
+def _centre_mask_fraction(mask: Bool[np.ndarray, "H W"], camera: Camera, place: np.ndarray) -> float:
     """Return how much of the square about a place (4,), homogeneous, is in a mask [-].
 
     Of a place that a picture does not show, the nearest square on it.
@@ -82,8 +75,8 @@ def _centre_mask_fraction(
 
 
 MAX_OUTLIER_IMAGE_SIDE_PX = 128
-"""Longer side at which silhouettes are compared [px], at most: a step of the grid that the hull is
-carved from is no longer than a pixel, or the hull's silhouette would have holes."""
+"""Longer side at which silhouettes are compared [px], at most: a step of the grid that the hull is carved from is no
+longer than a pixel, or the hull's silhouette would have holes."""
 MAX_DENYING_VIEWS_FRACTION = 0.1
 """Share of the views that may deny a point of the hull, at least one."""
 MIN_VIEWS_FOR_OUTLIERS = 8
@@ -106,20 +99,17 @@ class OutlierBounds:
 
 
 GIVEN_MASK_BOUNDS = OutlierBounds(0.75, 0.95)
-"""Of given masks. Measured on real sets: overlaps of right views 0.9 and more, of wrong ones 0.7
-and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
+"""Of given masks. Measured on real sets: overlaps of right views 0.9 and more, of wrong ones 0.7 and less; right ones
+are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
 """
 GROWN_MASK_BOUNDS = OutlierBounds(0.85, 0.8)
-"""Of grown masks that are accepted, which vary more: of 17 sets of one object every right view is
-filled by 0.91 and more; views that show another object on the same floor by 0.68 and less, at
-overlaps of 0.8 and less.
+"""Of grown masks that are accepted, which vary more: of 17 sets of one object every right view is filled by 0.91 and
+more; views that show another object on the same floor by 0.68 and less, at overlaps of 0.8 and less.
 """
 
 
 def outlier_views(
-    masks: UInt8[np.ndarray, "V H W"],
-    cameras: tuple[Camera, ...],
-    bounds: OutlierBounds = GIVEN_MASK_BOUNDS,
+    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...], bounds: OutlierBounds = GIVEN_MASK_BOUNDS
 ) -> tuple[int, ...]:
     """Return the numbers of views that do not show what the others see; (): of none that is known.
 
@@ -142,9 +132,7 @@ def median_fill_by_others(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Came
     return float(np.nanmedian(compare_with_hull_of_others(masks, cameras).filled))
 
 
-def compare_with_hull_of_others(
-    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]
-) -> SilhouetteComparison:
+def compare_with_hull_of_others(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> SilhouetteComparison:
     """Compare each mask with the hull of the others."""
     points = hull_grid_points(masks, cameras)
     side = min(MAX_OUTLIER_IMAGE_SIDE_PX, _finest_image_side_px(points, cameras))

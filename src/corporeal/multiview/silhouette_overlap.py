@@ -63,9 +63,7 @@ def compare_silhouettes(
     return SilhouetteComparison(overlap, filled)
 
 
-def sample_meshes(
-    meshes: Sequence[Mesh], count: int, rng: np.random.Generator
-) -> Float[np.ndarray, "N 3"]:
+def sample_meshes(meshes: Sequence[Mesh], count: int, rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
     """Return points on surfaces, as many on equal areas."""
     corners = np.concatenate([mesh.corners for mesh in meshes])
     areas = np.concatenate([mesh.areas for mesh in meshes])

@@ -1,7 +1,7 @@
 """Similarity transforms of a scene: points, cameras and Gaussians.
 
-A similarity is a matrix (4, 4) that takes x to s R x + t: its upper left is s R, its last column t.
-Pictures before and after are the same, but that depths are multiplied by s.
+A similarity is a matrix (4, 4) that takes x to s R x + t: its upper left is s R, its last column t. Pictures before and
+after are the same, but that depths are multiplied by s.
 """
 
 from collections.abc import Sequence
@@ -58,24 +58,18 @@ def decompose_similarity(matrix: SimilarityMatrix) -> SimilarityTransform:
     return SimilarityTransform(rotation, scale, (x, y, z))
 
 
-def apply_similarity_to_points(
-    points: Float[np.ndarray, "N 3"], matrix: SimilarityMatrix
-) -> Float[np.ndarray, "N 3"]:
+def apply_similarity_to_points(points: Float[np.ndarray, "N 3"], matrix: SimilarityMatrix) -> Float[np.ndarray, "N 3"]:
     """Return where points come to be."""
     return points @ matrix[:3, :3].T + matrix[:3, 3]
 
 
-def apply_similarity_to_cameras(
-    cameras: Sequence[Camera], matrix: SimilarityMatrix
-) -> tuple[Camera, ...]:
+def apply_similarity_to_cameras(cameras: Sequence[Camera], matrix: SimilarityMatrix) -> tuple[Camera, ...]:
     """Return cameras that see the moved scene as they saw it before; lenses stay."""
     rotation, scale, shift = decompose_similarity(matrix)
 
     def moved(camera: Camera) -> Camera:
         pose = camera.world_from_camera.astype(np.float64)
-        turned = similarity_matrix(
-            rotation @ pose[:3, :3], 1.0, scale * rotation @ pose[:3, 3] + shift
-        )
+        turned = similarity_matrix(rotation @ pose[:3, :3], 1.0, scale * rotation @ pose[:3, 3] + shift)
         return replace(camera, world_from_camera=turned)
 
     return tuple(moved(camera) for camera in cameras)

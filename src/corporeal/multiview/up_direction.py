@@ -1,9 +1,9 @@
 """Up direction from cameras, which people hold level or upright.
 
-One axis of a camera that is held level is horizontal, however far it looks up or down: its x-axis,
-or its y-axis where it is held upright. Up is the direction to which of every camera one of the two
-is perpendicular. All directions of half a sphere are tried, because which axis it is depends on up;
-the best is refined by least squares over the axes that it chose, robust to a few that lean.
+One axis of a camera that is held level is horizontal, however far it looks up or down: its x-axis, or its y-axis where
+it is held upright. Up is the direction to which of every camera one of the two is perpendicular. All directions of half
+a sphere are tried, because which axis it is depends on up; the best is refined by least squares over the axes that it
+chose, robust to a few that lean.
 """
 
 from dataclasses import dataclass
@@ -27,8 +27,8 @@ HALF_SPHERE_DIRECTIONS_COUNT = 20_000
 MAX_LEAN_DEG = 20.0
 """Lean from which on all are as bad [deg]."""
 UNCLEAR_DIRECTION_COST_DEG = 2.0
-"""What a direction costs about which no camera is turned clearly [deg]: a camera that looks along
-it has both axes level and says nothing."""
+"""What a direction costs about which no camera is turned clearly [deg]: a camera that looks along it has both axes
+level and says nothing."""
 MIN_MEAN_CAMERA_VOTE = 0.2
 """Mean of what cameras say, below which a direction is not considered."""
 RIVAL_ANGLE_COS = np.cos(np.radians(25))
@@ -65,8 +65,8 @@ def estimate_up_direction(cameras: tuple[Camera, ...]) -> UpDirection:
     flat = np.where(rolled[:, None], above, right)
     up, weight = _perpendicular_to_most(flat, start)
     share, more = np.linalg.eigvalsh(_axis_spread(flat, weight))[1:]
-    # Of parallel x-axes on less than half a circle it is ambiguous whether they are all level or
-    # all upright: an arm that swings up is a ring of cameras on their sides.
+    # Of parallel x-axes on less than half a circle it is ambiguous whether they are all level or all upright: an arm
+    # that swings up is a ring of cameras on their sides.
     parallel = np.linalg.eigvalsh(right.T @ right / len(right))[1] < MIN_SPANNED_FRACTION
     alike = parallel and np.linalg.norm(back.mean(axis=0)) > HALF_RING_MEAN_AXIS_LENGTH
     warnings = []
@@ -80,10 +80,7 @@ def estimate_up_direction(cameras: tuple[Camera, ...]) -> UpDirection:
         error = tilt * float(np.sqrt((1 / share + 1 / more) / len(cameras)))
         agreed = float((np.abs(flat @ up) < 2 * CAMERA_TILT_SCALE_SIN).mean())
         sure = (
-            agreed
-            * float(np.exp(-np.square(tilt / CAMERA_TILT_SCALE_SIN / 2)))
-            * ahead
-            * _level_hold_score(flat @ up)
+            agreed * float(np.exp(-np.square(tilt / CAMERA_TILT_SCALE_SIN / 2))) * ahead * _level_hold_score(flat @ up)
         )
     up, doubt = _choose_up_sign(up, (above, back), rolled, cameras)
     return UpDirection(up, error, sure * (0.5 if doubt else 1.0), (*warnings, *doubt))
@@ -94,10 +91,7 @@ def _search_up(
 ) -> tuple[Float[np.ndarray, "3"], float]:
     """Return the best direction of half a sphere, and how clearly it is the best, 0 to 1."""
     k = np.arange(HALF_SPHERE_DIRECTIONS_COUNT) + 0.5
-    z, turn = (
-        1 - k / HALF_SPHERE_DIRECTIONS_COUNT,
-        np.pi * (3 - np.sqrt(5)) * k,
-    )  # Fibonacci's spiral
+    z, turn = (1 - k / HALF_SPHERE_DIRECTIONS_COUNT, np.pi * (3 - np.sqrt(5)) * k)  # Fibonacci's spiral
     flat = np.sqrt(1 - z * z)
     tried = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
     x, y = np.abs(tried @ right.T), np.abs(tried @ above.T)
@@ -115,9 +109,7 @@ def _search_up(
 def _level_hold_score(sine: Float[np.ndarray, " V"]) -> float:
     """Return 1 where cameras lean as little as hands do, in the mean; 0 where they lean anyhow."""
     lean = float(np.degrees(np.arcsin(np.clip(np.abs(sine), 0, 1))).mean())
-    return float(
-        np.clip((DISAGREEING_LEAN_DEG - lean) / (DISAGREEING_LEAN_DEG - HELD_LEVEL_LEAN_DEG), 0, 1)
-    )
+    return float(np.clip((DISAGREEING_LEAN_DEG - lean) / (DISAGREEING_LEAN_DEG - HELD_LEVEL_LEAN_DEG), 0, 1))
 
 
 def _axis_spread(axes: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -142,10 +134,7 @@ def _mean_image_up(above: np.ndarray, right: np.ndarray, weight: np.ndarray) -> 
 
 
 def _choose_up_sign(
-    up: np.ndarray,
-    axes: tuple[np.ndarray, np.ndarray],
-    rolled: Bool[np.ndarray, " V"],
-    cameras: tuple[Camera, ...],
+    up: np.ndarray, axes: tuple[np.ndarray, np.ndarray], rolled: Bool[np.ndarray, " V"], cameras: tuple[Camera, ...]
 ) -> tuple[np.ndarray, list[str]]:
     """Turn up to where it is up in the pictures that were held level; else to the cameras."""
     above, back = axes

@@ -16,12 +16,12 @@ UNSEEN_HALF_GAP_DEG = 180.0
 """Such an angle from which on a flat face that looks to its middle is in no photograph [deg]."""
 
 MIN_COVERED_ANGLE_DEG = 90.0
-"""Angle of the circle around an object, below which outlines leave its depth open [deg]: between
-two tangent cones that are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is.
+"""Angle of the circle around an object, below which outlines leave its depth open [deg]: between two tangent cones that
+are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is.
 """
 STEEP_VIEW_ELEVATION_DEG = 45.0
-"""Height of a camera over the floor's horizon from which on an object that stands there seems no
-deeper than it is by its height [deg].
+"""Height of a camera over the floor's horizon from which on an object that stands there seems no deeper than it is by
+its height [deg].
 """
 
 
@@ -87,10 +87,7 @@ def depth_doubt_text(cameras: Sequence[Camera]) -> str | None:
 
     """
     seen = 360 - widest_unseen_angle(cameras)
-    if (
-        seen >= MIN_COVERED_ANGLE_DEG
-        or _steepest_elevation(tuple(cameras)) >= STEEP_VIEW_ELEVATION_DEG
-    ):
+    if seen >= MIN_COVERED_ANGLE_DEG or _steepest_elevation(tuple(cameras)) >= STEEP_VIEW_ELEVATION_DEG:
         return None
     return (
         f"all photographs were taken from {seen:.0f}° of the circle around it, and none from "
@@ -102,11 +99,7 @@ def _steepest_elevation(cameras: tuple[Camera, ...]) -> float:
     """Return how high the highest camera stands over the middle of what all look at [deg]."""
     away = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     away -= np.array(find_viewed_region(cameras).centre)
-    sine = (
-        away
-        @ estimate_up_direction(cameras).up
-        / np.maximum(np.linalg.norm(away, axis=1), np.finfo(float).tiny)
-    )
+    sine = away @ estimate_up_direction(cameras).up / np.maximum(np.linalg.norm(away, axis=1), np.finfo(float).tiny)
     return float(np.degrees(np.arcsin(np.clip(sine, -1, 1))).max())
 
 

@@ -8,8 +8,8 @@ from jaxtyping import Bool, Float
 from corporeal.core.types import Camera, Vector
 
 MIN_AXIS_CROSSING_SIN2 = 0.01
-"""Least mean square of the sine between optical axes and their main direction, for the place where
-they cross to be known: 6°."""
+"""Least mean square of the sine between optical axes and their main direction, for the place where they cross to be
+known: 6°."""
 
 
 @dataclass(frozen=True)
@@ -21,17 +21,15 @@ class ViewedRegion:
     """[m]"""
 
 
-def find_viewed_region(
-    cameras: tuple[Camera, ...], points: Float[np.ndarray, "N 3"] | None = None
-) -> ViewedRegion:
+def find_viewed_region(cameras: tuple[Camera, ...], points: Float[np.ndarray, "N 3"] | None = None) -> ViewedRegion:
     """Return the ball about the point nearest to the rays through the middles of all pictures.
 
     Its radius is the largest that fits into the pictures of half of the cameras.
 
     Args:
         cameras: One or more.
-        points: On what is in the pictures. Where all cameras look the same way, so that their axes
-            do not cross, the middle of those that most of them see is the ball's.
+        points: On what is in the pictures. Where all cameras look the same way, so that their axes do not cross, the
+            middle of those that most of them see is the ball's.
 
     """
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])

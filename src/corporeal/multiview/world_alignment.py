@@ -1,8 +1,8 @@
 """World alignment of a reconstruction: +z up, floor at z = 0.
 
-Poses from pictures have no up, and trained splats neither. It is taken from what the file says,
-else from the cameras, which people hold level, else from what programs usually write and how
-objects would rest; a plane that objects stand on corrects it.
+Poses from pictures have no up, and trained splats neither. It is taken from what the file says, else from the cameras,
+which people hold level, else from what programs usually write and how objects would rest; a plane that objects stand on
+corrects it.
 """
 
 from dataclasses import dataclass, replace
@@ -55,8 +55,8 @@ class WorldAlignment:
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str
-    """"plane": it is in the pictures; "person": stated by the user; "objects": their lowest points;
-    "nothing": there are none.
+    """"plane": it is in the pictures; "person": stated by the user; "objects": their lowest points; "nothing": there
+    are none.
     """
     radius: float
     """Of the scene, in the file's unit."""
@@ -99,26 +99,18 @@ def align_world(
 
     Args:
         cameras: Posed, in the file's frame; () for a splat without any.
-        points: On all that is in the pictures, in the file's frame and unit; a floor is looked for
-            among them.
+        points: On all that is in the pictures, in the file's frame and unit; a floor is looked for among them.
         z_up: Whether the file says that its +z is up.
         of_objects: Points that are on objects for sure, as masks tell; None: unknown.
         usual: What is up in such files as a rule; for want of cameras.
         stated: Stated by the user.
 
     """
-    points, of_objects = (
-        _fewer_points(points),
-        None if of_objects is None else _fewer_points(of_objects),
-    )
+    points, of_objects = (_fewer_points(points), None if of_objects is None else _fewer_points(of_objects))
     around = _scene_ball(cameras, points if of_objects is None else of_objects)
-    near = points[
-        np.linalg.norm(points - around.centre, axis=1) < MAX_POINT_DISTANCE_RADII * around.radius
-    ]
+    near = points[np.linalg.norm(points - around.centre, axis=1) < MAX_POINT_DISTANCE_RADII * around.radius]
     if stated.up is not None:
-        told = _UpEvidence(
-            _unit_vector(stated.up), "person", 1.0, 0.0, "Up is what was stated.", ()
-        )
+        told = _UpEvidence(_unit_vector(stated.up), "person", 1.0, 0.0, "Up is what was stated.", ())
     elif z_up or cameras:
         told = _up_from_file_or_cameras(cameras, z_up)
     else:
@@ -161,9 +153,7 @@ def _up_from_file_or_cameras(cameras: tuple[Camera, ...], z_up: bool) -> _UpEvid
     if seen is None or z_up:
         return _up_by_file(seen)
     many = f"{len(cameras)} cameras"
-    reason = (
-        f"Up is the consensus of {many}, which people hold level (to {_degrees_text(seen.error)})."
-    )
+    reason = f"Up is the consensus of {many}, which people hold level (to {_degrees_text(seen.error)})."
     if not np.isfinite(seen.error):
         reason = "Up is the mean of the pictures' up directions."
     return _UpEvidence(seen.up, "cameras", seen.sure, seen.error, reason, seen.warnings)
@@ -179,14 +169,10 @@ def _up_from_resting(told: _UpEvidence, points: np.ndarray) -> _UpEvidence:
     found = [(axis, stood) for axis, stood in rests if stood is not None]
     if not found:
         return told
-    axis, stood = min(
-        found, key=lambda f: f[1].tilt + (f[0] is not usual) * UNUSUAL_AXIS_EXTRA_ROLL_RAD
-    )
+    axis, stood = min(found, key=lambda f: f[1].tilt + (f[0] is not usual) * UNUSUAL_AXIS_EXTRA_ROLL_RAD)
     if stood.tilt > MAX_STANDING_ROLL_RAD:
         return told
-    fell = (
-        "" if axis is usual else f" Up is not {USUAL_UP_AXIS_WORDS}: the objects would fall over."
-    )
+    fell = "" if axis is usual else f" Up is not {USUAL_UP_AXIS_WORDS}: the objects would fall over."
     reason = f"Up is by the resting pose of the objects, {_degrees_text(stood.tilt)} from an axis."
     return _UpEvidence(stood.up, "rest", 0.5, np.inf, reason + fell, (_unknown_up_note(fell),))
 
@@ -215,9 +201,7 @@ def _up_by_file(seen: UpDirection | None) -> _UpEvidence:
         f"about a direction {np.degrees(angle):.0f}° from it. The cameras were used."
     )
     reason = f"Up is the consensus of the cameras (to {_degrees_text(seen.error)})."
-    return _UpEvidence(
-        seen.up, "cameras", seen.sure * 0.8, seen.error, reason, (*seen.warnings, words)
-    )
+    return _UpEvidence(seen.up, "cameras", seen.sure * 0.8, seen.error, reason, (*seen.warnings, words))
 
 
 def _find_floor(
@@ -233,11 +217,7 @@ def _find_floor(
 def _corrected_up(told: _UpEvidence, plane: GroundPlane) -> _UpEvidence:
     """Let a plane that objects stand on correct what is up."""
     angle = _angle_between(told.up, plane.normal)
-    if (
-        told.sure >= MIN_STRONG_CONFIDENCE
-        and told.error < MAX_SURE_UP_ERROR_RAD
-        and angle < NEAR_PLANE_ANGLE_RAD
-    ):
+    if told.sure >= MIN_STRONG_CONFIDENCE and told.error < MAX_SURE_UP_ERROR_RAD and angle < NEAR_PLANE_ANGLE_RAD:
         return told
     reason = f"{told.reason} The floor, {np.degrees(angle):.1f}° from it, corrected that."
     by = told.found_by if told.sure >= MIN_STRONG_CONFIDENCE else "floor"
@@ -283,18 +263,12 @@ def _world_alignment(
     elif floor is not None:
         height, by, reason = floor, "person", "The floor is where it was stated to be."
     elif len(lowest):
-        heights = apply_similarity_to_points(remove_outliers(lowest), similarity_matrix(rotation))[
-            :, 2
-        ]
+        heights = apply_similarity_to_points(remove_outliers(lowest), similarity_matrix(rotation))[:, 2]
         height, by = float(np.percentile(heights, UNDERSIDE_PERCENTILE)), "objects"
         reason = "No floor was found: it was placed below the lowest points."
         warnings.append(f"{reason} Objects that float above it will fall.")
     else:
-        height, by, reason = (
-            float(centre[2]),
-            "nothing",
-            "There are no points to place a floor below.",
-        )
+        height, by, reason = (float(centre[2]), "nothing", "There are no points to place a floor below.")
     shift = -np.array([centre[0], centre[1], height])
     return WorldAlignment(
         world_from_file=similarity_matrix(rotation, 1.0, shift),

@@ -1,8 +1,7 @@
 """Posterior of objects' masses over hypotheses, ranges and the uncertainty of their meshes.
 
-Importance sampling: samples of the whole scene are weighted by an estimate of each object's mass
-made without the library (``MassEvidence``). The estimate sets no value: the chosen values were
-sampled together inside measured ranges.
+Importance sampling: samples of the whole scene are weighted by an estimate of each object's mass made without the
+library (``MassEvidence``). The estimate sets no value: the chosen values were sampled together inside measured ranges.
 """
 
 from collections import Counter
@@ -32,11 +31,7 @@ from corporeal.discretization.cavity import is_vessel, measure_cavity
 from corporeal.discretization.drawn_thickness import scan_edge_length, scan_volume_log_deviation
 from corporeal.discretization.granular_bed_objects import fill_all_beds, loose_matter_parts
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart, measure_objects
-from corporeal.discretization.missing_walls import (
-    MissingWall,
-    find_missing_walls,
-    with_missing_walls,
-)
+from corporeal.discretization.missing_walls import MissingWall, find_missing_walls, with_missing_walls
 from corporeal.discretization.part_model import NO_VOLUME_LEEWAY, VolumeLeeway, part_mass
 from corporeal.geometry.scene_transforms import scale_to_life_size
 from corporeal.materials.material_candidates import fraction_of
@@ -58,10 +53,9 @@ MAX_DRAWS_PER_OBJECT = 200
 OPEN_MESH_VOLUME_LOG_STD = 0.3
 """Standard deviation of the logarithm of the volume of a mesh that is not closed [-]."""
 MODELLED_SHAPE_VOLUME_LOG_STD = 0.12
-"""Standard deviation of the logarithm of what a modelled shape encloses, over what objects of its
-name do [-], of a part that only its name describes: the distance that half of 18 solid objects of
-published mass and known material exceed, in deviations, beside what their densities have (decision
-110).
+"""Standard deviation of the logarithm of what a modelled shape encloses, over what objects of its name do [-], of a
+part that only its name describes: the distance that half of 18 solid objects of published mass and known material
+exceed, in deviations, beside what their densities have (decision 110).
 """
 NAME_ONLY_SOURCES = ("metadata", "unknown")
 """Sources of a part that was not seen in pictures."""
@@ -99,9 +93,7 @@ class MassSampler:
         members = [(a, m) for a in self.anatomies for m in a.members]
         self.members = [m for _, m in members]
         self.rooms = [
-            measure_cavity(a, m, 0.0, np.random.default_rng([seed, m.part, 5])).volume
-            if is_vessel(m)
-            else 0.0
+            measure_cavity(a, m, 0.0, np.random.default_rng([seed, m.part, 5])).volume if is_vessel(m) else 0.0
             for a, m in members
         ]
         self.owner = [p.object for p in parts.catalogue]
@@ -119,9 +111,7 @@ class MassSampler:
         """Return the mass of the described scene [kg]."""
         return float(self.of(ground(self.scene, self.parts, inventory, self.grounding)).sum())
 
-    def of(
-        self, field: MaterialField, leeways: Sequence[VolumeLeeway] | None = None
-    ) -> Float[np.ndarray, " B"]:
+    def of(self, field: MaterialField, leeways: Sequence[VolumeLeeway] | None = None) -> Float[np.ndarray, " B"]:
         """Return the mass of each object [kg].
 
         Args:
@@ -140,8 +130,8 @@ class MassSampler:
     def _as_built(self, field: MaterialField) -> dict[int, MeasuredPart]:
         """Return the parts that differ from their meshes, for each set of hypotheses.
 
-        What is loose fills what holds it; walls are as thick then as in the first field in which
-        just these parts are loose. What is hollow is closed below what is soft.
+        What is loose fills what holds it; walls are as thick then as in the first field in which just these parts are
+        loose. What is hollow is closed below what is soft.
         """
         loose = frozenset(loose_matter_parts(field))
         if loose not in self._beds:
@@ -151,9 +141,7 @@ class MassSampler:
         found = [(anatomy, find_missing_walls(anatomy, field, known)) for anatomy, known in pairs]
         closed = frozenset((k, b.upper) for _, lids in found for k in lids for b in lids[k])
         if (loose, closed) not in self._built:
-            members = [
-                m for anatomy, lids in found for m in with_missing_walls(anatomy, lids).members
-            ]
+            members = [m for anatomy, lids in found for m in with_missing_walls(anatomy, lids).members]
             unlike = [m for m in members if m.drawn is not None or m.lid is not None]
             self._built[loose, closed] = {m.part: m for m in unlike}
         return self._built[loose, closed]
@@ -170,13 +158,9 @@ class MassSampler:
         field = sample_material_field(field, self.owner, rng, library, floor)
         away = [float(rng.normal(-d / 2, d)) if d else 0.0 for d in self.doubts]
         judged = rng.normal(size=len(away))  # the error of thickness is common to all parts
-        hands = rng.normal(
-            size=len(self.scene.objects)
-        )  # the error of shape is common to all parts
+        hands = rng.normal(size=len(self.scene.objects))  # the error of shape is common to all parts
         shaped = [
-            float(f * hands[self.owner[m.part]])
-            if field.words[m.part].answered_by in NAME_ONLY_SOURCES
-            else 0.0
+            float(f * hands[self.owner[m.part]]) if field.words[m.part].answered_by in NAME_ONLY_SOURCES else 0.0
             for f, m in zip(self.forms, self.members, strict=True)
         ]
         leeways = [
@@ -189,17 +173,14 @@ class MassSampler:
 def volume_log_std(member: MeasuredPart) -> float:
     """Return how far the mesh leaves the enclosed volume open: deviation of its logarithm [-].
 
-    Of a scan h / (√3 τ) (``scan_volume_log_deviation``). It is more often too large than too small,
-    by half of that, .29 h / τ: fusing views thickens what is thin (boards of 16 mm that were
-    reconstructed on cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ both).
-    A stated ratio of thickness replaces this mean.
+    Of a scan h / (√3 τ) (``scan_volume_log_deviation``). It is more often too large than too small, by half of that,
+    .29 h / τ: fusing views thickens what is thin (boards of 16 mm that were reconstructed on cells of 12 and 7 mm
+    weighed a quarter and a seventh too much, .30 h / τ both). A stated ratio of thickness replaces this mean.
     """
     found = 0.0 if member.closed else OPEN_MESH_VOLUME_LOG_STD
     edge = scan_edge_length(member.body)
     if edge > 0 and member.volume > 0:
-        found = float(
-            np.hypot(found, scan_volume_log_deviation(edge, member.volume, member.body_area))
-        )
+        found = float(np.hypot(found, scan_volume_log_deviation(edge, member.volume, member.body_area)))
     return min(found, MAX_VOLUME_LOG_STD)
 
 
@@ -224,19 +205,13 @@ def ground_with_mass_posterior(
     """
     if not inventory.transcript:  # only ranges are uncertain
         return ground(scene, parts, _with_named_mass(scene, parts, inventory, grounding), grounding)
-    ours = replace(
-        grounding, field=""
-    )  # samples use the library's ranges, whoever chooses the values
-    believed = sample_masses(
-        MassSampler(scale_to_life_size(scene), parts, ours, 0), inventory, SAMPLES_PER_SCENE
-    )
+    ours = replace(grounding, field="")  # samples use the library's ranges, whoever chooses the values
+    believed = sample_masses(MassSampler(scale_to_life_size(scene), parts, ours, 0), inventory, SAMPLES_PER_SCENE)
     found = ground(scene, parts, believed.inventory, grounding)
     return replace(found, mixtures=believed.mixtures)
 
 
-def _with_named_mass(
-    scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig
-) -> Inventory:
+def _with_named_mass(scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig) -> Inventory:
     """Choose the construction of weights that fits the mass in their name best."""
     found = [construction_hypotheses(scene, k, words) for k, words in enumerate(inventory.objects)]
     if not any(found):
@@ -246,10 +221,7 @@ def _with_named_mass(
         if ways is None:
             continue
         made = [_with_description(inventory, number, words) for words in ways.words]
-        masses = [
-            float(scale.of(ground(scale.scene, parts, one, scale.grounding))[number])
-            for one in made
-        ]
+        masses = [float(scale.of(ground(scale.scene, parts, one, scale.grounding))[number]) for one in made]
         inventory = made[best_mass_fit(masses, ways.mass)]
     return inventory
 
@@ -268,9 +240,7 @@ def sample_masses(scale: MassSampler, inventory: Inventory, samples: int) -> Wei
     for k, words in enumerate(inventory.objects):
         doubted = bool(words.answers)
         doubted |= any(len(p.hypotheses) > 1 or p.material is None for p in leaf_parts(words.parts))
-        doubted |= any(
-            d for m, d in zip(scale.members, scale.doubts, strict=True) if scale.owner[m.part] == k
-        )
+        doubted |= any(d for m, d in zip(scale.members, scale.doubts, strict=True) if scale.owner[m.part] == k)
         known = None if doubted else float(placed[k])
         own = _ObjectSamples(words, k, draws)
         mixture = own.mixture(known)
@@ -282,8 +252,7 @@ def sample_masses(scale: MassSampler, inventory: Inventory, samples: int) -> Wei
 def total_mass_posterior(mixtures: Sequence[MassPosterior]) -> MassPosterior:
     """Return the total mass of one or more objects.
 
-    The interval of a sum is at most the sum of the intervals. The sum has mass evidence if every
-    object has.
+    The interval of a sum is at most the sum of the intervals. The sum has mass evidence if every object has.
     """
     if len(mixtures) == 1:
         return mixtures[0]
@@ -308,17 +277,12 @@ def _total(said: Sequence[MassEvidence], count: int) -> MassEvidence | None:
     """Add up the evidence of ``count`` objects, if there is some of each."""
     if not said or len(said) < count:
         return None
-    low, likely, high = (
-        sum(row) for row in zip(*((e.low, e.likely, e.high) for e in said), strict=True)
-    )
+    low, likely, high = (sum(row) for row in zip(*((e.low, e.likely, e.high) for e in said), strict=True))
     return MassEvidence(low, likely, high, " ".join(e.reason for e in said))
 
 
 def sample_hypotheses(
-    inventory: Inventory,
-    mixtures: Sequence[MassPosterior],
-    rng: np.random.Generator,
-    library: str,
+    inventory: Inventory, mixtures: Sequence[MassPosterior], rng: np.random.Generator, library: str
 ) -> Inventory:
     """Sample a hypothesis for every part from the posterior.
 
@@ -413,9 +377,7 @@ class _ObjectSamples:
         draw = self.draws[int(np.argmin(far))]
         names = {(p.object, p.name): k for k, p in enumerate(scale.parts.catalogue)}
         parts = []
-        for words, drawn in zip(
-            self.words.parts, draw.inventory.objects[self.number].parts, strict=True
-        ):
+        for words, drawn in zip(self.words.parts, draw.inventory.objects[self.number].parts, strict=True):
             k = names.get((self.number, words.name))
             if k is None:
                 parts.append(words)
@@ -423,9 +385,7 @@ class _ObjectSamples:
                 rows = zip(words.pieces, drawn.pieces, draw.field.pieces[k], strict=True)
                 pieces = [_fix_draw(p, q, r.material, r.structure) for p, q, r in rows]
                 main = max(pieces, key=lambda p: p.volume_share - p.inner_share)
-                kept = {
-                    name: getattr(words, name) for name in ("name", "volume_share", "surface_share")
-                }
+                kept = {name: getattr(words, name) for name in ("name", "volume_share", "surface_share")}
                 parts.append(
                     replace(
                         main, **kept, inside="", inner_share=0.0, missing=False,
@@ -433,15 +393,11 @@ class _ObjectSamples:
                     )
                 )  # fmt: skip
             else:
-                parts.append(
-                    _fix_draw(words, drawn, draw.field.materials[k], draw.field.structures[k])
-                )
+                parts.append(_fix_draw(words, drawn, draw.field.materials[k], draw.field.structures[k]))
         return replace(self.words, parts=tuple(parts))
 
 
-def _fix_draw(
-    words: PartDescription, drawn: PartDescription, made: Material, built: Structure
-) -> PartDescription:
+def _fix_draw(words: PartDescription, drawn: PartDescription, made: Material, built: Structure) -> PartDescription:
     """Fix a part to a sample; values that determine its mass are placed as sampled."""
     if not words.hypotheses or drawn.material is None or words.material is None:
         return replace(words, **{name: getattr(drawn, name) for name in NESTED_SHARE_FIELDS})
@@ -449,9 +405,7 @@ def _fix_draw(
     for name in MASS_FIELDS:
         if name in made.grounds and (name == "density" or built.kind != "solid"):
             ground = made.grounds[name]
-            places[name] = RangePlacement(
-                fraction_of(ground.range, ground.value), "evidence", FITTED_DRAW_REASON
-            )
+            places[name] = RangePlacement(fraction_of(ground.range, ground.value), "evidence", FITTED_DRAW_REASON)
     if built.contents is not None:
         ground = built.contents.grounds["density"]
         places[CONTENTS_DENSITY_FIELD] = RangePlacement(
@@ -480,13 +434,9 @@ def hypothesis_label(words: ObjectDescription, drawn: ObjectDescription) -> str:
     return "; ".join(in_doubt) or "as described"
 
 
-def weighted_quantiles(
-    values: Float[np.ndarray, " N"], weights: Float[np.ndarray, " N"]
-) -> tuple[float, float, float]:
+def weighted_quantiles(values: Float[np.ndarray, " N"], weights: Float[np.ndarray, " N"]) -> tuple[float, float, float]:
     """Return the 5 %, 50 % and 95 % points of weighted values; weights add up to 1."""
     order = np.argsort(values)
     at = np.cumsum(weights[order]) - 0.5 * weights[order]
-    low, middle, high = np.interp(
-        [INTERVAL_LOW_QUANTILE, 0.5, INTERVAL_HIGH_QUANTILE], at, values[order]
-    )
+    low, middle, high = np.interp([INTERVAL_LOW_QUANTILE, 0.5, INTERVAL_HIGH_QUANTILE], at, values[order])
     return float(low), float(middle), float(high)

@@ -3,16 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from corporeal.core.types import (
-    Inventory,
-    MaterialField,
-    Particles,
-    Parts,
-    Reconstruction,
-    Scene,
-    Trajectory,
-    Video,
-)
+from corporeal.core.types import Inventory, MaterialField, Particles, Parts, Reconstruction, Scene, Trajectory, Video
 from corporeal.scene.fractured_scene import FilledScene, apply_breaks
 from corporeal.scene.repose_reconstruction import repose_reconstruction
 from corporeal.scene.vessel_contents import SceneWithMaterials, add_vessel_contents
@@ -33,8 +24,7 @@ RUN_FILES = (
 class StageResults:
     """Results of the stages; None: not run, or not needed.
 
-    The fields carry the names of the stages. The properties raise LookupError if the stage has not
-    been run.
+    The fields carry the names of the stages. The properties raise LookupError if the stage has not been run.
     """
 
     reconstruct: Reconstruction | None = None
@@ -118,9 +108,7 @@ class StageResults:
     def rendered_reconstruction(self) -> Reconstruction | None:
         """The reconstruction for rendering; None if some objects have no Gaussians."""
         found = self.reconstruction
-        whole = found is not None and len(found.names) == len(
-            _made(self.assemble, "assemble").objects
-        )
+        whole = found is not None and len(found.names) == len(_made(self.assemble, "assemble").objects)
         return found if whole else None
 
     @property

@@ -126,11 +126,7 @@ def _view(made: StageResults, audit: RunAudit, max_bytes: int = MAX_VIEW_BYTES) 
 
 
 def run_audit(
-    made: StageResults,
-    audit: Audit,
-    happened: Outcome,
-    seen: tuple[Expectation, ...],
-    spent: RunCost,
+    made: StageResults, audit: Audit, happened: Outcome, seen: tuple[Expectation, ...], spent: RunCost
 ) -> RunAudit:
     """Add outcomes and the cost of the run to a simulation's audit."""
     audit = audit.noting(_warnings(made, audit))
@@ -142,9 +138,7 @@ def run_audit(
         peak_memory_mb=peak_memory_mb(),
         settings=spent.settings,
         questions=made.inventory.usage,
-        hints=run_hints(
-            made.assembled.scene, happened, spent.divided, audit.unbooked_loss, audit.parts
-        ),
+        hints=run_hints(made.assembled.scene, happened, spent.divided, audit.unbooked_loss, audit.parts),
     )
 
 

@@ -1,11 +1,9 @@
 """The stages of a run in order, with caching of their results.
 
-A run is a folder. Each stage stores its result in a numbered folder, under a key that covers all
-its inputs: fresh results are read, stale ones recomputed, interrupted ones resumed. ``run.json``
-holds the state of the run.
+A run is a folder. Each stage stores its result in a numbered folder, under a key that covers all its inputs: fresh
+results are read, stale ones recomputed, interrupted ones resumed. ``run.json`` holds the state of the run.
 
-What does a stage is imported when it is done: a run that is read back, or not begun, waits for
-none.
+What does a stage is imported when it is done: a run that is read back, or not begun, waits for none.
 """
 
 import shutil
@@ -21,16 +19,7 @@ from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
 from corporeal.core.setting_types import paths_read
-from corporeal.core.types import (
-    Inventory,
-    MaterialField,
-    Particles,
-    Parts,
-    Reconstruction,
-    Scene,
-    Trajectory,
-    Video,
-)
+from corporeal.core.types import Inventory, MaterialField, Particles, Parts, Reconstruction, Scene, Trajectory, Video
 from corporeal.geometry.gaussian_transforms import chosen_up_axis
 from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.io.input_files import (
@@ -93,8 +82,8 @@ def run(
         until: The last stage to run.
 
     Raises:
-        UserError: An input cannot be used, the disk is full, another process works in the folder,
-            or the simulation cannot go on.
+        UserError: An input cannot be used, the disk is full, another process works in the folder, or the simulation
+            cannot go on.
 
     """
     folder = Path(folder)
@@ -145,9 +134,7 @@ def read_run_request(folder: Path) -> RunRequest:
     if not folder.exists():
         raise UserError(f"{folder} is not a run: there is no such folder. Check the path.")
     if not (folder / RUN_FILE).exists():
-        raise UserError(
-            f"{folder} is not a run: it has no {RUN_FILE}. Start one with: corporeal run."
-        )
+        raise UserError(f"{folder} is not a run: it has no {RUN_FILE}. Start one with: corporeal run.")
     return from_plain(RunRequest, store.read_json(folder / RUN_FILE))
 
 
@@ -251,14 +238,7 @@ def write_showcase(name: str, folder: Path) -> Path:
     return path
 
 
-SHOWCASE_PACKAGES = (
-    "numpy",
-    "scipy",
-    "manifold3d",
-    "scikit-image",
-    "fast-simplification",
-    "pillow",
-)
+SHOWCASE_PACKAGES = ("numpy", "scipy", "manifold3d", "scikit-image", "fast-simplification", "pillow")
 """Packages whose versions are part of the cache key of a showcase scene."""
 
 
@@ -271,9 +251,7 @@ def write_cached_showcase(name: str, folder: Path) -> Path:
         UnknownChoiceError: There is no such scene.
 
     """
-    recipe = store.result_key(
-        "showcase", {p: version(p) for p in SHOWCASE_PACKAGES}, [name, store.source_digest()]
-    )
+    recipe = store.result_key("showcase", {p: version(p) for p in SHOWCASE_PACKAGES}, [name, store.source_digest()])
     kept = store.cache_folder("scenes") / f"{name}-{recipe}.glb"
     try:
         data = kept.read_bytes()
@@ -292,9 +270,7 @@ def write_cached_showcase(name: str, folder: Path) -> Path:
 class _Run:
     """One pass over the stages; holds their results."""
 
-    def __init__(
-        self, inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage
-    ) -> None:
+    def __init__(self, inputs: list[Path], folder: Path, settings: Settings, tell: ProgressOfStage) -> None:
         self.inputs, self.folder, self.settings, self.tell = inputs, folder, settings, tell
         self.key = ""
         self.seconds: dict[str, float] = {}
@@ -327,9 +303,7 @@ class _Run:
     def _do(self, verb: str) -> None:
         config = getattr(self.settings, verb, None)
         before = [self.key] if self.key else [store.path_digest(p) for p in self._files()]
-        self.key = store.result_key(
-            verb, config, before + digests_of_named_files(config) + self._borrowed(verb)
-        )
+        self.key = store.result_key(verb, config, before + digests_of_named_files(config) + self._borrowed(verb))
         folder = self.folder / STAGE_FOLDERS[verb]
         step = getattr(self, f"_{verb}")
         if store.is_fresh(folder, self.key):
@@ -367,8 +341,8 @@ class _Run:
     def _clear(self, verb: str, folder: Path) -> None:
         """Remove results that no longer follow from the settings.
 
-        An unfinished simulation is kept, and what a reconstruction learned: both go on from there,
-        a training only if it is of the same pictures.
+        An unfinished simulation is kept, and what a reconstruction learned: both go on from there, a training only if
+        it is of the same pictures.
         """
         for name in RUN_FILES:
             (self.folder / name).unlink(missing_ok=True)
@@ -396,9 +370,7 @@ class _Run:
         assert source is not None, "models need no reconstruction"
         config, extents = self.settings.reconstruct, self.settings.assemble.extent
         if self.settings.assemble.objects != "auto":
-            raise UserError(
-                "--objects is for models. Choose how objects are separated with --apart."
-            )
+            raise UserError("--objects is for models. Choose how objects are separated with --apart.")
         viewer = PhotoInterview(safe_name(scene_name(source)), asked.vlm, asked.record)
         result = reconstruct(source, config, extents, viewer, folder, progress)
         made, scene = result.found, result.scene
@@ -414,17 +386,13 @@ class _Run:
         progress(0.0, "reading the scene")
         inputs, config = self.inputs, self.settings.assemble
         if self.made.reconstruct is not None:
-            inputs = [
-                _reconstructed_model(self.inputs[0], self.folder / STAGE_FOLDERS["reconstruct"])
-            ]
+            inputs = [_reconstructed_model(self.inputs[0], self.folder / STAGE_FOLDERS["reconstruct"])]
             config = replace(config, extent=())  # they determine the scale of the reconstruction
             scene = assemble(inputs, config)
             if is_scene_file(self.inputs[0]):
                 scene = replace(scene, name=scene_title(self.inputs[0]))
             return self._keep(folder, scene)
-        return self._keep(
-            folder, assemble(inputs, config, chosen_up_axis(self.settings.reconstruct.up))
-        )
+        return self._keep(folder, assemble(inputs, config, chosen_up_axis(self.settings.reconstruct.up)))
 
     def _describe(self, folder: Path, progress: Progress) -> Inventory:
         from corporeal.pipeline.stages.describe import describe
@@ -452,9 +420,7 @@ class _Run:
 
         progress(0.0, "choosing material values")
         made = self.made
-        found = ground_with_mass_posterior(
-            made.scene, made.parts, made.inventory, self.settings.ground
-        )
+        found = ground_with_mass_posterior(made.scene, made.parts, made.inventory, self.settings.ground)
         return self._keep(folder, found)
 
     def _fill(self, folder: Path, progress: Progress) -> Particles:
@@ -473,9 +439,7 @@ class _Run:
     def _video(self, folder: Path, progress: Progress) -> Video:
         from corporeal.pipeline.stages.video import render_video
 
-        return self._keep(
-            folder, render_video(self.made.played, self.settings.video, folder, progress)
-        )
+        return self._keep(folder, render_video(self.made.played, self.settings.video, folder, progress))
 
     def _report(self, folder: Path, progress: Progress) -> None:
         from corporeal.pipeline.run_files import RunCost, write_run_files

@@ -30,15 +30,11 @@ MAX_RECORDING_FPS = 30.0
 def bind_scene(prepared: PreparedScene) -> SceneBinding:
     """Bind the surfaces of a scene to its particles."""
     p = prepared
-    skin = bind_vertices(
-        p.scene, p.parts, p.particles, granular_parts(p.field), fluid_parts(p.field)
-    )
+    skin = bind_vertices(p.scene, p.parts, p.particles, granular_parts(p.field), fluid_parts(p.field))
     return SceneBinding.of(p.scene, p.particles, skin)
 
 
-def record_trajectory(
-    cast: SceneBinding, trajectory: Trajectory, fps: float = MAX_RECORDING_FPS
-) -> Recording:
+def record_trajectory(cast: SceneBinding, trajectory: Trajectory, fps: float = MAX_RECORDING_FPS) -> Recording:
     """Record a trajectory with at most ``fps`` pictures a second, including the first and the last.
 
     Args:
@@ -91,9 +87,7 @@ def scene_summary(prepared: PreparedScene) -> dict[str, Any]:
         "particles": prepared.particles.count,
         "parts": part_cards(prepared),
         "panels": {name: _panel(p) for name, p in colour_panels(scene, parts, field).items()},
-        "ramp": np.round(255 * colours.ramp_colours(np.linspace(0, 1, RAMP_COLOURS)))
-        .astype(int)
-        .tolist(),
+        "ramp": np.round(255 * colours.ramp_colours(np.linspace(0, 1, RAMP_COLOURS))).astype(int).tolist(),
         "credits": list(credits),
         "honest": resolution_statement(prepared),
     }
@@ -117,8 +111,7 @@ def resolution_statement(prepared: PreparedScene) -> str:
     softer = sorted(
         (t.simulated_young_pa / t.young_pa, prepared.scene.objects[part.object].name, part.name)
         for part, t in zip(prepared.parts.catalogue, particles.treatments, strict=True)
-        if t.kind not in ("rigid", "foliage")
-        and t.simulated_young_pa < UNSOFTENED_MODULUS_RATIO * t.young_pa
+        if t.kind not in ("rigid", "foliage") and t.simulated_young_pa < UNSOFTENED_MODULUS_RATIO * t.young_pa
     )
     size = f"{particles.count:,} particles, cells of {1e3 * particles.cell:.3g} mm"
     if not softer:
@@ -159,9 +152,7 @@ def _warnings_with_parts(warnings: Sequence[str], prepared: PreparedScene) -> li
 
 
 def _panel(panel: CategoryPanel | NumericPanel) -> dict[str, Any]:
-    shade = [
-        "#" + "".join(f"{round(255 * c):02x}" for c in rgb) for rgb in part_colours(panel).tolist()
-    ]
+    shade = ["#" + "".join(f"{round(255 * c):02x}" for c in rgb) for rgb in part_colours(panel).tolist()]
     if isinstance(panel, CategoryPanel):
         return {"title": panel.title, "colours": shade, "labels": list(panel.label)}
     whole = {"values": [float(v) for v in panel.value], "unit": panel.unit, "log": panel.log}

@@ -6,8 +6,8 @@ Layout, as the archives abo-3dmodels.tar and abo-listings.tar unpack side by sid
     3dmodels/original/X/ID.glb
     listings/metadata/listings_X.json.gz   a product a line: 3dmodel_id, product_type, item_name
 
-Source: Collins et al., "ABO: Dataset and Benchmarks for Real-World 3D Object Understanding", CVPR
-2022, and the README files beside the data.
+Source: Collins et al., "ABO: Dataset and Benchmarks for Real-World 3D Object Understanding", CVPR 2022, and the README
+files beside the data.
 """
 
 import csv
@@ -61,9 +61,7 @@ def abo_candidates(root: Path) -> list[PoolCandidate]:
     return found
 
 
-def _abo_candidate(
-    file: Path, row: dict[str, str], product: ListedProduct | None, licence: str
-) -> PoolCandidate:
+def _abo_candidate(file: Path, row: dict[str, str], product: ListedProduct | None, licence: str) -> PoolCandidate:
     title = f"{product.title}, " if product and product.title else ""
     declared = ModelRow(
         class_name=product.class_name if product else "",

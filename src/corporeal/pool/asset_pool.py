@@ -11,16 +11,12 @@ from corporeal.io.gltf.gltf_credits import Credit
 
 
 def draw_least_used(
-    names: Sequence[str],
-    used: Mapping[str, int],
-    count: int,
-    rng: np.random.Generator,
-    repeat: bool = False,
+    names: Sequence[str], used: Mapping[str, int], count: int, rng: np.random.Generator, repeat: bool = False
 ) -> list[str]:
     """Return the ``count`` names that were used least, chance deciding between equals.
 
-    Over any number of draws the uses of two names differ by one at most, as long as every draw is
-    offered the same names and the uses are counted between draws.
+    Over any number of draws the uses of two names differ by one at most, as long as every draw is offered the same
+    names and the uses are counted between draws.
 
     Args:
         names: What there is, each once.

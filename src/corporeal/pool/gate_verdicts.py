@@ -70,9 +70,7 @@ class GateVerdicts:
         except OSError as problem:
             return GateVerdict("", f"cannot be read ({problem.strerror})")
         known = self.known.get(key)
-        if known is not None and (
-            not known.copy or (self.pool / MODELS_FOLDER / known.copy).exists()
-        ):
+        if known is not None and (not known.copy or (self.pool / MODELS_FOLDER / known.copy).exists()):
             return known
         verdict = _in_words_of_one_line(judge_file(file, key, self.gate, self.pool))
         self.known[key] = verdict

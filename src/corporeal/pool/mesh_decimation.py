@@ -49,9 +49,7 @@ def _decimate_surface(surface: Surface, target: int) -> Surface:
     return _transfer_attributes(surface, old, vertices, triangles)
 
 
-def _collapse_edges(
-    vertices: np.ndarray, triangles: np.ndarray, target: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _collapse_edges(vertices: np.ndarray, triangles: np.ndarray, target: int) -> tuple[np.ndarray, np.ndarray]:
     """Collapse edges, the cheapest first, until there are no more than ``target`` triangles.
 
     The library's threshold is an absolute squared distance: hence the unit size.
@@ -91,13 +89,7 @@ class _SourceSurface:
         face, foot = np.asarray(face), np.asarray(foot)
         a, b, c = np.swapaxes(self.vertices[self.triangles[face]], 0, 1)
         u, v, w = b - a, c - a, foot - a
-        uu, uv, vv, wu, wv = (
-            _row_dot(u, u),
-            _row_dot(u, v),
-            _row_dot(v, v),
-            _row_dot(w, u),
-            _row_dot(w, v),
-        )
+        uu, uv, vv, wu, wv = (_row_dot(u, u), _row_dot(u, v), _row_dot(v, v), _row_dot(w, u), _row_dot(w, v))
         area = np.maximum(uu * vv - uv * uv, 1e-300)
         s = np.clip((vv * wu - uv * wv) / area, 0, 1)
         t = np.clip((uu * wv - uv * wu) / area, 0, 1 - s)
@@ -108,9 +100,7 @@ class _SourceSurface:
         return np.einsum("nk,nkd->nd", weights, np.asarray(values, np.float64)[self.corners[face]])
 
 
-def _transfer_attributes(
-    surface: Surface, old: _SourceSurface, x: np.ndarray, triangles: np.ndarray
-) -> Surface:
+def _transfer_attributes(surface: Surface, old: _SourceSurface, x: np.ndarray, triangles: np.ndarray) -> Surface:
     """Give each corner of the new triangles what the old surface wears there."""
     face, weights = old.nearest(x)
     columns = {}
@@ -132,8 +122,7 @@ class _SourceTexture:
     def __init__(self, old: _SourceSurface, uv: np.ndarray) -> None:
         self.old, self.uv = old, uv
         self.density = np.sqrt(
-            _triangle_areas(uv[old.corners])
-            / np.maximum(_triangle_areas(old.vertices[old.triangles]), 1e-300)
+            _triangle_areas(uv[old.corners]) / np.maximum(_triangle_areas(old.vertices[old.triangles]), 1e-300)
         )
         """Of each old triangle, length in the picture per length in space."""
 
@@ -154,11 +143,7 @@ class _SourceTexture:
         at, inside = self.old.nearest(middle)
         centre = self.old.worn(self.uv, at, inside)
         density = np.median(self.density[np.column_stack([at, face[triangles]])], axis=1)
-        reach = (
-            MAX_TEXTURE_STRETCH
-            * density[:, None]
-            * np.linalg.norm(corners - middle[:, None], axis=2)
-        )
+        reach = MAX_TEXTURE_STRETCH * density[:, None] * np.linalg.norm(corners - middle[:, None], axis=2)
         taken = self.old.worn(self.uv, face, weights)[triangles]
         across = np.linalg.norm(taken - centre[:, None], axis=2) > reach
         for step in INWARD_LOOK_FRACTIONS:
@@ -184,9 +169,7 @@ def _transfer_normals(found: np.ndarray, x: np.ndarray, triangles: np.ndarray) -
     a, b, c = np.swapaxes(x[triangles], 0, 1)
     flat = _unit_rows(np.cross(b - a, c - a))[:, None]
     smooth = _unit_rows(found)[triangles]
-    return np.where(
-        (smooth * flat).sum(axis=2, keepdims=True) < MIN_CORNER_NORMAL_COS, flat, smooth
-    )
+    return np.where((smooth * flat).sum(axis=2, keepdims=True) < MIN_CORNER_NORMAL_COS, flat, smooth)
 
 
 def _join_equal_corners(
@@ -194,12 +177,8 @@ def _join_equal_corners(
 ) -> Surface:
     """Make corners of one vertex that look the same into one."""
     flat = {name: v.reshape(-1, v.shape[2]) for name, v in columns.items()}
-    rows = np.column_stack(
-        [triangles.reshape(-1), *(np.round(v * SAME_LOOK_STEPS_PER_UNIT) for v in flat.values())]
-    )
-    _, first, joined = np.unique(
-        rows.astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
+    rows = np.column_stack([triangles.reshape(-1), *(np.round(v * SAME_LOOK_STEPS_PER_UNIT) for v in flat.values())])
+    _, first, joined = np.unique(rows.astype(np.int64), axis=0, return_index=True, return_inverse=True)
     return replace(
         surface,
         vertices=x[triangles.reshape(-1)[first]],

@@ -54,9 +54,7 @@ def read_model_table(path: Path, places: Sequence[Path]) -> dict[Path, ModelRow]
             reader.fieldnames = heads
             lines = [(reader.line_num, line) for line in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as problem:
-        raise BadFileError(
-            path, f"cannot be read as a table ({problem}).", MODEL_TABLE_HELP
-        ) from problem
+        raise BadFileError(path, f"cannot be read as a table ({problem}).", MODEL_TABLE_HELP) from problem
     rows = {}
     for number, line in lines:
         name = _cell_text(line, ("file",))

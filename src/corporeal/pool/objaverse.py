@@ -7,8 +7,7 @@ Layout of the cache, ``~/.objaverse/hf-objaverse-v1``, as the package ``objavers
     metadata/000-023.json.gz     uid → name, license, user, viewerUrl, …
     glbs/000-023/<uid>.glb
 
-Models are in units of their makers. Source: Deitke et al., "Objaverse: A Universe of Annotated 3D
-Objects", CVPR 2023.
+Models are in units of their makers. Source: Deitke et al., "Objaverse: A Universe of Annotated 3D Objects", CVPR 2023.
 """
 
 import gzip
@@ -62,19 +61,12 @@ def objaverse_candidates(cache: Path | None = None) -> list[PoolCandidate]:
             "be downloaded: corporeal assets index --from objaverse --classes mug chair."
         )
     paths = _read_gzip_json(root / OBJAVERSE_PATHS_FILE)
-    lvis = (
-        _read_gzip_json(root / OBJAVERSE_LVIS_FILE)
-        if (root / OBJAVERSE_LVIS_FILE).is_file()
-        else {}
-    )
+    lvis = _read_gzip_json(root / OBJAVERSE_LVIS_FILE) if (root / OBJAVERSE_LVIS_FILE).is_file() else {}
     class_of = {uid: category_words(category) for category, uids in lvis.items() for uid in uids}
     files = {uid: root / path for uid, path in paths.items() if (root / path).is_file()}
     notes = _annotations(root, files)
     order = sorted(files, key=lambda uid: (class_of.get(uid, ""), uid))
-    return [
-        _objaverse_candidate(uid, files[uid], class_of.get(uid, ""), notes.get(uid, {}))
-        for uid in order
-    ]
+    return [_objaverse_candidate(uid, files[uid], class_of.get(uid, ""), notes.get(uid, {})) for uid in order]
 
 
 def fetch_objaverse(wanted: WantedModels) -> Path:
@@ -111,9 +103,7 @@ def choose_models(lvis: dict[str, list[str]], wanted: WantedModels) -> list[str]
     chosen = []
     for name in wanted.classes:
         if category_words(name) not in known:
-            near = [
-                k for k in sorted(known) if category_words(name) in k or k in category_words(name)
-            ]
+            near = [k for k in sorted(known) if category_words(name) in k or k in category_words(name)]
             advice = f"Did you mean: {', '.join(near[:8])}?" if near else "See lvisdataset.org."
             raise UserError(f"Objaverse has no LVIS category {name!r}. {advice}")
         chosen += sorted(known[category_words(name)])[: wanted.per_class]

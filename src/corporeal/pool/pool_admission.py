@@ -37,9 +37,7 @@ class PoolMember:
 class PoolAdmission:
     """Lets candidates into a pool, one after the other."""
 
-    def __init__(
-        self, pool: Path, members: Iterable[PoolMember], rejections: Iterable[PoolRejection]
-    ):
+    def __init__(self, pool: Path, members: Iterable[PoolMember], rejections: Iterable[PoolRejection]):
         self.pool = pool
         self.members = list(members)
         self.rejections = list(rejections)
@@ -55,16 +53,12 @@ class PoolAdmission:
         metric = is_in_metres(candidate, verdict.extent, words)
         reason = verdict.reason or self._why_not(verdict, words, bool(declared.metric) and metric)
         if reason:
-            self.rejections.append(
-                PoolRejection(single_line_text(str(candidate.file)), words, reason)
-            )
+            self.rejections.append(PoolRejection(single_line_text(str(candidate.file)), words, reason))
             return
         asset = PoolAsset(
             name=self._name(candidate),
             class_name=words,
-            file=self.pool / MODELS_FOLDER / verdict.copy
-            if verdict.copy
-            else candidate.file.resolve(),
+            file=self.pool / MODELS_FOLDER / verdict.copy if verdict.copy else candidate.file.resolve(),
             source=declared.source or str(candidate.file),
             sha256=verdict.sha256,
             licence=declared.licence or verdict.licence or UNKNOWN_LICENCE,
@@ -111,14 +105,11 @@ def _class_in_words(class_name: str) -> str:
 def is_in_metres(candidate: PoolCandidate, extent: float, words: str) -> bool:
     """Return whether lengths are metres: as declared, unless the mesh has another extent.
 
-    If not stated, they are if the object is then as large as such objects are: glTF is in metres by
-    its specification, and most files are not.
+    If not stated, they are if the object is then as large as such objects are: glTF is in metres by its specification,
+    and most files are not.
     """
     declared = candidate.declared
-    if (
-        declared.extent is not None
-        and abs(declared.extent / max(extent, 1e-300) - 1) > UNIT_DOUBT_RELATIVE_DIFFERENCE
-    ):
+    if declared.extent is not None and abs(declared.extent / max(extent, 1e-300) - 1) > UNIT_DOUBT_RELATIVE_DIFFERENCE:
         return False
     return extent_warning("", words, extent) is None if declared.metric is None else declared.metric
 
@@ -126,13 +117,8 @@ def is_in_metres(candidate: PoolCandidate, extent: float, words: str) -> bool:
 def why_absurd_extent(extent: float, words: str) -> str:
     """Return why an object of such an extent [m] can't be in metres; empty where it can."""
     known = typical_extent(words)
-    low, high = (
-        (known.low, known.high) if known else (MIN_PLAUSIBLE_EXTENT_M, MAX_PLAUSIBLE_EXTENT_M)
-    )
+    low, high = (known.low, known.high) if known else (MIN_PLAUSIBLE_EXTENT_M, MAX_PLAUSIBLE_EXTENT_M)
     if low / MAX_USUAL_SIZE_RATIO <= extent <= high * MAX_USUAL_SIZE_RATIO:
         return ""
     usual = f"a {known.words} is usually {known.usual:g} m" if known else "nothing is so"
-    return (
-        f"is declared as in metres and is {extent:.3g} m large; {usual}. Set metric = no if only "
-        "its shape counts"
-    )
+    return f"is declared as in metres and is {extent:.3g} m large; {usual}. Set metric = no if only its shape counts"

@@ -12,8 +12,7 @@ from corporeal.recognition.readable_names import everyday_words
 MANIFEST_FILE = "manifest.csv"
 """Table that is picked up where it lies in an indexed folder or right above it."""
 CONTAINER_FOLDER_NAMES = frozenset(
-    "models objects assets files meshes scenes glbs original originals source binary embedded "
-    "draco".split()
+    "models objects assets files meshes scenes glbs original originals source binary embedded draco".split()
 )
 """Folders of these names say nothing about what lies in them."""
 
@@ -27,18 +26,16 @@ class PoolCandidate:
     name: str = ""
 
 
-def candidates_in(
-    folders: Sequence[Path], table: Path | None = None, pool: Path | None = None
-) -> list[PoolCandidate]:
+def candidates_in(folders: Sequence[Path], table: Path | None = None, pool: Path | None = None) -> list[PoolCandidate]:
     """Return every model below the folders, each once, in the order of their paths.
 
-    A file's class is what a table says; else the name of the folder it lies in, right below the
-    indexed one; else nothing, and the file's own name will do.
+    A file's class is what a table says; else the name of the folder it lies in, right below the indexed one; else
+    nothing, and the file's own name will do.
 
     Args:
         folders: Searched with all their folders below.
-        table: CSV of classes; what it says goes before a manifest. What it names and is missing is
-            a candidate too, so that it is reported.
+        table: CSV of classes; what it says goes before a manifest. What it names and is missing is a candidate too, so
+            that it is reported.
         pool: A folder whose own copies are no candidates.
 
     Raises:

@@ -31,14 +31,11 @@ class OriginConfig:
     origin: CandidateOrigin = "folders"
     """Plain folders, the cache of the package objaverse, or Amazon Berkeley Objects."""
     csv: Path | None = None
-    """Of plain folders: table with columns file, class and, where known, licence, attribution,
-    extent_m, metric."""
+    """Of plain folders: table with columns file, class and, where known, licence, attribution, extent_m, metric."""
     wanted: objaverse.WantedModels = field(default_factory=objaverse.WantedModels)
 
 
-def find_candidates(
-    folders: Sequence[Path], config: OriginConfig, pool: Path
-) -> list[PoolCandidate]:
+def find_candidates(folders: Sequence[Path], config: OriginConfig, pool: Path) -> list[PoolCandidate]:
     """Return what asks to be let into the pool.
 
     Raises:
@@ -90,8 +87,8 @@ def index_pool(
 ) -> AssetPool:
     """Judge every model below the folders and keep the good ones in the pool.
 
-    What other files gave the pool before stays in it as long as they are there. A content that was
-    judged before, with the same gate, is not judged again; an interrupted run goes on where it was.
+    What other files gave the pool before stays in it as long as they are there. A content that was judged before, with
+    the same gate, is not judged again; an interrupted run goes on where it was.
 
     Args:
         folders: Hold models (glTF or meshes), at any depth, or a collection.

@@ -80,9 +80,7 @@ class ModelRejectedError(Exception):
 
 
 def inspect_model(
-    scene: Scene,
-    config: GateConfig = DEFAULT_GATE_CONFIG,
-    max_read_triangles: int = MAX_READ_TRIANGLES,
+    scene: Scene, config: GateConfig = DEFAULT_GATE_CONFIG, max_read_triangles: int = MAX_READ_TRIANGLES
 ) -> GatedModel:
     """Clean and decimate a model where it needs it, and measure it.
 
@@ -97,9 +95,7 @@ def inspect_model(
     """
     count = sum(len(s.triangles) for s in scene.surfaces)
     if count > max_read_triangles:
-        raise ModelRejectedError(
-            f"has {count:,} triangles; at most {max_read_triangles:,} are decimated"
-        )
+        raise ModelRejectedError(f"has {count:,} triangles; at most {max_read_triangles:,} are decimated")
     extent = _scene_extent(scene)
     mesh_name, look = shape_fingerprint(scene), look_fingerprint(scene)
     cleaned = _without_slivers(scene, extent)
@@ -174,8 +170,8 @@ def largest_component_fraction(mesh: Mesh) -> float:
 def separate_object_fractions(mesh: Mesh) -> Float[np.ndarray, " K"]:
     """Share of the area [-] of each object that stands clear of the others, the largest first.
 
-    Told by voxels as large as the gap, which sampled points fill: what they bridge is one object,
-    whether its pieces are joined or, as in most models, merely stuck together.
+    Told by voxels as large as the gap, which sampled points fill: what they bridge is one object, whether its pieces
+    are joined or, as in most models, merely stuck together.
     """
     points, _ = sample_surface(mesh, GATE_SURFACE_SAMPLES, np.random.default_rng(0))
     low = points.min(axis=0)
@@ -198,9 +194,7 @@ def _scene_extent(scene: Scene) -> float:
     extent = float(np.ptp(corners, axis=0).max())
     low, high = EXTENT_RANGE_UNITS
     if not low <= extent <= high:
-        raise ModelRejectedError(
-            f"is {extent:.3g} units large; {low:g} to {high:g} can be an object"
-        )
+        raise ModelRejectedError(f"is {extent:.3g} units large; {low:g} to {high:g} can be an object")
     return extent
 
 
@@ -212,9 +206,7 @@ def _is_used(s: Surface) -> Bool[np.ndarray, " V"]:
 
 def _without_slivers(scene: Scene, extent: float) -> Scene:
     """Return the scene without degenerate triangles, where there are many of them."""
-    kept = [
-        _surface_triangle_areas(s) > MAX_SLIVER_AREA_EXTENTS2 * extent**2 for s in scene.surfaces
-    ]
+    kept = [_surface_triangle_areas(s) > MAX_SLIVER_AREA_EXTENTS2 * extent**2 for s in scene.surfaces]
     share = 1 - np.concatenate(kept).mean()
     if share > MAX_SLIVER_FRACTION:
         raise ModelRejectedError(f"{share:.0%} of its triangles have no area")
@@ -250,18 +242,13 @@ def _check_count(triangles: int, texture: int, config: GateConfig) -> None:
 
 def _finest_texture_px(scene: Scene) -> int:
     """Return the side of the finest picture, repeats counted [px]; 0: there is none."""
-    sides = (
-        max(picture.shape[:2]) * max(1.0, area**0.5) for picture, area in _textures_with_area(scene)
-    )
+    sides = (max(picture.shape[:2]) * max(1.0, area**0.5) for picture, area in _textures_with_area(scene))
     return round(max(sides, default=0))
 
 
 def _are_textures_plain(scene: Scene) -> bool:
     """Whether the pictures carry colours and no detail."""
-    return all(
-        area < MAX_FLAT_UV_AREA or _is_palette_texture(picture)
-        for picture, area in _textures_with_area(scene)
-    )
+    return all(area < MAX_FLAT_UV_AREA or _is_palette_texture(picture) for picture, area in _textures_with_area(scene))
 
 
 def _textures_with_area(scene: Scene) -> Iterator[tuple[np.ndarray, float]]:
@@ -295,9 +282,7 @@ def _check_components(mesh: Mesh) -> None:
         raise ModelRejectedError("none of its triangles has an area")
     share = largest_component_fraction(mesh)
     if share <= MIN_MAIN_COMPONENT_FRACTION:
-        raise ModelRejectedError(
-            f"falls into crumbs: its largest connected piece has {share:.2%} of the area"
-        )
+        raise ModelRejectedError(f"falls into crumbs: its largest connected piece has {share:.2%} of the area")
     shares = separate_object_fractions(mesh)
     if shares[0] < MIN_ONE_OBJECT_FRACTION:
         raise ModelRejectedError(

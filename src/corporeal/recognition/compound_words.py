@@ -36,8 +36,7 @@ class KnownWords:
     joined: Mapping[str, tuple[str, ...]]
     """Phrases by how they look when they are written as one word."""
     squeezed: Mapping[str, str]
-    """Words and joined phrases by how they look without doubled letters; what two have is not in
-    it."""
+    """Words and joined phrases by how they look without doubled letters; what two have is not in it."""
 
 
 def without_doubled_letters(word: str) -> str:
@@ -50,17 +49,15 @@ def index_without_doubled_letters(words: Sequence[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for word in dict.fromkeys(words):
         if len(word) >= MIN_CORRECTED_LETTERS:
-            found[without_doubled_letters(word)] = (
-                "" if without_doubled_letters(word) in found else word
-            )
+            found[without_doubled_letters(word)] = "" if without_doubled_letters(word) in found else word
     return {short: word for short, word in found.items() if word}
 
 
 def normalise_compounds(words: Sequence[str], known: KnownWords) -> list[str]:
     """Return a name's words as a vocabulary has them.
 
-    ``["dumbbel"]`` gives ``["dumbbell"]``, ``["wineglas"]`` ``["wine", "glass"]``, ``["surf",
-    "board"]`` ``["surfboard"]``, ``["treestump"]`` ``["tree", "stump"]``.
+    ``["dumbbel"]`` gives ``["dumbbell"]``, ``["wineglas"]`` ``["wine", "glass"]``, ``["surf", "board"]``
+    ``["surfboard"]``, ``["treestump"]`` ``["tree", "stump"]``.
 
     Args:
         words: In English, in the singular.
@@ -71,9 +68,7 @@ def normalise_compounds(words: Sequence[str], known: KnownWords) -> list[str]:
     return [part for word in _join_compounds(right, known) for part in _split_compound(word, known)]
 
 
-def singularise_words(
-    words: Sequence[str], known: KnownWords, without_s: Callable[[str], str]
-) -> list[str]:
+def singularise_words(words: Sequence[str], known: KnownWords, without_s: Callable[[str], str]) -> list[str]:
     """Return words in the singular: ``["wine", "glasses"]`` gives ``["wine", "glass"]``.
 
     What a plural in -ies, -ves or -es is of has to be known; of any other the s is cut.
@@ -92,9 +87,7 @@ def singularise_words(
 
 def _singular(word: str, before: str, known: KnownWords, without_s: Callable[[str], str]) -> str:
     shorter = without_s(word)
-    ways = [
-        shorter.removesuffix(a) + b for a, b in SINGULAR_OF_PLURAL_ENDING if shorter.endswith(a)
-    ]
+    ways = [shorter.removesuffix(a) + b for a, b in SINGULAR_OF_PLURAL_ENDING if shorter.endswith(a)]
     if word in PLURALS_WITH_OTHER_MEANING:
         return next((way for way in ways if before + way in known.joined), shorter)
     if shorter == word:  # it may end as a singular does: taxis as tennis
@@ -140,14 +133,7 @@ def _split_compound(word: str, known: KnownWords) -> tuple[str, ...]:
         return (word,)
     if word in known.joined:
         return known.joined[word]
-    cuts = [
-        (word[:k], word[k:])
-        for k in range(MIN_COMPOUND_PART_LETTERS, len(word) - MIN_COMPOUND_PART_LETTERS + 1)
-    ]
+    cuts = [(word[:k], word[k:]) for k in range(MIN_COMPOUND_PART_LETTERS, len(word) - MIN_COMPOUND_PART_LETTERS + 1)]
     of_matter = ((a, b) for a, b in cuts if a in known.first and b in known.last)
-    of_things = (
-        (a, b)
-        for a, b in cuts
-        if len(a) >= MIN_FIRST_NOUN_LETTERS and a in known.words and b in known.last
-    )
+    of_things = ((a, b) for a, b in cuts if len(a) >= MIN_FIRST_NOUN_LETTERS and a in known.words and b in known.last)
     return next(of_matter, None) or next(of_things, (word,))

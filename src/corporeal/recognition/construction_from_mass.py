@@ -7,13 +7,7 @@ from functools import cache
 from importlib.resources import files
 from math import inf
 
-from corporeal.core.types import (
-    STATED_MATTER_KEY,
-    SUBSTANCE_KEY,
-    ObjectDescription,
-    PartDescription,
-    Scene,
-)
+from corporeal.core.types import STATED_MATTER_KEY, SUBSTANCE_KEY, ObjectDescription, PartDescription, Scene
 from corporeal.recognition.lexicon import head_noun_in, name_tokens, substance_terms
 from corporeal.recognition.mass_from_name import MASS_AGREEMENT_RATIO, mass_from_name
 
@@ -35,9 +29,7 @@ class ConstructionHypotheses:
     """The first: as it was recognised."""
 
 
-def construction_hypotheses(
-    scene: Scene, number: int, described: ObjectDescription
-) -> ConstructionHypotheses | None:
+def construction_hypotheses(scene: Scene, number: int, described: ObjectDescription) -> ConstructionHypotheses | None:
     """Return the hypotheses of construction, among which the mass in the name chooses.
 
     None: its name states no mass, it is no weight, or its construction is stated.
@@ -59,9 +51,7 @@ def construction_hypotheses(
         return None
     own = {t.material for n in named for t in substance_terms(n)}
     ways = [way for way in row["ways"] if not own or way["material"] in own]
-    return ConstructionHypotheses(
-        mass, (part, *(_constructed_part(part, way, mass) for way in ways))
-    )
+    return ConstructionHypotheses(mass, (part, *(_constructed_part(part, way, mass) for way in ways)))
 
 
 def best_mass_fit(masses: Sequence[float], said: float) -> int:

@@ -5,26 +5,17 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
-from corporeal.core.types import (
-    Note,
-    NoteKind,
-    ObjectDescription,
-    PartDescription,
-    Scene,
-    SceneObject,
-)
+from corporeal.core.types import Note, NoteKind, ObjectDescription, PartDescription, Scene, SceneObject
 from corporeal.recognition.lexicon import contents_table, names_open_vessel, strip_plural_s
 from corporeal.recognition.metadata_recognition import FileEvidence
 from corporeal.recognition.parts_by_name import name_words
 from corporeal.recognition.translation import translate_words
 
-PERCENT_FULL_PATTERN = re.compile(
-    r"(\d{1,3})\s*(?:%|percent|per cent|prozent)[\s_-]*(?:full|filled|voll)"
-)
+PERCENT_FULL_PATTERN = re.compile(r"(\d{1,3})\s*(?:%|percent|per cent|prozent)[\s_-]*(?:full|filled|voll)")
 FRACTION_FULL_PATTERN = re.compile(r"\b([1-4])\s*/\s*([2-5])[\s_-]*(?:full|filled|voll)")
 GOODS_FILL_FRACTION, OPEN_WARE_FILL_FRACTION = 0.9, 0.8
-"""How full is what is said to hold something, and not how much: bottles as they are sold, and open
-ware that is carried [-]."""
+"""How full is what is said to hold something, and not how much: bottles as they are sold, and open ware that is carried
+[-]."""
 MAX_FILL_FRACTION = 0.95
 """A rim stays free [-]."""
 MAX_SKIPPED_WORDS = 2
@@ -81,9 +72,7 @@ def _fill_fraction(name: str, said: Sequence[str]) -> float | None:
         return min(int(level[1]) / 100, MAX_FILL_FRACTION)
     if fraction := FRACTION_FULL_PATTERN.search(name):
         return min(int(fraction[1]) / int(fraction[2]), MAX_FILL_FRACTION)
-    shares = {
-        p: float(share) for share in contents_table()["share"] for p in _phrases("share", share)
-    }
+    shares = {p: float(share) for share in contents_table()["share"] for p in _phrases("share", share)}
     found = [(n, k, p) for k, n, p in _phrases_with_position(said, shares) if _is_level(said, k, n)]
     return shares[max(found)[2]] if found else None
 
@@ -108,9 +97,7 @@ def _find_contents(said: Sequence[str], vessel: WordPhrase, end: int, levelled: 
     return None
 
 
-def _phrases_with_position(
-    said: Sequence[str], known: Collection[WordPhrase]
-) -> Iterator[tuple[int, int, WordPhrase]]:
+def _phrases_with_position(said: Sequence[str], known: Collection[WordPhrase]) -> Iterator[tuple[int, int, WordPhrase]]:
     """Yield where phrases stand in a name, how long they are, and which."""
     for k in range(len(said)):
         for n in (3, 2, 1):
@@ -118,9 +105,7 @@ def _phrases_with_position(
                 yield k, n, tuple(said[k : k + n])
 
 
-def apply_named_contents(
-    found: PartDescription, evidence: FileEvidence, holds: bool
-) -> PartDescription:
+def apply_named_contents(found: PartDescription, evidence: FileEvidence, holds: bool) -> PartDescription:
     """Fill a vessel of one part as its name says.
 
     Args:
@@ -192,10 +177,7 @@ def _is_accounted_for(thing: ObjectDescription, said: NamedContents) -> bool:
         p.contents
         or p.built_by == "annotation"
         or (p.material and p.material == said.contents)
-        or any(
-            True
-            for _ in _phrases_with_position([strip_plural_s(w) for w in name_words(p.name)], inside)
-        )
+        or any(True for _ in _phrases_with_position([strip_plural_s(w) for w in name_words(p.name)], inside))
         for p in thing.parts
     )
 

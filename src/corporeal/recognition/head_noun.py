@@ -15,8 +15,8 @@ PhraseSet = Collection[tuple[str, ...]]
 def move_head_noun_last(words: Sequence[str], known: KnownWords, phrases: PhraseSet) -> list[str]:
     """Return a name's words with what it is of before it, and without what is beside it.
 
-    ``can of coke`` gives ``coke can``, ``barrel oil rusty`` ``oil barrel rusty``, ``bottle with
-    cork`` ``bottle``, ``barrel game asset`` ``barrel``.
+    ``can of coke`` gives ``coke can``, ``barrel oil rusty`` ``oil barrel rusty``, ``bottle with cork`` ``bottle``,
+    ``barrel game asset`` ``barrel``.
 
     Args:
         words: In English, in the singular.
@@ -31,8 +31,8 @@ def move_head_noun_last(words: Sequence[str], known: KnownWords, phrases: Phrase
 def strip_whole_from_part_name(words: Sequence[str], phrases: PhraseSet) -> tuple[str, ...]:
     """Return the words of a part's name without the object that it is of.
 
-    ``lid jar metal`` and ``jar lid metal`` give ``lid metal``; ``door handle`` is a word of its own
-    where the vocabulary has it.
+    ``lid jar metal`` and ``jar lid metal`` give ``lid metal``; ``door handle`` is a word of its own where the
+    vocabulary has it.
     """
     found = tuple(words)
     for k, word in enumerate(found):
@@ -59,17 +59,13 @@ def _move_complement_first(words: list[str], known: KnownWords, phrases: PhraseS
     for k in range(1, len(words) - 1):
         before, behind = words[:k], words[k + 1 :]
         several = (before[-1],) in _phrases("several")
-        if _is_in_phrase(words, k, phrases) or not (
-            several or any(w in known.words for w in before)
-        ):
+        if _is_in_phrase(words, k, phrases) or not (several or any(w in known.words for w in before)):
             continue
         if (words[k],) in _phrases("of") or _is_followed_by_substance(words[k], behind, known):
             own = before[:-1] if several else before
             n = next((n for n, w in enumerate(own) if w in known.words), 0)
             return _move_complement_first([*own[:n], *behind, *own[n:]], known, phrases)
-        if (words[k],) in (*_phrases("beside"), *_phrases("made")) and _names_object(
-            before, known, phrases
-        ):
+        if (words[k],) in (*_phrases("beside"), *_phrases("made")) and _names_object(before, known, phrases):
             return before
     return words
 

@@ -5,19 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core.types import Note, NoteKind
-from corporeal.recognition.typical_extents import (
-    extent_warning,
-    length_text,
-    typical_extent,
-    with_article,
-)
+from corporeal.recognition.typical_extents import extent_warning, length_text, typical_extent, with_article
 
-METRES_OF_MODELLING_UNIT = {
-    "metres": 1.0,
-    "centimetres": 1e-2,
-    "millimetres": 1e-3,
-    "inches": 0.0254,
-}
+METRES_OF_MODELLING_UNIT = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
 """What programs usually model in [m]."""
 PRINT_UNIT_ORDER = ("millimetres", "metres", "centimetres", "inches")
 """In which order they are likely in files that are made for printing."""
@@ -48,8 +38,8 @@ class InferredUnit:
 def infer_length_unit(file: Path, class_name: str, extent: float) -> InferredUnit | None:
     """Return the first usual unit in which an object is as large as such objects are.
 
-    One in which it is within the table's own range comes before one in which it is but nearly so.
-    Where there is none, an object of the table gets its usual size; else None.
+    One in which it is within the table's own range comes before one in which it is but nearly so. Where there is none,
+    an object of the table gets its usual size; else None.
 
     Args:
         file: Its suffix tells whether it is of a kind that is made for printing.
@@ -59,9 +49,7 @@ def infer_length_unit(file: Path, class_name: str, extent: float) -> InferredUni
     """
     order = PRINT_UNIT_ORDER if file.suffix.lower() == ".stl" else METRES_OF_MODELLING_UNIT
     sizes = {name: extent * METRES_OF_MODELLING_UNIT[name] for name in order}
-    likely = [
-        name for name, size in sizes.items() if extent_warning("it", class_name, size) is None
-    ]
+    likely = [name for name, size in sizes.items() if extent_warning("it", class_name, size) is None]
     known = typical_extent(class_name)
     within = [name for name in likely if known is None or known.low <= sizes[name] <= known.high]
     if likely:
@@ -77,8 +65,8 @@ def infer_shared_unit(
 ) -> InferredUnit | None:
     """Return the unit that a scene file's other meshes are in, where a mesh fits none by its size.
 
-    Who places meshes manually in metres has modelled them in one unit. An object of the table that
-    would be ten times smaller or larger in it than any such object is as large as they usually are.
+    Who places meshes manually in metres has modelled them in one unit. An object of the table that would be ten times
+    smaller or larger in it than any such object is as large as they usually are.
 
     Args:
         found: What the mesh by itself was taken for; None: nothing.
@@ -93,10 +81,7 @@ def infer_shared_unit(
     unit = named.pop()
     size = extent * METRES_OF_MODELLING_UNIT[unit]
     known = None if found is None else typical_extent(found.usual)
-    if (
-        known is not None
-        and not known.low / IMPLAUSIBLE_SIZE_RATIO < size < known.high * IMPLAUSIBLE_SIZE_RATIO
-    ):
+    if known is not None and not known.low / IMPLAUSIBLE_SIZE_RATIO < size < known.high * IMPLAUSIBLE_SIZE_RATIO:
         return found
     return InferredUnit(file, size, METRES_OF_MODELLING_UNIT[unit], unit, shared=True)
 
@@ -126,8 +111,7 @@ def _notes_of_unit(unit: str, rows: list[InferredUnit]) -> list[str]:
         size = length_text(rows[0].extent)
         return [
             Note(
-                f"{names[0]} states no unit: it was read in {unit}{also}, so that it is "
-                f"{size} large. {UNIT_ADVICE}",
+                f"{names[0]} states no unit: it was read in {unit}{also}, so that it is {size} large. {UNIT_ADVICE}",
                 NoteKind.ASSUMED,
             )
         ]

@@ -38,10 +38,7 @@ def packaged_goods() -> Iterator[tuple[str, dict]]:
     inside = {good: name for name, goods in contents_table()["contents"].items() for good in goods}
     named: set[str] = set()
     for row in contents_table()["sold"]:
-        goods = [
-            *row["of"],
-            *(g for kind in row.get("kinds", ()) for g in contents_table()["kinds"][kind]),
-        ]
+        goods = [*row["of"], *(g for kind in row.get("kinds", ()) for g in contents_table()["kinds"][kind])]
         for phrase, good in ((f"{good} {v}", good) for v in row["vessels"] for good in goods):
             if phrase not in named:
                 named.add(phrase)
@@ -134,9 +131,7 @@ def head_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
     found = list(_terms_with_position(tokens))
-    purposes = [
-        (k, t) for k, t in found if not _is_material_of_following(t, _word_after(tokens, k, t))
-    ]
+    purposes = [(k, t) for k, t in found if not _is_material_of_following(t, _word_after(tokens, k, t))]
     standing = [
         (k, term)
         for k, term in found
@@ -164,11 +159,7 @@ def _is_material_of_following(term: LexiconTerm, following: str) -> bool:
 
     What burns is no stove's material: a coal stove, but a wooden oven.
     """
-    if (
-        term.material in FUEL_MATERIALS
-        and term.phrase != ("wooden",)
-        and following in _burner_nouns()
-    ):
+    if term.material in FUEL_MATERIALS and term.phrase != ("wooden",) and following in _burner_nouns():
         return False
     if following not in _container_nouns():
         return True
@@ -221,9 +212,7 @@ def name_tokens(name: str) -> tuple[str, ...]:
     said = [correct_doubled_letters(remove_unknown_accents(w, known.words), known) for w in english]
     return tuple(
         move_head_noun_last(
-            normalise_compounds(singularise_words(said, known, strip_plural_s), known),
-            known,
-            multiword_names(),
+            normalise_compounds(singularise_words(said, known, strip_plural_s), known), known, multiword_names()
         )
     )
 
@@ -332,15 +321,9 @@ def _head_noun_among(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]])
 @cache
 def _noun_words() -> frozenset[str]:
     """Return words that name an object: what stands behind the last of them only describes it."""
-    tables = {
-        phrase[-1] for table in ("hollow", "open", "cast") for phrase in _table_phrases(table)
-    }
+    tables = {phrase[-1] for table in ("hollow", "open", "cast") for phrase in _table_phrases(table)}
     things = {term.phrase[-1] for term in lexicon_terms() if term.kind != "substance"}
-    return (
-        frozenset(tables | things | {name[-1] for name in multiword_names()})
-        | _container_nouns()
-        | part_nouns()
-    )
+    return frozenset(tables | things | {name[-1] for name in multiword_names()}) | _container_nouns() | part_nouns()
 
 
 @cache
@@ -399,9 +382,7 @@ def fired_materials() -> frozenset[str]:
 @cache
 def formed_materials() -> frozenset[str]:
     """Return materials that objects of any kind are sheets, castings or mouldings of."""
-    return (metal_materials() | mouldable_materials() | fired_materials() | {"glass"}) - frozenset(
-        _table()["solid"]
-    )
+    return (metal_materials() | mouldable_materials() | fired_materials() | {"glass"}) - frozenset(_table()["solid"])
 
 
 def names_unknown_object(tokens: tuple[str, ...]) -> bool:
@@ -439,12 +420,7 @@ def metal_materials() -> frozenset[str]:
 @cache
 def lexicon_terms() -> tuple[LexiconTerm, ...]:
     """Every phrase of the lexicon with what it states."""
-    named = [
-        _term(kind, phrase, row)
-        for kind in TERM_KINDS
-        for row in _table()[kind]
-        for phrase in row["words"]
-    ]
+    named = [_term(kind, phrase, row) for kind in TERM_KINDS for row in _table()[kind] for phrase in row["words"]]
     known = {term.phrase for term in named if term.kind == "thing"}
     goods = (_term("thing", phrase, row) for phrase, row in packaged_goods())
     return (*named, *(term for term in goods if term.phrase not in known))
@@ -471,14 +447,12 @@ def colour_rules() -> tuple[ColourRule, ...]:
 def _container_nouns() -> frozenset[str]:
     """Nouns that make the noun before them a mere purpose.
 
-    Beside those of the table every object that has a usual size and no usual material: a bowl is a
-    bowl, whatever is in it.
+    Beside those of the table every object that has a usual size and no usual material: a bowl is a bowl, whatever is in
+    it.
     """
     single = _single_sized_nouns()
     material = {w for term in lexicon_terms() for w in term.phrase if len(term.phrase) == 1}
-    return frozenset(map(strip_plural_s, _table()["holders"])) | (
-        single - material - _colour_words()
-    )
+    return frozenset(map(strip_plural_s, _table()["holders"])) | (single - material - _colour_words())
 
 
 @cache
@@ -499,9 +473,7 @@ def emptied_words() -> frozenset[str]:
 
 @cache
 def _table() -> dict[str, list]:
-    return tomllib.loads(
-        files("corporeal.recognition").joinpath("lexicon.toml").read_text(encoding="utf-8")
-    )
+    return tomllib.loads(files("corporeal.recognition").joinpath("lexicon.toml").read_text(encoding="utf-8"))
 
 
 def _term(kind: str, phrase: str, row: dict) -> LexiconTerm:

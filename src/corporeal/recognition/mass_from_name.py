@@ -9,8 +9,8 @@ from corporeal.core.types import Note, NoteKind
 from corporeal.recognition.readable_names import everyday_words
 
 MASS_AGREEMENT_RATIO = 1.5
-"""Factor between a mass that a name states and the one that comes out which needs no telling: three
-standard deviations of what follows from a printed weight (12 %)."""
+"""Factor between a mass that a name states and the one that comes out which needs no telling: three standard deviations
+of what follows from a printed weight (12 %)."""
 NETWORK_GENERATIONS = ("2g", "3g", "4g", "5g", "6g")
 """Of mobile networks."""
 
@@ -73,11 +73,7 @@ def mass_from_name_warning(name: str, mass: float, *names: str) -> str | None:
 
     """
     said = mass_from_name(*names)
-    if (
-        said is None
-        or mass <= 0.0
-        or 1 / MASS_AGREEMENT_RATIO <= mass / said <= MASS_AGREEMENT_RATIO
-    ):
+    if said is None or mass <= 0.0 or 1 / MASS_AGREEMENT_RATIO <= mass / said <= MASS_AGREEMENT_RATIO:
         return None
     return Note(
         f"{name}: its name says {said:.3g} kg, and it weighs {mass:.3g} kg. Check its size "

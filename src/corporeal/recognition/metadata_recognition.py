@@ -4,13 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from corporeal.core.types import (
-    Finish,
-    PartDescription,
-    Scene,
-    SceneObject,
-    Surface,
-)
+from corporeal.core.types import Finish, PartDescription, Scene, SceneObject, Surface
 from corporeal.recognition.head_noun import strip_whole_from_part_name
 from corporeal.recognition.lexicon import (
     LOOSE_MATERIALS,
@@ -42,9 +36,7 @@ WHOLE_OBJECT_MARGIN_FACTOR = 0.6
 """Factor on the margin of what describes the whole object when the part is only one of several."""
 MIN_METALLIC_VALUE = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
-UNPAINTED_METALS = frozenset(
-    "stainless_steel clad_steel cast-iron brass bronze pewter silver".split()
-)
+UNPAINTED_METALS = frozenset("stainless_steel clad_steel cast-iron brass bronze pewter silver".split())
 """Metals that are seldom painted: beside what is usually of them, a metal's name is no colour."""
 STUFFING_MATERIALS = frozenset(("seat_foam", "memory_foam", "fibre_fill"))
 """What upholstered objects are of, behind their covers."""
@@ -70,8 +62,7 @@ class FileEvidence:
     metallic_means_something: bool
     """Some surface of the object is not fully metallic: 1 is more than the exporter's default."""
     shared: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
-    """Leading words that all of the object's surfaces have in common, and all its finishes: they
-    describe the whole."""
+    """Leading words that all of the object's surfaces have in common, and all its finishes: they describe the whole."""
     claimed: frozenset[str] = frozenset()
     """Materials that the object's other parts name as their own."""
 
@@ -91,10 +82,7 @@ class FileEvidence:
     @property
     def general(self) -> list[TokenisedName]:
         """Names of the whole object; "desk leg" is a leg."""
-        whole = (
-            TokenisedName(n.text, strip_whole_from_part_name(n.words, multiword_names()))
-            for n in self.called
-        )
+        whole = (TokenisedName(n.text, strip_whole_from_part_name(n.words, multiword_names())) for n in self.called)
         return [*whole, *(TokenisedName(" ".join(w), w) for w in self.shared if w)]
 
     @property
@@ -129,20 +117,12 @@ def gather_file_evidence(scene: Scene, identity: PartsByName) -> list[FileEviden
     return [gathered[number] for number in range(len(identity.catalogue))]
 
 
-def _evidence_of_object(
-    scene: Scene, thing: int, surfaces: dict[int, list[int]]
-) -> dict[int, FileEvidence]:
+def _evidence_of_object(scene: Scene, thing: int, surfaces: dict[int, list[int]]) -> dict[int, FileEvidence]:
     """Gather evidence about all parts of one object; ``surfaces`` of each part."""
     worn = {p: [scene.surfaces[k] for k in mine] for p, mine in surfaces.items()}
-    finishes = {
-        p: [scene.finishes[f] for f in dict.fromkeys(s.finish for s in mine)]
-        for p, mine in worn.items()
-    }
+    finishes = {p: [scene.finishes[f] for f in dict.fromkeys(s.finish for s in mine)] for p, mine in worn.items()}
     looks = [f for mine in finishes.values() for f in mine]
-    shared = (
-        _common_prefix([s.name for mine in worn.values() for s in mine]),
-        _common_prefix([f.name for f in looks]),
-    )
+    shared = (_common_prefix([s.name for mine in worn.values() for s in mine]), _common_prefix([f.name for f in looks]))
     whole = FileEvidence(
         surfaces=(),
         finishes=(),
@@ -155,8 +135,7 @@ def _evidence_of_object(
     claims = {p: _named_substances(e.own) for p, e in found.items()}
     times = Counter(m for named in claims.values() for m in named)
     return {
-        p: replace(e, claimed=frozenset(m for m, n in times.items() if n > (m in claims[p])))
-        for p, e in found.items()
+        p: replace(e, claimed=frozenset(m for m, n in times.items() if n > (m in claims[p]))) for p, e in found.items()
     }
 
 
@@ -185,10 +164,7 @@ def _common_prefix(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def infer_hollow_structure(
-    words: PartDescription,
-    evidence: FileEvidence,
-    walled: Callable[[str], bool],
-    from_pictures: bool = False,
+    words: PartDescription, evidence: FileEvidence, walled: Callable[[str], bool], from_pictures: bool = False
 ) -> PartDescription:
     """Give parts of hollow classes a wall, if their structure is not stated.
 
@@ -222,10 +198,7 @@ def infer_hollow_structure(
     named = evidence.general
     called = evidence.alone and any("hollow" in name.words for name in named)
     is_hollow = called or any(names_hollow_object(name.words) for name in named)
-    is_cast = (
-        words.material in metal_materials()
-        and evidence.thing.real_extent > MAX_SOLID_CASTING_EXTENT_M
-    )
+    is_cast = words.material in metal_materials() and evidence.thing.real_extent > MAX_SOLID_CASTING_EXTENT_M
     if is_cast and any(names_hollow_casting(name.words) for name in named):
         is_hollow = True
     return replace(words, structure="shell") if is_hollow else words
@@ -251,22 +224,16 @@ def recognise_part(evidence: FileEvidence) -> PartDescription:
     for ask in (_by_own_names, _by_object_names, _by_colour, _by_surface_values):
         answer = ask(evidence)
         if answer is not None:
-            return _as_solid_if_named(
-                _without_lost_contents(_weaken_if_metallic(answer, evidence), evidence), evidence
-            )
+            return _as_solid_if_named(_without_lost_contents(_weaken_if_metallic(answer, evidence), evidence), evidence)
     return UNKNOWN_PART
 
 
 def _by_own_names(evidence: FileEvidence) -> PartDescription | None:
-    terms, name = _strongest_terms(
-        evidence.own, evidence.finishes, TERM_KINDS, evidence.general, evidence.extent
-    )
+    terms, name = _strongest_terms(evidence.own, evidence.finishes, TERM_KINDS, evidence.general, evidence.extent)
     if not terms or (terms[0].plant and not evidence.alone):
         return None  # "plant" names the pot's node as often as the leaves
     sure = terms[0].kind != "thing" or evidence.alone or terms[0].every
-    return _part_from_terms(
-        _as_metal_if_metallic(terms, evidence), name, 1.0 if sure else WHOLE_OBJECT_MARGIN_FACTOR
-    )
+    return _part_from_terms(_as_metal_if_metallic(terms, evidence), name, 1.0 if sure else WHOLE_OBJECT_MARGIN_FACTOR)
 
 
 def _by_object_names(evidence: FileEvidence) -> PartDescription | None:
@@ -274,17 +241,13 @@ def _by_object_names(evidence: FileEvidence) -> PartDescription | None:
     terms, name = _strongest_terms(names, evidence.finishes, kinds, names, evidence.extent)
     if not terms and evidence.alone and names != evidence.called:  # a part by itself: "desk leg"
         called = evidence.called
-        terms, name = _strongest_terms(
-            names, evidence.finishes, ("piece",), called, evidence.extent
-        )
+        terms, name = _strongest_terms(names, evidence.finishes, ("piece",), called, evidence.extent)
     if not terms:
         return None
     if evidence.alone or terms[0].every:
         packed = terms[0].contents == MACHINERY_CONTENTS and not evidence.alone
         return _part_from_terms(
-            _as_metal_if_metallic(terms, evidence),
-            name,
-            WHOLE_OBJECT_MARGIN_FACTOR if packed else 1.0,
+            _as_metal_if_metallic(terms, evidence), name, WHOLE_OBJECT_MARGIN_FACTOR if packed else 1.0
         )
     named = {t.material for t in terms}
     if terms[0].kind != "substance" or named & evidence.claimed:
@@ -300,9 +263,7 @@ def _by_colour(evidence: FileEvidence) -> PartDescription | None:
     for look in colour_rules():
         if look.of & around and all(matches_colour_rule(look, f) for f in evidence.finishes):
             reason = f"In {evidence.thing.class_name!r} what is {look.says} is usually "
-            return PartDescription(
-                "", look.material, margin=look.margin, reason=f"{reason}{look.material}."
-            )
+            return PartDescription("", look.material, margin=look.margin, reason=f"{reason}{look.material}.")
     return None
 
 
@@ -317,9 +278,7 @@ def _by_surface_values(evidence: FileEvidence) -> PartDescription | None:
 
 def _is_metallic(evidence: FileEvidence) -> bool:
     """Whether most of the surface is stated to be metal, and not by an exporter's default."""
-    return evidence.metallic_means_something and all(
-        f.metallic >= MIN_METALLIC_VALUE for f in evidence.finishes
-    )
+    return evidence.metallic_means_something and all(f.metallic >= MIN_METALLIC_VALUE for f in evidence.finishes)
 
 
 def _weaken_if_metallic(answer: PartDescription, evidence: FileEvidence) -> PartDescription:
@@ -392,10 +351,9 @@ def _strongest_terms(
 ) -> tuple[list[LexiconTerm], str]:
     """Find the strongest terms in any of the names, and the name they stand in.
 
-    Longest phrase first, then substance before piece before object, then what stands beside an
-    object. The phrase of a piece never ranks above a substance ("oak table top"), nor that of an
-    object above the substance right before it ("steel trash can"). Several are returned when
-    equally strong ones stand in the names.
+    Longest phrase first, then substance before piece before object, then what stands beside an object. The phrase of a
+    piece never ranks above a substance ("oak table top"), nor that of an object above the substance right before it
+    ("steel trash can"). Several are returned when equally strong ones stand in the names.
     """
     found: list[tuple[tuple[int, int, int, bool], LexiconTerm, str]] = []
     around = {w for name in thing for w in name.words}
@@ -413,9 +371,7 @@ def _strongest_terms(
                 term = replace(term, margin=term.margin * WHOLE_OBJECT_MARGIN_FACTOR)
             if not term.extents[0] <= extent < term.extents[1] or (term.lone and name not in thing):
                 continue
-            if term.kind in kinds and _term_condition_holds(
-                term, finishes, around | set(name.words)
-            ):
+            if term.kind in kinds and _term_condition_holds(term, finishes, around | set(name.words)):
                 length = len(term.phrase)
                 weight = 1 if term.kind == "piece" else max(length, term.before)
                 rank = (weight, -TERM_KINDS.index(term.kind), length, term.before > 0)
@@ -433,9 +389,8 @@ def _strongest_terms(
 def _terms_in_context(name: TokenisedName) -> list[LexiconTerm]:
     """Find what stands in a name; a substance right beside an object is that of such an object.
 
-    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no object's material:
-    a snow shoe, a snow globe. A general word means what such objects are of: a plastic duck is of
-    PVC.
+    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no object's material: a snow shoe, a snow
+    globe. A general word means what such objects are of: a plastic duck is of PVC.
     """
     standing = head_terms(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
@@ -453,8 +408,7 @@ def _terms_in_context(name: TokenisedName) -> list[LexiconTerm]:
     return [
         s
         for s in standing
-        if not (solid and _is_loose_material(s) and len(s.phrase) == 1)
-        and not _is_purpose(s, name, things)
+        if not (solid and _is_loose_material(s) and len(s.phrase) == 1) and not _is_purpose(s, name, things)
     ]
 
 
@@ -474,19 +428,13 @@ def _is_purpose(term: LexiconTerm, name: TokenisedName, things: Sequence[Lexicon
 def _structured_as_object(substance: LexiconTerm, thing: LexiconTerm) -> LexiconTerm:
     """Return a substance with the structure of an object of its class.
 
-    A ball of rubber is blown up, and one of steel is solid. A sofa of leather is covered with it,
-    as thick as that usually is. What is blown up is a skin, whatever it is.
+    A ball of rubber is blown up, and one of steel is solid. A sofa of leather is covered with it, as thick as that
+    usually is. What is blown up is a skin, whatever it is.
     """
     if substance.inflation is not None:
         return replace(substance, before=len(thing.phrase))
     if substance.material in COVER_MATERIALS and thing.material in STUFFING_MATERIALS:
-        return replace(
-            substance,
-            before=len(thing.phrase),
-            contents=thing.material,
-            fill=1.0,
-            every=thing.every,
-        )
+        return replace(substance, before=len(thing.phrase), contents=thing.material, fill=1.0, every=thing.every)
     same = have_same_walls(substance.material, thing.material)
     if not is_hollow_in_material(thing, substance.material):
         return replace(substance, before=len(thing.phrase))

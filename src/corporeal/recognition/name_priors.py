@@ -22,9 +22,7 @@ def usual_rebound(evidence: FileEvidence) -> float | None:
     return _common_value(evidence, lambda term: term.rebound)
 
 
-def _common_value(
-    evidence: FileEvidence, of: Callable[[LexiconTerm], float | None]
-) -> float | None:
+def _common_value(evidence: FileEvidence, of: Callable[[LexiconTerm], float | None]) -> float | None:
     """Return what all objects with the longest of an object's names have; None: they differ."""
     terms = [t for name in evidence.general for t in head_terms(name.words) if t.kind == "thing"]
     longest = max((len(t.phrase) for t in terms), default=0)

@@ -79,8 +79,8 @@ def strip_accents(text: str) -> str:
 def identify_parts(scene: Scene, hint: GroupHint = lambda surface, finish: "") -> PartsByName:
     """Identify the parts of every object.
 
-    A node whose extras state a substance is a part. Other surfaces of an object form one part when
-    they wear the same finish, unless ``hint`` (what the names say of the material) differs.
+    A node whose extras state a substance is a part. Other surfaces of an object form one part when they wear the same
+    finish, unless ``hint`` (what the names say of the material) differs.
     """
     looks = [_finish_key(finish) for finish in scene.finishes]
     members = _object_surfaces(scene)
@@ -113,11 +113,7 @@ def _surface_groups(
         key = (
             ("node", surface.name, str(stated))
             if stated
-            else (
-                "material",
-                looks[surface.finish],
-                hint(surface, scene.finishes[surface.finish]),
-            )
+            else ("material", looks[surface.finish], hint(surface, scene.finishes[surface.finish]))
         )
         groups.setdefault(key, []).append(k)
     return groups
@@ -126,13 +122,7 @@ def _surface_groups(
 def _finish_key(finish: Finish) -> Hashable:
     """Two finishes that differ in a running number only are one."""
     picture = None if finish.texture is None else zlib.crc32(finish.texture[::8, ::8].tobytes())
-    numbers = (
-        *finish.colour,
-        finish.metallic,
-        finish.roughness,
-        finish.transmission,
-        finish.emission,
-    )
+    numbers = (*finish.colour, finish.metallic, finish.roughness, finish.transmission, finish.emission)
     plain = re.sub(r"[\W\d_]+", "", finish.name).lower()
     return (plain, tuple(round(x, 3) for x in numbers), finish.alpha_mode, picture)
 
@@ -143,11 +133,7 @@ def _part_names(scene: Scene, number: int, groups: dict) -> list[str]:
     for surfaces in groups.values():
         first = scene.surfaces[surfaces[0]]
         finish = scene.finishes[first.finish].name
-        own = (
-            (first.name,)
-            if first.extras.get(SUBSTANCE_KEY)
-            else _name_candidates(first, finish, surfaces)
-        )
+        own = (first.name,) if first.extras.get(SUBSTANCE_KEY) else _name_candidates(first, finish, surfaces)
         named = next((n for n in own if name_words(n)), "")
         whole = thing.class_name or thing.name
         if len(groups) == 1:
@@ -158,11 +144,7 @@ def _part_names(scene: Scene, number: int, groups: dict) -> list[str]:
 
 def _name_candidates(first: Surface, finish: str, surfaces: list[int]) -> tuple[str, ...]:
     """One surface goes by its own name, several by the finish they share."""
-    return (
-        (first.name, finish)
-        if len(surfaces) == 1 and name_words(first.name)
-        else (finish, first.name)
-    )
+    return (first.name, finish) if len(surfaces) == 1 and name_words(first.name) else (finish, first.name)
 
 
 def _distinct_names(names: list[str]) -> list[str]:

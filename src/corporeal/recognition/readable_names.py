@@ -57,9 +57,7 @@ def everyday_words(name: str) -> str:
 
 def safe_name(name: str) -> str:
     """Return a name that can stand in a path or a table: word characters, spaces, dots, dashes."""
-    plain = (
-        c if is_letter(c) or re.match(r"[\w .()-]", c) else "\0" for c in compose_accents(name)
-    )
+    plain = (c if is_letter(c) or re.match(r"[\w .()-]", c) else "\0" for c in compose_accents(name))
     return re.sub("\0+", "_", "".join(plain)).strip(" .")[:80]
 
 
@@ -87,9 +85,8 @@ def numbered_names(classes: Sequence[str], titles: Sequence[str] = ()) -> list[s
 
     Args:
         classes: What each object is, in words.
-        titles: What each is called in its file. Where all of a class end in numbers of their own
-            ("block_10", "block_11"), these are kept: a scene file that names them means them.
-            Otherwise k counts from 0.
+        titles: What each is called in its file. Where all of a class end in numbers of their own ("block_10",
+            "block_11"), these are kept: a scene file that names them means them. Otherwise k counts from 0.
 
     """
     stems = [safe_name(words).replace(" ", "_") or "object" for words in classes]

@@ -5,14 +5,7 @@ from dataclasses import replace
 from math import isfinite
 from typing import Any
 
-from corporeal.core.types import (
-    STATED_MATTER_KEY,
-    SUBSTANCE_KEY,
-    MeasuredRange,
-    PartDescription,
-    Provenance,
-    Surface,
-)
+from corporeal.core.types import STATED_MATTER_KEY, SUBSTANCE_KEY, MeasuredRange, PartDescription, Provenance, Surface
 
 SEALABLE_STRUCTURES = ("shell", "hollow")
 """Structures that air can be sealed in."""
@@ -50,8 +43,8 @@ def _pressure(value: object) -> float | None:
 def stated_values(surfaces: Iterable[Surface]) -> dict[str, Provenance]:
     """Return the numbers that a file states of a part's material, with their sources.
 
-    Field of ``Material`` → value; where the file names no range it is the value alone. What cannot
-    be such a number is left out, and where surfaces of a part differ, the first counts.
+    Field of ``Material`` → value; where the file names no range it is the value alone. What cannot be such a number is
+    left out, and where surfaces of a part differ, the first counts.
     """
     for surface in surfaces:
         rows = _mapping(_mapping(surface.extras.get(STATED_MATTER_KEY)).get("values"))
@@ -84,9 +77,7 @@ def _stated_ground(row: Mapping[str, Any]) -> Provenance | None:
 
 def apply_stated_structure(words: PartDescription, surfaces: Iterable[Surface]) -> PartDescription:
     """Take over how a part is built, as a file that this package wrote states it."""
-    stated = next(
-        (s.extras[STATED_MATTER_KEY] for s in surfaces if STATED_MATTER_KEY in s.extras), None
-    )
+    stated = next((s.extras[STATED_MATTER_KEY] for s in surfaces if STATED_MATTER_KEY in s.extras), None)
     row = _mapping(_mapping(stated).get("words"))
     structure, contents = row.get("structure"), row.get("contents")
     if structure not in ("solid", "shell", "filled"):
@@ -121,9 +112,7 @@ def apply_stated_wall(words: PartDescription, thickness: float | None) -> PartDe
     return replace(words, structure=built, thickness=thickness, wall_usual=False)
 
 
-def apply_inflation(
-    words: PartDescription, stated: float | None, usual: float | None
-) -> PartDescription:
+def apply_inflation(words: PartDescription, stated: float | None, usual: float | None) -> PartDescription:
     """Put air behind the wall of what is a shell.
 
     Args:

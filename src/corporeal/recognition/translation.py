@@ -9,12 +9,11 @@ from pathlib import Path
 from corporeal.recognition.parts_by_name import strip_accents
 
 OF_PREPOSITIONS = frozenset("de del di du des da do della dello en au aux".split())
-"""What stands between an object and what belongs to it: "caja de carton" is a box of cardboard,
-"pot au lait" a milk pot.
+"""What stands between an object and what belongs to it: "caja de carton" is a box of cardboard, "pot au lait" a milk
+pot.
 """
 TRAILING_ADJECTIVES = frozenset("empty full old small large red blue green white black".split())
-"""What stands behind an object and what belongs to it, and is of the thing: "botella de vino vacía"
-is an empty bottle.
+"""What stands behind an object and what belongs to it, and is of the thing: "botella de vino vacía" is an empty bottle.
 """
 UMLAUT_TRANSCRIPTION = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 UNSPACED_SCRIPTS = ("CJK ", "HIRAGANA ", "KATAKANA ")
@@ -29,8 +28,8 @@ MIN_COMPOUND_LETTERS = 3
 def translate_words(words: Sequence[str]) -> list[str]:
     """Return the words of a name with those of other languages in English, the object last.
 
-    ``["seau", "de", "plage"]`` gives ``["plage", "bucket"]``, ``["holzstuhl"]`` ``["wood",
-    "chair"]``; what is not known stays as it is.
+    ``["seau", "de", "plage"]`` gives ``["plage", "bucket"]``, ``["holzstuhl"]`` ``["wood", "chair"]``; what is not
+    known stays as it is.
 
     Args:
         words: Of a name, in lower case.
@@ -40,20 +39,13 @@ def translate_words(words: Sequence[str]) -> list[str]:
     found = [_translate_word(strip_accents(word)) for word in words]
     known = [part for k, word in enumerate(words) for part in found[k] or (word,)]
     where = next(
-        (
-            k
-            for k, word in enumerate(words)
-            if strip_accents(word) in OF_PREPOSITIONS and k and found[k - 1]
-        ),
-        None,
+        (k for k, word in enumerate(words) if strip_accents(word) in OF_PREPOSITIONS and k and found[k - 1]), None
     )
     if where is None:
         return known
     before = [part for k in range(where) for part in found[k] or (words[k],)]
     behind = translate_words(words[where + 1 :])
-    last = next(
-        (k for k in range(len(behind), 1, -1) if behind[k - 1] not in TRAILING_ADJECTIVES), 1
-    )
+    last = next((k for k in range(len(behind), 1, -1) if behind[k - 1] not in TRAILING_ADJECTIVES), 1)
     return behind[:last] + before + behind[last:]
 
 
@@ -115,20 +107,13 @@ def substance_words() -> frozenset[str]:
 @cache
 def _word_translations() -> dict[str, tuple[str, ...]]:
     """Return every word that stands by itself → its English words."""
-    return {
-        s: english
-        for word, english in _dictionary_rows()
-        if word[0] != "-"
-        for s in _unaccented_spellings(word)
-    }
+    return {s: english for word, english in _dictionary_rows() if word[0] != "-" for s in _unaccented_spellings(word)}
 
 
 @cache
 def _ending_translations() -> dict[str, tuple[str, ...]]:
     """Return every word that ends compounds → its English words."""
-    ends = [
-        (word, english) for word, english in _dictionary_rows() if word[0] == "-" or word[-1] == "*"
-    ]
+    ends = [(word, english) for word, english in _dictionary_rows() if word[0] == "-" or word[-1] == "*"]
     return {s: english for word, english in ends for s in _unaccented_spellings(word)}
 
 

@@ -18,29 +18,22 @@ from corporeal.recognition.typical_extents import (
 BULK_DENSITY_MARGIN_RATIO = 2.0
 """How far beyond the table an object may be before it is reported, as a factor."""
 MAX_LARGE_OBJECT_KG_M3, LARGE_OBJECT_SIDE_M = 2000.0, 0.5
-"""What no object exceeds [kg/m³ of its box] whose longest side is that long [m], if its class is
-not in the table: stone and metal fill a part of theirs.
+"""What no object exceeds [kg/m³ of its box] whose longest side is that long [m], if its class is not in the table:
+stone and metal fill a part of theirs.
 """
 MAX_THICK_OBJECT_KG_M3, THICK_OBJECT_SIDE_M = 3500.0, 0.15
-"""What none exceeds that is so thick [m], its middle side: more than stone is metal through and
-through. What is thinner may be a bar or a plate."""
+"""What none exceeds that is so thick [m], its middle side: more than stone is metal through and through. What is
+thinner may be a bar or a plate."""
 
 
 BulkMeasure = Literal["box", "large", "face"]
-"""Mass is held against the volume of the smallest box around an object, or against that box's
-largest side where it goes with that: of what is flat, whose depth is a stand's, and of what is
-inflated. "large" is the box of objects from some length on, where small ones are denser.
+"""Mass is held against the volume of the smallest box around an object, or against that box's largest side where it
+goes with that: of what is flat, whose depth is a stand's, and of what is inflated. "large" is the box of objects from
+some length on, where small ones are denser.
 """
 BULK_MEASURES: tuple[BulkMeasure, ...] = ("box", "large", "face")
-PER_BOX_VOLUME_TEXT, PER_FACE_AREA_TEXT = (
-    "kg per cubic metre of its box",
-    "kg per square metre of its largest side",
-)
-UNIT_OF_BULK_MEASURE = {
-    "box": PER_BOX_VOLUME_TEXT,
-    "large": PER_BOX_VOLUME_TEXT,
-    "face": PER_FACE_AREA_TEXT,
-}
+PER_BOX_VOLUME_TEXT, PER_FACE_AREA_TEXT = ("kg per cubic metre of its box", "kg per square metre of its largest side")
+UNIT_OF_BULK_MEASURE = {"box": PER_BOX_VOLUME_TEXT, "large": PER_BOX_VOLUME_TEXT, "face": PER_FACE_AREA_TEXT}
 
 
 @dataclass(frozen=True)
@@ -70,9 +63,7 @@ def typical_bulk_density(class_name: str, longest: float) -> TypicalBulkDensity 
     return max(found, key=lambda e: (*rank_class_match(e.words, named), e.longer), default=None)
 
 
-def mass_warning(
-    name: str, class_name: str, mass: float, sides: tuple[float, float, float]
-) -> str | None:
+def mass_warning(name: str, class_name: str, mass: float, sides: tuple[float, float, float]) -> str | None:
     """Return a sentence for the user where an object is implausibly heavy or light.
 
     Args:
@@ -100,10 +91,7 @@ def mass_warning(
     large = f"longer than {known.longer:g} m " if known.longer else ""
     usual = with_article(known.words, f"{large}has", f"{large}have")
     usual = f"{usual} {known.low:g} to {known.high:g}"
-    return Note(
-        f"{_mass_text(name, mass, found, known.measure)}, and {usual}. {MASS_ADVICE}",
-        NoteKind.ASSUMED,
-    )
+    return Note(f"{_mass_text(name, mass, found, known.measure)}, and {usual}. {MASS_ADVICE}", NoteKind.ASSUMED)
 
 
 MASS_ADVICE = "Check its size (--extent), its material and whether it is hollow."

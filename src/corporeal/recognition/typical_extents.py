@@ -15,29 +15,14 @@ from corporeal.recognition.compound_words import (
     normalise_compounds,
     remove_unknown_accents,
 )
-from corporeal.recognition.head_noun import (
-    move_head_noun_last,
-    names_several_objects,
-    strip_whole_from_part_name,
-)
+from corporeal.recognition.head_noun import move_head_noun_last, names_several_objects, strip_whole_from_part_name
 from corporeal.recognition.translation import substance_words, translate_words
 
 TYPICAL_EXTENT_MARGIN_RATIO = 1.5
 """How far beyond the table an object may be before it is reported."""
 MIN_PLAUSIBLE_EXTENT_M, MAX_PLAUSIBLE_EXTENT_M = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
-CLASSES_ALSO_SUBSTANCES = (
-    "marble",
-    "brick",
-    "stone",
-    "rock",
-    "sand",
-    "snow",
-    "mud",
-    "foam",
-    "paper",
-    "glass",
-)
+CLASSES_ALSO_SUBSTANCES = ("marble", "brick", "stone", "rock", "sand", "snow", "mud", "foam", "paper", "glass")
 """Classes that may be meant as matter where another is named, the least likely last."""
 
 
@@ -84,12 +69,8 @@ def normalised_words(class_name: str, compounds: Mapping[str, tuple[str, ...]]) 
 
     """
     known = _vocabulary()
-    said = [
-        remove_unknown_accents(w, known.words) for w in translate_words(plain_words(class_name))
-    ]
-    tokens = normalise_compounds(
-        [_singular(correct_doubled_letters(w, known)) for w in said], known
-    )
+    said = [remove_unknown_accents(w, known.words) for w in translate_words(plain_words(class_name))]
+    tokens = normalise_compounds([_singular(correct_doubled_letters(w, known)) for w in said], known)
     phrases = frozenset((*known.joined.values(), *compounds.values()))
     ordered = strip_whole_from_part_name(move_head_noun_last(tokens, known, phrases), phrases)
     return [part for word in ordered for part in compounds.get(word, (word,))]
@@ -139,16 +120,10 @@ def extent_warning(name: str, class_name: str, extent: float) -> str | None:
     size = f"{name} is {length_text(extent)} large"
     if known is None:
         return Note(
-            f"{size}: is the file in metres? Give its real size with --extent {name}=METRES.",
-            NoteKind.ASSUMED,
-            name,
+            f"{size}: is the file in metres? Give its real size with --extent {name}=METRES.", NoteKind.ASSUMED, name
         )
     usual = f"{with_article(known.words, 'is', 'are')} usually about {length_text(known.usual)}"
-    return Note(
-        f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}.",
-        NoteKind.ASSUMED,
-        name,
-    )
+    return Note(f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}.", NoteKind.ASSUMED, name)
 
 
 def _is_normalised(extent: float, known: TypicalExtent | None) -> bool:
@@ -157,9 +132,7 @@ def _is_normalised(extent: float, known: TypicalExtent | None) -> bool:
     return (
         exact
         and known is not None
-        and not known.usual / TYPICAL_EXTENT_MARGIN_RATIO
-        < extent
-        < known.usual * TYPICAL_EXTENT_MARGIN_RATIO
+        and not known.usual / TYPICAL_EXTENT_MARGIN_RATIO < extent < known.usual * TYPICAL_EXTENT_MARGIN_RATIO
     )
 
 
@@ -167,9 +140,7 @@ def _is_normalised(extent: float, known: TypicalExtent | None) -> bool:
 def _table() -> tuple[TypicalExtent, ...]:
     rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     alike = [
-        _typical(words, row["size"], row.get("part", False))
-        for row in rows.pop("alike")
-        for words in row["words"]
+        _typical(words, row["size"], row.get("part", False)) for row in rows.pop("alike") for words in row["words"]
     ]
     return (*(_typical(words, sizes) for words, sizes in rows.items()), *alike)
 
@@ -188,15 +159,9 @@ def _compounds() -> dict[str, tuple[str, ...]]:
 def _vocabulary() -> KnownWords:
     """Return the words of the table and for substances, for compounds and slips."""
     things = {singular_words(name)[0] for name in sized_classes() if " " not in name}
-    known = (
-        things | {w for name in sized_classes() for w in singular_words(name)} | substance_words()
-    )
+    known = things | {w for name in sized_classes() for w in singular_words(name)} | substance_words()
     return KnownWords(
-        known,
-        substance_words(),
-        things,
-        _compounds(),
-        index_without_doubled_letters([*known, *_compounds()]),
+        known, substance_words(), things, _compounds(), index_without_doubled_letters([*known, *_compounds()])
     )
 
 
@@ -207,15 +172,11 @@ def _rank_entry(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:
 def rank_class_match(phrase: str, words: list[str]) -> tuple[int, int, int]:
     """Rank how well a class fits a name that has all its words, best last.
 
-    Classes that may be materials as well ("table glass", "lego brick") come later; then the last in
-    the name, and the one of most words.
+    Classes that may be materials as well ("table glass", "lego brick") come later; then the last in the name, and the
+    one of most words.
     """
     own = singular_words(phrase)
-    matter = (
-        CLASSES_ALSO_SUBSTANCES.index(own[0]) + 1
-        if len(own) == 1 and own[0] in CLASSES_ALSO_SUBSTANCES
-        else 0
-    )
+    matter = CLASSES_ALSO_SUBSTANCES.index(own[0]) + 1 if len(own) == 1 and own[0] in CLASSES_ALSO_SUBSTANCES else 0
     return -matter, max(words.index(w) for w in own), len(own)
 
 

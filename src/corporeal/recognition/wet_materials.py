@@ -15,8 +15,8 @@ def wet_material_values(
 ) -> dict[str, Provenance]:
     """Return density, loss and restitution of a wet material; empty if it holds no water.
 
-    A foam that is pressed pumps the water through its pores, which takes about the energy that its
-    cells store: it doesn't rebound as a dry one does.
+    A foam that is pressed pumps the water through its pores, which takes about the energy that its cells store: it
+    doesn't rebound as a dry one does.
 
     Args:
         names: Of the object and of its part.
@@ -29,12 +29,8 @@ def wet_material_values(
         found = said & set(row["words"])
         if found and dry is not None and material in row["of"]:
             low, usual, high = row["water"]
-            span = MeasuredRange(
-                dry.low * (1 + low), dry.typical * (1 + usual), dry.high * (1 + high), row["source"]
-            )
-            reason = (
-                f"By its name it is {sorted(found)[0]}: {usual:g} times its dry mass are water."
-            )
+            span = MeasuredRange(dry.low * (1 + low), dry.typical * (1 + usual), dry.high * (1 + high), row["source"])
+            reason = f"By its name it is {sorted(found)[0]}: {usual:g} times its dry mass are water."
             density = Provenance(span.typical, span, "metadata", reason, 0.35)
             return {"density": density} | _pore_pumping_values(row)
     return {}

@@ -18,12 +18,7 @@ from corporeal.reconstruction.segment.optimal_assignment import optimal_assignme
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface
 from corporeal.reconstruction.surface.object_surfaces import ObjectSurfaces
 from corporeal.render.object_portrait import PART_COLOURS, part_colour_names
-from corporeal.vlm.photographed_objects import (
-    UNKNOWN_CLASS,
-    PhotoInterview,
-    SeenObject,
-    object_of_usual_size,
-)
+from corporeal.vlm.photographed_objects import UNKNOWN_CLASS, PhotoInterview, SeenObject, object_of_usual_size
 
 NOBODYS_GREY = (0.2, 0.2, 0.2)
 """Linear RGB of what is nobody's, in painted pictures."""
@@ -59,9 +54,7 @@ class FoundObjects:
         return [oriented_box_size(solid.vertices)[2] for solid in self.solids]
 
 
-def named_objects(
-    config: ReconstructConfig, viewer: PhotoInterview, taken: GaussianScene
-) -> list[SeenObject]:
+def named_objects(config: ReconstructConfig, viewer: PhotoInterview, taken: GaussianScene) -> list[SeenObject]:
     """Return what objects there are, from the command line or a model; or nothing."""
     if config.object_names:
         return [object_of_usual_size(name) for name in config.object_names]
@@ -69,15 +62,12 @@ def named_objects(
 
 
 def recognise_objects(
-    wanted: Sequence[SeenObject],
-    found: FoundObjects,
-    config: ReconstructConfig,
-    viewer: PhotoInterview,
+    wanted: Sequence[SeenObject], found: FoundObjects, config: ReconstructConfig, viewer: PhotoInterview
 ) -> list[SeenObject]:
     """Return what each segmented object is; these are in order of size.
 
-    Who named objects on the command line named the largest first. Others are told by CLIP where
-    there is one, else by whoever sees the objects painted.
+    Who named objects on the command line named the largest first. Others are told by CLIP where there is one, else by
+    whoever sees the objects painted.
     """
     count = found.count
     if config.object_names or not wanted:
@@ -103,7 +93,5 @@ def _match_by_words(wanted: Sequence[SeenObject], found: FoundObjects, spec: str
 def _paint_objects(found: FoundObjects) -> list[np.ndarray]:
     """Return pictures, each followed by itself with the objects in colours of their own."""
     paints = np.array([*PART_COLOURS.values()])
-    ink = np.concatenate(
-        [paints[np.minimum(np.arange(found.count), len(paints) - 1)], [NOBODYS_GREY]]
-    )
+    ink = np.concatenate([paints[np.minimum(np.arange(found.count), len(paints) - 1)], [NOBODYS_GREY]])
     return found.taken.painted(np.sqrt(ink[found.closed.owner]))

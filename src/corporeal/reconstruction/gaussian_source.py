@@ -13,12 +13,7 @@ from corporeal.core.progress import Progress, subprogress
 from corporeal.core.types import Note, NoteKind
 from corporeal.io.input_files import input_kind, lacks_poses
 from corporeal.io.photos.mask_files import edited_masks
-from corporeal.io.photos.posed_photos import (
-    MASK_FOLDERS,
-    has_masks,
-    list_posed_photos,
-    read_posed_photos,
-)
+from corporeal.io.photos.posed_photos import MASK_FOLDERS, has_masks, list_posed_photos, read_posed_photos
 from corporeal.reconstruction.features.mask_models import split_model_spec
 from corporeal.reconstruction.gaussians.gaussian_scene import (
     MASK_MIN_U8,
@@ -46,8 +41,8 @@ POSED_PROGRESS = 0.5
 MASKED_PROGRESS = 0.1
 """The same, of finding masks."""
 WHOLE_PICTURES_PROGRESS, MASKS_TESTED_PROGRESS, RETESTED_PROGRESS = 0.7, 0.8, 0.9
-"""Share of finding poses that is done when whole pictures fit together, when masks were asked about
-it, and when they were asked again without pictures of something else."""
+"""Share of finding poses that is done when whole pictures fit together, when masks were asked about it, and when they
+were asked again without pictures of something else."""
 SEEN_POSES_FOLDER, OBJECT_POSES_FOLDER = "poses-seen", "poses-object"
 """Folders of masks that found poses are tested by, and of poses that are found from them."""
 ALIKE_POSES_FOLDER, ALIKE_SEEN_POSES_FOLDER = "poses-alike", "poses-alike-seen"
@@ -87,10 +82,7 @@ def gaussians_from_source(
         with tempfile.TemporaryDirectory(prefix="corporeal-") as name:
             return gaussians_from_source(source, config, Path(name), progress)
     training = TrainConfig(
-        config.training,
-        seed=config.training_seed,
-        rasteriser=config.rasteriser,
-        hull=config.resolution.hull,
+        config.training, seed=config.training_seed, rasteriser=config.rasteriser, hull=config.resolution.hull
     )
     kept = folder / "training.npz"
     instances = config.apart == "masks"
@@ -100,9 +92,7 @@ def gaussians_from_source(
     begun = 0.0 if posed is None else POSED_PROGRESS
     posed = posed or FoundPoses(source, (), ())
     with notes_on_error(posed.warnings):
-        found = find_or_grow_masks(
-            config, posed.folder, folder, subprogress(progress, begun, begun + MASKED_PROGRESS)
-        )
+        found = find_or_grow_masks(config, posed.folder, folder, subprogress(progress, begun, begun + MASKED_PROGRESS))
     with notes_on_error((*posed.warnings, *found.warnings)):
         if found.incomplete and not config.force:
             # Under wrong poses nothing is found whole: then that is what is to be said.
@@ -117,9 +107,7 @@ def gaussians_from_source(
         taken = load_or_train_gaussians(posed.folder, training, kept, later, instances, masked)
     made = replace(
         taken,
-        coloured=None
-        if found.doubted is None
-        else _read_masks_at_size(taken, posed.folder, found.doubted),
+        coloured=None if found.doubted is None else _read_masks_at_size(taken, posed.folder, found.doubted),
         statements=(*posed.statements, *found.statements, *taken.statements),
         warnings=(*posed.warnings, *found.warnings, *taken.warnings),
     )
@@ -141,9 +129,7 @@ class _MasksFound:
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
 
-def find_or_grow_masks(
-    config: ReconstructConfig, source: Path, folder: Path, progress: Progress
-) -> _MasksFound:
+def find_or_grow_masks(config: ReconstructConfig, source: Path, folder: Path, progress: Progress) -> _MasksFound:
     """Take masks from a folder, find them with a model, or grow them where there are none."""
     if config.masks not in (MASKS_AUTO, MASKS_NONE) and split_model_spec(config.masks) is None:
         return _MasksFound(Path(config.masks))
@@ -161,9 +147,7 @@ def find_or_grow_masks(
     return _MasksFound(grown.folder, (), warnings, True, incomplete=grown.incomplete)
 
 
-def _read_masks_at_size(
-    taken: GaussianScene, source: Path, folder: Path
-) -> Bool[np.ndarray, "V H W"] | None:
+def _read_masks_at_size(taken: GaussianScene, source: Path, folder: Path) -> Bool[np.ndarray, "V H W"] | None:
     """Read masks from a folder, as large as pictures are; None: not of all of them."""
     if taken.views is None:
         return None
@@ -172,9 +156,7 @@ def _read_masks_at_size(
     return masks >= MASK_MIN_U8 if masks is not None and masks.shape == shape else None
 
 
-def _find_source_poses(
-    source: Path, config: ReconstructConfig, folder: Path, progress: Progress
-) -> FoundPoses | None:
+def _find_source_poses(source: Path, config: ReconstructConfig, folder: Path, progress: Progress) -> FoundPoses | None:
     """Find where pictures were taken from; None: that is known, or there are none.
 
     Raises:
@@ -184,9 +166,7 @@ def _find_source_poses(
     if not lacks_poses(source):
         return None
     posed = find_poses(
-        source,
-        folder / POSES_FOLDER,
-        subprogress(progress, 0.0, POSED_PROGRESS * WHOLE_PICTURES_PROGRESS),
+        source, folder / POSES_FOLDER, subprogress(progress, 0.0, POSED_PROGRESS * WHOLE_PICTURES_PROGRESS)
     )
     with notes_on_error(posed.warnings):
         if config.masks != MASKS_AUTO:
@@ -198,14 +178,11 @@ def _find_source_poses(
         return _test_poses_by_masks(source, posed, config.force, folder, progress)
 
 
-def _test_poses_by_masks(
-    source: Path, posed: FoundPoses, force: bool, place: Path, progress: Progress
-) -> FoundPoses:
+def _test_poses_by_masks(source: Path, posed: FoundPoses, force: bool, place: Path, progress: Progress) -> FoundPoses:
     """Ask masks that are grown under found poses whether the object kept its place, too.
 
-    Poses are in doubt where less than seven tenths of the pictures agree about what neighbours
-    share. To leave out the third of them that masks speak against at most cannot mend that, so that
-    it is not tried.
+    Poses are in doubt where less than seven tenths of the pictures agree about what neighbours share. To leave out the
+    third of them that masks speak against at most cannot mend that, so that it is not tried.
 
     Raises:
         BadFileError: It did not.
@@ -218,9 +195,7 @@ def _test_poses_by_masks(
         ", to test the poses",
     )
     doubted = bool(posed.doubt)
-    grown = grown_masks(
-        posed.folder, place / SEEN_POSES_FOLDER, None, asking, testing=True, doubted=doubted
-    )
+    grown = grown_masks(posed.folder, place / SEEN_POSES_FOLDER, None, asking, testing=True, doubted=doubted)
     if not doubted and grown.contradict and grown.doubted is not None:
         less = subprogress(
             progress,
@@ -228,16 +203,12 @@ def _test_poses_by_masks(
             POSED_PROGRESS * RETESTED_PROGRESS,
             ", without what is something else",
         )
-        posed, grown = _drop_doubted_pictures(
-            posed, grown, grown.doubted / MASK_FOLDERS[0], place, less
-        )
+        posed, grown = _drop_doubted_pictures(posed, grown, grown.doubted / MASK_FOLDERS[0], place, less)
     if grown.folder is None:
         return _refuse_doubted_poses(source, posed, force)
     masks = grown.folder / MASK_FOLDERS[0]
     if (why := describe_moved_object(posed, masks)) is None:
-        return _refuse_doubted_poses(
-            source, drop_pictures_of_something_else(posed, masks), force=True
-        )
+        return _refuse_doubted_poses(source, drop_pictures_of_something_else(posed, masks), force=True)
     later = subprogress(progress, POSED_PROGRESS * RETESTED_PROGRESS, POSED_PROGRESS)
     again = find_object_poses(posed, masks, place / OBJECT_POSES_FOLDER, later)
     said = f"{why[0].upper()}{why[1:]}."
@@ -268,18 +239,14 @@ def _drop_doubted_pictures(
     shutil.copytree(posed.folder, other.folder)
     left = drop_pictures_of_something_else(other, doubted)
     if left != other:
-        again = grown_masks(
-            left.folder, place / ALIKE_SEEN_POSES_FOLDER, progress=progress, testing=True
-        )
+        again = grown_masks(left.folder, place / ALIKE_SEEN_POSES_FOLDER, progress=progress, testing=True)
         if again.folder is not None:
             return left, again
     shutil.rmtree(other.folder)
     return posed, grown
 
 
-def _refuse_doubted_poses(
-    source: Path, posed: FoundPoses, force: bool, step: str = STAND_STILL_HINT
-) -> FoundPoses:
+def _refuse_doubted_poses(source: Path, posed: FoundPoses, force: bool, step: str = STAND_STILL_HINT) -> FoundPoses:
     """Reject poses in which neighbours share too little, or say so in a warning.
 
     Args:

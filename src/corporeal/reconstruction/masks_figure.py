@@ -45,10 +45,7 @@ def masks_figure(source: Path, masked_by: Path | None, path: Path) -> None:
 
 
 def draw_masks_over(
-    pictures: Sequence[UInt8[np.ndarray, "H W 3"]],
-    masks: Bool[np.ndarray, "V H W"],
-    names: Sequence[str],
-    path: Path,
+    pictures: Sequence[UInt8[np.ndarray, "H W 3"]], masks: Bool[np.ndarray, "V H W"], names: Sequence[str], path: Path
 ) -> None:
     """Draw pictures, paler where no object is, with outlines.
 
@@ -66,9 +63,7 @@ def draw_masks_over(
         write_contact_sheet(tiles, path)
 
 
-def _draw_over(
-    picture: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]
-) -> UInt8[np.ndarray, "H W 3"]:
+def _draw_over(picture: UInt8[np.ndarray, "H W 3"], mask: Bool[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
     pale = (255 - FAINT_CONTRAST_FRACTION * (255 - picture.astype(np.float64))).astype(np.uint8)
     made = np.where(mask[..., None], picture, pale)
     inner = mask.copy()

@@ -24,11 +24,9 @@ from corporeal.reconstruction.masks.mask_quality import MAX_CROPPED_FRACTION
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 
 MIN_AGREED_FRACTION = 0.5
-"""Share of a mask that is of all masks' hull, below which more is in dispute than agreed on: masks
-by random weights that fill half of the pictures have .36, right ones of a guitar .84."""
-CORRECT_MASKS_HINT = (
-    "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
-)
+"""Share of a mask that is of all masks' hull, below which more is in dispute than agreed on: masks by random weights
+that fill half of the pictures have .36, right ones of a guitar .84."""
+CORRECT_MASKS_HINT = "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
 
 
 def masks_from_model(
@@ -65,17 +63,11 @@ def masks_from_model(
             raise BadFileError(source, what, advice)
     doubts = [] if why is None else [Note(f"Masks are not of one object: {why}.", NoteKind.GRAVE)]
     if why is None and share < INCOHERENT_HULL_FRACTION:
-        doubts = [
-            Note(
-                f"Masks may be wrong: {_contradiction_clause(share)}. Look at them.", NoteKind.GRAVE
-            )
-        ]
+        doubts = [Note(f"Masks may be wrong: {_contradiction_clause(share)}. Look at them.", NoteKind.GRAVE)]
     return learned.folder, said, tuple(doubts)
 
 
-def several_objects_reason(
-    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]
-) -> tuple[str | None, float]:
+def several_objects_reason(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> tuple[str | None, float]:
     """Return in a clause why masks are not of one object; None: they may be.
 
     Returns:

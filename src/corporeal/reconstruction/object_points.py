@@ -13,15 +13,8 @@ from corporeal.core.errors import UserError
 from corporeal.core.progress import Progress
 from corporeal.core.types import FeatureCloud, Views
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
-from corporeal.reconstruction.features.feature_lifting import (
-    LiftedFeatures,
-    known_features,
-    uplift_features,
-)
-from corporeal.reconstruction.features.point_descriptor import (
-    MAX_SHOWING_THROUGH_FRACTION,
-    mean_view_directions,
-)
+from corporeal.reconstruction.features.feature_lifting import LiftedFeatures, known_features, uplift_features
+from corporeal.reconstruction.features.point_descriptor import MAX_SHOWING_THROUGH_FRACTION, mean_view_directions
 from corporeal.reconstruction.features.point_features import PlacedPoints, points_by_projection
 from corporeal.reconstruction.gaussians.depth_rendering import render_depth
 from corporeal.reconstruction.gaussians.feature_distillation import distil_features
@@ -127,9 +120,7 @@ def points_on_objects(
         with ThreadPool() as pool:
             depth = render_depth(gaussians, cameras, pool).depth
         return points_by_projection(position, colour, cameras, depth, on_objects)
-    outside = mean_view_directions(
-        position, cameras, list(seen.share[:, on_objects]), MAX_SHOWING_THROUGH_FRACTION
-    )
+    outside = mean_view_directions(position, cameras, list(seen.share[:, on_objects]), MAX_SHOWING_THROUGH_FRACTION)
     shares = cache(lambda v: gaussian_weights(gaussians, cameras[v], WEIGHT_CELL_PX)[on_objects])
     cells = -(-cameras[0].height // WEIGHT_CELL_PX), -(-cameras[0].width // WEIGHT_CELL_PX)
 
@@ -147,19 +138,13 @@ def _points_of_field(
     progress: Progress,
 ) -> PlacedPoints:
     """Learn a radiance field of the objects, and take points from where it is dense."""
-    how = RadianceFieldConfig(
-        config.training, seed=config.training_seed, hull=config.resolution.hull
-    )
+    how = RadianceFieldConfig(config.training, seed=config.training_seed, hull=config.resolution.hull)
     kept = None if folder is None else folder / "radiance.npz"
-    learned, found = radiance_field_points(
-        taken, on_objects, MAX_OBJECT_POINTS, how, kept, progress
-    )
+    learned, found = radiance_field_points(taken, on_objects, MAX_OBJECT_POINTS, how, kept, progress)
     placed = points_by_projection(found.position, found.colour, taken.cameras, found.depth)
 
     def lift(maps: Sequence[np.ndarray]) -> LiftedFeatures:
-        return known_features(
-            distil_features(learned.field, taken.cameras, maps).at(found.position)
-        )
+        return known_features(distil_features(learned.field, taken.cameras, maps).at(found.position))
 
     return replace(placed, lift=lift, statements=learned.statements)
 
@@ -172,6 +157,4 @@ def labels_from_masks(
         return None
     near = on_objects[KDTree(taken.gaussians.mean[on_objects]).query(cloud.position)[1]]
     pixels = list(taken.views.object_of_pixel)
-    return lift_labels(
-        lambda v: gaussian_weights(taken.gaussians, taken.cameras[v])[near], pixels, cloud.count
-    )
+    return lift_labels(lambda v: gaussian_weights(taken.gaussians, taken.cameras[v])[near], pixels, cloud.count)

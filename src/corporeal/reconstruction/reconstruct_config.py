@@ -14,10 +14,7 @@ from corporeal.reconstruction.features import connect_encoder
 from corporeal.reconstruction.features.mask_models import MASK_MODEL_REGISTRY as MASKERS
 from corporeal.reconstruction.features.mask_models import connect_mask_model, split_model_spec
 from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
-from corporeal.reconstruction.surface.surface_config import (
-    DEFAULT_CLOSED_SURFACE,
-    ClosedSurfaceConfig,
-)
+from corporeal.reconstruction.surface.surface_config import DEFAULT_CLOSED_SURFACE, ClosedSurfaceConfig
 
 SegmentationRule = Literal["auto", "masks", "look", "components"]
 
@@ -62,19 +59,17 @@ class ReconstructConfig:
     count: int | None = None
     """Number of objects; by default as many as --object-names names, else it is estimated."""
     apart: SegmentationRule = "auto"
-    """What objects are segmented by; auto: instance masks where there are any, else appearance
-    features and concavity (look)."""
-    masks: Annotated[str, ReadsPath(prefixes=tuple(MASKERS), names=(MASKS_AUTO, MASKS_NONE))] = (
-        "auto"
-    )
-    """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER"
-    with weights of such a model; auto: those beside the photographs, else grown from what all
-    cameras look at; none: objects are what stands on the floor."""
+    """What objects are segmented by; auto: instance masks where there are any, else appearance features and concavity
+    (look)."""
+    masks: Annotated[str, ReadsPath(prefixes=tuple(MASKERS), names=(MASKS_AUTO, MASKS_NONE))] = "auto"
+    """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER" with weights of such a
+    model; auto: those beside the photographs, else grown from what all cameras look at; none: objects are what stands
+    on the floor."""
     up: UpAxisChoice = "auto"
     """Axis of the file that points up, also of a mesh; auto: from the file or the cameras."""
     floor_at: float | None = None
-    """Height of the floor along the up axis, in the file's unit; by default a plane is fitted, or,
-    where there is none, the floor is put below the lowest object."""
+    """Height of the floor along the up axis, in the file's unit; by default a plane is fitted, or, where there is none,
+    the floor is put below the lowest object."""
     metres_per_unit: float | None = None
     """Length of one unit of the file [m]; by default it follows from the sizes of the objects."""
     known_distance: MeasuredDistance | None = None
@@ -84,13 +79,12 @@ class ReconstructConfig:
     rasteriser: Literal["numba", "gsplat"] = "numba"
     """Rasteriser for training: numba on the processor, or gsplat on a CUDA GPU."""
     semantic: EncoderSpec = "descriptor"
-    """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
-    needs no weights."""
+    """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which needs no weights."""
     structural: EncoderSpec = "descriptor"
     """Features that parts are segmented by: "dinov2", "dinov2:FOLDER", or "descriptor"."""
     lifting: Literal["uplift", "back-projection", "radiance"] = "uplift"
-    """How image features are lifted to points: to Gaussians by their blending weights (uplift) or
-    by back-projection, or to points of a radiance field, which is then trained as well."""
+    """How image features are lifted to points: to Gaussians by their blending weights (uplift) or by back-projection,
+    or to points of a radiance field, which is then trained as well."""
     force: bool = False
     """Continue where objects are as large as the room, or photographs are reproduced badly."""
     training_seed: int = 0
@@ -127,9 +121,7 @@ def validate_reconstruct(
             "--count, or name all of them."
         )
     if config.object_names or not asked:
-        check_stated_extents(
-            extents, [object_of_usual_size(name) for name in config.object_names], source
-        )
+        check_stated_extents(extents, [object_of_usual_size(name) for name in config.object_names], source)
     for spec in (config.semantic, config.structural):
         connect_encoder(spec)  # who is to look must be there before anything is learned
     training_schedule.validate_rasteriser(config.rasteriser)

@@ -24,8 +24,8 @@ GOLDEN_ANGLE_RAD = np.pi * (3 - np.sqrt(5))
 class CameraAim:
     """Where to look from and at what, +z up in the picture: what a picture is ordered by.
 
-    Rays are cast from these numbers and not from a ``Camera``, whose matrices would round them:
-    equal aims give equal bytes, and a model's kept answers are found by the bytes of pictures.
+    Rays are cast from these numbers and not from a ``Camera``, whose matrices would round them: equal aims give equal
+    bytes, and a model's kept answers are found by the bytes of pictures.
     """
 
     eye: Vector
@@ -87,18 +87,13 @@ def fit_camera(
 
 
 def fit_cameras_around(
-    boxes: Float[np.ndarray, "F B 2 3"],
-    count: int,
-    size: tuple[int, int],
-    fill: float = PICTURE_FILL_FRACTION,
+    boxes: Float[np.ndarray, "F B 2 3"], count: int, size: tuple[int, int], fill: float = PICTURE_FILL_FRACTION
 ) -> list[CameraAim]:
     """See every box of every frame from evenly about the upper half of a sphere."""
     return [fit_camera(boxes, size, view, fill) for view in fibonacci_directions(count)]
 
 
-def cameras_around(
-    points: Float[np.ndarray, "N 3"], count: int, size: tuple[int, int]
-) -> tuple[Camera, ...]:
+def cameras_around(points: Float[np.ndarray, "N 3"], count: int, size: tuple[int, int]) -> tuple[Camera, ...]:
     """Return cameras that see nearly all of some points, from all sides above."""
     box = np.percentile(points, (OUTLIER_POINTS_PERCENT, 100 - OUTLIER_POINTS_PERCENT), axis=0)
     return tuple(camera_from_aim(aim) for aim in fit_cameras_around(box[None, None], count, size))
@@ -106,10 +101,7 @@ def cameras_around(
 
 def fibonacci_directions(count: int) -> list[Vector]:
     """Return unit vectors towards cameras: a spiral of equal areas (Fibonacci lattice)."""
-    z = (
-        MAX_ELEVATION_SINE
-        - (MAX_ELEVATION_SINE - MIN_ELEVATION_SINE) * (np.arange(count) + 0.5) / count
-    )
+    z = MAX_ELEVATION_SINE - (MAX_ELEVATION_SINE - MIN_ELEVATION_SINE) * (np.arange(count) + 0.5) / count
     turn = GOLDEN_ANGLE_RAD * np.arange(count)
     flat = np.sqrt(1 - z * z)
     x, y = flat * np.cos(turn), flat * np.sin(turn)
@@ -173,9 +165,7 @@ def _overlap(flat: np.ndarray) -> float:
         for j in range(i + 1, count):
             both = np.minimum(high[:, i], high[:, j]) - np.maximum(low[:, i], low[:, j])
             area = np.clip(both, 0, None).prod(axis=-1)
-            small = np.minimum(
-                (high[:, i] - low[:, i]).prod(axis=-1), (high[:, j] - low[:, j]).prod(axis=-1)
-            )
+            small = np.minimum((high[:, i] - low[:, i]).prod(axis=-1), (high[:, j] - low[:, j]).prod(axis=-1))
             shares.append(area / np.maximum(small, 1e-12))
     shares = [s[np.isfinite(s)] for s in shares]
     return float(np.mean(np.concatenate(shares))) if shares and sum(map(len, shares)) else 0.0

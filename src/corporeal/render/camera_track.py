@@ -81,14 +81,12 @@ class CameraTrack:
         return replace(self.aim, eye=(a + x, b + y, c + z), target=(p + x, q + y, r + z))
 
 
-def camera_track(
-    shot: CameraShot, reel: MotionBounds, size: tuple[int, int], view: Vector | None
-) -> CameraTrack:
+def camera_track(shot: CameraShot, reel: MotionBounds, size: tuple[int, int], view: Vector | None) -> CameraTrack:
     """Place the camera.
 
     Args:
-        shot: wide: everything, all the time; close: the object that is struck first, or else that
-            moves most; follow: all that moves.
+        shot: wide: everything, all the time; close: the object that is struck first, or else that moves most; follow:
+            all that moves.
         reel: What moves.
         size: Of the picture [px].
         view: Direction from the scene to the camera; None: where objects hide each other least.
@@ -127,9 +125,7 @@ def _extent(boxes: np.ndarray) -> np.ndarray:
     return np.nan_to_num(boxes[:, :, 1] - boxes[:, :, 0])
 
 
-def _follow_moving(
-    reel: MotionBounds, seen: list[int], size: tuple[int, int], view: Vector | None
-) -> CameraTrack:
+def _follow_moving(reel: MotionBounds, seen: list[int], size: tuple[int, int], view: Vector | None) -> CameraTrack:
     """Move along with some objects, in the direction in which they are hidden least."""
     # Pieces have no boxes before something breaks.
     low, high = reel.boxes[:, seen, 0], reel.boxes[:, seen, 1]

@@ -21,9 +21,7 @@ MIN_OKLAB_DISTANCE = 0.08
 MAX_COLOUR_TRIES = 60
 BRIGHT_SCHEME = ("#4477aa", "#228833", "#66ccee", "#ccbb44", "#aa3377", "#ee6677")
 """Tol's bright scheme, without its grey."""
-LAW_COLOURS = {
-    law: (CONSTITUTIVE_LAWS[law].name, BRIGHT_SCHEME[law.value % len(BRIGHT_SCHEME)]) for law in Law
-}
+LAW_COLOURS = {law: (CONSTITUTIVE_LAWS[law].name, BRIGHT_SCHEME[law.value % len(BRIGHT_SCHEME)]) for law in Law}
 """What each law is called in figures, and its colour."""
 OBJECT_COLOURS = (
     "#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee8866", "#77aadd",
@@ -48,10 +46,7 @@ def distinct_colours(names: Sequence[str]) -> list[Colour]:
     taken: dict[str, tuple[float, float, float]] = {}
     for name in dict.fromkeys(names):
         tries = [_own(name), *(_own(f"{name} {k}") for k in range(1, MAX_COLOUR_TRIES))]
-        far = [
-            min((_oklab_distance(own, other) for other in taken.values()), default=1.0)
-            for own in tries
-        ]
+        far = [min((_oklab_distance(own, other) for other in taken.values()), default=1.0) for own in tries]
         clear = next((k for k, d in enumerate(far) if d >= MIN_OKLAB_DISTANCE), int(np.argmax(far)))
         taken[name] = tries[clear]
     return [colour_from_oklch(*taken[name]) for name in names]
@@ -59,15 +54,9 @@ def distinct_colours(names: Sequence[str]) -> list[Colour]:
 
 def _own(name: str) -> tuple[float, float, float]:
     """Lightness, chroma and hue [rad] of a name."""
-    number = int.from_bytes(
-        hashlib.sha256(f"{COLOUR_HASH_SALT} {name}".encode()).digest()[:6], "big"
-    )
+    number = int.from_bytes(hashlib.sha256(f"{COLOUR_HASH_SALT} {name}".encode()).digest()[:6], "big")
     lightness, chroma = LIGHTNESS_CHROMA_TIERS[number % len(LIGHTNESS_CHROMA_TIERS)]
-    return (
-        lightness,
-        chroma,
-        2 * np.pi * ((number // len(LIGHTNESS_CHROMA_TIERS)) % HUE_COUNT) / HUE_COUNT,
-    )
+    return (lightness, chroma, 2 * np.pi * ((number // len(LIGHTNESS_CHROMA_TIERS)) % HUE_COUNT) / HUE_COUNT)
 
 
 def _oklab_distance(one: tuple[float, float, float], other: tuple[float, float, float]) -> float:

@@ -46,12 +46,7 @@ def _caption(pen: ImageDraw.ImageDraw, tile: SheetTile, place: tuple[int, int], 
     x, y = place
     for k, words in enumerate((tile.title, *tile.lines)):
         font = ImageFont.load_default(14 if k == 0 else 12)
-        pen.text(
-            (x, y + k * CAPTION_LINE_PX),
-            _truncate(words, font, width),
-            INK_RGB if k == 0 else FAINT_RGB,
-            font,
-        )
+        pen.text((x, y + k * CAPTION_LINE_PX), _truncate(words, font, width), INK_RGB if k == 0 else FAINT_RGB, font)
 
 
 def _truncate(words: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont, width: int) -> str:

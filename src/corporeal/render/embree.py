@@ -1,8 +1,8 @@
 """A ray caster on Embree: sun with soft shadow, sky with occlusion, one reflection, endless floor.
 
-The picture is cast in bands of rows, each on its own from rays to colours, so that bands share
-nothing and run in threads (Embree and the compiled loops release Python's lock). Linear light
-throughout; a filmic curve and sRGB at the end.
+The picture is cast in bands of rows, each on its own from rays to colours, so that bands share nothing and run in
+threads (Embree and the compiled loops release Python's lock). Linear light throughout; a filmic curve and sRGB at the
+end.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -17,12 +17,7 @@ from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.render import kernels_hits, kernels_light
 from corporeal.render.camera_placement import CameraAim, camera_axes
 from corporeal.render.kernels_hits import HIT_NOTHING, HitBuffer
-from corporeal.render.kernels_light import (
-    GLOSSY_ROUGHNESS,
-    LIGHT_CHANNELS,
-    SHARP_MIRROR_ROUGHNESS,
-    StudioLamps,
-)
+from corporeal.render.kernels_light import GLOSSY_ROUGHNESS, LIGHT_CHANNELS, SHARP_MIRROR_ROUGHNESS, StudioLamps
 from corporeal.render.ray_scene import MAX_TRANSPARENT_LAYERS, RayScene, continue_ray
 
 Quality = Literal["draft", "normal", "fine"]
@@ -66,9 +61,7 @@ def render_image(
     return out
 
 
-def identify_triangles(
-    stage: RayScene, camera: CameraAim, grid: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
+def identify_triangles(stage: RayScene, camera: CameraAim, grid: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """For each sample, the triangle it sees (-1: none) and its depth [m]; rows first."""
     job = RenderJob(stage, camera, RaySampling(grid, 1, 1))
     rays = job.rays((0, camera.height))
@@ -220,13 +213,7 @@ class RenderJob:
         kernels_light.blend_layers(s, on, near, self.lamps, light)
 
     def behind(
-        self,
-        rays: Rays,
-        s: HitBuffer,
-        thin: np.ndarray,
-        block: PixelBlock,
-        light: np.ndarray,
-        depth: int,
+        self, rays: Rays, s: HitBuffer, thin: np.ndarray, block: PixelBlock, light: np.ndarray, depth: int
     ) -> None:
         """Shade what is to be seen through surfaces that rays ``thin`` met."""
         start = np.zeros(rays.origin.shape, np.float32)
@@ -237,12 +224,7 @@ class RenderJob:
         self.layer(Rays(start, d), thin, block, light, hit, depth + 1)
 
     def meet(
-        self,
-        o: np.ndarray,
-        d: np.ndarray,
-        index: np.ndarray,
-        hit: tuple[np.ndarray, ...],
-        grid: int = 1,
+        self, o: np.ndarray, d: np.ndarray, index: np.ndarray, hit: tuple[np.ndarray, ...], grid: int = 1
     ) -> HitBuffer:
         """First surface that is not a hole; of samples so many times finer in each direction."""
         stage, s = self.stage, kernels_hits.hit_buffer(len(o))
@@ -259,10 +241,7 @@ class RenderJob:
             hole = (s.traits[index, 4] == 0) & (prim >= 0)
             if not hole.any():
                 break
-            o, e = (
-                continue_ray(o[hole], e[hole], t[hole], stage.size),
-                np.ascontiguousarray(e[hole]),
-            )
+            o, e = (continue_ray(o[hole], e[hole], t[hole], stage.size), np.ascontiguousarray(e[hole]))
             index, walked = index[hole], walked[hole] + t[hole]
             hit = stage.hit(o, e)
         return s
@@ -285,21 +264,15 @@ class RenderJob:
         lattice = lattice.reshape(*shape, LIGHT_CHANNELS)
         kernels_light.smooth_light(lattice, normal, depth, grid)
         light = np.zeros((len(s.kind), LIGHT_CHANNELS), np.float32)
-        missing = kernels_light.spread_light(
-            s, on, (height, width), lattice, normal, depth, grid, every, light
-        )
+        missing = kernels_light.spread_light(s, on, (height, width), lattice, normal, depth, grid, every, light)
         lone = np.flatnonzero(missing)
         light[lone] = self.ask(s, d, lone, block.places(lone), 2)
-        sharp = on[
-            (s.traits[on, 1] <= SHARP_MIRROR_ROUGHNESS) & (s.kind[on] == kernels_hits.HIT_OBJECT)
-        ]
+        sharp = on[(s.traits[on, 1] <= SHARP_MIRROR_ROUGHNESS) & (s.kind[on] == kernels_hits.HIT_OBJECT)]
         if len(sharp):
             self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
         return light
 
-    def ask(
-        self, s: HitBuffer, d: np.ndarray, index: np.ndarray, places: PixelPlaces, times: int = 1
-    ) -> np.ndarray:
+    def ask(self, s: HitBuffer, d: np.ndarray, index: np.ndarray, places: PixelPlaces, times: int = 1) -> np.ndarray:
         """Send rays to sky (so many times the usual) and sun and along the mirrored direction."""
         every, sky = self.sampling.every, times * self.sampling.sky
         row, column = places.row, places.column
@@ -322,13 +295,7 @@ class RenderJob:
         return self.stage.free(o, w, ray)
 
     def reflect(
-        self,
-        s: HitBuffer,
-        d: np.ndarray,
-        index: np.ndarray,
-        cells: np.ndarray,
-        light: np.ndarray,
-        rows: np.ndarray,
+        self, s: HitBuffer, d: np.ndarray, index: np.ndarray, cells: np.ndarray, light: np.ndarray, rows: np.ndarray
     ) -> None:
         """Write what glossy surfaces mirror into light[rows, 4:]."""
         stage = self.stage
@@ -336,13 +303,9 @@ class RenderJob:
         kernels_light.mirror_rays(s, index, d, cells, self.lamps, o, w)
         prim = np.full(len(index), -1, np.int32)
         u, v, t = (np.zeros(len(index), np.float32) for _ in range(3))
-        glossy = (s.traits[index, 1] < GLOSSY_ROUGHNESS) & (
-            s.kind[index] == kernels_hits.HIT_OBJECT
-        )
+        glossy = (s.traits[index, 1] < GLOSSY_ROUGHNESS) & (s.kind[index] == kernels_hits.HIT_OBJECT)
         if glossy.any():
             prim[glossy], u[glossy], v[glossy], t[glossy] = stage.hit(o[glossy], w[glossy])
         seen = np.zeros((len(index), 3), np.float32)
-        kernels_light.write_mirrored(
-            stage.look, stage.normals, self.lamps, s, index, w, prim, u, v, t, seen, 0
-        )
+        kernels_light.write_mirrored(stage.look, stage.normals, self.lamps, s, index, w, prim, u, v, t, seen, 0)
         light[rows, 4:LIGHT_CHANNELS] = seen

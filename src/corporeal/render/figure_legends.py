@@ -1,7 +1,7 @@
 """Legends of figures.
 
-The letters are those of DejaVu Sans, the font that comes with Matplotlib; Matplotlib itself would
-take longer to import than a whole figure to draw.
+The letters are those of DejaVu Sans, the font that comes with Matplotlib; Matplotlib itself would take longer to import
+than a whole figure to draw.
 """
 
 from collections.abc import Sequence
@@ -119,10 +119,7 @@ def names_legend(entries: Sequence[LegendEntry], middle: float, top: float) -> P
     """
     rows = -(-len(entries) // 2)
     columns = [c for c in (entries[:rows], entries[rows:]) if c]
-    wide = [
-        NAME_INDENT_PX + max(figure_font(SMALL_FONT_PX).getlength(e.name) for e in c)
-        for c in columns
-    ]
+    wide = [NAME_INDENT_PX + max(figure_font(SMALL_FONT_PX).getlength(e.name) for e in c) for c in columns]
     left = middle - (sum(wide) + COLUMN_GAP_PX * (len(columns) - 1)) / 2
     lines, swatches = [], []
     for column, width in zip(columns, wide, strict=True):
@@ -130,18 +127,12 @@ def names_legend(entries: Sequence[LegendEntry], middle: float, top: float) -> P
             y = top + row * LINE_PITCH_PX
             lines.append(TextLine(entry.name, (left + NAME_INDENT_PX, y + LINE_PITCH_PX / 2), "lm"))
             if entry.colour is not None:
-                swatches.append(
-                    ColourSwatch(
-                        (left, y + 3), (SMALL_FONT_PX, SMALL_FONT_PX), np.array([entry.colour])
-                    )
-                )
+                swatches.append(ColourSwatch((left, y + 3), (SMALL_FONT_PX, SMALL_FONT_PX), np.array([entry.colour])))
         left += width + COLUMN_GAP_PX
     return PanelLegend(tuple(lines), tuple(swatches))
 
 
-def scale_legend(
-    marks: Sequence[ScaleTick], ramp: Float[np.ndarray, "N 3"], middle: float, top: float
-) -> PanelLegend:
+def scale_legend(marks: Sequence[ScaleTick], ramp: Float[np.ndarray, "N 3"], middle: float, top: float) -> PanelLegend:
     """Draw a bar of colours over some values.
 
     Args:
@@ -172,8 +163,8 @@ NONCHARACTER = "\uffff"
 def drawable_name(name: str, instead: str) -> str:
     """Return a name as figures can write it.
 
-    The font that comes with Matplotlib has Latin, Greek, Cyrillic, Arabic and Hebrew letters, but
-    no Chinese, Japanese or Korean: such a name is written ``instead``; pages show it as it is.
+    The font that comes with Matplotlib has Latin, Greek, Cyrillic, Arabic and Hebrew letters, but no Chinese, Japanese
+    or Korean: such a name is written ``instead``; pages show it as it is.
     """
     if name.isascii():
         return name

@@ -2,9 +2,8 @@
 
 One scene in several sets of plain colours, in the same light.
 
-What is seen does not depend on colours. Which light arrives at a surface does not depend on its
-colour, nor on that of others where all are matt. Both are asked for once, and shaded in each set of
-colours.
+What is seen does not depend on colours. Which light arrives at a surface does not depend on its colour, nor on that of
+others where all are matt. Both are asked for once, and shaded in each set of colours.
 """
 
 from collections.abc import Sequence
@@ -119,14 +118,7 @@ SHEET_SIZE_PX, SHEET_PANEL_SIZE_PX = (1485, 1045), (472, 354)
 FIRST_PANEL_CORNER_PX, PANEL_STEP_PX = (18, 41), (489, 522)
 """Left and top of the first picture, and from one to the next [px]."""
 
-PANEL_ORDER: tuple[ColourQuantity, ...] = (
-    "material",
-    "law",
-    "young",
-    "poisson",
-    "density",
-    "object",
-)
+PANEL_ORDER: tuple[ColourQuantity, ...] = ("material", "law", "young", "poisson", "density", "object")
 """Panels of the figure, row by row."""
 
 
@@ -153,11 +145,7 @@ class NumericPanel:
 
 
 def fields_figure(
-    scene: Scene,
-    parts: Parts,
-    field: MaterialField,
-    path: Path,
-    picture_px: tuple[int, int] = PANEL_SIZE_PX,
+    scene: Scene, parts: Parts, field: MaterialField, path: Path, picture_px: tuple[int, int] = PANEL_SIZE_PX
 ) -> None:
     """Draw six panels: material, law, stiffness, Poisson's ratio, density and object.
 
@@ -174,9 +162,7 @@ def fields_figure(
     sheet = Image.new("RGB", SHEET_SIZE_PX, "white")
     shown = colour_panels(scene, parts, field)
     chosen = [shown[name] for name in PANEL_ORDER]
-    pictures = render_recoloured(
-        [_paint_parts(stage, parts, part_colours(p)) for p in chosen], camera, "draft"
-    )
+    pictures = render_recoloured([_paint_parts(stage, parts, part_colours(p)) for p in chosen], camera, "draft")
     for k, (panel, picture) in enumerate(zip(chosen, pictures, strict=True)):
         left, top = (
             FIRST_PANEL_CORNER_PX[0] + k % 3 * PANEL_STEP_PX[0],
@@ -188,9 +174,7 @@ def fields_figure(
     write_png(sheet, path)
 
 
-def panel_legend(
-    panel: CategoryPanel | NumericPanel, share: np.ndarray, corner: tuple[int, int]
-) -> PanelLegend:
+def panel_legend(panel: CategoryPanel | NumericPanel, share: np.ndarray, corner: tuple[int, int]) -> PanelLegend:
     """Place a panel's title, and below its picture what its colours mean.
 
     Args:
@@ -222,9 +206,7 @@ def write_filmstrip(video: Video, path: Path, count: int = 6, width: int = 340) 
     if not pictures:
         raise UserError(f"{video.path}: has no frames. Make it again.")
     small = (width, round(width * video.height / video.width))
-    shown = [
-        np.asarray(Image.fromarray(p).resize(small, Image.Resampling.LANCZOS)) for p in pictures
-    ]
+    shown = [np.asarray(Image.fromarray(p).resize(small, Image.Resampling.LANCZOS)) for p in pictures]
     times = [video.times[k] if video.times else k / video.fps for k in numbers]
     write_image_row(shown, [f"{t:.2f} s" for t in times], path)
 
@@ -268,13 +250,9 @@ def colour_panels(
     numbers = range(len(parts.catalogue))
     return {
         "material": CategoryPanel(
-            "Material",
-            [m.name.replace("_", " ") for m in made],
-            colours.distinct_colours([m.name for m in made]),
+            "Material", [m.name.replace("_", " ") for m in made], colours.distinct_colours([m.name for m in made])
         ),
-        "law": CategoryPanel(
-            "Constitutive law", [n for n, _ in laws], [colours.colour_from_hex(c) for _, c in laws]
-        ),
+        "law": CategoryPanel("Constitutive law", [n for n, _ in laws], [colours.colour_from_hex(c) for _, c in laws]),
         "object": CategoryPanel(
             "Object",
             [scene.objects[k].name.replace("_", " ") for k in things],
@@ -301,9 +279,7 @@ def part_colours(panel: CategoryPanel | NumericPanel) -> Float[np.ndarray, "K 3"
 def _paint_parts(stage: RayScene, parts: Parts, colour_of_part: np.ndarray) -> RayScene:
     """Paint each part; what is of none, number -1, is grey."""
     table = np.vstack([colour_of_part, [[0.75] * 3]])
-    return stage.painted(
-        srgb_to_linear(table), np.mod(parts.part_of_point, len(table)), PAPER_LIGHT
-    )
+    return stage.painted(srgb_to_linear(table), np.mod(parts.part_of_point, len(table)), PAPER_LIGHT)
 
 
 def _visible_pixels(seen: np.ndarray, parts: Parts) -> np.ndarray:
@@ -322,20 +298,12 @@ def _entries(panel: CategoryPanel, share: np.ndarray) -> list[LegendEntry]:
         colour[name] = panel.colour[k]
     ranked = sorted(total, key=lambda n: (-total[n], n))
     shown = ranked if len(ranked) <= MAX_LEGEND_ENTRIES else ranked[: MAX_LEGEND_ENTRIES - 1]
-    rest = (
-        [LegendEntry(f"and {len(ranked) - len(shown)} more", None)]
-        if len(ranked) > len(shown)
-        else []
-    )
+    rest = [LegendEntry(f"and {len(ranked) - len(shown)} more", None)] if len(ranked) > len(shown) else []
     return [*(LegendEntry(_shorten(n), colour[n]) for n in shown), *rest]
 
 
 def _shorten(name: str) -> str:
-    return (
-        name
-        if len(name) <= MAX_LEGEND_CHARACTERS
-        else name[: MAX_LEGEND_CHARACTERS - 1].rstrip() + "…"
-    )
+    return name if len(name) <= MAX_LEGEND_CHARACTERS else name[: MAX_LEGEND_CHARACTERS - 1].rstrip() + "…"
 
 
 def _scale(panel: NumericPanel) -> tuple[list[ScaleTick], np.ndarray]:
@@ -343,9 +311,7 @@ def _scale(panel: NumericPanel) -> tuple[list[ScaleTick], np.ndarray]:
     _, low, high = colours.turbo(panel.value or [0.0], panel.log)
     ramp = colours.ramp_colours(np.linspace(0, 1, 256))
     if high - low <= 1e-9 * max(abs(high), 1e-30):
-        return [ScaleTick(0.5, si_prefix_text(low, panel.unit))], np.repeat(
-            ramp[128:129], 256, axis=0
-        )
+        return [ScaleTick(0.5, si_prefix_text(low, panel.unit))], np.repeat(ramp[128:129], 256, axis=0)
     middle = np.sqrt(low * high) if panel.log else (low + high) / 2
     marks = [(0.0, low), (0.5, float(middle)), (1.0, high)]
     return [ScaleTick(x, si_prefix_text(value, panel.unit)) for x, value in marks], ramp

@@ -16,8 +16,7 @@ MAX_NORMAL_CHANGE = 0.01
 class LastRenderedPose:
     """The pose that the last picture was cast of.
 
-    Each pose is compared with that one and not with the one before: slow motion adds up until it is
-    seen.
+    Each pose is compared with that one and not with the one before: slow motion adds up until it is seen.
     """
 
     def __init__(self, aim_at: Callable[[float], CameraAim]) -> None:
@@ -25,9 +24,7 @@ class LastRenderedPose:
         self._aim_at = aim_at
         self._pose: tuple[np.ndarray, np.ndarray] | None = None
 
-    def moved(
-        self, place: Float[np.ndarray, "V 3"], normal: Float[np.ndarray, "V 3"], time: float
-    ) -> bool:
+    def moved(self, place: Float[np.ndarray, "V 3"], normal: Float[np.ndarray, "V 3"], time: float) -> bool:
         """Whether a pose is to be cast anew; if so, it is the one that others are compared with.
 
         Args:

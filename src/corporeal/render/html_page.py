@@ -6,12 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-MIME_TYPES = {
-    ".png": "image/png",
-    ".jpg": "image/jpeg",
-    ".svg": "image/svg+xml",
-    ".mp4": "video/mp4",
-}
+MIME_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 
 
 def fill_page(room: str, name: str, **content: object) -> str:

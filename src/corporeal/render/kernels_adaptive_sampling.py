@@ -1,8 +1,8 @@
 """Adaptive sampling where shared light is inaccurate.
 
-Light is smoothed over 12 × 12 pixels. Beside contacts, at the edges of shadows and on leaves and
-bars that is too wide: there every pixel asks for itself, along one of 16 sets of directions of
-which 4 × 4 pixels see each once, and its light is a mean over those. Loops compiled by numba.
+Light is smoothed over 12 × 12 pixels. Beside contacts, at the edges of shadows and on leaves and bars that is too wide:
+there every pixel asks for itself, along one of 16 sets of directions of which 4 × 4 pixels see each once, and its light
+is a mean over those. Loops compiled by numba.
 """
 
 import numba
@@ -17,24 +17,19 @@ from corporeal.render.kernels_light import (
     view_terms,
 )
 from corporeal.render.kernels_sparse_light import LIGHT_CHANNELS_PADDED, mean_over_like
-from corporeal.render.kernels_video import (
-    MAX_DEPTH_DIFFERENCE_RATIO,
-    MIN_NORMAL_COSINE,
-    filmic,
-    grey_level,
-)
+from corporeal.render.kernels_video import MAX_DEPTH_DIFFERENCE_RATIO, MIN_NORMAL_COSINE, filmic, grey_level
 
 COMPARED_OFFSET_PX = 6
 """Pixels to those whose light is compared: half of what light is smoothed over."""
 COMPARED_STRIDE_PX = 2
 """Every so manieth pixel of every so manieth row is compared; what it says holds about it."""
 MAX_BEND_GREY_LEVELS = 12.0
-"""Grey levels (of 255) by which light may bend over twice ``COMPARED_OFFSET_PX`` pixels: what
-smoothing takes off a slope that ends there is half of it.
+"""Grey levels (of 255) by which light may bend over twice ``COMPARED_OFFSET_PX`` pixels: what smoothing takes off a
+slope that ends there is half of it.
 """
 MAX_STEP_GREY_LEVELS = 8.0
-"""Grey levels by which light may differ over ``COMPARED_OFFSET_PX`` pixels where its surface ends:
-smoothing looks to one side there, and is off by more than what it still shows.
+"""Grey levels by which light may differ over ``COMPARED_OFFSET_PX`` pixels where its surface ends: smoothing looks to
+one side there, and is off by more than what it still shows.
 """
 IGNORED_LIGHT_DIFFERENCE = np.float32(0.04)
 """Share of light that may differ without a closer look."""
@@ -44,8 +39,7 @@ SAMPLING_SETS = SET_SIDE_PX * SET_SIDE_PX
 MAX_SETS_PER_PIXEL = 4
 """Sets of directions that a pixel looks along at most, where few of its surface are about it."""
 STRATIFIED_VARIANCE_RATIO = np.float32(0.35)
-"""Variance of what 4 × 4 pixels find over that of as many independent rays: their directions are
-spread evenly."""
+"""Variance of what 4 × 4 pixels find over that of as many independent rays: their directions are spread evenly."""
 NEW_LIGHT_WEIGHT = np.float32(0.8)
 """Weight of new light in what it is compared with: four times as many rays as asked before."""
 
@@ -101,18 +95,14 @@ def _mark_inaccurate_pixels(s, index, d, light, normal, depth, lit, first, lamps
                 if not shaded:
                     shaded = True
                     cos = dot(s.normal[g], lamps.sun)
-                    spot, graze = view_terms(
-                        s.normal[g], d[g], s.traits[g, 1], lamps.sun, scratch[0]
-                    )
+                    spot, graze = view_terms(s.normal[g], d[g], s.traits[g, 1], lamps.sun, scratch[0])
                     for c in range(LIGHT_CHANNELS):
                         other[c] = light[i, j, c]
                     _greys(s, g, cos, spot, graze, other, lamps, scratch[1], shown[0])
                 for c in range(LIGHT_CHANNELS):
                     other[c] = light[y, x, c] if c < 4 or mirrors else light[i, j, c]
                 _greys(s, g, cos, spot, graze, other, lamps, scratch[1], shown[count])
-            if shaded and _largest_bend(shown, count) > (
-                MAX_BEND_GREY_LEVELS if count == 2 else MAX_STEP_GREY_LEVELS
-            ):
+            if shaded and _largest_bend(shown, count) > (MAX_BEND_GREY_LEVELS if count == 2 else MAX_STEP_GREY_LEVELS):
                 out[i, j] = True
                 break
 
@@ -193,9 +183,7 @@ def sampling_sets(who, row, column, out):
     for k in range(len(row)):
         times = times + 1 if k > 0 and who[k] == who[k - 1] else 0
         # Pixels beside one another look at parts of sky and sun that are far apart.
-        out[k] = (
-            (row[k] % SET_SIDE_PX * SET_SIDE_PX + column[k] % SET_SIDE_PX) * 7 + times * 5
-        ) % SAMPLING_SETS
+        out[k] = ((row[k] % SET_SIDE_PX * SET_SIDE_PX + column[k] % SET_SIDE_PX) * 7 + times * 5) % SAMPLING_SETS
 
 
 @numba.njit(**LOOP)
@@ -222,8 +210,8 @@ def mean_of_sets(index, times, light, out):
 def blend_resampled_light(s, index, light, normal, depth, asks, counts, known, room):
     """Smooth new light over 4 × 4 pixels, and over more where it only differs by its noise.
 
-    Of a mean over few rays and one over many that may be off, the first is taken as far as they
-    differ by more than its variance (James and Stein 1961).
+    Of a mean over few rays and one over many that may be off, the first is taken as far as they differ by more than its
+    variance (James and Stein 1961).
 
     Args:
         s: What pixels met.
@@ -263,9 +251,7 @@ def _compared(index, light, known, wide, off):
     for g in index:
         i, j = g // w, g % w
         for c in range(LIGHT_CHANNELS):
-            wide[i, j, c] = (
-                NEW_LIGHT_WEIGHT * wide[i, j, c] + (1 - NEW_LIGHT_WEIGHT) * known[i, j, c]
-            )
+            wide[i, j, c] = NEW_LIGHT_WEIGHT * wide[i, j, c] + (1 - NEW_LIGHT_WEIGHT) * known[i, j, c]
             off[i, j, c] = (light[i, j, c] - wide[i, j, c]) ** 2
 
 

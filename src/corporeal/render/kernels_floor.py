@@ -1,8 +1,8 @@
 """Shading of the floor: tiles in hard and soft shadow.
 
-Tiles of 8 × 8 pixels are separated. Near objects and in their shadow pixels ask for light
-themselves; farther away objects only hide a little of the sky, which is asked at the corners of
-tiles and changes evenly between. Loops compiled by numba, over a band of pixels.
+Tiles of 8 × 8 pixels are separated. Near objects and in their shadow pixels ask for light themselves; farther away
+objects only hide a little of the sky, which is asked at the corners of tiles and changes evenly between. Loops compiled
+by numba, over a band of pixels.
 """
 
 import numba
@@ -10,13 +10,7 @@ import numpy as np
 
 from corporeal.render.kernels_hits import FLOOR_ROUGHNESS, INNER, JIT, LOOP
 from corporeal.render.kernels_light import floor_fade, shade_with_view_terms, view_terms
-from corporeal.render.kernels_video import (
-    HORIZON_SINE,
-    bounding_box_of,
-    filmic,
-    meets_box,
-    pixel_direction,
-)
+from corporeal.render.kernels_video import HORIZON_SINE, bounding_box_of, filmic, meets_box, pixel_direction
 
 TILE_PX = 8
 """Sides of a tile [px]."""
@@ -165,15 +159,11 @@ def queue_corner_rays(tiles, eye, frame, tangent, size, first, lamps, ways, boxe
 
     """
     room = np.empty(3), np.empty(3, np.float32), bounding_box_of(boxes)
-    return _queue_corner_rays(
-        tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker
-    )
+    return _queue_corner_rays(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker)
 
 
 @numba.njit(**LOOP)
-def _queue_corner_rays(
-    tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker
-):
+def _queue_corner_rays(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker):
     h, width = tiles.shape
     n, many = 0, len(ways) - 1
     e, p, hull = room
@@ -284,9 +274,7 @@ def _shade_soft_tiles(tiles, shape, lamps, sky, glances, mirrored, wall, floor, 
             for c in range(3):
                 light[4 + c] = mirrored[g, c]
             spot, graze, fade = glances[g, 0], glances[g, 1], glances[g, 2]
-            shade_with_view_terms(
-                lamps.sun[2], spot, graze, lamps.floor, traits, light, lamps, above, near
-            )
+            shade_with_view_terms(lamps.sun[2], spot, graze, lamps.floor, traits, light, lamps, above, near)
             for c in range(3):
                 out[g, c] = filmic(near[c] * fade + wall[g, c] * (1 - fade))
 

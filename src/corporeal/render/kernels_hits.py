@@ -10,25 +10,15 @@ import numpy as np
 
 from corporeal.geometry.crease_normals import CREASE_ANGLE_DEG
 from corporeal.geometry.srgb import srgb_to_linear
-from corporeal.render.packed_scene import (
-    ALPHA,
-    CUT,
-    GLOW,
-    METAL,
-    MODE,
-    ROUGH,
-    TEXTURE,
-    TRANSLUCENT,
-    TRANSMIT,
-)
+from corporeal.render.packed_scene import ALPHA, CUT, GLOW, METAL, MODE, ROUGH, TEXTURE, TRANSLUCENT, TRANSMIT
 
 JIT = {"nogil": True, "cache": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 LOOP = {**JIT, "_nrt": False}
-"""As ``JIT``, of what makes no array. Else every view of an array is counted when it begins and
-ends, by atomic operations on a place that all threads share."""
+"""As ``JIT``, of what makes no array. Else every view of an array is counted when it begins and ends, by atomic
+operations on a place that all threads share."""
 INNER = {**LOOP, "forceinline": True}
-"""As ``LOOP``, of what is called in loops: handing over a structure of arrays takes longer than
-what most of them do."""
+"""As ``LOOP``, of what is called in loops: handing over a structure of arrays takes longer than what most of them
+do."""
 LINEAR_OF_SRGB_BYTE = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
 CREASE_COSINE = float(np.cos(np.radians(CREASE_ANGLE_DEG)))
 """Cosine of the largest angle over which made normals are smoothed."""
@@ -209,12 +199,7 @@ def _shading_normal(normals, tri, bary, flat, d, keep, out):
             out[a] += bary[c] * side * n[a]
     length = _unit(out)
     near = dot(out, flat)
-    if (
-        not length > 1e-6
-        or not np.isfinite(length)
-        or near <= 0
-        or (not keep and near < CREASE_COSINE)
-    ):
+    if not length > 1e-6 or not np.isfinite(length) or near <= 0 or (not keep and near < CREASE_COSINE):
         for a in range(3):
             out[a] = flat[a]
     # Interpolated normals may point away from the eye at silhouettes: bend them back.
@@ -228,8 +213,8 @@ def _shading_normal(normals, tri, bary, flat, d, keep, out):
 def _lift(vertices, normals, tri, bary, flat, p):
     """Move a hit from its facet to the smooth surface that the facet stands for.
 
-    Without this, coarse meshes show their facets where light grazes (Hanika 2021, "Hacking the
-    Shadow Terminator", Ray Tracing Gems II, chapter 4).
+    Without this, coarse meshes show their facets where light grazes (Hanika 2021, "Hacking the Shadow Terminator", Ray
+    Tracing Gems II, chapter 4).
     """
     x, y, z = p[0], p[1], p[2]
     for c in range(3):

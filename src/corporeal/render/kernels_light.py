@@ -11,16 +11,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from corporeal.render.kernels_hits import (
-    HIT_FLOOR,
-    HIT_OBJECT,
-    INNER,
-    JIT,
-    LOOP,
-    dot,
-    hash01,
-    surface_colour,
-)
+from corporeal.render.kernels_hits import HIT_FLOOR, HIT_OBJECT, INNER, JIT, LOOP, dot, hash01, surface_colour
 
 SHARP_MIRROR_ROUGHNESS = 0.2
 """Roughness up to which each sample follows its own mirrored ray."""
@@ -126,13 +117,7 @@ def sun_tangents(sun, e):
         _normalised(sun[1], -sun[0], np.float32(0), e)
     else:
         e[0], e[1], e[2] = 1, 0, 0
-    return np.array(
-        [
-            sun[1] * e[2] - sun[2] * e[1],
-            sun[2] * e[0] - sun[0] * e[2],
-            sun[0] * e[1] - sun[1] * e[0],
-        ]
-    )
+    return np.array([sun[1] * e[2] - sun[2] * e[1], sun[2] * e[0] - sun[0] * e[2], sun[0] * e[1] - sun[1] * e[0]])
 
 
 @numba.njit(**LOOP)
@@ -144,12 +129,7 @@ def sun_direction(i, pixel, lamps, e, h, w):
     b = (i // 4 + (j // 4 + hash01(pixel, 3)) / 4) / 4
     r, phi = np.sqrt(a) * lamps.softness, 2 * np.pi * b
     x, y = r * np.cos(phi), r * np.sin(phi)
-    _normalised(
-        sun[0] + x * e[0] + y * h[0],
-        sun[1] + x * e[1] + y * h[1],
-        sun[2] + x * e[2] + y * h[2],
-        w,
-    )
+    _normalised(sun[0] + x * e[0] + y * h[0], sun[1] + x * e[1] + y * h[1], sun[2] + x * e[2] + y * h[2], w)
 
 
 @numba.njit(**INNER)
@@ -379,9 +359,7 @@ def shade_with_view_terms(cos, spot, graze, tint, traits, light, lamps, sky, out
     metal, rough, through, emission, solid = traits[0], traits[1], traits[2], traits[3], traits[4]
     for c in range(3):
         sky[c] = (
-            light[0] * lamps.horizon[c]
-            + light[1] * (lamps.zenith[c] - lamps.horizon[c])
-            + light[2] * lamps.floor[c]
+            light[0] * lamps.horizon[c] + light[1] * (lamps.zenith[c] - lamps.horizon[c]) + light[2] * lamps.floor[c]
         )
     free = min(max((sky[0] + sky[1] + sky[2]) / 3, 0.0), 1.0)
     lit = max(cos, 0.0) + through * max(-cos, 0.0)

@@ -1,8 +1,8 @@
 """Light at the hits of a video's pixels: sparse sampling and sharing.
 
-One pixel asks in each row and column of 4 × 4; the others take their neighbours' light. The 36 that
-ask in 12 × 12 pixels look along as many different directions, and it is 12 × 12 pixels that light
-is smoothed over: wherever these begin, each direction is in them once. Loops compiled by numba.
+One pixel asks in each row and column of 4 × 4; the others take their neighbours' light. The 36 that ask in 12 × 12
+pixels look along as many different directions, and it is 12 × 12 pixels that light is smoothed over: wherever these
+begin, each direction is in them once. Loops compiled by numba.
 """
 
 import numba
@@ -20,12 +20,7 @@ from corporeal.render.kernels_light import (
     studio_radiance,
     sun_tangents,
 )
-from corporeal.render.kernels_video import (
-    MAX_DEPTH_DIFFERENCE_RATIO,
-    MIN_NORMAL_COSINE,
-    bounding_box_of,
-    meets_box,
-)
+from corporeal.render.kernels_video import MAX_DEPTH_DIFFERENCE_RATIO, MIN_NORMAL_COSINE, bounding_box_of, meets_box
 
 LIGHT_CHANNELS_PADDED = 8
 """Channels of light, one more than there are: loops over them fill whole registers."""
@@ -34,8 +29,8 @@ DIRECTION_SETS = 36
 SUN_RAYS = 2
 """Rays to the sun of each: its shadows are the sharpest of all light that is smoothed."""
 GRAZING_SKY_FRACTION = 0.04
-"""Of the light of the sky that comes from right above the horizon, and is taken from higher up:
-shadows of so little would reach far over the floor."""
+"""Of the light of the sky that comes from right above the horizon, and is taken from higher up: shadows of so little
+would reach far over the floor."""
 MIN_LIKE_NEIGHBOURS = 4
 """Neighbours of the same surface whose light is a pixel's, too."""
 
@@ -78,11 +73,7 @@ def mark_sampled_pixels(s, on, known, first, out):
                 break
             q = y * w + x
             near = abs(s.depth[g] - s.depth[q]) < MAX_DEPTH_DIFFERENCE_RATIO * s.depth[g]
-            if (
-                s.kind[q] == HIT_NOTHING
-                or not near
-                or dot(s.normal[g], s.normal[q]) <= MIN_NORMAL_COSINE
-            ):
+            if s.kind[q] == HIT_NOTHING or not near or dot(s.normal[g], s.normal[q]) <= MIN_NORMAL_COSINE:
                 break
             alike += 1
         out[g] = alike < MIN_LIKE_NEIGHBOURS
@@ -142,8 +133,8 @@ def queue_light_rays(s, index, number, pixel, lamps, ways, counts, boxes, o, w, 
         number: Which set of directions each looks along (N,).
         pixel: What its dice hang on (N,).
         lamps: The studio.
-        ways: Points of the sphere (sets × C, 3) and directions to the sun (sets × D, 3): see
-            ``sky_points`` and ``sun_directions``.
+        ways: Points of the sphere (sets × C, 3) and directions to the sun (sets × D, 3): see ``sky_points`` and
+            ``sun_directions``.
         counts: C and D.
         boxes: About all that can be met (B, 2, 3) [m].
         o: Origins of rays (R, 3), room for N × (C + D) and one more.
@@ -157,9 +148,7 @@ def queue_light_rays(s, index, number, pixel, lamps, ways, counts, boxes, o, w, 
 
     """
     hull = bounding_box_of(boxes)
-    return _queue_light_rays(
-        s, index, number, pixel, lamps, ways, counts, (hull, boxes), o, w, ray, asker, light
-    )
+    return _queue_light_rays(s, index, number, pixel, lamps, ways, counts, (hull, boxes), o, w, ray, asker, light)
 
 
 @numba.njit(**LOOP)
@@ -221,8 +210,8 @@ def add_unblocked_light(s, index, w, asker, free, lamps, counts, light):
 def queue_mirror_rays(s, index, number, d, lamps, soft, o, w, asker, light):
     """Write what samples mirror of the studio; return how many may mirror objects, too.
 
-    Those rays are written down as in ``queue_light_rays``. Sharp mirrors follow rays of their own;
-    what mirrors the studio only is left out where it is not asked for (``soft``).
+    Those rays are written down as in ``queue_light_rays``. Sharp mirrors follow rays of their own; what mirrors the
+    studio only is left out where it is not asked for (``soft``).
     """
     gap, n = np.float32(2e-4 * lamps.size), 0
     for k in range(len(index)):
@@ -257,8 +246,7 @@ def mean_over_like(data, normal, depth, on, has, steps, stride, total, out, had)
                 if y < 0 or y >= h or x < 0 or x >= w or not has[y, x]:
                     continue
                 alike = step == 0 or (
-                    abs(depth[i, j] - depth[y, x]) < 0.02
-                    and dot(normal[i, j], normal[y, x]) > MIN_NORMAL_COSINE
+                    abs(depth[i, j] - depth[y, x]) < 0.02 and dot(normal[i, j], normal[y, x]) > MIN_NORMAL_COSINE
                 )
                 if alike:
                     weight += 1
@@ -276,8 +264,7 @@ def smooth_shared_light(data, normal, depth, on, has, spare):
     """Mean over 4 pixels down, 4 across, then once more over thrice that, of like surfaces.
 
     Args:
-        data: Light of the pixels that have any; then that of all (rows, columns,
-            ``LIGHT_CHANNELS_PADDED``).
+        data: Light of the pixels that have any; then that of all (rows, columns, ``LIGHT_CHANNELS_PADDED``).
         normal: Of what pixels met.
         depth: Its logarithm.
         on: Which of them met something.

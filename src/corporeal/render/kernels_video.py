@@ -20,15 +20,11 @@ EDGE_GREY_LEVELS = 6
 """Grey levels (of 255) between neighbours that are worth more samples."""
 EDGE_SUPERSAMPLING = 3
 """How much finer in each direction pixels are looked at where there is an edge."""
-EDGE_SAMPLE_OFFSETS = (
-    np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) / EDGE_SUPERSAMPLING
-)
+EDGE_SAMPLE_OFFSETS = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) / EDGE_SUPERSAMPLING
 """Samples about the middle of such a pixel, which is known: rows and columns."""
 TONE_CURVE_STEPS = 1 << 14
 """Parts of the display's curve."""
-TONE_CURVE = (255 * linear_to_srgb(np.arange(TONE_CURVE_STEPS + 1) / TONE_CURVE_STEPS)).astype(
-    np.float32
-)
+TONE_CURVE = (255 * linear_to_srgb(np.arange(TONE_CURVE_STEPS + 1) / TONE_CURVE_STEPS)).astype(np.float32)
 """Grey level of every so manieth part of the brightest light, and of none."""
 ALBEDO_STEP = 0.1
 """Steps of albedo from which on two triangles are painted apart."""
@@ -196,10 +192,7 @@ def mark_edges(s, picture, active, shape, inner, out):
 @numba.njit(**INNER)
 def _one_surface(s, g, q):
     """Whether two pixels see one smooth surface of one colour."""
-    if (
-        s.kind[g] != s.kind[q]
-        or abs(s.depth[g] - s.depth[q]) >= MAX_DEPTH_DIFFERENCE_RATIO * s.depth[g]
-    ):
+    if s.kind[g] != s.kind[q] or abs(s.depth[g] - s.depth[q]) >= MAX_DEPTH_DIFFERENCE_RATIO * s.depth[g]:
         return False
     far = np.float32(0)
     for c in range(3):

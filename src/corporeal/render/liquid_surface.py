@@ -1,8 +1,8 @@
 """Surface reconstruction of liquids from particles, per frame.
 
-Its particles part and join, so no mesh follows them. The surface is where the distance from the
-weighted mean of the particles around a point is their radius (Zhu and Bridson 2005, "Animating sand
-as a fluid", eq. 7): flat where they lie side by side, a ball around one alone.
+Its particles part and join, so no mesh follows them. The surface is where the distance from the weighted mean of the
+particles around a point is their radius (Zhu and Bridson 2005, "Animating sand as a fluid", eq. 7): flat where they lie
+side by side, a ball around one alone.
 """
 
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ MAX_NEIGHBOURS = 20
 REACH_SPACINGS = 2.0
 """They count up to this distance [spacings]."""
 PARTICLE_RADIUS_SPACINGS = 0.6
-"""Of a particle: half a spacing, and what makes a flat surface lie half a spacing outside of its
-first layer [spacings]."""
+"""Of a particle: half a spacing, and what makes a flat surface lie half a spacing outside of its first layer
+[spacings]."""
 SAMPLE_STEP_SPACINGS = 0.6
 """Between samples [spacings]."""
 MAX_GRID_SAMPLES = 3_000_000
@@ -62,9 +62,7 @@ def liquid_surface(points: Float[np.ndarray, "N 3"], spacing: float) -> LiquidSu
     field = np.full(shape, -spacing)
     near = _near(points, origin, step, shape, REACH_SPACINGS * spacing)
     field[tuple(near.T)] = _depth(origin + step * near, points, spacing)
-    vertices, triangles, normals, _ = marching_cubes(
-        field, 0.0, spacing=(step,) * 3, gradient_direction="ascent"
-    )
+    vertices, triangles, normals, _ = marching_cubes(field, 0.0, spacing=(step,) * 3, gradient_direction="ascent")
     # Normals point to where the field falls, as triangles do.
     return LiquidSurface(
         np.asarray(vertices, np.float64) + origin,

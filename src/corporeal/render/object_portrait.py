@@ -64,8 +64,8 @@ def render_portraits(
 
     Args:
         scene: Holds the object.
-        part_of_surface: For each surface of the scene, which of the object's parts it is, counted
-            from 0; None: it belongs to another object.
+        part_of_surface: For each surface of the scene, which of the object's parts it is, counted from 0; None: it
+            belongs to another object.
         portrait: How many views, how large.
 
     Returns:
@@ -74,22 +74,15 @@ def render_portraits(
     """
     stage, box, parts = _isolated_object(scene, part_of_surface)
     size = (portrait.size, portrait.size)
-    cameras = [
-        fit_camera(box[None, None], size, view, PICTURE_FILL_FRACTION)
-        for view in _directions(portrait)
-    ]
-    # One thread a picture: the bands that several share would leave their number in the bytes, by
-    # which answers are cached.
+    cameras = [fit_camera(box[None, None], size, view, PICTURE_FILL_FRACTION) for view in _directions(portrait)]
+    # One thread a picture: the bands that several share would leave their number in the bytes, by which answers are
+    # cached.
     with ThreadPoolExecutor(usable_cores()) as pool:
         pictures = list(pool.map(lambda camera: render_image(stage, camera, "draft", 1), cameras))
     if parts.max(initial=0) > 0:
         colours = np.array([PART_COLOURS[c] for c in part_colour_names(1 + int(parts.max()))])
         painted = stage.painted(colours.astype(np.float32), parts, StudioLight())
-        pictures.append(
-            render_image(
-                painted, max(cameras, key=lambda c: _visible_parts(stage, c, parts)), "draft", 1
-            )
-        )
+        pictures.append(render_image(painted, max(cameras, key=lambda c: _visible_parts(stage, c, parts)), "draft", 1))
     return tuple(pictures)
 
 
@@ -100,23 +93,16 @@ def _visible_parts(stage: RayScene, camera: CameraAim, parts: np.ndarray) -> tup
     return int((share > 0).sum()), float(share.min() / max(share.sum(), 1))
 
 
-def _isolated_object(
-    scene: Scene, part_of_surface: list[int | None]
-) -> tuple[RayScene, np.ndarray, np.ndarray]:
+def _isolated_object(scene: Scene, part_of_surface: list[int | None]) -> tuple[RayScene, np.ndarray, np.ndarray]:
     """Stand the object on the floor by itself: stage, box (2, 3) [m], part of each triangle."""
     kept = [k for k, part in enumerate(part_of_surface) if part is not None]
     worn = sorted({scene.surfaces[k].finish for k in kept})  # textures of others cost seconds
-    surfaces = tuple(
-        replace(scene.surfaces[k], finish=worn.index(scene.surfaces[k].finish)) for k in kept
-    )
+    surfaces = tuple(replace(scene.surfaces[k], finish=worn.index(scene.surfaces[k].finish)) for k in kept)
     finishes = tuple(scene.finishes[f] for f in worn)
     box = surfaces_bounding_box(surfaces)
     foot = np.array([*box.mean(axis=0)[:2], box[0, 2]])
     alone = move_scene(replace(scene, surfaces=surfaces, finishes=finishes), -foot)
-    parts = np.repeat(
-        np.array([part_of_surface[k] for k in kept], dtype=int),
-        [len(s.triangles) for s in surfaces],
-    )
+    parts = np.repeat(np.array([part_of_surface[k] for k in kept], dtype=int), [len(s.triangles) for s in surfaces])
     return RayScene(alone), box - foot, parts
 
 

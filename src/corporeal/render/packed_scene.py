@@ -59,9 +59,7 @@ def pack_scene(scene: Scene) -> PackedScene:
     )
 
 
-def with_plain_colours(
-    look: PackedScene, shades: np.ndarray, shade_of_triangle: np.ndarray
-) -> PackedScene:
+def with_plain_colours(look: PackedScene, shades: np.ndarray, shade_of_triangle: np.ndarray) -> PackedScene:
     """Return the same triangles without textures, each in one of the ``shades`` (S, 3) linear."""
     finish = np.zeros((len(shades), 12), dtype=np.float32)
     finish[:, :3] = shades
@@ -69,9 +67,7 @@ def with_plain_colours(
     finish[:, ROUGH] = 0.8
     finish[:, TEXTURE] = -1
     return look._replace(
-        colours=np.ones_like(look.colours),
-        finish=finish,
-        finish_of_triangle=shade_of_triangle.astype(np.int32),
+        colours=np.ones_like(look.colours), finish=finish, finish_of_triangle=shade_of_triangle.astype(np.int32)
     )
 
 

@@ -8,8 +8,8 @@ from PIL import Image
 from corporeal.core.store import disk_errors
 
 ZLIB_LEVEL = 4
-"""Of zlib, 1 to 9: pictures are a sixth larger than by its usual 6, and the view of a report a
-twenty-fifth, in less than half the time."""
+"""Of zlib, 1 to 9: pictures are a sixth larger than by its usual 6, and the view of a report a twenty-fifth, in less
+than half the time."""
 
 
 def write_png(picture: Image.Image, path: Path) -> None:

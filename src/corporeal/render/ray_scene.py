@@ -35,8 +35,8 @@ class StudioLight:
     """The studio. Colours are light, or sRGB where they are written in hex."""
 
     front: Vector | None = None
-    """From where the scene is seen that the sun stands by; None: from the camera, so that the sun
-    stands at the same side of every picture."""
+    """From where the scene is seen that the sun stands by; None: from the camera, so that the sun stands at the same
+    side of every picture."""
     sun: tuple[float, float, float] = (-0.69, -0.41, 0.90)
     """Towards the sun, as seen from the front: right, ahead, up."""
     sun_colour: tuple[float, float, float] = (3.0, 2.75, 2.4)
@@ -97,18 +97,14 @@ class RayScene:
             first += len(surface.vertices)
         starts = np.cumsum([(~gone).sum(), *(len(t) for t in triangles)])
         there.starts = np.concatenate([np.cumsum([0, *~gone])[self.starts], starts])
-        there.look = with_new_triangles(
-            look, ~gone, np.concatenate(triangles), np.concatenate(finish), first
-        )
+        there.look = with_new_triangles(look, ~gone, np.concatenate(triangles), np.concatenate(finish), first)
         there.vertices = np.ascontiguousarray(np.concatenate(vertices))
         there.normals = np.ascontiguousarray(np.concatenate(normals))
         there.corners = there.look.triangles.astype(np.uint32)
         there.scene = there._built()
         return there
 
-    def painted(
-        self, shades: np.ndarray, shade_of_triangle: np.ndarray, light: StudioLight
-    ) -> "RayScene":
+    def painted(self, shades: np.ndarray, shade_of_triangle: np.ndarray, light: StudioLight) -> "RayScene":
         """Return the stage in matt plain colours: each triangle has one of (S, 3) linear ones."""
         there = copy(self)
         there.look = with_plain_colours(self.look, shades, shade_of_triangle)

@@ -2,10 +2,10 @@
 
     length of the header (uint32) | header (JSON) | arrays, each on a multiple of 4 bytes
 
-The header names every array as [offset, count, kind]. Every object moves by a rigid pose per frame.
-One that deforms has, per vertex, what is left after that motion (3 × int16, ``RESIDUAL_STEP_M``
-each) and a normal (2 bytes, octahedral), both in the pose's frame: 8 bytes where float32 takes 24.
-Frames are kept as differences in time (``deltas.in_time``).
+The header names every array as [offset, count, kind]. Every object moves by a rigid pose per frame. One that deforms
+has, per vertex, what is left after that motion (3 × int16, ``RESIDUAL_STEP_M`` each) and a normal (2 bytes,
+octahedral), both in the pose's frame: 8 bytes where float32 takes 24. Frames are kept as differences in time
+(``deltas.in_time``).
 """
 
 import io
@@ -37,16 +37,14 @@ def encode_octahedral(normals: Float[np.ndarray, "N 3"]) -> Int8[np.ndarray, "N 
     flat = normals / np.maximum(np.abs(normals).sum(axis=1, keepdims=True), 1e-12)
     corner = np.where(flat[:, :2] >= 0, 1.0, -1.0)
     folded = (1.0 - np.abs(flat[:, [1, 0]])) * corner
-    return np.round(MAX_SIGNED_BYTE * np.where(flat[:, 2:] < 0, folded, flat[:, :2])).astype(
-        np.int8
-    )
+    return np.round(MAX_SIGNED_BYTE * np.where(flat[:, 2:] < 0, folded, flat[:, :2])).astype(np.int8)
 
 
 def encode_time_deltas(values: np.ndarray) -> UInt8[np.ndarray, " N"]:
     """Lay out what changes little from frame to frame: (T, V, C) integers as bytes.
 
-    Differences between frames, which wrap around; then axis by axis; then all low bytes before all
-    high ones. Deflate finds long runs in the result.
+    Differences between frames, which wrap around; then axis by axis; then all low bytes before all high ones. Deflate
+    finds long runs in the result.
     """
     change = values.copy()
     change[1:] -= values[:-1]
@@ -129,12 +127,7 @@ class SceneBinding:
         return [self._object(k, frame, place, turned, stress) for k in range(len(self.rigid))]
 
     def _object(
-        self,
-        k: int,
-        frame: Frame,
-        place: np.ndarray,
-        turned: np.ndarray,
-        stress: np.ndarray | None,
+        self, k: int, frame: Frame, place: np.ndarray, turned: np.ndarray, stress: np.ndarray | None
     ) -> ObjectFrame:
         R, t = self._pose(k, frame)
         pose = np.concatenate([R.ravel(), t])
@@ -205,10 +198,7 @@ class Recording:
     def out_of_reach(self) -> int:
         """Number of vertices that went farther from their object than 16 bits reach."""
         soft = [[f.residual for f in frames if f.residual is not None] for frames in self.objects]
-        far = [
-            np.any([(np.abs(r) == MAX_RESIDUAL_STEPS).any(axis=1) for r in rows], axis=0)
-            for rows in soft
-        ]
+        far = [np.any([(np.abs(r) == MAX_RESIDUAL_STEPS).any(axis=1) for r in rows], axis=0) for rows in soft]
         return int(sum(np.sum(f) for f in far))
 
 
@@ -348,9 +338,7 @@ def _surfaces(scene: Scene, parts: Parts, cast: SceneBinding, block: ArrayBlock)
 def _bytes_of(surface: Surface) -> UInt8[np.ndarray, "V 3"]:
     """Return the colours of vertices as sRGB."""
     assert surface.colours is not None
-    return np.round(255 * linear_to_srgb(np.nan_to_num(surface.colours[:, :3], nan=1.0))).astype(
-        np.uint8
-    )
+    return np.round(255 * linear_to_srgb(np.nan_to_num(surface.colours[:, :3], nan=1.0))).astype(np.uint8)
 
 
 def _frames_block(recording: Recording, block: ArrayBlock) -> dict:
@@ -373,9 +361,7 @@ def _frames_bytes(frames: Sequence[ObjectFrame], top: float, block: ArrayBlock) 
         tracks["residual"] = block.add(encode_time_deltas(np.array(residual, "<i2")))
         tracks["normal"] = block.add(encode_time_deltas(np.array(normal)))
     if stress and top > 0:
-        tracks["stress"] = block.add(
-            encode_time_deltas(stress_bytes(np.array(stress), top)[..., None])
-        )
+        tracks["stress"] = block.add(encode_time_deltas(stress_bytes(np.array(stress), top)[..., None]))
     return tracks
 
 

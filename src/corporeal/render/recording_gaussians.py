@@ -1,8 +1,7 @@
 """Gaussians of recordings: pose at rest, and binding to objects.
 
-In the page a mean moves like the nearest vertex of its object, and the ellipsoid turns with the
-object's pose; only the video stretches it with the material. Colours are those of degree 0: the
-same from all sides.
+In the page a mean moves like the nearest vertex of its object, and the ellipsoid turns with the object's pose; only the
+video stretches it with the material. Colours are those of degree 0: the same from all sides.
 """
 
 import numpy as np

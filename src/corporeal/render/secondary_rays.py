@@ -5,18 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Int
 
-from corporeal.render import (
-    kernels_adaptive_sampling,
-    kernels_light,
-    kernels_sparse_light,
-    kernels_video,
-)
+from corporeal.render import kernels_adaptive_sampling, kernels_light, kernels_sparse_light, kernels_video
 from corporeal.render.embree import PixelBlock, PixelPlaces
-from corporeal.render.kernels_adaptive_sampling import (
-    COMPARED_OFFSET_PX,
-    SAMPLING_SETS,
-    SET_SIDE_PX,
-)
+from corporeal.render.kernels_adaptive_sampling import COMPARED_OFFSET_PX, SAMPLING_SETS, SET_SIDE_PX
 from corporeal.render.kernels_hits import HitBuffer
 from corporeal.render.kernels_light import LIGHT_CHANNELS, StudioLamps
 from corporeal.render.kernels_sparse_light import DIRECTION_SETS, LIGHT_CHANNELS_PADDED, SUN_RAYS
@@ -33,8 +24,8 @@ SUN_SHARE_TOLERANCE = 1e-3
 SHARED_LIGHT_REACH_PX = 15
 """Pixels as far away may change the light that is shared: 8 by its means, 7 by who shares it."""
 LIGHT_DEPENDENCE_REACH_PX = 22 + SHARED_LIGHT_REACH_PX
-"""Pixels as far away may change a pixel's light: 10 by means over those that asked again, 6 by
-``RESAMPLE_REACH_PX``, 6 by ``COMPARED_OFFSET_PX``, and what is shared hangs on more."""
+"""Pixels as far away may change a pixel's light: 10 by means over those that asked again, 6 by ``RESAMPLE_REACH_PX``, 6
+by ``COMPARED_OFFSET_PX``, and what is shared hangs on more."""
 
 
 @dataclass(frozen=True)
@@ -90,13 +81,9 @@ class LightSampler:
         """
         number = np.empty(len(index), np.int64)
         kernels_sparse_light.direction_sets(places.row, places.column, number)
-        return self.along(
-            s, d, RayDirections(index, number, places, (DIRECTION_SETS, sky, SUN_RAYS))
-        )
+        return self.along(s, d, RayDirections(index, number, places, (DIRECTION_SETS, sky, SUN_RAYS)))
 
-    def along(
-        self, s: HitBuffer, d: np.ndarray, ways: RayDirections
-    ) -> Float32[np.ndarray, "N channels"]:
+    def along(self, s: HitBuffer, d: np.ndarray, ways: RayDirections) -> Float32[np.ndarray, "N channels"]:
         """Light that arrives at samples along the directions that they look."""
         stage, index, many = self.stage, ways.index, len(ways.index)
         sets, sky, suns = ways.counts
@@ -104,18 +91,13 @@ class LightSampler:
         o, w = (np.empty((many * (sky + suns) + 1, 3), np.float32) for _ in range(2))
         ray, asker = (np.empty(len(o), np.int64) for _ in range(2))
         pixel = ways.places.row * 65536 + ways.places.column
-        to = (
-            kernels_sparse_light.sky_points(sets * sky),
-            kernels_sparse_light.sun_directions(self.lamps, sets * suns),
-        )
+        to = (kernels_sparse_light.sky_points(sets * sky), kernels_sparse_light.sun_directions(self.lamps, sets * suns))
         who = index, ways.number, pixel
         n = kernels_sparse_light.queue_light_rays(
             s, *who, self.lamps, to, (sky, suns), self.boxes, o, w, ray, asker, light
         )
         free = stage.free(o[:n], w[:n], ray[:n])
-        kernels_sparse_light.add_unblocked_light(
-            s, index, w, asker, free, self.lamps, (sky, suns), light
-        )
+        kernels_sparse_light.add_unblocked_light(s, index, w, asker, free, self.lamps, (sky, suns), light)
         n = kernels_sparse_light.queue_mirror_rays(
             s, index, ways.number, d, self.lamps, ways.mirrored, o, w, asker, light
         )
@@ -128,9 +110,7 @@ class LightSampler:
             light[who, 4:LIGHT_CHANNELS] = seen
         return light
 
-    def again(
-        self, s: HitBuffer, d: np.ndarray, on: np.ndarray, block: PixelBlock, arrived: IncomingLight
-    ) -> None:
+    def again(self, s: HitBuffer, d: np.ndarray, on: np.ndarray, block: PixelBlock, arrived: IncomingLight) -> None:
         """Let pixels ask for themselves whose neighbours' light is not theirs.
 
         Args:
@@ -161,22 +141,13 @@ class LightSampler:
         bright = arrived.light.reshape(-1, LIGHT_CHANNELS_PADDED)[who, 3]
         calm = (bright < SUN_SHARE_TOLERANCE) | (bright > 1 - SUN_SHARE_TOLERANCE)
         for some, suns in ((calm, 0), (~calm, RESAMPLE_SKY_SUN_RAYS[1])):
-            ways = (
-                who[some],
-                number[some],
-                block.places(who[some]),
-                (SAMPLING_SETS, RESAMPLE_SKY_SUN_RAYS[0], suns),
-            )
+            ways = (who[some], number[some], block.places(who[some]), (SAMPLING_SETS, RESAMPLE_SKY_SUN_RAYS[0], suns))
             found[some] = self.along(s, d, RayDirections(*ways, False))
         found[calm, 3] = bright[calm]
         light = np.zeros_like(arrived.light)
-        kernels_adaptive_sampling.mean_of_sets(
-            index, times, found, light.reshape(-1, LIGHT_CHANNELS_PADDED)
-        )
+        kernels_adaptive_sampling.mean_of_sets(index, times, found, light.reshape(-1, LIGHT_CHANNELS_PADDED))
         # Those at the rim only help others: not all that they would be smoothed over asked.
-        inner = np.flatnonzero(
-            kernels_video.dilate_mask(doubt, RESAMPLE_REACH_PX - RESAMPLE_RIM_PX) & arrived.known
-        )
+        inner = np.flatnonzero(kernels_video.dilate_mask(doubt, RESAMPLE_REACH_PX - RESAMPLE_RIM_PX) & arrived.known)
         room = np.zeros_like(light), np.empty_like(light), np.empty_like(light)
         kernels_adaptive_sampling.blend_resampled_light(
             s, inner, light, *surface, asks, RESAMPLE_SKY_SUN_RAYS, arrived.light, room

@@ -14,11 +14,7 @@ MIN_SUN_SINE = 1e-3
 
 
 def tiles_with_surfaces(
-    stage: RayScene,
-    eye: Float[np.ndarray, "3"],
-    frame: Float[np.ndarray, "3 3"],
-    tangent: float,
-    size: tuple[int, int],
+    stage: RayScene, eye: Float[np.ndarray, "3"], frame: Float[np.ndarray, "3 3"], tangent: float, size: tuple[int, int]
 ) -> Bool[np.ndarray, "rows columns"]:
     """Tiles of a picture in which surfaces could be seen.
 
@@ -32,9 +28,7 @@ def tiles_with_surfaces(
     """
     seen = np.zeros([-(-n // TILE_PX) for n in size[::-1]], np.bool_)
     if stage.shown:
-        kernels_floor.mark_outlined_tiles(
-            stage.vertices, stage.look.triangles, eye, frame, tangent, size, seen
-        )
+        kernels_floor.mark_outlined_tiles(stage.vertices, stage.look.triangles, eye, frame, tangent, size, seen)
     return seen
 
 

@@ -1,7 +1,7 @@
 """Skinning: vertices and Gaussians are bound to nearby particles at the start.
 
-Weights depend on position and part only, so vertices doubled along a texture seam stay together,
-and a rigid object, whose particles all share one rotation, moves exactly.
+Weights depend on position and part only, so vertices doubled along a texture seam stay together, and a rigid object,
+whose particles all share one rotation, moves exactly.
 """
 
 from dataclasses import dataclass, replace
@@ -79,9 +79,7 @@ class SkinBinding:
         """Places (V, 3) [m] and deformation gradients (V, 3, 3) at one instant."""
         place, gradient = np.empty_like(self.rest), np.empty((len(self.rest), 3, 3))
         moved = self._moved(frame)
-        kernels_skin.deform_points(
-            self.rest, self.near, self.weight, self.start, *moved, place, gradient
-        )
+        kernels_skin.deform_points(self.rest, self.near, self.weight, self.start, *moved, place, gradient)
         return place, gradient
 
     def _moved(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
@@ -154,11 +152,7 @@ def bind_points(
 
 
 def _bind(
-    rest: np.ndarray,
-    normals: np.ndarray,
-    owners: _VertexOwners,
-    particles: Particles,
-    loose: np.ndarray,
+    rest: np.ndarray, normals: np.ndarray, owners: _VertexOwners, particles: Particles, loose: np.ndarray
 ) -> SkinBinding:
     near = np.zeros((len(rest), NEIGHBOUR_PARTICLES), dtype=np.int64)
     weight = np.zeros((len(rest), NEIGHBOUR_PARTICLES))
@@ -222,9 +216,7 @@ def _carrying_pairs(owners: _VertexOwners, particles: Particles):
                 yield vertices, own
 
 
-def _nearest(
-    points: np.ndarray, own: np.ndarray, position: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _nearest(points: np.ndarray, own: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     found = KDTree(position[own]).query(points, k=NEIGHBOUR_PARTICLES + 1)
     distance, index = (np.asarray(x) for x in found)
     weight = np.empty((len(points), NEIGHBOUR_PARTICLES))

@@ -9,9 +9,7 @@ SLOW_BEFORE_S, SLOW_AFTER_S = 0.06, 0.24
 """A slow motion begins and ends so long before and after its instant [s]."""
 
 
-def frame_positions(
-    time: Float[np.ndarray, " F"], slow: float, about: float | None
-) -> Float[np.ndarray, " N"]:
+def frame_positions(time: Float[np.ndarray, " F"], slow: float, about: float | None) -> Float[np.ndarray, " N"]:
     """Return the place of every picture among the frames: 2.5 is halfway from frame 2 to 3.
 
     Args:
@@ -37,8 +35,8 @@ def is_slow(time: float, about: float | None) -> bool:
 def interpolate_frames(first: Frame, second: Frame, share: float) -> Frame:
     """Return the instant between two frames, at ``share`` of the way.
 
-    Places and deformations are taken to change evenly; a rotation's small shrinkage in between is
-    (1 - cos α/2) for a turn α from frame to frame.
+    Places and deformations are taken to change evenly; a rotation's small shrinkage in between is (1 - cos α/2) for a
+    turn α from frame to frame.
     """
     if share <= 0:
         return first

@@ -1,7 +1,7 @@
 """View directions without occlusion, tested by rays to every object.
 
-Boxes cannot tell a bowl from a block. Where the usual direction leaves an object behind or inside
-of another one for most of the time, others are tried, also from higher up.
+Boxes cannot tell a bowl from a block. Where the usual direction leaves an object behind or inside of another one for
+most of the time, others are tried, also from higher up.
 """
 
 from collections.abc import Sequence
@@ -52,11 +52,7 @@ def unoccluded_view(
         return None
     best, least = None, float(hidden.mean()) - MIN_VISIBILITY_GAIN
     for view, cost in _directions(usual):
-        cost += float(
-            _hidden_fractions(
-                stages, object_of_vertex, places, fit_camera(boxes, size, view)
-            ).mean()
-        )
+        cost += float(_hidden_fractions(stages, object_of_vertex, places, fit_camera(boxes, size, view)).mean())
         if cost < least:
             best, least = view, cost
     return best
@@ -65,10 +61,7 @@ def unoccluded_view(
 def _sample_vertices(object_of_vertex: np.ndarray) -> list[np.ndarray]:
     """Choose some vertices of each object."""
     members = [np.flatnonzero(object_of_vertex == k) for k in np.unique(object_of_vertex)]
-    return [
-        m[np.linspace(0, len(m) - 1, min(len(m), MAX_POINTS_PER_OBJECT)).astype(int)]
-        for m in members
-    ]
+    return [m[np.linspace(0, len(m) - 1, min(len(m), MAX_POINTS_PER_OBJECT)).astype(int)] for m in members]
 
 
 def _directions(usual: CameraAim) -> list[tuple[Vector, float]]:
@@ -87,22 +80,14 @@ def _directions(usual: CameraAim) -> list[tuple[Vector, float]]:
 
 
 def _hidden_fractions(
-    stages: Sequence[RayScene],
-    object_of_vertex: np.ndarray,
-    places: list[np.ndarray],
-    aim: CameraAim,
+    stages: Sequence[RayScene], object_of_vertex: np.ndarray, places: list[np.ndarray], aim: CameraAim
 ) -> Float[np.ndarray, " B"]:
     """Share of each object that others hide from a camera, as a mean over instants [-]."""
-    shares = [
-        [_hidden_fraction(stage, object_of_vertex, mine, aim) for mine in places]
-        for stage in stages
-    ]
+    shares = [[_hidden_fraction(stage, object_of_vertex, mine, aim) for mine in places] for stage in stages]
     return np.mean(shares, axis=0)
 
 
-def _hidden_fraction(
-    stage: RayScene, object_of_vertex: np.ndarray, mine: np.ndarray, aim: CameraAim
-) -> float:
+def _hidden_fraction(stage: RayScene, object_of_vertex: np.ndarray, mine: np.ndarray, aim: CameraAim) -> float:
     eye = (np.asarray(aim.eye) - stage.origin).astype(np.float32)
     rays = np.ascontiguousarray(stage.vertices[mine] - eye)
     prim, _, _, far = stage.hit(np.tile(eye, (len(rays), 1)), rays)

@@ -69,23 +69,14 @@ class VideoWriter:
 
 def check_size(width: int, height: int) -> None:
     """Raise UserError where a video cannot have such a size."""
-    if (
-        width % 2
-        or height % 2
-        or min(width, height) < MIN_SIDE_PX
-        or max(width, height) > MAX_SIDE_PX
-    ):
+    if width % 2 or height % 2 or min(width, height) < MIN_SIDE_PX or max(width, height) > MAX_SIDE_PX:
         raise UserError(
-            f"A video cannot be {width} × {height} pixels. Both must be even, from {MIN_SIDE_PX} "
-            "to "
-            f"{MAX_SIDE_PX}."
+            f"A video cannot be {width} × {height} pixels. Both must be even, from {MIN_SIDE_PX} to {MAX_SIDE_PX}."
         )
 
 
 @contextmanager
-def open_video(
-    path: Path, fps: int, size: tuple[int, int], credit: str = ""
-) -> Iterator[VideoWriter]:
+def open_video(path: Path, fps: int, size: tuple[int, int], credit: str = "") -> Iterator[VideoWriter]:
     """Write H.264 that any browser plays to ``path``, which appears only when it is finished.
 
     Args:
@@ -124,9 +115,7 @@ def _encoder(path: Path, options: list[str], log: IO[Any]) -> Any:
     try:
         program = imageio_ffmpeg.get_ffmpeg_exe()
         command = [program, "-y", "-loglevel", "error", *options, str(path)]
-        return subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log
-        )
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log)
     except (RuntimeError, OSError) as error:
         raise UserError(
             f"Cannot write {path}: no ffmpeg program can be started ({error}). "

@@ -16,9 +16,7 @@ BAR_SIZE_PX = (120, 10)
 """[px]"""
 
 
-def draw_names(
-    picture: np.ndarray, title: str, labels: Sequence[str], colours: Sequence[Colour]
-) -> np.ndarray:
+def draw_names(picture: np.ndarray, title: str, labels: Sequence[str], colours: Sequence[Colour]) -> np.ndarray:
     """Write names beside their colours into the upper left corner, each pair once."""
     image, draw, font = _canvas(picture)
     step = font.size + 5
@@ -28,9 +26,7 @@ def draw_names(
         top = MARGIN_PX + (row + 1) * step
         box = (MARGIN_PX, top + 2, MARGIN_PX + font.size - 2, top + font.size)
         draw.rectangle(box, fill=tuple(round(255 * c) for c in colour))
-        text = (
-            name if len(name) <= MAX_LEGEND_CHARACTERS else name[: MAX_LEGEND_CHARACTERS - 1] + "…"
-        )
+        text = name if len(name) <= MAX_LEGEND_CHARACTERS else name[: MAX_LEGEND_CHARACTERS - 1] + "…"
         draw.text((MARGIN_PX + font.size + 4, top), text, fill=TEXT_COLOUR, font=font)
     return np.asarray(image)
 

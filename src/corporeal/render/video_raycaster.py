@@ -1,12 +1,11 @@
 """Pictures of a video: one ray a pixel, more at edges, and none where nothing stands.
 
-Most of a video is floor and backdrop: where no ray to sky or sun could meet a box about an object,
-a pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
-still. Where objects are far and hide only some sky, the sky is asked at the corners of tiles. What
-is left is seen by one ray a pixel; every fourth pixel asks for light, and neighbours on one surface
-share what they found. Where that is not theirs, each pixel asks for itself. Pixels beside which
-another surface is seen in another colour are cast again, finer. Nothing hangs on the picture
-before: equal input gives equal bytes, and what does not move does not flicker.
+Most of a video is floor and backdrop: where no ray to sky or sun could meet a box about an object, a pixel keeps the
+light of the empty studio, which is cast once for as long as the camera stands still. Where objects are far and hide
+only some sky, the sky is asked at the corners of tiles. What is left is seen by one ray a pixel; every fourth pixel
+asks for light, and neighbours on one surface share what they found. Where that is not theirs, each pixel asks for
+itself. Pixels beside which another surface is seen in another colour are cast again, finer. Nothing hangs on the
+picture before: equal input gives equal bytes, and what does not move does not flicker.
 """
 
 from collections.abc import Callable
@@ -36,13 +35,7 @@ from corporeal.render.embree import (
     RenderJob,
     render_image,
 )
-from corporeal.render.kernels_floor import (
-    NEAR_OBJECT_TILES,
-    TILE_CAST,
-    TILE_PX,
-    TILE_SOFT,
-    TILE_UNTOUCHED,
-)
+from corporeal.render.kernels_floor import NEAR_OBJECT_TILES, TILE_CAST, TILE_PX, TILE_SOFT, TILE_UNTOUCHED
 from corporeal.render.kernels_hits import HIT_NOTHING, HitBuffer
 from corporeal.render.kernels_light import LIGHT_CHANNELS, SHARP_MIRROR_ROUGHNESS
 from corporeal.render.kernels_sparse_light import LIGHT_CHANNELS_PADDED
@@ -159,9 +152,7 @@ class VideoRaycaster:
             self._pool = threads, ThreadPoolExecutor(threads)
         return self._pool[1]
 
-    def _cast(
-        self, stage: RayScene, camera: CameraAim, quality: Quality, threads: int
-    ) -> UInt8[np.ndarray, "H W 3"]:
+    def _cast(self, stage: RayScene, camera: CameraAim, quality: Quality, threads: int) -> UInt8[np.ndarray, "H W 3"]:
         if quality not in SKY_SAMPLING:
             return render_image(stage, camera, quality, threads)
         # No more bands than threads, since bands overlap.
@@ -171,9 +162,7 @@ class VideoRaycaster:
         pool = self._workers(threads)
         known = self._empty
         if known is None or (known.aim, known.place) != (camera, _scene_and_floor_key(stage)):
-            known = self._empty = _cast_empty_studio(
-                stage, camera, SKY_SAMPLING[quality], pool, self._empty_band_tiles
-            )
+            known = self._empty = _cast_empty_studio(stage, camera, SKY_SAMPLING[quality], pool, self._empty_band_tiles)
         out = known.printed.copy()
         job = _FrameRender(stage, camera, SKY_SAMPLING[quality], known)
         for _ in pool.map(lambda r: job.band(r, out), rows):
@@ -186,11 +175,7 @@ def _scene_and_floor_key(stage: RayScene) -> tuple[float, ...]:
 
 
 def _cast_empty_studio(
-    stage: RayScene,
-    camera: CameraAim,
-    plan: _SkySampling,
-    pool: ThreadPoolExecutor,
-    band_tiles: int,
+    stage: RayScene, camera: CameraAim, plan: _SkySampling, pool: ThreadPoolExecutor, band_tiles: int
 ) -> _EmptyStudio:
     """Cast the studio without objects, so many rows of tiles at once."""
     band = band_tiles * TILE_PX
@@ -213,23 +198,16 @@ def _cast_empty_studio(
 class _FrameRender(RenderJob):
     """One picture being taken."""
 
-    def __init__(
-        self, stage: RayScene, camera: CameraAim, plan: _SkySampling, empty: _EmptyStudio
-    ) -> None:
+    def __init__(self, stage: RayScene, camera: CameraAim, plan: _SkySampling, empty: _EmptyStudio) -> None:
         super().__init__(stage, camera, RaySampling(1, 1, plan.sky))
         self.pixel *= TEXTURE_FILTER_PX
         self.plan, self.empty, self.boxes = plan, empty, stage.boxes()
         self.asker = LightSampler(stage, self.lamps, self.boxes)
         self.ways = shadow_culling.floor_light_directions(self.lamps, 1)
-        self.open = (
-            1.0,
-            float(shadow_culling.floor_light_directions(self.lamps, plan.sky)[:-1, 2].mean()),
-        )
+        self.open = (1.0, float(shadow_culling.floor_light_directions(self.lamps, plan.sky)[:-1, 2].mean()))
         self.blur = np.float32(shadow_culling.shadow_blur_width(self.lamps, self.boxes))
         size = camera.width, camera.height
-        self.outlined = shadow_culling.tiles_with_surfaces(
-            stage, self.eye, self.frame, self.tangent, size
-        )
+        self.outlined = shadow_culling.tiles_with_surfaces(stage, self.eye, self.frame, self.tangent, size)
 
     def wide(self, rows: tuple[int, int], tiles: int = HALO_TILES) -> tuple[int, int]:
         """Rows with those above and below, so many tiles, that the light filter looks at."""
@@ -261,9 +239,7 @@ class _FrameRender(RenderJob):
         floor = np.flatnonzero(s.kind[mine] == kernels_hits.HIT_FLOOR)
         eye, glances = self.eye.astype(np.float32), self.empty.glances[here]
         kernels_floor.floor_view_terms(rays.direction[mine], floor, eye, self.lamps, glances)
-        self.empty.mirrored[here] = arrived.light.reshape(-1, LIGHT_CHANNELS_PADDED)[
-            mine, 4:LIGHT_CHANNELS
-        ]
+        self.empty.mirrored[here] = arrived.light.reshape(-1, LIGHT_CHANNELS_PADDED)[mine, 4:LIGHT_CHANNELS]
         size = width, height
         every = np.ones(len(light), np.uint8)
         kernels_video.write_srgb(toned, every, wide[0], size, rows, self.empty.printed)
@@ -339,9 +315,7 @@ class _FrameRender(RenderJob):
         """Nearest triangle and where, of each pixel; rays that could hit nothing are not cast."""
         if not self.stage.shown:
             return self.stage.missed(rays.origin)
-        asked = shadow_culling.tiles_to_pixels(
-            self.outlined[block.first // TILE_PX :], (block.rows, block.columns)
-        )
+        asked = shadow_culling.tiles_to_pixels(self.outlined[block.first // TILE_PX :], (block.rows, block.columns))
         index, many = np.flatnonzero(asked), len(rays.origin)
         # All rays begin at the eye.
         eye = np.broadcast_to(rays.origin[0], (len(index), 3)).copy()
@@ -352,9 +326,7 @@ class _FrameRender(RenderJob):
             whole[index] = part
         return hit
 
-    def tiles(
-        self, rays: Rays, prim: np.ndarray, block: PixelBlock
-    ) -> UInt8[np.ndarray, "rows columns"]:
+    def tiles(self, rays: Rays, prim: np.ndarray, block: PixelBlock) -> UInt8[np.ndarray, "rows columns"]:
         """Tell the tiles apart: what they show is as it was, darkened softly, or to be cast."""
         shape = block.rows, block.columns
         things = np.zeros([-(-n // TILE_PX) for n in shape], np.bool_)
@@ -376,9 +348,7 @@ class _FrameRender(RenderJob):
         room = kernels_floor.count_soft_corners(tiles) * (len(self.ways) - 1)
         o, w = (np.empty((room, 3), np.float32) for _ in range(2))
         asker = np.empty(room, np.int64)
-        n = kernels_floor.queue_corner_rays(
-            tiles, *view, self.lamps, self.ways, self.boxes, o, w, asker
-        )
+        n = kernels_floor.queue_corner_rays(tiles, *view, self.lamps, self.ways, self.boxes, o, w, asker)
         free = self.stage.free(o[:n], w[:n], asker[:n])
         sky = np.full((height + 1, width + 1, 2), self.open, np.float32)
         kernels_floor.subtract_hidden_sky(asker, free, self.ways, width + 1, sky)
@@ -421,9 +391,7 @@ class _FrameRender(RenderJob):
             lit.reshape(shape),
         )
         surface, spare = (arrived.normal, arrived.log), np.empty_like(arrived.light)
-        kernels_sparse_light.smooth_shared_light(
-            arrived.light, *surface, arrived.known, asks.reshape(shape), spare
-        )
+        kernels_sparse_light.smooth_shared_light(arrived.light, *surface, arrived.known, asks.reshape(shape), spare)
         if len(self.boxes):
             self.asker.again(s, d, on, block, arrived)
         self.reflect_sharply(s, d, on, arriving)
@@ -433,19 +401,13 @@ class _FrameRender(RenderJob):
         kernels_light.blend_layers(s, seen, near, self.lamps, light)
         return s, arrived
 
-    def reflect_sharply(
-        self, s: HitBuffer, d: np.ndarray, on: np.ndarray, light: np.ndarray
-    ) -> None:
+    def reflect_sharply(self, s: HitBuffer, d: np.ndarray, on: np.ndarray, light: np.ndarray) -> None:
         """Let each smooth surface mirror what it sees itself, instead of its neighbours."""
-        sharp = on[
-            (s.traits[on, 1] <= SHARP_MIRROR_ROUGHNESS) & (s.kind[on] == kernels_hits.HIT_OBJECT)
-        ]
+        sharp = on[(s.traits[on, 1] <= SHARP_MIRROR_ROUGHNESS) & (s.kind[on] == kernels_hits.HIT_OBJECT)]
         if len(sharp):
             self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
 
-    def refine(
-        self, pixels: np.ndarray, block: PixelBlock, arrived: IncomingLight, toned: np.ndarray
-    ) -> None:
+    def refine(self, pixels: np.ndarray, block: PixelBlock, arrived: IncomingLight, toned: np.ndarray) -> None:
         """Replace pixels by the mean of finer samples."""
         count = len(EDGE_SAMPLE_OFFSETS)
         total = len(pixels) * count

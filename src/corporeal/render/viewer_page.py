@@ -46,9 +46,7 @@ def inline_view(take: bytes) -> str:
 
     """
     modules = json.dumps([(name, web_file(name)) for name in VIEW_SCRIPTS]).encode()
-    return INLINE_VIEW_HTML.format(
-        modules=_packed(modules), take=_packed(take), style=web_file("viewer.css")
-    )
+    return INLINE_VIEW_HTML.format(modules=_packed(modules), take=_packed(take), style=web_file("viewer.css"))
 
 
 def _packed(data: bytes) -> str:

@@ -8,8 +8,8 @@ from corporeal.core.types import Parts, Scene
 def parts_named_in(sentence: str, scene: Scene, parts: Parts) -> list[int]:
     """Return the parts that a sentence is about.
 
-    Those that it names as "object: part"; or else all parts of the objects that it names, also as
-    "Object 2 of the scene". A name counts where no letter, digit or underscore stands beside it.
+    Those that it names as "object: part"; or else all parts of the objects that it names, also as "Object 2 of the
+    scene". A name counts where no letter, digit or underscore stands beside it.
     """
     owners = [scene.objects[part.object].name for part in parts.catalogue]
     named = [

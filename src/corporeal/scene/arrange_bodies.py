@@ -41,18 +41,13 @@ def arrange_bodies(
 
     Args:
         bodies: At least one.
-        arrangement: ``scatter``: side by side; ``stack``: one above the other, below what carries
-            most; ``onto``: all above that one; ``row``: in a line along +x, heavy ones first
+        arrangement: ``scatter``: side by side; ``stack``: one above the other, below what carries most; ``onto``: all
+            above that one; ``row``: in a line along +x, heavy ones first
         and flat ones last, broadside on.
         rng: Source of what is left to chance.
 
     """
-    ways = {
-        "scatter": _scatter_poses,
-        "stack": _stack_poses,
-        "onto": _onto_poses,
-        "row": _row_poses,
-    }
+    ways = {"scatter": _scatter_poses, "stack": _stack_poses, "onto": _onto_poses, "row": _row_poses}
     if arrangement not in ways:
         raise UnknownChoiceError("arrangement", arrangement, list(get_args(BodyArrangement)))
     return ways[arrangement](bodies, rng)
@@ -84,9 +79,7 @@ def _stack_poses(bodies: Sequence[SettlingBody], rng: np.random.Generator) -> li
 
 def _onto_poses(bodies: Sequence[SettlingBody], rng: np.random.Generator) -> list[BodyPose]:
     first, *rest = _order_by_top_room(bodies, rng)
-    return _pile_poses(
-        bodies, [first, *map(int, rng.permutation(rest))], rng, rng.uniform(0.2, 0.8)
-    )
+    return _pile_poses(bodies, [first, *map(int, rng.permutation(rest))], rng, rng.uniform(0.2, 0.8))
 
 
 def _order_by_top_room(bodies: Sequence[SettlingBody], rng: np.random.Generator) -> list[int]:
@@ -118,9 +111,7 @@ def _row_poses(bodies: Sequence[SettlingBody], rng: np.random.Generator) -> list
     room, back = _PlacedBodies(), np.array([-1.0, 0.0, 0.0])
     for k in order:
         body = bodies[k]
-        pose = _pose_on_floor(
-            body, _broadside(body, _standing_stance(body), rng), _free_height(body, bodies)
-        )
+        pose = _pose_on_floor(body, _broadside(body, _standing_stance(body), rng), _free_height(body, bodies))
         room.bring(k, body.hull, pose, back, rng.uniform(0.1, 0.2) * body.extent)
     return room.poses()
 
@@ -130,11 +121,7 @@ def _row_poses(bodies: Sequence[SettlingBody], rng: np.random.Generator) -> list
 
 def _random_rotation(body: SettlingBody, rng: np.random.Generator) -> np.ndarray:
     """Upright where that is stable, else tumbled."""
-    return (
-        _stance_with_yaw(body.upright, rng)
-        if body.upright.tip >= MIN_TIP_ANGLE_RAD
-        else random_rotation(rng)
-    )
+    return _stance_with_yaw(body.upright, rng) if body.upright.tip >= MIN_TIP_ANGLE_RAD else random_rotation(rng)
 
 
 def _standing_stance(body: SettlingBody) -> StandingStance:
@@ -159,10 +146,7 @@ def _broadside(body: SettlingBody, stance: StandingStance, rng: np.random.Genera
     outline = (body.hull.vertices @ rotation.T)[:, :2]
     normal = ConvexHull(outline).equations[:, :2]
     narrow = normal[np.argmin(np.ptp(outline @ normal.T, axis=0))]
-    return (
-        _rotation_about_z(np.pi * int(rng.integers(2)) - np.arctan2(narrow[1], narrow[0]))
-        @ rotation
-    )
+    return _rotation_about_z(np.pi * int(rng.integers(2)) - np.arctan2(narrow[1], narrow[0])) @ rotation
 
 
 def _random_yaw(rng: np.random.Generator) -> np.ndarray:
@@ -188,9 +172,7 @@ def _pose_on_floor(body: SettlingBody, rotation: np.ndarray, gap: float) -> Body
     """With the centre of mass above the origin and ``gap`` below the lowest point."""
     centre = rotation @ body.centre
     lowest = float((body.hull.vertices @ rotation.T)[:, 2].min())
-    return BodyPose(
-        (float(-centre[0]), float(-centre[1]), gap - lowest), quaternion_tuple_of(rotation)
-    )
+    return BodyPose((float(-centre[0]), float(-centre[1]), gap - lowest), quaternion_tuple_of(rotation))
 
 
 def quaternion_tuple_of(rotation: np.ndarray) -> tuple[float, float, float, float]:
@@ -220,9 +202,7 @@ class _PlacedBodies:
         """Where they stand, in the order of their numbers."""
         return [self.standing[k] for k in range(len(self.standing))]
 
-    def bring(
-        self, number: int, surface: ConvexPiece, pose: BodyPose, direction: np.ndarray, gap: float
-    ) -> None:
+    def bring(self, number: int, surface: ConvexPiece, pose: BodyPose, direction: np.ndarray, gap: float) -> None:
         """Let a body come along ``direction`` [unit] to ``pose``, or until ``gap`` [m] is left."""
         corners = pose.world(surface.vertices)
         if self.standing:
@@ -241,12 +221,7 @@ class _PlacedBodies:
         return max(0.0, float((corners @ direction).max()) - nearest)
 
     def _advance(
-        self,
-        solid: fcl.CollisionObject,
-        goal: np.ndarray,
-        direction: np.ndarray,
-        reach: float,
-        gap: float,
+        self, solid: fcl.CollisionObject, goal: np.ndarray, direction: np.ndarray, reach: float, gap: float
     ) -> float:
         """Return how far from its goal it stops [m]."""
         left = reach

@@ -37,10 +37,7 @@ def body_of(entry: dict, job: dict):
         part = bproc.object.create_from_blender_mesh(joined([piece]), f"{entry['name']} {number}")
         part.set_parent(body)
         part.enable_rigidbody(
-            True,
-            collision_shape="CONVEX_HULL",
-            collision_margin=job["margin"],
-            friction=job["friction"],
+            True, collision_shape="CONVEX_HULL", collision_margin=job["margin"], friction=job["friction"]
         )
         firm(part.get_rigidbody())
     turn = Quaternion(entry["quaternion"]).to_matrix().to_4x4()
@@ -71,19 +68,12 @@ def lay_floor(job: dict) -> None:
     """Put a block below z = 0, far wider than the scene."""
     reach = job["floor"]
     block = {
-        "vertices": [
-            (x, y, z) for x in (-reach, reach) for y in (-reach, reach) for z in (-0.5, 0.5)
-        ],
+        "vertices": [(x, y, z) for x in (-reach, reach) for y in (-reach, reach) for z in (-0.5, 0.5)],
         "triangles": QUADS,
     }
     floor = bproc.object.create_from_blender_mesh(joined([block]), "floor")
     floor.set_location([0.0, 0.0, -0.5])
-    floor.enable_rigidbody(
-        False,
-        collision_shape="BOX",
-        collision_margin=job["margin"],
-        friction=job["friction"],
-    )
+    floor.enable_rigidbody(False, collision_shape="BOX", collision_margin=job["margin"], friction=job["friction"])
     firm(floor.get_rigidbody())
 
 

@@ -1,14 +1,14 @@
 """Initial speed of a chain of collisions, so that the impact reaches the last object.
 
-Backwards along the row: what slides a way d arrives with v² = v₀² - 2 μ g d, and goes on together
-with what it strikes, M v/(M + m): impacts without a bounce. Where heavy objects come first that
-takes the least speed; from the light end it may take too much. Then the row is played with rigid
-bodies, for hits beside the middle, and for objects that turn, topple or roll.
+Backwards along the row: what slides a way d arrives with v² = v₀² - 2 μ g d, and goes on together with what it strikes,
+M v/(M + m): impacts without a bounce. Where heavy objects come first that takes the least speed; from the light end it
+may take too much. Then the row is played with rigid bodies, for hits beside the middle, and for objects that turn,
+topple or roll.
 
 Rigid-body preview of an interaction, to find contacts and their times.
 
-The engine's contacts are soft and take the bounce out of impacts, so that less momentum is passed
-on than in reality: so it is a lower bound.
+The engine's contacts are soft and take the bounce out of impacts, so that less momentum is passed on than in reality:
+so it is a lower bound.
 """
 
 from collections.abc import Hashable, Mapping, Sequence
@@ -72,9 +72,7 @@ def preview_contacts(
     return [PreviewContact(*pair, met[pair]) for pair in sorted(met, key=lambda p: (met[p], p))]
 
 
-def impact_hops(
-    met: Sequence[Sequence[ObjectKey]], sent: Sequence[ObjectKey]
-) -> dict[ObjectKey, int]:
+def impact_hops(met: Sequence[Sequence[ObjectKey]], sent: Sequence[ObjectKey]) -> dict[ObjectKey, int]:
     """Count how far an impact was passed on: 1 for what was struck, 2 for what that struck.
 
     Args:
@@ -115,9 +113,7 @@ class ChainStart:
     """When it reaches the last [s]."""
 
 
-def find_collision_chain(
-    still: SettledBodies, arrival: float, rng: np.random.Generator
-) -> ChainStart | None:
+def find_collision_chain(still: SettledBodies, arrival: float, rng: np.random.Generator) -> ChainStart | None:
     """Find the end and the speed from which an impact reaches the last of a row.
 
     Args:
@@ -141,9 +137,7 @@ def find_collision_chain(
     return None
 
 
-def chain_start_speed(
-    still: SettledBodies, row: Sequence[int], arrival: float, last: float
-) -> float:
+def chain_start_speed(still: SettledBodies, row: Sequence[int], arrival: float, last: float) -> float:
     """Return the speed of the first that strikes the second and the last fast enough [m/s].
 
     Args:

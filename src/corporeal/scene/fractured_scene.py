@@ -18,9 +18,7 @@ class FilledScene:
     particles: Particles
 
 
-def apply_breaks(
-    whole: SceneWithMaterials, particles: Particles, breaks: Sequence[FractureEvent]
-) -> FilledScene:
+def apply_breaks(whole: SceneWithMaterials, particles: Particles, breaks: Sequence[FractureEvent]) -> FilledScene:
     """Return a scene in which every piece of what broke is an object with one part.
 
     The first piece keeps the object's number and name; the others come after all there are.
@@ -34,9 +32,7 @@ def apply_breaks(
     for one in breaks:
         share, objects = piece_mass_fractions(one, particles), len(whole.scene.objects)
         whole = SceneWithMaterials(
-            fractured_scene(whole.scene, one, share),
-            _fractured_parts(whole, one),
-            fractured_field(whole.field, one),
+            fractured_scene(whole.scene, one, share), _fractured_parts(whole, one), fractured_field(whole.field, one)
         )
         particles = fractured_particles(particles, one, objects)
     return FilledScene(whole, particles)

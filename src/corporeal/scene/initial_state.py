@@ -61,9 +61,7 @@ def with_initial_state(scene: Scene, lifts: Sequence[str], velocities: Sequence[
 
     """
     for name, metres in map(parse_lift, lifts):
-        scene = move_scene(
-            scene, np.array([0.0, 0.0, metres]), _object_number(scene, name, "--lift")
-        )
+        scene = move_scene(scene, np.array([0.0, 0.0, metres]), _object_number(scene, name, "--lift"))
     for name, velocity in map(parse_initial_velocity, velocities):
         k = _object_number(scene, name, "--velocity")
         objects = list(scene.objects)

@@ -1,10 +1,10 @@
 """Interactions of a settled scene: drop, throw, slide, wind.
 
-The settled poses are certified at rest; an interaction changes the start of as few objects as it
-can. Heights and speeds are drawn within ranges that scale with the scene, so that a scene of twice
-the size plays the same video more slowly (Froude scaling): a height is a share of an object's size,
-a speed a share of √(g L). What depends on masses and friction is found from them: how fast the
-first of a row must go for the impact to reach the last, and in which wind something moves.
+The settled poses are certified at rest; an interaction changes the start of as few objects as it can. Heights and
+speeds are drawn within ranges that scale with the scene, so that a scene of twice the size plays the same video more
+slowly (Froude scaling): a height is a share of an object's size, a speed a share of √(g L). What depends on masses and
+friction is found from them: how fast the first of a row must go for the impact to reach the last, and in which wind
+something moves.
 """
 
 from collections.abc import Sequence
@@ -25,13 +25,7 @@ from corporeal.scene.wind_threshold import wind_headings, wind_threshold
 
 InteractionKind = Literal["fall", "fall-onto", "collision", "chain", "wind"]
 INTERACTION_KINDS: tuple[InteractionKind, ...] = get_args(InteractionKind)
-MIN_OBJECTS_OF_KIND: dict[InteractionKind, int] = {
-    "fall": 1,
-    "wind": 1,
-    "fall-onto": 2,
-    "collision": 2,
-    "chain": 3,
-}
+MIN_OBJECTS_OF_KIND: dict[InteractionKind, int] = {"fall": 1, "wind": 1, "fall-onto": 2, "collision": 2, "chain": 3}
 """Fewest objects that an interaction takes."""
 ARRANGEMENTS_OF_KIND: dict[InteractionKind, tuple[BodyArrangement, ...]] = {
     "fall": ("scatter", "stack", "onto"),
@@ -47,12 +41,11 @@ FALL_HEIGHT_SIZES_RANGE = (0.5, 1.5)
 IMPACT_SPEED_RATIO_RANGE = (0.5, 0.9)
 """Speed on impact over √(g L), L the largest object's size: 1.1 to 2.0 m/s at half a metre."""
 MIN_MOVER_MASS_RATIO = 0.5
-"""What is sent into another has at least this share of its mass, where anything has: then what is
-struck goes on with a third of the speed or more."""
+"""What is sent into another has at least this share of its mass, where anything has: then what is struck goes on with a
+third of the speed or more."""
 MIN_APPROACH_SIZE_FRACTION = 0.1
-"""Least way to what is struck, over the largest object's size: what is soft spreads as it comes to
-bear its own weight before time 0 (a quilt of half a metre by 46 mm), and nothing strikes what it
-touches already."""
+"""Least way to what is struck, over the largest object's size: what is soft spreads as it comes to bear its own weight
+before time 0 (a quilt of half a metre by 46 mm), and nothing strikes what it touches already."""
 WIND_SPEED_RATIO_RANGE = (1.15, 1.35)
 """Speed of the wind over the slowest one that moves anything."""
 MAX_WIND_SPEED_M_S = 32.0
@@ -77,10 +70,7 @@ class SceneInteraction:
 
 
 def begin_interaction(
-    bodies: Sequence[SettlingBody],
-    poses: Sequence[BodyPose],
-    kind: InteractionKind,
-    rng: np.random.Generator,
+    bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], kind: InteractionKind, rng: np.random.Generator
 ) -> SceneInteraction | None:
     """Begin an interaction in a settled scene.
 
@@ -120,9 +110,7 @@ def _begin_fall(still: SettledBodies, rng: np.random.Generator) -> SceneInteract
     ]
     highest = float((still.boxes[:, 0, 2] + rises).max())
     words = f"everything falls to the ground, from up to {highest:.2g} m"
-    return SceneInteraction(
-        "fall", tuple(entries), _watch_duration(sqrt(2 * highest / GRAVITY_M_S2)), words
-    )
+    return SceneInteraction("fall", tuple(entries), _watch_duration(sqrt(2 * highest / GRAVITY_M_S2)), words)
 
 
 def _begin_fall_onto(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction | None:
@@ -138,9 +126,7 @@ def _begin_fall_onto(still: SettledBodies, rng: np.random.Generator) -> SceneInt
         if still.free(top) and not any(boxes_meet(column, boxes[k]) for k in others):
             words = f"{names[top]} falls {height:.2g} m onto {names[target]}"
             entries = (_entry_at(names[top], over),)
-            return SceneInteraction(
-                "fall-onto", entries, _watch_duration(sqrt(2 * height / GRAVITY_M_S2)), words
-            )
+            return SceneInteraction("fall-onto", entries, _watch_duration(sqrt(2 * height / GRAVITY_M_S2)), words)
     return None
 
 
@@ -150,14 +136,11 @@ def _begin_fall_onto(still: SettledBodies, rng: np.random.Generator) -> SceneInt
 def _begin_collision(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction | None:
     """Send one object along the floor into another: one that is heavy enough to be felt.
 
-    Friction leaves it the speed drawn when it arrives, v₀² = v² + 2 μ g d over the gap d; what
-    rolls arrives faster. Nothing is sent into what stands nearer than
-    ``MIN_APPROACH_SIZE_FRACTION``.
+    Friction leaves it the speed drawn when it arrives, v₀² = v² + 2 μ g d over the gap d; what rolls arrives faster.
+    Nothing is sent into what stands nearer than ``MIN_APPROACH_SIZE_FRACTION``.
     """
     least = MIN_APPROACH_SIZE_FRACTION * float(still.sizes.max())
-    for mover, target in sorted(
-        _ordered_pairs(still, rng), key=lambda p: _is_mover_too_light(still, p)
-    ):
+    for mover, target in sorted(_ordered_pairs(still, rng), key=lambda p: _is_mover_too_light(still, p)):
         if not (still.free(mover) and still.open_way(mover, target)):
             continue
         gap, heading = still.gap(mover, target)
@@ -166,9 +149,7 @@ def _begin_collision(still: SettledBodies, rng: np.random.Generator) -> SceneInt
             start = sqrt(arrival**2 + 2 * still.bodies[mover].friction * GRAVITY_M_S2 * gap)
             entry = _entry_with_velocity(still.names[mover], start * heading)
             words = f"{still.names[mover]} is sent into {still.names[target]} at {start:.2g} m/s"
-            return SceneInteraction(
-                "collision", (entry,), _watch_duration(2 * gap / (start + arrival)), words
-            )
+            return SceneInteraction("collision", (entry,), _watch_duration(2 * gap / (start + arrival)), words)
     return None
 
 
@@ -186,9 +167,7 @@ def _begin_chain(still: SettledBodies, rng: np.random.Generator) -> SceneInterac
 
 
 def _arrival_speed(still: SettledBodies, rng: np.random.Generator) -> float:
-    return float(rng.uniform(*IMPACT_SPEED_RATIO_RANGE)) * sqrt(
-        GRAVITY_M_S2 * float(still.sizes.max())
-    )
+    return float(rng.uniform(*IMPACT_SPEED_RATIO_RANGE)) * sqrt(GRAVITY_M_S2 * float(still.sizes.max()))
 
 
 # ---------------------------------------------------------------- wind
@@ -205,9 +184,7 @@ def _begin_wind(still: SettledBodies, rng: np.random.Generator) -> SceneInteract
         moving = [wind_threshold(still.bodies[k], still.poses[k], heading) for k in loose]
         speed = share * min(moving, default=np.inf)
         if speed <= MAX_WIND_SPEED_M_S:
-            wind = Wind(
-                _horizontal_vector(speed * heading), WIND_GUST_FRACTION, end=WIND_DURATION_S
-            )
+            wind = Wind(_horizontal_vector(speed * heading), WIND_GUST_FRACTION, end=WIND_DURATION_S)
             entries = tuple(ObjectEntry(name=n, wind=wind) for n in still.names)
             words = f"a wind of {speed:.2g} m/s, in gusts, for {WIND_DURATION_S:g} s"
             return SceneInteraction("wind", entries, 1.5, words)

@@ -11,10 +11,7 @@ from corporeal.scene.vessel_contents import SceneWithMaterials
 
 
 def merge_filled_scenes(
-    here: FilledScene,
-    there: FilledScene,
-    friction: Float[np.ndarray, "K1 K1"],
-    restitution: Float[np.ndarray, "K1 K1"],
+    here: FilledScene, there: FilledScene, friction: Float[np.ndarray, "K1 K1"], restitution: Float[np.ndarray, "K1 K1"]
 ) -> FilledScene:
     """Return one filled scene of two, at the first one's grid spacing and under its forces.
 
@@ -27,9 +24,7 @@ def merge_filled_scenes(
     """
     a, b = here.whole, there.whole
     whole = SceneWithMaterials(
-        _merged_scene(a.scene, b.scene),
-        _merged_parts(a, b),
-        _merged_field(a.field, b.field, friction, restitution),
+        _merged_scene(a.scene, b.scene), _merged_parts(a, b), _merged_field(a.field, b.field, friction, restitution)
     )
     return FilledScene(whole, _merged_particles(here, there.particles))
 
@@ -58,10 +53,7 @@ def _merged_scene(a: Scene, b: Scene) -> Scene:
     objects, finishes = len(a.objects), len(a.finishes)
     more = (replace(s, object=s.object + objects, finish=s.finish + finishes) for s in b.surfaces)
     return replace(
-        a,
-        objects=(*a.objects, *b.objects),
-        surfaces=(*a.surfaces, *more),
-        finishes=(*a.finishes, *b.finishes),
+        a, objects=(*a.objects, *b.objects), surfaces=(*a.surfaces, *more), finishes=(*a.finishes, *b.finishes)
     )
 
 
@@ -74,16 +66,11 @@ def _merged_parts(a: SceneWithMaterials, b: SceneWithMaterials) -> Parts:
         object_of_point=np.append(own.object_of_point, more.object_of_point + objects),
         part_of_point=np.append(own.part_of_point, part),
         confidence=np.append(own.confidence, more.confidence),
-        catalogue=(
-            *own.catalogue,
-            *(replace(entry, object=entry.object + objects) for entry in more.catalogue),
-        ),
+        catalogue=(*own.catalogue, *(replace(entry, object=entry.object + objects) for entry in more.catalogue)),
     )
 
 
-def _merged_field(
-    a: MaterialField, b: MaterialField, friction: np.ndarray, restitution: np.ndarray
-) -> MaterialField:
+def _merged_field(a: MaterialField, b: MaterialField, friction: np.ndarray, restitution: np.ndarray) -> MaterialField:
     """Existing pairs keep their coefficients, which may be annotated."""
     friction, restitution = friction.copy(), restitution.copy()
     old = [*range(len(a.materials)), len(friction) - 1]
@@ -114,12 +101,7 @@ def _merged_particles(here: FilledScene, b: Particles) -> Particles:
         both["rate"] = np.append(_particle_rates(a), _particle_rates(b))
     roots = (replace(r, object=r.object + objects, part=r.part + parts) for r in b.roots)
     lists = ("treatments", "mass_real", "fills", "walls")
-    return replace(
-        a,
-        roots=(*a.roots, *roots),
-        **both,
-        **{name: getattr(a, name) + getattr(b, name) for name in lists},
-    )
+    return replace(a, roots=(*a.roots, *roots), **both, **{name: getattr(a, name) + getattr(b, name) for name in lists})
 
 
 def _particle_rates(particles: Particles) -> Float[np.ndarray, " P"]:

@@ -12,8 +12,8 @@ from corporeal.geometry.scene_transforms import object_boxes
 def repose_reconstruction(found: Reconstruction, scene: Scene) -> Reconstruction:
     """Return Gaussians and points where a scene's objects stand now, by the scene's numbers.
 
-    Objects may have been moved and resized, but not turned. Floor and background stay. Others may
-    stand beside those that were found.
+    Objects may have been moved and resized, but not turned. Floor and background stay. Others may stand beside those
+    that were found.
 
     Raises:
         UserError: Not all that were found are in the scene.
@@ -22,8 +22,7 @@ def repose_reconstruction(found: Reconstruction, scene: Scene) -> Reconstruction
     names = [o.name for o in scene.objects]
     if not set(found.names) <= set(names):
         raise UserError(
-            f"The scene has {', '.join(names)}, the reconstruction {', '.join(found.names)}. "
-            "Reconstruct it again."
+            f"The scene has {', '.join(names)}, the reconstruction {', '.join(found.names)}. Reconstruct it again."
         )
     number = np.array([names.index(name) for name in found.names])
     before, after = found.boxes, object_boxes(scene)[number]

@@ -60,9 +60,7 @@ class RestEvidence:
     """What speaks against rest, in words."""
 
 
-def measure_rest(
-    bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], deepest: float
-) -> RestEvidence:
+def measure_rest(bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], deepest: float) -> RestEvidence:
     """Measure drift, penetration, hovering and extent of bodies that claim to be at rest.
 
     Args:
@@ -133,20 +131,13 @@ def _deepest_penetration(
 
 
 def _nearest_distance(
-    k: int,
-    bodies: Sequence[SettlingBody],
-    poses: Sequence[BodyPose],
-    clouds: Sequence[np.ndarray],
-    near: float,
+    k: int, bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], clouds: Sequence[np.ndarray], near: float
 ) -> float:
     """Distance from one body to the nearest other [m]; inf: more than ``near``."""
     least = np.inf
     for j, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
         if j != k:
-            for surface, points in (
-                (body, pose.body(clouds[k])),
-                (bodies[k], poses[k].body(clouds[j])),
-            ):
+            for surface, points in ((body, pose.body(clouds[k])), (bodies[k], poses[k].body(clouds[j]))):
                 points = _near_body_points(surface, points, near)
                 points = points[surface.shape.may_be_within(near, points)]
                 if len(points):

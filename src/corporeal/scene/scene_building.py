@@ -12,17 +12,7 @@ import trimesh
 from jaxtyping import Float, Int
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import (
-    GRAVITY_VECTOR,
-    Finish,
-    Keyframes,
-    Push,
-    Scene,
-    SceneObject,
-    Surface,
-    Vector,
-    Wind,
-)
+from corporeal.core.types import GRAVITY_VECTOR, Finish, Keyframes, Push, Scene, SceneObject, Surface, Vector, Wind
 from corporeal.geometry.crease_normals import add_crease_normals
 from corporeal.geometry.scene_transforms import overlapping_objects
 from corporeal.materials import MaterialEntry, find_material
@@ -181,11 +171,7 @@ def solid(
 
 
 def build_scene(
-    *solids: Solid,
-    name: str = "scene",
-    duration: float = 1.0,
-    fps: int = 60,
-    gravity: Vector = GRAVITY_VECTOR,
+    *solids: Solid, name: str = "scene", duration: float = 1.0, fps: int = 60, gravity: Vector = GRAVITY_VECTOR
 ) -> Scene:
     """Put solids into a scene above the floor.
 
@@ -197,8 +183,7 @@ def build_scene(
         gravity: [m/s²]
 
     Returns:
-        A scene of one object per solid, in their order. Solids that stand in each other are named
-        in its ``warnings``.
+        A scene of one object per solid, in their order. Solids that stand in each other are named in its ``warnings``.
 
     Raises:
         UserError: There is no solid, one reaches below the floor, or a number makes no sense.
@@ -214,9 +199,7 @@ def build_scene(
     made = Scene(
         name=name,
         source="built in Python",
-        objects=tuple(
-            _scene_object_of(one, called) for one, called in zip(solids, names, strict=True)
-        ),
+        objects=tuple(_scene_object_of(one, called) for one, called in zip(solids, names, strict=True)),
         surfaces=tuple(_surface_of(one, k) for k, one in enumerate(solids)),
         finishes=tuple(_finish_of(one) for one in solids),
         gravity=gravity,
@@ -241,9 +224,7 @@ def _placed_solid(
 
 
 def _finish_of(one: Solid) -> Finish:
-    return (
-        replace(one.finish, name=one.name) if one.colour is None else Finish(one.name, one.colour)
-    )
+    return replace(one.finish, name=one.name) if one.colour is None else Finish(one.name, one.colour)
 
 
 def _scene_object_of(one: Solid, name: str) -> SceneObject:
@@ -292,6 +273,5 @@ def _refuse_below_floor(one: Solid) -> None:
     depth = -float(one.vertices[:, 2].min())
     if depth > MAX_ROUNDOFF_DEPTH_M:
         raise UserError(
-            f"{one.name} reaches {depth:.3g} m below the floor, which is at z = 0. Raise it with "
-            "at=(x, y, z)."
+            f"{one.name} reaches {depth:.3g} m below the floor, which is at z = 0. Raise it with at=(x, y, z)."
         )

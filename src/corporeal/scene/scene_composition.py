@@ -81,9 +81,7 @@ def read_composition(folder: Path) -> SceneComposition:
         rows = [{"class_name": row["class"], **row} for row in data["objects"]]
         return from_plain(SceneComposition, {"settled_with": "mujoco", **data, "objects": rows})
     except (KeyError, ValueError, TypeError, AttributeError) as error:
-        raise BadFileError(
-            path, f"is not a composition of this version ({error}).", ASSEMBLE_AGAIN
-        ) from error
+        raise BadFileError(path, f"is not a composition of this version ({error}).", ASSEMBLE_AGAIN) from error
 
 
 def _composed_object(row: dict[str, Any]) -> dict[str, Any]:
@@ -112,6 +110,4 @@ def read_certificate(folder: Path) -> RestCertificate:
     try:
         return from_plain(RestCertificate, data)
     except (ValueError, TypeError, AttributeError) as error:
-        raise BadFileError(
-            path, f"is not a certificate of this version ({error}).", ASSEMBLE_AGAIN
-        ) from error
+        raise BadFileError(path, f"is not a certificate of this version ({error}).", ASSEMBLE_AGAIN) from error

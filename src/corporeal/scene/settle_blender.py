@@ -1,8 +1,8 @@
 """Settling of bodies in Blender through BlenderProc, in a separate process.
 
-A job goes out as a file and a result comes back as one; both are data. Blender is GPL and is never
-imported. All is computed in a scene of one size, as in ``mujoco.py``, because Bullet's margins and
-thresholds are absolute: the scene's unit is ``BLENDER_SCENE_SIZE`` long, and times are longer by
+A job goes out as a file and a result comes back as one; both are data. Blender is GPL and is never imported. All is
+computed in a scene of one size, as in ``mujoco.py``, because Bullet's margins and thresholds are absolute: the scene's
+unit is ``BLENDER_SCENE_SIZE`` long, and times are longer by
     its root.
 """
 
@@ -70,9 +70,7 @@ class BlenderError(UserError):
 
 
 def drop_in_blender(
-    bodies: Sequence[SettlingBody],
-    poses: Sequence[BodyPose],
-    config: BlenderConfig = DEFAULT_BLENDER_CONFIG,
+    bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: BlenderConfig = DEFAULT_BLENDER_CONFIG
 ) -> DroppedBodies:
     """Drop bodies and wait until all are at rest; not the same bits on every machine.
 
@@ -94,9 +92,7 @@ def drop_in_blender(
     return _dropped_bodies(result, bodies, config.program)
 
 
-def _blender_job(
-    bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: BlenderConfig
-) -> dict[str, Any]:
+def _blender_job(bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: BlenderConfig) -> dict[str, Any]:
     """Describe what falls, about its centres of mass and in Blender's units."""
     scale = BLENDER_SCENE_SIZE / scene_unit_of(bodies)
     lightest = min(b.mass for b in bodies)
@@ -104,8 +100,7 @@ def _blender_job(
     for number, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
         arms = [(p.vertices - body.centre) * scale for p in body.pieces]
         pieces = [
-            {"vertices": a.tolist(), "triangles": p.triangles.tolist()}
-            for a, p in zip(arms, body.pieces, strict=True)
+            {"vertices": a.tolist(), "triangles": p.triangles.tolist()} for a, p in zip(arms, body.pieces, strict=True)
         ]
         entries.append(
             {
@@ -178,11 +173,7 @@ def _kill_blender(process: "subprocess.Popen[bytes]") -> None:
 
 def _log_tail(log: Path) -> str:
     lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
-    return (
-        f"Its last output: {' | '.join(lines[-LOG_TAIL_LINES:])}."
-        if lines
-        else "It printed nothing."
-    )
+    return f"Its last output: {' | '.join(lines[-LOG_TAIL_LINES:])}." if lines else "It printed nothing."
 
 
 def _read_result(path: Path, program: str) -> Any:
@@ -206,19 +197,12 @@ def _dropped_bodies(result: Any, bodies: Sequence[SettlingBody], program: str) -
         raise _nonsense_error(program, f"seconds = {result.get('seconds')}, quiet = {quiet}")
     by_name = {str(e["name"]): e for e in entries}
     scale = scene_unit_of(bodies) / BLENDER_SCENE_SIZE
-    poses = [
-        _pose_of_entry(by_name[k], b, scale, program) for k, b in zip(wanted, bodies, strict=True)
-    ]
+    poses = [_pose_of_entry(by_name[k], b, scale, program) for k, b in zip(wanted, bodies, strict=True)]
     return DroppedBodies(poses, seconds[0] / BLENDER_SCENE_SIZE**0.5, quiet)
 
 
-def _pose_of_entry(
-    entry: Mapping[str, Any], body: SettlingBody, scale: float, program: str
-) -> BodyPose:
-    where, turn = (
-        _finite_numbers(entry.get("position"), 3),
-        _finite_numbers(entry.get("quaternion"), 4),
-    )
+def _pose_of_entry(entry: Mapping[str, Any], body: SettlingBody, scale: float, program: str) -> BodyPose:
+    where, turn = (_finite_numbers(entry.get("position"), 3), _finite_numbers(entry.get("quaternion"), 4))
     if where is None or turn is None:
         pose = f"{entry.get('position')}, turned by {entry.get('quaternion')}"
         raise _nonsense_error(program, f"{body.name} is at {pose}")
@@ -241,6 +225,5 @@ def _finite_numbers(values: Any, count: int) -> list[float] | None:
 
 def _nonsense_error(program: str, what: str) -> BlenderError:
     return BlenderError(
-        f"{program}: its result is invalid: {what}. Install a BlenderProc of Blender 4.2, or "
-        "settle with mujoco."
+        f"{program}: its result is invalid: {what}. Install a BlenderProc of Blender 4.2, or settle with mujoco."
     )

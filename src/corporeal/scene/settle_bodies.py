@@ -98,16 +98,12 @@ def settle_bodies(
     )
 
 
-def _drop_bodies(
-    bodies: Sequence[SettlingBody], start: Sequence[BodyPose], config: SettleConfig
-) -> DroppedBodies:
+def _drop_bodies(bodies: Sequence[SettlingBody], start: Sequence[BodyPose], config: SettleConfig) -> DroppedBodies:
     drop = load_backend("settling engine", config.engine, SETTLING_ENGINES)
     return drop(bodies, start, config.blender if config.engine == "blenderproc" else config.drop)
 
 
-def _why_lost(
-    bodies: Sequence[SettlingBody], start: Sequence[BodyPose], dropped: DroppedBodies
-) -> str:
+def _why_lost(bodies: Sequence[SettlingBody], start: Sequence[BodyPose], dropped: DroppedBodies) -> str:
     """Return why bodies are not worth examining; "": they are."""
     if not dropped.quiet:
         return f"something still moved after {dropped.seconds:.0f} s"
@@ -119,9 +115,7 @@ def _why_lost(
     return ""
 
 
-def _rest_certificate(
-    evidence: RestEvidence, seed: int, attempts: int, seconds: float
-) -> RestCertificate:
+def _rest_certificate(evidence: RestEvidence, seed: int, attempts: int, seconds: float) -> RestCertificate:
     return RestCertificate(
         drift_m=evidence.drift,
         penetration_m=evidence.penetration,

@@ -63,9 +63,7 @@ def settle_for_interaction(
     for k in range(MAX_SETTLED_COMPOSITIONS):
         way = ways[k % len(ways)]
         try:
-            poses, certificate = settle_bodies(
-                bodies, way, int(rng.integers(2**31)), deepest, config
-            )
+            poses, certificate = settle_bodies(bodies, way, int(rng.integers(2**31)), deepest, config)
         except BlenderError:
             raise
         except UserError as refusal:
@@ -83,31 +81,25 @@ def settle_for_interaction(
     names = ", ".join(b.name for b in bodies)
     raise UserError(
         reason
-        or f"{names}: {_why_impossible(kinds[0])} in {MAX_SETTLED_COMPOSITIONS} compositions. Try another --seed, another "
+        or f"{names}: {_why_impossible(kinds[0])} in {MAX_SETTLED_COMPOSITIONS} compositions. "
+        "Try another --seed, another "
         "--interaction, or other objects."
     )
 
 
 def _possible_arrangements(
-    asked: BodyArrangement | Literal["auto"],
-    kinds: Sequence[InteractionKind],
-    count: int,
-    rng: np.random.Generator,
+    asked: BodyArrangement | Literal["auto"], kinds: Sequence[InteractionKind], count: int, rng: np.random.Generator
 ) -> list[BodyArrangement]:
     """Return the ways in which objects may stand, in an order of chance."""
     if asked != "auto":
         return [asked]
     if count == 1:
         return ["scatter"]
-    ways: Sequence[BodyArrangement] = (
-        ARRANGEMENTS_OF_KIND[kinds[0]] if kinds else get_args(BodyArrangement)
-    )
+    ways: Sequence[BodyArrangement] = ARRANGEMENTS_OF_KIND[kinds[0]] if kinds else get_args(BodyArrangement)
     return [ways[k] for k in rng.permutation(len(ways))]
 
 
-def _fitting_kinds(
-    kinds: Sequence[InteractionKind], arrangement: BodyArrangement
-) -> list[InteractionKind]:
+def _fitting_kinds(kinds: Sequence[InteractionKind], arrangement: BodyArrangement) -> list[InteractionKind]:
     """Keep what may happen to objects that stand so; the first may, however they stand."""
     return [kinds[0], *(k for k in kinds[1:] if arrangement in ARRANGEMENTS_OF_KIND[k])]
 

@@ -6,9 +6,9 @@ of unit size: lengths are divided by the scene's unit and times by the root of i
 similarity keeps gravity and friction as they are), because the engine's softness, tolerances and
 thresholds are absolute.
 
-Soft contacts and some resistance to rolling bring everything to rest soon, but elsewhere than hard
-smooth objects rest: what is round would roll on, and what stands on small faces would tilt. So the
-resistance is taken away and contacts are hardened before the end.
+Soft contacts and some resistance to rolling bring everything to rest soon, but elsewhere than hard smooth objects rest:
+what is round would roll on, and what stands on small faces would tilt. So the resistance is taken away and contacts are
+hardened before the end.
 """
 
 # The engine's names come from compiled modules without stubs.
@@ -53,23 +53,22 @@ class DropConfig:
 
 DEFAULT_DROP_CONFIG = DropConfig()
 SPINNING_FRICTION, ROLLING_FRICTION = 0.02, 0.02
-"""Coefficients of friction against turning about the normal [unit], and rolling, of a body's
-extent."""
+"""Coefficients of friction against turning about the normal [unit], and rolling, of a body's extent."""
 CONTACT_SOLREF = [0.008, 1.0]
 HARD_CONTACT_STEP_S, HARD_CONTACT_TIME_CONSTANT_S = 5e-4, 1e-3
-"""Step [s] and time constant [s] of hard contacts: they give way a few thousandths of a millimetre
-per metre of scene."""
+"""Step [s] and time constant [s] of hard contacts: they give way a few thousandths of a millimetre per metre of
+scene."""
 CONTACT_SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
 CONTACT_PARAMETERS = {"solref": CONTACT_SOLREF, "solimp": CONTACT_SOLIMP, "condim": 6}
 """Contact of every geometry."""
 FLOOR_AND_HULLS_BIT = 1
-"""Bit of contype and conaffinity; pieces meet in explicit pairs only, as the engine would take the
-larger of two frictions."""
+"""Bit of contype and conaffinity; pieces meet in explicit pairs only, as the engine would take the larger of two
+frictions."""
 ADDED_INERTIA_FRACTION = 1e-6
 """Of a body's inertia, added about every axis."""
 CONTACT_MEMORY_BYTES = 1 << 30
-"""Room for contacts [bytes]; what is not used costs nothing. By itself the engine takes room for
-about 200, and lets objects fall through each other at more, or stops."""
+"""Room for contacts [bytes]; what is not used costs nothing. By itself the engine takes room for about 200, and lets
+objects fall through each other at more, or stops."""
 CONTACTS_FULL_WARNINGS = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
 """Warnings of contacts that were left out."""
 
@@ -86,9 +85,7 @@ class DroppedBodies:
 
 
 def drop_in_mujoco(
-    bodies: Sequence[SettlingBody],
-    poses: Sequence[BodyPose],
-    config: DropConfig = DEFAULT_DROP_CONFIG,
+    bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: DropConfig = DEFAULT_DROP_CONFIG
 ) -> DroppedBodies:
     """Drop bodies and wait until all are at rest.
 
@@ -107,9 +104,7 @@ def drop_in_mujoco(
     return DroppedBodies(engine.poses(), float(engine.data.time), moved < config.chatter)
 
 
-def _step_until_rest(
-    engine: "MujocoScene", config: DropConfig, longest: float, calm_after: float
-) -> float:
+def _step_until_rest(engine: "MujocoScene", config: DropConfig, longest: float, calm_after: float) -> float:
     """Step until nothing moves for a while, or time is up; return how far objects went last."""
     step = float(engine.model.opt.timestep)
     window, calm = round(config.hold / step), round(calm_after / step)
@@ -221,16 +216,12 @@ class MujocoScene:
         return found
 
 
-def _scene_spec(
-    bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], unit: float, step: float
-) -> mujoco.MjSpec:
+def _scene_spec(bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], unit: float, step: float) -> mujoco.MjSpec:
     spec = _floor_spec(step)
     # Contacts are as soft for any mass; only masses near the engine's smallest number matter.
     lightest = min(b.mass for b in bodies)
     for k, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
-        node = spec.worldbody.add_body(
-            name=f"{k}", pos=np.array(pose.position) / unit, quat=pose.quaternion
-        )
+        node = spec.worldbody.add_body(name=f"{k}", pos=np.array(pose.position) / unit, quat=pose.quaternion)
         if body.inertial:
             _give_inertia(node, body.inertial, unit, lightest)
         node.add_freejoint()
@@ -262,12 +253,7 @@ def _floor_spec(step: float) -> mujoco.MjSpec:
 
 
 def _add_shape(
-    spec: mujoco.MjSpec,
-    node: "mujoco.MjsBody",
-    body: SettlingBody,
-    number: int,
-    unit: float,
-    density: float,
+    spec: mujoco.MjSpec, node: "mujoco.MjsBody", body: SettlingBody, number: int, unit: float, density: float
 ) -> None:
     """Give body ``number`` its hull, which meets the floor, and its pieces, which meet others'."""
     friction = [body.grip_on(None), SPINNING_FRICTION, ROLLING_FRICTION * body.extent / unit]
@@ -306,9 +292,7 @@ def _add_contact_pairs(
     """Let every piece of one body meet every piece of another."""
     one, other = (bodies[k] for k in numbers)
     sliding, roll = one.grip_on(other), ROLLING_FRICTION * max(one.extent, other.extent) / unit
-    first, second = (
-        [_piece_name(k, number) for number in range(len(bodies[k].pieces))] for k in numbers
-    )
+    first, second = ([_piece_name(k, number) for number in range(len(bodies[k].pieces))] for k in numbers)
     for a in first:
         for b in second:
             spec.add_pair(
@@ -321,9 +305,7 @@ def _add_contact_pairs(
             )
 
 
-def _give_inertia(
-    node: "mujoco.MjsBody", inertial: MassProperties, unit: float, lightest: float
-) -> None:
+def _give_inertia(node: "mujoco.MjsBody", inertial: MassProperties, unit: float, lightest: float) -> None:
     """Return how a body's mass lies, in units of length and of the lightest mass."""
     tensor = inertial.inertia / (lightest * unit**2)
     # The engine refuses what is thinner than any body can be.

@@ -82,10 +82,7 @@ class SettledBodies:
             return False
         gap, heading = self.gap(mover, target)
         others = [k for k in range(len(self)) if k not in (mover, target)]
-        ways = [
-            self.boxes[mover] + [*(s * heading), 0.0]
-            for s in np.linspace(0.0, gap, WAY_SAMPLES_COUNT)
-        ]
+        ways = [self.boxes[mover] + [*(s * heading), 0.0] for s in np.linspace(0.0, gap, WAY_SAMPLES_COUNT)]
         return not any(boxes_meet(w, self.boxes[k], margin=0.0) for w in ways for k in others)
 
 
@@ -95,9 +92,7 @@ def largest_box_side(box: Float[np.ndarray, "2 3"]) -> float:
 
 
 def boxes_meet(
-    a: Float[np.ndarray, "2 3"],
-    b: Float[np.ndarray, "2 3"],
-    margin: float = FALL_CLEARANCE_FRACTION,
+    a: Float[np.ndarray, "2 3"], b: Float[np.ndarray, "2 3"], margin: float = FALL_CLEARANCE_FRACTION
 ) -> bool:
     """Return whether two boxes come closer than a share of the larger one's size."""
     space = margin * max(largest_box_side(a), largest_box_side(b))

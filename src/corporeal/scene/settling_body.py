@@ -8,12 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.core.types import Vector
-from corporeal.geometry.convex_hull import (
-    ConvexPiece,
-    StandingStance,
-    convex_hull_of,
-    standing_stances,
-)
+from corporeal.geometry.convex_hull import ConvexPiece, StandingStance, convex_hull_of, standing_stances
 from corporeal.geometry.mesh import orient_outward, weld_mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 
@@ -125,9 +120,7 @@ class SettlingBody:
     def hull(self) -> ConvexPiece:
         """The convex hull of the mesh."""
         points = self.vertices[np.unique(self.triangles)]
-        return convex_hull_of(
-            points, MIN_HULL_THICKNESS_FRACTION * float(np.ptp(points, axis=0).max())
-        )
+        return convex_hull_of(points, MIN_HULL_THICKNESS_FRACTION * float(np.ptp(points, axis=0).max()))
 
     @cached_property
     def shape(self) -> QueryMesh:

@@ -55,10 +55,7 @@ def _add_object(scene: Scene, one: VesselContents) -> Scene:
     things[one.vessel] = one.holder
     surface = replace(one.surface, object=len(things), finish=len(scene.finishes))
     return replace(
-        scene,
-        objects=(*things, one.thing),
-        surfaces=(*scene.surfaces, surface),
-        finishes=(*scene.finishes, one.finish),
+        scene, objects=(*things, one.thing), surfaces=(*scene.surfaces, surface), finishes=(*scene.finishes, one.finish)
     )
 
 

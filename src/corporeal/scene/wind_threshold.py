@@ -2,9 +2,9 @@
 
 Wind pressure on objects at rest.
 
-With u the velocity of the air and θ the angle between u and a face's inward normal, the pressure is
-½ ρ_air C u² cos³θ where cos θ > 0, and nothing in the lee (Hoerner 1965; see ``mpm/wind.py``, which
-does the same for faces in motion and imports nothing of the project: a test holds the two equal).
+With u the velocity of the air and θ the angle between u and a face's inward normal, the pressure is ½ ρ_air C u² cos³θ
+where cos θ > 0, and nothing in the lee (Hoerner 1965; see ``mpm/wind.py``, which does the same for faces in motion and
+imports nothing of the project: a test holds the two equal).
 """
 
 from dataclasses import dataclass
@@ -24,9 +24,7 @@ FLAT_PLATE_DRAG_COEFFICIENT = 1.17
 """C: pressure on a plate that faces the wind, over ½ ρ u² [-]."""
 
 
-def drag_areas(
-    area: Float[np.ndarray, "A 3"], heading: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "A 3"]:
+def drag_areas(area: Float[np.ndarray, "A 3"], heading: Float[np.ndarray, "3"]) -> Float[np.ndarray, "A 3"]:
     """Force on each face over ½ ρ_air u² [m²]: along its inward normal, C A cos³θ large.
 
     Args:
@@ -36,14 +34,12 @@ def drag_areas(
     """
     size = np.linalg.norm(area, axis=1)
     inward = -area / np.maximum(size, 1e-30)[:, None]
-    return (FLAT_PLATE_DRAG_COEFFICIENT * size * np.maximum(inward @ heading, 0.0) ** 3)[
-        :, None
-    ] * inward
+    return (FLAT_PLATE_DRAG_COEFFICIENT * size * np.maximum(inward @ heading, 0.0) ** 3)[:, None] * inward
 
 
 ROUND_FOOT_SIZE_FRACTION = 0.1
-"""What is round hardly rolls on a grid: it stands as on a foot that reaches this share of its size
-beyond its centre (two cells of a draft)."""
+"""What is round hardly rolls on a grid: it stands as on a foot that reaches this share of its size beyond its centre
+(two cells of a draft)."""
 WIND_DIRECTIONS_COUNT = 8
 """Directions from which wind is tried."""
 
@@ -63,9 +59,9 @@ class WindDrag:
 def wind_threshold(body: SettlingBody, pose: BodyPose, heading: Float[np.ndarray, "2"]) -> float:
     """Return the slowest wind that moves an object [m/s]; inf: none does.
 
-    It slides where the drag exceeds friction, D q > μ (m g - L q) with q = ½ ρ_air u², and falls
-    over where the moment of the air about the edge of its foot exceeds that of its weight. What
-    leans on something, its centre of mass not above its foot, can only slide.
+    It slides where the drag exceeds friction, D q > μ (m g - L q) with q = ½ ρ_air u², and falls over where the moment
+    of the air about the edge of its foot exceeds that of its weight. What leans on something, its centre of mass not
+    above its foot, can only slide.
 
     Args:
         body: What; its material says how rough it is.
@@ -76,9 +72,7 @@ def wind_threshold(body: SettlingBody, pose: BodyPose, heading: Float[np.ndarray
     weight = body.mass * GRAVITY_M_S2
     points = pose.world(body.hull.vertices)
     bottom = float(points[:, 2].min())
-    foot = (
-        points[points[:, 2] < bottom + WEIGHT_BEARING_HEIGHT_FRACTION * body.extent, :2] @ heading
-    )
+    foot = points[points[:, 2] < bottom + WEIGHT_BEARING_HEIGHT_FRACTION * body.extent, :2] @ heading
     lee = float(foot.max())
     drag = wind_drag_of(body, pose, heading, np.array([*(lee * heading), bottom]))
     held = lee - float(pose.world(body.centre[None])[0, :2] @ heading)
@@ -106,10 +100,7 @@ def wind_headings(first: float) -> Float[np.ndarray, "H 2"]:
 
 
 def wind_drag_of(
-    body: SettlingBody,
-    pose: BodyPose,
-    heading: Float[np.ndarray, "2"],
-    pivot: Float[np.ndarray, "3"],
+    body: SettlingBody, pose: BodyPose, heading: Float[np.ndarray, "2"], pivot: Float[np.ndarray, "3"]
 ) -> WindDrag:
     """Add up the air's force on every face of an object, and its moment about a point of an edge.
 

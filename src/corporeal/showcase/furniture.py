@@ -89,17 +89,13 @@ def _leg(top: PropPoint, foot: PropPoint, upper: float, lower: float) -> PropMes
     """Turn a leg between two points [m] with radii above and below [m], flat on the floor."""
     t = np.linspace(0, 1, 8)[:, None]
     path = np.asarray(foot, float) * (1 - t) + np.asarray(top, float) * t
-    m = parametric_surfaces.tube_surface(
-        path, lower + (upper - lower) * t[:, 0] ** 0.8, 16, uv_per_metre=2
-    )
+    m = parametric_surfaces.tube_surface(path, lower + (upper - lower) * t[:, 0] ** 0.8, 16, uv_per_metre=2)
     v = m.vertices.copy()
     v[:, 2] = np.maximum(v[:, 2], 0)
     return replace(m, uv=m.uv[:, ::-1], vertices=v)
 
 
-def _board(
-    size: PropPoint, at: ArrayLike, turn: PropPoint = ZERO_OFFSET, radius: float = 0.008
-) -> PropMesh:
+def _board(size: PropPoint, at: ArrayLike, turn: PropPoint = ZERO_OFFSET, radius: float = 0.008) -> PropMesh:
     return RoundedBox(size, radius, tile=0.5).mesh().moved(at, turn)
 
 
@@ -111,9 +107,7 @@ def _armrest(x: np.ndarray, y: float, z: np.ndarray) -> PropMesh:
     share = np.clip((v[:, 0] + middle - x[0]) / (x[-1] - x[0]), 0, 1)
     v[:, 1] *= 0.75 + 0.25 * np.sin(share * np.pi * 0.75)
     v[:, 2] += np.interp(v[:, 0] + middle, x, z)
-    return replace(
-        m, vertices=v + np.array([middle, y, 0]), normals=welded_vertex_normals(v, m.faces)
-    )
+    return replace(m, vertices=v + np.array([middle, y, 0]), normals=welded_vertex_normals(v, m.faces))
 
 
 def couch() -> PropModel:
@@ -122,13 +116,9 @@ def couch() -> PropModel:
     base = mesh_difference(plinth.mesh().moved((0.0, 0, 0.225)), body, legs)
     seat = mesh_difference(_pair((0.66, 0.70, 0.145), 0.024, (0.095, 0.378), 0), body, base)
     back = mesh_difference(_pair((0.40, 0.68, 0.12), 0.040, (-0.195, 0.635), 79), body, seat)
-    pillow = CushionShape(
-        (0.42, 0.42, 0.03), 0.06, 0.0145, 0.005, 10, pinch=0.07, seams=(0,)
-    ).mesh()
+    pillow = CushionShape((0.42, 0.42, 0.03), 0.06, 0.0145, 0.005, 10, pinch=0.07, seams=(0,)).mesh()
     pillow = pillow.moved(turn=(0, 66, 0)).moved((-0.005, 0.44, 0.637), (0, 0, 12))
-    walnut = textured_finish(
-        "walnut", procedural_textures.wood_texture(512, 33, "#3a2214", "#65401f", "#8d6137"), 0.45
-    )
+    walnut = textured_finish("walnut", procedural_textures.wood_texture(512, 33, "#3a2214", "#65401f", "#8d6137"), 0.45)
     oat = _weave("oat weave", 51, "#8b7f70", "#c9bda9", "#eee5d6")
     rust = _weave("rust weave", 52, "#70301d", "#bf5b39", "#e59468")
     return PropModel(
@@ -146,11 +136,7 @@ def couch() -> PropModel:
 
 def _couch_legs() -> PropMesh:
     return mesh_union(
-        [
-            _leg((x, y, 0.17), (1.1 * x, 1.02 * y, 0), 0.026, 0.015)
-            for x in (-0.34, 0.34)
-            for y in (-0.74, 0.74)
-        ]
+        [_leg((x, y, 0.17), (1.1 * x, 1.02 * y, 0), 0.026, 0.015) for x in (-0.34, 0.34) for y in (-0.74, 0.74)]
     )
 
 

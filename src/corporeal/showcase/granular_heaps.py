@@ -26,17 +26,10 @@ def mud_pile() -> PropModel:
 
     colours = ("#2a2018", "#453527", "#5f4b38")
     look = textured_finish(
-        "wet mud",
-        procedural_textures.speckle_texture(512, 81, *colours, falloff=1.2, contrast=0.12),
-        0.22,
+        "wet mud", procedural_textures.speckle_texture(512, 81, *colours, falloff=1.2, contrast=0.12), 0.22
     )
     return PropModel(
-        "mud_pile",
-        (
-            PropPart(
-                "mud", parametric_surfaces.mound_surface(height, rim, 64, 144, 0.25), look, "mud"
-            ),
-        ),
+        "mud_pile", (PropPart("mud", parametric_surfaces.mound_surface(height, rim, 64, 144, 0.25), look, "mud"),)
     )
 
 
@@ -56,17 +49,10 @@ def sand_pile() -> PropModel:
 
     colours = ("#b28a54", "#dcb77e", "#f1d9aa")
     look = textured_finish(
-        "dry sand",
-        procedural_textures.speckle_texture(512, 91, *colours, falloff=0.35, contrast=0.16),
-        0.95,
+        "dry sand", procedural_textures.speckle_texture(512, 91, *colours, falloff=0.35, contrast=0.16), 0.95
     )
     return PropModel(
-        "sand_pile",
-        (
-            PropPart(
-                "sand", parametric_surfaces.mound_surface(height, rim, 84, 168, 0.35), look, "sand"
-            ),
-        ),
+        "sand_pile", (PropPart("sand", parametric_surfaces.mound_surface(height, rim, 84, 168, 0.35), look, "sand"),)
     )
 
 
@@ -81,8 +67,7 @@ def snow_heap() -> PropModel:
 
     look = plain_finish("fresh snow", "#f3f7fc", 0.85)
     return PropModel(
-        "snow_heap",
-        (PropPart("snow", parametric_surfaces.mound_surface(height, rim, 60, 128), look, "snow"),),
+        "snow_heap", (PropPart("snow", parametric_surfaces.mound_surface(height, rim, 60, 128), look, "snow"),)
     )
 
 
@@ -91,22 +76,16 @@ def _heap_rim(radius: float, seed: int, wobble: float) -> parametric_surfaces.Ri
     c = np.random.default_rng(seed).standard_normal((2, 5)) / np.arange(1, 6) ** 1.2
 
     def rim(angle: np.ndarray) -> np.ndarray:
-        waves = [
-            c[0, k] * np.cos((k + 1) * angle) + c[1, k] * np.sin((k + 1) * angle) for k in range(5)
-        ]
+        waves = [c[0, k] * np.cos((k + 1) * angle) + c[1, k] * np.sin((k + 1) * angle) for k in range(5)]
         return radius * (1 + wobble * np.sum(waves, axis=0))
 
     return rim
 
 
-def _rim_distance_fraction(
-    x: np.ndarray, y: np.ndarray, rim: parametric_surfaces.RimRadius
-) -> np.ndarray:
+def _rim_distance_fraction(x: np.ndarray, y: np.ndarray, rim: parametric_surfaces.RimRadius) -> np.ndarray:
     """Distance from the centre as a share of the rim's."""
     return np.clip(np.hypot(x, y) / rim(np.arctan2(y, x)), 0, 1)
 
 
-def _heap_relief(
-    noise: sdf.SignedDistanceField, x: np.ndarray, y: np.ndarray, wavelength: float
-) -> np.ndarray:
+def _heap_relief(noise: sdf.SignedDistanceField, x: np.ndarray, y: np.ndarray, wavelength: float) -> np.ndarray:
     return noise(np.stack([x, y, 0 * x], -1).reshape(-1, 3) / wavelength).reshape(x.shape)

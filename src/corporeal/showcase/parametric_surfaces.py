@@ -42,23 +42,17 @@ def lathe_surface(profile: ArrayLike, segments: int = 64, loop: bool = False) ->
     r, z = p[:, :1], np.repeat(p[:, 1:], segments + 1, 1)
     v = np.stack([r * np.cos(angle), r * np.sin(angle), z], -1).reshape(-1, 3)
     uv = np.stack(np.broadcast_arrays(j / segments, (along / along[-1])[:, None]), -1)
-    return make_mesh(
-        v, _drop_degenerate(v, _grid_triangles(len(p), segments + 1)), uv=uv.reshape(-1, 2)
-    )
+    return make_mesh(v, _drop_degenerate(v, _grid_triangles(len(p), segments + 1)), uv=uv.reshape(-1, 2))
 
 
-def tube_surface(
-    path: ArrayLike, radii: ArrayLike, sides: int = 10, uv_per_metre: float = 1.0
-) -> PropMesh:
+def tube_surface(path: ArrayLike, radii: ArrayLike, sides: int = 10, uv_per_metre: float = 1.0) -> PropMesh:
     """Rod along a path [m] with rounded ends; one radius, or one per point [m]."""
     p = np.asarray(path, float)
     r = np.broadcast_to(radii, len(p)).astype(float)
     t = _path_directions(np.gradient(p, axis=0))
     along = _path_lengths(p)
     a, b = r[0] * t[0], r[-1] * t[-1]
-    points = np.concatenate(
-        [[p[0] - 0.6 * a, p[0] - 0.4 * a], p, [p[-1] + 0.4 * b, p[-1] + 0.6 * b]]
-    )
+    points = np.concatenate([[p[0] - 0.6 * a, p[0] - 0.4 * a], p, [p[-1] + 0.4 * b, p[-1] + 0.6 * b]])
     widths = np.concatenate([[0, 0.7 * r[0]], r, [0.7 * r[-1], 0]])
     headings = np.concatenate([t[:1], t[:1], t, t[-1:], t[-1:]])
     lengths = np.concatenate([[0, 0], along, along[-1:], along[-1:]]) * uv_per_metre
@@ -89,9 +83,7 @@ def ring_surface(path: ArrayLike, radius: float, sides: int = 6) -> PropMesh:
     following, beside = (i + 1) % n * sides, (j + 1) % sides
     corners = (i * sides + j, i * sides + beside, following + beside, following + j)
     a, b, c, d = (x.reshape(-1) for x in corners)
-    return make_mesh(
-        v.reshape(-1, 3), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    )
+    return make_mesh(v.reshape(-1, 3), np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]))
 
 
 @dataclass(frozen=True)
@@ -228,8 +220,7 @@ def leaf_surface(length: float, thickness: float, curl: float) -> PropMesh:
     vertices = [np.concatenate([left, rib + sign * lift, right]) for sign in (1, -1)]
     # Both faces keep their own normals at the rim.
     normals = [
-        sign * welded_vertex_normals(v, _drop_degenerate(v, grid))
-        for v, sign in zip(vertices, (-1, 1), strict=True)
+        sign * welded_vertex_normals(v, _drop_degenerate(v, grid)) for v, sign in zip(vertices, (-1, 1), strict=True)
     ]
     v = np.concatenate(vertices)
     faces = _drop_degenerate(v, np.concatenate([grid[:, ::-1], grid + 15]))
@@ -250,17 +241,10 @@ def _grid_triangles(rows: int, columns: int) -> Int[np.ndarray, "T 3"]:
     """Triangles of a grid of rows × columns vertices."""
     i, j = np.arange(rows - 1)[:, None] * columns, np.arange(columns - 1)[None]
     a = (i + j).reshape(-1)
-    return np.concatenate(
-        [
-            np.stack([a, a + 1, a + columns + 1], 1),
-            np.stack([a, a + columns + 1, a + columns], 1),
-        ]
-    )
+    return np.concatenate([np.stack([a, a + 1, a + columns + 1], 1), np.stack([a, a + columns + 1, a + columns], 1)])
 
 
-def _drop_degenerate(
-    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"]
-) -> Int[np.ndarray, "S 3"]:
+def _drop_degenerate(vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"]) -> Int[np.ndarray, "S 3"]:
     """Drop triangles with two corners in one place (poles)."""
     a, b, c = (np.round(vertices, 9)[faces[:, i]] for i in range(3))
     flat = (a == b).all(1) | (b == c).all(1) | (c == a).all(1)

@@ -93,20 +93,12 @@ def potted_ficus(seed: int = 10) -> PropModel:
         stem = _braided_stem(k, lean)
         aside = [0.5 * np.cos(2.1 * k), 0.5 * np.sin(2.1 * k), 0.2]
         twigs.append(stem)
-        twigs += _grow_branch(
-            rng, BranchStart(stem.path[-1], stem.heading + aside, 0.30, 0.0100, 2), habit
-        )
+        twigs += _grow_branch(rng, BranchStart(stem.path[-1], stem.heading + aside, 0.30, 0.0100, 2), habit)
     sides = {3: 12, 2: 7, 1: 5, 0: 4}
-    trunk = mesh_union(
-        [parametric_surfaces.tube_surface(t.path, t.radii, sides[t.generations], 4) for t in twigs]
-    )
+    trunk = mesh_union([parametric_surfaces.tube_surface(t.path, t.radii, sides[t.generations], 4) for t in twigs])
     pot, soil = _pot_and_soil()
-    clay = procedural_textures.speckle_texture(
-        512, 61, "#a8502c", "#c8693d", "#dc8a5c", falloff=1.3
-    )
-    earth = procedural_textures.speckle_texture(
-        256, 62, "#1f140d", "#3a281b", "#6a5138", falloff=0.4
-    )
+    clay = procedural_textures.speckle_texture(512, 61, "#a8502c", "#c8693d", "#dc8a5c", falloff=1.3)
+    earth = procedural_textures.speckle_texture(256, 62, "#1f140d", "#3a281b", "#6a5138", falloff=0.4)
     bark = procedural_textures.bark_texture(256, 63, "#6e5b48", "#978370", "#bfae9b")
     blade = procedural_textures.leaf_texture(128, "#2a6b2a", "#43923a", "#76bf55")
     green = Finish("ficus leaf", texture=blade, roughness=0.42, translucency=0.45)
@@ -115,12 +107,7 @@ def potted_ficus(seed: int = 10) -> PropModel:
         "potted_ficus",
         (
             PropPart("pot", pot, textured_finish("terracotta", clay, 0.85), "terracotta"),
-            PropPart(
-                "soil",
-                mesh_difference(soil, trunk),
-                textured_finish("potting soil", earth, 1.0),
-                "potting_soil",
-            ),
+            PropPart("soil", mesh_difference(soil, trunk), textured_finish("potting soil", earth, 1.0), "potting_soil"),
             PropPart("trunk", trunk, textured_finish("ficus bark", bark, 0.85), "hardwood"),
             PropPart("leaves", leaves, green, "leaves-flowers"),
         ),
@@ -153,9 +140,7 @@ def _pot_and_soil() -> tuple[PropMesh, PropMesh]:
         points = np.stack([x, y, 0 * x], -1).reshape(-1, 3) / 0.06
         return 0.188 + 0.004 * noise(points).reshape(x.shape)
 
-    fill = parametric_surfaces.mound_surface(height, lambda a: 0.150 + 0 * a, 12, 40, 0.2).moved(
-        (0, 0, 0.0165)
-    )
+    fill = parametric_surfaces.mound_surface(height, lambda a: 0.150 + 0 * a, 12, 40, 0.2).moved((0, 0, 0.0165))
     return pot, mesh_difference(hollow, mesh_difference(hollow, fill))
 
 
@@ -171,13 +156,9 @@ def small_tree(seed: int = 9) -> PropModel:
     for a in np.arange(5) * 2.4 + 0.3:
         start = stem.at(min(0.70 + 0.055 * (a % 5), 0.97))
         heading = np.array([np.cos(a), np.sin(a), 0.75])
-        twigs += _grow_branch(
-            rng, BranchStart(start, heading, 0.33, 0.013, 2), GrowthHabit(0.8, 0.05)
-        )
+        twigs += _grow_branch(rng, BranchStart(start, heading, 0.33, 0.013, 2), GrowthHabit(0.8, 0.05))
     sides = {3: 14, 2: 7, 1: 5, 0: 3}
-    wood = mesh_union(
-        [parametric_surfaces.tube_surface(t.path, t.radii, sides[t.generations], 2) for t in twigs]
-    )
+    wood = mesh_union([parametric_surfaces.tube_surface(t.path, t.radii, sides[t.generations], 2) for t in twigs])
     v = wood.vertices.copy()
     v[:, 2] = np.maximum(v[:, 2], 0)
     bark = procedural_textures.bark_texture(256, 71, "#40301f", "#6b5440", "#978069")
@@ -188,12 +169,7 @@ def small_tree(seed: int = 9) -> PropModel:
     return PropModel(
         "small_tree",
         (
-            PropPart(
-                "trunk",
-                _at_sapling_size(trunk),
-                textured_finish("tree bark", bark, 0.9),
-                "hardwood",
-            ),
+            PropPart("trunk", _at_sapling_size(trunk), textured_finish("tree bark", bark, 0.9), "hardwood"),
             PropPart("leaves", _at_sapling_size(leaves), green, "leaves-flowers"),
         ),
     )
@@ -204,9 +180,7 @@ def _at_sapling_size(mesh: PropMesh) -> PropMesh:
     return replace(mesh, vertices=0.6 * mesh.vertices)
 
 
-def _grow_branch(
-    rng: np.random.Generator, bud: BranchStart, habit: GrowthHabit
-) -> list[PlantBranch]:
+def _grow_branch(rng: np.random.Generator, bud: BranchStart, habit: GrowthHabit) -> list[PlantBranch]:
     """Grow one branch and then its children."""
     n = 6 if bud.generations else 4
     heading, path = bud.heading, [np.asarray(bud.start, float)]
@@ -238,9 +212,7 @@ def _grow_branch(
     return twigs
 
 
-def _set_leaves(
-    rng: np.random.Generator, twigs: list[PlantBranch], foliage: FoliageStyle
-) -> PropMesh:
+def _set_leaves(rng: np.random.Generator, twigs: list[PlantBranch], foliage: FoliageStyle) -> PropMesh:
     """Set leaves along the last twigs, turned to the light, each with its own tint."""
     ends = [t for t in twigs if t.generations == 0]
     centre = np.mean([t.path.mean(0) for t in ends], 0)
@@ -250,18 +222,12 @@ def _set_leaves(
         twig = ends[k % len(ends)]
         share = 0.2 + 0.8 * ((k // len(ends)) + rng.random() * 0.7) / per_twig
         at = twig.at(min(share, 0.995))
-        leaves.append(
-            _set_leaf(rng, at, unit_vectors(at - centre + [0, 0, 0.02]), twig.heading, foliage)
-        )
+        leaves.append(_set_leaf(rng, at, unit_vectors(at - centre + [0, 0, 0.02]), twig.heading, foliage))
     return concatenate_meshes(leaves)
 
 
 def _set_leaf(
-    rng: np.random.Generator,
-    at: np.ndarray,
-    outward: np.ndarray,
-    along: np.ndarray,
-    foliage: FoliageStyle,
+    rng: np.random.Generator, at: np.ndarray, outward: np.ndarray, along: np.ndarray, foliage: FoliageStyle
 ) -> PropMesh:
     """Set one leaf at a point [m] of a twig."""
     scatter = 0.75 * rng.standard_normal(3) * [1, 1, 0.7]

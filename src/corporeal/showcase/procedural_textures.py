@@ -38,18 +38,14 @@ def image_bytes(x: np.ndarray) -> TextureImage:
     return np.clip(np.round(x), 0, 255).astype(np.uint8)
 
 
-def speckle_texture(
-    n: int, seed: int, *colours: str, falloff: float = 0.8, contrast: float = 0.22
-) -> TextureImage:
+def speckle_texture(n: int, seed: int, *colours: str, falloff: float = 0.8, contrast: float = 0.22) -> TextureImage:
     """Plain fractal noise through a ramp: sand, soil, terracotta, mud."""
     return image_bytes(colour_ramp(0.5 + contrast * fractal_noise(n, seed, falloff), *colours))
 
 
 def swirl_texture(n: int, seed: int, *colours: str) -> TextureImage:
     """Marbled rubber."""
-    return image_bytes(
-        colour_ramp(0.5 + 0.25 * np.sin(3.0 * fractal_noise(n, seed, 2.4, (2, 1))), *colours)
-    )
+    return image_bytes(colour_ramp(0.5 + 0.25 * np.sin(3.0 * fractal_noise(n, seed, 2.4, (2, 1))), *colours))
 
 
 def wood_texture(n: int, seed: int, *colours: str) -> TextureImage:
@@ -88,9 +84,7 @@ def leaf_texture(n: int, *colours: str) -> TextureImage:
 def pages_texture(n: int = 256) -> TextureImage:
     """Edges of paper, one line per leaf."""
     line = np.random.default_rng(1).standard_normal(n)[:, None, None]
-    return image_bytes(
-        rgb_of_hex("#efe6d0") + 9 * line + 3 * fractal_noise(n, 2, 0.5, (12, 1))[..., None]
-    )
+    return image_bytes(rgb_of_hex("#efe6d0") + 9 * line + 3 * fractal_noise(n, 2, 0.5, (12, 1))[..., None])
 
 
 def mug_glaze_texture(n: int = 512) -> TextureImage:
@@ -99,9 +93,7 @@ def mug_glaze_texture(n: int = 512) -> TextureImage:
     v, u = np.meshgrid(1 - t, t, indexing="ij")
     edge = 0.115 + 0.016 * np.sin(4 * np.pi * u) + 0.008 * np.sin(10 * np.pi * u + 1)
     foot, outside = (v < edge)[..., None], (v < 0.478)[..., None]
-    x = np.where(
-        foot, rgb_of_hex("#c19a76"), np.where(outside, rgb_of_hex("#2f7f86"), rgb_of_hex("#f3eee0"))
-    )
+    x = np.where(foot, rgb_of_hex("#c19a76"), np.where(outside, rgb_of_hex("#2f7f86"), rgb_of_hex("#f3eee0")))
     line = np.exp(-(((v - edge - 0.006) / 0.006) ** 2))[..., None]
     return image_bytes(x * (1 - 0.25 * line) + 5 * fractal_noise(n, 4, 1.0)[..., None] * foot)
 
@@ -210,9 +202,7 @@ def _draw_label(n: int, background: str, paint: Callable[[ImageBrush, int], None
     return np.asarray(picture.resize((n, n), Image.Resampling.LANCZOS))
 
 
-def _oval(
-    d: ImageBrush, centre: tuple[float, float], wide: float, tall: float, colour: str
-) -> None:
+def _oval(d: ImageBrush, centre: tuple[float, float], wide: float, tall: float, colour: str) -> None:
     x, y = centre
     d.ellipse([x - wide, y - tall, x + wide, y + tall], fill=colour)
 

@@ -35,9 +35,7 @@ class PropMesh:
         """Turn by xyz Euler angles [degrees], then shift [m]."""
         rotation = Rotation.from_euler("xyz", np.asarray(turn), degrees=True).as_matrix()
         return replace(
-            self,
-            vertices=self.vertices @ rotation.T + np.asarray(by, float),
-            normals=self.normals @ rotation.T,
+            self, vertices=self.vertices @ rotation.T + np.asarray(by, float), normals=self.normals @ rotation.T
         )
 
     def tinted(self, colours: ArrayLike) -> "PropMesh":
@@ -71,9 +69,7 @@ class PropModel:
 
     def moved(self, by: ArrayLike = ZERO_OFFSET, turn: ArrayLike = ZERO_OFFSET) -> "PropModel":
         """Turn by xyz Euler angles [degrees], then shift [m]."""
-        return replace(
-            self, parts=tuple(replace(p, mesh=p.mesh.moved(by, turn)) for p in self.parts)
-        )
+        return replace(self, parts=tuple(replace(p, mesh=p.mesh.moved(by, turn)) for p in self.parts))
 
     def bounds(self) -> Float[np.ndarray, "2 3"]:
         """Lowest and highest corner [m]."""
@@ -81,29 +77,20 @@ class PropModel:
         return np.stack([points.min(0), points.max(0)])
 
 
-def plain_finish(
-    name: str, colour: str, roughness: float, metallic: float = 0.0, emission: float = 0.0
-) -> Finish:
+def plain_finish(name: str, colour: str, roughness: float, metallic: float = 0.0, emission: float = 0.0) -> Finish:
     """Make a finish of one colour, given as '#rrggbb' in sRGB."""
     rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
     red, green, blue = (float(x) for x in srgb_to_linear(rgb).round(6))
-    return Finish(
-        name, (red, green, blue, 1.0), metallic=metallic, roughness=roughness, emission=emission
-    )
+    return Finish(name, (red, green, blue, 1.0), metallic=metallic, roughness=roughness, emission=emission)
 
 
-def textured_finish(
-    name: str, texture: UInt8[np.ndarray, "H W 3"], roughness: float, metallic: float = 0.0
-) -> Finish:
+def textured_finish(name: str, texture: UInt8[np.ndarray, "H W 3"], roughness: float, metallic: float = 0.0) -> Finish:
     """Make a finish that carries a picture."""
     return Finish(name, texture=texture, metallic=metallic, roughness=roughness)
 
 
 def make_mesh(
-    vertices: ArrayLike,
-    faces: ArrayLike,
-    uv: ArrayLike | None = None,
-    normals: ArrayLike | None = None,
+    vertices: ArrayLike, faces: ArrayLike, uv: ArrayLike | None = None, normals: ArrayLike | None = None
 ) -> PropMesh:
     """Fill in what is missing: smooth normals over welded positions, zero UV; colour white."""
     v, f = np.asarray(vertices, float), np.asarray(faces, np.int64)
@@ -116,9 +103,7 @@ def weld_vertices(
     vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"]
 ) -> tuple[Float[np.ndarray, "W 3"], Int[np.ndarray, "S 3"]]:
     """Merge vertices at the same position (to 1e-7 m); drop triangles that collapse."""
-    _, first, number = np.unique(
-        np.round(vertices, 7), axis=0, return_index=True, return_inverse=True
-    )
+    _, first, number = np.unique(np.round(vertices, 7), axis=0, return_index=True, return_inverse=True)
     f = number.reshape(-1)[faces]
     return vertices[first], f[_proper_triangles(f)]
 
@@ -135,10 +120,7 @@ def welded_vertex_normals(
 
 
 def corner_normals(
-    vertices: Float[np.ndarray, "V 3"],
-    faces: Int[np.ndarray, "T 3"],
-    numbers: Int[np.ndarray, "T 3"],
-    count: int,
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"], numbers: Int[np.ndarray, "T 3"], count: int
 ) -> Float[np.ndarray, "count 3"]:
     """Area-weighted unit normals of ``count`` points; ``numbers`` says which point a corner is."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
@@ -167,9 +149,7 @@ def concatenate_meshes(meshes: Sequence[PropMesh]) -> PropMesh:
 
 def mesh_union(meshes: Sequence[PropMesh]) -> PropMesh:
     """Boolean union; normals, UV and colours ride along."""
-    return _mesh_of_manifold(
-        m3.Manifold.batch_boolean([_manifold_of_mesh(m) for m in meshes], m3.OpType.Add)
-    )
+    return _mesh_of_manifold(m3.Manifold.batch_boolean([_manifold_of_mesh(m) for m in meshes], m3.OpType.Add))
 
 
 def mesh_difference(mesh: PropMesh, *away: PropMesh) -> PropMesh:

@@ -31,6 +31,4 @@ PROP_BUILDERS: dict[str, Callable[[], PropModel]] = {
 }
 POURED_MODELS = ("honey", "ketchup")
 """Models of what has no shape of its own: they are no props of a pool."""
-POOL_PROP_BUILDERS = {
-    name: build for name, build in PROP_BUILDERS.items() if name not in POURED_MODELS
-}
+POOL_PROP_BUILDERS = {name: build for name, build in PROP_BUILDERS.items() if name not in POURED_MODELS}

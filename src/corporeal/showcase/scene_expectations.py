@@ -1,8 +1,8 @@
 """Expected outcomes of the showcase scenes, and their comparison.
 
-The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order.
-Each expectation bounds a measure from both sides where too much is as wrong as too little, and
-names a run that must not meet it: one of ``FAULTY_RUNS``, each the same scene with one known fault.
+The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order. Each expectation bounds
+a measure from both sides where too much is as wrong as too little, and names a run that must not meet it: one of
+``FAULTY_RUNS``, each the same scene with one known fault.
 """
 
 from collections.abc import Callable
@@ -15,9 +15,7 @@ from typing import Any, Literal
 from corporeal.core.audit_data import Expectation, ObjectOutcome, Outcome
 
 OutcomeMeasure = Callable[[Outcome], float | None]
-FaultName = Literal[
-    "single", "capped", "wrong", "halfgravity", "frozen", "squashed", "toppled", "shifted"
-]
+FaultName = Literal["single", "capped", "wrong", "halfgravity", "frozen", "squashed", "toppled", "shifted"]
 FAULTY_RUNS: dict[FaultName, str] = {
     "single": "one velocity field for all objects",
     "capped": "Young's moduli capped by the published rule",
@@ -195,9 +193,7 @@ FALL_HEIGHT_TOLERANCE = 0.1
 def expect_fall(thing: str, height: float, words: str) -> MeasureExpectation:
     """Demand that an object strikes as after a free fall of some height [m]."""
     low, high = (1 - FALL_HEIGHT_TOLERANCE) * height, (1 + FALL_HEIGHT_TOLERANCE) * height
-    return MeasureExpectation(
-        words, measure_of_object(thing, "fall_m"), low, high, "m", "halfgravity"
-    )
+    return MeasureExpectation(words, measure_of_object(thing, "fall_m"), low, high, "m", "halfgravity")
 
 
 SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] = {
@@ -205,12 +201,7 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
         expect_fall("rubber_duck", 1.2, "The duck strikes as after its fall"),
         # Deeper than 0.06 m, half of the duck's height, the mud would have swallowed it.
         MeasureExpectation(
-            "The mud keeps an imprint (deeper than a grid cell)",
-            dent_depth("mud_pile"),
-            0,
-            0.06,
-            "mm",
-            "frozen",
+            "The mud keeps an imprint (deeper than a grid cell)", dent_depth("mud_pile"), 0, 0.06, "mm", "frozen"
         ),
         MeasureExpectation(
             "The duck ends undeformed (shape error)",
@@ -224,12 +215,7 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
     "duck-on-can": (
         expect_fall("rubber_duck", 2.0, "The duck strikes as after its fall"),
         MeasureExpectation(
-            "The can keeps a dent",
-            measure_of_object("soda_can", "dent_depth_dx"),
-            1,
-            inf,
-            "grid cells",
-            "wrong",
+            "The can keeps a dent", measure_of_object("soda_can", "dent_depth_dx"), 1, inf, "grid cells", "wrong"
         ),
         # The can is 0.066 m across.
         MeasureExpectation(
@@ -241,12 +227,7 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
             "capped",
         ),
         MeasureExpectation(
-            "The dent is where the duck struck",
-            dent_from_impact,
-            -inf,
-            1 / 3,
-            "lengths of the duck",
-            "single",
+            "The dent is where the duck struck", dent_from_impact, -inf, 1 / 3, "lengths of the duck", "single"
         ),
         # A body that is squashed flat has a shape error of some 10 %.
         MeasureExpectation(
@@ -280,12 +261,8 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
             are_met_in_order("vase", "ball", "armchair"),
             "single",
         ),
-        FactExpectation(
-            "Vase and ball part again", separated_after_contact("vase", "ball"), "single"
-        ),
-        FactExpectation(
-            "Ball and armchair part again", separated_after_contact("ball", "armchair"), "capped"
-        ),
+        FactExpectation("Vase and ball part again", separated_after_contact("vase", "ball"), "single"),
+        FactExpectation("Ball and armchair part again", separated_after_contact("ball", "armchair"), "capped"),
         MeasureExpectation(
             "The vase keeps its shape (largest shape error)",
             measure_of_object("vase", "shape_error_max"),
@@ -306,12 +283,7 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
     "lamp-on-couch": (
         # Its cushions are 0.2 m thick.
         MeasureExpectation(
-            "The cushions give far",
-            measure_of_object("couch", "deepest_squeeze_m"),
-            0.02,
-            0.2,
-            "mm",
-            "frozen",
+            "The cushions give far", measure_of_object("couch", "deepest_squeeze_m"), 0.02, 0.2, "mm", "frozen"
         ),
         MeasureExpectation(
             "The lamp keeps its shape (shape error)",
@@ -321,61 +293,32 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
             "%",
             "squashed",
         ),
-        FactExpectation(
-            "The lamp lifts off again",
-            measure_between("couch", "floor_lamp", "separated"),
-            "frozen",
-        ),
+        FactExpectation("The lamp lifts off again", measure_between("couch", "floor_lamp", "separated"), "frozen"),
     ),
     "ficus-pushed": (
         # Leaves that swing by a third of its height would be torn off.
         MeasureExpectation(
-            "The plant sways",
-            measure_of_object("potted_ficus", "deepest_squeeze_m"),
-            0.001,
-            0.3,
-            "mm",
-            "frozen",
+            "The plant sways", measure_of_object("potted_ficus", "deepest_squeeze_m"), 0.001, 0.3, "mm", "frozen"
         ),
         MeasureExpectation(
-            "The pot stays put",
-            measure_of_object("potted_ficus", "moved_level_m"),
-            -inf,
-            0.01,
-            "mm",
-            "shifted",
+            "The pot stays put", measure_of_object("potted_ficus", "moved_level_m"), -inf, 0.01, "mm", "shifted"
         ),
     ),
     "tree-and-ball-in-sand": (
         expect_fall("ball", 1.2, "The ball strikes as after its fall"),
         # At 0.1 m half of the ball would be below the surface.
         MeasureExpectation(
-            "The sand keeps a mark (deeper than a grid cell)",
-            dent_depth("sand_pile"),
-            0,
-            0.1,
-            "mm",
-            "frozen",
+            "The sand keeps a mark (deeper than a grid cell)", dent_depth("sand_pile"), 0, 0.1, "mm", "frozen"
         ),
         MeasureExpectation(
-            "The tree stands",
-            measure_of_object("small_tree", "turned_deg"),
-            -inf,
-            15,
-            "degrees",
-            "toppled",
+            "The tree stands", measure_of_object("small_tree", "turned_deg"), -inf, 15, "degrees", "toppled"
         ),
     ),
     "steel-and-rubber": (
         expect_fall("steel_ball", 0.5, "The steel ball strikes as after its fall"),
         expect_fall("rubber_ball", 0.5, "The rubber ball strikes as after its fall"),
         MeasureExpectation(
-            "The rubber ball rebounds higher, as shares of the fall",
-            rubber_rebound_excess,
-            0.1,
-            0.8,
-            "%",
-            "wrong",
+            "The rubber ball rebounds higher, as shares of the fall", rubber_rebound_excess, 0.1, 0.8, "%", "wrong"
         ),
         # Steel on concrete: e between 0.3 and 0.8.
         MeasureExpectation(
@@ -398,22 +341,10 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
     "water-knocked-over": (
         # The impact has one and a half times what tips it over (``showcase.scenes``).
         MeasureExpectation(
-            "The glass falls over",
-            measure_of_object("tumbler", "turned_deg"),
-            60,
-            120,
-            "degrees",
-            "frozen",
+            "The glass falls over", measure_of_object("tumbler", "turned_deg"), 60, 120, "degrees", "frozen"
         ),
         # What lies below the lower rim of a glass on its side stays: a tenth at most.
-        MeasureExpectation(
-            "The water leaves it (share)",
-            spilled_fraction("tumbler_0_water"),
-            0.6,
-            1.0,
-            "%",
-            "frozen",
-        ),
+        MeasureExpectation("The water leaves it (share)", spilled_fraction("tumbler_0_water"), 0.6, 1.0, "%", "frozen"),
         # A ball that came back as fast as it came would give 0.37 kg m/s to 0.38 kg.
         MeasureExpectation(
             "The impact carries the water no farther than its momentum can (mean way)",
@@ -427,25 +358,15 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
     "honey-poured": (
         # Huppert 1982: 0.063 m after 1 s.
         MeasureExpectation(
-            "The honey spreads (radius)",
-            measure_of_object("honey", "reach_m"),
-            0.04,
-            0.068,
-            "mm",
-            "frozen",
+            "The honey spreads (radius)", measure_of_object("honey", "reach_m"), 0.04, 0.068, "mm", "frozen"
         ),
         MeasureExpectation(
-            "It lies flat: its height",
-            measure_of_object("honey", "height_m"),
-            0.006,
-            0.03,
-            "mm",
-            "toppled",
+            "It lies flat: its height", measure_of_object("honey", "height_m"), 0.006, 0.03, "mm", "toppled"
         ),
     ),
     "ketchup-stops": (
-        # 0.0625 m where it is let down slowly (``showcase.scenes``); what falls goes on by its own
-        # momentum, so less of it by a twelfth at most, and more by a fifth.
+        # 0.0625 m where it is let down slowly (``showcase.scenes``); what falls goes on by its own momentum, so less of
+        # it by a twelfth at most, and more by a fifth.
         MeasureExpectation(
             "The ketchup slumps as far as its yield stress lets it (radius)",
             measure_of_object("ketchup", "reach_m"),
@@ -454,8 +375,8 @@ SCENE_EXPECTATIONS: dict[str, tuple[MeasureExpectation | FactExpectation, ...]] 
             "mm",
             "halfgravity",
         ),
-        # 1.19 for the profile of ``showcase.scenes``: 98 % of it lie within 16.5 mm of its 21 mm
-        # and 61.3 mm of its middle. A tenth to either side; squashed to seven tenths it is below 1.
+        # 1.19 for the profile of ``showcase.scenes``: 98 % of it lie within 16.5 mm of its 21 mm and 61.3 mm of its
+        # middle. A tenth to either side; squashed to seven tenths it is below 1.
         MeasureExpectation(
             "The ketchup keeps its volume (height times area, over its volume)",
             heap_fill_ratio("ketchup", 1.64e-4),

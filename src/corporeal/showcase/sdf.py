@@ -14,21 +14,15 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
-from corporeal.showcase.prop_mesh import (
-    ZERO_OFFSET,
-    PropMesh,
-    make_mesh,
-    unit_vectors,
-    weld_vertices,
-)
+from corporeal.showcase.prop_mesh import ZERO_OFFSET, PropMesh, make_mesh, unit_vectors, weld_vertices
 
 SdfPoints = Float[np.ndarray, "N 3"]
 SignedDistances = Float[np.ndarray, " N"]
 SignedDistanceField = Callable[[SdfPoints], SignedDistances]
 """From points [m] to signed distances [m]."""
 MAX_FIELD_SLOPE = 3.0
-"""Values of a field over distances from its surface, at most [-]: 1 where they are distances, more
-about ellipsoids and stretched rings."""
+"""Values of a field over distances from its surface, at most [-]: 1 where they are distances, more about ellipsoids and
+stretched rings."""
 
 
 def _vector_lengths(v: SdfPoints) -> SignedDistances:
@@ -37,9 +31,7 @@ def _vector_lengths(v: SdfPoints) -> SignedDistances:
     return np.sqrt(x * x + y * y + z * z)
 
 
-def sdf_ellipsoid(
-    centre: ArrayLike, radii: ArrayLike, turn: ArrayLike = ZERO_OFFSET
-) -> SignedDistanceField:
+def sdf_ellipsoid(centre: ArrayLike, radii: ArrayLike, turn: ArrayLike = ZERO_OFFSET) -> SignedDistanceField:
     """Ellipsoid about a centre, turned by xyz Euler angles [degrees]; exact on its surface."""
     c, r = np.asarray(centre, float), np.asarray(radii, float)
     axes = Rotation.from_euler("xyz", np.asarray(turn), degrees=True).as_matrix()
@@ -80,9 +72,7 @@ def sdf_cylinder(radius: float, low: float, high: float, fillet: float) -> Signe
     return field
 
 
-def sdf_torus(
-    centre: ArrayLike, major: float, minor: float, tall: float = 1.0
-) -> SignedDistanceField:
+def sdf_torus(centre: ArrayLike, major: float, minor: float, tall: float = 1.0) -> SignedDistanceField:
     """Ring in the xz plane; ``tall`` stretches it along z."""
 
     def field(p: SdfPoints) -> SignedDistances:
@@ -111,17 +101,13 @@ def sdf_smooth_union(*fields: SignedDistanceField, k: float) -> SignedDistanceFi
     return field
 
 
-def sdf_smooth_intersection(
-    f: SignedDistanceField, g: SignedDistanceField, k: float = 1e-4
-) -> SignedDistanceField:
+def sdf_smooth_intersection(f: SignedDistanceField, g: SignedDistanceField, k: float = 1e-4) -> SignedDistanceField:
     """Smooth intersection."""
     outside = sdf_smooth_union(lambda p: -f(p), lambda p: -g(p), k=k)
     return lambda p: -outside(p)
 
 
-def sdf_smooth_difference(
-    f: SignedDistanceField, g: SignedDistanceField, k: float = 1e-4
-) -> SignedDistanceField:
+def sdf_smooth_difference(f: SignedDistanceField, g: SignedDistanceField, k: float = 1e-4) -> SignedDistanceField:
     """Smooth difference."""
     return sdf_smooth_intersection(f, lambda p: -g(p), k)
 
@@ -181,25 +167,17 @@ def _marching_cubes(f: SignedDistanceField, sampling: SdfSampling) -> tuple[np.n
     """Marching cubes on a regular grid, welded."""
     step = sampling.step
     # An odd offset keeps grid points off flat faces: a distance of exactly zero would tear them.
-    axes = [
-        np.arange(a - 2.318 * step, b + 3 * step, step)
-        for a, b in zip(sampling.low, sampling.high, strict=True)
-    ]
+    axes = [np.arange(a - 2.318 * step, b + 3 * step, step) for a, b in zip(sampling.low, sampling.high, strict=True)]
     values = values_near_surface(f, axes, step)
     if min(np.take(values, end, axis).min() for axis in range(3) for end in (0, -1)) < 0:
         raise ValueError(
-            f"The surface leaves the box {sampling.low} to {sampling.high} m and would stay open. "
-            "Widen the box."
+            f"The surface leaves the box {sampling.low} to {sampling.high} m and would stay open. Widen the box."
         )
-    v, faces, _, _ = marching_cubes(
-        values, 0.0, spacing=(step, step, step), gradient_direction="descent"
-    )
+    v, faces, _, _ = marching_cubes(values, 0.0, spacing=(step, step, step), gradient_direction="descent")
     return weld_vertices(v + np.array([a[0] for a in axes]), faces)
 
 
-def values_near_surface(
-    f: SignedDistanceField, axes: Sequence[np.ndarray], step: float
-) -> Float[np.ndarray, "X Y Z"]:
+def values_near_surface(f: SignedDistanceField, axes: Sequence[np.ndarray], step: float) -> Float[np.ndarray, "X Y Z"]:
     """Values of a field on a grid, exact in every cell that its surface could go through.
 
     Every second point along each axis is asked first. Where the values at all eight about a place

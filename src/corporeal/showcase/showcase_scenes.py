@@ -1,7 +1,7 @@
 """The ten showcase scenes: initial states and forces.
 
-Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
-has there: the video begins when something is about to happen. Nothing numerical is in a scene.
+Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it has there: the
+video begins when something is about to happen. Nothing numerical is in a scene.
 """
 
 import math
@@ -83,9 +83,7 @@ def duck_on_mud() -> ShowcaseComposition:
     the mud's inertia, ρ v², which at first is more. The mud flows and keeps an imprint of a
     few centimetres, in which the duck tips over and comes to rest on its beak.
     """
-    duck = PlacedModel(
-        "rubber_duck", (0.0, 0.0, 0.245), (2, -3, 10), velocity_after_fall(1.2, 0.155)
-    )
+    duck = PlacedModel("rubber_duck", (0.0, 0.0, 0.245), (2, -3, 10), velocity_after_fall(1.2, 0.155))
     return ShowcaseComposition(
         "The mud yields under the duck and keeps its imprint; the duck ends undeformed.",
         (PlacedModel("mud_pile"), duck),
@@ -97,14 +95,13 @@ def duck_on_mud() -> ShowcaseComposition:
 def duck_on_can() -> ShowcaseComposition:
     """Throw the duck down onto an empty can that lies on its side.
 
-    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic dent
-    of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and Suh
-    1988). With 285 MPa and t = 0.1 mm that is 73 N at 1 mm and 230 N at 10 mm, which costs (2/3) P
-    δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with k ≈ 2.3 E
-    h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J, 50 N) it only
-    bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with 75 N, which in
-    reality leaves a dent of a millimetre or two. The simulated dent is far deeper: a wall that the
-    grid must thicken is softer in its plane. Its place and its rest are reliable, its depth is not.
+    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic dent of depth δ in a
+    tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and Suh 1988). With 285 MPa and t = 0.1 mm that
+    is 73 N at 1 mm and 230 N at 10 mm, which costs (2/3) P δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h
+    = 2 mm, pushes back with k ≈ 2.3 E h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J,
+    50 N) it only bounces; thrown down at 6 m/s, as a child can, it has 1.4 J and pushes with 75 N, which in reality
+    leaves a dent of a millimetre or two. The simulated dent is far deeper: a wall that the grid must thicken is softer
+    in its plane. Its place and its rest are reliable, its depth is not.
     """
     can = PlacedModel("soda_can", (-0.0575, 0, 0.0331), (0, 90, 0))
     duck = PlacedModel("rubber_duck", (-0.005, 0.0, 0.24), (0, 0, -15), (0.0, 0.0, -6.0))
@@ -202,10 +199,7 @@ def water_knocked_over() -> ShowcaseComposition:
     """
     return ShowcaseComposition(
         "A glass of water falls over: water leaves it, and is heavier than the glass.",
-        (
-            PlacedModel("tumbler"),
-            PlacedModel("wooden_ball", (-0.085, 0.004, 0.062), velocity=(4.0, 0.0, 0.0)),
-        ),
+        (PlacedModel("tumbler"), PlacedModel("wooden_ball", (-0.085, 0.004, 0.062), velocity=(4.0, 0.0, 0.0))),
         view=(0.30, -0.85, 0.42),
         duration=1.0,
     )
@@ -214,8 +208,8 @@ def water_knocked_over() -> ShowcaseComposition:
 def honey_poured() -> ShowcaseComposition:
     """Let a column of honey fall out of its jar onto the floor.
 
-    A viscous drop of volume V spreads as r = 0.894 (g V³ t/3ν)^⅛ (Huppert 1982): 113 cm³ of 10 Pa s
-    are 12.6 cm across after 1 s.
+    A viscous drop of volume V spreads as r = 0.894 (g V³ t/3ν)^⅛ (Huppert 1982): 113 cm³ of 10 Pa s are 12.6 cm across
+    after 1 s.
     """
     return ShowcaseComposition(
         "Honey folds down and spreads, slower and slower.",
@@ -233,10 +227,7 @@ def ketchup_stops() -> ShowcaseComposition:
     25 Pa it is 12.5 cm across and 21 mm high. Without a yield stress it would not stop.
     """
     return ShowcaseComposition(
-        "Ketchup slumps into a heap that stays.",
-        (PlacedModel("ketchup"),),
-        view=(0.80, -0.62, 0.40),
-        duration=1.0,
+        "Ketchup slumps into a heap that stays.", (PlacedModel("ketchup"),), view=(0.80, -0.62, 0.40), duration=1.0
     )
 
 
@@ -262,9 +253,7 @@ def build_showcase_scene(name: str) -> Scene:
 
     """
     composition = _composition_of(name)
-    return scene_of_models(
-        name, place_models(composition), composition.models, composition.duration
-    )
+    return scene_of_models(name, place_models(composition), composition.models, composition.duration)
 
 
 def build_single_prop_scene(model: str) -> Scene:
@@ -279,9 +268,7 @@ def build_single_prop_scene(model: str) -> Scene:
     return scene_of_models(model, [PROP_BUILDERS[model]()], [PlacedModel(model)], duration=1.0)
 
 
-def scene_of_models(
-    name: str, models: Sequence[PropModel], things: Sequence[PlacedModel], duration: float
-) -> Scene:
+def scene_of_models(name: str, models: Sequence[PropModel], things: Sequence[PlacedModel], duration: float) -> Scene:
     """Put models, one per object, into a scene."""
     finishes = {id(p.finish): p.finish for m in models for p in m.parts}
     places = list(finishes)
@@ -319,8 +306,7 @@ def view_direction(name: str) -> PropPoint:
 def place_models(composition: ShowcaseComposition) -> list[PropModel]:
     """Build the models and put them where they stand."""
     models = [
-        _without_parts_of_model(PROP_BUILDERS[t.model](), t.without).moved(t.at, t.turn)
-        for t in composition.models
+        _without_parts_of_model(PROP_BUILDERS[t.model](), t.without).moved(t.at, t.turn) for t in composition.models
     ]
     for inner, outer in composition.planted.items():
         models[outer] = _cut_room_in_heap(models[outer], models[inner])
@@ -334,13 +320,7 @@ def _without_parts_of_model(model: PropModel, missing: tuple[str, ...]) -> PropM
 def _cut_room_in_heap(heap: PropModel, guest: PropModel) -> PropModel:
     solid = guest.parts[0].mesh
     parts = tuple(
-        PropPart(
-            p.name,
-            mesh_difference(p.mesh, concatenate_meshes([solid])),
-            p.finish,
-            p.substance,
-            p.shell,
-        )
+        PropPart(p.name, mesh_difference(p.mesh, concatenate_meshes([solid])), p.finish, p.substance, p.shell)
         for p in heap.parts
     )
     return PropModel(heap.name, parts)

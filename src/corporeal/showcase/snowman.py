@@ -26,24 +26,9 @@ def snowman() -> PropModel:
         "snowman",
         (
             PropPart("snow", snow, plain_finish("snow", "#f3f7fc", 0.85), "snow"),
-            PropPart(
-                "coal",
-                mesh_difference(_coal_pieces(), snow),
-                plain_finish("coal", "#1b1a1c", 0.7),
-                "granite",
-            ),
-            PropPart(
-                "nose",
-                mesh_difference(_carrot(), snow),
-                plain_finish("carrot", "#ee7416", 0.6),
-                "apple",
-            ),
-            PropPart(
-                "arms",
-                mesh_difference(_arms(), snow),
-                textured_finish("twig bark", bark, 0.9),
-                "hardwood",
-            ),
+            PropPart("coal", mesh_difference(_coal_pieces(), snow), plain_finish("coal", "#1b1a1c", 0.7), "granite"),
+            PropPart("nose", mesh_difference(_carrot(), snow), plain_finish("carrot", "#ee7416", 0.6), "apple"),
+            PropPart("arms", mesh_difference(_arms(), snow), textured_finish("twig bark", bark, 0.9), "hardwood"),
         ),
     )
 
@@ -67,21 +52,15 @@ def _coal_pieces() -> PropMesh:
     """Two eyes, three buttons, five pieces of a smile."""
     spots = [(0.160, 0.058, 1.080, 0.021), (0.160, -0.058, 1.080, 0.021)]
     spots += [(0.235, 0, 0.79, 0.020), (0.243, 0, 0.70, 0.021), (0.236, 0, 0.61, 0.020)]
-    spots += [
-        (0.163 - 0.9 * y * y, y, 0.975 + 3.2 * y * y, 0.0105) for y in np.linspace(-0.06, 0.06, 5)
-    ]
-    return concatenate_meshes(
-        [_coal_lump((x, y, z), r, seed) for seed, (x, y, z, r) in enumerate(spots)]
-    )
+    spots += [(0.163 - 0.9 * y * y, y, 0.975 + 3.2 * y * y, 0.0105) for y in np.linspace(-0.06, 0.06, 5)]
+    return concatenate_meshes([_coal_lump((x, y, z), r, seed) for seed, (x, y, z, r) in enumerate(spots)])
 
 
 def _coal_lump(centre: PropPoint, radius: float, seed: int) -> PropMesh:
     """Model one rough piece of coal."""
     c = np.array(centre)
     return sdf.mesh_sdf(
-        sdf.sdf_displaced(
-            sdf.sdf_sphere(c, radius), sdf.periodic_noise_3d(seed), 0.12 * radius, 1.6 * radius
-        ),
+        sdf.sdf_displaced(sdf.sdf_sphere(c, radius), sdf.periodic_noise_3d(seed), 0.12 * radius, 1.6 * radius),
         sdf.SdfSampling(c - 1.4 * radius, c + 1.4 * radius, radius / 6, 260),
     )
 
@@ -89,9 +68,7 @@ def _coal_lump(centre: PropPoint, radius: float, seed: int) -> PropMesh:
 def _carrot() -> PropMesh:
     t = np.linspace(0, 1, 9)
     path = np.stack([0.13 + 0.20 * t, 0 * t, 1.03 - 0.02 * t**2], 1)
-    return parametric_surfaces.tube_surface(
-        path, 0.026 * (1 - 0.85 * t) * (1 + 0.06 * np.sin(25 * t)), 14
-    )
+    return parametric_surfaces.tube_surface(path, 0.026 * (1 - 0.85 * t) * (1 + 0.06 * np.sin(25 * t)), 14)
 
 
 def _arms() -> PropMesh:
@@ -108,7 +85,5 @@ def _arms() -> PropMesh:
 def _twig(start: PropPoint, end: PropPoint, lift: float, radius: float) -> PropMesh:
     """Bend a twig upwards by ``lift`` [m]; it tapers to half its radius."""
     a, b = np.array(start), np.array(end)
-    path = (
-        a + TWIG_PATH_FRACTIONS * (b - a) + lift * np.sin(np.pi * TWIG_PATH_FRACTIONS) * [0, 0, 1]
-    )
+    path = a + TWIG_PATH_FRACTIONS * (b - a) + lift * np.sin(np.pi * TWIG_PATH_FRACTIONS) * [0, 0, 1]
     return parametric_surfaces.tube_surface(path, np.linspace(radius, 0.5 * radius, 7), 8)

@@ -27,9 +27,7 @@ def rubber_duck() -> PropModel:
     duck = PropModel(
         "rubber_duck",
         (
-            PropPart(
-                "body", body, plain_finish("duck yellow vinyl", "#fbb80f", 0.30), "soft_PVC", 0.002
-            ),
+            PropPart("body", body, plain_finish("duck yellow vinyl", "#fbb80f", 0.30), "soft_PVC", 0.002),
             PropPart("beak", mesh_difference(_beak(), body), orange, "soft_PVC"),
             PropPart("eye_left", mesh_difference(_eye(1), body), black, "soft_PVC"),
             PropPart("eye_right", mesh_difference(_eye(-1), body), black, "soft_PVC"),
@@ -46,10 +44,7 @@ def _duck_body() -> PropMesh:
     )
     tail = sdf.sdf_capsule((-0.026, 0, 0.040), (-0.056, 0, 0.068), 0.021, 0.0035)
     left, right = (
-        sdf.sdf_ellipsoid(
-            (-0.010, s * 0.0335, 0.040), (0.025, 0.0075, 0.0165), (s * -14, -16, s * 8)
-        )
-        for s in (1, -1)
+        sdf.sdf_ellipsoid((-0.010, s * 0.0335, 0.040), (0.025, 0.0075, 0.0165), (s * -14, -16, s * 8)) for s in (1, -1)
     )
     head = sdf.sdf_ellipsoid((0.024, 0, 0.086), (0.0275, 0.0262, 0.0260))
     bird = sdf.sdf_smooth_union(sdf.sdf_smooth_union(trunk, tail, k=0.024), head, k=0.019)
@@ -84,8 +79,8 @@ def _eye(side: int) -> PropMesh:
 def play_ball() -> PropModel:
     """Model a play ball, 0.22 m across, of EVA foam.
 
-    Not an inflated one: it is the air in it that makes that stiff, and a wall of 3 mm of rubber
-    alone would sag under its own weight.
+    Not an inflated one: it is the air in it that makes that stiff, and a wall of 3 mm of rubber alone would sag under
+    its own weight.
     """
     look = textured_finish("ball foam skin", procedural_textures.ball_stripes(), 0.38)
     return PropModel("ball", (PropPart("ball", _ball_of_radius(0.11), look, "EVA_foam"),))
@@ -94,9 +89,7 @@ def play_ball() -> PropModel:
 def rubber_ball() -> PropModel:
     """Model a solid bouncy ball, 0.10 m across."""
     look = textured_finish(
-        "swirled rubber",
-        procedural_textures.swirl_texture(512, 12, "#c2185b", "#ff5a36", "#ffb347"),
-        0.3,
+        "swirled rubber", procedural_textures.swirl_texture(512, 12, "#c2185b", "#ff5a36", "#ffb347"), 0.3
     )
     return PropModel("rubber_ball", (PropPart("ball", _ball_of_radius(0.05), look, "rubber"),))
 
@@ -111,20 +104,14 @@ def _ball_of_radius(radius: float, segments: int = 96) -> PropMesh:
     t = np.linspace(-np.pi / 2, np.pi / 2, segments // 2 + 1)
     profile = radius * np.stack([np.cos(t), np.sin(t)], 1)
     profile[[0, -1], 0] = 0
-    return (
-        parametric_surfaces.lathe_surface(profile, segments)
-        .moved(turn=(24, -18, 0))
-        .moved((0, 0, radius))
-    )
+    return parametric_surfaces.lathe_surface(profile, segments).moved(turn=(24, -18, 0)).moved((0, 0, radius))
 
 
 def cloth_bound_book() -> PropModel:
     """Model a cloth-bound book, 21 × 15 × 3 cm, lying flat."""
     wide, tall, thick, board = 0.15, 0.21, 0.032, 0.003
     boards = [
-        parametric_surfaces.RoundedBox((wide, tall, board), 0.0012, corner=4)
-        .mesh()
-        .moved((0, 0, z))
+        parametric_surfaces.RoundedBox((wide, tall, board), 0.0012, corner=4).mesh().moved((0, 0, z))
         for z in (board / 2, thick - board / 2)
     ]
     a = np.radians(np.linspace(90, 270, 13))
@@ -139,19 +126,12 @@ def cloth_bound_book() -> PropModel:
     uv = np.where(on_board, np.stack([0.5 + v[:, 1] / tall, 0.5 - v[:, 0] / wide], 1), 0.02)
     cover = replace(cover, uv=np.stack([1 - uv[:, 0], uv[:, 1]], 1))
     size = (wide - 0.008, tall - 0.008, thick - 2 * board)
-    block = (
-        parametric_surfaces.RoundedBox(size, 0.0008, tile=0.05, grain=1)
-        .mesh()
-        .moved((-0.002, 0, thick / 2))
-    )
+    block = parametric_surfaces.RoundedBox(size, 0.0008, tile=0.05, grain=1).mesh().moved((-0.002, 0, thick / 2))
     return PropModel(
         "book",
         (
             PropPart(
-                "cover",
-                cover,
-                textured_finish("book cloth", procedural_textures.book_cover(), 0.65),
-                "cardboard",
+                "cover", cover, textured_finish("book cloth", procedural_textures.book_cover(), 0.65), "cardboard"
             ),
             PropPart(
                 "pages",
@@ -172,14 +152,8 @@ def _extrude_outline(outline: np.ndarray, depth: float) -> PropMesh:
 
 def throw_pillow() -> PropModel:
     """Model a throw pillow, 0.45 m."""
-    pillow = parametric_surfaces.CushionShape(
-        (0.45, 0.45, 0.03), 0.062, 0.0145, 0.005, 20, pinch=0.07, seams=(0,)
-    )
+    pillow = parametric_surfaces.CushionShape((0.45, 0.45, 0.03), 0.062, 0.0145, 0.005, 20, pinch=0.07, seams=(0,))
     look = textured_finish(
-        "mustard weave",
-        procedural_textures.weave_texture(512, 21, "#7d5512", "#d79a2b", "#f2c766"),
-        0.95,
+        "mustard weave", procedural_textures.weave_texture(512, 21, "#7d5512", "#d79a2b", "#f2c766"), 0.95
     )
-    return PropModel(
-        "cushion", (PropPart("cushion", pillow.mesh().moved((0, 0, 0.077)), look, "fibre_fill"),)
-    )
+    return PropModel("cushion", (PropPart("cushion", pillow.mesh().moved((0, 0, 0.077)), look, "fibre_fill"),))

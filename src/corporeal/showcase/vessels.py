@@ -22,21 +22,11 @@ def tumbler() -> PropModel:
     outside = [(0.0, 0.0), (0.030, 0.0), (0.034, 0.004), (0.035, 0.098), (0.0345, 0.1)]
     inside = [(0.0325, 0.1), (0.032, 0.098), (0.031, 0.012), (0.027, 0.008), (0.0, 0.008)]
     profile = np.concatenate(
-        [
-            parametric_surfaces.soften_corners(outside, 4),
-            parametric_surfaces.soften_corners(inside, 4),
-        ]
+        [parametric_surfaces.soften_corners(outside, 4), parametric_surfaces.soften_corners(inside, 4)]
     )
     pale = plain_finish("clear glass", "#dcecf0", 0.05)
     look = replace(pale, colour=(*pale.colour[:3], 0.1), alpha_mode="BLEND")
-    wall = PropPart(
-        "glass",
-        parametric_surfaces.lathe_surface(profile, 72),
-        look,
-        "glass",
-        contents="water",
-        fill=0.6,
-    )
+    wall = PropPart("glass", parametric_surfaces.lathe_surface(profile, 72), look, "glass", contents="water", fill=0.6)
     return PropModel("tumbler", (wall,))
 
 
@@ -49,9 +39,7 @@ def honey() -> PropModel:
 def ketchup() -> PropModel:
     """Model ketchup as a cup leaves it that is lifted off: 6 cm across and 6 cm tall."""
     look = plain_finish("ketchup", "#b3170f", 0.15)
-    return PropModel(
-        "ketchup", (PropPart("ketchup", _upright_cylinder(0.030, 0.06), look, "ketchup"),)
-    )
+    return PropModel("ketchup", (PropPart("ketchup", _upright_cylinder(0.030, 0.06), look, "ketchup"),))
 
 
 def wooden_ball() -> PropModel:
@@ -60,9 +48,7 @@ def wooden_ball() -> PropModel:
     profile = 0.025 * np.stack([np.cos(t), np.sin(t)], 1)
     profile[[0, -1], 0] = 0
     mesh = parametric_surfaces.lathe_surface(profile, 72).moved((0, 0, 0.025))
-    return PropModel(
-        "wooden_ball", (PropPart("ball", mesh, plain_finish("beech", "#c99a63", 0.5), "hardwood"),)
-    )
+    return PropModel("wooden_ball", (PropPart("ball", mesh, plain_finish("beech", "#c99a63", 0.5), "hardwood"),))
 
 
 def _upright_cylinder(radius: float, height: float) -> PropMesh:
@@ -77,9 +63,7 @@ def soda_can() -> PropModel:
     """Model a 330 ml can, 66 × 115 mm, by its outside; wall 0.1 mm and lid 0.25 mm in reality."""
     body, lid = _can_body(), _can_lid()
     # Ink on aluminium is half mirror, half paint: one partly metallic finish does for both.
-    printed = textured_finish(
-        "printed aluminium", procedural_textures.can_label(), 0.30, metallic=0.45
-    )
+    printed = textured_finish("printed aluminium", procedural_textures.can_label(), 0.30, metallic=0.45)
     bare = plain_finish("bare aluminium", "#c9ccd0", 0.30, metallic=1.0)
     bright = plain_finish("tab aluminium", "#dcdee2", 0.22, metallic=1.0)
     sheet = "aluminium_can_sheet"
@@ -100,12 +84,7 @@ def _can_body() -> PropMesh:
     neck = [(0.0331, 0.0985), (0.0328, 0.102), (0.0295, 0.1075), (0.0272, 0.1105), (0.0268, 0.1112)]
     under_lid = [(0.0266, 0.1108), (0.0262, 0.103), (0.0, 0.103)]
     profile = np.concatenate(
-        [
-            parametric_surfaces.soften_corners(foot),
-            wall,
-            parametric_surfaces.soften_corners(neck),
-            under_lid,
-        ]
+        [parametric_surfaces.soften_corners(foot), wall, parametric_surfaces.soften_corners(neck), under_lid]
     )
     body = parametric_surfaces.lathe_surface(profile, 72)
     return replace(body, uv=np.stack([body.uv[:, 0], body.vertices[:, 2] / 0.115], 1))
@@ -125,23 +104,12 @@ def _can_tab() -> PropMesh:
     z = 0.1072
     pull = _ellipse_points(32, (-0.0005, 0, z + 0.0012), 0.0105, 0.0072)
     score = _ellipse_points(40, (0.0118, 0, z - 0.0003), 0.0082, 0.0088)
-    bridge = (
-        parametric_surfaces.RoundedBox((0.0068, 0.0138, 0.0016), 0.0007)
-        .mesh()
-        .moved((0.0040, 0, z + 0.0012))
-    )
+    bridge = parametric_surfaces.RoundedBox((0.0068, 0.0138, 0.0016), 0.0007).mesh().moved((0.0040, 0, z + 0.0012))
     rivet = [(0, z - 0.002), (0.0030, z - 0.002), (0.0030, z + 0.0018), (0.0022, z + 0.0026)]
     rivet += [(0, z + 0.0026)]
-    pin = parametric_surfaces.lathe_surface(parametric_surfaces.soften_corners(rivet, 2), 24).moved(
-        (0.0035, 0, 0)
-    )
+    pin = parametric_surfaces.lathe_surface(parametric_surfaces.soften_corners(rivet, 2), 24).moved((0.0035, 0, 0))
     return mesh_union(
-        [
-            parametric_surfaces.ring_surface(pull, 0.0011),
-            bridge,
-            pin,
-            parametric_surfaces.ring_surface(score, 0.0005),
-        ]
+        [parametric_surfaces.ring_surface(pull, 0.0011), bridge, pin, parametric_surfaces.ring_surface(score, 0.0005)]
     )
 
 
@@ -153,22 +121,15 @@ def vase() -> PropModel:
     inside = [(0.050, 0.280), (0.046, 0.2815), (0.041, 0.276), (0.029, 0.25), (0.033, 0.222)]
     inside += [(0.075, 0.192), (0.093, 0.135), (0.080, 0.07), (0.050, 0.012), (0.0, 0.010)]
     profile = np.concatenate(
-        [
-            parametric_surfaces.soften_corners(outside, 4),
-            parametric_surfaces.soften_corners(inside, 4)[1:],
-        ]
+        [parametric_surfaces.soften_corners(outside, 4), parametric_surfaces.soften_corners(inside, 4)[1:]]
     )
     look = textured_finish("blue-white glaze", procedural_textures.vase_glaze(), 0.16)
-    return PropModel(
-        "vase", (PropPart("vase", parametric_surfaces.lathe_surface(profile, 72), look, "ceramic"),)
-    )
+    return PropModel("vase", (PropPart("vase", parametric_surfaces.lathe_surface(profile, 72), look, "ceramic"),))
 
 
 def mug() -> PropModel:
     """Model a stoneware mug, 94 mm tall: glazed rim and inside, coloured outside."""
-    outer = sdf.sdf_smooth_intersection(
-        sdf.sdf_cylinder(0.041, 0.0, 0.2, 0.008), lambda p: p[:, 2] - 0.095, k=0.004
-    )
+    outer = sdf.sdf_smooth_intersection(sdf.sdf_cylinder(0.041, 0.0, 0.2, 0.008), lambda p: p[:, 2] - 0.095, k=0.004)
     ring = sdf.sdf_torus((0.043, 0, 0.049), 0.0225, 0.0062, 1.22)
     handle = sdf.sdf_smooth_intersection(ring, lambda p: 0.038 - p[:, 0])
     inside = sdf.sdf_cylinder(0.0365, 0.006, 0.2, 0.008)
@@ -213,12 +174,7 @@ def floor_lamp() -> PropModel:
     )
 
 
-LAMP_SHADE_BOTTOM_M, LAMP_SHADE_TOP_M, LAMP_SHADE_BOTTOM_RADIUS_M, LAMP_SHADE_TOP_RADIUS_M = (
-    1.20,
-    1.55,
-    0.215,
-    0.155,
-)
+LAMP_SHADE_BOTTOM_M, LAMP_SHADE_TOP_M, LAMP_SHADE_BOTTOM_RADIUS_M, LAMP_SHADE_TOP_RADIUS_M = (1.20, 1.55, 0.215, 0.155)
 """The shade: heights of its rims and their radii [m]."""
 LAMP_SHADE_WALL_M = 0.004
 """How thick its glass is [m]."""
@@ -227,16 +183,12 @@ LAMP_WIRE_RADIUS_M = LAMP_SHADE_BOTTOM_RADIUS_M - LAMP_SHADE_WALL_M - 0.0018
 
 
 def _shade_radius(share: float | np.ndarray) -> float | np.ndarray:
-    return (
-        LAMP_SHADE_BOTTOM_RADIUS_M + (LAMP_SHADE_TOP_RADIUS_M - LAMP_SHADE_BOTTOM_RADIUS_M) * share
-    )
+    return LAMP_SHADE_BOTTOM_RADIUS_M + (LAMP_SHADE_TOP_RADIUS_M - LAMP_SHADE_BOTTOM_RADIUS_M) * share
 
 
 def _lamp_shade() -> PropMesh:
     s = np.linspace(0, 1, 13)
-    outside = np.stack(
-        [_shade_radius(s), LAMP_SHADE_BOTTOM_M + (LAMP_SHADE_TOP_M - LAMP_SHADE_BOTTOM_M) * s], 1
-    )
+    outside = np.stack([_shade_radius(s), LAMP_SHADE_BOTTOM_M + (LAMP_SHADE_TOP_M - LAMP_SHADE_BOTTOM_M) * s], 1)
     return parametric_surfaces.lathe_surface(
         np.concatenate([outside, outside[::-1] - [LAMP_SHADE_WALL_M, 0]]), 96, loop=True
     )
@@ -259,16 +211,12 @@ def _lamp_spider() -> list[PropMesh]:
     rise = LAMP_SHADE_TOP_M - LAMP_SHADE_BOTTOM_M
     hoops = []
     for z in (LAMP_SHADE_BOTTOM_M + 0.047, LAMP_SHADE_TOP_M - 0.012, LAMP_SHADE_BOTTOM_M + 0.012):
-        r = float(_shade_radius((z - LAMP_SHADE_BOTTOM_M) / rise)) - (
-            LAMP_SHADE_BOTTOM_RADIUS_M - LAMP_WIRE_RADIUS_M
-        )
+        r = float(_shade_radius((z - LAMP_SHADE_BOTTOM_M) / rise)) - (LAMP_SHADE_BOTTOM_RADIUS_M - LAMP_WIRE_RADIUS_M)
         hoops.append(parametric_surfaces.ring_surface(_ellipse_points(72, (0, 0, z), r, r), 0.0028))
     bars = []
     s = np.linspace(0.03, 0.97, 6)
     strut = np.stack([LAMP_WIRE_RADIUS_M - 0.0602 * s, LAMP_SHADE_BOTTOM_M + s * rise], 1)
-    spoke = np.array(
-        [(0.010, 1.235), (0.07, 1.237), (0.150, 1.243), (LAMP_WIRE_RADIUS_M - 0.0075, 1.2466)]
-    )
+    spoke = np.array([(0.010, 1.235), (0.07, 1.237), (0.150, 1.243), (LAMP_WIRE_RADIUS_M - 0.0075, 1.2466)])
     for angle in 2 * np.pi * np.arange(3) / 3 + 0.4:
         for (r, z), radius in ((spoke.T, 0.003), (strut.T, 0.0024)):
             path = np.stack([r * np.cos(angle), r * np.sin(angle), z], 1)

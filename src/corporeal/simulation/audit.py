@@ -9,13 +9,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.core.audit_data import (
-    Audit,
-    EnergyGain,
-    Expectation,
-    PartAudit,
-    SettlingOutcome,
-)
+from corporeal.core.audit_data import Audit, EnergyGain, Expectation, PartAudit, SettlingOutcome
 from corporeal.core.types import Ledger, MaterialField, Particles, Scene, SceneObject, Trajectory
 from corporeal.discretization.filled_shells import acting_material
 from corporeal.simulation.audit_messages import (
@@ -101,9 +95,7 @@ LEDGER_QUANTITIES = (
 
 def count_not_finite(ledger: Ledger) -> int:
     """Count values of the ledger that are not finite."""
-    return sum(
-        int(np.count_nonzero(~np.isfinite(getattr(ledger, name)))) for name in LEDGER_QUANTITIES
-    )
+    return sum(int(np.count_nonzero(~np.isfinite(getattr(ledger, name)))) for name in LEDGER_QUANTITIES)
 
 
 def momentum_residual(ledger: Ledger, scene: Scene, cell: float) -> float:
@@ -122,9 +114,9 @@ def momentum_residual(ledger: Ledger, scene: Scene, cell: float) -> float:
 def energy_growth(ledger: Ledger, scene: Scene, cell: float, with_losses: bool = True) -> float:
     """(max(E + dissipated - external work) - E₀) / max(E₀, work of gravity), relative [-].
 
-    E is kinetic (with its affine part) and elastic; gravity's work is what the potential energy
-    lost. Where neither is there to compare with, a fall through one cell is. Without the losses it
-    is the growth of what moves and is strained alone: that no booking can hide or feign.
+    E is kinetic (with its affine part) and elastic; gravity's work is what the potential energy lost. Where neither is
+    there to compare with, a fall through one cell is. Without the losses it is the growth of what moves and is strained
+    alone: that no booking can hide or feign.
     """
     balance, scale = energy_balance(ledger, scene, cell)
     if with_losses:
@@ -176,9 +168,7 @@ def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float:
     return float(-taken[taken < 0.0].sum()) / whole if whole > 0 else 0.0
 
 
-def energy_balance(
-    ledger: Ledger, scene: Scene, cell: float
-) -> tuple[Float[np.ndarray, " F"], float]:
+def energy_balance(ledger: Ledger, scene: Scene, cell: float) -> tuple[Float[np.ndarray, " F"], float]:
     """Kinetic and elastic energy minus external work, and the reference energy [J].
 
     See ``energy_growth``.
@@ -223,14 +213,10 @@ def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> tuple
     """One row per part: real and simulated numbers side by side."""
     first = {int(k): int(p) for p, k in reversed(list(enumerate(particles.part)))}
     owner = {k: scene.objects[particles.object[p]] for k, p in first.items()}
-    return tuple(
-        part_row(k, owner.get(k), particles, field) for k in range(len(particles.treatments))
-    )
+    return tuple(part_row(k, owner.get(k), particles, field) for k in range(len(particles.treatments)))
 
 
-def part_row(
-    k: int, owner: SceneObject | None, particles: Particles, field: MaterialField
-) -> PartAudit:
+def part_row(k: int, owner: SceneObject | None, particles: Particles, field: MaterialField) -> PartAudit:
     """Real and simulated values of one part; owner: None where it has no particles."""
     material, structure, mass = field.materials[k], field.structures[k], particles.mass_real[k]
     treatment = particles.treatments[k]

@@ -49,6 +49,4 @@ def _read(kind: type[A], folder: Path, remedy: str) -> A:
     try:
         return from_plain(kind, data)
     except (ValueError, TypeError, AttributeError) as error:
-        raise BadFileError(
-            path, f"is no audit that this version can read ({error}).", remedy
-        ) from error
+        raise BadFileError(path, f"is no audit that this version can read ({error}).", remedy) from error

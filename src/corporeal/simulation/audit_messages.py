@@ -4,13 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from corporeal.core.audit_data import (
-    Audit,
-    PredictedBreakage,
-    SettledObjectOutcome,
-    SettlingOutcome,
-    SurfacePairCheck,
-)
+from corporeal.core.audit_data import Audit, PredictedBreakage, SettledObjectOutcome, SettlingOutcome, SurfacePairCheck
 from corporeal.core.types import Note, NoteKind
 
 ALLOWED_BREACHES = {
@@ -34,16 +28,12 @@ def breach_messages(found: Audit) -> list[str]:
     whose = f" Most of it is in {gain.object}, from {gain.time:.2f} s on." if gain else ""
     begun = found.start_penetration_m or 0.0
     into = "the floor" if found.floor_penetration_m == depth else "each other"
-    if (
-        into == "each other"
-        and depth - begun <= ALLOWED_BREACHES["max_penetration_dx"] * found.cell_m < begun
-    ):
+    if into == "each other" and depth - begun <= ALLOWED_BREACHES["max_penetration_dx"] * found.cell_m < begun:
         reason = "they overlap at the start. Move them apart in the scene."
     else:
         reason = "contact is softer than in reality. A finer --detail reduces it."
     sentences = {
-        "nan_count": "{0} values of the result are not finite: the result is invalid. Please "
-        "report this.",
+        "nan_count": "{0} values of the result are not finite: the result is invalid. Please report this.",
         "particles_out_of_domain": "{0} particles left the domain: the objects that they belong "
         "to came apart for numerical reasons.",
         "momentum_residual": "Momentum changed by {0:.1%} without an external impulse: speeds "
@@ -60,9 +50,7 @@ def breach_messages(found: Audit) -> list[str]:
     limits = ALLOWED_BREACHES | {"nan_count": 0, "particles_out_of_domain": 0}
     values = {name: getattr(found, name) for name in sentences}
     return [
-        Note(
-            text.format(values[name]), NoteKind.GRAVE if name in GRAVE_BREACHES else NoteKind.DOUBT
-        )
+        Note(text.format(values[name]), NoteKind.GRAVE if name in GRAVE_BREACHES else NoteKind.DOUBT)
         for name, text in sentences.items()
         if values[name] > limits[name]
     ]
@@ -115,8 +103,7 @@ def equilibrium_warnings(settling: SettlingOutcome | None) -> list[str]:
     if settling is None:
         return []
     sentences = [
-        f"{obj.name} moved by {shift_message(obj)} before time 0: the pose in the file is not in static "
-        "equilibrium."
+        f"{obj.name} moved by {shift_message(obj)} before time 0: the pose in the file is not in static equilibrium."
         for obj in settling.objects
         if obj.moved_dx > SAG_WARNING_DX
     ]
@@ -132,11 +119,7 @@ def equilibrium_message(settling: SettlingOutcome | None) -> str:
     """Return in a sentence how long objects settled and how far each sank; "" where they did not."""
     if settling is None:
         return ""
-    moved = [
-        f"{obj.name} moved by {shift_message(obj)}"
-        for obj in settling.objects
-        if obj.moved_dx > SAG_MENTION_DX
-    ]
+    moved = [f"{obj.name} moved by {shift_message(obj)}" for obj in settling.objects if obj.moved_dx > SAG_MENTION_DX]
     return (
         f"Before time 0 objects were relaxed to static equilibrium for {settling.seconds:.2g} s: "
         f"{', '.join(moved) or 'no object moved visibly'}."

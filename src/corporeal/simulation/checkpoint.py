@@ -1,9 +1,8 @@
 """Checkpoints, from which an interrupted simulation resumes bit for bit.
 
-``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the
-problem it belongs to; ``checkpoint-before.npz`` is the one before it, for when the last cannot be
-read. Each is sealed with a digest, written whole, forced to the disk and then renamed, so that a
-process or a machine that stops in the middle leaves the old ones.
+``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the problem it belongs to;
+``checkpoint-before.npz`` is the one before it, for when the last cannot be read. Each is sealed with a digest, written
+whole, forced to the disk and then renamed, so that a process or a machine that stops in the middle leaves the old ones.
 """
 
 import hashlib
@@ -54,9 +53,7 @@ DEFAULT_CHECKPOINTS = CheckpointConfig()
 class Checkpoints:
     """The last two states of one simulation in one folder."""
 
-    def __init__(
-        self, folder: Path, name: str, config: CheckpointConfig = DEFAULT_CHECKPOINTS
-    ) -> None:
+    def __init__(self, folder: Path, name: str, config: CheckpointConfig = DEFAULT_CHECKPOINTS) -> None:
         """Manage the checkpoints in a folder.
 
         Args:
@@ -101,9 +98,7 @@ class Checkpoints:
 
     def _read(self, path: Path) -> CheckpointState:
         found = read_arrays(path)
-        state = {
-            k.removeprefix(STATE_PREFIX): v for k, v in found.items() if k.startswith(STATE_PREFIX)
-        }
+        state = {k.removeprefix(STATE_PREFIX): v for k, v in found.items() if k.startswith(STATE_PREFIX)}
         try:
             done, name, seal = int(found["done"]), str(found["name"]), str(found["seal"])
         except KeyError as error:

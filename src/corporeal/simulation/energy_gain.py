@@ -12,15 +12,15 @@ from corporeal.mpm.problem import Problem
 from corporeal.simulation.ledger_row import object_of_body
 
 MAX_FREE_FLIGHT_GROWTH = 0.01
-"""Growth of an object's energy in flight, as a share of the most it had, that ends a run: explicit
-steps and transfers between particles and grid only lose energy."""
+"""Growth of an object's energy in flight, as a share of the most it had, that ends a run: explicit steps and transfers
+between particles and grid only lose energy."""
 
 
 class EnergyWatch:
     """Compares every frame of a run with those before it, object by object.
 
-    Between two frames in which an object touched nothing and no push, wind or grip did work, its
-    motion, strain and height together can only lose energy; what they gain comes from the method.
+    Between two frames in which an object touched nothing and no push, wind or grip did work, its motion, strain and
+    height together can only lose energy; what they gain comes from the method.
     """
 
     def __init__(self, names: Sequence[str], pull: float, cell: float) -> None:

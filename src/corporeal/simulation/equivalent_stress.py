@@ -28,8 +28,8 @@ class VonMises:
     def at(self, now: Snapshot) -> Float[np.ndarray, " P"]:
         """Return the stress [Pa] at one instant; 0 in rigid bodies, which have no strain.
 
-        That of the Cauchy stress σ = τ / J of the material's law, whose τ follows from the elastic
-        deformation gradient; what a lossy material resists only for a while is not in it.
+        That of the Cauchy stress σ = τ / J of the material's law, whose τ follows from the elastic deformation
+        gradient; what a lossy material resists only for a while is not in it.
         """
         out = np.zeros(len(now.position))
         F = np.asarray(now.deformation[self.soft], dtype=np.float64)

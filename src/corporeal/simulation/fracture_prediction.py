@@ -1,8 +1,8 @@
 """Prediction of brittle fracture at the first impact of each other body.
 
-The simulation keeps such parts whole, unless ``breaking`` is set. Here the energy of the impact is
-compared with what half of such parts bear (``fracture``). Impacts after the first of a pair are not
-looked at: a vase that falls over where it stood, and what bounces, are judged by their first touch.
+The simulation keeps such parts whole, unless ``breaking`` is set. Here the energy of the impact is compared with what
+half of such parts bear (``fracture``). Impacts after the first of a pair are not looked at: a vase that falls over
+where it stood, and what bounces, are judged by their first touch.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,12 +17,7 @@ from corporeal.core.types import FractureEvent, Frame, MaterialField, Particles,
 from corporeal.geometry.mesh import join_meshes
 from corporeal.materials import find_material
 from corporeal.mpm.physics.springs import rotation_vector
-from corporeal.simulation.impact_fracture import (
-    BrittleForm,
-    BrittlePart,
-    ElasticSolid,
-    breakage_word,
-)
+from corporeal.simulation.impact_fracture import BrittleForm, BrittlePart, ElasticSolid, breakage_word
 
 FLOOR_MATERIAL = "concrete"
 """Name of the floor and the walls."""
@@ -31,8 +26,8 @@ SHEET_ASPECT_RATIO = 8.0
 ROUND_ASPECT_RATIO = 1.5
 """A closed wall is round where its longest side is less than this times its shortest [-]."""
 MIN_HULL_FILL_FRACTION = 0.5
-"""Share of its convex hull that a closed outer surface encloses at least; with less, its mesh shows
-both faces of a wall."""
+"""Share of its convex hull that a closed outer surface encloses at least; with less, its mesh shows both faces of a
+wall."""
 WELD_EXTENT_RATIO = 1e-6
 """Vertices nearer than this share of an object's extent are one."""
 FREE_FLIGHT_FRAMES = 1.5
@@ -139,9 +134,7 @@ def _brittle(particles: Particles, field: MaterialField) -> np.ndarray:
 class _FirstImpacts:
     """The first impacts of a run."""
 
-    def __init__(
-        self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
-    ) -> None:
+    def __init__(self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory) -> None:
         self.scene, self.particles, self.field = scene, particles, field
         self.trajectory, self.ledger = trajectory, trajectory.ledger
         self.brittle = _brittle(particles, field)
@@ -202,9 +195,7 @@ class _FirstImpacts:
         away = np.linalg.norm(frame.position[mine] - point, axis=1)
         return int(self.particles.part[mine[np.argmin(away)]])
 
-    def _mover(
-        self, frame: Frame, k: int, number: int, time: float, point: Float[np.ndarray, "3"]
-    ) -> _ImpactMotion:
+    def _mover(self, frame: Frame, k: int, number: int, time: float, point: Float[np.ndarray, "3"]) -> _ImpactMotion:
         """How an object moves at a time [s] after frame k, before it is struck at a point [m]."""
         mine = np.flatnonzero(self.particles.object == number)
         mass, place = self.particles.mass[mine], frame.position[mine]
@@ -290,8 +281,8 @@ class _FirstImpacts:
     def _sheet(self, k: int, owner: int, short: float) -> float:
         """Mean thickness of a solid sheet [m], 2 V/A with both faces in A.
 
-        A plate with a rim is thinner than its box is high. Where an object has several parts, the
-        area of one is not known, and the box's shortest side counts.
+        A plate with a rim is thinner than its box is high. Where an object has several parts, the area of one is not
+        known, and the box's shortest side counts.
         """
         if np.any((self.particles.object == owner) & (self.particles.part != k)):
             return short

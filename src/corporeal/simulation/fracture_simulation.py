@@ -1,8 +1,8 @@
 """Simulated fracture: objects struck with ten times the energy they withstand become fragments.
 
-The run is taken back to just before the two touch, what the wall bears until it breaks is taken
-from the impact, and the object becomes rigid pieces that move on as it did (decision fracture-pieces). The
-momentum of the pieces is that of the whole.
+The run is taken back to just before the two touch, what the wall bears until it breaks is taken from the impact, and
+the object becomes rigid pieces that move on as it did (decision fracture-pieces). The momentum of the pieces is that of
+the whole.
 """
 
 from collections.abc import Sequence
@@ -16,20 +16,9 @@ from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.voronoi_fragments import cut_fragments, fragment_cells, fragment_seeds
 from corporeal.mpm.engines import require
-from corporeal.mpm.problem import (
-    BodySplit,
-    BodySplittingEngine,
-    Engine,
-    InteractiveEngine,
-    Snapshot,
-)
+from corporeal.mpm.problem import BodySplit, BodySplittingEngine, Engine, InteractiveEngine, Snapshot
 from corporeal.mpm.split_body import can_split
-from corporeal.simulation.fracture_prediction import (
-    BrittleImpact,
-    encloses_cavity,
-    first_impacts,
-    piece_objects,
-)
+from corporeal.simulation.fracture_prediction import BrittleImpact, encloses_cavity, first_impacts, piece_objects
 from corporeal.simulation.fracture_state import FractureState
 from corporeal.simulation.impact_fracture import CERTAIN_BREAK_ENERGY_RATIO
 from corporeal.simulation.trajectory_files import gather_ledgers, read_ledger
@@ -50,12 +39,7 @@ class FracturedRun:
 
 
 def next_breaking_impact(
-    stage: FractureState,
-    breaks: Sequence[FractureEvent],
-    whole: set[int],
-    folder: Path,
-    number: int,
-    since: float,
+    stage: FractureState, breaks: Sequence[FractureEvent], whole: set[int], folder: Path, number: int, since: float
 ) -> BrittleImpact | None:
     """Return the first fracturing impact since a time [s], if any.
 
@@ -76,9 +60,7 @@ def next_breaking_impact(
     found = [
         blow
         for blow in first_impacts(stage.scene, stage.particles, stage.field, trajectory)
-        if blow.found.time > since
-        and blow.found.ratio > CERTAIN_BREAK_ENERGY_RATIO
-        and blow.object not in spared
+        if blow.found.time > since and blow.found.ratio > CERTAIN_BREAK_ENERGY_RATIO and blow.object not in spared
     ]
     return min(found, key=lambda blow: blow.found.time, default=None)
 
@@ -129,9 +111,7 @@ class _CutPieces:
     surfaces: tuple[Surface, ...]
 
 
-def _pieces(
-    stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot
-) -> _CutPieces | None:
+def _pieces(stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot) -> _CutPieces | None:
     """Cut an object into Voronoi cells around the impact; None: its surface is not closed."""
     scene, particles = stage.scene, stage.particles
     own = [s for s in scene.surfaces if s.object == blow.object]

@@ -8,12 +8,7 @@ from jaxtyping import Float
 from corporeal.core.types import FractureEvent, MaterialField, Particles, Scene
 from corporeal.discretization.build_model import ModelMapping
 from corporeal.mpm.problem import BodySplit, Problem, Snapshot
-from corporeal.scene.fractured_scene import (
-    fractured_field,
-    fractured_particles,
-    fractured_scene,
-    piece_mass_fractions,
-)
+from corporeal.scene.fractured_scene import fractured_field, fractured_particles, fractured_scene, piece_mass_fractions
 
 
 @dataclass(frozen=True)
@@ -28,9 +23,7 @@ class FractureState:
     """Rotation of each body when the problem's positions are those of its particles."""
 
     @classmethod
-    def at_start(
-        cls, scene: Scene, particles: Particles, field: MaterialField, posed: ModelMapping
-    ) -> "FractureState":
+    def at_start(cls, scene: Scene, particles: Particles, field: MaterialField, posed: ModelMapping) -> "FractureState":
         """Return the state without fractures."""
         turned = np.broadcast_to(np.eye(3), (len(posed.problem.bodies), 3, 3))
         return cls(scene, particles, field, posed, turned)
@@ -41,9 +34,7 @@ class FractureState:
         first = sum(counts[:body])
         return slice(first, first + counts[body])
 
-    def with_pieces(
-        self, one: FractureEvent, split: BodySplit, problem: Problem, now: Snapshot
-    ) -> "FractureState":
+    def with_pieces(self, one: FractureEvent, split: BodySplit, problem: Problem, now: Snapshot) -> "FractureState":
         """Return the state with the fragments of a body as objects.
 
         Args:
@@ -66,9 +57,7 @@ class FractureState:
             ]
         )
         turned = np.concatenate([self.turned, np.empty((more, 3, 3))])
-        turned[[body, *range(len(self.turned), len(turned))]] = (
-            now.motion[mine][0] @ self.turned[body]
-        )
+        turned[[body, *range(len(self.turned), len(turned))]] = now.motion[mine][0] @ self.turned[body]
         after = ModelMapping(
             problem=problem,
             order=order,

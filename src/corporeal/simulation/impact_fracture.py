@@ -15,13 +15,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 TUBE_COMPLIANCE = 0.149
-"""P R³/(2 l D) by which an open ring gives between two opposite loads P, 2 l its length
-(Timoshenko, Theory of Plates and Shells: inextensional deformation of a cylindrical shell) [-]."""
+"""P R³/(2 l D) by which an open ring gives between two opposite loads P, 2 l its length (Timoshenko, Theory of Plates
+and Shells: inextensional deformation of a cylindrical shell) [-]."""
 RING_MOMENT = 0.318
 """M/(P R) under such a load: 1/π (Timoshenko, Strength of Materials) [-]."""
 PLATE_COMPLIANCE = 0.0148
-"""w D/(P b²) of a simply supported plate of sides 1.3 : 1 under a load in its middle (Timoshenko,
-Theory of Plates and Shells, table 23) [-]."""
+"""w D/(P b²) of a simply supported plate of sides 1.3 : 1 under a load in its middle (Timoshenko, Theory of Plates and
+Shells, table 23) [-]."""
 LUMP_TENSION_FACTOR = 0.9
 """Tension over F/D² in a lump that is pressed between two points (Hiramatsu and Oka 1966) [-]."""
 LUMP_STRENGTH_RATIO = 1.0 / 3.0
@@ -112,15 +112,13 @@ class BrittlePart:
     def tension(self, force: float, other: ElasticSolid) -> float:
         """Largest tension under a force [Pa].
 
-        3 F/(2 π t²) ((1 + ν) ln(L/r) + .6) with Westergaard's radius r of the loaded circle, or
-        larger where the wall is pressed flat; a tube adds what bends it oval.
+        3 F/(2 π t²) ((1 + ν) ln(L/r) + .6) with Westergaard's radius r of the loaded circle, or larger where the wall
+        is pressed flat; a tube adds what bends it oval.
         """
         if self.form == "lump":
             return LUMP_TENSION_FACTOR * force / self.length**2
         t, R = self.thickness, self.radius
-        touch = (0.75 * force * self.touch * (self.solid.compliance + other.compliance)) ** (
-            1.0 / 3.0
-        )
+        touch = (0.75 * force * self.touch * (self.solid.compliance + other.compliance)) ** (1.0 / 3.0)
         r = sqrt(1.6 * touch**2 + t**2) - 0.675 * t if touch < 1.72 * t else touch
         reach = 2.0 * self.length / pi if self.form == "plate" else sqrt(R * t)
         if self.form != "plate":

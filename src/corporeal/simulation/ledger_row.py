@@ -9,9 +9,7 @@ from corporeal.mpm.physics.body_distance import pair_gaps, plane_depth
 from corporeal.mpm.problem import Diagnostics, Problem, Snapshot, StepStatistics
 
 
-def ledger_row(
-    problem: Problem, now: Snapshot, measure: Diagnostics, steps: StepStatistics
-) -> Ledger:
+def ledger_row(problem: Problem, now: Snapshot, measure: Diagnostics, steps: StepStatistics) -> Ledger:
     """Return the ledger's row of one instant.
 
     The bodies of one object, its soft material and the frames bonded to it, are added up.
@@ -76,18 +74,13 @@ def plane_depths(problem: Problem, now: Snapshot) -> np.ndarray:
         if body.rigid:
             stretch = now.deformation[mine]
         if body.rigid and len(body.surface):
-            points, stretch = (
-                rotate_with_body(body.surface, body.position, points, stretch[0]),
-                None,
-            )
+            points, stretch = (rotate_with_body(body.surface, body.position, points, stretch[0]), None)
         for w, plane in enumerate(problem.planes):
             depths[w, b] = plane_depth(points, plane, stretch, problem.cell)
     return depths
 
 
-def rotate_with_body(
-    points: np.ndarray, start: np.ndarray, now: np.ndarray, rotation: np.ndarray
-) -> np.ndarray:
+def rotate_with_body(points: np.ndarray, start: np.ndarray, now: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Points that turn with a rigid body whose particles went from ``start`` to ``now`` [m]."""
     return (points - start.mean(axis=0)) @ rotation.T + now.mean(axis=0)
 
@@ -128,9 +121,7 @@ def sum_by_object_pair(table: np.ndarray, name: np.ndarray) -> np.ndarray:
     return between - np.diag(np.diag(between))
 
 
-SUMMED_QUANTITIES = (
-    "mass momentum angular_momentum kinetic elastic potential external_impulse flow".split()
-)
+SUMMED_QUANTITIES = "mass momentum angular_momentum kinetic elastic potential external_impulse flow".split()
 
 
 def object_contact_times(row: dict[str, np.ndarray], name: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
 """Gaps, overlaps and crossings of objects, measured between their rendered surfaces.
 
-The ledger measures between particles, which resolve a surface to a fraction of a cell. Here the
-meshes of the scene follow the material, as in the video, and are asked for distances themselves.
+The ledger measures between particles, which resolve a surface to a fraction of a cell. Here the meshes of the scene
+follow the material, as in the video, and are asked for distances themselves.
 """
 
 from collections.abc import Mapping, Sequence
@@ -69,9 +69,7 @@ class TrackedSurface:
         return np.einsum("nk,nkd->nd", self.weight, corners)
 
 
-def surface_pairs(
-    scene: Scene, particles: Particles, trajectory: Trajectory
-) -> tuple[SurfacePairCheck, ...]:
+def surface_pairs(scene: Scene, particles: Particles, trajectory: Trajectory) -> tuple[SurfacePairCheck, ...]:
     """Measure every two objects that came near each other, in the scene's order.
 
     Args:
@@ -82,9 +80,7 @@ def surface_pairs(
     """
     shown = {s.object for s in scene.surfaces if len(s.triangles)}
     close = [p for p in _close_pairs(particles, trajectory) if shown.issuperset(p)]
-    coats = {
-        k: _tracked_surface(scene, particles, k) for k in sorted({b for p in close for b in p})
-    }
+    coats = {k: _tracked_surface(scene, particles, k) for k in sorted({b for p in close for b in p})}
     passed = _passages(coats, close, trajectory, particles.cell)
     looked = np.unique(np.linspace(0, len(trajectory.time) - 1, OVERLAP_FRAMES + 1).astype(int))
     rows: dict[tuple[int, int], list[float]] = {pair: [] for pair in close}
@@ -127,9 +123,7 @@ def _tracked_surface(scene: Scene, particles: Particles, number: int) -> Tracked
     bends = any(particles.treatments[k].kind != "rigid" for k in np.unique(particles.part[members]))
     if bends:
         longest = float(np.ptp(mesh.vertices, axis=0).max())
-        mesh = refine_mesh(
-            mesh, max(longest / MAX_EDGES_ALONG_SURFACE, DENT_EDGE_DX * particles.cell)
-        )
+        mesh = refine_mesh(mesh, max(longest / MAX_EDGES_ALONG_SURFACE, DENT_EDGE_DX * particles.cell))
     owner = np.full(len(mesh.vertices), number)
     skin = bind_points(mesh.vertices, owner, particles, np.zeros(0, dtype=bool))
     points, triangle = sample_surface(mesh, SURFACE_SAMPLES, rng)
@@ -214,10 +208,7 @@ def _close_pairs(particles: Particles, trajectory: Trajectory) -> list[tuple[int
 
 
 def _gap(
-    pair: tuple[int, int],
-    coats: Mapping[int, TrackedSurface],
-    shapes: dict[int, QueryMesh],
-    reach: float,
+    pair: tuple[int, int], coats: Mapping[int, TrackedSurface], shapes: dict[int, QueryMesh], reach: float
 ) -> float:
     """Distance of two surfaces [m], negative where they overlap; inf beyond ``reach``."""
     found = [np.inf]
@@ -234,15 +225,12 @@ def _gap(
 
 
 def distance_within(
-    points: Float[np.ndarray, "N 3"],
-    shape: QueryMesh,
-    within: Bool[np.ndarray, " N"],
-    reach: float,
+    points: Float[np.ndarray, "N 3"], shape: QueryMesh, within: Bool[np.ndarray, " N"], reach: float
 ) -> Float[np.ndarray, " N"]:
     """Distance of points to a surface [m]; of those outside maybe too much, but for the nearest.
 
-    Only triangles that can be within ``reach`` are looked at: a tree of all of them takes longer
-    than asking it for some hundred points. What is farther is looked up again where it counts.
+    Only triangles that can be within ``reach`` are looked at: a tree of all of them takes longer than asking it for
+    some hundred points. What is farther is looked up again where it counts.
     """
     low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
     # One bit of a corner for each side of the box that it does not lie beyond.
@@ -272,18 +260,11 @@ class Passage:
 
 
 def _passages(
-    coats: Mapping[int, TrackedSurface],
-    close: Sequence[tuple[int, int]],
-    trajectory: Trajectory,
-    cell: float,
+    coats: Mapping[int, TrackedSurface], close: Sequence[tuple[int, int]], trajectory: Trajectory, cell: float
 ) -> dict[tuple[int, int], Passage]:
     """Find the objects that passed through others, by pair."""
     found: dict[tuple[int, int], Passage] = {}
-    walks = {
-        (a, c): RelativePath(coats[a], coats[c], cell)
-        for pair in close
-        for a, c in permutations(pair)
-    }
+    walks = {(a, c): RelativePath(coats[a], coats[c], cell) for pair in close for a, c in permutations(pair)}
     for k, time in enumerate(trajectory.time.tolist()):
         frame = trajectory.frames[k]
         if not np.isfinite(frame.position).all():
@@ -303,8 +284,8 @@ def _passages(
 class RelativePath:
     """Piecewise linear paths of particles of one object in the frame of another.
 
-    A line ends where something has moved by ``TRACK_STRIDE_DX``; what rests costs nothing. Of what
-    spins so fast that it turns by more than ``MAX_TURN_RAD`` between frames (a shard), nothing is
+    A line ends where something has moved by ``TRACK_STRIDE_DX``; what rests costs nothing. Of what spins so fast that
+    it turns by more than ``MAX_TURN_RAD`` between frames (a shard), nothing is
     said: a straight line in its frame would lead through it where the true arc leads past.
     """
 
@@ -322,11 +303,7 @@ class RelativePath:
         """Whether some grain has come so far near the other that it must be looked at."""
         self.now = fit, there = self._there(frame)
         turned, self.turned = self.turned, fit.rotation
-        if (
-            self.last is None
-            or turned is None
-            or rotation_angle(fit.rotation @ turned.T) > MAX_TURN_RAD
-        ):
+        if self.last is None or turned is None or rotation_angle(fit.rotation @ turned.T) > MAX_TURN_RAD:
             self.last = there
             return False
         box = fit.undo(frame.position[self.other.members].astype(float))
@@ -357,13 +334,11 @@ class RelativePath:
         self.last = np.where(outside[:, None], there, last)
         return float(self.passed.mean())
 
-    def _through(
-        self, fit: RigidFit, shape: QueryMesh, there: np.ndarray, last: np.ndarray
-    ) -> Bool[np.ndarray, " N"]:
+    def _through(self, fit: RigidFit, shape: QueryMesh, there: np.ndarray, last: np.ndarray) -> Bool[np.ndarray, " N"]:
         """Whether each path, in the other's frame at the start [m], passes through it.
 
-        It enters and leaves by faces that look opposite ways; what slides along a round body cuts
-        its surface at faces that look nearly the same way.
+        It enters and leaves by faces that look opposite ways; what slides along a round body cuts its surface at faces
+        that look nearly the same way.
         """
         mesh = shape.mesh
         box = fit.undo(mesh.vertices)

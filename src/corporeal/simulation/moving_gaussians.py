@@ -28,9 +28,7 @@ class MovingGaussians:
         """Return all Gaussians at one instant; colour: of every particle, in sRGB."""
         g = self.gaussians
         place, F = self.skin.carried(frame)
-        moved = deform_gaussians(
-            replace(g, **{n: getattr(g, n)[self.moving] for n in GAUSSIAN_ARRAYS}), F, place
-        )
+        moved = deform_gaussians(replace(g, **{n: getattr(g, n)[self.moving] for n in GAUSSIAN_ARRAYS}), F, place)
         if colour is not None:
             moved = replace(moved, sh=_same_from_all_sides(moved.sh, colour[self.skin.near[:, 0]]))
         arrays = {n: getattr(g, n).copy() for n in GAUSSIAN_ARRAYS}

@@ -30,13 +30,11 @@ REACH_PARTICLE_FRACTION = 0.98
 REST_FRAMES = 8
 """Frames that are averaged over the rest."""
 TOUCHING_DISTANCE_DX = 0.5
-"""Bodies no farther apart touch [cells]: the distance of two particles in one body. Surfaces are
-known no better. What rests on something is within 0.45, what stands beside it from 1 on."""
+"""Bodies no farther apart touch [cells]: the distance of two particles in one body. Surfaces are known no better. What
+rests on something is within 0.45, what stands beside it from 1 on."""
 
 
-def measure_outcome(
-    scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
-) -> Outcome:
+def measure_outcome(scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory) -> Outcome:
     """Describe what was seen.
 
     Args:
@@ -61,9 +59,7 @@ def measure_outcome(
 class ObjectParticles:
     """Particle positions of every object over time; one pass over the frames on disk."""
 
-    def __init__(
-        self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
-    ) -> None:
+    def __init__(self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory) -> None:
         self.gravity = -scene.gravity[2]
         self.cell, self.time, self.ledger = particles.cell, trajectory.time, trajectory.ledger
         self.trajectory = trajectory
@@ -174,13 +170,11 @@ def level_reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
     return float(np.quantile(np.hypot(*aside.T), REACH_PARTICLE_FRACTION)) + cell / 4
 
 
-def vertical_extent(
-    points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float
-) -> float:
+def vertical_extent(points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float) -> float:
     """Extent of most material along z [m]: of the points, and half a row above and below them.
 
-    A row is half a cell high at the start. What is squeezed flat has rows as much lower: a puddle
-    that was a column would else be taken for half a cell higher than it is.
+    A row is half a cell high at the start. What is squeezed flat has rows as much lower: a puddle that was a column
+    would else be taken for half a cell higher than it is.
 
     Args:
         points: Now [m].
@@ -204,9 +198,7 @@ def left_vessel(body: int, bodies: "ObjectParticles") -> float | None:
     vessel = bodies.vessel_of.get(body)
     if vessel is None:
         return None
-    fit = fit_rigid_motion(
-        bodies.start[vessel], bodies.last[vessel][-1], np.ones(len(bodies.start[vessel]))
-    )
+    fit = fit_rigid_motion(bodies.start[vessel], bodies.last[vessel][-1], np.ones(len(bodies.start[vessel])))
     points = bodies.last[body][-1]
     there = np.isfinite(points).all(axis=1)
     inside = Delaunay(bodies.start[vessel]).find_simplex(fit.undo(points[there])) >= 0
@@ -219,9 +211,7 @@ def to_vector(values: Float[np.ndarray, "3"]) -> Vector:
     return x, y, z
 
 
-def dent_distances(
-    body: int, mark: ResidualDent, names: list[str], bodies: ObjectParticles
-) -> dict[str, float | None]:
+def dent_distances(body: int, mark: ResidualDent, names: list[str], bodies: ObjectParticles) -> dict[str, float | None]:
     """Distance on the undeformed body from each first contact to the dent's centroid [m]."""
     found: dict[str, float | None] = {}
     for other, name in enumerate([*names, FLOOR_NAME]):
@@ -289,11 +279,7 @@ def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str
         floor = c == len(names)
         gap = None if floor else ledger.gap[:, a, c]
         after = None if gap is None or not touched else gap[time > instant]
-        impulse = (
-            np.linalg.norm(ledger.plane_impulse[-1, 0, a])
-            if floor
-            else ledger.pair_impulse[-1, a, c]
-        )
+        impulse = np.linalg.norm(ledger.plane_impulse[-1, 0, a]) if floor else ledger.pair_impulse[-1, a, c]
         rows[pair_name(names[a], FLOOR_NAME if floor else names[c])] = PairOutcome(
             first_contact_s=instant if touched else None,
             contact_point=to_vector(ledger.contact_point[-1, a, c]) if touched else None,
@@ -307,15 +293,11 @@ def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str
     return rows
 
 
-def stays_separated(
-    gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell: float
-) -> bool:
+def stays_separated(gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell: float) -> bool:
     """Whether two bodies are more than a cell apart for at least 0.1 s."""
     apart = np.concatenate([[False], gap > cell, [False]]).astype(int)
     edges = np.flatnonzero(np.diff(apart)).reshape(-1, 2)
-    return any(
-        time[last - 1] - time[first] >= SEPARATION_DURATION_S - 1e-9 for first, last in edges
-    )
+    return any(time[last - 1] - time[first] >= SEPARATION_DURATION_S - 1e-9 for first, last in edges)
 
 
 def contact_order(pairs: Mapping[str, PairOutcome]) -> tuple[tuple[str, str], ...]:
@@ -323,9 +305,7 @@ def contact_order(pairs: Mapping[str, PairOutcome]) -> tuple[tuple[str, str], ..
     met = [
         (row.first_contact_s, name)
         for name, row in pairs.items()
-        if row.gap_start_dx is not None
-        and row.first_contact_s is not None
-        and row.gap_start_dx > TOUCHING_DISTANCE_DX
+        if row.gap_start_dx is not None and row.first_contact_s is not None and row.gap_start_dx > TOUCHING_DISTANCE_DX
     ]
     split = [name.split("|") for _, name in sorted(met)]
     return tuple((first, second) for first, second in split)

@@ -22,9 +22,7 @@ def trusted_fit(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) 
     fit = fit_rigid_motion(start, now, weight)
     for _ in range(FIT_ITERATIONS):
         error = np.linalg.norm(fit.undo(now) - start, axis=1)
-        fit = fit_rigid_motion(
-            start, now, (error <= np.quantile(error, TRUSTED_FRACTION)).astype(float)
-        )
+        fit = fit_rigid_motion(start, now, (error <= np.quantile(error, TRUSTED_FRACTION)).astype(float))
     return fit
 
 
@@ -48,8 +46,8 @@ def mean_of_largest(size: Float[np.ndarray, " N"]) -> float:
 def upper_percentile(size: Float[np.ndarray, " N"]) -> float:
     """Return what a hundredth of the values exceed.
 
-    A fixed number of largest values grows with how many there are: the mean of eight is 23 mm for
-    the leaves of a ficus of 1,238 particles and 40 mm of 3,094, this 21.5 and 21.9 mm.
+    A fixed number of largest values grows with how many there are: the mean of eight is 23 mm for the leaves of a ficus
+    of 1,238 particles and 40 mm of 3,094, this 21.5 and 21.9 mm.
     """
     return float(np.quantile(size, 1.0 - IGNORED_DEEPEST_FRACTION))
 
@@ -71,8 +69,8 @@ def residual_dent(
 ) -> ResidualDent:
     """Residual displacement of a body, averaged over its last frames so that vibration cancels.
 
-    A can that is struck on top also gives where it stands: only what moved within 60° of the
-    deepest place's direction counts as the same dent, and of that nothing that flew off by itself.
+    A can that is struck on top also gives where it stands: only what moved within 60° of the deepest place's direction
+    counts as the same dent, and of that nothing that flew off by itself.
 
     Args:
         start: Where the particles started [m].
@@ -81,9 +79,7 @@ def residual_dent(
 
     """
     shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
-    around = (
-        KDTree(start).query(start, k=min(PATCH_PARTICLES, len(start)))[1].reshape(len(start), -1)
-    )
+    around = KDTree(start).query(start, k=min(PATCH_PARTICLES, len(start)))[1].reshape(len(start), -1)
     size = np.linalg.norm(shift, axis=1)
     together = size <= THROWN_MOTION_RATIO * np.median(size[around], axis=1)
     moved = together & (size > threshold)
@@ -98,9 +94,7 @@ def residual_dent(
 
 
 def place_at_start(
-    point: Float[np.ndarray, " 3"],
-    now: Float[np.ndarray, "N 3"],
-    start: Float[np.ndarray, "N 3"],
+    point: Float[np.ndarray, " 3"], now: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, " 3"]:
     """Map a point on a body now to its initial position [m]."""
     _, nearest = KDTree(now).query(point, k=min(NEIGHBOUR_PARTICLES, len(now)))

@@ -11,18 +11,10 @@ from corporeal.mpm.physics import rigid
 from corporeal.mpm.split_body import ParentMap
 from corporeal.scene.fractured_scene import piece_mass_fractions
 from corporeal.simulation.fracture_state import FractureState
-from corporeal.simulation.trajectory_files import (
-    FrameLayout,
-    read_frame,
-    read_ledger,
-    write_frame,
-    write_layout,
-)
+from corporeal.simulation.trajectory_files import FrameLayout, read_frame, read_ledger, write_frame, write_layout
 
 
-def rewrite_history(
-    folder: Path, count: int, before: FractureState, after: FractureState, one: FractureEvent
-) -> None:
+def rewrite_history(folder: Path, count: int, before: FractureState, after: FractureState, one: FractureEvent) -> None:
     """Write the first ``count`` frames again, with the fragments as objects that move together."""
     old, new = FrameLayout.of(before.posed), FrameLayout.of(after.posed)
     for number in range(count):
@@ -65,9 +57,7 @@ def _ledger_shares(row: Ledger, frame: Frame, before: FractureState, one: Fractu
     return Ledger(**found)
 
 
-def _piece_motions(
-    row: Ledger, frame: Frame, before: FractureState, one: FractureEvent
-) -> list["_PieceMotion"]:
+def _piece_motions(row: Ledger, frame: Frame, before: FractureState, one: FractureEvent) -> list["_PieceMotion"]:
     """Return the motion of each fragment while the object is whole."""
     particles, k = before.particles, one.object
     mine = np.flatnonzero(particles.object == k)
@@ -81,9 +71,7 @@ def _piece_motions(
     for n in range(len(one.surfaces)):
         own = one.piece == n
         mass = rigid.mass_and_inertia(place[own], weight[own], volume[own])
-        moves.append(
-            _PieceMotion.of(mass, speed + np.cross(spin, mass.centre - whole.centre), spin)
-        )
+        moves.append(_PieceMotion.of(mass, speed + np.cross(spin, mass.centre - whole.centre), spin))
     return moves
 
 
@@ -101,8 +89,5 @@ class _PieceMotion:
     def of(cls, mass: rigid.BodyInertia, speed: np.ndarray, spin: np.ndarray) -> "_PieceMotion":
         momentum, own = mass.total * speed, mass.inertia @ spin
         return cls(
-            mass.centre,
-            momentum,
-            np.cross(mass.centre, momentum) + own,
-            0.5 * float(momentum @ speed + own @ spin),
+            mass.centre, momentum, np.cross(mass.centre, momentum) + own, 0.5 * float(momentum @ speed + own @ spin)
         )

@@ -23,11 +23,7 @@ START_HINT = "Let it fall (--drop 0.5), throw it (--velocity NAME=1,0,0) or push
 
 
 def run_hints(
-    scene: Scene,
-    happened: Outcome,
-    divided: bool,
-    lost: float | None = None,
-    parts: Sequence[PartAudit] = (),
+    scene: Scene, happened: Outcome, divided: bool, lost: float | None = None, parts: Sequence[PartAudit] = ()
 ) -> tuple[str, ...]:
     """Return hints for the next run, in sentences.
 
@@ -40,12 +36,7 @@ def run_hints(
 
     """
     joined = () if divided else _one_object_hint(scene)
-    return (
-        *scene.hints,
-        *joined,
-        *_motionless_hint(scene, happened),
-        *_energy_loss_hint(lost, parts),
-    )
+    return (*scene.hints, *joined, *_motionless_hint(scene, happened), *_energy_loss_hint(lost, parts))
 
 
 def _energy_loss_hint(share: float | None, parts: Sequence[PartAudit]) -> Iterator[str]:
@@ -100,7 +91,5 @@ def _is_still(what: ObjectOutcome | None) -> bool:
     far = float(np.linalg.norm(what.moved_m))
     turns = what.turned_deg > MIN_VISIBLE_TURN_DEG
     return (
-        not turns
-        and far < MIN_VISIBLE_MOTION_RATIO * what.length_m
-        and what.shape_error_max < MIN_VISIBLE_MOTION_RATIO
+        not turns and far < MIN_VISIBLE_MOTION_RATIO * what.length_m and what.shape_error_max < MIN_VISIBLE_MOTION_RATIO
     )

@@ -34,9 +34,7 @@ class PreparedScene:
 
     def broken(self, breaks: Sequence[FractureEvent]) -> "PreparedScene":
         """Return it with fragments as objects."""
-        filled = apply_breaks(
-            SceneWithMaterials(self.scene, self.parts, self.field), self.particles, breaks
-        )
+        filled = apply_breaks(SceneWithMaterials(self.scene, self.parts, self.field), self.particles, breaks)
         scene, parts, field = filled.whole.all
         return PreparedScene(scene, self.inventory, parts, field, filled.particles)
 

@@ -1,11 +1,10 @@
 """Static equilibrium under gravity before time 0, by dynamic relaxation.
 
-Poses at rest come from rigid bodies. Here soft objects sink until they carry their weight and what
-lies on them. Motion is taken out by kinetic damping (Cundall 1976; Barnes 1999, "Form finding and
-analysis of tension structures by dynamic relaxation"): whenever the kinetic energy of an object
-passes a maximum it lies near its balance, and is stopped there. There is no coefficient to choose,
-and what falls over falls as fast as in reality. In the end nothing is damped for a while; only what
-stays by itself has found its balance.
+Poses at rest come from rigid bodies. Here soft objects sink until they carry their weight and what lies on them. Motion
+is taken out by kinetic damping (Cundall 1976; Barnes 1999, "Form finding and analysis of tension structures by dynamic
+relaxation"): whenever the kinetic energy of an object passes a maximum it lies near its balance, and is stopped there.
+There is no coefficient to choose, and what falls over falls as fast as in reality. In the end nothing is damped for a
+while; only what stays by itself has found its balance.
 """
 
 from collections.abc import Callable
@@ -23,8 +22,8 @@ ENERGY_CHECK_INTERVAL_RATIO = 0.1
 CALM_WINDOW_S, CALM_DRIFT_DX = 0.05, 0.02
 """Less than so many cells within so many seconds [s, dx]: rest is tested."""
 WATCH_WINDOW_S, STILL_DRIFT_DX = 0.25, 0.1
-"""It stays when, left alone so long, nothing drifts by so much [s, dx]: a fifth of what counts as
-motion (docs/reference/static-equilibrium-benchmark.md)."""
+"""It stays when, left alone so long, nothing drifts by so much [s, dx]: a fifth of what counts as motion
+(docs/reference/static-equilibrium-benchmark.md)."""
 MAX_RELAXATION_S = 4.0
 """Maximum relaxation time [s]."""
 CHECKS_BETWEEN_SAVE_POINTS = 10
@@ -57,8 +56,8 @@ class StaticEquilibrium:
 def settling_problem(problem: Problem, hung: set[int]) -> Problem:
     """Return the problem without motion, wind, forces and loss.
 
-    Branches that forget at once neither bear nor lose anything: what remains is the slow modulus,
-    which alone carries what has lain for long.
+    Branches that forget at once neither bear nor lose anything: what remains is the slow modulus, which alone carries
+    what has lain for long.
 
     Args:
         problem: Of the video.
@@ -97,9 +96,7 @@ class DynamicRelaxation:
         self.members = [np.flatnonzero(group == k).tolist() for k in range(group.max() + 1)]
         self.bodies = range(len(group))
         self.owner = np.repeat(group, [len(b.position) for b in problem.bodies])
-        self.sample = ENERGY_CHECK_INTERVAL_RATIO * float(
-            np.sqrt(self.cell / np.linalg.norm(problem.gravity))
-        )
+        self.sample = ENERGY_CHECK_INTERVAL_RATIO * float(np.sqrt(self.cell / np.linalg.norm(problem.gravity)))
         self.first: Snapshot = engine.snapshot()
         self.start, self.energy = self._look()
         self.energy[:] = 0.0

@@ -1,7 +1,6 @@
 """Summary of a run's notes by severity: possible errors, assumptions, omissions.
 
-Notes get their kind where they are made (``types.notes``); here they are ordered for the report and
-the terminal.
+Notes get their kind where they are made (``types.notes``); here they are ordered for the report and the terminal.
 """
 
 import re
@@ -26,12 +25,8 @@ class SummarySection:
     """Which they are, the gravest first."""
 
 
-WARNINGS_SECTION = SummarySection(
-    "warning", "What may be wrong", "warnings", (NoteKind.GRAVE, NoteKind.DOUBT)
-)
-ASSUMPTIONS_SECTION = SummarySection(
-    "hint", "What was assumed, and what changes it", "hints", (NoteKind.ASSUMED,)
-)
+WARNINGS_SECTION = SummarySection("warning", "What may be wrong", "warnings", (NoteKind.GRAVE, NoteKind.DOUBT))
+ASSUMPTIONS_SECTION = SummarySection("hint", "What was assumed, and what changes it", "hints", (NoteKind.ASSUMED,))
 LEFT_OUT_SECTION = SummarySection("left out", "What was left out", "left out", (NoteKind.LEFT_OUT,))
 SECTIONS = (WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SECTION)
 """The gravest first."""

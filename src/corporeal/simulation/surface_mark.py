@@ -1,8 +1,8 @@
 """The mark in sand, mud, snow or paste: how deep its free surface fell, and how high a rim rose.
 
-Cohesive bodies are dented where their material went (``residual_shape.dent``). Grains and pastes
-separate: a splash carries a few far away, which says nothing of the depth of the hollow. Its depth
-is that of the surface, in columns along z of a width of ``COLUMN_WIDTH_DX`` cells.
+Cohesive bodies are dented where their material went (``residual_shape.dent``). Grains and pastes separate: a splash
+carries a few far away, which says nothing of the depth of the hollow. Its depth is that of the surface, in columns
+along z of a width of ``COLUMN_WIDTH_DX`` cells.
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ class SurfaceMark:
     rim: float
     """By how much it rose in the column where it rose most [m], 0: nowhere."""
     place: Float[np.ndarray, " 3"]
-    """Centroid of what fell by more than the threshold, weighted by how far squared, on the surface
-    as it started [m]; nan: nothing did."""
+    """Centroid of what fell by more than the threshold, weighted by how far squared, on the surface as it started [m];
+    nan: nothing did."""
     share: float
     """Share of the columns that fell so far [-]."""
 
@@ -41,21 +41,18 @@ def keeps_surface_mark(material: Material) -> bool:
 
 
 def surface_mark(
-    start: Float[np.ndarray, "N 3"],
-    now: list[Float[np.ndarray, "N 3"]],
-    cell: float,
-    threshold: float,
+    start: Float[np.ndarray, "N 3"], now: list[Float[np.ndarray, "N 3"]], cell: float, threshold: float
 ) -> SurfaceMark:
     """Compare the heights of a body's free surface with those at the start.
 
-    The rigid motion of what kept its shape is taken off first. A column whose particles have all
-    gone fell to where the lowest of them lay. Columns that were empty at the start count for
+    The rigid motion of what kept its shape is taken off first. A column whose particles have all gone fell to where the
+    lowest of them lay. Columns that were empty at the start count for
     nothing: what is thrown beside a heap is no rim.
 
     Args:
         start: Where the particles started, z up [m].
-        now: Where they are in each of the last frames; the median of the heights counts, so that
-            what flies past a column is none of its surface [m].
+        now: Where they are in each of the last frames; the median of the heights counts, so that what flies past a
+            column is none of its surface [m].
         cell: Grid spacing dx, of particles half a cell apart [m].
         threshold: What fell by less belongs to no mark [m].
 
@@ -94,8 +91,8 @@ class HeightColumns:
     def over(cls, points: Float[np.ndarray, "N 3"], width: float) -> "HeightColumns":
         """Lay columns over the points that a body starts with.
 
-        Their edges lie half a spacing beside its outermost points, so that where points are a
-        lattice no row of them is on an edge.
+        Their edges lie half a spacing beside its outermost points, so that where points are a lattice no row of them is
+        on an edge.
         """
         corner = points[:, :2].min(axis=0) - width / 4
         count = np.floor((points[:, :2].max(axis=0) - corner) / width).astype(int) + 1
@@ -103,9 +100,7 @@ class HeightColumns:
         np.minimum.at(columns.bottom, columns.of(points)[0], points[:, 2])
         return columns
 
-    def of(
-        self, points: Float[np.ndarray, "N 3"]
-    ) -> tuple[Int[np.ndarray, " M"], Bool[np.ndarray, " N"]]:
+    def of(self, points: Float[np.ndarray, "N 3"]) -> tuple[Int[np.ndarray, " M"], Bool[np.ndarray, " N"]]:
         """Return the columns of those points that are in any, and which points those are."""
         cells = np.floor((points[:, :2] - self.corner) / self.width)
         inside = np.asarray(((cells >= 0) & (cells < self.count)).all(axis=1))

@@ -1,10 +1,9 @@
 """Trajectory files: one per frame, written atomically, read one by one.
 
-``frames/00000.npz`` holds ``time``, every particle's ``position`` (float32 [m]); of the particles
-that can deform the total deformation gradient ``motion`` (float16) and the square root of the von
-Mises ``stress`` (float16 [√Pa], which reaches 4 GPa); the ``rotation`` of every rigid object
-(float64, NaN for the others), and the ledger of that instant under ``ledger.<name>``.
-``frames/layout.npz`` says which particle belongs to which object and which objects are rigid.
+``frames/00000.npz`` holds ``time``, every particle's ``position`` (float32 [m]); of the particles that can deform the
+total deformation gradient ``motion`` (float16) and the square root of the von Mises ``stress`` (float16 [√Pa], which
+reaches 4 GPa); the ``rotation`` of every rigid object (float64, NaN for the others), and the ledger of that instant
+under ``ledger.<name>``. ``frames/layout.npz`` says which particle belongs to which object and which objects are rigid.
 ``ledger.npz`` gathers the ledger and the times once all frames are there.
 """
 
@@ -89,16 +88,12 @@ def read_arrays(path: Path, start: str = "", without: str = "\0") -> dict[str, n
             names = [n for n in file.files if n.startswith(start) and not n.startswith(without)]
             return {name: file[name] for name in names}
     except NPZ_ERRORS as error:
-        raise BadFileError(
-            path, f"cannot be read ({error}).", "Run corporeal simulate again."
-        ) from error
+        raise BadFileError(path, f"cannot be read ({error}).", "Run corporeal simulate again.") from error
 
 
 def write_layout(folder: Path, layout: FrameLayout) -> None:
     """Write the data common to all frames."""
-    write_arrays(
-        folder / FRAMES_FOLDER / LAYOUT_FILE, {"object": layout.object, "rigid": layout.rigid}
-    )
+    write_arrays(folder / FRAMES_FOLDER / LAYOUT_FILE, {"object": layout.object, "rigid": layout.rigid})
 
 
 def read_layout(folder: Path) -> FrameLayout:
@@ -107,9 +102,7 @@ def read_layout(folder: Path) -> FrameLayout:
     return FrameLayout(object=found["object"].astype(np.int64), rigid=found["rigid"].astype(bool))
 
 
-def write_frame(
-    folder: Path, number: int, frame: Frame, layout: FrameLayout, ledger: Ledger
-) -> None:
+def write_frame(folder: Path, number: int, frame: Frame, layout: FrameLayout, ledger: Ledger) -> None:
     """Write one frame with its ledger."""
     rotation = np.full((len(layout.rigid), 3, 3), np.nan)
     for body in np.flatnonzero(layout.rigid):
@@ -146,9 +139,7 @@ def _frame(path: Path, found: dict[str, np.ndarray], layout: FrameLayout) -> Fra
             stress[layout.bends] = found["stress"].astype(np.float32) ** 2
         return Frame(float(found["time"]), found["position"].copy(), deformation, stress)
     except (KeyError, ValueError, IndexError) as error:
-        raise BadFileError(
-            path, f"is not a frame of this run ({error}).", "Run corporeal simulate again."
-        ) from error
+        raise BadFileError(path, f"is not a frame of this run ({error}).", "Run corporeal simulate again.") from error
 
 
 def read_ledger(folder: Path, number: int) -> Ledger:
@@ -171,9 +162,7 @@ def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
     names = [f.name for f in fields(Ledger)]
     absent = [name for name in names if name not in found]
     if absent:
-        raise BadFileError(
-            path, f"has a ledger without {', '.join(absent)}.", "Run corporeal simulate again."
-        )
+        raise BadFileError(path, f"has a ledger without {', '.join(absent)}.", "Run corporeal simulate again.")
     return Ledger(**{name: found[name] for name in names})
 
 

@@ -1,9 +1,9 @@
 """Access control of the server, and content security policy of its pages.
 
-Programs on this machine and pages of other sites can reach a server on 127.0.0.1 as well as its
-user does. So: only known names in ``Host`` (a foreign name is DNS rebinding), only the page's own
-origin for WebSockets, a header that foreign pages cannot send for everything that changes
-something, and a token wherever the server listens beyond this machine.
+Programs on this machine and pages of other sites can reach a server on 127.0.0.1 as well as its user does. So: only
+known names in ``Host`` (a foreign name is DNS rebinding), only the page's own origin for WebSockets, a header that
+foreign pages cannot send for everything that changes something, and a token wherever the server listens beyond this
+machine.
 """
 
 import hmac
@@ -75,11 +75,7 @@ class AccessGuard:
             return PlainTextResponse("Not from another page.\n", 403)
         if self.door.token and not self._known(headers):
             return self._ask(scope)
-        if (
-            scope["type"] == "http"
-            and scope["method"] not in SAFE_METHODS
-            and REQUEST_HEADER not in headers
-        ):
+        if scope["type"] == "http" and scope["method"] not in SAFE_METHODS and REQUEST_HEADER not in headers:
             return PlainTextResponse(f"Changes need the header {REQUEST_HEADER}: 1.\n", 403)
         return None
 

@@ -22,18 +22,7 @@ MAX_COMMAND_BYTES = 4096
 MAX_COMMANDS_PER_SECOND = 200
 MAX_NAME_CHARACTERS = 300
 """Of an object [letters]."""
-COMMAND_KINDS = (
-    "grab",
-    "pull",
-    "drop",
-    "gravity",
-    "wind",
-    "play",
-    "pause",
-    "step",
-    "reset",
-    "contact",
-)
+COMMAND_KINDS = ("grab", "pull", "drop", "gravity", "wind", "play", "pause", "step", "reset", "contact")
 COMMAND_KINDS += ("add",)
 
 
@@ -46,12 +35,12 @@ class Command:
     """The page's number of it, sent back with the pictures that show it."""
     object: int = 0
     point: Vector = (0.0, 0.0, 0.0)
-    """Where an object is taken; what is pointed at, or in a record the middle of the underside of
-    an object that is added [m].
+    """Where an object is taken; what is pointed at, or in a record the middle of the underside of an object that is
+    added [m].
     """
     to: Vector = (0.0, 0.0, 0.0)
-    """Where it is pulled [m]; gravity [m/s²]; wind [m/s]; in its last place, how high above all
-    that is under it an object that is added begins [m].
+    """Where it is pulled [m]; gravity [m/s²]; wind [m/s]; in its last place, how high above all that is under it an
+    object that is added begins [m].
     """
     firm: float = 4.0
     """Natural frequency on the hand's spring [Hz]."""
@@ -85,9 +74,7 @@ def parse_command(text: str) -> Command:
         object=_whole(asked, "object"),
         point=_vector(asked, "point", MAX_POINT_M),
         to=_vector(asked, "to", limit),
-        firm=min(
-            max(_number(asked.get("firm", 4.0)), MIN_GRIP_FREQUENCY_HZ), MAX_GRIP_FREQUENCY_HZ
-        ),
+        firm=min(max(_number(asked.get("firm", 4.0)), MIN_GRIP_FREQUENCY_HZ), MAX_GRIP_FREQUENCY_HZ),
         single=asked.get("single") is True,
         twin=asked.get("twin") is True,
         thing=_name(asked.get("thing", "")),

@@ -140,9 +140,7 @@ class InteractionController:
             raise UserError(f"There is no object {number}.")
         return found
 
-    def _nearest(
-        self, bodies: Sequence[int], places: np.ndarray, point: Vector
-    ) -> _GrippedParticle:
+    def _nearest(self, bodies: Sequence[int], places: np.ndarray, point: Vector) -> _GrippedParticle:
         """Find the particle of some bodies that is nearest to a point [m].
 
         Args:
@@ -181,9 +179,7 @@ class InteractionController:
         mass = float(self.engine.measure().mass[spot.body])
         stiffness = mass * (2 * np.pi * order.firm) ** 2
         x, y, z = point.tolist()
-        require(self.engine, InteractiveEngine).attach_spring(
-            spot.body, (x, y, z), order.to, stiffness
-        )
+        require(self.engine, InteractiveEngine).attach_spring(spot.body, (x, y, z), order.to, stiffness)
         self.held = SpringGrip(spot.body, stiffness, order.to)
 
     def _pull(self, order: Command) -> None:
@@ -226,9 +222,7 @@ class InteractionController:
         """Return where an object that is to be added begins, over what reaches up to ``top`` [m]."""
         room = max(drop_height(order), MIN_CLEARANCE_DX * self.engine.problem.cell)
         x, y, _ = order.point
-        return replace(
-            order, do=RECORDED_ADD, point=(x, y, top + room), to=(0.0, 0.0, drop_height(order))
-        )
+        return replace(order, do=RECORDED_ADD, point=(x, y, top + room), to=(0.0, 0.0, drop_height(order)))
 
     def _join(self, order: Command) -> None:
         one = AddedObject(order.thing, order.point, drop_height(order))

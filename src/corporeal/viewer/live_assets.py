@@ -69,9 +69,7 @@ class LiveAssets:
             names = [o.name for o in whole.scene.objects]
             if key.name in names:
                 return isolate_object(whole, names.index(key.name))
-        raise UserError(
-            f"There is no {text!r} to drop: it is neither a model of corporeal nor an object of a run."
-        )
+        raise UserError(f"There is no {text!r} to drop: it is neither a model of corporeal nor an object of a run.")
 
     def _filled(self) -> list[str]:
         return [row["name"] for row in self.shelf.listed() if row["shown"]]

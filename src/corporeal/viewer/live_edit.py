@@ -57,11 +57,7 @@ class LiveEditor:
     """Makes scenes with more and more in them; each is made once."""
 
     def __init__(
-        self,
-        prepared: PreparedScene,
-        quality: QualityPreset,
-        find: AssetFinder,
-        config: GroundConfig,
+        self, prepared: PreparedScene, quality: QualityPreset, find: AssetFinder, config: GroundConfig
     ) -> None:
         """Begin with what a live simulation begins with.
 
@@ -125,9 +121,7 @@ class LiveEditor:
             )
         need = 8 * float(np.prod(high - low)) / cell**3
         if need > PARTICLE_LIMIT_RATIO * self.quality.particles:
-            raise UserError(
-                f"{thing} is too large for the cells of this scene. Drop something smaller."
-            )
+            raise UserError(f"{thing} is too large for the cells of this scene. Drop something smaller.")
         # As it falls, so hard it strikes: that decides how it is treated.
         lifted = move_scene(scene, np.array([0.0, 0.0, height]) - _underside_point(scene))
         particles = fill(lifted, whole.parts, whole.field, quality=self.quality)
@@ -142,9 +136,7 @@ class LiveEditor:
     def _with(self, before: PreparedScene, added: AddedObject, number: int) -> PreparedScene:
         if number > MAX_ADDED_OBJECTS:
             raise UserError(f"{MAX_ADDED_OBJECTS} objects have been dropped. Begin again.")
-        here = FilledScene(
-            SceneWithMaterials(before.scene, before.parts, before.field), before.particles
-        )
+        here = FilledScene(SceneWithMaterials(before.scene, before.parts, before.field), before.particles)
         there = _renamed(self.ready(added.thing, added.height), here.whole.scene)
         there = shift_filled_scene(there, np.array(added.foot))
         a, b = here.whole.field, there.whole.field

@@ -259,9 +259,7 @@ class LiveSimulation:
         force = self.hands.force(now.position)
         beside = self.twin.engine.snapshot() if self.twin else None
         with self.taken:
-            self.instant = RenderState(
-                self.face, now, beside, held, force, self.done, self.playing, self.rate
-            )
+            self.instant = RenderState(self.face, now, beside, held, force, self.done, self.playing, self.rate)
             self.taken.notify_all()
 
     def _show(self) -> None:
@@ -342,9 +340,7 @@ class LiveSimulation:
         self.spent["step"] = stepping
         if moved:
             self.cost += COST_SMOOTHING * (stepping / self.pace - self.cost)
-            self.pace = float(
-                np.clip(1 / MAX_FPS / max(self.cost, 1e-3), MIN_FRAME_TIME_S, 1 / MAX_FPS)
-            )
+            self.pace = float(np.clip(1 / MAX_FPS / max(self.cost, 1e-3), MIN_FRAME_TIME_S, 1 / MAX_FPS))
 
     # ---------------------------------------------------------------- pictures
 
@@ -366,11 +362,7 @@ class LiveSimulation:
         shown = [now for now in (instant.now, instant.beside) if now is not None]
         face = instant.face
         frames = [face.moments.frame(now) for now in shown]
-        tops = [
-            float(np.percentile(f.stress, STRESS_SCALE_PERCENTILE))
-            for f in frames
-            if f.stress is not None
-        ]
+        tops = [float(np.percentile(f.stress, STRESS_SCALE_PERCENTILE)) for f in frames if f.stress is not None]
         self.top = max(self.top, *tops)
         held = np.full(3, np.nan) if instant.held is None else instant.held
         numbers = [instant.rate, instant.force, self.top]

@@ -1,7 +1,7 @@
 """Records of live simulations, and their replay at higher resolution.
 
-The record holds every order and the instant of every advance. What was taken hold of is told by
-where its material was at the start, so that a scene filled more finely obeys it as well.
+The record holds every order and the instant of every advance. What was taken hold of is told by where its material was
+at the start, so that a scene filled more finely obeys it as well.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,12 +24,7 @@ from corporeal.pipeline.stages.fill import FillConfig, fill
 from corporeal.pipeline.viewer_data import MAX_RECORDING_FPS, bind_scene, viewer_recording
 from corporeal.render.recording_format import record_frames
 from corporeal.simulation.simulation_result import PreparedScene
-from corporeal.viewer.interaction_controller import (
-    RECORDED_ADD,
-    InteractionController,
-    InteractionEvent,
-    drop_height,
-)
+from corporeal.viewer.interaction_controller import RECORDED_ADD, InteractionController, InteractionEvent, drop_height
 from corporeal.viewer.live_assets import LiveAssets
 from corporeal.viewer.live_edit import AddedObject, LiveEditor
 from corporeal.viewer.run_store import RunStore
@@ -68,9 +63,7 @@ def read_record(path: Path) -> InteractionRecord:
     return from_plain(InteractionRecord, store.read_json(path))
 
 
-def write_replays(
-    place: Path, progress: Progress, run: Path, kept: Path, beside: Sequence[Path] = ()
-) -> None:
+def write_replays(place: Path, progress: Progress, run: Path, kept: Path, beside: Sequence[Path] = ()) -> None:
     """Do again what a record says with both contacts; write ``multi.take``, ``single.take``.
 
     Args:
@@ -113,9 +106,7 @@ def drop_events(done: InteractionRecord) -> list[tuple[float, AddedObject]]:
     for touch in done.touches:
         now = max(now, touch.until)
         if touch.order is not None and touch.order.do == RECORDED_ADD:
-            found.append(
-                (now, AddedObject(touch.order.thing, touch.order.point, drop_height(touch.order)))
-            )
+            found.append((now, AddedObject(touch.order.thing, touch.order.point, drop_height(touch.order))))
     return found
 
 
@@ -139,8 +130,8 @@ def replay_frames(
 ) -> Iterator[Frame]:
     """Do again what a record says; yield frames, its first and last instant among them.
 
-    All frames hold all that is there in the end: until it is dropped, an object waits where it will
-    begin, and a page hides it.
+    All frames hold all that is there in the end: until it is dropped, an object waits where it will begin, and a page
+    hides it.
 
     Args:
         growth: The scene.
@@ -153,9 +144,7 @@ def replay_frames(
     posed = growth.at(()).posed
     whole = growth.at(tuple(one for _, one in drop_events(done))).prepared.particles
     problem = replace(posed.problem, contact=contact)
-    hands = InteractionController(
-        posed, problem, min(MAX_REPLAY_THREADS, usable_cores()), growth, engine
-    )
+    hands = InteractionController(posed, problem, min(MAX_REPLAY_THREADS, usable_cores()), growth, engine)
     moments, shown = SnapshotFrames(posed), 0.0
     yield with_waiting_objects(moments.frame(hands.engine.snapshot()), whole)
     for touch in done.touches:

@@ -151,9 +151,7 @@ class ReplayJobs:
 
     async def _state(self, request: Request) -> Response:
         found = self._find(request.path_params["id"])
-        return JSONResponse(
-            {"state": found.state, "fraction": found.fraction, "words": found.words}
-        )
+        return JSONResponse({"state": found.state, "fraction": found.fraction, "words": found.words})
 
     async def _page(self, request: Request) -> Response:
         self._find(request.path_params["id"])

@@ -44,17 +44,14 @@ def free_run_name(runs: Path, wanted: str) -> str:
     raise UserError(f"There are too many runs called {stem}.")
 
 
-def prepare_changed_run(
-    run: Path, made: StageResults, asked: Mapping[str, Any]
-) -> tuple[QueuedRun, Settings]:
+def prepare_changed_run(run: Path, made: StageResults, asked: Mapping[str, Any]) -> tuple[QueuedRun, Settings]:
     """Prepare a run that differs from another as a page asks; its annotations are written.
 
     Args:
         run: The other one's folder; not changed.
         made: What its stages made.
-        asked: ``parts``: number of a part → ``material`` and ``values`` (field → SI); ``detail``;
-            ``drop`` in sizes of the object; ``objects``: number of an object → ``lift`` [m] and
-            ``velocity`` [m/s].
+        asked: ``parts``: number of a part → ``material`` and ``values`` (field → SI); ``detail``; ``drop`` in sizes of
+            the object; ``objects``: number of an object → ``lift`` [m] and ``velocity`` [m/s].
 
     Raises:
         UserError: Something asked is not known, or a value lies outside its measured range.
@@ -88,17 +85,12 @@ def _detail(word: Any) -> Any:
     return word
 
 
-def _initial_state(
-    made: StageResults, asked: Mapping[str, Any], before: AssembleConfig
-) -> AssembleConfig:
+def _initial_state(made: StageResults, asked: Mapping[str, Any], before: AssembleConfig) -> AssembleConfig:
     """Return how objects begin: what is not asked for is as it was."""
     changes = asked.get("objects", {})
     if not isinstance(changes, dict):
         raise UserError("The changes of objects are no table.")
-    lift, velocity = (
-        dict(map(parse_lift, before.lift)),
-        dict(map(parse_initial_velocity, before.velocity)),
-    )
+    lift, velocity = (dict(map(parse_lift, before.lift)), dict(map(parse_initial_velocity, before.velocity)))
     objects = made.assembled.scene.objects
     for name, change in changes.items():
         k = int(name) if str(name).isdecimal() else -1
@@ -171,8 +163,6 @@ def _merge_annotations(old: Any, new: Mapping[str, Mapping[str, Any]]) -> dict[s
     merged = dict(old) if isinstance(old, dict) else {}
     for owner, parts in new.items():
         before = merged.get(owner)
-        whole = (
-            {} if before is None else before if isinstance(before, dict) else {"material": before}
-        )
+        whole = {} if before is None else before if isinstance(before, dict) else {"material": before}
         merged[owner] = {**whole, "parts": {**whole.get("parts", {}), **parts}}
     return merged

@@ -1,7 +1,7 @@
 """Queue of runs started from the page, each in its own process.
 
-What was asked stands in ``.queue.json``. A job that is stopped, or whose server is killed, goes on
-in the same folder from where it was.
+What was asked stands in ``.queue.json``. A job that is stopped, or whose server is killed, goes on in the same folder
+from where it was.
 """
 
 import signal
@@ -51,12 +51,7 @@ class JobProgress:
 
 
 def run_in_process(
-    place: Path,
-    progress: ProgressCallback,
-    inputs: list[Path],
-    folder: Path,
-    settings: Settings,
-    until: str,
+    place: Path, progress: ProgressCallback, inputs: list[Path], folder: Path, settings: Settings, until: str
 ) -> None:
     """Do one run, in a process of its own; every word about progress begins with its stage."""
 
@@ -169,14 +164,7 @@ class RunQueue:
             "settings": self.settings[entry.id],
             "until": entry.until,
         }
-        job = Job(
-            entry.id,
-            run_in_process,
-            self.runs / JOBS_FOLDER / entry.id,
-            entry.id,
-            given,
-            resumable=True,
-        )
+        job = Job(entry.id, run_in_process, self.runs / JOBS_FOLDER / entry.id, entry.id, given, resumable=True)
         self.progress[entry.id] = JobProgress()
         self._set(replace(entry, state="running"))
         self.workers.start(job)
@@ -214,11 +202,7 @@ class RunQueue:
         row = {"id": entry.id, "name": entry.name, "state": entry.state, "error": entry.error}
         running = entry.state == "running"
         bars = _stage_fractions(self._verbs(entry), progress.verbs) if running else {}
-        return row | {
-            "until": entry.until,
-            "verbs": bars,
-            "words": progress.words if running else "",
-        }
+        return row | {"until": entry.until, "verbs": bars, "words": progress.words if running else ""}
 
     def _verbs(self, entry: QueuedRun) -> Sequence[str]:
         every = stages_for([Path(path) for path in entry.inputs])

@@ -138,19 +138,12 @@ def load_run(run: Path) -> LoadedRun:
         raise UserError(f"{run} has no {REQUIRED_STAGE} yet: nothing of it can be shown in 3D.")
     cast = bind_scene(made.prepared)
     if made.simulate is None:
-        return LoadedRun(
-            made, viewer_recording(made.prepared, cast, found=made.rendered_reconstruction)
-        )
+        return LoadedRun(made, viewer_recording(made.prepared, cast, found=made.rendered_reconstruction))
     audit = run / AUDIT_FILE
     whole = from_plain(RunAudit, store.read_json(audit)) if audit.exists() else None
     recording = record_trajectory(cast, made.trajectory, MAX_RECORDING_FPS)
     shown = viewer_recording(
-        made.prepared,
-        cast,
-        made.played.outcome,
-        recording,
-        whole,
-        found=made.rendered_reconstruction,
+        made.prepared, cast, made.played.outcome, recording, whole, found=made.rendered_reconstruction
     )
     return LoadedRun(made, shown)
 

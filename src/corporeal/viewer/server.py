@@ -76,9 +76,7 @@ def address_words(address: ListenAddress, port: int, door: AccessPolicy) -> list
     ]
 
 
-def serve(
-    app: Starlette, listener: socket.socket, ready: Callable[[], None], browse: str = ""
-) -> None:
+def serve(app: Starlette, listener: socket.socket, ready: Callable[[], None], browse: str = "") -> None:
     """Serve until Ctrl-C.
 
     Args:

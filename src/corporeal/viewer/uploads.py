@@ -78,17 +78,13 @@ class UploadInbox:
         room, reason = min(
             (
                 limits.file_bytes,
-                f"More than {in_gib(limits.file_bytes)}, the most that a page takes: "
-                "corporeal run FILE.",
+                f"More than {in_gib(limits.file_bytes)}, the most that a page takes: corporeal run FILE.",
             ),
             (
                 limits.inbox_bytes - held,
                 f"Uploads may have {most} together: delete what is not needed in {INBOX_FOLDER}.",
             ),
-            (
-                free - limits.free_disk_bytes,
-                f"The disk is nearly full: {in_gib(free)} are free, and {spare} stay so.",
-            ),
+            (free - limits.free_disk_bytes, f"The disk is nearly full: {in_gib(free)} are free, and {spare} stay so."),
         )
         return max(room, 0), reason
 
@@ -105,8 +101,7 @@ class UploadInbox:
         known = next((name for magic, name in FILE_SIGNATURES if head.startswith(magic)), None)
         if known is None:
             raise UserError(
-                "Neither a GLB, nor a splat (PLY), nor a zip of photographs. Other files: "
-                "corporeal run FILE."
+                "Neither a GLB, nor a splat (PLY), nor a zip of photographs. Other files: corporeal run FILE."
             )
         path, size = folder / known, raw.stat().st_size
         raw.rename(path)

@@ -21,16 +21,7 @@ from corporeal.viewer.access import REPORT_CONTENT_POLICY, AccessGuard, AccessPo
 from corporeal.viewer.run_store import THUMBNAIL_FILE, RunStore
 
 MIME_TYPES = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
-PAGE_FILES = (
-    *VIEW_SCRIPTS,
-    "touch.js",
-    "change.js",
-    "export.js",
-    "start.js",
-    "home.js",
-    "viewer.css",
-    "home.css",
-)
+PAGE_FILES = (*VIEW_SCRIPTS, "touch.js", "change.js", "export.js", "start.js", "home.js", "viewer.css", "home.css")
 """All that a page may load of the package."""
 
 
@@ -106,9 +97,7 @@ class _Pages:
 
     async def runs(self, request: Request) -> Response:
         listed = await run_in_threadpool(self.shelf.listed)
-        return JSONResponse(
-            {"runs": listed, "read_only": self.shown.read_only, "works": self.shown.works}
-        )
+        return JSONResponse({"runs": listed, "read_only": self.shown.read_only, "works": self.shown.works})
 
     async def take(self, request: Request) -> Response:
         opened = await run_in_threadpool(self.shelf.open, request.path_params["name"])

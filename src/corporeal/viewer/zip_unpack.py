@@ -19,18 +19,7 @@ UNCHECKED_RATIO_BYTES = 1 << 20
 """A file that unpacks to no more is not measured by its ratio [bytes]."""
 MAX_FOLDER_DEPTH = 4
 """Most folders in one another."""
-ALLOWED_SUFFIXES = (
-    ".jpg",
-    ".jpeg",
-    ".png",
-    ".webp",
-    ".tif",
-    ".tiff",
-    ".json",
-    ".txt",
-    ".bin",
-    ".ply",
-)
+ALLOWED_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".json", ".txt", ".bin", ".ply")
 """Photographs, and what says where they were taken from."""
 NAME_PATTERN = re.compile(r"[\w][\w .()+,=-]{0,118}")
 BLOCK_BYTES = 1 << 20
@@ -54,8 +43,8 @@ def unpack_zip(source: Path, folder: Path, most: int = MAX_UNPACKED_BYTES) -> in
         most: Bytes that all files together may have.
 
     Raises:
-        BadFileError: It is no zip, or holds what no set of photographs needs: links, paths that
-            lead out, other archives, too many files, or too much in them.
+        BadFileError: It is no zip, or holds what no set of photographs needs: links, paths that lead out, other
+            archives, too many files, or too much in them.
 
     """
     left = _UnpackBudget(most)
@@ -68,17 +57,13 @@ def unpack_zip(source: Path, folder: Path, most: int = MAX_UNPACKED_BYTES) -> in
             for entry in files:
                 _unpack_one(archive, entry, folder, left, source.name)
     except ARCHIVE_ERRORS as error:
-        raise BadFileError(
-            source.name, f"cannot be unpacked ({error}).", "Pack it again."
-        ) from error
+        raise BadFileError(source.name, f"cannot be unpacked ({error}).", "Pack it again.") from error
     if not files:
         raise BadFileError(source.name, "is empty.")
     return len(files)
 
 
-def _unpack_one(
-    archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left: _UnpackBudget, of: str
-) -> None:
+def _unpack_one(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, folder: Path, left: _UnpackBudget, of: str) -> None:
     path = folder.joinpath(*_places(entry, of))
     if path.exists():
         raise BadFileError(of, "has two files of one name.")
@@ -113,7 +98,5 @@ def _places(entry: zipfile.ZipInfo, of: str) -> tuple[str, ...]:
     if not all(NAME_PATTERN.fullmatch(part) and not part.endswith((" ", ".")) for part in parts):
         raise BadFileError(of, "holds a path that leads elsewhere, or a strange name.")
     if path.suffix.lower() not in ALLOWED_SUFFIXES:
-        raise BadFileError(
-            of, f"holds {path.suffix or 'a file without a suffix'}.", "Pack photographs only."
-        )
+        raise BadFileError(of, f"holds {path.suffix or 'a file without a suffix'}.", "Pack photographs only.")
     return parts

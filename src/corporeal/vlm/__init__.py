@@ -18,8 +18,8 @@ class AnswerSchema(BaseModel):
     """Base of the answers to questions."""
 
     SCHEMA: ClassVar[str]
-    """Name and version of its fields, such as "materials/1": answers are recorded under it, not
-    under the name of the class. Raise the version with every change of the fields."""
+    """Name and version of its fields, such as "materials/1": answers are recorded under it, not under the name of the
+    class. Raise the version with every change of the fields."""
 
 
 Answer = TypeVar("Answer", bound=AnswerSchema)

@@ -12,20 +12,9 @@ from corporeal.core.errors import BadFileError
 from corporeal.core.types import PartDescription
 from corporeal.recognition.stated_properties import MAX_INFLATION_PA, SEALABLE_STRUCTURES
 
-ANNOTATION_KEYS = (
-    "material",
-    "structure",
-    "thickness_mm",
-    "contents",
-    "fill",
-    "solidity",
-    "inflation_kPa",
-    "values",
-)
+ANNOTATION_KEYS = ("material", "structure", "thickness_mm", "contents", "fill", "solidity", "inflation_kPa", "values")
 ANNOTATION_STRUCTURES = ("solid", "shell", "sheet", "hollow", "filled", "packed")
-ANNOTATION_EXAMPLE = (
-    "For example: 'duck_0: soft_PVC', or 'duck_0: { material: soft_PVC, thickness_mm: 2 }'."
-)
+ANNOTATION_EXAMPLE = "For example: 'duck_0: soft_PVC', or 'duck_0: { material: soft_PVC, thickness_mm: 2 }'."
 
 
 @dataclass(frozen=True)
@@ -60,8 +49,7 @@ def read_annotations(
         free: Objects whose parts are not segmented yet: the file may name them.
 
     Returns:
-        (object, part) → its annotation. That of an object holds for all its parts that are not
-        named themselves.
+        (object, part) → its annotation. That of an object holds for all its parts that are not named themselves.
 
     Raises:
         BadFileError: The file is not such a file, or names an object or part that does not exist.
@@ -73,9 +61,7 @@ def read_annotations(
             raise _unknown(path, "object", name, scene)
         parts = given.pop("parts", {}) if isinstance(given, dict) else {}
         if not isinstance(parts, dict):
-            raise BadFileError(
-                path, f"'parts' of {name!r} must map part names.", ANNOTATION_EXAMPLE
-            )
+            raise BadFileError(path, f"'parts' of {name!r} must map part names.", ANNOTATION_EXAMPLE)
         parts = {str(part): answer for part, answer in parts.items()}
         for part in parts:
             if part not in scene[name] and name not in free:
@@ -101,9 +87,7 @@ def read_annotation_mapping(path: Path) -> dict:
         first = (str(error) or "nested too deep").splitlines()[0]
         raise BadFileError(path, f"is not YAML ({first}).", ANNOTATION_EXAMPLE) from error
     if not isinstance(parsed, dict):
-        raise BadFileError(
-            path, "must map object names to what they are made of.", ANNOTATION_EXAMPLE
-        )
+        raise BadFileError(path, "must map object names to what they are made of.", ANNOTATION_EXAMPLE)
     return {str(name): value for name, value in parsed.items()}
 
 
@@ -111,23 +95,17 @@ def _annotation(path: Path, where: str, given: Any) -> PartAnnotation:
     if isinstance(given, str):
         return PartAnnotation(material=given)
     if not isinstance(given, dict):
-        raise BadFileError(
-            path, f"{where}: must be a material's name or a mapping.", ANNOTATION_EXAMPLE
-        )
+        raise BadFileError(path, f"{where}: must be a material's name or a mapping.", ANNOTATION_EXAMPLE)
     strange = [k for k in given if k not in ANNOTATION_KEYS]
     if strange:
-        raise BadFileError(
-            path, f"{where}: unknown key {strange[0]!r}.", f"Keys: {_list(ANNOTATION_KEYS)}."
-        )
+        raise BadFileError(path, f"{where}: unknown key {strange[0]!r}.", f"Keys: {_list(ANNOTATION_KEYS)}.")
     structure = given.get("structure")
     if structure not in (None, *ANNOTATION_STRUCTURES):
         options = f"Choose one of: {', '.join(ANNOTATION_STRUCTURES)}."
         raise BadFileError(path, f"{where}: structure is {structure!r}.", options)
     for key in ("material", "contents"):
         if given.get(key) is not None and not isinstance(given[key], str):
-            raise BadFileError(
-                path, f"{where}: {key} must be a name, not {given[key]!r}.", ANNOTATION_EXAMPLE
-            )
+            raise BadFileError(path, f"{where}: {key} must be a name, not {given[key]!r}.", ANNOTATION_EXAMPLE)
     thickness = _thickness(path, where, given.get("thickness_mm"))
     return PartAnnotation(
         material=given.get("material"),
@@ -200,9 +178,7 @@ def _list(names: Any) -> str:
     return ", ".join(str(n) for n in names)
 
 
-def apply_structure_annotation(
-    annotation: PartAnnotation, words: PartDescription
-) -> PartDescription:
+def apply_structure_annotation(annotation: PartAnnotation, words: PartDescription) -> PartDescription:
     """Apply the annotated structure of a part."""
     walled = annotation.thickness is not None or annotation.inflation is not None
     wall = "sheet" if words.structure == "sheet" and annotation.inflation is None else "shell"
@@ -226,9 +202,7 @@ def apply_structure_annotation(
     words = replace(words, inflation=pressure if structure in SEALABLE_STRUCTURES else None)
     if structure != "filled":
         return replace(words, contents=None, fill=None)
-    return replace(
-        words, contents=annotation.contents or words.contents, fill=annotation.fill or words.fill
-    )
+    return replace(words, contents=annotation.contents or words.contents, fill=annotation.fill or words.fill)
 
 
 def annotated_pieces(

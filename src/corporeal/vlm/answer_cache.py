@@ -1,7 +1,7 @@
 """Cache of paid answers on the disk.
 
-One JSON file per validated answer, named by a digest of its inputs, and written atomically: several
-processes may share the folder.
+One JSON file per validated answer, named by a digest of its inputs, and written atomically: several processes may share
+the folder.
 """
 
 import hashlib
@@ -14,15 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from corporeal.core import store
-from corporeal.vlm import (
-    Answer,
-    AnswerCheck,
-    AnswerSchema,
-    Question,
-    Reply,
-    VlmClient,
-    no_complaints,
-)
+from corporeal.vlm import Answer, AnswerCheck, AnswerSchema, Question, Reply, VlmClient, no_complaints
 
 ANSWER_CACHE_VERSION = 1
 
@@ -37,9 +29,7 @@ class CachingClient:
 
     looks = True
 
-    def __init__(
-        self, model: VlmClient, name: str, settings: Mapping[str, Any], at: Path | None = None
-    ) -> None:
+    def __init__(self, model: VlmClient, name: str, settings: Mapping[str, Any], at: Path | None = None) -> None:
         self.model, self.name, self.settings = model, name, dict(settings)
         self.folder = at or answer_cache_folder()
         self._locks: dict[str, Lock] = {}
@@ -67,10 +57,7 @@ class CachingClient:
 
     def key(self, question: Question, answer: type[AnswerSchema]) -> str:
         """Return the digest of a question: task, model, text, pictures, shape of the answer, and settings."""
-        pictures = [
-            hashlib.sha256(str(p.shape).encode() + p.tobytes()).hexdigest()
-            for p in question.pictures
-        ]
+        pictures = [hashlib.sha256(str(p.shape).encode() + p.tobytes()).hexdigest() for p in question.pictures]
         asked = {
             "version": ANSWER_CACHE_VERSION,
             "task": question.task,

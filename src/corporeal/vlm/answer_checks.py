@@ -64,12 +64,7 @@ def ranking_complaints(answer: RankingAnswer, count: int) -> list[str]:
     return [f"Rank each of the decompositions 1 to {count} exactly once."]
 
 
-def materials_complaints(
-    answer: MaterialsAnswer,
-    parts: Sequence[str],
-    names: AllowedNames,
-    shared: bool,
-) -> list[str]:
+def materials_complaints(answer: MaterialsAnswer, parts: Sequence[str], names: AllowedNames, shared: bool) -> list[str]:
     """Check names, builds, probabilities and, where parts share one mesh, what they take up."""
     found = name_complaints([p.part for p in answer.parts], parts)
     for part in answer.parts:
@@ -83,8 +78,7 @@ def name_complaints(got: Sequence[str], wanted: Sequence[str]) -> list[str]:
     if sorted(got) == sorted(wanted):
         return []
     return [
-        f"Answer for exactly these names, each once: {'; '.join(wanted)}. You answered for: "
-        f"{'; '.join(got) or 'none'}."
+        f"Answer for exactly these names, each once: {'; '.join(wanted)}. You answered for: {'; '.join(got) or 'none'}."
     ]
 
 
@@ -106,10 +100,7 @@ def _structure_problems(way: PartHypothesis, names: AllowedNames) -> list[str]:
     walled = way.built in ("sheet", "hollow", "filled")
     made = names.material(way.material) if way.material is not None else None
     if walled and made is not None and not names.walled(made):
-        found.append(
-            f"Nobody makes walls of {way.material}: it is built 'solid' or 'packed', never "
-            f"{way.built!r}."
-        )
+        found.append(f"Nobody makes walls of {way.material}: it is built 'solid' or 'packed', never {way.built!r}.")
     if way.built != "filled":
         if way.contents is not None:
             found.append("Only what is built 'filled' has contents.")
@@ -163,9 +154,7 @@ def _sums(outside: Sequence[PartAnswer]) -> list[str]:
     for what in ("volume_share", "surface_share"):
         total = sum(getattr(p, what) for p in outside)
         if not isclose(total, 1.0, abs_tol=SHARE_SUM_TOLERANCE):
-            found.append(
-                f"{what} of the parts that lie at the surface must add up to 1, not {total:.2f}."
-            )
+            found.append(f"{what} of the parts that lie at the surface must add up to 1, not {total:.2f}.")
     return found
 
 
@@ -184,12 +173,8 @@ def weakness_notes(answer: MaterialsAnswer) -> list[str]:
     for part in answer.parts:
         total = sum(way.probability for way in part.ways)
         if total > 1 + SHARE_SUM_TOLERANCE:
-            found.append(
-                f"the probabilities of {part.part} add up to {total:.3g} and were divided by it"
-            )
-    if all(
-        len(p.ways) == 1 and p.ways[0].probability > 1 - SHARE_SUM_TOLERANCE for p in answer.parts
-    ):
+            found.append(f"the probabilities of {part.part} add up to {total:.3g} and were divided by it")
+    if all(len(p.ways) == 1 and p.ways[0].probability > 1 - SHARE_SUM_TOLERANCE for p in answer.parts):
         found.append(
             "one way only was given for every part, as certain: the interval of its mass covers "
             "measured ranges and no other build"
@@ -224,19 +209,13 @@ def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
     if not answer.low_kg <= answer.likely_kg <= answer.high_kg:
         return ["low_kg, likely_kg and high_kg must be in this order."]
     said = [(answer.likely_kg, "Answer in kilograms.")]
-    said += [
-        (_printed_weight(fact), f"Check the unit of {fact.words!r}.") for fact in answer.printed
-    ]
+    said += [(_printed_weight(fact), f"Check the unit of {fact.words!r}.") for fact in answer.printed]
     return [problem for mass, advice in said if (problem := _too_dense(mass, box, advice))]
 
 
 def _printed_weight(fact: PrintedStatement) -> float | None:
     """Weight [kg] that is printed on an object, or None where it is something else."""
-    factor = (
-        KILOGRAMS_OF_PRINTED_UNIT.get(fact.unit)
-        if fact.kind in ("net weight", "total weight")
-        else None
-    )
+    factor = KILOGRAMS_OF_PRINTED_UNIT.get(fact.unit) if fact.kind in ("net weight", "total weight") else None
     return fact.number * factor if fact.number and factor else None
 
 
@@ -301,9 +280,7 @@ def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
     """Check that sizes are lengths of objects, in order, and no slip of a unit."""
     sizes = (answer.smallest, answer.usual, answer.largest)
     if not all(MIN_OBJECT_EXTENT_M <= size <= MAX_OBJECT_EXTENT_M for size in sizes):
-        return [
-            f"Sizes must lie between {MIN_OBJECT_EXTENT_M:g} and {MAX_OBJECT_EXTENT_M:g} metres."
-        ]
+        return [f"Sizes must lie between {MIN_OBJECT_EXTENT_M:g} and {MAX_OBJECT_EXTENT_M:g} metres."]
     if not answer.smallest <= answer.usual <= answer.largest:
         return ["smallest, usual and largest must be in this order."]
     known = typical_extent(class_name)

@@ -1,7 +1,7 @@
 """Several answers to one request, which pays for the pictures once.
 
-OpenAI's chat format has ``n``; its client hands on the first choice only, so that the others are
-read off the response. A server that ignores ``n`` gives one, and is asked again.
+OpenAI's chat format has ``n``; its client hands on the first choice only, so that the others are read off the response.
+A server that ignores ``n`` gives one, and is asked again.
 """
 
 import hashlib
@@ -82,9 +82,7 @@ class SpareAnswers:
         with self._one:
             self._kept[_key(question, answer)] = list(texts)
 
-    def take(
-        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer]
-    ) -> Answer | None:
+    def take(self, question: Question, answer: type[Answer], check: AnswerCheck[Answer]) -> Answer | None:
         """Return the next valid one; None: none is left."""
         if question.turn.number == 1 or not question.turn.alike:
             return None
@@ -104,9 +102,7 @@ def _key(question: Question, answer: type[AnswerSchema]) -> str:
     return hashlib.sha256(json.dumps(row).encode()).hexdigest()
 
 
-def _parse_fitting_answer(
-    text: str, answer: type[Answer], check: AnswerCheck[Answer]
-) -> Answer | None:
+def _parse_fitting_answer(text: str, answer: type[Answer], check: AnswerCheck[Answer]) -> Answer | None:
     """Read an answer, whatever stands around its braces; None where it does not fit."""
     try:
         found = answer.model_validate_json(text[text.find("{") : text.rfind("}") + 1])

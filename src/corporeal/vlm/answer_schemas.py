@@ -33,12 +33,7 @@ KILOGRAMS_OF_PRINTED_UNIT = {"g": 1e-3, "kg": 1.0, "oz": 0.028349523, "lb": 0.45
 CUBIC_METRES_OF_PRINTED_UNIT = {"ml": 1e-6, "l": 1e-3, "fl oz": 2.9573530e-5}
 METRES_OF_PRINTED_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of what is printed (NIST Handbook 44, Appendix C; fluid ounces are those of the US)."""
-LISTED_FORM_OF_UNIT = {
-    "cl": ("ml", 10.0),
-    "dl": ("ml", 100.0),
-    "mg": ("g", 1e-3),
-    "lbs": ("lb", 1.0),
-}
+LISTED_FORM_OF_UNIT = {"cl": ("ml", 10.0), "dl": ("ml", 100.0), "mg": ("g", 1e-3), "lbs": ("lb", 1.0)}
 """Units that answers give, too: a listed one, and how many of it. To list them would need a new
 version of the schema, and so end every recorded answer about a mass."""
 

@@ -41,16 +41,7 @@ from pydantic_ai.settings import ModelSettings
 from pydantic_ai.usage import RunUsage
 
 from corporeal.core.errors import UserError
-from corporeal.vlm import (
-    Answer,
-    AnswerCheck,
-    AnswerCost,
-    AnswerNumber,
-    Question,
-    Reply,
-    UnansweredError,
-    no_complaints,
-)
+from corporeal.vlm import Answer, AnswerCheck, AnswerCost, AnswerNumber, Question, Reply, UnansweredError, no_complaints
 from corporeal.vlm.answer_sampling import OTHER_CHOICES, SAMPLING_TEMPERATURE, SpareAnswers, hear
 
 
@@ -210,10 +201,7 @@ class ApiClient(ABC):
 
         client = create_async_httpx2_client(timeout=self.patience.timeout)
         hooks = client.event_hooks
-        client.event_hooks = {
-            "request": [*hooks["request"], out],
-            "response": [*hooks["response"], back, hear],
-        }
+        client.event_hooks = {"request": [*hooks["request"], out], "response": [*hooks["response"], back, hear]}
         return client
 
     def ask(
@@ -223,8 +211,8 @@ class ApiClient(ABC):
 
         Raises:
             UnansweredError: No usable answer within the patience.
-            UserError: The key is refused, the model is unknown, the account is empty, or there is
-                no server: no other question would be answered either.
+            UserError: The key is refused, the model is unknown, the account is empty, or there is no server: no other
+                question would be answered either.
 
         """
         if self._over is not None:
@@ -238,9 +226,7 @@ class ApiClient(ABC):
             self._over = error
             raise
 
-    async def _ask(
-        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer]
-    ) -> Reply[Answer]:
+    async def _ask(self, question: Question, answer: type[Answer], check: AnswerCheck[Answer]) -> Reply[Answer]:
         usage, start = RunUsage(), time.monotonic()
         spare = self._spares.take(question, answer, check)
         if spare is not None:
@@ -263,12 +249,7 @@ class ApiClient(ABC):
         raise AssertionError("the last failure raises")
 
     async def _once(
-        self,
-        question: Question,
-        answer: type[Answer],
-        check: AnswerCheck[Answer],
-        usage: RunUsage,
-        form: RequestForm,
+        self, question: Question, answer: type[Answer], check: AnswerCheck[Answer], usage: RunUsage, form: RequestForm
     ) -> Answer:
         agent = Agent(
             self.model,
@@ -286,9 +267,7 @@ class ApiClient(ABC):
 
         heard: list[list[str]] = []
         OTHER_CHOICES.set(heard if form.count > 1 else None)
-        pictures = [
-            BinaryContent(encode_jpeg(p), media_type="image/jpeg") for p in question.pictures
-        ]
+        pictures = [BinaryContent(encode_jpeg(p), media_type="image/jpeg") for p in question.pictures]
         try:
             asked = await agent.run(
                 [question.text, *pictures],
@@ -355,13 +334,10 @@ class ApiClient(ABC):
         where = self._where()
         if isinstance(error, ModelAuthenticationError):
             raise UserError(
-                f"{where} refused the key for {self.address.spec}. Check the environment variable "
-                f"{self._variable()}."
+                f"{where} refused the key for {self.address.spec}. Check the environment variable {self._variable()}."
             ) from None
         if isinstance(error, ModelNotFoundError):
-            raise UserError(
-                f"{where} knows no model {self.address.model!r}. Check the name after --vlm."
-            ) from None
+            raise UserError(f"{where} knows no model {self.address.model!r}. Check the name after --vlm.") from None
         if isinstance(error, ModelQuotaExceededError):
             raise UserError(
                 f"{where} says that the account's credit or quota is used up. Answers so far are "
@@ -369,9 +345,7 @@ class ApiClient(ABC):
             ) from None
         unreachable = isinstance(error, ModelConnectionError) and error.phase == "connect"
         if unreachable and failures >= self.patience.tries:
-            raise UserError(
-                f"There is no answer from {where}. Check the network, and that the server runs."
-            ) from None
+            raise UserError(f"There is no answer from {where}. Check the network, and that the server runs.") from None
 
     def _plain(self, error: Exception) -> str:
         """Return an error in one line, without the key."""
@@ -389,9 +363,7 @@ def _validation_failure_text(error: Exception) -> str:
     said = last.tool_retry.content
     if isinstance(said, list):
         rows = [row for row in said if isinstance(row, dict)]
-        said = "; ".join(
-            f"{_answer_path_text(row.get('loc', ()))}: {row.get('msg', '')}" for row in rows
-        )
+        said = "; ".join(f"{_answer_path_text(row.get('loc', ()))}: {row.get('msg', '')}" for row in rows)
     return f"no answer fits, also when asked again; of the last: {said}"
 
 
@@ -410,9 +382,7 @@ class OpenAIClient(ApiClient):
         from pydantic_ai.models.openai import OpenAIChatModel
         from pydantic_ai.providers.openai import OpenAIProvider
 
-        provider = OpenAIProvider(
-            base_url=self.address.url, api_key=secret, http_client=self._http()
-        )
+        provider = OpenAIProvider(base_url=self.address.url, api_key=secret, http_client=self._http())
         return OpenAIChatModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -426,9 +396,7 @@ class AnthropicClient(ApiClient):
         from pydantic_ai.models.anthropic import AnthropicModel
         from pydantic_ai.providers.anthropic import AnthropicProvider
 
-        provider = AnthropicProvider(
-            base_url=self.address.url, api_key=secret, http_client=self._http()
-        )
+        provider = AnthropicProvider(base_url=self.address.url, api_key=secret, http_client=self._http())
         return AnthropicModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -441,9 +409,7 @@ class GoogleClient(ApiClient):
         from pydantic_ai.models.google import GoogleModel
         from pydantic_ai.providers.google import GoogleProvider
 
-        provider = GoogleProvider(
-            base_url=self.address.url, api_key=secret, http_client=self._http()
-        )
+        provider = GoogleProvider(base_url=self.address.url, api_key=secret, http_client=self._http())
         return GoogleModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -466,11 +432,7 @@ class OllamaClient(ApiClient):
         return OllamaModel(self.address.model, provider=provider, profile=profile)
 
 
-OUTPUT_MODES: dict[str, Callable[[Any], Any]] = {
-    "native": NativeOutput,
-    "tool": ToolOutput,
-    "prompted": PromptedOutput,
-}
+OUTPUT_MODES: dict[str, Callable[[Any], Any]] = {"native": NativeOutput, "tool": ToolOutput, "prompted": PromptedOutput}
 """How a model is held to the shape of an answer, by what its server can do."""
 
 

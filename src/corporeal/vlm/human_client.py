@@ -1,7 +1,7 @@
 """Manual answers: every question is written to a page, and waits for its answer.
 
-For a chat window without an API key, or answers by a person. Answers are kept as recordings in the
-same folder, for ``--vlm replay:FOLDER``.
+For a chat window without an API key, or answers by a person. Answers are kept as recordings in the same folder, for
+``--vlm replay:FOLDER``.
 """
 
 import re
@@ -131,9 +131,7 @@ def _read_answer(path: Path, answer: type[Answer], check: AnswerCheck[Answer]) -
 
 def _write_page(page: Path, question: Question, answer: type[AnswerSchema], wrong: str) -> None:
     schema = answer.model_json_schema()
-    text = question.text + ANSWER_SHAPE_TEXT.format(
-        shape=schema_example(schema, schema.get("$defs", {}))
-    )
+    text = question.text + ANSWER_SHAPE_TEXT.format(shape=schema_example(schema, schema.get("$defs", {})))
     if wrong:
         text = f"**The answer given so far does not fit:** {wrong}\n\n{text}"
     store.write_bytes(page, text.encode())
@@ -155,8 +153,7 @@ def schema_example(schema: Mapping, known: Mapping, indent: str = "") -> str:
     if schema["type"] == "object":
         inner = f"{indent}  "
         rows = (
-            f'{inner}"{name}": {schema_example(value, known, inner)}'
-            for name, value in schema["properties"].items()
+            f'{inner}"{name}": {schema_example(value, known, inner)}' for name, value in schema["properties"].items()
         )
         return "{\n" + ",\n".join(rows) + f"\n{indent}}}"
     return f"{schema['type']}{_limits(schema)}"

@@ -44,29 +44,20 @@ SIZE_DISAGREEMENT_RATIO = 2.5
 """By what factor a size may differ from the usual one before it is reported."""
 
 
-def parts_from_answer(
-    answer: MaterialsAnswer, by: LookingSource, names: AllowedNames
-) -> list[PartDescription]:
+def parts_from_answer(answer: MaterialsAnswer, by: LookingSource, names: AllowedNames) -> list[PartDescription]:
     """Convert a validated answer to descriptions, one per part; unknown parts have no material."""
     outside = [p for p in answer.parts if p.inside is None and not p.missing]
-    total = [
-        sum(getattr(p, what) or 0.0 for p in outside) for what in ("volume_share", "surface_share")
-    ]
+    total = [sum(getattr(p, what) or 0.0 for p in outside) for what in ("volume_share", "surface_share")]
     within = {
-        part.part: sum(p.volume_share or 0.0 for p in answer.parts if p.inside == part.part)
-        for part in answer.parts
+        part.part: sum(p.volume_share or 0.0 for p in answer.parts if p.inside == part.part) for part in answer.parts
     }
     return [
         replace(
-            with_likeliest_hypothesis(
-                PartDescription(part.part, None), part_hypotheses(part, names), by
-            ),
+            with_likeliest_hypothesis(PartDescription(part.part, None), part_hypotheses(part, names), by),
             volume_share=_normalised_share(part.volume_share, total[0]),
             surface_share=_normalised_share(part.surface_share, total[1]),
             inside=part.inside or "",
-            inner_share=_normalised_share(within[part.part], total[0])
-            if within[part.part]
-            else 0.0,
+            inner_share=_normalised_share(within[part.part], total[0]) if within[part.part] else 0.0,
             missing=part.missing,
         )
         for part in answer.parts
@@ -152,11 +143,7 @@ def complete_from_file(
         own = replace(file, structure="solid", thickness=None, contents=None, fill=None)
         own = replace(own, built_by=answered.built_by)
     elif answered.structure and (file.thickness or file.material is None or walled(file.material)):
-        kept = {
-            "structure": answered.structure,
-            "contents": answered.contents,
-            "fill": answered.fill,
-        }
+        kept = {"structure": answered.structure, "contents": answered.contents, "fill": answered.fill}
         own = replace(file, **kept, built_by=answered.built_by)
     return replace(
         own,
@@ -172,18 +159,10 @@ def complete_from_file(
     )
 
 
-def _complete_hypotheses(
-    ways: Sequence[Hypothesis], file: PartDescription
-) -> tuple[Hypothesis, ...]:
+def _complete_hypotheses(ways: Sequence[Hypothesis], file: PartDescription) -> tuple[Hypothesis, ...]:
     """Set the file's material in hypotheses without one."""
     return tuple(
-        replace(
-            way,
-            material=file.material,
-            structure=file.structure,
-            contents=file.contents,
-            fill=file.fill,
-        )
+        replace(way, material=file.material, structure=file.structure, contents=file.contents, fill=file.fill)
         if way.material is None
         else way
         for way in ways
@@ -192,23 +171,16 @@ def _complete_hypotheses(
 
 def evidence_from_answer(answer: MassAnswer, by: LookingSource) -> MassEvidence:
     """Convert an answer about an object's mass to SI."""
-    printed = tuple(
-        PrintedFact(fact.kind, _si_value(fact.number, fact.unit), fact.words)
-        for fact in answer.printed
-    )
+    printed = tuple(PrintedFact(fact.kind, _si_value(fact.number, fact.unit), fact.words) for fact in answer.printed)
     return MassEvidence(answer.low_kg, answer.likely_kg, answer.high_kg, answer.reason, printed, by)
 
 
 def _si_value(number: float | None, unit: str) -> float | None:
-    factor = (
-        KILOGRAMS_OF_PRINTED_UNIT | CUBIC_METRES_OF_PRINTED_UNIT | METRES_OF_PRINTED_UNIT
-    ).get(unit)
+    factor = (KILOGRAMS_OF_PRINTED_UNIT | CUBIC_METRES_OF_PRINTED_UNIT | METRES_OF_PRINTED_UNIT).get(unit)
     return None if number is None or factor is None else number * factor
 
 
-def contradiction_with_file(
-    words: PartDescription, material: str | None, wall: float | None, put: float | None
-) -> str:
+def contradiction_with_file(words: PartDescription, material: str | None, wall: float | None, put: float | None) -> str:
     """Describe in a clause where a model contradicts the file; "" if it does not.
 
     Args:
@@ -222,19 +194,13 @@ def contradiction_with_file(
     if material not in (None, words.material) and words.answered_by in LOOKING_SOURCE_NAMES:
         stated, answered = [str(material)], [str(words.material)]
     other = words.structure == "solid" if wall else words.structure != "solid"
-    apart = bool(
-        wall and put and not 1 / WALL_AGREEMENT_RATIO <= put / wall <= WALL_AGREEMENT_RATIO
-    )
+    apart = bool(wall and put and not 1 / WALL_AGREEMENT_RATIO <= put / wall <= WALL_AGREEMENT_RATIO)
     if wall is not None and words.built_by in LOOKING_SOURCE_NAMES and (other or apart):
         stated.append(f"a wall {wall * 1e3:.3g} mm thick" if wall else "solid")
-        answered.append(
-            f"a wall {put * 1e3:.3g} mm thick" if apart and put else str(words.structure)
-        )
+        answered.append(f"a wall {put * 1e3:.3g} mm thick" if apart and put else str(words.structure))
     if not stated:
         return ""
-    who = LOOKING_SOURCE_NAMES[
-        words.answered_by if words.answered_by in LOOKING_SOURCE_NAMES else words.built_by
-    ]
+    who = LOOKING_SOURCE_NAMES[words.answered_by if words.answered_by in LOOKING_SOURCE_NAMES else words.built_by]
     return f"the file states {', '.join(stated)} for {words.name}, {who} said {', '.join(answered)}"
 
 
@@ -243,9 +209,7 @@ def hypothesis_name(name: str, number: int) -> str:
     return name if number == 0 else f"{name}, way {number + 1}"
 
 
-def apply_placements(
-    words: PartDescription, placements: Mapping[str, Mapping[str, RangePlacement]]
-) -> PartDescription:
+def apply_placements(words: PartDescription, placements: Mapping[str, Mapping[str, RangePlacement]]) -> PartDescription:
     """Set the placements of a part, its hypotheses and its pieces by their names."""
     own = dict(placements.get(words.name, {}))
     ways = tuple(
@@ -265,8 +229,7 @@ def parts_filling_scan(words: Sequence[PartDescription]) -> list[PartDescription
     return [
         leaf
         for leaf in leaf_parts(words)
-        if not (leaf.inside or leaf.missing)
-        and any(w in ("solid", "packed", None) for w in _possible_structures(leaf))
+        if not (leaf.inside or leaf.missing) and any(w in ("solid", "packed", None) for w in _possible_structures(leaf))
     ]
 
 
@@ -274,9 +237,7 @@ def _possible_structures(words: PartDescription) -> list[str | None]:
     return [way.structure for way in words.hypotheses] or [words.structure]
 
 
-def apply_real_shares(
-    words: PartDescription, answer: ThicknessAnswer, by: LookingSource
-) -> PartDescription:
+def apply_real_shares(words: PartDescription, answer: ThicknessAnswer, by: LookingSource) -> PartDescription:
     """Set the ratio of real to scanned volume of a part, or its pieces."""
     said = {p.part: ScanThickening(p.low, p.likely, p.high, p.reason, by) for p in answer.parts}
     pieces = tuple(replace(p, swelling=said.get(p.name)) for p in words.pieces)
@@ -363,10 +324,7 @@ def sum_usage(transcript: Sequence[Mapping]) -> ModelUsage:
     rows = [r for r in transcript if r.get("answer") is not None]
     if not rows:
         return NO_USAGE
-    costs = [
-        price_usd(r["model"], r["input_tokens"], r["output_tokens"]) if r["calls"] else 0.0
-        for r in rows
-    ]
+    costs = [price_usd(r["model"], r["input_tokens"], r["output_tokens"]) if r["calls"] else 0.0 for r in rows]
     known = None if None in costs else round(sum(c or 0.0 for c in costs), 6)
     return ModelUsage(
         models=tuple(sorted({r["model"] for r in rows})),

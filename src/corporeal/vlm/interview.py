@@ -8,16 +8,7 @@ from string import Template
 import numpy as np
 
 from corporeal.discretization.drawn_thickness import NO_DRAWN_SHAPE, DrawnShape, ThinScan
-from corporeal.vlm import (
-    SINGLE_ANSWER,
-    Answer,
-    AnswerCheck,
-    AnswerNumber,
-    Question,
-    Reply,
-    UnansweredError,
-    VlmClient,
-)
+from corporeal.vlm import SINGLE_ANSWER, Answer, AnswerCheck, AnswerNumber, Question, Reply, UnansweredError, VlmClient
 from corporeal.vlm.answer_checks import (
     MAX_OBJECTS_IN_SCENE,
     MAX_PARTS,
@@ -77,9 +68,7 @@ FRACTION_INSTRUCTION = (
     "Answer with a fraction for each quantity: 0 is the low end of its range, 1 the high end, 0.5 "
     "the middle; on a logarithmic scale, where one is named, 0.5 is the geometric middle."
 )
-VALUE_INSTRUCTION = (
-    "Answer with a value for each quantity, in the unit and inside the range that it names."
-)
+VALUE_INSTRUCTION = "Answer with a value for each quantity, in the unit and inside the range that it names."
 REVISION_INSTRUCTION = (
     "\n\nYou answered this before, and your values do not fit each other:\n\n$answer\n\n"
     "$problems\n\nAnswer again, for all parts. Keep a value only if it is meant so, and say why."
@@ -168,20 +157,12 @@ class Interview:
             f"{k}. {'; '.join(f'{p.name} ({p.look})' for p in d.parts)}. Reason: {d.why}"
             for k, d in enumerate(options, 1)
         )
-        asked = self._question(
-            "ranking", decompositions="\n".join(lines), alternatives=str(len(options))
-        )
-        reply = self._ask(
-            self.critic, asked, RankingAnswer, lambda a: ranking_complaints(a, len(options))
-        )
+        asked = self._question("ranking", decompositions="\n".join(lines), alternatives=str(len(options)))
+        reply = self._ask(self.critic, asked, RankingAnswer, lambda a: ranking_complaints(a, len(options)))
         return reply.answer.ranking[0].number - 1 if reply else 0
 
     def materials(
-        self,
-        parts: Mapping[str, str],
-        names: AllowedNames,
-        lists: Mapping[str, str],
-        shared: bool,
+        self, parts: Mapping[str, str], names: AllowedNames, lists: Mapping[str, str], shared: bool
     ) -> tuple[MaterialsAnswer, LookingSource] | None:
         """Ask question 2; None: no answer.
 
@@ -198,29 +179,18 @@ class Interview:
         named = _part_list(parts)
         hollowed = "hollowed" if self.subject.drawn.hollowed else "whole"
         asked = self._question(
-            "materials",
-            parts=named,
-            unseen=hollowed,
-            holes=hollowed,
-            shares="shared" if shared else "own",
+            "materials", parts=named, unseen=hollowed, holes=hollowed, shares="shared" if shared else "own"
         )
         asked = replace(asked, lists=lists)
         reply = self._ask(
-            self.model,
-            asked,
-            MaterialsAnswer,
-            lambda a: materials_complaints(a, list(parts), names, shared),
+            self.model, asked, MaterialsAnswer, lambda a: materials_complaints(a, list(parts), names, shared)
         )
         if reply is None:
             return None
-        self.warnings += [
-            f"{self.subject.name}: {clause}." for clause in weakness_notes(reply.answer)
-        ]
+        self.warnings += [f"{self.subject.name}: {clause}." for clause in weakness_notes(reply.answer)]
         return reply.answer, reply.by
 
-    def thickness(
-        self, parts: Sequence[str], thin: ThinScan
-    ) -> tuple[ThicknessAnswer, LookingSource] | None:
+    def thickness(self, parts: Sequence[str], thin: ThinScan) -> tuple[ThicknessAnswer, LookingSource] | None:
         """Ask for the ratio of real to scanned volume of a thin scan; None: no answer.
 
         Args:
@@ -240,15 +210,11 @@ class Interview:
             least=least,
             greatest=greatest,
         )
-        reply = self._ask(
-            self.model, asked, ThicknessAnswer, lambda a: thickness_complaints(a, parts)
-        )
+        reply = self._ask(self.model, asked, ThicknessAnswer, lambda a: thickness_complaints(a, parts))
         if reply is None:
             return None
         about = f"{self.subject.name}: "
-        self.warnings += [
-            about + sentence for sentence in strange_share_notes(reply.answer, thin.doubt)
-        ]
+        self.warnings += [about + sentence for sentence in strange_share_notes(reply.answer, thin.doubt)]
         return reply.answer, reply.by
 
     def mass(self) -> tuple[MassAnswer, LookingSource] | None:
@@ -275,10 +241,7 @@ class Interview:
         reply = self._placement(offers, shape, {})
         problems = odd(reply.answer) if reply else ()
         if reply and problems:
-            again = {
-                "answer": json.dumps(reply.answer.model_dump()),
-                "problems": "\n".join(f"- {p}" for p in problems),
-            }
+            again = {"answer": json.dumps(reply.answer.model_dump()), "problems": "\n".join(f"- {p}" for p in problems)}
             reply = self._placement(offers, shape, again) or reply
         return (reply.answer, reply.by) if reply else None
 
@@ -295,24 +258,19 @@ class Interview:
         )
         asked = replace(
             asked,
-            prompt=asked.prompt
-            + (Template(REVISION_INSTRUCTION).substitute(again) if again else ""),
+            prompt=asked.prompt + (Template(REVISION_INSTRUCTION).substitute(again) if again else ""),
             facts={**asked.facts, **again},
             lists={"ranges": _range_list(offers)},
         )
         wanted: dict[str, Collection[str]] = {part: list(o.ranges) for part, o in offers.items()}
         bounds = {(p, q): b for p, o in offers.items() for q, b in o.bounds.items()}
-        return self._ask(
-            self.model, asked, shape, lambda a: placement_complaints(a, wanted, bounds)
-        )
+        return self._ask(self.model, asked, shape, lambda a: placement_complaints(a, wanted, bounds))
 
     def extents(self, classes: Sequence[str]) -> dict[str, float]:
         """Ask question 4: class → usual longest side [m]; empty: no answer."""
         asked = self._question("extents", classes="\n".join(f"- {c}" for c in classes))
         asked = replace(asked, views="none", pictures=())
-        reply = self._ask(
-            self.model, asked, ExtentsAnswer, lambda a: extents_complaints(a, classes)
-        )
+        reply = self._ask(self.model, asked, ExtentsAnswer, lambda a: extents_complaints(a, classes))
         return {c.class_name: c.metres for c in reply.answer.classes} if reply else {}
 
     def size(self) -> Reply[SizeAnswer] | None:
@@ -336,12 +294,7 @@ class Interview:
         """
         lines = "\n".join(f"{k}. {words}" for k, words in enumerate(things, 1))
         asked = self._question("regions", colours=", ".join(colours), things=lines)
-        return self._ask(
-            self.model,
-            asked,
-            RegionsAnswer,
-            lambda a: regions_complaints(a, colours, len(things)),
-        )
+        return self._ask(self.model, asked, RegionsAnswer, lambda a: regions_complaints(a, colours, len(things)))
 
     def _question(self, task: str, **facts: str) -> Question:
         about = self.subject
@@ -375,9 +328,7 @@ class Interview:
                 f"{self.subject.name}: the question about {question.task} got no usable answer "
                 f"{_answer_number_text(question.turn)}({error})"
             )
-            self.transcript.append(
-                _transcript_row(question) | {"answer": None, "error": str(error)}
-            )
+            self.transcript.append(_transcript_row(question) | {"answer": None, "error": str(error)})
             return None
         self.transcript.append(_transcript_row(question) | _answered(reply))
         return reply

@@ -13,8 +13,8 @@ from corporeal.discretization.part_model import NORMAL_90_PERCENT_WIDTH_SIGMAS
 from corporeal.vlm.interpret_answers import leaf_parts
 
 MIN_JUDGED_MASS_LOG_STD = 0.25
-"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on objects
-that no data set publishes are off by a fifth (ALDE .20).
+"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on objects that no data set
+publishes are off by a fifth (ALDE .20).
 """
 PACKAGING_MASS_RATIO = 1.12
 """Usual mass of packaged goods over their printed net weight [-]."""
@@ -26,16 +26,12 @@ CONTRADICTION_STD_COUNT = 3.0
 """Evidence further than this many standard deviations from every sample contradicts them."""
 
 
-def mass_likelihood(
-    masses: Float[np.ndarray, " N"], evidence: MassEvidence | None
-) -> Float[np.ndarray, " N"]:
+def mass_likelihood(masses: Float[np.ndarray, " N"], evidence: MassEvidence | None) -> Float[np.ndarray, " N"]:
     """Likelihood of each mass [kg] given the evidence: log-normal with a floor."""
     found = np.ones(len(masses))
     for centre, width in evidence_masses(evidence):
         away = np.log(masses / centre) / width
-        found *= (1 - UNRELATED_EVIDENCE_PROBABILITY) * np.exp(
-            -0.5 * away**2
-        ) + UNRELATED_EVIDENCE_PROBABILITY
+        found *= (1 - UNRELATED_EVIDENCE_PROBABILITY) * np.exp(-0.5 * away**2) + UNRELATED_EVIDENCE_PROBABILITY
     return found
 
 

@@ -18,12 +18,7 @@ from corporeal.multiview.metric_scale import (
     scale_from_file,
 )
 from corporeal.recognition.readable_names import everyday_words, safe_name, unique_names
-from corporeal.recognition.typical_extents import (
-    class_name_words,
-    length_text,
-    typical_extent,
-    with_article,
-)
+from corporeal.recognition.typical_extents import class_name_words, length_text, typical_extent, with_article
 from corporeal.vlm import VlmClient, connect_vlm
 from corporeal.vlm.interpret_answers import sum_usage
 from corporeal.vlm.interview import Interview, InterviewSubject
@@ -37,8 +32,7 @@ COMMAND_LINE_SOURCE = "the command line"
 UNKNOWN_CLASS = "object"
 """Name of unknown objects."""
 PHOTOGRAPHY_WORDS = frozenset(
-    "camera card computer drone image laptop phone photo photograph picture snapshot tablet video "
-    "webcam".split()
+    "camera card computer drone image laptop phone photo photograph picture snapshot tablet video webcam".split()
 )
 """Words for photographs and their devices, which name folders, not objects."""
 
@@ -127,9 +121,7 @@ class PhotoInterview:
         warnings = tuple(w for interview in self.interviews for w in interview.warnings)
         return QuestionLog(rows, sum_usage(rows), warnings)
 
-    def _interview(
-        self, model: VlmClient, task: str, pictures: Sequence[np.ndarray], count: int
-    ) -> Interview:
+    def _interview(self, model: VlmClient, task: str, pictures: Sequence[np.ndarray], count: int) -> Interview:
         prompt = read_prompt(files("corporeal.vlm").joinpath("prompts", f"{task}.md"))
         views = f"{count} of its photographs"
         subject = InterviewSubject(
@@ -151,11 +143,7 @@ class PhotoInterview:
 def object_of_usual_size(class_name: str) -> SeenObject:
     """Return a named object with the usual size of its class."""
     known = typical_extent(class_name)
-    return (
-        SeenObject(class_name, extent=known.usual, sized_by=EXTENT_TABLE_SOURCE)
-        if known
-        else SeenObject(class_name)
-    )
+    return SeenObject(class_name, extent=known.usual, sized_by=EXTENT_TABLE_SOURCE) if known else SeenObject(class_name)
 
 
 def telling_words(source: str) -> str:
@@ -163,11 +151,7 @@ def telling_words(source: str) -> str:
 
     Words for photographs and devices are excluded.
     """
-    return " ".join(
-        w
-        for w in everyday_words(source).split()
-        if not PHOTOGRAPHY_WORDS & set(class_name_words(w))
-    )
+    return " ".join(w for w in everyday_words(source).split() if not PHOTOGRAPHY_WORDS & set(class_name_words(w)))
 
 
 def object_from_name(source: str) -> SeenObject | None:
@@ -212,9 +196,7 @@ def class_extent_note(objects: Sequence[SeenObject], names: Sequence[str]) -> st
     """
     sized = [(o, name) for o, name in zip(objects, names, strict=True) if o.extent is not None]
     usually = (with_article(one.class_name, "usually is", "usually are") for one, _ in sized)
-    large = (
-        f"{u}, {length_text(one.extent or 0)}" for u, (one, _) in zip(usually, sized, strict=True)
-    )
+    large = (f"{u}, {length_text(one.extent or 0)}" for u, (one, _) in zip(usually, sized, strict=True))
     them = "it is" if len(objects) == 1 else "they are"
     return Note(
         f"How large {them} was not stated: assumed as large as {'; '.join(dict.fromkeys(large))}. "
@@ -228,9 +210,7 @@ def object_names(objects: Sequence[SeenObject]) -> list[str]:
     return unique_names([safe_name(one.class_name) or UNKNOWN_CLASS for one in objects])
 
 
-def check_stated_extents(
-    stated: Sequence[str], objects: Sequence[SeenObject], source: str = ""
-) -> None:
+def check_stated_extents(stated: Sequence[str], objects: Sequence[SeenObject], source: str = "") -> None:
     """Raise UserError where a size is stated of an unknown object.
 
     Args:
@@ -244,9 +224,7 @@ def check_stated_extents(
     for text in stated:
         name, _ = parse_extent(text, (known or [UNKNOWN_CLASS])[0])
         if name not in known and not name.startswith(UNKNOWN_CLASS):
-            step = (
-                f"Choose one of: {', '.join(known)}." if known else "Name it with --object-names."
-            )
+            step = f"Choose one of: {', '.join(known)}." if known else "Name it with --object-names."
             raise UserError(f"--extent: no object {name!r}. {step}")
 
 

@@ -1,8 +1,8 @@
 """Prompts in files. The first line of each states its version, such as "version: materials/1".
 
-Answers are recorded under the version of their prompt and the facts that were put into it, not
-under its text. Raise the number when the question asks for something else, so that answers to the
-former one no longer fit; leave it when only the words change.
+Answers are recorded under the version of their prompt and the facts that were put into it, not under its text. Raise
+the number when the question asks for something else, so that answers to the former one no longer fit; leave it when
+only the words change.
 """
 
 import re

@@ -75,9 +75,7 @@ class RealExtent:
     """Contradictions, in sentences."""
 
 
-def find_class_sizes(
-    classes: Iterable[str], vlm: str = "metadata", record: Path | None = None
-) -> ClassSizes:
+def find_class_sizes(classes: Iterable[str], vlm: str = "metadata", record: Path | None = None) -> ClassSizes:
     """Find the usual sizes of classes: from a model first, then the table.
 
     Args:
@@ -103,20 +101,16 @@ def find_class_sizes(
     known = {name: size for name in named if (size := _size_from_table(name))}
     rows = tuple(row for interview in interviews for row in interview.transcript)
     warnings = [w for interview in interviews for w in interview.warnings]
-    warnings += [
-        w for size in answered if (w := _table_disagreement_text(size, known.get(size.class_name)))
-    ]
+    warnings += [w for size in answered if (w := _table_disagreement_text(size, known.get(size.class_name)))]
     asked = {size.class_name: size for size in answered}
     return ClassSizes(known | asked, rows, sum_usage(rows), tuple(warnings))
 
 
-def estimate_real_extent(
-    name: str, class_name: str, extent: float, metric: bool, sizes: ClassSizes
-) -> RealExtent:
+def estimate_real_extent(name: str, class_name: str, extent: float, metric: bool, sizes: ClassSizes) -> RealExtent:
     """Return the real size of the object in a file.
 
-    A file in metres counts; the usual size of its class can only cast doubt on it. Otherwise the
-    usual size of its class, or a default.
+    A file in metres counts; the usual size of its class can only cast doubt on it. Otherwise the usual size of its
+    class, or a default.
 
     Args:
         name: Of the asset, for the sentences.
@@ -175,27 +169,19 @@ def _size_from_table(class_name: str) -> ClassSize | None:
     if found is None:
         return None
     reason = f"{extent_text(found.usual)} is usual for such objects: {found.words}."
-    return ClassSize(
-        class_name, found.low, found.usual, found.high, "table", EXTENT_TABLE_SOURCE, reason
-    )
+    return ClassSize(class_name, found.low, found.usual, found.high, "table", EXTENT_TABLE_SOURCE, reason)
 
 
 def _size_source_text(size: ClassSize) -> str:
     """Name the source of a size: a table is its own name."""
-    return (
-        EXTENT_TABLE_SOURCE
-        if size.said_by == "table"
-        else f"{ANSWER_SOURCE_TEXT[size.said_by]} ({size.who})"
-    )
+    return EXTENT_TABLE_SOURCE if size.said_by == "table" else f"{ANSWER_SOURCE_TEXT[size.said_by]} ({size.who})"
 
 
 def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> str:
     """Describe where a model's size is outside the table's range; "" if it is not."""
     if (
         known is None
-        or known.low / TYPICAL_EXTENT_MARGIN_RATIO
-        <= answered.usual
-        <= known.high * TYPICAL_EXTENT_MARGIN_RATIO
+        or known.low / TYPICAL_EXTENT_MARGIN_RATIO <= answered.usual <= known.high * TYPICAL_EXTENT_MARGIN_RATIO
     ):
         return ""
     return (
@@ -209,12 +195,7 @@ def _table_disagreement_text(answered: ClassSize, known: ClassSize | None) -> st
 
 def _class_disagreement_text(name: str, extent: float, known: ClassSize | None) -> str:
     """Describe where a file's size is outside its class's range; "" if it is not."""
-    if (
-        known is None
-        or known.low / TYPICAL_EXTENT_MARGIN_RATIO
-        <= extent
-        <= known.high * TYPICAL_EXTENT_MARGIN_RATIO
-    ):
+    if known is None or known.low / TYPICAL_EXTENT_MARGIN_RATIO <= extent <= known.high * TYPICAL_EXTENT_MARGIN_RATIO:
         return ""
     return (
         f"{name} is {extent_text(extent)} large in its file, which is in metres; "

@@ -1,9 +1,8 @@
 """Recorded answers: free, offline, repeatable.
 
-A recording is one JSON file: task, scene, version of the prompt and facts put into it, schema,
-views, model, lists, prompt, answer. It is found by what was asked about what, not by pixels, by
-model, by words of the prompt, or by how long the library's lists were; so neither a better renderer
-nor a new material nor a clearer sentence makes it stale.
+A recording is one JSON file: task, scene, version of the prompt and facts put into it, schema, views, model, lists,
+prompt, answer. It is found by what was asked about what, not by pixels, by model, by words of the prompt, or by how
+long the library's lists were; so neither a better renderer nor a new material nor a clearer sentence makes it stale.
 """
 
 import hashlib
@@ -17,15 +16,7 @@ from pydantic import ValidationError
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.vlm import (
-    Answer,
-    AnswerCheck,
-    AnswerSchema,
-    Question,
-    Reply,
-    VlmClient,
-    no_complaints,
-)
+from corporeal.vlm import Answer, AnswerCheck, AnswerSchema, Question, Reply, VlmClient, no_complaints
 
 RECORDING_KEY_FIELDS = ("task", "scene", "prompt_version", "facts", "schema", "views")
 """What must be equal for a recording to answer a question, most telling last to differ."""
@@ -41,10 +32,7 @@ class ReplayClient:
     def __init__(self, folder: str) -> None:
         self.folder = Path(folder)
         if not folder or not self.folder.is_dir():
-            raise UserError(
-                f"No folder of recordings at {folder!r}. Use --vlm replay:FOLDER, or --vlm "
-                "metadata."
-            )
+            raise UserError(f"No folder of recordings at {folder!r}. Use --vlm replay:FOLDER, or --vlm metadata.")
         self.rows = [_read_recording(path) for path in sorted(self.folder.glob("*.json"))]
 
     def ask(
@@ -53,8 +41,8 @@ class ReplayClient:
         """Return the recorded answer.
 
         Raises:
-            UserError: There is none; the message names the field in which the nearest one differs.
-                Or there is one that no longer fits what can be answered.
+            UserError: There is none; the message names the field in which the nearest one differs. Or there is one that
+                no longer fits what can be answered.
 
         """
         row = self._row(recording_key_row(question, answer))
@@ -67,14 +55,7 @@ class ReplayClient:
         return self._row(recording_key_row(question, answer)) is not None
 
     def _row(self, wanted: dict[str, Any]) -> dict | None:
-        return next(
-            (
-                r
-                for r in self._alike(wanted)
-                if r.get(ANSWER_NUMBER_KEY) == wanted.get(ANSWER_NUMBER_KEY)
-            ),
-            None,
-        )
+        return next((r for r in self._alike(wanted) if r.get(ANSWER_NUMBER_KEY) == wanted.get(ANSWER_NUMBER_KEY)), None)
 
     def _alike(self, wanted: dict[str, Any]) -> list[dict]:
         """Return the recorded answers to a question, whichever of several they are."""
@@ -89,9 +70,7 @@ class ReplayClient:
                 f"No recording in {self.folder} is answer {wanted.get(ANSWER_NUMBER_KEY, '1')} to {about}; it "
                 f"holds {len(alike)}. Record more of them, or ask for fewer (--answers)."
             )
-        nearest = max(
-            self.rows, key=lambda row: [row[f] == wanted[f] for f in RECORDING_KEY_FIELDS]
-        )
+        nearest = max(self.rows, key=lambda row: [row[f] == wanted[f] for f in RECORDING_KEY_FIELDS])
         differs = next(f for f in RECORDING_KEY_FIELDS if nearest[f] != wanted[f])
         how = f"differs in {_difference(differs, nearest[differs], wanted[differs])}"
         if differs in ("prompt_version", "schema"):
@@ -158,9 +137,7 @@ def _read_recording(path: Path) -> dict:
         row = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise BadFileError(path, f"is not a recording ({error}).", "Delete it.") from error
-    missing = [
-        f for f in (*RECORDING_KEY_FIELDS, "answer") if not isinstance(row, dict) or f not in row
-    ]
+    missing = [f for f in (*RECORDING_KEY_FIELDS, "answer") if not isinstance(row, dict) or f not in row]
     if missing:
         raise BadFileError(path, f"is not a recording: it has no {missing[0]!r}.", "Delete it.")
     return row | {"file": path.name}
@@ -171,15 +148,11 @@ def _validated(row: dict, answer: type[Answer], check: AnswerCheck[Answer]) -> A
         found = answer.model_validate(row["answer"])
     except ValidationError as error:
         raise BadFileError(
-            row["file"],
-            f"its answer does not fit: {first_validation_problem(error)}.",
-            "Record it again.",
+            row["file"], f"its answer does not fit: {first_validation_problem(error)}.", "Record it again."
         ) from error
     complaints = check(found)
     if complaints:
-        raise BadFileError(
-            row["file"], f"its answer does not fit: {complaints[0]}", "Record it again."
-        )
+        raise BadFileError(row["file"], f"its answer does not fit: {complaints[0]}", "Record it again.")
     return found
 
 

@@ -65,9 +65,7 @@ def _drop(waiting: SimpleQueue[int]) -> None:
 
 
 def _work(
-    jobs: Sequence[Callable[[], JobResult]],
-    waiting: SimpleQueue[int],
-    finished: SimpleQueue[_FinishedJob],
+    jobs: Sequence[Callable[[], JobResult]], waiting: SimpleQueue[int], finished: SimpleQueue[_FinishedJob]
 ) -> None:
     while True:
         try:

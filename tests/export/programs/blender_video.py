@@ -35,8 +35,6 @@ for number, second in enumerate(seconds):
         mesh.vertices.foreach_get("co", flat)
         world = np.array(posed.matrix_world)
         parent = thing.parent.name if thing.parent else ""
-        found[f"{number}|{parent}|{thing.name}"] = (
-            flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
-        )
+        found[f"{number}|{parent}|{thing.name}"] = flat.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]
         posed.to_mesh_clear()
 np.savez(out, **found)

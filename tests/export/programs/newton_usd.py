@@ -42,19 +42,13 @@ def bodies(builder, model):
         origin = poses[k, :3] + turn @ com[k]
         yield (
             label,
-            {
-                "mass": float(model.body_mass.numpy()[k]),
-                "inertia": inertia.tolist(),
-                "origin": origin.tolist(),
-            },
+            {"mass": float(model.body_mass.numpy()[k]), "inertia": inertia.tolist(), "origin": origin.tolist()},
         )
 
 
 def drift(model, seconds):
     """How far every body's origin goes in so long [m]."""
-    solver = newton.solvers.SolverMuJoCo(
-        model, use_mujoco_cpu=True, cone="elliptic", iterations=100, ls_iterations=50
-    )
+    solver = newton.solvers.SolverMuJoCo(model, use_mujoco_cpu=True, cone="elliptic", iterations=100, ls_iterations=50)
     now, then, control = model.state(), model.state(), model.control()
     start = now.body_q.numpy()[:, :3].copy()
     for _ in range(round(seconds / STEP)):

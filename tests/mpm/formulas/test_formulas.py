@@ -22,9 +22,7 @@ from corporeal.mpm.laws.drucker_prager import apex_strain, cone_slope
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.quiet_warp import wp
 
-wp.set_module_options(
-    formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast")
-)
+wp.set_module_options(formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
 
 COUNT = 8000
 YOUNG, POISSON, YIELD, HARDENING, ANGLE = 1e5, 0.3, 2e3, 1e4, np.radians(30.0)
@@ -47,9 +45,7 @@ Doubles = wp.array(dtype=wp.float64)
 @wp.kernel
 def at_one_lane(H: wp.array(dtype=wp.mat33), past: wp.array(dtype=wp.vec2), t: Floats, out: Floats):
     i = wp.tid()
-    r = law_response(
-        t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], H[i], past[i][0], past[i][1]
-    )
+    r = law_response(t[0], t[1], t[2], t[3], t[4], t[5], t[6], t[7], t[8], H[i], past[i][0], past[i][1])
     for k in range(PLACES):
         out[PLACES * i + k] = r[k]
 
@@ -255,9 +251,7 @@ def test_matter_with_a_past_flows_as_in_float64(law, width, H):
     tau = hencky.tau(exact.F, mu, lam)[:, *UPPER]
     assert (np.linalg.norm(found[:, :6] - tau, axis=1) / (YOUNG * size)).max() < TOLERANCE
     assert np.abs(found[:, int(RESPONSE_PLASTIC_STRAIN)] - exact.plastic_strain).max() < TOLERANCE
-    assert (
-        np.abs(found[:, int(RESPONSE_PLASTIC_WORK)] - exact.loss) / (YOUNG * size**2)
-    ).max() < 2 * TOLERANCE
+    assert (np.abs(found[:, int(RESPONSE_PLASTIC_WORK)] - exact.loss) / (YOUNG * size**2)).max() < 2 * TOLERANCE
     if law == Law.FLUID:
         plain, newton = responses(law, H, width, past, apex, 1.0), flowed(law, F, past, cohesion, 1)
         strain = plain[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9].reshape(-1, 3, 3)
@@ -302,11 +296,7 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
         given = [on_processor(in_lanes(H)), on_processor(log_volume_ratio), out]
         wp.launch(mean_at_eight_lanes, COUNT // 8, [law.value, bulk, *given], device="cpu")
         found = out.numpy().reshape(-1, 2, 8).transpose(0, 2, 1).reshape(COUNT, 2)
-    numbers, full, r = (
-        np.full(COUNT, law.value),
-        np.full(COUNT, bulk),
-        log_volume_ratio.astype(np.float64),
-    )
+    numbers, full, r = (np.full(COUNT, law.value), np.full(COUNT, bulk), log_volume_ratio.astype(np.float64))
     J = determinant(F)
 
     def pressure(more):
@@ -325,9 +315,7 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
     # And it is the slope of what is stored.
     assert (energy(1e-6) - energy(-1e-6)) / 2e-6 == pytest.approx(exact, rel=1e-5, abs=1e-4)
     stored = on_processor(np.zeros(COUNT), wp.float64)
-    doubles = [
-        on_processor(a.astype(np.float64).ravel(), wp.float64) for a in (H, log_volume_ratio)
-    ]
+    doubles = [on_processor(a.astype(np.float64).ravel(), wp.float64) for a in (H, log_volume_ratio)]
     wp.launch(mean_energies, COUNT, [law.value, bulk, *doubles, stored], device="cpu")
     assert stored.numpy() == pytest.approx(energy(0.0), rel=1e-9)
 
@@ -336,12 +324,8 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
 def test_elastic_laws_leave_the_strain_alone_and_do_no_plastic_work(width, H):
     for law in ELASTIC:
         found = responses(law, H, width)
-        np.testing.assert_array_equal(
-            found[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9], H.reshape(-1, 9)
-        )
-        assert not found[
-            :, [int(RESPONSE_PLASTIC_STRAIN), int(RESPONSE_OPENED), int(RESPONSE_PLASTIC_WORK)]
-        ].any()
+        np.testing.assert_array_equal(found[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9], H.reshape(-1, 9))
+        assert not found[:, [int(RESPONSE_PLASTIC_STRAIN), int(RESPONSE_OPENED), int(RESPONSE_PLASTIC_WORK)]].any()
 
 
 @pytest.mark.parametrize("width", [1, 8])
@@ -367,9 +351,7 @@ def test_the_stored_energy_is_that_of_numpy(law, H):
 def test_laws_have_the_same_numbers_in_both_languages():
     numbers = re.search(r"enum Law {(.*)}", formulas.cpp_preamble())[1]
     listed = dict(re.findall(r"(\w+) = (\d+)", numbers))
-    assert {name: int(number) for name, number in listed.items()} == {
-        law.name: law.value for law in Law
-    }
+    assert {name: int(number) for name, number in listed.items()} == {law.name: law.value for law in Law}
 
 
 def test_no_law_is_chosen_by_a_bare_number():

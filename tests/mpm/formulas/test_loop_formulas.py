@@ -20,9 +20,7 @@ from corporeal.mpm.physics import (
 )
 from corporeal.mpm.quiet_warp import wp
 
-wp.set_module_options(
-    formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast")
-)
+wp.set_module_options(formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
 
 COUNT = 4000
 SINGLE, DOUBLE = 2e-6, 1e-13
@@ -116,9 +114,7 @@ def gaps(table: Floats, a: Floats, c: Floats, h: Floats, out: wp.array2d(dtype=w
   to[n + i] = mpm::Face<double>::gap_to_plane(p[i], ((const double *)h.data)[i]);
   to[2 * n + i] = mpm::Face<double>::gap_to_thin(p[i], ((const double *)h.data)[i]);
 """)
-def gaps_double(
-    table: Doubles, a: Doubles, c: Doubles, h: Doubles, n: int, i: int, out: Doubles
-): ...
+def gaps_double(table: Doubles, a: Doubles, c: Doubles, h: Doubles, n: int, i: int, out: Doubles): ...
 
 
 @wp.kernel
@@ -154,8 +150,7 @@ def test_open_distances_are_those_of_numpy_in_either_precision(dtype, rng):
 def test_the_numbers_of_the_method_are_written_from_python():
     listed = dict(re.findall(r"constexpr (\w+ \w+) = ([^;]+);", formulas.cpp_preamble()))
     assert {name: float(value) for name, value in listed.items()} == {
-        f"{constants.cpp_type(value)} {name}": value
-        for name, value in constants.constants_by_name().items()
+        f"{constants.cpp_type(value)} {name}": value for name, value in constants.constants_by_name().items()
     }
     assert {"double LATTICE_GAP_DX", "double MAX_FACE_DEPTH_DX", "int SWEEPS"} <= listed.keys()
 
@@ -208,9 +203,7 @@ def test_normals_of_what_moves_farther_in_a_step_are_chosen_more_often():
 
 
 @wp.kernel
-def projections(
-    J: Vectors64, u: Vectors64, n: Vectors64, soft: Doubles, mu: Doubles, out: Vectors64
-):
+def projections(J: Vectors64, u: Vectors64, n: Vectors64, soft: Doubles, mu: Doubles, out: Vectors64):
     """One projection of a contact of two nodes, as the loops put it together."""
     i = wp.tid()
     un = wp.dot(u[i], n[i])
@@ -234,17 +227,10 @@ def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
         )
         # ``solve`` begins with no impulse: from u + J/m the first projection gives J's next value.
         pair = (np.array([value]) for value in (0, 1))
-        one = contact_impulses.ContactList(
-            *pair, np.zeros((1, 3)), n[i : i + 1], np.zeros(1), mu[i : i + 1]
-        )
+        one = contact_impulses.ContactList(*pair, np.zeros((1, 3)), n[i : i + 1], np.zeros(1), mu[i : i + 1])
         exact[i] = contact_impulses.solve(one, movers, np.array([0.1]), 1)[0]
     numbers = [sent(value, wp.float64) for value in (1.0 / heavy, mu)]
-    found = run(
-        projections,
-        *(sent(value, wp.vec3d) for value in (J, u, n)),
-        *numbers,
-        out=(COUNT, wp.vec3d),
-    )
+    found = run(projections, *(sent(value, wp.vec3d) for value in (J, u, n)), *numbers, out=(COUNT, wp.vec3d))
     along = np.sum(found * n, axis=1)
     rubbed = np.linalg.norm(found - along[:, None] * n, axis=1)
     assert (along == 0.0).any() and (rubbed < 0.99 * mu * along).any()
@@ -259,9 +245,7 @@ def spans(m: Doubles, h: Doubles, full: D, dx: D, dt: D, out: Doubles):
 
 
 @wp.kernel
-def drags(
-    span: Doubles, soft: Doubles, curve: Vectors64, n: Vectors64, t: Vectors64, out: Vectors64
-):
+def drags(span: Doubles, soft: Doubles, curve: Vectors64, n: Vectors64, t: Vectors64, out: Vectors64):
     i = wp.tid()
     out[i] = one_lane_contact.drag_impulse(soft[i], span[i], curve[i], D(0.25), n[i], t[i])
 
@@ -292,9 +276,7 @@ def test_what_a_wall_drags_on_a_liquid_is_that_of_numpy(rng):
 
 
 @wp.kernel
-def targets(
-    e: Doubles, u: Doubles, kick: Doubles, f: Doubles, g: Doubles, dt: D, dx: D, out: Doubles
-):
+def targets(e: Doubles, u: Doubles, kick: Doubles, f: Doubles, g: Doubles, dt: D, dx: D, out: Doubles):
     i = wp.tid()
     approach = one_lane_contact.approach_of(u[i], kick[i], f[i])
     out[i] = one_lane_contact.closing_speed(g[i], dt)
@@ -307,9 +289,7 @@ def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
     u, kick = rng.uniform(-0.3, 1.0, COUNT), rng.uniform(-0.1, 0.1, COUNT)
     e = rng.uniform(0.1, 1.0, COUNT) * (rng.uniform(size=COUNT) > 0.2)
     gap = rng.uniform(-0.2, 0.2, COUNT) * dx
-    contacts = contact_impulses.ContactList(
-        *[np.zeros((COUNT, *shape)) for shape in [()] * 2 + [(3,)] * 2 + [()] * 2]
-    )
+    contacts = contact_impulses.ContactList(*[np.zeros((COUNT, *shape)) for shape in [()] * 2 + [(3,)] * 2 + [()] * 2])
     feigned = rng.uniform(0.0, 0.2, COUNT)
     rebound = contact_impulses.ReboundRules(np.arange(COUNT), e, kick, feigned)
     exact, hit = contact_impulses.target_speeds(contacts._replace(gap=gap), u, rebound, dx, dt)
@@ -330,9 +310,7 @@ def test_restitution_at_the_speed_of_a_blow_is_as_in_numpy(rng):
     power = np.where(rng.uniform(size=COUNT) < 0.5, 0.25, 0.0)
     law = np.column_stack([rng.uniform(0.1, 9.0, COUNT), rng.uniform(0, 0.05, COUNT), power])
     law = np.column_stack([law, rng.uniform(0.0, 0.3, COUNT), rng.uniform(0.5, 1.0, COUNT)])
-    exact = np.array(
-        [impact_support.restitution_at_speed(*row) for row in zip(e, law, v, strict=True)]
-    )
+    exact = np.array([impact_support.restitution_at_speed(*row) for row in zip(e, law, v, strict=True)])
     assert 0.05 < (exact == law[:, 4]).mean() < 0.6
     table = wp.array(law, dtype=D, device="cpu")
     found = run(bounces, sent(e, wp.float64), table, sent(v, wp.float64), out=(COUNT, wp.float64))
@@ -360,10 +338,7 @@ def test_a_free_turn_is_that_of_numpy(dt, rng):
     found = run(turns, *given, dt, out=((2, COUNT), wp.mat33d))
     for i in range(0, COUNT, 10):
         assert np.abs(found[0, i] - rigid.world_inverse_inertia(R[i], inertia[i])).max() < DOUBLE
-        assert (
-            np.abs(found[1, i] - rigid.integrate_rotation(R[i], inertia[i], L[i], dt)).max()
-            < DOUBLE
-        )
+        assert np.abs(found[1, i] - rigid.integrate_rotation(R[i], inertia[i], L[i], dt)).max() < DOUBLE
     assert np.abs(found[1] @ found[1].swapaxes(1, 2) - np.eye(3)).max() < DOUBLE
 
 
@@ -395,15 +370,11 @@ def winds(F: Matrices, N: Vectors, u: Vectors, m: Floats, air: float, dt: float,
   for (int d = 0; d < 3; d++) to[d] = 0.0;
   mpm::Air<double>::press(air, area, (Numbers)u.data + 3 * i, mass, dt, to);
 """)
-def wind_double(
-    F: Matrices64, N: Vectors64, u: Vectors64, m: Doubles, air: D, dt: D, i: int, out: Vectors64
-): ...
+def wind_double(F: Matrices64, N: Vectors64, u: Vectors64, m: Doubles, air: D, dt: D, i: int, out: Vectors64): ...
 
 
 @wp.kernel
-def winds_in_double(
-    F: Matrices64, N: Vectors64, u: Vectors64, m: Doubles, air: D, dt: D, out: Vectors64
-):
+def winds_in_double(F: Matrices64, N: Vectors64, u: Vectors64, m: Doubles, air: D, dt: D, out: Vectors64):
     wind_double(F, N, u, m, air, dt, wp.tid(), out)
 
 
@@ -422,10 +393,7 @@ def test_wind_presses_on_a_deformed_face_as_in_numpy_in_either_precision(rng):
     found = run(winds, *given, air, dt, out=(COUNT, wp.vec3))
     assert np.abs(found - exact).max() < SINGLE * largest
     kinds = (wp.mat33d, wp.vec3d, wp.vec3d, wp.float64)
-    given = [
-        sent(value.astype(np.float64), kind)
-        for value, kind in zip((F, N, seen, mass), kinds, strict=True)
-    ]
+    given = [sent(value.astype(np.float64), kind) for value, kind in zip((F, N, seen, mass), kinds, strict=True)]
     found = run(winds_in_double, *given, air, dt, out=(COUNT, wp.vec3d))
     assert np.abs(found - exact).max() < DOUBLE * largest
 
@@ -447,10 +415,7 @@ def test_a_grip_pulls_as_in_numpy_and_no_more_than_a_step_can_follow(rng):
     exact = np.stack(
         [
             spring_grips.Grip(
-                spring_grips.GripHold(np.zeros(1, np.int64), np.ones(1), m[i], np.zeros(3)),
-                away[i],
-                k[i],
-                c[i],
+                spring_grips.GripHold(np.zeros(1, np.int64), np.ones(1), m[i], np.zeros(3)), away[i], k[i], c[i]
             ).impulse(np.zeros(3), v[i], dt)
             for i in range(COUNT)
         ]

@@ -12,11 +12,7 @@ COUNT = 300
 
 
 @wp.kernel
-def shifts(
-    rows: wp.array(dtype=wp.float64),
-    towards: wp.array(dtype=wp.vec3d),
-    out: wp.array(dtype=wp.vec4d),
-):
+def shifts(rows: wp.array(dtype=wp.float64), towards: wp.array(dtype=wp.vec3d), out: wp.array(dtype=wp.vec4d)):
     i = wp.tid()
     out[i] = one_lane_contact.shift_to_contact(rows, i, towards[i])
 

@@ -22,9 +22,7 @@ def some_deformations(count=40, seed=0):
     """Random rotations and stretches between 0.4 and 2.5."""
     rng = np.random.default_rng(seed)
     stretch = np.exp(rng.uniform(-0.9, 0.9, (count, 3)))
-    return kinematics.from_stretches(
-        some_rotations(count, rng), stretch, some_rotations(count, rng)
-    )
+    return kinematics.from_stretches(some_rotations(count, rng), stretch, some_rotations(count, rng))
 
 
 def constants(count):

@@ -21,9 +21,7 @@ def principal_tau(strain):
 
 
 def von_mises(strain, yield_stress, hardening=0.0, plastic=0.0):
-    return cylinder.return_von_mises(
-        strain, MU * ONE, yield_stress * ONE, hardening * ONE, plastic * ONE
-    )
+    return cylinder.return_von_mises(strain, MU * ONE, yield_stress * ONE, hardening * ONE, plastic * ONE)
 
 
 def drucker_prager(strain, degrees, cohesion=0.0, volume=0.0):
@@ -35,10 +33,7 @@ def drucker_prager(strain, degrees, cohesion=0.0, volume=0.0):
 def numbers(count, yield_stress=0.0, friction_angle=0.5, cohesion=0.0):
     """What return maps read, the same for ``count`` particles that do not harden."""
     one = np.ones(count)
-    slope, apex = (
-        cone.cone_slope(friction_angle),
-        cone.apex_strain(friction_angle, cohesion, MU, LAM),
-    )
+    slope, apex = (cone.cone_slope(friction_angle), cone.apex_strain(friction_angle, cohesion, MU, LAM))
     given = (MU, LAM, yield_stress, 0.0, slope, apex, 0.0, 1.0)
     return YieldParameters(*(value * one for value in given))
 

@@ -32,11 +32,7 @@ def of(shear, bulk=(0.0, 0.0), time=(1.0, 1.0)):
 @pytest.mark.parametrize("loss", [0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 1.0])
 def test_the_loss_factor_is_flat_over_the_band_within_three_per_cent(loss):
     share = fit_branches(loss)
-    modulus = complex_modulus(
-        np.array(share.strength),
-        np.array(share.time),
-        BAND,
-    )
+    modulus = complex_modulus(np.array(share.strength), np.array(share.time), BAND)
     found = modulus.imag / modulus.real
     assert np.abs(found / loss - 1).max() < 0.033
     assert share.time[0] > share.time[1]
@@ -44,11 +40,7 @@ def test_the_loss_factor_is_flat_over_the_band_within_three_per_cent(loss):
 
 def test_one_branch_alone_would_not_be_flat():
     share = fit_branches(0.3)
-    one = complex_modulus(
-        np.array([share.strength[0]]),
-        np.array([share.time[0]]),
-        BAND,
-    )
+    one = complex_modulus(np.array([share.strength[0]]), np.array([share.time[0]]), BAND)
     assert np.abs(one.imag / one.real / 0.3 - 1).max() > 0.3
 
 
@@ -85,14 +77,10 @@ def test_a_stepped_oscillation_has_the_loss_of_the_fit(steps):
     for now in time:
         rate = 1e-3 * frequency * np.cos(frequency * (now + 0.5 * dt))
         memory = advance_branches(memory, sheared(dt * rate), branch.time, dt)
-        found.append(
-            1e-3 * np.sin(frequency * (now + dt)) + maxwell_stress(branch, memory)[0, 0, 1]
-        )
+        found.append(1e-3 * np.sin(frequency * (now + dt)) + maxwell_stress(branch, memory)[0, 0, 1])
     last, phase = np.array(found[-steps:]), frequency * (time[-steps:] + dt)
     loss = (last @ np.cos(phase)) / (last @ np.sin(phase))
-    modulus = complex_modulus(
-        np.array(share.strength), np.array(share.time), np.array([frequency])
-    )[0]
+    modulus = complex_modulus(np.array(share.strength), np.array(share.time), np.array([frequency]))[0]
     assert loss == pytest.approx(modulus.imag / modulus.real, rel=2e-3)
 
 
@@ -122,10 +110,7 @@ def test_branches_do_not_mind_who_looks():
 
 def test_forgetting_never_makes_energy():
     rng = np.random.default_rng(2)
-    memory, branch = (
-        blank(50),
-        MaxwellBranches(*(np.tile(v, (50, 1)) for v in ([1.0, 2.0], [1.0, 3.0], [1.0, 0.1]))),
-    )
+    memory, branch = (blank(50), MaxwellBranches(*(np.tile(v, (50, 1)) for v in ([1.0, 2.0], [1.0, 3.0], [1.0, 0.1]))))
     for _ in range(200):
         held = advance_branches(memory, 0.05 * rng.normal(size=(50, 3, 3)), branch.time, 1e-12)
         memory = advance_branches(held, np.zeros((50, 3, 3)), branch.time, 0.05)

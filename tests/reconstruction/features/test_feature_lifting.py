@@ -125,9 +125,7 @@ def test_a_sliver_of_a_gaussian_has_no_say():
 
 def test_what_nobody_saw_looks_like_its_neighbours():
     position = np.array([[0, 0, 0], [1, 0, 0], [0.25, 0, 0], [9, 0, 0.0]])
-    before = LiftedFeatures(
-        np.array([[1, 0], [0, 1], [0, 0], [0, 0]], np.float32), np.array([2, 1, 0, 0])
-    )
+    before = LiftedFeatures(np.array([[1, 0], [0, 1], [0, 0], [0, 0]], np.float32), np.array([2, 1, 0, 0]))
     after = fill_unseen_points(position, before)
     np.testing.assert_allclose(after.mean[2], [0.9, 0.1], rtol=1e-6)
     np.testing.assert_allclose(after.mean[3], np.array([64, 81]) / 145, rtol=1e-6)
@@ -191,9 +189,7 @@ def test_gaussians_take_what_the_rasteriser_blended_them_into(boxes):
     sh = np.zeros((len(rows), 1, 3))
     discs = Gaussians(position[rows], turn, scale, np.full(len(rows), 0.95), sh)
     maps = [np.eye(3)[w + 1] for w in which]
-    lifted = uplift_features(
-        lambda view: gaussian_weights(discs, cameras[view], 1, 1), (96, 96), maps, len(rows)
-    )
+    lifted = uplift_features(lambda view: gaussian_weights(discs, cameras[view], 1, 1), (96, 96), maps, len(rows))
     right = lifted.mean[:, 1:].argmax(1) == owner[rows]
     free = sum(unhidden(TWO, position[rows], normal[rows], owner[rows], c) for c in cameras) > 2
     assert free.mean() > 0.6

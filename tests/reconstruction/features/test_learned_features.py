@@ -43,8 +43,7 @@ def length(rows):
 
 
 @pytest.mark.parametrize(
-    ("high", "wide", "rows", "columns"),
-    [(56, 56, 4, 4), (28, 42, 4, 6), (112, 70, 6, 4), (56, 105, 4, 8)],
+    ("high", "wide", "rows", "columns"), [(56, 56, 4, 4), (28, 42, 4, 6), (112, 70, 6, 4), (56, 105, 4, 8)]
 )
 def test_a_map_covers_the_picture_in_whole_patches(clip, dinov2, high, wide, rows, columns):
     picture = photograph(high, wide)
@@ -103,9 +102,7 @@ def test_dense_clip_is_the_pooled_feature_where_all_patches_are_one(clip, torch)
             pooled = model.get_image_features(pixel_values=pixels, interpolate_pos_encoding=True)
     finally:
         last.forward = whole
-    torch.testing.assert_close(
-        dense_features(model, pixels)[0], pooled.pooler_output, atol=1e-5, rtol=1e-5
-    )
+    torch.testing.assert_close(dense_features(model, pixels)[0], pooled.pooler_output, atol=1e-5, rtol=1e-5)
 
 
 def test_positions_are_interpolated_not_cut(clip, torch):
@@ -113,12 +110,8 @@ def test_positions_are_interpolated_not_cut(clip, torch):
     vision = connect_encoder(f"clip:{clip}").model.vision_model.embeddings
     pixels = torch.zeros(1, 3, SIDE, SIDE)
     torch.testing.assert_close(vision(pixels, interpolate_pos_encoding=True), vision(pixels))
-    wide = (
-        connect_encoder(f"clip:{clip}").map(np.full((56, 112, 3), 128, np.uint8)).astype(np.float32)
-    )
-    square = (
-        connect_encoder(f"clip:{clip}").map(np.full((56, 56, 3), 128, np.uint8)).astype(np.float32)
-    )
+    wide = connect_encoder(f"clip:{clip}").map(np.full((56, 112, 3), 128, np.uint8)).astype(np.float32)
+    square = connect_encoder(f"clip:{clip}").map(np.full((56, 56, 3), 128, np.uint8)).astype(np.float32)
     near = (wide[:, 0] * square[:, 0]).sum(-1)
     far = (wide[:, -1] * square[:, 0]).sum(-1)
     assert (near > far).all()

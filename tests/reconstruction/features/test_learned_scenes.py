@@ -58,31 +58,21 @@ class Seer(PhotoInterview):
         pytest.fail("CLIP tells which is which")
 
 
-def test_models_that_were_saved_here_see_things_and_name_parts(
-    models, splat, tmp_path, monkeypatch
-):
+def test_models_that_were_saved_here_see_things_and_name_parts(models, splat, tmp_path, monkeypatch):
     coarse = ReconstructionResolution(12, (96, 96), 60_000, 60_000)
-    config = ReconstructConfig(
-        up="z", training="draft", lifting="radiance", resolution=coarse, **models
-    )
+    config = ReconstructConfig(up="z", training="draft", lifting="radiance", resolution=coarse, **models)
     result = reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")
     found, scene = result.found, result.scene
     assert {o.class_name for o in scene.objects} == {"brick", "crate"}
     assert found.cloud.semantic.shape == (found.cloud.count, 24)
     assert found.cloud.structural.shape == (found.cloud.count, 48)
     pieces = (PartDescription("lid", "wood"), PartDescription("body", "steel"))
-    things = [
-        ObjectDescription(o.name, o.class_name, (PartDescription(o.name, None),))
-        for o in scene.objects
-    ]
+    things = [ObjectDescription(o.name, o.class_name, (PartDescription(o.name, None),)) for o in scene.objects]
     pieced = PartDescription(scene.objects[0].name, "wood", pieces=pieces)
     things[0] = ObjectDescription(scene.objects[0].name, scene.objects[0].class_name, (pieced,))
     inventory = Inventory(tuple(things))
     parts = segment(scene, inventory, found=found, semantic=config.semantic)
-    assert [(p.name, p.found_by) for p in parts.catalogue[:2]] == [
-        ("lid", "words"),
-        ("body", "words"),
-    ]
+    assert [(p.name, p.found_by) for p in parts.catalogue[:2]] == [("lid", "words"), ("body", "words")]
 
     def looked(*_):
         pytest.fail("a map that is kept was made again")

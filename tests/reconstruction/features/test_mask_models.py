@@ -14,11 +14,7 @@ from corporeal.core.types import Views
 from corporeal.io.photos.posed_photos import read_posed_photos
 from corporeal.io.photos.transforms_json import write_views
 from corporeal.reconstruction.features.learned_masks import learned_masks, number_instances
-from corporeal.reconstruction.features.mask_models import (
-    MaskInstance,
-    connect_mask_model,
-    split_model_spec,
-)
+from corporeal.reconstruction.features.mask_models import MaskInstance, connect_mask_model, split_model_spec
 from corporeal.render.camera_placement import CameraAim, camera_from_aim
 
 WIDE, HIGH = 48, 36
@@ -143,9 +139,7 @@ def test_weights_that_do_not_fill_the_model_are_refused(sam2, tmp_path):
 
 
 def test_a_folder_that_is_not_there_is_named_and_nothing_is_fetched(monkeypatch):
-    monkeypatch.setattr(
-        "corporeal.reconstruction.features.mask_models.find_spec", lambda package: True
-    )
+    monkeypatch.setattr("corporeal.reconstruction.features.mask_models.find_spec", lambda package: True)
     for spec in ("sam2:", "sam3:nowhere", "birefnet:facebook/sam2"):
         with pytest.raises(UserError, match="none are downloaded"):
             connect_mask_model(spec)
@@ -154,9 +148,7 @@ def test_a_folder_that_is_not_there_is_named_and_nothing_is_fetched(monkeypatch)
 
 
 def test_missing_packages_are_named(monkeypatch):
-    monkeypatch.setattr(
-        "corporeal.reconstruction.features.mask_models.find_spec", lambda package: None
-    )
+    monkeypatch.setattr("corporeal.reconstruction.features.mask_models.find_spec", lambda package: None)
     with pytest.raises(UserError, match=r"needs torch and transformers.*corporeal\[learned\]"):
         connect_mask_model("sam2:folder")
     with pytest.raises(UserError, match=r"needs onnxruntime.*corporeal\[birefnet\]"):

@@ -15,9 +15,7 @@ from corporeal.reconstruction.features.point_descriptor import (
     point_descriptor,
 )
 
-RADIUS = np.sqrt(
-    GAMUT_RADIUS_LAB100**2 + MAX_COLOUR_SPREAD_LAB100**2 + 0.1**2 + 0.5 * 0.5**2 + (0.3 * 0.5) ** 2
-)
+RADIUS = np.sqrt(GAMUT_RADIUS_LAB100**2 + MAX_COLOUR_SPREAD_LAB100**2 + 0.1**2 + 0.5 * 0.5**2 + (0.3 * 0.5) ** 2)
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +88,7 @@ def test_a_look_without_weight_does_not_count(boxes):
     position, normal, _ = boxes
     rng = np.random.default_rng(3)
     config = replace(DEFAULT_DESCRIPTOR, colour=0.0, spread=0.0)
-    a, b = (
-        point_descriptor(position, rng.random((2000, 3)), normal, None, config) for _ in range(2)
-    )
+    a, b = (point_descriptor(position, rng.random((2000, 3)), normal, None, config) for _ in range(2))
     np.testing.assert_array_equal(a, b)
 
 

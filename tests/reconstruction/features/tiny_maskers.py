@@ -42,9 +42,7 @@ def save_sam2(folder, seed=0):
         ),
     )
     Sam2Model(config).save_pretrained(folder)
-    (folder / "preprocessor_config.json").write_text(
-        json.dumps({"image_mean": MEAN, "image_std": DEVIATION})
-    )
+    (folder / "preprocessor_config.json").write_text(json.dumps({"image_mean": MEAN, "image_std": DEVIATION}))
     return folder
 
 
@@ -87,9 +85,7 @@ def save_sam3(folder, seed=0):
     )
     config = Sam3Config(
         vision_config=dict(
-            backbone_config=backbone,
-            fpn_hidden_size=32,
-            backbone_feature_sizes=[[16, 16], [8, 8], [4, 4]],
+            backbone_config=backbone, fpn_hidden_size=32, backbone_feature_sizes=[[16, 16], [8, 8], [4, 4]]
         ),
         text_config=text,
         geometry_encoder_config=small | {"num_layers": 1, "roi_size": 3},

@@ -59,13 +59,7 @@ def save_dinov2(folder, seed=0):
     from transformers import Dinov2Config, Dinov2Model
 
     torch.manual_seed(seed)
-    config = Dinov2Config(
-        hidden_size=48,
-        num_hidden_layers=2,
-        num_attention_heads=4,
-        image_size=SIDE,
-        patch_size=PATCH,
-    )
+    config = Dinov2Config(hidden_size=48, num_hidden_layers=2, num_attention_heads=4, image_size=SIDE, patch_size=PATCH)
     Dinov2Model(config).save_pretrained(folder)
     (folder / "preprocessor_config.json").write_text(json.dumps(STATISTICS))
     return folder

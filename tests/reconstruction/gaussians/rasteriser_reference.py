@@ -79,9 +79,7 @@ def picture_covariance(
     return P @ P.T
 
 
-def gaussian_colour(
-    row: Inexact[np.ndarray, " D"], camera: PinholeCamera
-) -> Inexact[np.ndarray, "3"]:
+def gaussian_colour(row: Inexact[np.ndarray, " D"], camera: PinholeCamera) -> Inexact[np.ndarray, "3"]:
     """Return what is seen of one Gaussian, at least black."""
     towards = row[PARAM_MEAN:PARAM_ROTATION] - camera.eye
     direction = towards / np.sqrt((towards * towards).sum())

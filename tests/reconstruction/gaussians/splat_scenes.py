@@ -7,11 +7,7 @@ from scipy.spatial.transform import Rotation
 from corporeal.core.types import Camera, Gaussians, Views
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
-from corporeal.reconstruction.gaussians.rasteriser_numba import (
-    draw,
-    picture_of_drawing,
-    pinhole_of_camera,
-)
+from corporeal.reconstruction.gaussians.rasteriser_numba import draw, picture_of_drawing, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 
@@ -50,12 +46,7 @@ def pictured(gaussians, cameras, background=(0.0, 0.0, 0.0)):
     made = []
     with ThreadPool(1) as pool:
         for camera in cameras:
-            drawing = draw(
-                parameters_of_gaussians(gaussians),
-                pinhole_of_camera(camera),
-                np.array(background),
-                pool,
-            )
+            drawing = draw(parameters_of_gaussians(gaussians), pinhole_of_camera(camera), np.array(background), pool)
             made.append(picture_of_drawing(drawing))
     rgb = np.stack([np.round(np.clip(p.rgb, 0, 1) * 255).astype(np.uint8) for p in made])
     return Views(rgb, cameras), np.stack([p.alpha > 0.5 for p in made])
@@ -90,7 +81,5 @@ def together(*some):
 def eyes(count=16, focal=168.0, centre=(0.0, 0.0, 0.5)):
     """Cameras above the floor."""
     return tuple(
-        c
-        for c in around(2 * count, (192, 192), 3.5, focal, np.array(centre))
-        if c.world_from_camera[2, 3] > 0.8
+        c for c in around(2 * count, (192, 192), 3.5, focal, np.array(centre)) if c.world_from_camera[2, 3] > 0.8
     )

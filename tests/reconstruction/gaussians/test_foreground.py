@@ -9,10 +9,7 @@ from splat_scenes import around, blobs, pictured
 from corporeal.core.errors import UserError
 from corporeal.core.types import Gaussians
 from corporeal.multiview.point_cloud_geometry import nearest_neighbours, point_normals
-from corporeal.reconstruction.features.point_descriptor import (
-    MAX_SHOWING_THROUGH_FRACTION,
-    mean_view_directions,
-)
+from corporeal.reconstruction.features.point_descriptor import MAX_SHOWING_THROUGH_FRACTION, mean_view_directions
 from corporeal.reconstruction.gaussians.foreground import (
     assign_hidden_gaussians,
     foreground_gaussians,
@@ -54,9 +51,7 @@ def scene():
 
 def test_without_masks_things_are_above_the_floor_and_in_the_middle(scene):
     gaussians, kind = scene
-    found = foreground_gaussians(
-        gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, threads=1)
-    )
+    found = foreground_gaussians(gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, threads=1))
     assert found[kind == 0].mean() > 0.95
     assert not found[kind == 1].any()
     assert not found[kind == 2].any()
@@ -67,9 +62,7 @@ def test_with_masks_what_shows_outside_them_is_not_of_the_things(scene):
     gaussians, kind = scene
     alone = replace(gaussians, opacity=np.where(kind == 0, gaussians.opacity, 0))
     _, masks = pictured(alone, CAMERAS)
-    found = foreground_gaussians(
-        gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, masks, threads=1)
-    )
+    found = foreground_gaussians(gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, masks, threads=1))
     assert found[kind == 0].mean() > 0.95
     assert found[kind != 0].mean() < 0.02
 
@@ -85,9 +78,7 @@ def test_what_shows_is_summed_over_pictures(scene):
     np.testing.assert_allclose(left.weight, seen.weight, rtol=1e-5)
     np.testing.assert_allclose(left.inside + right.inside, seen.weight, rtol=1e-5, atol=1e-6)
     assert (seen.views <= len(CAMERAS)).all()
-    nothing = gaussian_visibility(
-        replace(gaussians, opacity=0 * gaussians.opacity), CAMERAS, threads=1
-    )
+    nothing = gaussian_visibility(replace(gaussians, opacity=0 * gaussians.opacity), CAMERAS, threads=1)
     assert not nothing.weight.any() and not nothing.views.any()
 
 
@@ -112,18 +103,14 @@ def test_undersides_face_down_though_light_comes_through_from_above(opacity):
     below = out[:, 2] < -0.8
     assert (seen.share[:, below].max(axis=0) > 0.01).mean() > 0.9
     assert 0.3 < np.median(seen.share[:, out[:, 2] > 0.5].max(axis=0)) < 0.95
-    towards = mean_view_directions(
-        gaussians.mean, CAMERAS, list(seen.share), MAX_SHOWING_THROUGH_FRACTION
-    )
+    towards = mean_view_directions(gaussians.mean, CAMERAS, list(seen.share), MAX_SHOWING_THROUGH_FRACTION)
     normal = point_normals(gaussians.mean, nearest_neighbours(gaussians.mean, 16), towards)
     assert ((normal * out).sum(axis=1) > 0).mean() > 0.995
 
 
 def test_gaussians_that_are_more_than_pixels_belong_to_things_too():
     gaussians, out = ball(20_000, 0.002)
-    found = foreground_gaussians(
-        gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, threads=1), floor=False
-    )
+    found = foreground_gaussians(gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, threads=1), floor=False)
     assert found[out[:, 2] > -0.2].mean() > 0.9
 
 
@@ -143,9 +130,4 @@ def test_what_is_faint_goes_with_the_thing_that_it_reaches_and_the_floor_stays()
 def test_what_is_below_the_floor_is_not_drawn_with_a_thing_but_for_the_floors_error():
     heights = np.array([0.3, -0.001, -0.05, -0.05])
     gaussians = like(np.stack([0 * heights, 0 * heights, heights], axis=1), 0.02)
-    assert gaussians_below_floor(gaussians, np.array([0, 0, 0, -1]), 0.4).tolist() == [
-        False,
-        False,
-        True,
-        False,
-    ]
+    assert gaussians_below_floor(gaussians, np.array([0, 0, 0, -1]), 0.4).tolist() == [False, False, True, False]

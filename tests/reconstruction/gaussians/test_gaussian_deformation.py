@@ -64,9 +64,7 @@ def test_covariances_follow_the_matter():
     before = painted()
     F = np.eye(3) + 0.4 * RNG(1).normal(size=(80, 3, 3))
     after = deform_gaussians(before, F, before.mean + 1)
-    np.testing.assert_allclose(
-        covariance(after), F @ covariance(before) @ F.transpose(0, 2, 1), atol=1e-12
-    )
+    np.testing.assert_allclose(covariance(after), F @ covariance(before) @ F.transpose(0, 2, 1), atol=1e-12)
     np.testing.assert_array_equal(after.opacity, before.opacity)
     np.testing.assert_array_equal(after.mean, before.mean + 1)
 
@@ -75,14 +73,10 @@ def test_a_stretch_turns_no_colour():
     before = painted()
     A = RNG(2).normal(size=(80, 3, 3))
     stretch = np.eye(3) + 0.5 * A @ A.transpose(0, 2, 1)
-    np.testing.assert_allclose(
-        deform_gaussians(before, stretch, before.mean).sh, before.sh, atol=1e-12
-    )
+    np.testing.assert_allclose(deform_gaussians(before, stretch, before.mean).sh, before.sh, atol=1e-12)
     F = TURN @ stretch
     np.testing.assert_allclose(nearest_rotations(F), np.tile(TURN, (80, 1, 1)), atol=1e-12)
-    np.testing.assert_allclose(
-        deform_gaussians(before, F, before.mean).sh, rotate_sh(before.sh, TURN), atol=1e-12
-    )
+    np.testing.assert_allclose(deform_gaussians(before, F, before.mean).sh, rotate_sh(before.sh, TURN), atol=1e-12)
 
 
 def test_each_turns_by_its_own_rotation():

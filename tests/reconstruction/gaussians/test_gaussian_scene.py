@@ -69,17 +69,13 @@ def test_nothing_is_learned_under_poses_that_are_certainly_wrong(taken):
 
 
 def test_nothing_is_learned_of_the_room_where_masks_are_inverted(taken, monkeypatch):
-    monkeypatch.setattr(
-        gaussian_scene, "are_masks_inverted", lambda masks, cameras: bool(masks.all())
-    )
+    monkeypatch.setattr(gaussian_scene, "are_masks_inverted", lambda masks, cameras: bool(masks.all()))
     with pytest.raises(UserError, match=r"photos: The masks are black in the middle .*: invert"):
         taken(FINE, UserError("It was learned all the same."))
 
 
 @pytest.mark.parametrize("longest", [128, 512])
-def test_poses_are_checked_in_pictures_of_the_size_that_the_check_was_measured_on(
-    longest, monkeypatch
-):
+def test_poses_are_checked_in_pictures_of_the_size_that_the_check_was_measured_on(longest, monkeypatch):
     """In draft's pictures of 128 pixels, .45 of what wrong focal lengths contradict still met."""
     camera, looked, asked = Camera(np.eye(3), np.eye(4), 4, 4), [], []
 
@@ -138,9 +134,7 @@ def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):
 
 def test_a_photograph_that_contradicts_the_masks_of_all_others_is_left_out(monkeypatch):
     stage, aims = RayScene(patterned()), ring(np.arange(12) * 30, (160, 120))
-    masks = np.stack(
-        [np.uint8(255) * (identify_triangles(stage, aim)[0] >= OF_SLAB) for aim in aims]
-    )
+    masks = np.stack([np.uint8(255) * (identify_triangles(stage, aim)[0] >= OF_SLAB) for aim in aims])
     masks[7] = masks[7][::-1, ::-1]  # its picture was turned by half, and its pose was not
     cameras = tuple(camera_from_aim(aim) for aim in aims)
     rgb = np.arange(12, dtype=np.uint8)[:, None, None, None] * np.ones((1, 120, 160, 3), np.uint8)
@@ -159,9 +153,7 @@ def test_a_photograph_that_contradicts_the_masks_of_all_others_is_left_out(monke
 
 
 @pytest.mark.parametrize(("odd", "times"), [(0, 1), (1, 1), (6, 2)])
-def test_grown_masks_are_learned_from_again_without_what_no_other_photograph_shows(
-    monkeypatch, tmp_path, odd, times
-):
+def test_grown_masks_are_learned_from_again_without_what_no_other_photograph_shows(monkeypatch, tmp_path, odd, times):
     camera, given, told = Camera(np.eye(3), np.eye(4), 16, 16), [], []
     views = Views(np.zeros((3, 16, 16, 3), np.uint8), (camera,) * 3)
     shown = PosedPhotos(views, ("a", "b", "c"), True, np.full((3, 16, 16), 255, np.uint8))
@@ -182,9 +174,7 @@ def test_grown_masks_are_learned_from_again_without_what_no_other_photograph_sho
     def take(grown):
         given.clear()
         kept, tell = tmp_path / "training.npz", lambda f, w: told.append(f)
-        return load_or_train_gaussians(
-            Path("photos"), TrainConfig("draft"), kept, tell, masked=MaskSource(None, grown)
-        )
+        return load_or_train_gaussians(Path("photos"), TrainConfig("draft"), kept, tell, masked=MaskSource(None, grown))
 
     made = take(grown=True)
     assert len(given) == times and given[0][0].all() and told == sorted(told)
@@ -202,9 +192,7 @@ def test_with_masks_no_floor_is_among_what_is_learned_though_sparse_points_show_
     rng, aims = np.random.default_rng(0), ring(np.arange(12) * 30, (64, 48))
     cameras = tuple(camera_from_aim(aim) for aim in aims)
     plane = np.concatenate([rng.uniform(-1, 1, (400, 2)), rng.normal(0, 1e-4, (400, 1))], axis=1)
-    thing = np.concatenate(
-        [rng.uniform(-0.2, 0.2, (100, 2)), rng.uniform(0, 0.4, (100, 1))], axis=1
-    )
+    thing = np.concatenate([rng.uniform(-0.2, 0.2, (100, 2)), rng.uniform(0, 0.4, (100, 1))], axis=1)
     gaussians = Gaussians(
         thing.astype(np.float32),
         np.tile(np.float32([1, 0, 0, 0]), (100, 1)),
@@ -214,9 +202,7 @@ def test_with_masks_no_floor_is_among_what_is_learned_though_sparse_points_show_
     )
     views = Views(np.zeros((12, 48, 64, 3), np.uint8), cameras)
     masks = np.ones((12, 48, 64), bool)
-    taken = gaussian_scene.GaussianScene(
-        gaussians, cameras, views, masks, seen=np.concatenate([plane, thing])
-    )
+    taken = gaussian_scene.GaussianScene(gaussians, cameras, views, masks, seen=np.concatenate([plane, thing]))
     made = gaussian_scene.turn_upright(taken)
     assert "plane" in made.statements[-1], "the floor is found"
     assert not made.floor, "and yet is not among the Gaussians"

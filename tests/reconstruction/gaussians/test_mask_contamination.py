@@ -11,10 +11,7 @@ from splat_scenes import around, blobs, pictured
 from corporeal.core.types import Views
 from corporeal.reconstruction.gaussians import mask_contamination as module
 from corporeal.reconstruction.gaussians.gaussian_scene import MIN_CONTAMINATION_FRACTION
-from corporeal.reconstruction.gaussians.mask_contamination import (
-    drop_thin_pieces,
-    mask_contamination,
-)
+from corporeal.reconstruction.gaussians.mask_contamination import drop_thin_pieces, mask_contamination
 
 THING = blobs(40)
 WIDE = 5
@@ -48,9 +45,9 @@ def test_pieces_of_what_stands_behind_are_found_and_little_else(scene):
     views, masks = scene
     pieces = beside(masks)
     odd = found(views, masks | pieces)
-    assert np.count_nonzero(
-        drop_thin_pieces(odd, masks | pieces)
-    ) > MIN_CONTAMINATION_FRACTION * np.count_nonzero(masks)
+    assert np.count_nonzero(drop_thin_pieces(odd, masks | pieces)) > MIN_CONTAMINATION_FRACTION * np.count_nonzero(
+        masks
+    )
     assert np.count_nonzero(odd & pieces) > 0.8 * np.count_nonzero(pieces)
     assert np.count_nonzero(odd & masks) < 0.1 * np.count_nonzero(pieces)
 
@@ -63,9 +60,7 @@ def test_right_masks_stay_and_outlines_that_err_by_a_pixel(scene, exposed):
     shown = Views(np.round(gains * views.rgb).astype(np.uint8), views.cameras)
     wider = np.stack([binary_dilation(mask) for mask in masks])
     for some in (masks, wider):
-        assert np.count_nonzero(found(shown, some)) < MIN_CONTAMINATION_FRACTION * np.count_nonzero(
-            some
-        )
+        assert np.count_nonzero(found(shown, some)) < MIN_CONTAMINATION_FRACTION * np.count_nonzero(some)
 
 
 def test_what_is_thin_is_not_learned_and_is_no_reason_to_learn_again(scene):
@@ -75,9 +70,7 @@ def test_what_is_thin_is_not_learned_and_is_no_reason_to_learn_again(scene):
     legs[:, :30, 30:33] = True  # from the top of the picture into the thing
     assert np.count_nonzero(legs & ~masks) > 8 * 3 * 5
     odd = found(views, masks | legs)
-    assert (odd & legs)[:, :10].any() and not (drop_thin_pieces(odd, masks | legs) & legs)[
-        :, :10
-    ].any()
+    assert (odd & legs)[:, :10].any() and not (drop_thin_pieces(odd, masks | legs) & legs)[:, :10].any()
 
 
 def test_a_highlight_within_is_the_things(scene):
@@ -89,9 +82,7 @@ def test_a_highlight_within_is_the_things(scene):
     assert not odd[:, 27:37, 27:37].any()
 
 
-@pytest.mark.parametrize(
-    ("paint", "strange"), [((75, 75, 75), False), ((-75, -75, -75), False), ((85, -85, 0), True)]
-)
+@pytest.mark.parametrize(("paint", "strange"), [((75, 75, 75), False), ((-75, -75, -75), False), ((85, -85, 0), True)])
 def test_what_is_but_lighter_or_darker_at_the_rim_is_the_things(paint, strange):
     dull = replace(THING, sh=0.3 * THING.sh)
     views, masks = pictured(dull, around(8, (64, 64), focal=80.0), (0.5, 0.5, 0.5))

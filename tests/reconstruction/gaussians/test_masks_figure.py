@@ -5,12 +5,7 @@ import json
 import numpy as np
 from PIL import Image
 
-from corporeal.reconstruction.masks_figure import (
-    FAINT_CONTRAST_FRACTION,
-    OUTLINE_RGB,
-    draw_masks_over,
-    masks_figure,
-)
+from corporeal.reconstruction.masks_figure import FAINT_CONTRAST_FRACTION, OUTLINE_RGB, draw_masks_over, masks_figure
 from corporeal.render.contact_sheet import TILE_GAP_PX
 
 GREY = 100

@@ -37,15 +37,7 @@ def haze():
     masks = rng.integers(0, 256, (2, SIDE * SIDE)).astype(np.uint8)
     rays = np.stack([rng.integers(0, 2, 24), rng.integers(0, SIDE * SIDE, 24)], axis=1)
     jitter, behind = rng.random(24, np.float32), rng.random(3, np.float32)
-    return (
-        made,
-        around(2, (SIDE, SIDE), focal=60.0),
-        pictures,
-        masks,
-        rays.astype(np.int32),
-        jitter,
-        behind,
-    )
+    return (made, around(2, (SIDE, SIDE), focal=60.0), pictures, masks, rays.astype(np.int32), jitter, behind)
 
 
 def plain(values, made, cameras, pictures, masks, rays, jitter, behind):
@@ -192,9 +184,7 @@ def test_points_of_a_learned_field_lie_on_the_surface(learned):
     with pytest.raises(UserError, match="what one picture shows, no other does"):
         field_surface_points(made.field, views.cameras, 10, allowed=lambda at: at[:, 2] > 9)
     with pytest.raises(UserError, match="what one picture shows, no other does"):
-        field_surface_points(
-            haze_field(np.zeros(3), 0.1, np.ones((4, 4, 4), bool)), views.cameras, 10
-        )
+        field_surface_points(haze_field(np.zeros(3), 0.1, np.ones((4, 4, 4), bool)), views.cameras, 10)
     every_third, _ = radiance_field._ray_ends(views.cameras, found.depth, found.depth.size // 5)
     off = np.abs(np.linalg.norm(every_third, axis=1) - 0.3) / made.field.grid.cell
     ends = np.count_nonzero(np.isfinite(found.depth))
@@ -273,10 +263,7 @@ def test_rays_take_from_nodes_what_the_first_round_gives_back(learned):
 )
 def test_what_cannot_be_learned_from_is_refused(spoil, told):
     with pytest.raises(UserError, match=told):
-        train_field(
-            *spoil(*painted(around(4, (32, 32), focal=100.0))),
-            replace(SMALL, steps=1),
-        )
+        train_field(*spoil(*painted(around(4, (32, 32), focal=100.0))), replace(SMALL, steps=1))
 
 
 def test_maps_that_do_not_fit_are_refused(learned):

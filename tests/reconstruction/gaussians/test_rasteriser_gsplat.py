@@ -91,9 +91,7 @@ def stand_in(monkeypatch):
     gsplat = ModuleType("gsplat")
     gsplat.rasterization = rasterization
     monkeypatch.setitem(sys.modules, "gsplat", gsplat)
-    monkeypatch.delitem(
-        sys.modules, "corporeal.reconstruction.gaussians.rasteriser_gsplat", raising=False
-    )
+    monkeypatch.delitem(sys.modules, "corporeal.reconstruction.gaussians.rasteriser_gsplat", raising=False)
     monkeypatch.setattr(torch.Tensor, "cuda", lambda tensor: tensor)
     monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
     return torch
@@ -106,10 +104,7 @@ def test_drawings_and_gradients_are_those_of_the_processor(stand_in):
     background = np.array([0.2, 0.5, 0.9], np.float32)
     slope = np.random.default_rng(0).normal(size=(4, 40, 48)).astype(np.float32)
     with ThreadPool(1) as pool:
-        ours, theirs = (
-            room.draw(theta, camera, background, pool)
-            for room in (rasteriser_numba, rasteriser_gsplat)
-        )
+        ours, theirs = (room.draw(theta, camera, background, pool) for room in (rasteriser_numba, rasteriser_gsplat))
         np.testing.assert_allclose(theirs.planes, ours.planes, atol=2e-3)
         exact = rasteriser_numba.back(ours, slope, pool)
         found = rasteriser_gsplat.back(theirs, slope, pool)
@@ -138,17 +133,13 @@ def test_without_a_card_it_says_so(stand_in, monkeypatch):
 
     monkeypatch.setattr(stand_in.cuda, "is_available", lambda: False)
     with ThreadPool(1) as pool, pytest.raises(UserError, match="CUDA, and torch finds none"):
-        rasteriser_gsplat.draw(
-            parameters_of_gaussians(blobs(3)), pinhole_of_camera(around(1)[0]), np.zeros(3), pool
-        )
+        rasteriser_gsplat.draw(parameters_of_gaussians(blobs(3)), pinhole_of_camera(around(1)[0]), np.zeros(3), pool)
 
 
 def test_without_gsplat_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "gsplat", None)
     monkeypatch.setitem(sys.modules, "torch", None)
-    monkeypatch.delitem(
-        sys.modules, "corporeal.reconstruction.gaussians.rasteriser_gsplat", raising=False
-    )
+    monkeypatch.delitem(sys.modules, "corporeal.reconstruction.gaussians.rasteriser_gsplat", raising=False)
     cameras = around(4)
     views = Views(np.zeros((4, 40, 48, 3), np.uint8), cameras)
     with pytest.raises(UserError, match="'gsplat' needs 'torch'"):

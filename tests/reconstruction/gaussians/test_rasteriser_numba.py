@@ -8,17 +8,8 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Camera
 from corporeal.geometry.spherical_harmonics import sh_basis
 from corporeal.reconstruction.gaussians import kernels_harmonics
-from corporeal.reconstruction.gaussians.gaussian_parameters import (
-    gaussians_of_parameters,
-    parameters_of_gaussians,
-)
-from corporeal.reconstruction.gaussians.rasteriser_numba import (
-    back,
-    draw,
-    gaussian_weights,
-    pinhole_of_camera,
-    render,
-)
+from corporeal.reconstruction.gaussians.gaussian_parameters import gaussians_of_parameters, parameters_of_gaussians
+from corporeal.reconstruction.gaussians.rasteriser_numba import back, draw, gaussian_weights, pinhole_of_camera, render
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 GROUPS = {
@@ -128,9 +119,7 @@ def dense(torch, x, eye):
                      0.4886025119029199 * d[:, 2], -0.4886025119029199 * d[:, 0]], 1)  # fmt: skip
     colour = (0.5 + torch.einsum("nk,nkc->nc", Y, x[:, 11:].view(-1, 4, 3))).clamp_min(0)
     v, u = torch.meshgrid(
-        torch.arange(eye.height).double() + 0.5,
-        torch.arange(eye.width).double() + 0.5,
-        indexing="ij",
+        torch.arange(eye.height).double() + 0.5, torch.arange(eye.width).double() + 0.5, indexing="ij"
     )
     T, rgb = torch.ones_like(u), 0
     for i in torch.argsort(p[:, 2].detach()):
@@ -217,9 +206,7 @@ def test_harmonics_and_slopes_equal_those_of_the_geometry(coefficients):
     kernels_harmonics.harmonics_gradient(*d, coefficients, S)
     np.testing.assert_allclose(Y[:coefficients], sh_basis(d[None], degree)[0], atol=1e-14)
     steps = d + 1e-30j * np.eye(3)
-    np.testing.assert_allclose(
-        S[:coefficients], sh_basis(steps, degree).imag.T / 1e-30, atol=1e-13, rtol=0
-    )
+    np.testing.assert_allclose(S[:coefficients], sh_basis(steps, degree).imag.T / 1e-30, atol=1e-13, rtol=0)
 
 
 @pytest.mark.parametrize("cell", [1, 4, 16])

@@ -44,9 +44,7 @@ def scene():
     post = some(np.concatenate([side, lid[np.linalg.norm(lid[:, :2], axis=1) < 0.3]]), 0.012, 0.6)
     speck = some(np.array([[0.5, 0.5, 0.5]]), 0.02, 0.6)
     kinds = floor, post, speck
-    whole = Gaussians(
-        *(np.concatenate([getattr(g, f) for g in kinds]) for f in vars(floor) if f != "warnings")
-    )
+    whole = Gaussians(*(np.concatenate([getattr(g, f) for g in kinds]) for f in vars(floor) if f != "warnings"))
     return whole, np.repeat(np.arange(3), [g.count for g in kinds])
 
 
@@ -72,6 +70,4 @@ def test_specks_in_the_air_are_no_things_and_without_things_nothing_is_left(scen
     _, post = pictured(gaussian_subset(whole, kind == POST), CAMERAS)
     assert (true & ~post).any()
     assert not (masks_above_floor(whole, CAMERAS, floor=True, threads=1) & true & ~post).any()
-    assert not masks_above_floor(
-        gaussian_subset(whole, kind == FLOOR), CAMERAS, floor=True, threads=1
-    ).any()
+    assert not masks_above_floor(gaussian_subset(whole, kind == FLOOR), CAMERAS, floor=True, threads=1).any()

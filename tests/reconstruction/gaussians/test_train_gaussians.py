@@ -18,16 +18,10 @@ from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.plane_sweep import PlaneSweepConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import train_gaussians
-from corporeal.reconstruction.gaussians.training_schedule import (
-    DensificationConfig,
-    TrainConfig,
-    shrink_picture,
-)
+from corporeal.reconstruction.gaussians.training_schedule import DensificationConfig, TrainConfig, shrink_picture
 from glb_maker import CUBE, CUBE_TRIANGLES
 
-COARSE = TrainConfig(
-    "draft", threads=1, hull=HullConfig(grid_cells=30_000), sweep=PlaneSweepConfig(max_depths=4_000)
-)
+COARSE = TrainConfig("draft", threads=1, hull=HullConfig(grid_cells=30_000), sweep=PlaneSweepConfig(max_depths=4_000))
 """Begins from coarse hulls and few depths."""
 SMALL = replace(COARSE, gaussians=400, steps=160)
 
@@ -83,9 +77,7 @@ def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
     views, masks = plain(BENCH)
     on_it = replace(FINE, begin="hull")
     opened = train_gaussians(views, masks, config=on_it).quality.psnr_on_objects
-    monkeypatch.setattr(
-        carved_volume, "hull_cells_seen_past", lambda v, m, closed, p: closed.inside & False
-    )
+    monkeypatch.setattr(carved_volume, "hull_cells_seen_past", lambda v, m, closed, p: closed.inside & False)
     made = train_gaussians(views, masks, config=FINE).quality.psnr_on_objects
     control = train_gaussians(views, masks, config=on_it).quality.psnr_on_objects
     assert made > control + 2 and made > 25
@@ -95,9 +87,7 @@ def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
 @pytest.mark.slow
 def test_nothing_begins_inside_a_box():
     views, masks = plain([((-0.4, -0.3, 0.0), (0.8, 0.6, 0.5))])
-    one, other = (
-        train_gaussians(views, masks, config=replace(LEARNING, begin=b)) for b in ("auto", "hull")
-    )
+    one, other = (train_gaussians(views, masks, config=replace(LEARNING, begin=b)) for b in ("auto", "hull"))
     np.testing.assert_array_equal(one.gaussians.mean, other.gaussians.mean)
     assert one.ahead < module.MIN_TRIAL_GAIN_DB and np.isnan(other.ahead)
 
@@ -115,12 +105,8 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
         return float((seen[shown] - views.depth[shown]).clip(0).mean())
 
     small = deep()
-    monkeypatch.setattr(
-        densification, "equal_scale_limits", lambda theta, widest: equal_scale_limits(theta, 10.0)
-    )
-    monkeypatch.setattr(
-        module, "points_on_hull", lambda *what: replace(points_on_hull(*what), width=None)
-    )
+    monkeypatch.setattr(densification, "equal_scale_limits", lambda theta, widest: equal_scale_limits(theta, 10.0))
+    monkeypatch.setattr(module, "points_on_hull", lambda *what: replace(points_on_hull(*what), width=None))
     assert small < deep() / 1.2
 
 
@@ -171,16 +157,12 @@ def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_pa
     with pytest.raises(KilledError):
         train_gaussians(views, masks, config=few, checkpoint=path, progress=kill)
     two = replace(few, threads=2)
-    again = train_gaussians(
-        views, masks, config=two, checkpoint=path, progress=lambda f, w: steps.append(w)
-    ).gaussians
+    again = train_gaussians(views, masks, config=two, checkpoint=path, progress=lambda f, w: steps.append(w)).gaussians
     assert steps[0].startswith("step 40 ")
     for name in ("mean", "rotation", "scale", "opacity", "sh"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(again, name))
     steps.clear()
-    last = train_gaussians(
-        views, masks, config=few, checkpoint=path, progress=lambda f, w: steps.append(w)
-    )
+    last = train_gaussians(views, masks, config=few, checkpoint=path, progress=lambda f, w: steps.append(w))
     assert not steps, "what was finished is not done again"
     np.testing.assert_array_equal(last.gaussians.mean, whole.mean)
 
@@ -203,9 +185,7 @@ def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, spo
         config = replace(config, seed=1)
     else:
         config = replace(config, hull=HullConfig(grid_cells=40_000))
-    train_gaussians(
-        views, masks, config=config, checkpoint=path, progress=lambda f, w: steps.append(w)
-    )
+    train_gaussians(views, masks, config=config, checkpoint=path, progress=lambda f, w: steps.append(w))
     assert steps[0].startswith("step 1 ")
 
 

@@ -12,10 +12,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Views
 from corporeal.geometry.rotation import matrix_from_quaternion
 from corporeal.multiview.viewed_region import find_viewed_region
-from corporeal.reconstruction.gaussians import (
-    densification,
-    gaussian_initialisation,
-)
+from corporeal.reconstruction.gaussians import densification, gaussian_initialisation
 from corporeal.reconstruction.gaussians.carved_volume import carve_volume
 from corporeal.reconstruction.gaussians.densification import (
     MAX_COPIES,
@@ -40,11 +37,7 @@ from corporeal.reconstruction.gaussians.hull_config import HullConfig
 from corporeal.reconstruction.gaussians.image_loss import TargetImage, image_loss, target_image
 from corporeal.reconstruction.gaussians.kernels_plane_sweep import count_support
 from corporeal.reconstruction.gaussians.kernels_training import SSIM_WINDOW, adam_rows
-from corporeal.reconstruction.gaussians.plane_sweep import (
-    PlaneSweepConfig,
-    neighbouring_views,
-    sweep_planes,
-)
+from corporeal.reconstruction.gaussians.plane_sweep import PlaneSweepConfig, neighbouring_views, sweep_planes
 from corporeal.reconstruction.gaussians.rasteriser_numba import draw, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import camera_rows
@@ -96,9 +89,7 @@ def test_the_loss_and_its_slope():
     drawings = {}
     for threads in (1, 3):
         with ThreadPool(threads) as pool:
-            drawing = draw(
-                parameters_of_gaussians(blobs()), pinhole_of_camera(camera), np.full(3, 0.3), pool
-            )
+            drawing = draw(parameters_of_gaussians(blobs()), pinhole_of_camera(camera), np.full(3, 0.3), pool)
             drawings[threads] = drawing, image_loss(drawing, aim, pool)
     drawing, off = drawings[1]
     planes, target = drawing.planes[:4].astype(complex), aim.planes.astype(float)

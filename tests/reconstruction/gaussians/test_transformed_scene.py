@@ -17,9 +17,7 @@ def test_pictures_before_and_after_a_similarity_are_the_same():
     scene, cameras = blobs(degree=3), around(3)
     scene.sh[:, 1:] = 0.3 * rng.normal(size=scene.sh[:, 1:].shape)
     for scale in (0.01, 1.0, 40.0):
-        made = similarity_matrix(
-            matrix_from_quaternion(rng.normal(size=4)), scale, 3 * scale * rng.normal(size=3)
-        )
+        made = similarity_matrix(matrix_from_quaternion(rng.normal(size=4)), scale, 3 * scale * rng.normal(size=3))
         moved = apply_similarity_to_gaussians(scene, made)
         for old, new in zip(cameras, apply_similarity_to_cameras(cameras, made), strict=True):
             before = render(scene, old, threads=1)

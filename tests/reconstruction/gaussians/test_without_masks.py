@@ -46,9 +46,7 @@ def test_rays_end_on_the_floor_or_on_the_dome():
     far = ROOM.reach(eye, ray)
     np.testing.assert_allclose(far[:2], [0.75, 3.0])
     assert np.linalg.norm(eye[2] + far[2] * ray[2]) == pytest.approx(10)
-    np.testing.assert_allclose(
-        ROOM.normals(np.array([[3.0, 0, -0.5], [0, 0, 10.0]])), [[0, 0, 1], [0, 0, -1]]
-    )
+    np.testing.assert_allclose(ROOM.normals(np.array([[3.0, 0, -0.5], [0, 0, 10.0]])), [[0, 0, 1], [0, 0, -1]])
 
 
 def test_the_floor_is_found_whichever_way_is_up():
@@ -79,9 +77,7 @@ def test_gaussians_begin_flat_on_known_surfaces_and_as_wide_as_told():
     normal = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.6, 0, 0.8], [0, 0, 0]])
     points = StartPoints(np.eye(4, 3), np.ones((4, 3)), 0.5, normal, np.full(4, 0.2))
     theta = initial_gaussians(points, 9, 0, RNG(0))
-    np.testing.assert_allclose(
-        np.exp(theta[:, 7:10]), [[0.2, 0.2, 0.02]] * 3 + [[0.2] * 3], rtol=1e-5
-    )
+    np.testing.assert_allclose(np.exp(theta[:, 7:10]), [[0.2, 0.2, 0.02]] * 3 + [[0.2] * 3], rtol=1e-5)
     w, x, y, z = theta[:3, 3:7].T
     axis = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
     np.testing.assert_allclose(axis, normal[:3], atol=1e-6)
@@ -103,9 +99,7 @@ def wall():
     """What twelve cameras say who see, in all directions, a surface 3 m away."""
     cameras = around(12)
     shape = 12, 10, 12
-    return cameras, ViewDepths(
-        camera_rows(cameras), 4.0, np.full(12, 0.9), np.full(shape, 3.0), np.full(shape, 30.0)
-    )
+    return cameras, ViewDepths(camera_rows(cameras), 4.0, np.full(12, 0.9), np.full(shape, 3.0), np.full(shape, 30.0))
 
 
 def test_what_views_see_past_is_haze_if_it_is_wide(wall):
@@ -156,11 +150,7 @@ def test_smooth_pictures_are_laid_on_the_floor():
     sh = np.zeros((count, 1, 3))
     sh[near, 0] = 2 * np.sin(12 * flat[near] + [0, 1, 2])
     made = Gaussians(
-        flat,
-        np.tile([1.0, 0, 0, 0], (count, 1)),
-        np.tile([0.06, 0.06, 0.002], (count, 1)),
-        np.full(count, 0.99),
-        sh,
+        flat, np.tile([1.0, 0, 0, 0], (count, 1)), np.tile([0.06, 0.06, 0.002], (count, 1)), np.full(count, 0.99), sh
     )
     views, _ = pictured(made, above(16, size=(96, 96), focal=120.0), (0.5, 0.5, 0.5))
     with ThreadPool(1) as pool:
@@ -193,16 +183,10 @@ def test_a_gain_is_told_from_what_is_covered_alone():
     views, masks = pictured(truth, cameras)
     darker = (0.5 * views.rgb[0]).astype(np.uint8)
     with ThreadPool(1) as pool:
-        drawing = draw(
-            parameters_of_gaussians(truth), pinhole_of_camera(cameras[0]), np.ones(3), pool
-        )
-    found = exposure_gains.exposure_gain(
-        drawing, darker, np.where(masks[0], 255, 0).astype(np.uint8)
-    )
+        drawing = draw(parameters_of_gaussians(truth), pinhole_of_camera(cameras[0]), np.ones(3), pool)
+    found = exposure_gains.exposure_gain(drawing, darker, np.where(masks[0], 255, 0).astype(np.uint8))
     np.testing.assert_allclose(found, 0.5, rtol=0.02)
-    assert np.isnan(
-        exposure_gains.exposure_gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))
-    ).all()
+    assert np.isnan(exposure_gains.exposure_gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))).all()
 
 
 def test_exposure_changes_things_and_not_the_grey_behind_them():

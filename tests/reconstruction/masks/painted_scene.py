@@ -25,9 +25,7 @@ MIDDLES = {"head": HEAD, "close": CLOSE}
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
-def scene(
-    ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=None, finer=1, floor=FLOOR
-):
+def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=None, finer=1, floor=FLOOR):
     """Photographs of a ball on a mottled floor, its true masks, and points on both.
 
     belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius
@@ -41,9 +39,7 @@ def scene(
     wide, high = finer * WIDE, finer * HIGH
     turns = 2.4 * np.arange(count)
     eyes = np.stack([2.6 * np.cos(turns), 2.6 * np.sin(turns), np.linspace(0.5, 2.0, count)], -1)
-    cameras = tuple(
-        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, wide, high)) for e in eyes
-    )
+    cameras = tuple(camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, wide, high)) for e in eyes)
     pictures, masks, seen = [], [], []
     for camera in cameras:
         v, u = np.mgrid[:high, :wide] + 0.5

@@ -39,9 +39,7 @@ def test_pictures_get_one_exposure():
 
 def test_without_a_floor_they_stay_as_they_are():
     views, _, _ = scene()
-    assert (
-        equalise_exposure(views, None, find_viewed_region(views.cameras), ROUND_PICTURE_PX) is views
-    )
+    assert equalise_exposure(views, None, find_viewed_region(views.cameras), ROUND_PICTURE_PX) is views
 
 
 def test_a_thing_is_told_from_a_floor_that_is_as_brown_in_another_picture():

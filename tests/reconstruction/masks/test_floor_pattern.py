@@ -37,9 +37,7 @@ def test_another_plane_has_no_pattern():
     """Half a radius higher nothing lies: views from different sides do not agree about it."""
     views, masks, _ = scene(count=24)
     wrong = GroundPlane(GROUND.normal, FLOOR + 0.25, 0.5, 0.001)
-    right, other = (
-        shows_floor_pattern(views, p, find_viewed_region(views.cameras)) for p in (GROUND, wrong)
-    )
+    right, other = (shows_floor_pattern(views, p, find_viewed_region(views.cameras)) for p in (GROUND, wrong))
     assert other[~masks].mean() < 0.2 * right[~masks].mean()
 
 

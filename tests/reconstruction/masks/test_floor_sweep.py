@@ -40,16 +40,11 @@ def test_cameras_that_lean_anyhow_know_no_level_plane():
     random, leaning = np.random.default_rng(0), []
     for camera in views.cameras:
         turn = random.uniform(0, 2 * np.pi)
-        roll = np.array(
-            [[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]]
-        )
+        roll = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
         pose = camera.world_from_camera.copy()
         pose[:3, :3] = pose[:3, :3] @ roll
         leaning.append(Camera(camera.K, pose, camera.width, camera.height))
-    assert (
-        sweep_floor_plane(Views(views.rgb, tuple(leaning)), find_viewed_region(tuple(leaning)))
-        is None
-    )
+    assert sweep_floor_plane(Views(views.rgb, tuple(leaning)), find_viewed_region(tuple(leaning))) is None
 
 
 def test_a_floor_between_two_heights_that_are_tried_is_found():
@@ -58,9 +53,7 @@ def test_a_floor_between_two_heights_that_are_tried_is_found():
     around = find_viewed_region(views.cameras)
     off = 0.012
     true = (FLOOR - around.centre[2]) / around.radius
-    shares = [
-        _pattern_fraction(views, level_plane(UP, h, around), around) for h in (true, true + off)
-    ]
+    shares = [_pattern_fraction(views, level_plane(UP, h, around), around) for h in (true, true + off)]
     config = FloorSweepConfig(true + off - 0.4, true + off + 0.4, 9, sum(shares) / 2)
     found = sweep_floor_plane(views, around, config)
     assert found is not None

@@ -10,17 +10,8 @@ from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.masks import grown_masks
-from corporeal.reconstruction.masks.floor_texture import (
-    FIT_AGREES,
-    FIT_CONTRADICTS,
-    FIT_UNKNOWN,
-    floor_fit,
-)
-from corporeal.reconstruction.masks.grown_masks import (
-    BY_FLOOR_STATEMENT,
-    UNSURE_OVERLAP_FRACTION,
-    _grow_and_describe,
-)
+from corporeal.reconstruction.masks.floor_texture import FIT_AGREES, FIT_CONTRADICTS, FIT_UNKNOWN, floor_fit
+from corporeal.reconstruction.masks.grown_masks import BY_FLOOR_STATEMENT, UNSURE_OVERLAP_FRACTION, _grow_and_describe
 from corporeal.reconstruction.masks.mask_quality import MAX_COLOUR_OVERLAP
 from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
 from corporeal.reconstruction.masks.region_growing import grow_masks
@@ -81,9 +72,7 @@ def test_masks_on_a_print_of_their_colours_are_believed(monkeypatch):
     monkeypatch.setattr(grown_masks, "grow_masks", kept)
     grown, said = _grow_and_describe(views, seeds, False, lambda fraction, words: None)
     before = all_grown[0]  # by colours alone
-    assert before is not None and before.alike > UNSURE_OVERLAP_FRACTION * MAX_COLOUR_OVERLAP, (
-        "colours hardly tell"
-    )
+    assert before is not None and before.alike > UNSURE_OVERLAP_FRACTION * MAX_COLOUR_OVERLAP, "colours hardly tell"
     assert BY_FLOOR_STATEMENT in said
     assert grown is not None
     gained = agreement(grown.inside, masks) - agreement(before.inside, masks)

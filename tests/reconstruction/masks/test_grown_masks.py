@@ -136,9 +136,7 @@ def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(grey, tmp_pat
     shutil.copytree(made.doubted.parent, run)
     none = Gaussians(*(np.zeros((0, n)) for n in (3, 4, 3)), np.zeros(0), np.zeros((0, 1, 3)))
     monkeypatch.setattr(
-        gaussian_source,
-        "load_or_train_gaussians",
-        lambda *_: GaussianScene(none, views.cameras, views),
+        gaussian_source, "load_or_train_gaussians", lambda *_: GaussianScene(none, views.cameras, views)
     )
     taken, masked = gaussians_from_source(photos, ReconstructConfig(), run, unheard)
     assert not masked and taken.coloured is not None
@@ -190,10 +188,7 @@ def test_the_command_says_how_to_go_on(grown, tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [
-        (("--at", "1", "2", "--box", "1", "2", "3", "4"), "not both"),
-        (("--at", "999", "2"), "does not lie in"),
-    ],
+    [(("--at", "1", "2", "--box", "1", "2", "3", "4"), "not both"), (("--at", "999", "2"), "does not lie in")],
 )
 def test_bad_words_get_one_sentence(photos, monkeypatch, capsys, words, said):
     assert type_in(monkeypatch, "masks", photos[0], *words) == 2
@@ -201,14 +196,12 @@ def test_bad_words_get_one_sentence(photos, monkeypatch, capsys, words, said):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [((), "Point at the object with --at or --box"), (("--box", "1", "2", "9", "9"), "--on")],
+    ("words", "said"), [((), "Point at the object with --at or --box"), (("--box", "1", "2", "9", "9"), "--on")]
 )
 def test_who_pointed_is_not_told_to_point(photos, monkeypatch, capsys, words, said):
     """A box around a thing that was found nowhere was answered with: point at it with --box."""
     monkeypatch.setattr(
-        "corporeal.reconstruction.masks.grown_masks.grown_masks",
-        lambda *_: GrownMasks(None, ("No masks were grown.",)),
+        "corporeal.reconstruction.masks.grown_masks.grown_masks", lambda *_: GrownMasks(None, ("No masks were grown.",))
     )
     assert type_in(monkeypatch, "masks", photos[0], *words) == 2
     assert said in (told := capsys.readouterr().err.replace("\n", " "))
@@ -259,9 +252,7 @@ def test_a_folder_without_masks_of_these_photographs_is_refused(photos, tmp_path
 
 
 @pytest.mark.parametrize("doubted", [True, False])
-def test_growing_ends_where_outlines_contradict_each_other_under_doubted_poses(
-    monkeypatch, doubted
-):
+def test_growing_ends_where_outlines_contradict_each_other_under_doubted_poses(monkeypatch, doubted):
     grown, told = [], lambda share, words: None
     monkeypatch.setattr(module, "grow_masks", lambda *what, **more: grown.append(more))
     monkeypatch.setattr(module, "outlines_contradict", lambda made: True)

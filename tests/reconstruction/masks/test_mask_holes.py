@@ -11,9 +11,7 @@ from corporeal.render.camera_placement import CameraAim, camera_from_aim
 WIDE, HIGH, COUNT = 128, 96, 16
 TURNS = np.arange(COUNT) * 2 * np.pi / COUNT
 CAMERAS = tuple(
-    camera_from_aim(
-        CameraAim((2.6 * np.cos(t), 2.6 * np.sin(t), 0.6), (0.0, 0.0, 0.0), 40.0, WIDE, HIGH)
-    )
+    camera_from_aim(CameraAim((2.6 * np.cos(t), 2.6 * np.sin(t), 0.6), (0.0, 0.0, 0.0), 40.0, WIDE, HIGH))
     for t in TURNS
 )
 ROOM = voxel_volume(CAMERAS, ViewedRegion((0.0, 0.0, 0.0), 0.9), None)

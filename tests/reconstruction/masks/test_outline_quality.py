@@ -85,9 +85,7 @@ def test_of_what_hovers_less_needs_to_stand_under_it(grown):
     legs = replace(grown, hanging=MaskAttachments(some, some), lowest=0.0)
     assert lacking_attachment_reason(legs) is None
     assert "hovers above the floor" in (lacking_attachment_reason(replace(legs, lowest=0.1)) or "")
-    assert lacking_attachment_reason(replace(grown, hanging=None, lowest=0.1)) is None, (
-        "nothing is under it"
-    )
+    assert lacking_attachment_reason(replace(grown, hanging=None, lowest=0.1)) is None, "nothing is under it"
 
 
 def test_masks_of_what_is_too_thin_end_the_run(grown, tmp_path, monkeypatch):

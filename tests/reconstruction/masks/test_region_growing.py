@@ -11,11 +11,7 @@ from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
 from corporeal.reconstruction.masks import region_growing as growing
 from corporeal.reconstruction.masks.floor_grid import floor_intersections
-from corporeal.reconstruction.masks.mask_prompts import (
-    PicturePrompt,
-    cut_at_prompt,
-    seeds_from_prompt,
-)
+from corporeal.reconstruction.masks.mask_prompts import PicturePrompt, cut_at_prompt, seeds_from_prompt
 from corporeal.reconstruction.masks.mask_quality import incompleteness_reason, mask_doubt
 from corporeal.reconstruction.masks.mask_seeds import seeds_from_cameras
 from corporeal.reconstruction.masks.region_growing import grow_masks
@@ -50,9 +46,7 @@ def test_what_was_moved_between_two_rounds_is_told_from_all_around_it():
     views, _, points = scene()
     shown = views.rgb.copy()
     shown[1::2] = np.roll(shown[1::2], 8, axis=2)
-    assert (
-        mask_doubt(grow_masks(replace(views, rgb=shown), seeds_from_cameras(views, points))) is None
-    )
+    assert mask_doubt(grow_masks(replace(views, rgb=shown), seeds_from_cameras(views, points))) is None
 
 
 def test_flat_things_of_its_colour_beside_it_are_told():
@@ -65,17 +59,10 @@ def test_flat_things_of_its_colour_beside_it_are_told():
 def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_a_thing():
     views, masks, points = scene(flat=0.2)
     plane = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 1.0, 0.01)
-    places = np.stack(
-        [
-            floor_intersections(camera, plane).reshape(*masks.shape[1:], 3)
-            for camera in views.cameras
-        ]
-    )
+    places = np.stack([floor_intersections(camera, plane).reshape(*masks.shape[1:], 3) for camera in views.cameras])
     discs = on_discs(places, 0.2) & ~masks
     for flat, least, most in ((False, 0.0, 0.1), (True, 0.95, 1.0)):
-        seeds = replace(
-            seeds_from_cameras(views, points), piece=0.005
-        )  # a disc is a crumb of a ball
+        seeds = replace(seeds_from_cameras(views, points), piece=0.005)  # a disc is a crumb of a ball
         grown = grow_masks(views, seeds, flat=flat)
         assert grown is not None
         inside = grown.inside > 0.5

@@ -18,13 +18,9 @@ def seen():
     """Cells, of the ball in the middle and of a cap at the upper edge of what is looked at."""
     turns = 2.4 * np.arange(14)
     eyes = np.stack([4 * np.cos(turns), 4 * np.sin(turns), np.linspace(0.5, 2.0, 14)], axis=-1)
-    cameras = tuple(
-        camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, 96, 72)) for e in eyes
-    )
+    cameras = tuple(camera_from_aim(CameraAim(tuple(e), (0.0, 0.0, 0.0), 48.0, 96, 72)) for e in eyes)
     room = voxel_volume(cameras, AROUND, GROUND)
-    place = (
-        np.stack(np.unravel_index(room.index, (VOXELS_ACROSS,) * 3)) + 0.5
-    ) / VOXELS_ACROSS * 2 - 1
+    place = (np.stack(np.unravel_index(room.index, (VOXELS_ACROSS,) * 3)) + 0.5) / VOXELS_ACROSS * 2 - 1
     ball = np.linalg.norm(place, axis=0) < RADIUS
     return room, ball, room.outer & (place[2] > 0.85)
 

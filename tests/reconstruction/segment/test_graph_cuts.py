@@ -1,11 +1,7 @@
 import numpy as np
 import pytest
 
-from corporeal.reconstruction.segment.cut_proposals import (
-    MergeTreeProposals,
-    PatchGraph,
-    SweepProposals,
-)
+from corporeal.reconstruction.segment.cut_proposals import MergeTreeProposals, PatchGraph, SweepProposals
 from corporeal.reconstruction.segment.graph_cuts import best_graph_cut
 from corporeal.reconstruction.segment.object_segmentation import count_stacked_objects
 from corporeal.reconstruction.segment.patch_graph import SurfacePatches
@@ -14,12 +10,7 @@ from corporeal.reconstruction.segment.patch_graph import SurfacePatches
 def clique(sizes, bridges, appearance=None):
     """Groups of nodes that hold fully, and weak bridges between groups (group, group, weight)."""
     start = np.cumsum([0, *sizes])
-    pairs = [
-        (start[k] + a, start[k] + b, 1.0)
-        for k, n in enumerate(sizes)
-        for a in range(n)
-        for b in range(a + 1, n)
-    ]
+    pairs = [(start[k] + a, start[k] + b, 1.0) for k, n in enumerate(sizes) for a in range(n) for b in range(a + 1, n)]
     pairs += [(start[a], start[b], w) for a, b, w in bridges]
     i, j, w = (np.array(part) for part in zip(*pairs, strict=True))
     count = int(start[-1])
@@ -85,9 +76,7 @@ def test_candidates_know_their_sums_and_what_they_are_held_by(kind):
     i, j = i[kept], j[kept]
     weight = rng.random(len(i))
     graph = PatchGraph(i, j, weight, np.ones(len(i)), rng.random(17), rng.random((17, 2)))
-    proposals = (
-        MergeTreeProposals(graph) if kind == "tree" else SweepProposals(graph, rng.permutation(17))
-    )
+    proposals = MergeTreeProposals(graph) if kind == "tree" else SweepProposals(graph, rng.permutation(17))
     sums, across = proposals.sums(graph.appearance), proposals.across()
     assert len(across) >= 15
     for k in range(len(across)):
@@ -113,10 +102,7 @@ def test_only_thin_things_on_each_other_are_a_stack():
     assert count_stacked_objects(*blocks(book, lifted)) == 2
     crate = ((0.1, 0, 0.15), (0.9, 0.6, 0.9))
     assert count_stacked_objects(*blocks(book, crate)) == 1
-    assert (
-        count_stacked_objects(*blocks(((0, 0, 0), (0.6, 0.6, 0.6)), ((0, 0, 0.6), (0.6, 0.6, 1.2))))
-        == 0
-    )
+    assert count_stacked_objects(*blocks(((0, 0, 0), (0.6, 0.6, 0.6)), ((0, 0, 0.6), (0.6, 0.6, 1.2)))) == 0
     beside = ((1.1, 0, 0), (2, 0.6, 0.15))
     assert count_stacked_objects(*blocks(book, beside)) == 0
     above = ((0, 0, 0.6), (1, 0.6, 0.75))

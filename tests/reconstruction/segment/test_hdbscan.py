@@ -78,9 +78,7 @@ def test_leaves_are_the_finest_clusters_and_mass_prefers_what_lasts():
     """Two pairs of plates: the halves of a pair part late, the pairs early."""
     rng = np.random.default_rng(4)
     grid = 0.03 * np.stack(np.meshgrid(np.arange(14), np.arange(14)), -1).reshape(-1, 2)
-    plates = [
-        grid + np.array([x, 0]) + rng.uniform(-3e-3, 3e-3, grid.shape) for x in (0, 0.45, 20, 20.45)
-    ]
+    plates = [grid + np.array([x, 0]) + rng.uniform(-3e-3, 3e-3, grid.shape) for x in (0, 0.45, 20, 20.45)]
     points, truth = np.concatenate(plates), np.repeat(np.arange(4), len(grid))
     leaves = hdbscan(points, 50, 5, "leaf").cluster_of_point
     lasting = hdbscan(points, 50, 5, "mass").cluster_of_point

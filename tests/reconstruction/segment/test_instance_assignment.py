@@ -23,11 +23,7 @@ def pair():
     normal = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
     appearance = np.ones((2 * EACH, 1), np.float32)
     seen = np.full(2 * EACH, 4)
-    return (
-        FeatureCloud(position, np.full((2 * EACH, 3), 0.5), appearance, appearance, seen),
-        normal,
-        owner,
-    )
+    return (FeatureCloud(position, np.full((2 * EACH, 3), 0.5), appearance, appearance, seen), normal, owner)
 
 
 def views(owner, numbers, hidden=0.5):
@@ -79,9 +75,7 @@ def test_masks_that_cut_things_elsewhere_in_every_view_count_beside_look(pair):
     cloud, normal, owner = pair
     masks = []
     for _ in range(12):
-        seeds = cloud.position[
-            np.r_[RNG.integers(EACH, size=10), EACH + RNG.integers(EACH, size=10)]
-        ]
+        seeds = cloud.position[np.r_[RNG.integers(EACH, size=10), EACH + RNG.integers(EACH, size=10)]]
         away = np.linalg.norm(cloud.position[:, None] - seeds, axis=-1)
         away[owner == 0, 10:] = away[owner == 1, :10] = np.inf
         masks.append(away.argmin(axis=1))
@@ -94,9 +88,7 @@ def test_masks_are_believed_before_a_count(pair):
     cloud, normal, owner = pair
     split = assign_instances(cloud, "auto", 3, normal, views(owner, [(0, 1)] * 12))
     assert split.object_of_point.max() == 1
-    assert split.warnings[0].startswith(
-        "3 objects were named or counted, but instance masks show 2"
-    )
+    assert split.warnings[0].startswith("3 objects were named or counted, but instance masks show 2")
 
 
 def test_the_published_rule_takes_what_touches_for_one(pair):
@@ -116,12 +108,7 @@ def test_masks_that_are_forgotten_or_missing(pair):
 
 @pytest.mark.parametrize(
     ("rule", "count", "pieces", "found"),
-    [
-        ("auto", None, 1, 1),
-        ("look", None, 1, 2),
-        ("auto", 2, 1, 2),
-        ("auto", None, 2, 2),
-    ],
+    [("auto", None, 1, 1), ("look", None, 1, 2), ("auto", 2, 1, 2), ("auto", None, 2, 2)],
     ids=["touching", "asked to look", "told", "space between"],
 )
 def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count, pieces, found):

@@ -25,20 +25,13 @@ def scene(spheres, looks, count=3000, seed=0):
     appearance = np.array(looks, float)[owner] + 0.02 * rng.normal(size=(len(owner), len(looks[0])))
     appearance = (appearance / np.linalg.norm(appearance, axis=1, keepdims=True)).astype(np.float16)
     grey = np.full(position.shape, 0.5)
-    return (
-        FeatureCloud(position, grey, appearance, appearance, np.ones(len(owner), int)),
-        normal,
-        owner,
-    )
+    return (FeatureCloud(position, grey, appearance, appearance, np.ones(len(owner), int)), normal, owner)
 
 
 def agreement(owner, found):
     """Mean over true things of the best overlap with a found one."""
     overlap = [
-        max(
-            np.sum((owner == a) & (found == b)) / np.sum((owner == a) | (found == b))
-            for b in np.unique(found)
-        )
+        max(np.sum((owner == a) & (found == b)) / np.sum((owner == a) | (found == b)) for b in np.unique(found))
         for a in np.unique(owner)
     ]
     return np.mean(overlap)
@@ -82,10 +75,7 @@ def test_a_number_that_nobody_gave_is_said_to_be_counted():
     assert split.object_of_point.max() == 1 and agreement(owner, split.object_of_point) > 0.97
     assert "2 were counted" in split.warnings[0]
     alone, normal, _ = scene(TWINS[:1], [[1, 0]])
-    assert (
-        "1 was counted"
-        in segment_objects(alone, None, normal, config=TOUCHING_IS_ONE_CONFIG).warnings[0]
-    )
+    assert "1 was counted" in segment_objects(alone, None, normal, config=TOUCHING_IS_ONE_CONFIG).warnings[0]
 
 
 @pytest.mark.parametrize("count", [0, -1, 201])
@@ -106,11 +96,7 @@ def test_few_points_are_few_things(points):
     rng = np.random.default_rng(3)
     appearance = np.ones((points, 2)) / np.sqrt(2)
     cloud = FeatureCloud(
-        rng.random((points, 3)),
-        appearance[:, :1] * [1, 1, 1],
-        appearance,
-        appearance,
-        np.ones(points, int),
+        rng.random((points, 3)), appearance[:, :1] * [1, 1, 1], appearance, appearance, np.ones(points, int)
     )
     split = segment_objects(cloud, min(points, 3))
     assert len(split.object_of_point) == points == len(split.confidence)

@@ -86,9 +86,7 @@ def test_a_small_thing_is_the_less_likely_of_two_that_fit():
 
 def test_words_that_say_nothing_neither_win_nor_lose():
     silent = likely(seen((0.2, 0.5, 0.2)), "thing")[0]
-    assert silent == pytest.approx(
-        -0.5 * (UNSAID_SIGMAS**2 + UNSAID_SIGMAS**2 + (UNSAID_SIGMAS / 2) ** 2)
-    )
+    assert silent == pytest.approx(-0.5 * (UNSAID_SIGMAS**2 + UNSAID_SIGMAS**2 + (UNSAID_SIGMAS / 2) ** 2))
     green, purple = likely(seen((0.2, 0.5, 0.2)), "green thing", "purple thing")
     assert green > silent > purple
 
@@ -138,11 +136,7 @@ def test_the_top_of_a_lamp_that_has_fallen_over_is_found(turn):
     cloud, bit = lamp(turn, across=1.0)
     up = top_direction(cloud, bit, 3, TOLD)
     assert up @ turn[:, 2] > 0.99
-    assert log_likelihood(observed_attributes(cloud, bit, 3, up), TOLD).argmax(axis=1).tolist() == [
-        0,
-        1,
-        2,
-    ]
+    assert log_likelihood(observed_attributes(cloud, bit, 3, up), TOLD).argmax(axis=1).tolist() == [0, 1, 2]
 
 
 def test_a_wide_thing_has_not_fallen_over():

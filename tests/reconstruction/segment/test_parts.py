@@ -91,9 +91,7 @@ def test_place_tells_apart_what_looks_the_same():
     same = np.tile(np.array([[1.0, 0.0]], np.float16), (2000, 1))
     nothing = np.zeros((2000, 0), np.float16)
     cloud = FeatureCloud(points, np.full((2000, 3), 0.5), nothing, same, np.ones(2000, int))
-    apart = cluster_parts(
-        cloud, PartsConfig(selection="mass", smallest=100, superpoints=1000)
-    ).cluster_of_point
+    apart = cluster_parts(cloud, PartsConfig(selection="mass", smallest=100, superpoints=1000)).cluster_of_point
     assert apart.max() >= 1 and purity(apart, np.repeat([0, 1], 1000)) == 1
     together = cluster_parts(cloud, replace(QUICK, position_weight=0.0)).cluster_of_point
     assert together.max() == 0
@@ -104,9 +102,7 @@ def test_a_handful_of_points_is_one_cluster(count):
     nothing = np.zeros((count, 0), np.float16)
     appearance = np.ones((count, 4), np.float16)
     x = np.arange(3.0 * count).reshape(count, 3)
-    found = cluster_parts(
-        FeatureCloud(x, np.zeros((count, 3)), nothing, appearance, np.ones(count, int))
-    )
+    found = cluster_parts(FeatureCloud(x, np.zeros((count, 3)), nothing, appearance, np.ones(count, int)))
     np.testing.assert_array_equal(found.cluster_of_point, np.zeros(count))
 
 
@@ -151,9 +147,7 @@ def test_an_object_without_points_has_no_parts():
 def test_features_in_half_precision_are_not_widened_all_at_once():
     rng = np.random.default_rng(6)
     rows = rng.normal(size=(60_000, 64)).astype(np.float16)
-    cloud = FeatureCloud(
-        rng.random((60_000, 3)), rng.random((60_000, 3)), rows, rows, np.ones(60_000, int)
-    )
+    cloud = FeatureCloud(rng.random((60_000, 3)), rng.random((60_000, 3)), rows, rows, np.ones(60_000, int))
     clusters = PartClusters(rng.integers(0, 5, 60_000), np.ones(60_000))
     tracemalloc.start()
     name_clusters(clusters, cloud, np.eye(64)[:2], thing("a", "b").parts)
@@ -212,25 +206,19 @@ def test_what_is_not_typical_of_a_cluster_does_not_decide_its_name():
 def test_a_cluster_that_looks_like_those_of_another_name_goes_over_to_them():
     looks = np.array([[1, 0, 0], [0.98, 0.2, 0], [0, 1, 0], [0, 0.98, 0.2], [0.05, 1, 0.1]])
     doubt = np.log([[9, 1], [9, 1], [1, 9], [1, 9], [6, 4]])
-    np.testing.assert_array_equal(
-        _agree_on_appearance(looks, doubt, doubt.argmax(1)), [0, 0, 1, 1, 1]
-    )
+    np.testing.assert_array_equal(_agree_on_appearance(looks, doubt, doubt.argmax(1)), [0, 0, 1, 1, 1])
 
 
 def test_words_that_are_sure_are_not_overruled_by_looks():
     looks = np.array([[1, 0, 0], [0.98, 0.2, 0], [0, 1, 0], [0, 0.98, 0.2], [0.05, 1, 0.1]])
     sure = np.log([[9, 1], [9, 1], [1, 9], [1, 9], [999, 1]])
-    np.testing.assert_array_equal(
-        _agree_on_appearance(looks, sure, sure.argmax(1)), [0, 0, 1, 1, 0]
-    )
+    np.testing.assert_array_equal(_agree_on_appearance(looks, sure, sure.argmax(1)), [0, 0, 1, 1, 0])
 
 
 def test_the_last_cluster_of_a_name_keeps_it():
     looks = np.array([[1.0, 0], [1.0, 0.01], [0.98, 0.2]])
     score = np.log([[9.0, 1], [9, 1], [4, 6]])
-    np.testing.assert_array_equal(
-        _agree_on_appearance(looks, score, np.array([0, 0, 1])), [0, 0, 1]
-    )
+    np.testing.assert_array_equal(_agree_on_appearance(looks, score, np.array([0, 0, 1])), [0, 0, 1])
 
 
 def test_confidence_is_how_probable_a_name_is_by_the_temperature_of_training():
@@ -244,7 +232,5 @@ def test_confidence_is_how_probable_a_name_is_by_the_temperature_of_training():
         np.tile(np.eye(4)[:1], (6, 1)),
         np.ones(6, int),
     )
-    found = name_clusters(
-        PartClusters(np.zeros(6, np.int64), np.full(6, 0.5)), cloud, words, thing("a", "b").parts
-    )
+    found = name_clusters(PartClusters(np.zeros(6, np.int64), np.full(6, 0.5)), cloud, words, thing("a", "b").parts)
     np.testing.assert_allclose(found.confidence, 0.5 / (1 + np.exp(-2)), rtol=1e-6)

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.core.types import FeatureCloud
-from corporeal.reconstruction.segment.object_segmentation import (
-    join_nearest_pieces,
-    segment_objects,
-)
+from corporeal.reconstruction.segment.object_segmentation import join_nearest_pieces, segment_objects
 
 RNG = np.random.default_rng(5)
 
@@ -18,13 +15,10 @@ def ball(middle, radius=0.1, count=1500):
 
 
 @pytest.mark.parametrize(
-    ("most", "joined"),
-    [(None, (0, 1, 2)), (4, (0, 1, 2)), (3, (0, 1, 2)), (2, (0, 1, 1)), (1, (0, 0, 0))],
+    ("most", "joined"), [(None, (0, 1, 2)), (4, (0, 1, 2)), (3, (0, 1, 2)), (2, (0, 1, 1)), (1, (0, 0, 0))]
 )
 def test_what_is_nearest_is_joined_until_it_is_few_enough(most, joined):
-    points = np.concatenate(
-        [ball((0, 0, 0), 0.3, 4000), ball((0.7, 0, 0)), ball((0.7, 0.3, 0), 0.1, 900)]
-    )
+    points = np.concatenate([ball((0, 0, 0), 0.3, 4000), ball((0.7, 0, 0)), ball((0.7, 0.3, 0), 0.1, 900)])
     piece = np.repeat([0, 1, 2], [4000, 1500, 900])
     np.testing.assert_array_equal(join_nearest_pieces(piece, points, most), np.array(joined)[piece])
 

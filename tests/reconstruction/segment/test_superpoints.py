@@ -85,7 +85,5 @@ def test_the_best_pairs_are_not_always_the_best_pair():
 
 def test_a_forbidden_pair_is_never_made():
     never = -np.inf
-    np.testing.assert_array_equal(
-        optimal_assignment(np.array([[never, 1.0], [never, 0.9]])), [1, -1]
-    )
+    np.testing.assert_array_equal(optimal_assignment(np.array([[never, 1.0], [never, 0.9]])), [1, -1])
     np.testing.assert_array_equal(optimal_assignment(np.array([[5.0, 1.0], [5.0, never]])), [1, 0])

@@ -71,9 +71,7 @@ def test_pictures_from_there_that_were_not_matched_say_nothing():
 
 def test_a_model_without_tracks_says_nothing():
     bare = model_of(AROUND, np.zeros(COUNT))
-    bare = ColmapModel(
-        bare.folder, bare.cameras, bare.images, bare.points, bare.colours, np.zeros((0, 2), int)
-    )
+    bare = ColmapModel(bare.folder, bare.cameras, bare.images, bare.points, bare.colours, np.zeros((0, 2), int))
     assert doppelganger_groups(bare, ALL) == (NAMES,)
 
 
@@ -100,9 +98,7 @@ def test_what_is_left_must_be_most_of_the_pictures(pictures, doubted):
     said = model_doubts(told)
     assert bool(said) == doubted
     if doubted:
-        assert said == [
-            "only 19 of 40 pictures fit together (5 more only where another side looks alike)"
-        ]
+        assert said == ["only 19 of 40 pictures fit together (5 more only where another side looks alike)"]
 
 
 def test_two_halves_are_left_for_masks_to_judge():
@@ -141,9 +137,7 @@ def test_few_points_are_enough_where_neighbours_agree(tmp_path, monkeypatch):
     assert neighbours_support_model(SPARSE, tmp_path, ALBUM)
     also = replace(SPARSE, focal=4.0)
     assert not neighbours_support_model(also, tmp_path, ALBUM), "no lens is like that"
-    assert not neighbours_support_model(replace(SPARSE, points=900), tmp_path, ALBUM), (
-        "it is believed anyway"
-    )
+    assert not neighbours_support_model(replace(SPARSE, points=900), tmp_path, ALBUM), "it is believed anyway"
 
 
 @pytest.mark.parametrize("why", ["folded", "apart", "few"])
@@ -159,9 +153,7 @@ def test_few_points_are_not_where_nothing_speaks_for_them(why, tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("sure", [True, False])
-def test_a_search_for_more_points_is_left_where_its_neighbours_contradict(
-    sure, tmp_path, monkeypatch
-):
+def test_a_search_for_more_points_is_left_where_its_neighbours_contradict(sure, tmp_path, monkeypatch):
     around, folded = model_of(AROUND, np.zeros(COUNT)), model_of(FOLDED, FOLDED != AROUND)
     more = SfmRun("thorough", COUNT, COUNT, 5000, 1.2, focal=0.6, parted=(12, 12))
     monkeypatch.setattr(check, "read_colmap", lambda place: around if sure else folded)

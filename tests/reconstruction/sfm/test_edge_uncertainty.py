@@ -7,11 +7,7 @@ import pytest
 from PIL import Image
 
 from corporeal.core.types import Camera
-from corporeal.reconstruction.sfm.model_refinement import (
-    adjust_bundle,
-    adjust_bundle_by_edges,
-    whitening_matrices,
-)
+from corporeal.reconstruction.sfm.model_refinement import adjust_bundle, adjust_bundle_by_edges, whitening_matrices
 from corporeal.render.camera_placement import camera_from_aim
 from patterned_scene import pose_errors, ring
 
@@ -29,10 +25,7 @@ def striped(angle, side=64):
 @pytest.mark.parametrize("angle", [0.0, 0.5, 1.2])
 def test_an_error_counts_along_an_edge_for_less(angle):
     white = whitening_matrices(striped(angle), np.array([[30.0, 34.0]]))[0]
-    edge, normal = (
-        np.array([np.cos(angle), np.sin(angle)]),
-        np.array([-np.sin(angle), np.cos(angle)]),
-    )
+    edge, normal = (np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)]))
     assert np.linalg.norm(white @ normal) == pytest.approx(1.0, abs=0.02)
     assert np.linalg.norm(white @ edge) < 0.3
 
@@ -42,10 +35,7 @@ def test_errors_count_alike_where_there_is_no_edge():
     white = whitening_matrices(rng.uniform(0, 255, (64, 64)), rng.uniform(16, 48, (50, 2)))
     lengths = np.linalg.svd(white, compute_uv=False)
     assert lengths[:, 0] == pytest.approx(1.0) and np.median(lengths[:, 1]) > 0.85
-    assert whitening_matrices(np.full((9, 9), 7.0), np.full((1, 2), 4.0))[0] @ [
-        1,
-        2,
-    ] == pytest.approx([1, 2])
+    assert whitening_matrices(np.full((9, 9), 7.0), np.full((1, 2), 4.0))[0] @ [1, 2] == pytest.approx([1, 2])
 
 
 def floor_of(camera: Camera):
@@ -68,13 +58,7 @@ def planked(tmp_path):
     made = pycolmap.Reconstruction()
     focal, middle = true[0].K[0, 0], true[0].K[:2, 2]
     made.add_camera_with_trivial_rig(
-        pycolmap.Camera(
-            model="SIMPLE_RADIAL",
-            width=SIZE[0],
-            height=SIZE[1],
-            params=[focal, *middle, 0.0],
-            camera_id=1,
-        )
+        pycolmap.Camera(model="SIMPLE_RADIAL", width=SIZE[0], height=SIZE[1], params=[focal, *middle, 0.0], camera_id=1)
     )
     tracks = [pycolmap.Track() for _ in points]
     for k, camera in enumerate(true):

@@ -69,9 +69,7 @@ def test_neighbours_by_name_are_matched_whatever_small_copies_say(total):
     shared[:, : FEW_PARTNERS + MAX_PARTNERS] = shared[: FEW_PARTNERS + MAX_PARTNERS] = 200
     pairs = set(match_partners(shared))
     assert {
-        (k, k + d)
-        for k in range(total - ALWAYS_MATCHED_DISTANCE)
-        for d in range(1, ALWAYS_MATCHED_DISTANCE + 1)
+        (k, k + d) for k in range(total - ALWAYS_MATCHED_DISTANCE) for d in range(1, ALWAYS_MATCHED_DISTANCE + 1)
     } <= pairs
 
 

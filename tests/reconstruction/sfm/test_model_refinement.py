@@ -30,11 +30,7 @@ def test_pictures_of_sizes_of_their_own_were_cropped():
 def test_how_far_a_photograph_was_reduced_is_kept(tmp_path):
     rng = np.random.default_rng(0)
     for k, size in enumerate(
-        [
-            (MAX_PICTURE_PX * 2, MAX_PICTURE_PX),
-            (MAX_PICTURE_PX, 900),
-            (MAX_PICTURE_PX * 2, MAX_PICTURE_PX * 4),
-        ]
+        [(MAX_PICTURE_PX * 2, MAX_PICTURE_PX), (MAX_PICTURE_PX, 900), (MAX_PICTURE_PX * 2, MAX_PICTURE_PX * 4)]
     ):
         noise = Image.fromarray(rng.integers(0, 256, (30, 40, 3), np.uint8))
         noise.resize(size).save(tmp_path / f"{k}.jpg", quality=40)
@@ -65,9 +61,7 @@ def test_a_point_that_passed_behind_a_camera_is_not_counted(tmp_path, monkeypatc
             track.add_element(image, k)
         model.add_point3D(point, track, np.zeros(3, np.uint8))
     behind = np.array([[0.1, 0.0, 2.0], [0.0, 0.2, -1e-9]])
-    monkeypatch.setattr(
-        model_refinement, "solve_bundle", lambda bundle, exact: replace(bundle, points=behind)
-    )
+    monkeypatch.setattr(model_refinement, "solve_bundle", lambda bundle, exact: replace(bundle, points=behind))
     model_refinement.adjust_bundle_by_edges(pycolmap, model, tmp_path)
     assert model.num_points3D() == 1
     assert model.compute_mean_reprojection_error() < 1e-6

@@ -7,11 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from corporeal.core.errors import BadFileError
 from corporeal.reconstruction.sfm.find_poses import find_poses
-from corporeal.reconstruction.sfm.one_viewpoint import (
-    describe_one_viewpoint,
-    is_same_viewpoint,
-    pairs_of_rotation,
-)
+from corporeal.reconstruction.sfm.one_viewpoint import describe_one_viewpoint, is_same_viewpoint, pairs_of_rotation
 
 LONGEST = 480
 
@@ -60,9 +56,7 @@ def test_a_camera_that_turns_on_the_spot_is_told_although_its_lens_is_not_known(
     pictures = [1.15 * LONGEST * p[:, :2] / p[:, 2:] + rng.normal(0, 0.4, (400, 2)) for p in local]
     pairs = pairs_of(pictures)
     seen_by_both = [np.abs(np.c_[a, b]).max(axis=1) < 0.5 for a, b in pairs]
-    assert pairs_of_rotation(
-        [(a[s], b[s]) for (a, b), s in zip(pairs, seen_by_both, strict=True)]
-    ).all()
+    assert pairs_of_rotation([(a[s], b[s]) for (a, b), s in zip(pairs, seen_by_both, strict=True)]).all()
     moved = [(a, 1.02 * b + 0.02 * rng.normal(size=b.shape)) for a, b in pairs]
     assert not pairs_of_rotation(moved).any()
     assert pairs_of_rotation([]).shape == (0,)

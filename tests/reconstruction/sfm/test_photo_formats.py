@@ -156,9 +156,7 @@ def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
     with pytest.raises(BadFileError, match=said):
         gathered(tmp_path)
     Image.fromarray(greys[0]).save(tmp_path / "photos" / "0.jpg")
-    assert [p.name for p in photos_in_folder(tmp_path / "photos")] == ["0.jpg"], (
-        "raws lie beside it"
-    )
+    assert [p.name for p in photos_in_folder(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
 
 
 def test_what_is_not_read_beside_photographs_is_said_if_no_raw_picture(tmp_path, greys):
@@ -167,8 +165,7 @@ def test_what_is_not_read_beside_photographs_is_said_if_no_raw_picture(tmp_path,
     assert gathered(tmp_path).said == ()
     (tmp_path / "photos" / "anders.tif").touch()
     assert gathered(tmp_path).said == (
-        "1 more picture is of a kind that is not read (TIF), such as anders.tif: convert what is "
-        "to be used to JPEG.",
+        "1 more picture is of a kind that is not read (TIF), such as anders.tif: convert what is to be used to JPEG.",
     )
 
 
@@ -215,18 +212,13 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([lost / "a.jpg"])
     (tmp_path / "videos").mkdir()
     (tmp_path / "videos" / "a.MOV").touch()
-    with pytest.raises(
-        UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"
-    ):
+    with pytest.raises(UserError, match=r"holds 1 videos and no model\. Name the video itself: .*a"):
         assemble([tmp_path / "videos"])
 
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [
-        ("a.jpg", r"is no PNG, JPEG or WebP picture\. Take 40"),
-        ("a.gif", "is a GIF. Convert it to MP4"),
-    ],
+    [("a.jpg", r"is no PNG, JPEG or WebP picture\. Take 40"), ("a.gif", "is a GIF. Convert it to MP4")],
 )
 def test_what_only_its_name_calls_a_picture_is_not_called_one(tmp_path, name, said):
     """A text called .jpg was "a single picture, which shows no depth"."""

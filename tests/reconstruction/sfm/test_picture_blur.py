@@ -7,11 +7,7 @@ from scipy.ndimage import gaussian_filter, uniform_filter1d
 
 from corporeal.core.errors import BadFileError
 from corporeal.reconstruction.sfm.find_poses import find_poses
-from corporeal.reconstruction.sfm.picture_blur import (
-    BLURRED_SIGMA_PX,
-    blurred_pictures,
-    picture_blur,
-)
+from corporeal.reconstruction.sfm.picture_blur import BLURRED_SIGMA_PX, blurred_pictures, picture_blur
 from patterned_scene import photographs, ring
 
 

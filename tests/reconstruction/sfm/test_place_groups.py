@@ -97,19 +97,12 @@ def test_why_pictures_are_left_out_is_said_as_far_as_it_is_known():
 
 def test_pictures_that_share_much_when_small_need_no_finer_points():
     large, small = [(1280, 960)] * 40, [(640, 480)] * 40
-    assert copies_share_enough(circle(40, 6), large) and not copies_share_enough(
-        circle(40, 3), large
-    )
-    assert not copies_share_enough(circle(40, 6), small), (
-        "they would have no more points than copies"
-    )
+    assert copies_share_enough(circle(40, 6), large) and not copies_share_enough(circle(40, 3), large)
+    assert not copies_share_enough(circle(40, 6), small), "they would have no more points than copies"
 
 
 def test_a_search_is_in_vain_where_few_pictures_share_anything():
-    assert (
-        hopelessness_reason(np.zeros((20, 20), int))
-        == "none of 20 pictures share points with any other"
-    )
+    assert hopelessness_reason(np.zeros((20, 20), int)) == "none of 20 pictures share points with any other"
     few = beside(circle(4, 1), np.zeros((16, 16), int))
     assert hopelessness_reason(few) == "only 4 of 20 pictures share points with any other"
     banana = beside(circle(7, 1), circle(4, 1), circle(3, 1), np.zeros((2, 2), int))
@@ -167,6 +160,4 @@ def test_points_are_shared_within_a_place_alone(two_places, tmp_path):
 def test_who_is_refused_hears_how_many_pictures_show_something_else():
     why = describe_missing_poses(["only 54 of 86 pictures fit together"], 34)
     assert why.endswith("only 54 of 86 pictures fit together; 34 more show another place.")
-    assert describe_missing_poses(["only 54 of 86 pictures fit together"], 0).endswith(
-        "fit together."
-    )
+    assert describe_missing_poses(["only 54 of 86 pictures fit together"], 0).endswith("fit together.")

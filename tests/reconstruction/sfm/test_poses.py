@@ -30,24 +30,12 @@ from corporeal.reconstruction.sfm.mask_consistency import remove_by_masks
 from corporeal.reconstruction.sfm.pose_acceptance import model_doubts, some_names, thorough_in_vain
 from corporeal.reconstruction.sfm.prepare_images import prepare_images
 from corporeal.reconstruction.sfm.sfm_run import SfmRun, names_by_camera, pictures_beside_first
-from corporeal.reconstruction.sfm.video_frames import (
-    StaticPixels,
-    choose_frames,
-    write_video_frames,
-)
+from corporeal.reconstruction.sfm.video_frames import StaticPixels, choose_frames, write_video_frames
 from corporeal.render.camera_placement import camera_from_aim
 from corporeal.render.embree import identify_triangles
 from corporeal.render.ray_scene import RayScene
 from corporeal.render.video_file import open_video
-from patterned_scene import (
-    OF_SLAB,
-    blots,
-    patterned,
-    photographs,
-    pose_errors,
-    ring,
-    stepped,
-)
+from patterned_scene import OF_SLAB, blots, patterned, photographs, pose_errors, ring, stepped
 
 COUNT = 14
 TURN_ABOUT_Z = np.array([[0, -1.0, 0, 0.3], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
@@ -97,20 +85,14 @@ def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
     assert angle.max() < 0.5 and place.max() < 0.01
     assert f"{COUNT} of {COUNT} photographs" in found.statements[0]
     (told,) = found.warnings
-    for name in (
-        "broken.jpg is damaged",
-        "phone.heic is a HEIC picture",
-        "lens cap.jpg shows nothing",
-    ):
+    for name in ("broken.jpg is damaged", "phone.heic is a HEIC picture", "lens cap.jpg shows nothing"):
         assert name in told
     assert "photo_001.jpg shows the same as photo_001_(copy).jpg" in told
     assert (found.folder / CAMERAS_FIGURE_FILE).stat().st_size > 10_000
     assert (found.folder / "sparse" / "0" / "images.txt").exists()
 
 
-def test_pictures_that_were_cropped_each_differently_are_posed_by_where_their_lenses_were(
-    taken, tmp_path
-):
+def test_pictures_that_were_cropped_each_differently_are_posed_by_where_their_lenses_were(taken, tmp_path):
     pytest.importorskip("pycolmap")
     rng = np.random.default_rng(5)
     (tmp_path / "cropped").mkdir()
@@ -197,9 +179,7 @@ def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_
     assert why is not None and "moved or turned over between the pictures" in why
     assert find_object_poses(by_slab, masks, tmp_path / "nothing", silent) is None
     models["masked"] = by_block
-    assert find_object_poses(by_slab, masks, tmp_path / "nothing", silent) is None, (
-        "it is remembered"
-    )
+    assert find_object_poses(by_slab, masks, tmp_path / "nothing", silent) is None, "it is remembered"
     found = find_object_poses(by_slab, masks, tmp_path / "object", silent)
     assert found is not None and not (found.folder / "masks").exists()
     assert describe_moved_object(found, masks) is None
@@ -208,11 +188,7 @@ def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_
 
 
 @pytest.mark.parametrize(
-    "how",
-    [
-        "refused",
-        *(pytest.param(how, marks=pytest.mark.slow) for how in ("forced", "found", "still")),
-    ],
+    "how", ["refused", *(pytest.param(how, marks=pytest.mark.slow) for how in ("forced", "found", "still"))]
 )
 def test_a_run_does_not_believe_poses_of_the_background(turned_over, tmp_path, how, monkeypatch):
     folder, models, _ = turned_over
@@ -334,9 +310,7 @@ def test_masks_are_turned_with_their_photographs(tmp_path):
     exif[0x0112] = TURN_RIGHT
     for k in range(4):
         picture = Image.fromarray(rng.integers(0, 255, (6, 8, 3)).astype(np.uint8))
-        picture.resize((64, 48), Image.Resampling.NEAREST).save(
-            tmp_path / "photos" / f"{k}.png", exif=exif
-        )
+        picture.resize((64, 48), Image.Resampling.NEAREST).save(tmp_path / "photos" / f"{k}.png", exif=exif)
         mask = np.zeros((48, 64), np.uint8)
         mask[:, :10] = 255  # the left in the file is the top as it is shown
         if k % 2:
@@ -375,10 +349,7 @@ WRONG = {
     "few": (SfmRun("thorough", 24, 11, 541, 0.9, (), 0.85, 0.1), "only 11 of 24"),
     "a lens": (SfmRun("thorough", 24, 20, 1541, 0.9, (), 0.85, 0.55), "k1 0.55"),
     "a vase": (SfmRun("thorough", 48, 40, 380, 1.1, (), 1.0, 0.0), "10 points per picture"),
-    "a lens of a vase": (
-        SfmRun("thorough", 48, 40, 4000, 1.1, (), 0.14, 0.0),
-        "focal length 0.14",
-    ),
+    "a lens of a vase": (SfmRun("thorough", 48, 40, 4000, 1.1, (), 0.14, 0.0), "focal length 0.14"),
 }
 
 
@@ -411,9 +382,7 @@ def test_a_group_that_says_the_same_again_is_no_rival():
 
 def model_of(pycolmap, eyes, begin=0):
     model = pycolmap.Reconstruction()
-    model.add_camera_with_trivial_rig(
-        pycolmap.Camera(model=0, width=4, height=4, params=[4, 2, 2], camera_id=1)
-    )
+    model.add_camera_with_trivial_rig(pycolmap.Camera(model=0, width=4, height=4, params=[4, 2, 2], camera_id=1))
     for k, eye in enumerate(eyes):
         image = pycolmap.Image(f"{begin + k}.jpg", image_id=k + 1, camera_id=1)
         pose = np.linalg.inv(eye)[:3]

@@ -45,11 +45,7 @@ def model(folder, middles, rng):
         pixel = FOCAL * seen[:, :2] / seen[:, 2:] + (WIDE / 2, HIGH / 2) + middles[k]
         pixel += rng.normal(0, 0.3, pixel.shape)
         own = pycolmap.Camera(
-            model="SIMPLE_RADIAL",
-            width=WIDE,
-            height=HIGH,
-            params=[FOCAL, WIDE / 2, HIGH / 2, 0.0],
-            camera_id=k + 1,
+            model="SIMPLE_RADIAL", width=WIDE, height=HIGH, params=[FOCAL, WIDE / 2, HIGH / 2, 0.0], camera_id=k + 1
         )
         made.add_camera_with_trivial_rig(own)
         image = pycolmap.Image(name=f"{k}.jpg", keypoints=pixel, camera_id=k + 1, image_id=k + 1)
@@ -88,9 +84,7 @@ def test_poses_of_cropped_pictures_are_refused_or_a_warning(spread, refused, tmp
     monkeypatch.setattr(posing, "describe_mirrored", lambda _: None)
     monkeypatch.setattr(posing, "principal_point_spread", lambda _: spread)
     monkeypatch.setattr(
-        posing,
-        "_record_of_runs",
-        lambda folder, own, *_: posing._PosesRecord((), own.said, "", (told,)),
+        posing, "_record_of_runs", lambda folder, own, *_: posing._PosesRecord((), own.said, "", (told,))
     )
     kept = posing._find_or_load_poses(tmp_path, tmp_path, lambda share, words: None)
     said = "the photographs were cropped, each in another way"

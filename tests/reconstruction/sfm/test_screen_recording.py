@@ -63,7 +63,5 @@ def test_a_video_of_it_is_refused_in_one_sentence(page, tmp_path):
     for frame in windows(page):
         writer.send(np.ascontiguousarray(np.dstack([frame] * 3)))
     writer.close()
-    with pytest.raises(
-        UserError, match=r"a recording of a page that is scrolled\. Record the object"
-    ):
+    with pytest.raises(UserError, match=r"a recording of a page that is scrolled\. Record the object"):
         write_video_frames(video, tmp_path / "frames", lambda share, words: None)

@@ -80,9 +80,7 @@ class _Shots:
 
 
 @pytest.mark.parametrize("why", ["outlines", "colours", "still doubted"])
-def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believed(
-    tmp_path, monkeypatch, why
-):
+def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believed(tmp_path, monkeypatch, why):
     (tmp_path / "poses").mkdir()
     posed, masks = placed(tmp_path / "poses", (2, 7, 11))
     posed = FoundPoses(posed.folder, posed.statements, posed.warnings)
@@ -98,9 +96,7 @@ def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believe
     monkeypatch.setattr(gaussian_source, "has_masks", lambda shots: False)
     monkeypatch.setattr(gaussian_source, "grown_masks", lambda *what, **more: next(answers))
     run = tmp_path / "run"
-    found = gaussian_source._find_source_poses(
-        tmp_path, ReconstructConfig(), run, lambda share, words: None
-    )
+    found = gaussian_source._find_source_poses(tmp_path, ReconstructConfig(), run, lambda share, words: None)
     assert found is not None
     count = pycolmap.Reconstruction(str(found.folder / "sparse" / "0")).num_reg_images()
     if why == "outlines":
@@ -111,9 +107,7 @@ def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believe
         assert not (run / gaussian_source.ALIKE_POSES_FOLDER).exists()
 
 
-def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(
-    tmp_path, monkeypatch
-):
+def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(tmp_path, monkeypatch):
     """Less than seven tenths agree: to leave out a third at most cannot mend that."""
     (tmp_path / "poses").mkdir()
     posed, masks = placed(tmp_path / "poses", (2, 7, 11))
@@ -131,33 +125,23 @@ def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(
     monkeypatch.setattr(gaussian_source, "grown_masks", grown)
     run = tmp_path / "run"
     with pytest.raises(BadFileError, match="doubt"):
-        gaussian_source._find_source_poses(
-            tmp_path, ReconstructConfig(), run, lambda share, words: None
-        )
+        gaussian_source._find_source_poses(tmp_path, ReconstructConfig(), run, lambda share, words: None)
     assert asked == [True], "masks are not grown again"
 
 
 @pytest.mark.parametrize("masks", ["agree", "contradict", "forced", "not asked"])
-def test_masks_that_were_given_are_asked_about_poses_that_neighbours_doubt(
-    masks, tmp_path, monkeypatch
-):
+def test_masks_that_were_given_are_asked_about_poses_that_neighbours_doubt(masks, tmp_path, monkeypatch):
     wrong = range(0, COUNT, 2) if masks != "agree" else ()
     posed, _ = placed(tmp_path, wrong)
     monkeypatch.setattr(gaussian_source, "lacks_poses", lambda source: True)
     monkeypatch.setattr(gaussian_source, "find_poses", lambda *_: posed)
-    monkeypatch.setattr(
-        gaussian_source, "list_posed_photos", lambda folder: SimpleNamespace(shots=())
-    )
+    monkeypatch.setattr(gaussian_source, "list_posed_photos", lambda folder: SimpleNamespace(shots=()))
     monkeypatch.setattr(gaussian_source, "has_masks", lambda shots: True)
     how = "none" if masks == "not asked" else "auto"
     config = ReconstructConfig(masks=how, force=masks == "forced")
     if masks == "contradict":
         with pytest.raises(BadFileError, match=r"doubt\. Put it on something with a pattern"):
-            gaussian_source._find_source_poses(
-                tmp_path, config, tmp_path / "run", lambda share, words: None
-            )
+            gaussian_source._find_source_poses(tmp_path, config, tmp_path / "run", lambda share, words: None)
         return
-    found = gaussian_source._find_source_poses(
-        tmp_path, config, tmp_path / "run", lambda share, words: None
-    )
+    found = gaussian_source._find_source_poses(tmp_path, config, tmp_path / "run", lambda share, words: None)
     assert found is not None and found.warnings == ("Doubt.", "before")

@@ -44,9 +44,7 @@ def round_ones(places, opacity, colour=RED, wide=0.03):
         rotation=np.tile(np.float32([1, 0, 0, 0]), (count, 1)),
         scale=np.full((count, 3), wide, np.float32),
         opacity=np.full(count, opacity, np.float32),
-        sh=np.tile((np.float32(colour) - 0.5) / SH_DC_COEFFICIENT, (count, 1, 1)).astype(
-            np.float32
-        ),
+        sh=np.tile((np.float32(colour) - 0.5) / SH_DC_COEFFICIENT, (count, 1, 1)).astype(np.float32),
     )
 
 
@@ -99,17 +97,15 @@ def test_a_mouth_that_photographs_look_into_is_not_closed():
     assert len(added) > 200
     assert added[:, 2].max() < 0.15
     over = gaussian_subset(shown, np.arange(shown.count) >= learned.count)
-    assert middle(over, max(ABOVE, key=lambda c: c.world_from_camera[2, 3]))[0][0] == pytest.approx(
-        RED[0], abs=0.1
-    ), "what lies below still does"
+    assert middle(over, max(ABOVE, key=lambda c: c.world_from_camera[2, 3]))[0][0] == pytest.approx(RED[0], abs=0.1), (
+        "what lies below still does"
+    )
 
 
 def test_discs_lie_within_their_own_thin_wall():
     wall = trimesh.creation.box((1.0, 1.0, 1.6 * CELL)).subdivide_to_size(0.04)
     learned = round_ones(wall.vertices, 0.9)
-    shown, of = add_backing_surfels(
-        learned, np.full(learned.count, -1), [solid(wall)], seen_by(learned, SIDES)
-    )
+    shown, of = add_backing_surfels(learned, np.full(learned.count, -1), [solid(wall)], seen_by(learned, SIDES))
     added = shown.mean[of == 0]
     assert len(added) == shown.count - learned.count > 0
     inside = np.abs(added[:, :2]).max(axis=1) < 0.4

@@ -79,13 +79,9 @@ def test_what_stands_on_the_floor_is_closed_by_it():
     gaussians, owner = together(clad(cube))
     bare = gaussians.mean[:, 2] > 0.01  # nobody ever saw it from below
     kept = {n: getattr(gaussians, n)[bare] for n in ("mean", "rotation", "scale", "opacity", "sh")}
-    (solid,) = build_closed_surfaces(
-        Gaussians(**kept), owner[bare], eyes(), masks(eyes(), cube), config=SMALL
-    )
+    (solid,) = build_closed_surfaces(Gaussians(**kept), owner[bare], eyes(), masks(eyes(), cube), config=SMALL)
     assert solid.vertices[:, 2].min() > -1e-9
-    low = (solid.vertices[:, 2] < 0.1 * solid.cell) & (
-        np.abs(solid.vertices[:, :2]).max(axis=1) < 0.35
-    )
+    low = (solid.vertices[:, 2] < 0.1 * solid.cell) & (np.abs(solid.vertices[:, :2]).max(axis=1) < 0.35)
     np.testing.assert_allclose(solid.vertices[low, 2], 0, atol=1e-9)
     assert low.sum() > 100
     assert fits(solid, cube)
@@ -95,16 +91,10 @@ def test_what_stands_on_the_floor_is_closed_by_it():
 def test_a_bowl_stays_open():
     outer = trimesh.creation.icosphere(4, 0.6).apply_translation([0, 0, 0.6])
     inner = trimesh.creation.icosphere(4, 0.45).apply_translation([0, 0, 0.6])
-    bowl = trimesh.boolean.difference(
-        [outer, inner, box([-1, -1, 0.6], [1, 1, 2])], engine="manifold"
-    )
+    bowl = trimesh.boolean.difference([outer, inner, box([-1, -1, 0.6], [1, 1, 2])], engine="manifold")
     gaussians, owner = together(clad(bowl, 6000))
-    (solid,) = build_closed_surfaces(
-        gaussians, owner, eyes(20), masks(eyes(20), bowl), config=SMALL
-    )
-    inside = shape(solid).inside(
-        np.array([[0, 0, 0.5], [0, 0, 0.3], [0, 0, 0.07], [0.525, 0, 0.5]])
-    )
+    (solid,) = build_closed_surfaces(gaussians, owner, eyes(20), masks(eyes(20), bowl), config=SMALL)
+    inside = shape(solid).inside(np.array([[0, 0, 0.5], [0, 0, 0.3], [0, 0, 0.07], [0.525, 0, 0.5]]))
     assert inside.tolist() == [False, False, True, True]
     assert fits(solid, bowl)
     assert shape(solid).closed
@@ -130,9 +120,7 @@ def test_what_stands_on_legs_is_hollow_below():
     legs = [box([x - 0.04, y - 0.04, 0], [x + 0.04, y + 0.04, 0.6]) for x, y in LEGS]
     table = trimesh.boolean.union([box([-0.5, -0.5, 0.6], [0.5, 0.5, 0.7]), *legs])
     gaussians, owner = together(clad(table, 8000))
-    (solid,) = build_closed_surfaces(
-        gaussians, owner, eyes(20), masks(eyes(20), table), config=SMALL
-    )
+    (solid,) = build_closed_surfaces(gaussians, owner, eyes(20), masks(eyes(20), table), config=SMALL)
     points = np.array([[x, y, z] for x, y in LEGS for z in (0.1, 0.3, 0.5)])
     assert shape(solid).inside(points).all()
     assert not shape(solid).inside(np.array([[0, 0, 0.1], [0, 0, 0.3], [0.2, 0, 0.4]])).any()
@@ -145,20 +133,13 @@ LEGS = [(x, y) for x in (-0.44, 0.44) for y in (-0.44, 0.44)]
 
 
 def test_every_place_in_touching_things_belongs_to_one_of_them():
-    below, above = (
-        box([-0.5, -0.5, 0], [0.5, 0.5, 0.4]),
-        box([-0.25, -0.25, 0.4], [0.25, 0.25, 0.9]),
-    )
+    below, above = (box([-0.5, -0.5, 0], [0.5, 0.5, 0.4]), box([-0.25, -0.25, 0.4], [0.25, 0.25, 0.9]))
     gaussians, owner = together(clad(below, 5000), clad(above, 3000))
-    hidden = (np.abs(gaussians.mean[:, 2] - 0.4) < 1e-3) & (
-        np.abs(gaussians.mean[:, :2]).max(axis=1) < 0.25
-    )
+    hidden = (np.abs(gaussians.mean[:, 2] - 0.4) < 1e-3) & (np.abs(gaussians.mean[:, :2]).max(axis=1) < 0.25)
     names = ("mean", "rotation", "scale", "opacity", "sh")
     kept = {n: getattr(gaussians, n)[~hidden] for n in names}
     shown = masks(eyes(20), below, above)
-    one, two = build_closed_surfaces(
-        Gaussians(**kept), owner[~hidden], eyes(20), shown, config=SMALL
-    )
+    one, two = build_closed_surfaces(Gaussians(**kept), owner[~hidden], eyes(20), shown, config=SMALL)
     places = np.random.default_rng(0).uniform([-0.5, -0.5, 0], [0.5, 0.5, 0.9], (40000, 3))
     in_one, in_two = shape(one).inside(places), shape(two).inside(places)
     assert not (in_one & in_two).any()
@@ -200,12 +181,9 @@ def test_hollows_that_nobody_sees_and_crumbs_are_no_surface():
 
 @pytest.mark.slow
 def test_the_number_of_threads_changes_nothing():
-    gaussians, owner = together(
-        clad(trimesh.creation.icosphere(3, 0.5).apply_translation([0, 0, 0.5]))
-    )
+    gaussians, owner = together(clad(trimesh.creation.icosphere(3, 0.5).apply_translation([0, 0, 0.5])))
     (one,), (two,) = (
-        build_closed_surfaces(gaussians, owner, eyes(8), config=replace(SMALL, threads=n))
-        for n in (1, 3)
+        build_closed_surfaces(gaussians, owner, eyes(8), config=replace(SMALL, threads=n)) for n in (1, 3)
     )
     np.testing.assert_array_equal(one.vertices, two.vertices)
     np.testing.assert_array_equal(one.colours, two.colours)
@@ -234,9 +212,7 @@ def test_what_nobody_sees_is_coloured_without_patches():
     whole, owner = together(clad(cube))
     red = whole.mean[:, :1] < 0
     sh = (np.where(red, (0.8, 0.1, 0.1), (0.1, 0.1, 0.8)) - 0.5)[:, None] / SH_DC_COEFFICIENT
-    (solid,) = build_closed_surfaces(
-        replace(whole, sh=sh), owner, eyes(), masks(eyes(), cube), config=SMALL
-    )
+    (solid,) = build_closed_surfaces(replace(whole, sh=sh), owner, eyes(), masks(eyes(), cube), config=SMALL)
     x, y, z = solid.vertices.T
     below = (z < 0.5 * solid.cell) & (np.maximum(abs(x), abs(y)) < 0.25)
     edges = np.concatenate([solid.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
@@ -244,7 +220,4 @@ def test_what_nobody_sees_is_coloured_without_patches():
     assert len(edges) > 100
     steps = np.abs(solid.colours[edges[:, 0]] - solid.colours[edges[:, 1]]).max(axis=1)
     assert steps.max() < 0.2, "from red to blue at once"
-    assert (
-        solid.colours[below & (x < -0.15), 0].mean()
-        > solid.colours[below & (x > 0.15), 0].mean() + 0.15
-    )
+    assert solid.colours[below & (x < -0.15), 0].mean() > solid.colours[below & (x > 0.15), 0].mean() + 0.15

@@ -5,11 +5,7 @@ import pytest
 from skimage.measure import marching_cubes
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.reconstruction.surface.fairing import (
-    fair_unobserved_patches,
-    neighbour_mean_matrix,
-    smooth_taubin,
-)
+from corporeal.reconstruction.surface.fairing import fair_unobserved_patches, neighbour_mean_matrix, smooth_taubin
 
 CELL = 0.04
 MIDDLE = np.array([0.0, 0.0, 2.0])
@@ -58,13 +54,8 @@ def test_noise_about_it_hardly_tilts_it():
     noise *= np.where(unknown, 0, 0.003 / noise.std())
     rough = Mesh(mesh.vertices + noise[:, None] * normals, mesh.triangles)
     none = np.zeros(len(unknown), bool)
-    tilt = off(
-        fair_unobserved_patches(rough, unknown, none, CELL, 0.0, neighbour_mean_matrix(mesh)), 15
-    )[1]
-    control = off(
-        fair_unobserved_patches(rough, unknown, ~unknown, CELL, 0.0, neighbour_mean_matrix(mesh)),
-        15,
-    )[1]
+    tilt = off(fair_unobserved_patches(rough, unknown, none, CELL, 0.0, neighbour_mean_matrix(mesh)), 15)[1]
+    control = off(fair_unobserved_patches(rough, unknown, ~unknown, CELL, 0.0, neighbour_mean_matrix(mesh)), 15)[1]
     assert tilt < control / 2
 
 
@@ -74,18 +65,14 @@ def test_sides_that_fold_onto_themselves_do_no_harm():
     for a, b, _ in mesh.triangles[unknown[mesh.triangles].all(axis=1)][:20]:
         v[b] = v[a]
     none = np.zeros(len(unknown), bool)
-    made = fair_unobserved_patches(
-        Mesh(v, mesh.triangles), unknown, none, CELL, 0.0, neighbour_mean_matrix(mesh)
-    )
+    made = fair_unobserved_patches(Mesh(v, mesh.triangles), unknown, none, CELL, 0.0, neighbour_mean_matrix(mesh))
     assert abs(off(made, 15)[0]) < 0.02
 
 
 def test_the_known_about_a_large_patch_stays_where_it_is():
     """A ball hardly seen: its sides are smoothed over two cells and not over a tenth of it."""
     mesh, unknown = ball(80)
-    made = fair_unobserved_patches(
-        mesh, unknown, np.zeros(len(unknown), bool), CELL, 0.0, neighbour_mean_matrix(mesh)
-    )
+    made = fair_unobserved_patches(mesh, unknown, np.zeros(len(unknown), bool), CELL, 0.0, neighbour_mean_matrix(mesh))
     away = np.linalg.norm(made.vertices - MIDDLE, axis=1)[~unknown] - 1
     assert np.abs(away).mean() < 0.003 and np.abs(away).max() < 0.03
 

@@ -39,9 +39,7 @@ def found(gaussians, of_object=None, masks=None):
 
 
 def test_things_apart_are_told_apart_and_most_points_come_first():
-    whole, owner = together(
-        ball((0.6, 0, 0.25), count=900), ball((-0.4, 0, 0.4), 0.4, 3000), ball((0.6, 0.7, 0.25))
-    )
+    whole, owner = together(ball((0.6, 0, 0.25), count=900), ball((-0.4, 0, 0.4), 0.4, 3000), ball((0.6, 0.7, 0.25)))
     np.testing.assert_array_equal(found(whole), np.array([2, 0, 1])[owner])
 
 
@@ -51,9 +49,7 @@ def test_things_that_touch_are_one_to_space():
 
 
 def vase():
-    return together(
-        ball((0, 0, 0.3), 0.3, 3000), rod(0.55, 0.95, 0.01, 13), ball((0, 0, 1), 0.1, 400)
-    )[0]
+    return together(ball((0, 0, 0.3), 0.3, 3000), rod(0.55, 0.95, 0.01, 13), ball((0, 0, 1), 0.1, 400))[0]
 
 
 @pytest.mark.parametrize("draw", [None, 0, 1, 2])
@@ -71,9 +67,7 @@ def test_without_its_neck_it_is_two():
 
 
 def test_a_leg_that_carving_leaves_crumbs_of_breaks_nothing():
-    leg = clad(
-        trimesh.creation.cylinder(0.004, 0.8, sections=8).apply_translation((0, 0, 0.5)), 600
-    )
+    leg = clad(trimesh.creation.cylinder(0.004, 0.8, sections=8).apply_translation((0, 0, 0.5)), 600)
     whole, _ = together(ball((0, 0, 1), 0.2), leg, ball((0, 0, 0.1), 0.1, 600))
     assert not found(whole).any()
 
@@ -81,11 +75,7 @@ def test_a_leg_that_carving_leaves_crumbs_of_breaks_nothing():
 def test_haze_between_things_builds_no_bridge():
     gap = np.column_stack([np.linspace(-0.2, 0.2, 12), np.zeros(12), np.full(12, 0.25)])
     haze = Gaussians(
-        gap,
-        np.tile([1.0, 0, 0, 0], (12, 1)),
-        np.full((12, 3), 0.03),
-        np.full(12, 0.08),
-        np.zeros((12, 1, 3)),
+        gap, np.tile([1.0, 0, 0, 0], (12, 1)), np.full((12, 3), 0.03), np.full(12, 0.08), np.zeros((12, 1, 3))
     )
     whole, owner = together(ball((-0.5, 0, 0.25)), ball((0.5, 0, 0.25)), haze)
     label = found(whole)

@@ -7,11 +7,7 @@ import trimesh
 from corporeal.geometry.mesh import Mesh
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import camera_rows
-from corporeal.reconstruction.surface.hull_top import (
-    MIN_SAID_HEIGHT_FRACTION,
-    HullTop,
-    lower_hull_top,
-)
+from corporeal.reconstruction.surface.hull_top import MIN_SAID_HEIGHT_FRACTION, HullTop, lower_hull_top
 from corporeal.render.camera_placement import CameraAim, camera_from_aim
 
 SIDE, AWAY, STEEP = 160, 6.0, 40.0
@@ -31,10 +27,7 @@ def rows(steep):
     """Cameras all around that look down at an angle."""
     turns = np.radians(np.arange(0, 360, 15))
     flat, high = AWAY * np.cos(np.radians(steep)), AWAY * np.sin(np.radians(steep))
-    aims = [
-        CameraAim((flat * np.cos(t), flat * np.sin(t), high), (0.0, 0.0, 0.0), 30.0, SIDE, SIDE)
-        for t in turns
-    ]
+    aims = [CameraAim((flat * np.cos(t), flat * np.sin(t), high), (0.0, 0.0, 0.0), 30.0, SIDE, SIDE) for t in turns]
     cameras = camera_rows(tuple(camera_from_aim(aim) for aim in aims))
     return np.concatenate([cameras, np.full((len(cameras), 2), float(SIDE))], axis=1)
 
@@ -67,9 +60,7 @@ def test_a_roof_of_grazing_rays_is_lowered_to_its_middle_and_said():
     top = made.vertices[:, 2].max()
     assert roof.share == pytest.approx((mesh.vertices[:, 2].max() - top) / top)
     rise = AWAY * np.sin(np.radians(STEEP)) - mesh.vertices[:, 2].max() / 2
-    assert np.tan(np.radians(roof.lowest)) == pytest.approx(
-        rise / (AWAY * np.cos(np.radians(STEEP)))
-    )
+    assert np.tan(np.radians(roof.lowest)) == pytest.approx(rise / (AWAY * np.cos(np.radians(STEEP))))
     [said] = roof.warnings
     assert f"±{roof.share:.0%}" in said and "from low down" in said
 

@@ -38,9 +38,7 @@ def bumpy():
 
 
 def pattern(seed=0, smooth=1.5):
-    blots = gaussian_filter(
-        np.random.default_rng(seed).normal(size=(256, 256, 3)), (smooth, smooth, 0)
-    )
+    blots = gaussian_filter(np.random.default_rng(seed).normal(size=(256, 256, 3)), (smooth, smooth, 0))
     return 0.5 + 0.15 * blots / blots.std()
 
 

@@ -56,9 +56,7 @@ def test_what_falls_apart_and_was_seen_from_one_side_is_refused():
     why = pieces_rejection_reason(2, half)
     assert why is not None and "in 2 pieces, and from 198°" in why and "--force" in why
     assert pieces_rejection_reason(1, half) is None, "one thing in one piece"
-    assert pieces_rejection_reason(2, CAMERAS) is None, (
-        "a warning says it where all sides were seen"
-    )
+    assert pieces_rejection_reason(2, CAMERAS) is None, "a warning says it where all sides were seen"
     assert pieces_rejection_reason(2, []) is None, "a splat without cameras"
 
 
@@ -107,9 +105,7 @@ def test_a_surface_that_is_not_what_masks_show_is_refused():
     eaten = Mesh(vertices * (0.6, 0.6, 0.2), triangles)
     why = overlap_rejection_reason([eaten], cameras, masks)
     assert why is not None and "overlap by" in why and "--force" in why
-    assert overlap_rejection_reason([eaten], cameras, np.zeros_like(masks)) is None, (
-        "nobody said anything"
-    )
+    assert overlap_rejection_reason([eaten], cameras, np.zeros_like(masks)) is None, "nobody said anything"
 
 
 def test_masks_that_no_surface_can_fill_are_of_something_else_too():
@@ -126,14 +122,10 @@ def test_masks_that_no_surface_can_fill_are_of_something_else_too():
         high = (rows.max() - rows.min()) // 4
         one[rows.min() - high : rows.min(), columns.min() : columns.max()] = True
     few = np.where(np.arange(20)[:, None, None] % 5 == 0, wall, False)
-    assert overlap_rejection_reason(block, cameras, masks | few, given=False) is None, (
-        "few photographs err"
-    )
+    assert overlap_rejection_reason(block, cameras, masks | few, given=False) is None, "few photographs err"
     why = overlap_rejection_reason(block, cameras, masks | wall, given=False)
     assert why is not None and "The shape contradicts the photographs" in why and "--force" in why
-    assert overlap_rejection_reason(block, cameras, masks | wall) is None, (
-        "somebody said that it is the thing"
-    )
+    assert overlap_rejection_reason(block, cameras, masks | wall) is None, "somebody said that it is the thing"
 
 
 def test_what_was_seen_from_one_side_only_is_refused():

@@ -5,8 +5,8 @@ up and the floor at z = 0; quaternions are (w, x, y, z); cameras follow OpenCV. 
 is an index array: for each y, which x. Letters in shapes: V vertices, T triangles, P particles,
 N points, K parts.
 
-``scene`` is what comes in, ``described`` what it is in words, ``matter`` what it is made of,
-``simulated`` what is simulated; ``notes`` what was noticed. All are imported from here.
+``scene`` is what comes in, ``described`` what it is in words, ``matter`` what it is made of, ``simulated`` what is
+simulated; ``notes`` what was noticed. All are imported from here.
 """
 
 from corporeal.core.types.description import (
@@ -40,14 +40,7 @@ from corporeal.core.types.material_field import (
     Structure,
     WeighedHypothesis,
 )
-from corporeal.core.types.notes import (
-    Note,
-    NoteKind,
-    note_kind,
-    note_kinds,
-    notes_with_kinds,
-    with_text,
-)
+from corporeal.core.types.notes import Note, NoteKind, note_kind, note_kinds, notes_with_kinds, with_text
 from corporeal.core.types.scene import (
     GRAVITY_M_S2,
     GRAVITY_VECTOR,

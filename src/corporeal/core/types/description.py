@@ -48,9 +48,9 @@ class Provenance:
 
 
 StructureKind = Literal["solid", "shell", "sheet", "hollow", "filled", "packed"]
-"""How a part is made: solid throughout; a wall, open or closed (``shell``, if not stated which;
-``sheet`` open: cup, plate, lid, cover; ``hollow`` closed about air); a wall with contents behind it
-(``filled``); or parts and air (``packed``).
+"""How a part is made: solid throughout; a wall, open or closed (``shell``, if not stated which; ``sheet`` open: cup,
+plate, lid, cover; ``hollow`` closed about air); a wall with contents behind it (``filled``); or parts and air
+(``packed``).
 """
 WALLED_KINDS: tuple[str, ...] = ("shell", "sheet", "hollow", "filled")
 """What has a wall."""
@@ -152,8 +152,7 @@ class PartDescription:
     placements: dict[str, RangePlacement] = field(default_factory=dict)
     """Field of ``Material`` → where in its range a model put it; fields not named are typical."""
     inflation: float | None = None
-    """Gauge pressure of the air sealed behind the wall [Pa]; 0: no more than around it; None: it is
-    not sealed."""
+    """Gauge pressure of the air sealed behind the wall [Pa]; 0: no more than around it; None: it is not sealed."""
     rebound: float | None = None
     """Restitution on a hard floor that rules ask of balls of its name [-]; None: none is known."""
     volume_share: float = 1.0
@@ -167,15 +166,15 @@ class PartDescription:
     missing: bool = False
     """Whether the mesh does not show this piece, as a scanner does not see glass."""
     pieces: "tuple[PartDescription, ...]" = ()
-    """What the part consists of where its mesh does not tell them apart: the shaft and the handle
-    of a scanned screwdriver. The words above are then those of the piece that matters most."""
+    """What the part consists of where its mesh does not tell them apart: the shaft and the handle of a scanned
+    screwdriver. The words above are then those of the piece that matters most."""
     built_by: AnswerSource = "unknown"
     """The source of how it is built; ``answered_by``: of what it is made of."""
     swelling: ScanThickening | None = None
     """How much of what the mesh draws of it is real; None: unknown, the mesh counts."""
     wall_unseen: bool = False
-    """Whether its surface need not show the inner face of its wall, as pictures do not where that
-    is plain: how thick the surface draws it tells nothing."""
+    """Whether its surface need not show the inner face of its wall, as pictures do not where that is plain: how thick
+    the surface draws it tells nothing."""
     wall_usual: bool = False
     """Whether ``thickness`` is that of most objects of its name: it is not stated for this one."""
     wall_why: str = ""

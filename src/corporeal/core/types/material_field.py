@@ -91,8 +91,8 @@ class Structure:
     """Whether wall and contents, sealed air, are one soft solid: of mass over volume all through.
     """
     gauge_pressure: float | None = None
-    """Pressure of air sealed behind an elastic wall that bears more than the air does, above that
-    around it [Pa]; None: there is none, or the air bears more."""
+    """Pressure of air sealed behind an elastic wall that bears more than the air does, above that around it [Pa]; None:
+    there is none, or the air bears more."""
     rebound: float | None = None
     """Restitution that rules ask of an inflated ball of its name [-]; None: none is known."""
     solidity: float = 1.0
@@ -181,8 +181,7 @@ class MaterialField:
     words: tuple[PartDescription, ...]
     """The answer each material was chosen from, one per part."""
     friction: Float[np.ndarray, "K1 K1"]
-    """Sliding friction between parts [-], K1 = K + 1; the last row and column are the floor and the
-    walls."""
+    """Sliding friction between parts [-], K1 = K + 1; the last row and column are the floor and the walls."""
     restitution: Float[np.ndarray, "K1 K1"]
     """Newton's coefficient between rigid parts [-]; last row and column as above."""
     pieces: tuple[tuple[PartComponent, ...], ...] = ()

@@ -1,7 +1,7 @@
 """Notes on results: sentences with a kind, set where they are made.
 
-A note is a string: what only prints sentences knows nothing of kinds. A plain string counts as a
-doubt, which errs to the safe side; so do sentences that were kept before there were kinds.
+A note is a string: what only prints sentences knows nothing of kinds. A plain string counts as a doubt, which errs to
+the safe side; so do sentences that were kept before there were kinds.
 """
 
 from collections.abc import Iterable, Sequence

@@ -12,8 +12,8 @@ GRAVITY_M_S2 = 9.81
 GRAVITY_VECTOR: Vector = (0.0, 0.0, -GRAVITY_M_S2)
 """The same as a vector [m/s²]."""
 SUBSTANCE_KEY, STATED_MATTER_KEY = "substance", "stated_matter"
-"""Keys of a surface's extras: the name of what a file says that it is made of, and all that the
-file says of it (``values``, ``words``)."""
+"""Keys of a surface's extras: the name of what a file says that it is made of, and all that the file says of it
+(``values``, ``words``)."""
 
 
 @dataclass(frozen=True)
@@ -76,15 +76,14 @@ class Push:
 class Keyframes:
     """Prescribed motion of a rigid object: how far it has moved and turned at given times.
 
-    N rows, the first of them where the object starts. Between rows all is smooth (monotone cubic
-    interpolation); before the first and after the last the object rests.
+    N rows, the first of them where the object starts. Between rows all is smooth (monotone cubic interpolation); before
+    the first and after the last the object rests.
     """
 
     time: tuple[float, ...]
     """Rising [s]."""
     shift: tuple[Vector, ...]
-    """From the start, of what was then the middle of the underside of its bounding box [m]; the
-    first is zero."""
+    """From the start, of what was then the middle of the underside of its bounding box [m]; the first is zero."""
     turn: tuple[Vector, ...]
     """Rotation vector from the row before, about that point [rad]; the first is zero."""
 
@@ -168,8 +167,8 @@ class Scene:
     """[s]"""
     fps: int = 60
     settled: bool = False
-    """Whether everything that lies or stands has come to rest before it begins: then what is soft
-    finds its balance before time 0, and pushes, winds and velocities begin there."""
+    """Whether everything that lies or stands has come to rest before it begins: then what is soft finds its balance
+    before time 0, and pushes, winds and velocities begin there."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
     hints: tuple[str, ...] = ()
@@ -179,8 +178,7 @@ class Scene:
     def object_of_triangle(self) -> Int[np.ndarray, " T"]:
         """For each triangle of all surfaces in order, its object."""
         return np.repeat(
-            np.array([s.object for s in self.surfaces], dtype=np.int64),
-            [len(s.triangles) for s in self.surfaces],
+            np.array([s.object for s in self.surfaces], dtype=np.int64), [len(s.triangles) for s in self.surfaces]
         )
 
 
@@ -211,8 +209,8 @@ class Views:
     cameras: tuple[Camera, ...]
     """One per view."""
     depth: Float[np.ndarray, "V H W"] | None = None
-    """Of what the middle of each pixel shows, along the camera's z [m]; inf where there is nothing.
-    The floor is something."""
+    """Of what the middle of each pixel shows, along the camera's z [m]; inf where there is nothing. The floor is
+    something."""
     normals: Float[np.ndarray, "V H W 3"] | None = None
     """Of the facets: unit, in the world, towards the camera; 0 where there is nothing."""
     object_of_pixel: Int[np.ndarray, "V H W"] | None = None

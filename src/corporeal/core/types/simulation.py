@@ -45,8 +45,8 @@ class Discretization:
     vibration: float = 0.0
     """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
     is_floor_covering: bool = False
-    """Whether it is a rigid sheet that lies on the floor, thinner than half a cell: what strikes it
-    strikes the floor."""
+    """Whether it is a rigid sheet that lies on the floor, thinner than half a cell: what strikes it strikes the
+    floor."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +85,11 @@ class VesselContents:
 
 
 CURVATURE_COLUMNS = 12
-"""Numbers that say how a surface curves at a point: its outward unit normal (3); the direction of
-an arc, tangential and of unit length (3); the radius of the ball that moves along that arc [m], and
-the arc's own radius less the ball's [m], both 0 where it is flat; how far from the point the
-surface is so [m]; 1 where its neighbours take over there on all sides, 0 where something round
-ends; and the curvatures along the arc's direction and across it [1/m], less than 0 where the
-surface is hollow. A ball has no arc, a cylinder no ball. All zeros: nothing is known."""
+"""Numbers that say how a surface curves at a point: its outward unit normal (3); the direction of an arc, tangential
+and of unit length (3); the radius of the ball that moves along that arc [m], and the arc's own radius less the ball's
+[m], both 0 where it is flat; how far from the point the surface is so [m]; 1 where its neighbours take over there on
+all sides, 0 where something round ends; and the curvatures along the arc's direction and across it [1/m], less than 0
+where the surface is hollow. A ball has no arc, a cylinder no ball. All zeros: nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -118,19 +117,15 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
-    curvature: Float[np.ndarray, "S2 Columns"] = field(
-        default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS))
-    )
+    curvature: Float[np.ndarray, "S2 Columns"] = field(default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS)))
     """How each of those points curves, see ``CURVATURE_COLUMNS``; none: as corners."""
     face: Float[np.ndarray, "A 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Outward area vectors of the surface that objects in the wind show to the air [m²]."""
-    particle_of_face: Int[np.ndarray, " A"] = field(
-        default_factory=lambda: np.zeros(0, dtype=np.int64)
-    )
+    particle_of_face: Int[np.ndarray, " A"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Which particle bears each of those faces."""
     rate: Float[np.ndarray, " R"] = field(default_factory=lambda: np.zeros(0))
-    """Natural angular frequency of every particle of foliage on its stalk, 0 for all others
-    [rad/s]; empty where there is no foliage."""
+    """Natural angular frequency of every particle of foliage on its stalk, 0 for all others [rad/s]; empty where there
+    is no foliage."""
     roots: tuple[PlantRoot, ...] = ()
     """Of plants that stand in soil."""
     contents: tuple[VesselContents, ...] = ()
@@ -139,9 +134,7 @@ class Particles:
     """Where liquids touch rigid objects, inside of what is hollow too [m]."""
     wetted_normal: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Unit, out of the material there."""
-    object_of_wetted: Int[np.ndarray, " W"] = field(
-        default_factory=lambda: np.zeros(0, dtype=np.int64)
-    )
+    object_of_wetted: Int[np.ndarray, " W"] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     fills: tuple[str, ...] = ()
     """How each part was filled, in words, for the report."""
     walls: tuple[tuple[float, float], ...] = ()
@@ -178,8 +171,8 @@ class Frame:
 class Ledger:
     """Sums over bodies and pairs, at one instant or over time.
 
-    B objects, W planes. F is absent for one instant, the number of frames for a trajectory. Work
-    and impulses are accumulated since time 0.
+    B objects, W planes. F is absent for one instant, the number of frames for a trajectory. Work and impulses are
+    accumulated since time 0.
     """
 
     time: Float[np.ndarray, "*F"]
@@ -211,8 +204,7 @@ class Ledger:
     friction_loss: Float[np.ndarray, "*F"]
     """[J]"""
     impact_loss: Float[np.ndarray, "*F"]
-    """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of
-    the grid [J]."""
+    """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of the grid [J]."""
     impact_of_pair: Float[np.ndarray, "*F B+W B+W"]
     """The same of each pair, symmetric [J]; below 0: contact gave it energy."""
     plastic_loss: Float[np.ndarray, "*F"]

@@ -1,9 +1,9 @@
 """Merging of models into one GLB; pictures and arrays are copied byte for byte.
 
-One root, below it one named node per object with its place and its ``extras``, below that the
-object's own tree as its file has it. Names, samplers, textures, materials with their extensions,
-skins and extras survive; animations, cameras and lights do not. A model that occurs twice is stored
-once. The same input gives the same bytes. ``read_glb`` reads the file as one of our own.
+One root, below it one named node per object with its place and its ``extras``, below that the object's own tree as its
+file has it. Names, samplers, textures, materials with their extensions, skins and extras survive; animations, cameras
+and lights do not. A model that occurs twice is stored once. The same input gives the same bytes. ``read_glb`` reads the
+file as one of our own.
 """
 
 import math
@@ -42,13 +42,11 @@ class MergeMember:
     scale: float = 1.0
     """World size over the file's: world = position + R (scale · x)."""
     extras: dict = field(default_factory=dict)
-    """What the object's node says of it: object_id, class, asset_sha256, source, licence,
-    attribution, real_extent_m, scale …"""
+    """What the object's node says of it: object_id, class, asset_sha256, source, licence, attribution, real_extent_m,
+    scale …"""
 
 
-def merge_glb_files(
-    path: Path, members: Sequence[MergeMember], name: str, extras: dict
-) -> tuple[str, ...]:
+def merge_glb_files(path: Path, members: Sequence[MergeMember], name: str, extras: dict) -> tuple[str, ...]:
     """Write one GLB of all members.
 
     Args:
@@ -62,8 +60,8 @@ def merge_glb_files(
 
     Raises:
         BadFileError: A member's file cannot be used.
-        UserError: There is none, two have one name, a pose or an extra is no finite number, or the
-            file would be too large.
+        UserError: There is none, two have one name, a pose or an extra is no finite number, or the file would be too
+            large.
 
     """
     _check_members(members)
@@ -158,9 +156,7 @@ class _SourceModel:
         """Copy a skeleton onto the copied nodes; None where some of its joints are not shown."""
         joints = node_numbers(skin, "joints", len(self.document.entries("nodes")))
         if not joints or not all(j in number for j in joints):
-            self.document.warn(
-                "a skeleton is left out: its joints are not in the scene.", NoteKind.LEFT_OUT
-            )
+            self.document.warn("a skeleton is left out: its joints are not in the scene.", NoteKind.LEFT_OUT)
             return None
         item = copy_without_extensions(skin, "skeleton") | {"joints": [number[j] for j in joints]}
         inverse = skin.refer("inverseBindMatrices", "accessors")

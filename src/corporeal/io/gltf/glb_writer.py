@@ -77,11 +77,7 @@ class GlbDocument:
     def primitive(self, s: Surface) -> dict:
         """Add a surface's arrays and return what draws them."""
         attributes = {"POSITION": self.array(s.vertices, bounds=True)}
-        for name, values in (
-            ("NORMAL", s.normals),
-            ("TEXCOORD_0", s.uv),
-            ("COLOR_0", s.colours),
-        ):
+        for name, values in (("NORMAL", s.normals), ("TEXCOORD_0", s.uv), ("COLOR_0", s.colours)):
             if values is not None:
                 attributes[name] = self.array(values)
         return {
@@ -134,11 +130,7 @@ class GlbDocument:
 
     def material_item(self, f: Finish) -> dict:
         """Return a finish as glTF says it."""
-        pbr: dict = {
-            "baseColorFactor": list(f.colour),
-            "metallicFactor": f.metallic,
-            "roughnessFactor": f.roughness,
-        }
+        pbr: dict = {"baseColorFactor": list(f.colour), "metallicFactor": f.metallic, "roughnessFactor": f.roughness}
         if f.texture is not None:
             pbr["baseColorTexture"] = {"index": self.texture(f)}
         item: dict = {"name": f.name, "pbrMetallicRoughness": pbr}
@@ -163,11 +155,7 @@ class GlbDocument:
         """Add a finish's picture."""
         png = io.BytesIO()
         Image.fromarray(np.asarray(f.texture)).save(png, "PNG")
-        image = {
-            "name": f.name,
-            "mimeType": "image/png",
-            "bufferView": self.view(png.getvalue()),
-        }
+        image = {"name": f.name, "mimeType": "image/png", "bufferView": self.view(png.getvalue())}
         if "samplers" not in self.json:
             self.add("samplers", {"magFilter": 9729, "minFilter": 9987})
         return self.add("textures", {"sampler": 0, "source": self.add("images", image)})
@@ -178,11 +166,7 @@ class GlbDocument:
         root: dict = {
             "name": scene.name,
             "matrix": Y_UP_FROM_Z_UP,
-            "extras": {
-                "gravity_m_s2": list(scene.gravity),
-                "duration_s": scene.duration,
-                "fps": scene.fps,
-            }
+            "extras": {"gravity_m_s2": list(scene.gravity), "duration_s": scene.duration, "fps": scene.fps}
             | ({"settled": True} if scene.settled else {}),
         }
         if objects:
@@ -204,11 +188,7 @@ def _asset(scene: Scene) -> dict:
 
 
 def _object_extras(thing: SceneObject) -> dict:
-    extras: dict = {
-        "class": thing.class_name,
-        "real_extent_m": thing.real_extent,
-        "scale": thing.scale,
-    }
+    extras: dict = {"class": thing.class_name, "real_extent_m": thing.real_extent, "scale": thing.scale}
     if any(thing.velocity):
         extras["velocity_m_s"] = list(thing.velocity)
     if thing.push is not None:
@@ -232,7 +212,4 @@ def _object_extras(thing: SceneObject) -> dict:
 
 
 def _window(force: Push | Wind) -> dict:
-    return {
-        "start_s": force.start,
-        "end_s": force.end if math.isfinite(force.end) else None,
-    }
+    return {"start_s": force.start, "end_s": force.end if math.isfinite(force.end) else None}

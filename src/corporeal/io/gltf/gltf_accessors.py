@@ -6,14 +6,7 @@ import numpy as np
 
 from corporeal.io.gltf.gltf_document import GltfEntry
 
-DTYPE_OF_COMPONENT_TYPE = {
-    5120: "<i1",
-    5121: "<u1",
-    5122: "<i2",
-    5123: "<u2",
-    5125: "<u4",
-    5126: "<f4",
-}
+DTYPE_OF_COMPONENT_TYPE = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTH_OF_ACCESSOR_TYPE = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 MAX_ROWS_WITHOUT_DATA = 10_000_000
 """An accessor without bytes is all zeros, of any length it likes to claim; this is accepted."""
@@ -50,9 +43,7 @@ def _kind(accessor: GltfEntry) -> tuple[np.dtype, int]:
     if component is None:
         accessor.fail(f"unknown 'componentType' {accessor.whole('componentType')}.")
     if width is None:
-        accessor.fail(
-            f"'type' {accessor.text('type')[:20]!r} is not one of {', '.join(WIDTH_OF_ACCESSOR_TYPE)}."
-        )
+        accessor.fail(f"'type' {accessor.text('type')[:20]!r} is not one of {', '.join(WIDTH_OF_ACCESSOR_TYPE)}.")
     return np.dtype(component), width
 
 

@@ -1,8 +1,7 @@
 """Copying of meshes and materials of a glTF file, byte for byte, into another.
 
-Entries are copied once, on first use. Whatever an index points to gets a new number; all else
-passes as it is. glTF 2.0 specification, sections 3.6 to 3.9, and the extensions named below,
-Khronos Group.
+Entries are copied once, on first use. Whatever an index points to gets a new number; all else passes as it is. glTF 2.0
+specification, sections 3.6 to 3.9, and the extensions named below, Khronos Group.
 """
 
 from typing import Any
@@ -78,10 +77,7 @@ class GltfCopier:
         return self._once(
             "meshes",
             entry,
-            lambda: (
-                copy_without_extensions(entry)
-                | {"primitives": [self._primitive(p) for p in primitives]}
-            ),
+            lambda: copy_without_extensions(entry) | {"primitives": [self._primitive(p) for p in primitives]},
         )
 
     def accessor(self, entry: GltfEntry) -> int:
@@ -104,9 +100,7 @@ class GltfCopier:
             item["targets"] = [self._attributes(t) for t in entry.children("targets")]
         packed = entry.extension(DRACO_EXTENSION)
         if packed:
-            item["extensions"] = {
-                DRACO_EXTENSION: packed.value | {"bufferView": self._view(packed)}
-            }
+            item["extensions"] = {DRACO_EXTENSION: packed.value | {"bufferView": self._view(packed)}}
             self.use(DRACO_EXTENSION)
         return item
 
@@ -144,9 +138,7 @@ class GltfCopier:
         except BadFileError as problem:
             self.document.warn_of("a material", problem)
         except RecursionError:
-            self.document.warn(
-                "a material is left out: it is nested too deeply.", NoteKind.LEFT_OUT
-            )
+            self.document.warn("a material is left out: it is nested too deeply.", NoteKind.LEFT_OUT)
         return {}
 
     def _material(self, entry: GltfEntry) -> dict:
@@ -166,9 +158,7 @@ class GltfCopier:
         item = copy_without_extensions(entry) | self._source(entry)
         sampler = entry.refer("sampler", "samplers")
         if sampler:
-            item["sampler"] = self._once(
-                "samplers", sampler, lambda: copy_without_extensions(sampler)
-            )
+            item["sampler"] = self._once("samplers", sampler, lambda: copy_without_extensions(sampler))
         others = entry.child("extensions")
         found = {} if others is None else {n: self._source(others.needed(n)) for n in others.value}
         found = {name: source for name, source in found.items() if source}
@@ -205,6 +195,4 @@ def copy_without_extensions(entry: GltfEntry, *dropped: str) -> dict:
 
 
 def _image_mime(start: bytes) -> str:
-    return next(
-        (kind for sign, kind in MIME_OF_IMAGE_SIGNATURE.items() if start.startswith(sign)), ""
-    )
+    return next((kind for sign, kind in MIME_OF_IMAGE_SIGNATURE.items() if start.startswith(sign)), "")

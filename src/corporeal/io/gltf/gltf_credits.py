@@ -9,8 +9,7 @@ from corporeal.recognition.readable_names import single_line_text
 MAX_STATED_CREDIT_CHARACTERS = 500
 """Of what is kept of a credit [characters]."""
 LICENCE_PATTERN = re.compile(
-    r"\b(?:CC0(?:[- ]1\.0)?|CC[- ]BY(?:[- ](?:NC|SA|ND))*(?:[- ]\d\.\d)?|Apache-2\.0|MIT(?:-0)?)\b",
-    re.IGNORECASE,
+    r"\b(?:CC0(?:[- ]1\.0)?|CC[- ]BY(?:[- ](?:NC|SA|ND))*(?:[- ]\d\.\d)?|Apache-2\.0|MIT(?:-0)?)\b", re.IGNORECASE
 )
 """Licences that are recognised within a sentence."""
 

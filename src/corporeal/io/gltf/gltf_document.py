@@ -159,9 +159,7 @@ class GltfDocument:
 
     def warn_of(self, what: str, problem: BadFileError) -> None:
         """Remember that something was left out, and the problem behind it."""
-        reason = (
-            str(problem).removeprefix(f"{self.path}: ").removesuffix(GLTF_EXPORT_ADVICE).strip()
-        )
+        reason = str(problem).removeprefix(f"{self.path}: ").removesuffix(GLTF_EXPORT_ADVICE).strip()
         self.warn(f"{what} is left out: {reason}", NoteKind.LEFT_OUT)
 
     def spend(self, entry: GltfEntry, rows: int) -> None:

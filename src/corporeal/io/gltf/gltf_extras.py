@@ -33,9 +33,7 @@ def scene_from_extras(document: GltfDocument, root: GltfEntry) -> dict:
     }
 
 
-def object_from_extras(
-    document: GltfDocument, head: GltfEntry | None, extent: float
-) -> SceneObject:
+def object_from_extras(document: GltfDocument, head: GltfEntry | None, extent: float) -> SceneObject:
     """Return an object as its node describes it; ``head`` None: the whole file is the object.
 
     A name stays empty where the file gives none of use; the extent is the mesh's own [m].
@@ -63,8 +61,7 @@ def object_from_extras(
 def object_credit(extras: dict) -> str:
     """Return whom to thank for an object, and under which licence it may be used, if it says so."""
     whole, *fields = (
-        x if isinstance(x := extras.get(key), str) else ""
-        for key in ("credit", "licence", "attribution")
+        x if isinstance(x := extras.get(key), str) else "" for key in ("credit", "licence", "attribution")
     )
     return whole or Credit(*fields).words
 

@@ -1,7 +1,7 @@
 """Materials of a glTF file as finishes.
 
-What concerns only the look never refuses a file: a broken texture or material becomes a warning.
-Facts: glTF 2.0, section 3.9, and the KHR extensions named below, Khronos Group.
+What concerns only the look never refuses a file: a broken texture or material becomes a warning. Facts: glTF 2.0,
+section 3.9, and the KHR extensions named below, Khronos Group.
 """
 
 from dataclasses import dataclass, replace

@@ -7,9 +7,7 @@ import numpy as np
 
 from corporeal.io.gltf.gltf_document import GltfDocument, GltfEntry
 
-Z_UP_FROM_Y_UP = np.array(
-    [[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]],
-)
+Z_UP_FROM_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
 """(x, y, z) → (x, -z, y): the one place where the file's Y-up becomes Z-up."""
 MAX_NODES = 100_000
 TRANSFORM_KEYS = {"matrix", "translation", "rotation", "scale"}

@@ -15,9 +15,7 @@ MAX_DRACO_VERTICES = 20_000_000
 DRACO_ADVICE = "Export the model without Draco compression."
 
 
-def decode_draco(
-    primitive: GltfEntry, packed: GltfEntry
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def decode_draco(primitive: GltfEntry, packed: GltfEntry) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return the triangles (T, 3) and each attribute's values (V, width) as real numbers."""
     view = packed.refer("bufferView", "bufferViews") or packed.fail("'bufferView' is missing.")
     data = bytes(packed.document.view(view))
@@ -115,9 +113,7 @@ def read_primitive(primitive: GltfEntry, mesh: str, dress: TexturedFinish) -> Gl
     document = primitive.document
     mode = primitive.whole("mode", MODE_TRIANGLES)
     if mode in UNREAD_PRIMITIVE_MODES:
-        document.warn(
-            f"mesh {mesh!r} holds {UNREAD_PRIMITIVE_MODES[mode]}; only triangles are used."
-        )
+        document.warn(f"mesh {mesh!r} holds {UNREAD_PRIMITIVE_MODES[mode]}; only triangles are used.")
         return None
     if mode not in (MODE_TRIANGLES, MODE_TRIANGLE_STRIP, MODE_TRIANGLE_FAN):
         primitive.fail(f"unknown 'mode' {mode}.")
@@ -125,15 +121,11 @@ def read_primitive(primitive: GltfEntry, mesh: str, dress: TexturedFinish) -> Gl
         document.warn(f"mesh {mesh!r} can morph; its rest shape is used.")
     source = _PrimitiveSource(primitive, mesh)
     if source.count == 0:
-        document.warn(
-            f"mesh {mesh!r} has a primitive without vertices; it is left out.", NoteKind.LEFT_OUT
-        )
+        document.warn(f"mesh {mesh!r} has a primitive without vertices; it is left out.", NoteKind.LEFT_OUT)
         return None
     triangles = _without_degenerate(source.triangles(mode))
     if not len(triangles):
-        document.warn(
-            f"mesh {mesh!r} has a primitive without triangles; it is left out.", NoteKind.LEFT_OUT
-        )
+        document.warn(f"mesh {mesh!r} has a primitive without triangles; it is left out.", NoteKind.LEFT_OUT)
         return None
     used, triangles = _renumber_used_vertices(triangles, source.count, primitive)
     document.spend(primitive, len(used))
@@ -248,9 +240,7 @@ def _without_degenerate(t: np.ndarray) -> np.ndarray:
     return t[(t[:, 0] != t[:, 1]) & (t[:, 1] != t[:, 2]) & (t[:, 2] != t[:, 0])]
 
 
-def _renumber_used_vertices(
-    triangles: np.ndarray, count: int, primitive: GltfEntry
-) -> tuple[np.ndarray, np.ndarray]:
+def _renumber_used_vertices(triangles: np.ndarray, count: int, primitive: GltfEntry) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices in use, and the triangles numbered among them."""
     if triangles.max() >= count:
         primitive.fail(f"index {triangles.max()} is beyond the {count} vertices.")

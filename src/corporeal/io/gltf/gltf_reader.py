@@ -1,7 +1,7 @@
 """Read a glTF 2.0 scene (.glb, .gltf) as a Scene: Z up, metres as in the file.
 
-Triangles, looks, names and extras are kept. Skins and morphs are left at rest, animations out. Any
-file gives a scene or one ``BadFileError`` that names the place in the file.
+Triangles, looks, names and extras are kept. Skins and morphs are left at rest, animations out. Any file gives a scene
+or one ``BadFileError`` that names the place in the file.
 """
 
 from collections import Counter
@@ -18,12 +18,7 @@ from corporeal.io.gltf.gltf_materials import FinishReader
 from corporeal.io.gltf.gltf_nodes import PlacedNode, placed_nodes
 from corporeal.io.gltf.gltf_primitives import GltfPrimitive, read_primitive
 from corporeal.io.gltf.gltf_skinning import SkinPoses, transform_primitive
-from corporeal.recognition.readable_names import (
-    everyday_words,
-    numbered_names,
-    safe_name,
-    unique_names,
-)
+from corporeal.recognition.readable_names import everyday_words, numbered_names, safe_name, unique_names
 
 READABLE_EXTENSION_PREFIXES = (
     "KHR_materials_",
@@ -75,9 +70,8 @@ def read_glb(path: Path, objects: ObjectGrouping = "auto") -> Scene:
 
     Args:
         path: A .glb or .gltf file; its companions must lie beside it.
-        objects: "one": the whole file is one object. "nodes": every node on the first level that
-            branches is one. "auto": the nodes that say their class in their extras, as our own
-            files do; without any, the whole file.
+        objects: "one": the whole file is one object. "nodes": every node on the first level that branches is one.
+            "auto": the nodes that say their class in their extras, as our own files do; without any, the whole file.
 
     Raises:
         BadFileError: The file cannot be used.
@@ -95,8 +89,7 @@ def read_gltf_model(path: Path, objects: ObjectGrouping = "auto") -> LoadedModel
     shapes = _placed_primitives(document, tree, wardrobe)
     if not shapes:
         document.root.fail(
-            "the scene holds no triangles of any size.",
-            "Export a mesh; points, lines and splats are not used.",
+            "the scene holds no triangles of any size.", "Export a mesh; points, lines and splats are not used."
         )
     owner = _object_of_node(tree, {s.node for s in shapes}, objects)
     scene = _assembled_scene(document, tree, shapes, owner)
@@ -151,9 +144,7 @@ def _warn_of_unplaced_meshes(document: GltfDocument, tree: list[PlacedNode]) -> 
         names = ", ".join(safe_name(n.text("name")) or "nameless" for n in left[:3])
         more = ", …" if len(left) > 3 else ""
         are = "nodes with meshes are" if len(left) > 1 else "node with a mesh is"
-        document.warn(
-            f"{len(left)} {are} not in its scene and left out: {names}{more}.", NoteKind.LEFT_OUT
-        )
+        document.warn(f"{len(left)} {are} not in its scene and left out: {names}{more}.", NoteKind.LEFT_OUT)
 
 
 def _check_total(document: GltfDocument, shown: list[list[_FinishedPrimitive]]) -> None:
@@ -186,9 +177,7 @@ def _most_telling_name(node: GltfEntry, mesh: GltfEntry) -> str:
     return safe_name(other)
 
 
-def _object_of_node(
-    tree: list[PlacedNode], shaped: set[int], objects: ObjectGrouping
-) -> dict[int, int]:
+def _object_of_node(tree: list[PlacedNode], shaped: set[int], objects: ObjectGrouping) -> dict[int, int]:
     """Return, for each node with triangles, the node that is its object; -1: the whole file."""
     if objects == "one":
         return dict.fromkeys(shaped, -1)
@@ -228,10 +217,7 @@ def _branching_nodes(tree: list[PlacedNode], shaped: set[int]) -> set[int]:
 
 
 def _assembled_scene(
-    document: GltfDocument,
-    tree: list[PlacedNode],
-    shapes: list[_PlacedPrimitive],
-    owner: dict[int, int],
+    document: GltfDocument, tree: list[PlacedNode], shapes: list[_PlacedPrimitive], owner: dict[int, int]
 ) -> Scene:
     """Gather the shapes under their objects, in the file's order."""
     nodes: dict[int, GltfEntry | None] = {-1: None} | {p.number: p.node for p in tree}

@@ -47,9 +47,7 @@ class SkinPoses:
         return world @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
 
 
-def transform_primitive(
-    piece: GltfPrimitive, placed: PlacedNode, bones: np.ndarray | None
-) -> GltfPrimitive:
+def transform_primitive(piece: GltfPrimitive, placed: PlacedNode, bones: np.ndarray | None) -> GltfPrimitive:
     """Return the piece in the world; a mirrored one keeps its outside out."""
     with np.errstate(all="ignore"):
         world = _skinning_matrices(piece, bones)

@@ -27,17 +27,11 @@ def apply_body_statements(
     named = [safe_name(str(bodies[p]["title"])) if p in bodies else o.name for o, p in pairs]
     names = unique_names([name or o.name for (o, _), name in zip(pairs, named, strict=True)])
     things = [
-        _apply_body(replace(o, name=name), bodies[path], turn)
-        if path in bodies
-        else replace(o, name=name)
+        _apply_body(replace(o, name=name), bodies[path], turn) if path in bodies else replace(o, name=name)
         for (o, path), name in zip(pairs, names, strict=True)
     ]
     loose = [name for (_, path), name in zip(pairs, names, strict=True) if path not in bodies]
-    fixed = (
-        (f"{', '.join(loose)}: no rigid bodies in the file; they are movable here.",)
-        if loose
-        else ()
-    )
+    fixed = (f"{', '.join(loose)}: no rigid bodies in the file; they are movable here.",) if loose else ()
     return replace(scene, objects=tuple(things), warnings=(*scene.warnings, *fixed))
 
 

@@ -1,7 +1,7 @@
 """Loading of OBJ, PLY, STL, OFF, 3MF, DAE and USD as a Scene, +Z up.
 
-The libraries that read them run in a child process with limits of time and memory; what it hands
-over is checked as any file's. Facts of each kind, docs/reference/input-files.md, "Meshes".
+The libraries that read them run in a child process with limits of time and memory; what it hands over is checked as any
+file's. Facts of each kind, docs/reference/input-files.md, "Meshes".
 """
 
 import os
@@ -53,18 +53,14 @@ class MeshFile:
 
 
 def load_mesh(
-    path: Path,
-    objects: ObjectGrouping = "one",
-    up: UpAxis | None = None,
-    max_seconds: int = MAX_MESH_READ_S,
+    path: Path, objects: ObjectGrouping = "one", up: UpAxis | None = None, max_seconds: int = MAX_MESH_READ_S
 ) -> MeshFile:
     """Read one file.
 
     Args:
         path: Its suffix says what it is; its companions must lie beside it.
-        objects: "one": the whole file is one object. "nodes": every named object on the first level
-            that branches is one. "auto": the bodies that the file states (USD); without any, the
-            whole file.
+        objects: "one": the whole file is one object. "nodes": every named object on the first level that branches is
+            one. "auto": the bodies that the file states (USD); without any, the whole file.
         up: Axis of the file that points up; None: the one it states, else its kind's usual one.
         max_seconds: Reading it may take so long [s].
 
@@ -85,11 +81,7 @@ def load_mesh(
     turn = rotation_to_z_up(taken)
     turned = _to_z_up(raw, turn, raw.unit or 1.0)
     bodies = raw.bodies if objects == "auto" else {}
-    owners = (
-        _body_of_surface(turned, bodies)
-        if bodies
-        else _object_of_surface(turned, objects == "nodes")
-    )
+    owners = _body_of_surface(turned, bodies) if bodies else _object_of_surface(turned, objects == "nodes")
     scene = _scene(path, turned, owners, raw)
     scene = replace(scene, warnings=(*scene.warnings, *of_up))
     if bodies:
@@ -167,15 +159,11 @@ def _check_numbers(path: Path, raw: RawMesh) -> None:
         raise BadFileError(path, "holds no triangles.", MESH_EXPORT_ADVICE)
     for s in raw.surfaces:
         if s.vertices.ndim != 2 or s.vertices.shape[1] != 3:
-            raise BadFileError(
-                path, "has vertices that are not places in space.", MESH_EXPORT_ADVICE
-            )
+            raise BadFileError(path, "has vertices that are not places in space.", MESH_EXPORT_ADVICE)
         if s.triangles.min() < 0 or s.triangles.max() >= len(s.vertices):
             raise BadFileError(path, "has a face without corners.", MESH_EXPORT_ADVICE)
         if not np.isfinite(s.vertices).all():
-            raise BadFileError(
-                path, "has vertices that are not finite numbers.", MESH_EXPORT_ADVICE
-            )
+            raise BadFileError(path, "has vertices that are not finite numbers.", MESH_EXPORT_ADVICE)
     places = np.concatenate([s.vertices for s in raw.surfaces])
     if np.abs(places).max() > MAX_MESH_COORDINATE:
         raise BadFileError(path, "has vertices at impossible places.", MESH_EXPORT_ADVICE)
@@ -198,15 +186,11 @@ def _assumed_up_axis(path: Path, raw: RawMesh, usual: UpAxis) -> tuple[UpAxis, t
     axis, why = likelier
     kind = path.suffix.lower()
     said = f"{path.name} does not state what is up. {usual} was taken, as is usual in {kind}, "
-    return usual, (
-        Note(f"{said}{why}. If it lies on its side, use --up {axis[1]}.", NoteKind.ASSUMED),
-    )
+    return usual, (Note(f"{said}{why}. If it lies on its side, use --up {axis[1]}.", NoteKind.ASSUMED),)
 
 
 def _to_z_up(raw: RawMesh, turn: np.ndarray, unit: float) -> list[Surface]:
-    return [
-        add_crease_normals(replace(s, vertices=unit * s.vertices @ turn.T)) for s in raw.surfaces
-    ]
+    return [add_crease_normals(replace(s, vertices=unit * s.vertices @ turn.T)) for s in raw.surfaces]
 
 
 def _object_of_surface(surfaces: list[Surface], nodes: bool) -> list[str]:
@@ -262,9 +246,7 @@ def _scene(path: Path, surfaces: list[Surface], owners: list[str], raw: RawMesh)
         ),
         raw.finishes,
         metres_per_unit=raw.unit or 1.0,
-        warnings=(Note(f"{path.name}: left out: {', '.join(raw.lost)}.", NoteKind.LEFT_OUT),)
-        if raw.lost
-        else (),
+        warnings=(Note(f"{path.name}: left out: {', '.join(raw.lost)}.", NoteKind.LEFT_OUT),) if raw.lost else (),
     )
 
 

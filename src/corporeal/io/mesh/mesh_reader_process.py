@@ -4,10 +4,9 @@
 
     python -m corporeal.io.mesh.mesh_reader_process MODULE:FUNCTION FILE FOLDER
 
-calls a function of a ``registry.Reader`` with the file and writes what it returns into the folder:
-RAW_MESH_FILE (``raw_mesh.RawMesh``), COMPANIONS_FILE (paths), or in place of them REFUSAL_FILE,
-what is wrong. The libraries that read meshes were written for files that mean well: on others some
-never return, take all memory, or die.
+calls a function of a ``registry.Reader`` with the file and writes what it returns into the folder: RAW_MESH_FILE
+(``raw_mesh.RawMesh``), COMPANIONS_FILE (paths), or in place of them REFUSAL_FILE, what is wrong. The libraries that
+read meshes were written for files that mean well: on others some never return, take all memory, or die.
 """
 
 import resource

@@ -77,9 +77,7 @@ def _unique_name(name: str, taken: set[str], counts: dict[str | None, int]) -> t
     return (own,)
 
 
-def _geometry_places(
-    nodes: Iterable[Any], along: tuple[str, ...]
-) -> Iterator[tuple[tuple[str, ...], Any]]:
+def _geometry_places(nodes: Iterable[Any], along: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Return every place of a geometry, and the names of the nodes above it."""
     from collada.scene import GeometryNode, Node, NodeNode
 
@@ -143,9 +141,7 @@ def _absolute_corner(corner: bytes, so_far: list[int]) -> bytes:
 
 MAX_ZIP_UNPACKED_BYTES = 2**29
 """What a ZIP may unpack to [bytes]."""
-Z_UP_COMMENT_PATTERN = re.compile(
-    r"(?i)\b\+?z[ _-]+(?:axis[ _-]+)?(?:is[ _-]+)?up\b|\bup[ _-]*axis\W{1,3}\+?z\b"
-)
+Z_UP_COMMENT_PATTERN = re.compile(r"(?i)\b\+?z[ _-]+(?:axis[ _-]+)?(?:is[ _-]+)?up\b|\bup[ _-]*axis\W{1,3}\+?z\b")
 COMMENT_HEAD_CHARACTERS = 2000
 """Characters at the beginning of a file where comments say how it was written."""
 UP_OF_DAE_AXIS = {"X_UP": "+x", "Y_UP": "+y", "Z_UP": "+z"}
@@ -195,8 +191,7 @@ class _ObjMaterials(_CompanionResolver):
 def read_obj(path: Path) -> RawMesh:
     """Read a Wavefront OBJ with its materials; its unit is unknown, its up axis at most a comment.
 
-    Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
-    but one of the two.
+    Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write but one of the two.
     """
     data = with_absolute_indices(bytes(read_file_bytes(path)))
     named = b"o" if _names_in_obj(data, b"o") else b"g"
@@ -236,9 +231,7 @@ def read_3mf(path: Path) -> RawMesh:
         with zipfile.ZipFile(path) as archive:
             size = sum(entry.file_size for entry in archive.infolist())
     except zipfile.BadZipFile as problem:
-        raise BadFileError(
-            path, f"cannot be read as 3MF ({problem}).", MESH_EXPORT_ADVICE
-        ) from problem
+        raise BadFileError(path, f"cannot be read as 3MF ({problem}).", MESH_EXPORT_ADVICE) from problem
     if size > MAX_ZIP_UNPACKED_BYTES:
         raise BadFileError(path, f"unpacks to {size / 2**30:.1f} GiB.", "Split it into several.")
     scene = _load_with_trimesh(path, "3mf")
@@ -265,11 +258,7 @@ def read_dae(path: Path) -> RawMesh:
 
 
 def _load_with_trimesh(
-    path: Path,
-    kind: str,
-    data: bytes | None = None,
-    resolver: Resolver | None = None,
-    **options: Any,
+    path: Path, kind: str, data: bytes | None = None, resolver: Resolver | None = None, **options: Any
 ) -> trimesh.Scene:
     data = bytes(read_file_bytes(path)) if data is None else data
     return trimesh.load_scene(

@@ -1,7 +1,7 @@
 """Triangulation of binary PLY faces of mixed size.
 
-Blender, MeshLab and others write such files; the reader of meshes takes all faces of a file to have
-as many corners as the first. Turk, "The PLY Polygon File Format" (1994).
+Blender, MeshLab and others write such files; the reader of meshes takes all faces of a file to have as many corners as
+the first. Turk, "The PLY Polygon File Format" (1994).
 """
 
 import itertools
@@ -81,20 +81,11 @@ def _find_faces(data: memoryview) -> FaceLayout | None:
     end = re.search(rb"^end_header[ \t]*\r?\n", head, re.MULTILINE)
     lines = head[: end.start()].decode("latin-1").splitlines() if end else []
     words = [line.split() for line in lines]
-    order = next(
-        (
-            BYTE_ORDER_OF_PLY_FORMAT.get(w[1], "")
-            for w in words
-            if w[:1] == ["format"] and len(w) > 1
-        ),
-        "",
-    )
+    order = next((BYTE_ORDER_OF_PLY_FORMAT.get(w[1], "") for w in words if w[:1] == ["format"] and len(w) > 1), "")
     begins = [k for k, w in enumerate(words) if w[:1] == ["element"]] + [len(words)]
     at = end.end() if end else 0
     for k, following in itertools.pairwise(begins if order else []):
-        properties = [
-            _parse_property(w, order) for w in words[k + 1 : following] if w[:1] == ["property"]
-        ]
+        properties = [_parse_property(w, order) for w in words[k + 1 : following] if w[:1] == ["property"]]
         known = [p for p in properties if p is not None]
         if len(known) < len(properties) or len(words[k]) != 3 or not words[k][2].isdecimal():
             return None
@@ -114,9 +105,7 @@ def _parse_property(words: list[str], order: str) -> FaceProperty | None:
     """Return what a line of the header states; None where it states nothing that is known."""
     match words:
         case [_, "list", counted, kind, name] if {counted, kind} <= DTYPE_OF_PLY_TYPE.keys():
-            return FaceProperty(
-                name, order + DTYPE_OF_PLY_TYPE[kind], order + DTYPE_OF_PLY_TYPE[counted]
-            )
+            return FaceProperty(name, order + DTYPE_OF_PLY_TYPE[kind], order + DTYPE_OF_PLY_TYPE[counted])
         case [_, kind, name] if kind in DTYPE_OF_PLY_TYPE:
             return FaceProperty(name, order + DTYPE_OF_PLY_TYPE[kind])
     return None
@@ -148,12 +137,7 @@ def _corner_places(
 ) -> tuple[Int[np.ndarray, " F"], Int[np.ndarray, " F"]]:
     """Return for each face where its corners stand [bytes], and how many they are."""
     steps = [
-        (
-            p.name in FACE_INDEX_PROPERTIES,
-            np.dtype(p.kind).itemsize,
-            np.dtype(p.counted or "u1").itemsize,
-            p,
-        )
+        (p.name in FACE_INDEX_PROPERTIES, np.dtype(p.kind).itemsize, np.dtype(p.counted or "u1").itemsize, p)
         for p in faces.properties
     ]
     at, places, longs = faces.start, [], []
@@ -168,9 +152,7 @@ def _corner_places(
                 longs.append(long)
             at += long * size
         if at > len(data):
-            raise BadFileError(
-                path, "cannot be read as PLY (it ends within its faces).", COPY_AGAIN_ADVICE
-            )
+            raise BadFileError(path, "cannot be read as PLY (it ends within its faces).", COPY_AGAIN_ADVICE)
     return np.array(places), np.array(longs)
 
 

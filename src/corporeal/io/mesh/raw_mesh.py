@@ -32,8 +32,8 @@ class RawMesh:
     lost: tuple[str, ...] = ()
     """What was left out, such as "pictures (2)"."""
     bodies: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    """Path of each body that the file states → ``title``, ``mass`` [kg], ``velocity`` [m/s, the
-    file's axes], and ``custom``, what our own writer states of it."""
+    """Path of each body that the file states → ``title``, ``mass`` [kg], ``velocity`` [m/s, the file's axes], and
+    ``custom``, what our own writer states of it."""
     custom: Mapping[str, Any] = field(default_factory=dict)
     """Scene data of files written here; empty for other files."""
 

@@ -1,10 +1,9 @@
 """Inference of the up axis of meshes that don't state it.
 
-There are two criteria. As it is taken it would tip over, and does not if the other usual axis
-points up. Or it stands on the plane through the origin that the other axis is normal to, as models
-are placed by who makes them, while the axis that is taken goes through its middle. Chairs and
-shelves also stand on their backs, and balls stand anyhow: what neither tells may lie on its side
-all the same.
+There are two criteria. As it is taken it would tip over, and does not if the other usual axis points up. Or it stands
+on the plane through the origin that the other axis is normal to, as models are placed by who makes them, while the axis
+that is taken goes through its middle. Chairs and shelves also stand on their backs, and balls stand anyhow: what
+neither tells may lie on its side all the same.
 """
 
 import numpy as np
@@ -58,9 +57,7 @@ def _surface_centroid(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray
 def _is_stable(points: np.ndarray, centre: np.ndarray) -> bool:
     """Return whether the middle is above what touches a floor below points, +z up."""
     low = points[:, 2].min()
-    touching = points[
-        points[:, 2] <= low + FLOOR_CONTACT_EXTENT_FRACTION * np.ptp(points, axis=0).max(), :2
-    ]
+    touching = points[points[:, 2] <= low + FLOOR_CONTACT_EXTENT_FRACTION * np.ptp(points, axis=0).max(), :2]
     if len(touching) < 3:
         return False
     try:
@@ -75,6 +72,4 @@ def _rests_on_zero(heights: np.ndarray) -> bool:
 
 
 def _is_centred(heights: np.ndarray) -> bool:
-    return abs(float(heights.max() + heights.min())) <= 2 * CENTRED_SIDE_FRACTION * float(
-        np.ptp(heights)
-    )
+    return abs(float(heights.max() + heights.min())) <= 2 * CENTRED_SIDE_FRACTION * float(np.ptp(heights))

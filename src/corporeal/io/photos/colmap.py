@@ -1,8 +1,7 @@
 """COLMAP's models: cameras, images and points, as text or in binary.
 
-Poses are camera from world; the middle of the upper left pixel is (0.5, 0.5), as here. The world's
-frame and size are the model's own: unless they were set, up is unknown and lengths mean nothing.
-Format: colmap.github.io/format.html.
+Poses are camera from world; the middle of the upper left pixel is (0.5, 0.5), as here. The world's frame and size are
+the model's own: unless they were set, up is unknown and lengths mean nothing. Format: colmap.github.io/format.html.
 """
 
 from collections.abc import Iterator
@@ -17,22 +16,11 @@ from corporeal.core import store
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Camera
 from corporeal.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix
-from corporeal.io.photos.colmap_binary import (
-    ColmapBinaryReader,
-    camera_rows,
-    image_rows,
-    point_rows,
-)
+from corporeal.io.photos.colmap_binary import ColmapBinaryReader, camera_rows, image_rows, point_rows
 from corporeal.multiview.lens_distortion import Lens
 
 COLMAP_EXPORT_ADVICE = "Export the model again."
-PARAMETER_COUNT_OF_CAMERA_MODEL = {
-    "SIMPLE_PINHOLE": 3,
-    "PINHOLE": 4,
-    "SIMPLE_RADIAL": 4,
-    "RADIAL": 5,
-    "OPENCV": 8,
-}
+PARAMETER_COUNT_OF_CAMERA_MODEL = {"SIMPLE_PINHOLE": 3, "PINHOLE": 4, "SIMPLE_RADIAL": 4, "RADIAL": 5, "OPENCV": 8}
 """How many numbers each model has that is read."""
 COLMAP_UNDISTORT_ADVICE = "Run COLMAP's image_undistorter first."
 
@@ -84,10 +72,7 @@ class ColmapModel:
 
 def is_colmap(folder: Path) -> bool:
     """Tell a model's folder by its files."""
-    return any(
-        all((folder / f"{name}{kind}").is_file() for name in ("cameras", "images"))
-        for kind in (".bin", ".txt")
-    )
+    return any(all((folder / f"{name}{kind}").is_file() for name in ("cameras", "images")) for kind in (".bin", ".txt"))
 
 
 def read_colmap(folder: Path) -> ColmapModel:
@@ -100,9 +85,7 @@ def read_colmap(folder: Path) -> ColmapModel:
     folder = Path(folder)
     binary = (folder / "images.bin").is_file() and (folder / "cameras.bin").is_file()
     if not is_colmap(folder):
-        raise BadFileError(
-            folder, "holds no cameras and images of a COLMAP model.", COLMAP_EXPORT_ADVICE
-        )
+        raise BadFileError(folder, "holds no cameras and images of a COLMAP model.", COLMAP_EXPORT_ADVICE)
     rows = _read_binary(folder) if binary else _read_text(folder)
     if not rows.images:
         raise BadFileError(folder, "the COLMAP model holds no images.", COLMAP_EXPORT_ADVICE)
@@ -145,15 +128,9 @@ def lens_of_camera(folder: Path, camera: ColmapCamera) -> Lens:
         what = f"a camera is {camera.model[:40]}; {known} are read."
         raise BadFileError(folder, what, COLMAP_UNDISTORT_ADVICE)
     p = camera.parameters
-    good = (
-        len(p) == PARAMETER_COUNT_OF_CAMERA_MODEL[camera.model]
-        and np.isfinite(p).all()
-        and p[0] > 0
-    )
+    good = len(p) == PARAMETER_COUNT_OF_CAMERA_MODEL[camera.model] and np.isfinite(p).all() and p[0] > 0
     if not good or min(camera.width, camera.height) < 1:
-        raise BadFileError(
-            folder, f"a {camera.model} camera has bad numbers.", COLMAP_EXPORT_ADVICE
-        )
+        raise BadFileError(folder, f"a {camera.model} camera has bad numbers.", COLMAP_EXPORT_ADVICE)
     two = camera.model in ("PINHOLE", "OPENCV")
     fx, fy, cx, cy = p[:4] if two else (p[0], p[0], p[1], p[2])
     rest = p[4:] if two else p[3:]
@@ -203,17 +180,13 @@ class _PointRow:
 
 def _read_binary(folder: Path) -> _ModelRows:
     path = folder / "images.bin"
-    cameras = {
-        k: ColmapCamera(*row) for k, row in camera_rows(ColmapBinaryReader(folder / "cameras.bin"))
-    }
+    cameras = {k: ColmapCamera(*row) for k, row in camera_rows(ColmapBinaryReader(folder / "cameras.bin"))}
     images = [
         (number, ColmapImage(name, camera, world_from_camera(path, name, turn, shift)))
         for number, name, camera, turn, shift in image_rows(ColmapBinaryReader(path))
     ]
     file = folder / "points3D.bin"
-    points = (
-        [_PointRow(*row) for row in point_rows(ColmapBinaryReader(file))] if file.is_file() else []
-    )
+    points = [_PointRow(*row) for row in point_rows(ColmapBinaryReader(file))] if file.is_file() else []
     return _ModelRows(cameras, images, points)
 
 
@@ -228,9 +201,7 @@ def _read_text(folder: Path) -> _ModelRows:
     path = folder / "points3D.txt"
     lines = _word_lines(path) if path.is_file() else iter(())
     points = [
-        _PointRow(
-            tuple(_parse_numbers(path, w, range(1, 7), least=7)), _track_image_numbers(path, w)
-        )
+        _PointRow(tuple(_parse_numbers(path, w, range(1, 7), least=7)), _track_image_numbers(path, w))
         for w in lines
         if w
     ]
@@ -269,9 +240,7 @@ def _word_lines(path: Path) -> Iterator[list[str]]:
         raise BadFileError(path, f"cannot be read ({problem.strerror}).") from problem
 
 
-def _parse_numbers(
-    path: Path, words: list[str], which: range | list[int], least: int
-) -> list[float]:
+def _parse_numbers(path: Path, words: list[str], which: range | list[int], least: int) -> list[float]:
     """Return some words of a line as numbers."""
     try:
         if len(words) < least:
@@ -284,9 +253,7 @@ def _parse_numbers(
 
 
 def _bad_line(path: Path, words: list[str]) -> NoReturn:
-    raise BadFileError(
-        path, f"cannot read the line {' '.join(words)[:60]!r}.", COLMAP_EXPORT_ADVICE
-    )
+    raise BadFileError(path, f"cannot read the line {' '.join(words)[:60]!r}.", COLMAP_EXPORT_ADVICE)
 
 
 # ---------------------------------------------------------------- writing
@@ -316,10 +283,7 @@ def write_colmap(
     there = np.zeros((0, 3)) if points is None else points
     shades = np.full(there.shape, 128, np.uint8) if colours is None else colours
     rows = zip(there, shades, strict=True)
-    marks = [
-        f"{k + 1} {_format_numbers(x)} {' '.join(str(c) for c in rgb)} 0"
-        for k, (x, rgb) in enumerate(rows)
-    ]
+    marks = [f"{k + 1} {_format_numbers(x)} {' '.join(str(c) for c in rgb)} 0" for k, (x, rgb) in enumerate(rows)]
     with store.disk_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for file, lines in (("cameras", lenses), ("images", images), ("points3D", marks)):

@@ -76,12 +76,7 @@ def camera_rows(file: ColmapBinaryReader) -> Iterator[tuple[int, tuple]]:
             raise BadFileError(file.path, what, "Run COLMAP's image_undistorter first.")
         yield (
             number,
-            (
-                CAMERA_MODEL_NAMES[model],
-                width,
-                height,
-                file.take(f"{CAMERA_MODEL_PARAMETER_COUNTS[model]}d"),
-            ),
+            (CAMERA_MODEL_NAMES[model], width, height, file.take(f"{CAMERA_MODEL_PARAMETER_COUNTS[model]}d")),
         )
 
 

@@ -1,8 +1,8 @@
 """Cropping of photographs to their masks before downscaling.
 
-An object that fills a third of each photograph has a third of the pixels along its sides that a
-reduced photograph has: its thin parts and walls are lost. What is around it is of no use where
-masks say so. So each photograph is cut out about its mask, all to one size, before it is reduced.
+An object that fills a third of each photograph has a third of the pixels along its sides that a reduced photograph has:
+its thin parts and walls are lost. What is around it is of no use where masks say so. So each photograph is cut out
+about its mask, all to one size, before it is reduced.
 """
 
 from dataclasses import dataclass
@@ -45,9 +45,7 @@ def mask_box_fractions(mask: Bool[np.ndarray, "H W"]) -> tuple[float, float] | N
     return (columns[-1] - columns[0] + 1) / width, (rows[-1] - rows[0] + 1) / height
 
 
-def plan_crop(
-    boxes: Float[np.ndarray, "V 2"], size: tuple[int, int], largest: tuple[int, int]
-) -> CropWindow:
+def plan_crop(boxes: Float[np.ndarray, "V 2"], size: tuple[int, int], largest: tuple[int, int]) -> CropWindow:
     """Return how photographs are cut out about what masks show.
 
     The window is square, where the photographs are as high: a long object is seen from all sides.

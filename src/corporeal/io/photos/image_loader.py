@@ -16,12 +16,7 @@ from PIL import Image
 
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Camera, Note, NoteKind
-from corporeal.io.image_decoder import (
-    IMAGE_FORMATS,
-    MAX_IMAGE_PIXELS,
-    decode_image,
-    decode_instances,
-)
+from corporeal.io.image_decoder import IMAGE_FORMATS, MAX_IMAGE_PIXELS, decode_image, decode_instances
 from corporeal.io.photos.crop_to_masks import CropWindow, mask_box_fractions, plan_crop
 from corporeal.io.photos.photo_file_names import UNREAD_IMAGE_SUFFIXES
 from corporeal.multiview.lens_distortion import Lens, undistort_image
@@ -80,8 +75,7 @@ class LoadedPhotos:
     masks: UInt8[np.ndarray, "V H W"] | None
     """Share of each pixel that belongs to the objects, 255: all; None: unknown."""
     object_of_pixel: Int32[np.ndarray, "V H W"] | None
-    """What each view takes each pixel for; -1: nothing. Numbers may mean other objects
-    elsewhere."""
+    """What each view takes each pixel for; -1: nothing. Numbers may mean other objects elsewhere."""
     names: tuple[str, ...]
     warnings: tuple[str, ...]
     done: tuple[str, ...] = ()
@@ -107,9 +101,7 @@ class _LoadedPhoto:
     """Whether it says that it is to be turned, and was not."""
 
 
-def load_photos(
-    source: Path, shots: list[PosedPhotoFile], longest: int, close: bool = False
-) -> LoadedPhotos:
+def load_photos(source: Path, shots: list[PosedPhotoFile], longest: int, close: bool = False) -> LoadedPhotos:
     """Read all photographs.
 
     Args:
@@ -216,9 +208,7 @@ def _visible_mask(shot: PosedPhotoFile) -> UInt8[np.ndarray, "H W"]:
     if shot.mask is not None:
         return _decode_file(shot.mask)[..., 0]
     picture = _decode_file(shot.picture)
-    if _is_to_be_turned(
-        shot, picture.shape[1], picture.shape[0], asked := exif_quarter_turns_of_file(shot.picture)
-    ):
+    if _is_to_be_turned(shot, picture.shape[1], picture.shape[0], asked := exif_quarter_turns_of_file(shot.picture)):
         picture = np.rot90(picture, asked)
     return _object_alpha(shot, picture, _instance_numbers(shot.instances, picture.shape[1::-1]))
 
@@ -239,9 +229,7 @@ def _load_photo(shot: PosedPhotoFile, frame: CropWindow) -> _LoadedPhoto:
     masked = shot.mask is not None or picture.shape[2] == 4 or numbers is not None
     alpha = _object_alpha(shot, picture, numbers)
     if masked and alpha.max() < MIN_MASK_PEAK_U8:
-        raise _UnusablePhotoError(
-            "has a mask that shows nothing" + (MASK_NUMBERS_HINT if shot.mask else "")
-        )
+        raise _UnusablePhotoError("has a mask that shows nothing" + (MASK_NUMBERS_HINT if shot.mask else ""))
     rgba = np.dstack([_on_white(picture[..., :3], alpha), alpha])
     rgba, numbers, camera = _straighten_and_crop(rgba, numbers, lens, shot.world_from_camera, frame)
     ignored = asked > 0 and not turned
@@ -288,9 +276,7 @@ def rotated_mask_problem(mask: tuple[int, int], picture: tuple[int, int]) -> str
     ratio, swapped = width * high / (height * wide), width * wide / (height * high)
     if abs(swapped - 1) > ASPECT_TOLERANCE_FRACTION or abs(ratio - 1) <= ASPECT_TOLERANCE_FRACTION:
         return None
-    return (
-        f"has a mask of {width} × {height} pixels, which lies across its {wide} × {high}: turn it"
-    )
+    return f"has a mask of {width} × {height} pixels, which lies across its {wide} × {high}: turn it"
 
 
 def _is_to_be_turned(shot: PosedPhotoFile, width: int, height: int, asked: int) -> bool:
@@ -344,9 +330,7 @@ def _read(path: Path) -> bytes:
         raise _UnusablePhotoError(f"cannot be read ({problem.strerror})") from None
 
 
-def _object_alpha(
-    shot: PosedPhotoFile, picture: np.ndarray, numbers: np.ndarray | None
-) -> np.ndarray:
+def _object_alpha(shot: PosedPhotoFile, picture: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:
     """Return what belongs to the objects (H, W): the mask, else the alpha, else all instances."""
     if shot.mask is None and picture.shape[2] == 4:
         return picture[..., 3]
@@ -384,9 +368,7 @@ def _reduced_size(width: int, height: int, longest: int) -> tuple[int, int]:
 # ---------------------------------------------------------------- all of them
 
 
-def _keep_consistently_masked(
-    prints: list[_LoadedPhoto], bad: list[UnusablePhoto]
-) -> list[_LoadedPhoto]:
+def _keep_consistently_masked(prints: list[_LoadedPhoto], bad: list[UnusablePhoto]) -> list[_LoadedPhoto]:
     """Leave out the few without a mask where others have one, or ignore that there are none."""
     masked = [p for p in prints if p.masked]
     if not masked or len(masked) == len(prints):
@@ -408,12 +390,7 @@ def _refuse_if_most_unusable(source: Path, total: int, bad: list[UnusablePhoto])
 
 def unusable_photos_notes(total: int, bad: list[UnusablePhoto]) -> list[str]:
     """Return which of so many pictures were left out, and why; nothing where all are used."""
-    return [
-        Note(
-            f"{len(bad)} of {total} pictures were left out: {_list_reasons(bad)}.",
-            NoteKind.LEFT_OUT,
-        )
-    ] * bool(bad)
+    return [Note(f"{len(bad)} of {total} pictures were left out: {_list_reasons(bad)}.", NoteKind.LEFT_OUT)] * bool(bad)
 
 
 def _list_reasons(bad: list[UnusablePhoto]) -> str:
@@ -422,9 +399,7 @@ def _list_reasons(bad: list[UnusablePhoto]) -> str:
     return "; ".join(names) + (f"; and {more} more" if more else "")
 
 
-def _change_notes(
-    prints: list[_LoadedPhoto], sizes: Counter[tuple[int, int]], frame: CropWindow
-) -> list[str]:
+def _change_notes(prints: list[_LoadedPhoto], sizes: Counter[tuple[int, int]], frame: CropWindow) -> list[str]:
     """Return what was done to the pictures, in sentences."""
     changes, size = [], frame.whole
     if len(sizes) > 1:
@@ -444,9 +419,7 @@ def _change_notes(
 def _oddity_notes(prints: list[_LoadedPhoto]) -> list[str]:
     """Return what is odd about the pictures themselves, in sentences."""
     odd = []
-    grey = sum(
-        int(np.ptp(p.rgba[..., :3], axis=-1).max()) <= MAX_GREY_CHANNEL_SPREAD_U8 for p in prints
-    )
+    grey = sum(int(np.ptp(p.rgba[..., :3], axis=-1).max()) <= MAX_GREY_CHANNEL_SPREAD_U8 for p in prints)
     if 0 < grey < len(prints):
         odd.append(f"{grey} of {len(prints)} pictures are grey: colours will be paler.")
     asking = sum(p.asks for p in prints)

@@ -1,8 +1,8 @@
 """Mask files: one PNG for each photograph, in its own pixels, editable.
 
-A folder gets ``masks`` (white where objects are), ``instances`` where objects have numbers, and
-``masks.json``, which says what they were made by and what they were when they were made. Edited
-masks are never overwritten by the same means.
+A folder gets ``masks`` (white where objects are), ``instances`` where objects have numbers, and ``masks.json``, which
+says what they were made by and what they were when they were made. Edited masks are never overwritten by the same
+means.
 """
 
 from collections import Counter
@@ -54,9 +54,7 @@ def mask_file_names(shots: Sequence[PosedPhotoFile]) -> list[str]:
     return [f"{p.stem}.png" if a else f"{p}.png" for p, a in zip(paths, alone, strict=True)]
 
 
-def mask_in_photo_pixels(
-    inside: Float32[np.ndarray, "H W"], shot: PosedPhotoFile
-) -> Float32[np.ndarray, "h w"] | None:
+def mask_in_photo_pixels(inside: Float32[np.ndarray, "H W"], shot: PosedPhotoFile) -> Float32[np.ndarray, "h w"] | None:
     """Return a mask of a straightened, reduced photograph as one of the photograph itself.
 
     None: the photograph cannot be read.
@@ -84,12 +82,7 @@ def write_instances(folder: Path, name: str, number: Int[np.ndarray, "H W"]) -> 
 
 
 def write_mask_record(
-    folder: Path,
-    made_by: str,
-    said: Sequence[str],
-    incomplete: str = "",
-    beside: str = "",
-    contradict: bool = False,
+    folder: Path, made_by: str, said: Sequence[str], incomplete: str = "", beside: str = "", contradict: bool = False
 ) -> None:
     """Note what lies in the folder now; until then nothing in it counts as made."""
     digests = {str(p.relative_to(folder)): store.path_digest(p) for p in _mask_files(folder)}
@@ -114,8 +107,4 @@ def edited_masks(folder: Path) -> dict[str, str]:
 
 
 def _mask_files(folder: Path) -> list[Path]:
-    return [
-        p
-        for n in (MASK_FOLDERS[0], INSTANCE_FOLDERS[0])
-        for p in sorted((folder / n).rglob("*.png"))
-    ]
+    return [p for n in (MASK_FOLDERS[0], INSTANCE_FOLDERS[0]) for p in sorted((folder / n).rglob("*.png"))]

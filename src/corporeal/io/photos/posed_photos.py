@@ -14,38 +14,16 @@ from corporeal.core.types import Views
 from corporeal.io.image_decoder import IMAGE_FORMATS
 from corporeal.io.photos.colmap import ColmapModel, is_colmap, read_colmap
 from corporeal.io.photos.image_loader import PosedPhotoFile, load_photos
-from corporeal.io.photos.photo_file_names import (
-    IMAGE_FOLDERS,
-    INSTANCE_FOLDERS,
-    MASK_FOLDERS,
-    READABLE_IMAGE_SUFFIXES,
-)
-from corporeal.io.photos.projection_matrices import (
-    check_focal,
-    find_projections,
-    read_projection,
-    split_projection,
-)
-from corporeal.io.photos.transforms_frame import (
-    TRANSFORMS_FILE,
-    TransformsFrame,
-    read_transforms_frames,
-)
+from corporeal.io.photos.photo_file_names import IMAGE_FOLDERS, INSTANCE_FOLDERS, MASK_FOLDERS, READABLE_IMAGE_SUFFIXES
+from corporeal.io.photos.projection_matrices import check_focal, find_projections, read_projection, split_projection
+from corporeal.io.photos.transforms_frame import TRANSFORMS_FILE, TransformsFrame, read_transforms_frames
 from corporeal.io.referenced_files import path_beside
 from corporeal.multiview.lens_distortion import Lens
 from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.recognition.readable_names import single_line_text
 
 TRANSFORMS_FILES = (TRANSFORMS_FILE, "transforms_train.json")
-COLMAP_MODEL_FOLDERS = (
-    "",
-    "sparse/0",
-    "sparse",
-    "colmap/sparse/0",
-    "model",
-    "dense/sparse",
-    "undistorted/sparse",
-)
+COLMAP_MODEL_FOLDERS = ("", "sparse/0", "sparse", "colmap/sparse/0", "model", "dense/sparse", "undistorted/sparse")
 IMAGE_NAME_SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG")
 DEFAULT_LONGEST_SIDE_PX = 1024
 """Of a picture's sides, unless more is asked for [px]."""
@@ -53,9 +31,7 @@ NO_INSTANCES_MESSAGE = (
     "There are no instance masks. Name them by object_file_path in transforms.json, or put them "
     "into a folder 'instances' with the names of the pictures; or leave --apart out."
 )
-POSED_PHOTOS_ADVICE = (
-    "Name a folder with transforms.json, a COLMAP model, or 3 × 4 projection matrices."
-)
+POSED_PHOTOS_ADVICE = "Name a folder with transforms.json, a COLMAP model, or 3 × 4 projection matrices."
 
 
 @dataclass(frozen=True)
@@ -63,8 +39,8 @@ class PosedPhotos:
     """Posed pictures, with further scene data of the file."""
 
     views: Views
-    """Where there is a mask, all outside it is white. ``object_of_pixel``: what instance masks say,
-    whose numbers need not mean the same from view to view; None: there are none."""
+    """Where there is a mask, all outside it is white. ``object_of_pixel``: what instance masks say, whose numbers need
+    not mean the same from view to view; None: there are none."""
     names: tuple[str, ...]
     """Of the pictures, as the file has them."""
     z_up: bool
@@ -118,21 +94,20 @@ def read_posed_photos(
 ) -> PosedPhotos:
     """Read a folder of posed photographs, or the ``transforms.json`` of one.
 
-    All come out at one size, the most frequent one, at most ``longest`` pixels long, with lenses
-    straightened. A minority of pictures that are missing or broken is left out and named.
+    All come out at one size, the most frequent one, at most ``longest`` pixels long, with lenses straightened. A
+    minority of pictures that are missing or broken is left out and named.
 
     Args:
         path: The folder or file.
         longest: Of a picture's sides [px].
-        masks: A folder of masks instead of the photographs' own, or one that holds ``masks``,
-            ``instances`` or both.
+        masks: A folder of masks instead of the photographs' own, or one that holds ``masks``, ``instances`` or both.
         bare: Whether masks and instances beside the photographs are ignored.
         close: Whether larger pictures are cut out about what masks show, before they are reduced.
         most: How many are read, at equal steps; None: all.
 
     Raises:
-        BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used;
-            or no mask has the name of a photograph.
+        BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used; or no mask has the
+            name of a photograph.
 
     """
     found = list_posed_photos(path)
@@ -214,14 +189,11 @@ def _with_masks_from(folder: Path, shots: list[PosedPhotoFile]) -> list[PosedPho
         raise BadFileError(folder, "there is no such folder.", "Name a folder of masks.")
     parted = any((folder / name).is_dir() for name in (*MASK_FOLDERS, *INSTANCE_FOLDERS))
     masks, instances = (
-        [folder / name for name in names if (folder / name).is_dir()]
-        for names in (MASK_FOLDERS, INSTANCE_FOLDERS)
+        [folder / name for name in names if (folder / name).is_dir()] for names in (MASK_FOLDERS, INSTANCE_FOLDERS)
     )
     made = [
         replace(
-            shot,
-            mask=_image_named_as(shot, masks if parted else [folder]),
-            instances=_image_named_as(shot, instances),
+            shot, mask=_image_named_as(shot, masks if parted else [folder]), instances=_image_named_as(shot, instances)
         )
         for shot in shots
     ]
@@ -238,28 +210,20 @@ def _image_named_as(shot: PosedPhotoFile, folders: list[Path]) -> Path | None:
     name = PurePath(shot.name.lstrip("./"))
     files = [name.as_posix(), name.with_suffix("").as_posix(), f"{name.as_posix()}.png"]
     files += _companion_names(shot.picture)
-    return next(
-        (p for base in folders for f in files if (p := _find_image(base, f)) is not None), None
-    )
+    return next((p for base in folders for f in files if (p := _find_image(base, f)) is not None), None)
 
 
 def has_posed_photos(folder: Path) -> bool:
     """Tell a folder of photographs with poses by its files, without reading them."""
     posed = any((folder / name).is_file() for name in TRANSFORMS_FILES)
-    return (
-        posed
-        or any(is_colmap(folder / m) for m in COLMAP_MODEL_FOLDERS)
-        or bool(find_projections(folder))
-    )
+    return posed or any(is_colmap(folder / m) for m in COLMAP_MODEL_FOLDERS) or bool(find_projections(folder))
 
 
 # ---------------------------------------------------------------- transforms.json
 
 
 def _list_transforms(path: Path) -> PhotoListing:
-    return PhotoListing(
-        path, [_photo_of_frame(frame) for frame in read_transforms_frames(path)], z_up=True
-    )
+    return PhotoListing(path, [_photo_of_frame(frame) for frame in read_transforms_frames(path)], z_up=True)
 
 
 def _photo_of_frame(frame: TransformsFrame) -> PosedPhotoFile:
@@ -280,9 +244,7 @@ def _photo_of_frame(frame: TransformsFrame) -> PosedPhotoFile:
 
 def _find_image(folder: Path, name: str) -> Path | None:
     """Return a picture in or below the folder; the suffix of its name may be missing."""
-    return next(
-        (p for s in IMAGE_NAME_SUFFIXES if (p := path_beside(folder, name + s)) is not None), None
-    )
+    return next((p for s in IMAGE_NAME_SUFFIXES if (p := path_beside(folder, name + s)) is not None), None)
 
 
 def find_companion_image(picture: Path | None, folder: Path, names: tuple[str, ...]) -> Path | None:
@@ -307,11 +269,7 @@ def unused_masks_note(folder: Path, pictures: Sequence[Path]) -> list[str]:
     """State that a folder has masks whose names fit none of its photographs, if it has such."""
     for place in (folder / name for name in MASK_FOLDERS):
         held = [p for p in sorted(place.rglob("*")) if p.suffix.lower() in READABLE_IMAGE_SUFFIXES]
-        if (
-            held
-            and pictures
-            and not any(find_companion_image(p, folder, (place.name,)) for p in pictures)
-        ):
+        if held and pictures and not any(find_companion_image(p, folder, (place.name,)) for p in pictures):
             return [
                 f"None of the {len(held)} pictures in {place.name} has the name of a photograph, "
                 f"so that they are no masks: {single_line_text(held[0].name)} is the first of them, where "
@@ -330,10 +288,7 @@ def _list_colmap(folder: Path, place: Path) -> PhotoListing:
     for image in model.images:
         picture = path_beside(root, image.name)
         lens = partial(_as_stated, model.lens(image))
-        more = (
-            find_companion_image(picture, folder, names)
-            for names in (MASK_FOLDERS, INSTANCE_FOLDERS)
-        )
+        more = (find_companion_image(picture, folder, names) for names in (MASK_FOLDERS, INSTANCE_FOLDERS))
         shots.append(PosedPhotoFile(image.name, picture, lens, image.world_from_camera, *more))
     shots.sort(key=lambda shot: shot.name)
     return PhotoListing(folder, shots, False, model)
@@ -358,10 +313,7 @@ def _list_projections(folder: Path, pairs: list[tuple[Path, Path]]) -> list[Pose
     shots = []
     for picture, file in pairs:
         K, pose = split_projection(file, read_projection(file))
-        more = (
-            find_companion_image(picture, folder, names)
-            for names in (MASK_FOLDERS, INSTANCE_FOLDERS)
-        )
+        more = (find_companion_image(picture, folder, names) for names in (MASK_FOLDERS, INSTANCE_FOLDERS))
         shots.append(PosedPhotoFile(picture.name, picture, partial(_pinhole, file, K), pose, *more))
     return shots
 

@@ -1,9 +1,9 @@
 """Cameras as 3 × 4 projection matrices P = K [R | t], one file per image.
 
-``name.txt`` or ``name.npy`` belongs to ``name.jpg`` (or .png …), beside it or in a folder of its
-own: ``projections``, ``cameras``, ``calib``, ``txt``. Texts may begin with the line CONTOUR. P maps
-a point of the world to (u, v, 1) times its depth; the upper left corner of a picture is (0, 0).
-Hartley & Zisserman, "Multiple View Geometry", 2nd ed., section 6.2.4.
+``name.txt`` or ``name.npy`` belongs to ``name.jpg`` (or .png …), beside it or in a folder of its own: ``projections``,
+``cameras``, ``calib``, ``txt``. Texts may begin with the line CONTOUR. P maps a point of the world to (u, v, 1) times
+its depth; the upper left corner of a picture is (0, 0). Hartley & Zisserman, "Multiple View Geometry", 2nd ed., section
+6.2.4.
 """
 
 from pathlib import Path
@@ -30,9 +30,7 @@ def find_projections(folder: Path) -> list[tuple[Path, Path]]:
     for at in MATRIX_FOLDERS:
         files = {p.stem: p for p in _files(folder / at, MATRIX_SUFFIXES)}
         for shown in MATRIX_IMAGE_FOLDERS:
-            pairs = [
-                (p, files.get(p.stem)) for p in _files(folder / shown, READABLE_IMAGE_SUFFIXES)
-            ]
+            pairs = [(p, files.get(p.stem)) for p in _files(folder / shown, READABLE_IMAGE_SUFFIXES)]
             found = [(p, file) for p, file in pairs if file is not None]
             if found:
                 return found
@@ -63,8 +61,8 @@ def split_projection(
 ) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "4 4"]]:
     """Return K and world from camera of a projection matrix of any scale and sign.
 
-    The left 3 × 3 part is K R up to a factor. Its sign is such that the determinant is positive
-    (then +z is ahead); K has a positive diagonal and ends in 1.
+    The left 3 × 3 part is K R up to a factor. Its sign is such that the determinant is positive (then +z is ahead); K
+    has a positive diagonal and ends in 1.
 
     Raises:
         BadFileError: The left part is singular: no finite camera.

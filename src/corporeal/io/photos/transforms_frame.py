@@ -1,8 +1,7 @@
 """One frame of a ``transforms.json``, in any of the dialects that tools write.
 
-Blender and NeRF's synthetic scenes state ``camera_angle_x`` alone and leave out the suffix of the
-picture; instant-ngp and nerfstudio state ``fl_x``, ``cx``, ``w`` … for all frames or for each, and
-the coefficients of a lens (OPENCV).
+Blender and NeRF's synthetic scenes state ``camera_angle_x`` alone and leave out the suffix of the picture; instant-ngp
+and nerfstudio state ``fl_x``, ``cx``, ``w`` … for all frames or for each, and the coefficients of a lens (OPENCV).
 """
 
 import json
@@ -22,20 +21,10 @@ OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """Between the axes of an OpenCV camera and an OpenGL one."""
 MAX_TRANSFORMS_FILE_BYTES = 2**27
 """[bytes]"""
-TRANSFORMS_ADVICE = (
-    "Name a folder of photographs with their transforms.json, or write the file again."
-)
+TRANSFORMS_ADVICE = "Name a folder of photographs with their transforms.json, or write the file again."
 RADIAL_KEYS = ("k1", "k2", "k3", "k4")
 TANGENTIAL_KEYS = ("p1", "p2")
-READABLE_CAMERA_MODELS = (
-    "",
-    "OPENCV",
-    "PINHOLE",
-    "SIMPLE_PINHOLE",
-    "SIMPLE_RADIAL",
-    "RADIAL",
-    "PERSPECTIVE",
-)
+READABLE_CAMERA_MODELS = ("", "OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE")
 FISHEYE_KEYS = ("is_fisheye", "ftheta_p0", "latlong")
 """Lens parameters of instant-ngp that are not of pinhole cameras."""
 
@@ -70,9 +59,7 @@ class TransformsFrame:
     def lens(self, width: int, height: int) -> Lens:
         """Return the lens before a picture of this size, or of the size that the file states."""
         model = str(self.value.get("camera_model", ""))
-        if model.upper() not in READABLE_CAMERA_MODELS or any(
-            self.value.get(key) for key in FISHEYE_KEYS
-        ):
+        if model.upper() not in READABLE_CAMERA_MODELS or any(self.value.get(key) for key in FISHEYE_KEYS):
             kind = model if model.upper() not in READABLE_CAMERA_MODELS else "fisheye"
             step = "Undistort the pictures, best with the program that wrote the file."
             self.fail(f"its lens bends straight lines in a way not known ({kind[:40]}).", step)
@@ -134,17 +121,13 @@ def read_transforms_frames(path: Path) -> list[TransformsFrame]:
     frames = parsed.get("frames") if isinstance(parsed, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(f, dict) for f in frames):
         raise BadFileError(path, "it has no list of frames.", "Each needs its file_path.")
-    return [
-        TransformsFrame(path, f"frame {k + 1}: ", parsed | frame) for k, frame in enumerate(frames)
-    ]
+    return [TransformsFrame(path, f"frame {k + 1}: ", parsed | frame) for k, frame in enumerate(frames)]
 
 
 def _parsed(path: Path) -> Any:
     try:
         if path.stat().st_size > MAX_TRANSFORMS_FILE_BYTES:
-            raise BadFileError(
-                path, f"is larger than {MAX_TRANSFORMS_FILE_BYTES >> 20} MiB.", TRANSFORMS_ADVICE
-            )
+            raise BadFileError(path, f"is larger than {MAX_TRANSFORMS_FILE_BYTES >> 20} MiB.", TRANSFORMS_ADVICE)
         return json.loads(path.read_bytes())
     except OSError as problem:
         raise BadFileError(path, f"cannot be read ({problem.strerror}).") from problem

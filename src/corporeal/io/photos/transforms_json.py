@@ -1,9 +1,8 @@
 """Posed pictures as ``transforms.json``, as in instant-ngp and nerfstudio.
 
-The matrix of a frame leads from camera to world, both as OpenGL has them (x right, y up, z back;
-the world's z up); ours looks along +z with y down, so the second and the third column change sign.
-The folder also holds what these tools don't know (normals, who is where), under names of its own;
-they leave that alone.
+The matrix of a frame leads from camera to world, both as OpenGL has them (x right, y up, z back; the world's z up);
+ours looks along +z with y down, so the second and the third column change sign. The folder also holds what these tools
+don't know (normals, who is where), under names of its own; they leave that alone.
 
     rgb/0000.png       sRGB
     depth/0000.png     16 bits: z-depth in units of integer_depth_scale [m]; 0: nothing, or farther
@@ -54,16 +53,13 @@ def write_views(folder: Path, views: Views) -> Path:
         The path of ``transforms.json``.
 
     Raises:
-        UserError: A camera is skewed, which the format cannot say; more than 65534 objects or
-            parts; the disk refuses it.
+        UserError: A camera is skewed, which the format cannot say; more than 65534 objects or parts; the disk refuses
+            it.
 
     """
     path = folder / TRANSFORMS_FILE
     unit = _depth_unit(views)
-    frames = [
-        {"transform_matrix": (c.world_from_camera @ OPENCV_FROM_OPENGL).tolist()}
-        for c in views.cameras
-    ]
+    frames = [{"transform_matrix": (c.world_from_camera @ OPENCV_FROM_OPENGL).tolist()} for c in views.cameras]
     with store.disk_errors(folder):
         path.unlink(missing_ok=True)
         for key, name, pictures in _layers(views, unit):
@@ -133,9 +129,7 @@ def _depth_unit(views: Views) -> float:
         return DEFAULT_DEPTH_UNIT_M
     if far > DEFAULT_DEPTH_UNIT_M * MAX_DEPTH_U16:
         return 10.0 ** math.ceil(math.log10(far / MAX_DEPTH_U16))
-    return min(
-        DEFAULT_DEPTH_UNIT_M, 10.0 ** math.floor(math.log10(near / MIN_DEPTH_STEPS_TO_NEAREST))
-    )
+    return min(DEFAULT_DEPTH_UNIT_M, 10.0 ** math.floor(math.log10(near / MIN_DEPTH_STEPS_TO_NEAREST)))
 
 
 def _depth_in_units(depth: np.ndarray, unit: float) -> np.ndarray:
@@ -154,12 +148,12 @@ def _normals_as_colours(normals: np.ndarray) -> np.ndarray:
 def read_views(folder: Path) -> Views:
     """Read a folder of posed pictures with all that was measured with them, as it was written.
 
-    What a frame says of its camera goes before what the file says. All but colours and cameras is
-    optional. ``photographs.read_photographs`` reads what others took, and is more patient.
+    What a frame says of its camera goes before what the file says. All but colours and cameras is optional.
+    ``photographs.read_photographs`` reads what others took, and is more patient.
 
     Raises:
-        BadFileError: It is no such folder, a number or picture in it is bad, the pictures are not
-            all of one size, or a lens bends straight lines.
+        BadFileError: It is no such folder, a number or picture in it is bad, the pictures are not all of one size, or a
+            lens bends straight lines.
 
     """
     path = folder / TRANSFORMS_FILE
@@ -211,10 +205,7 @@ def _picture(frame: TransformsFrame, key: str, decode: Callable[[bytes], np.ndar
 
 
 def _stack_images(
-    shots: list[TransformsFrame],
-    key: str,
-    decode: Callable[[bytes], np.ndarray],
-    shape: tuple[int, ...] | None = None,
+    shots: list[TransformsFrame], key: str, decode: Callable[[bytes], np.ndarray], shape: tuple[int, ...] | None = None
 ) -> np.ndarray | None:
     """Return one kind of picture of all frames, (V, H, W, …); None where no frame has it."""
     lacking = [s for s in shots if key not in s.value]

@@ -1,8 +1,8 @@
 """Gaussians as ``.ksplat``, as GaussianSplats3D (mkkellogg) writes them, at its three levels.
 
-A header of 4096 bytes, one of 1024 for each section, then the sections: counts of partly filled
-buckets, middles of buckets, Gaussians. Levels 1 and 2 store places relative to their bucket in 16
-bits and the rest in half precision; level 2 has harmonics as bytes between two bounds.
+A header of 4096 bytes, one of 1024 for each section, then the sections: counts of partly filled buckets, middles of
+buckets, Gaussians. Levels 1 and 2 store places relative to their bucket in 16 bits and the rest in half precision;
+level 2 has harmonics as bytes between two bounds.
 """
 
 import struct
@@ -68,20 +68,14 @@ def read_ksplat(path: Path, data: memoryview) -> Gaussians:
     bounds = (low or DEFAULT_SH_BOUNDS[0], high or DEFAULT_SH_BOUNDS[1])
     at = KSPLAT_HEADER_BYTES + KSPLAT_SECTION_HEADER_BYTES * sections
     if at > len(data):
-        raise BadFileError(
-            path, f"has no room for the {sections:,} sections it claims.", COPY_AGAIN_ADVICE
-        )
+        raise BadFileError(path, f"has no room for the {sections:,} sections it claims.", COPY_AGAIN_ADVICE)
     found = []
     for k in range(sections):
-        section = _read_section(
-            path, data, KSPLAT_HEADER_BYTES + KSPLAT_SECTION_HEADER_BYTES * k, level
-        )
+        section = _read_section(path, data, KSPLAT_HEADER_BYTES + KSPLAT_SECTION_HEADER_BYTES * k, level)
         kind = _record_dtype(level, section.degree)
         end = at + section.head + kind.itemsize * section.room
         if end > len(data) or section.count > section.room:
-            raise BadFileError(
-                path, f"section {k + 1} runs past the end of the file.", COPY_AGAIN_ADVICE
-            )
+            raise BadFileError(path, f"section {k + 1} runs past the end of the file.", COPY_AGAIN_ADVICE)
         if section.count:
             found.append(_decode_section(path, data, at, section, kind, bounds))
         at = end
@@ -93,11 +87,7 @@ def read_ksplat(path: Path, data: memoryview) -> Gaussians:
 def _read_section(path: Path, data: memoryview, at: int, level: int) -> _KsplatSection:
     fields = struct.unpack_from("<IIIIfHxxIxxxxIIH", data, at)
     count, room, capacity, buckets, block, size, span, full, partial, degree = fields
-    if (
-        degree >= len(SH_COEFFICIENTS_OF_DEGREE)
-        or full + partial > buckets
-        or not np.isfinite(block)
-    ):
+    if degree >= len(SH_COEFFICIENTS_OF_DEGREE) or full + partial > buckets or not np.isfinite(block):
         raise BadFileError(path, "the header of a section is bad.", COPY_AGAIN_ADVICE)
     span = span or DEFAULT_HALF_RANGE_OF_LEVEL[level]
     return _KsplatSection(count, room, capacity, buckets, block, size, span, full, partial, degree)
@@ -119,12 +109,7 @@ def _record_dtype(level: int, degree: int) -> np.dtype:
 
 
 def _decode_section(
-    path: Path,
-    data: memoryview,
-    at: int,
-    section: _KsplatSection,
-    kind: np.dtype,
-    bounds: tuple[float, float],
+    path: Path, data: memoryview, at: int, section: _KsplatSection, kind: np.dtype, bounds: tuple[float, float]
 ) -> Gaussians:
     rows = np.frombuffer(data, kind, section.count, at + section.head)
     mean = rows["mean"].astype(np.float32)
@@ -140,9 +125,7 @@ def _decode_section(
         rotation=rows["turn"].astype(np.float32),
         scale=rows["scale"].astype(np.float32),
         opacity=rgba[:, 3],
-        sh=np.concatenate(
-            [(rgba[:, None, :3] - 0.5) / np.float32(SH_DC_COEFFICIENT), _sh_by_band(rest)], axis=1
-        ),
+        sh=np.concatenate([(rgba[:, None, :3] - 0.5) / np.float32(SH_DC_COEFFICIENT), _sh_by_band(rest)], axis=1),
     )
 
 
@@ -154,9 +137,7 @@ def _bucket_centres(path: Path, data: memoryview, at: int, section: _KsplatSecti
     bucket = np.searchsorted(ends, np.arange(section.count), side="right")
     bad = section.bucket_bytes < 12 or not len(ends) or ends[-1] < section.count
     if bad:
-        raise BadFileError(
-            path, "its buckets hold fewer Gaussians than there are.", COPY_AGAIN_ADVICE
-        )
+        raise BadFileError(path, "its buckets hold fewer Gaussians than there are.", COPY_AGAIN_ADVICE)
     stride = section.bucket_bytes
     raw = np.frombuffer(data, np.uint8, stride * section.buckets, at + 4 * section.partial)
     middles = np.ascontiguousarray(raw.reshape(-1, stride)[:, :12]).view("<f4")
@@ -180,9 +161,6 @@ def _concatenate_sections(found: list[Gaussians]) -> Gaussians:
     most = max(g.sh.shape[1] for g in found)
     padded = [np.pad(g.sh, ((0, 0), (0, most - g.sh.shape[1]), (0, 0))) for g in found]
     return Gaussians(
-        *(
-            np.concatenate([getattr(g, name) for g in found])
-            for name in ("mean", "rotation", "scale", "opacity")
-        ),
+        *(np.concatenate([getattr(g, name) for g in found]) for name in ("mean", "rotation", "scale", "opacity")),
         sh=np.concatenate(padded),
     )

@@ -6,12 +6,7 @@ from pathlib import Path
 from corporeal.core.errors import BadFileError
 from corporeal.core.registry import load_function
 from corporeal.core.types import Gaussians, Note, NoteKind
-from corporeal.geometry.gaussian_transforms import (
-    UpAxis,
-    drop_invalid_gaussians,
-    rotation_to_z_up,
-    transform_gaussians,
-)
+from corporeal.geometry.gaussian_transforms import UpAxis, drop_invalid_gaussians, rotation_to_z_up, transform_gaussians
 from corporeal.io.gltf.gltf_container import read_file_bytes
 from corporeal.io.ply_container import COPY_AGAIN_ADVICE
 from corporeal.io.registry import reader_of_content, readers_of
@@ -25,8 +20,8 @@ def load_splat(path: Path, up: UpAxis | None = None) -> Gaussians:
 
     Args:
         path: A file, or the folder of an unpacked SOG.
-        up: Which axis of the file points up; the result is turned so that +z does. None: it keeps
-            the file's own frame. INRIA's layout and all but SPZ usually have "-y", SPZ "+y".
+        up: Which axis of the file points up; the result is turned so that +z does. None: it keeps the file's own frame.
+            INRIA's layout and all but SPZ usually have "-y", SPZ "+y".
 
     Raises:
         BadFileError: It is no splat, it is broken, or most of it cannot be used.
@@ -48,10 +43,7 @@ def load_splat(path: Path, up: UpAxis | None = None) -> Gaussians:
         what = f"{lost:,} of {raw.count:,} Gaussians cannot be used: {reasons}."
         raise BadFileError(path, what, "Train or export it again.")
     if lost:
-        words = Note(
-            f"{path.name}: {lost:,} of {raw.count:,} Gaussians were left out: {reasons}.",
-            NoteKind.LEFT_OUT,
-        )
+        words = Note(f"{path.name}: {lost:,} of {raw.count:,} Gaussians were left out: {reasons}.", NoteKind.LEFT_OUT)
         gaussians = replace(gaussians, warnings=(*gaussians.warnings, words))
     return gaussians if up is None else transform_gaussians(gaussians, rotation_to_z_up(up))
 

@@ -1,7 +1,7 @@
 """Gaussians as SOG version 2 (PlayCanvas): pictures that hold numbers, and ``meta.json``.
 
-A folder, or all of it in one ZIP file (``.sog``). Pixel i, row by row, belongs to Gaussian i.
-Specification: developer.playcanvas.com/user-manual/gaussian-splatting/formats/sog.
+A folder, or all of it in one ZIP file (``.sog``). Pixel i, row by row, belongs to Gaussian i. Specification:
+developer.playcanvas.com/user-manual/gaussian-splatting/formats/sog.
 """
 
 import io
@@ -47,9 +47,7 @@ def read_sog(path: Path, data: memoryview) -> Gaussians:
     return _SogReader(path, lambda name: read_beside(path.parent, name, MAX_SOG_FILE_BYTES)).read()
 
 
-def read_sog_zip(
-    path: Path, data: memoryview, max_file_bytes: int = MAX_SOG_FILE_BYTES
-) -> Gaussians:
+def read_sog_zip(path: Path, data: memoryview, max_file_bytes: int = MAX_SOG_FILE_BYTES) -> Gaussians:
     """Return the Gaussians of a bundle as it says them, unchecked.
 
     max_file_bytes: of one picture or of the JSON; larger ones are refused.
@@ -61,9 +59,7 @@ def read_sog_zip(
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OSError, RuntimeError) as problem:
-        raise BadFileError(
-            path, f"its ZIP is broken ({str(problem)[:60]}).", COPY_AGAIN_ADVICE
-        ) from None
+        raise BadFileError(path, f"its ZIP is broken ({str(problem)[:60]}).", COPY_AGAIN_ADVICE) from None
 
     def source(name: str) -> bytes:
         try:
@@ -178,9 +174,7 @@ class _SogReader:
         width = SH_COEFFICIENTS_OF_DEGREE[bands]
         palette = self.picture(meta, "shN")[..., :3]
         if palette.shape[1] != PALETTE_ROW_ENTRIES * width:
-            self.fail(
-                f"the palette is {palette.shape[1]} pixels wide, not {PALETTE_ROW_ENTRIES * width}."
-            )
+            self.fail(f"the palette is {palette.shape[1]} pixels wide, not {PALETTE_ROW_ENTRIES * width}.")
         palette = palette.reshape(-1, width, 3)
         label = self.pixels(meta, "shN", count, 1).astype(np.int64)
         entry = label[:, 0] + 256 * label[:, 1]

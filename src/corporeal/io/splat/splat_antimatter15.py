@@ -11,9 +11,7 @@ from corporeal.core.errors import BadFileError
 from corporeal.core.types import Gaussians
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 
-SPLAT_RECORD_DTYPE = np.dtype(
-    [("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("turn", "u1", 4)]
-)
+SPLAT_RECORD_DTYPE = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("turn", "u1", 4)])
 MIN_PLAUSIBLE_RECORDS_FRACTION = 0.5
 """Share of records with positive scales and some length of rotation that tells such a file."""
 
@@ -40,9 +38,7 @@ def read_antimatter15(path: Path, data: memoryview) -> Gaussians:
 
     """
     if len(data) % SPLAT_RECORD_DTYPE.itemsize:
-        what = (
-            f"is {len(data):,} bytes long, which is no multiple of {SPLAT_RECORD_DTYPE.itemsize}."
-        )
+        what = f"is {len(data):,} bytes long, which is no multiple of {SPLAT_RECORD_DTYPE.itemsize}."
         raise BadFileError(path, what, "Copy or download it again.")
     rows = np.frombuffer(data, SPLAT_RECORD_DTYPE)
     rgba = rows["rgba"] / np.float32(255)

@@ -1,9 +1,9 @@
 """Gaussians as compressed PLY, as PlayCanvas' tools (SuperSplat, SplatTransform) write it.
 
-Chunks of 256 Gaussians share bounds of place, of the logarithm of scale, and, in newer files, of
-colour. Within them a Gaussian is four numbers of 32 bits: place 11-10-11 bits, rotation 2-10-10-10
-(which component is the largest, then the three others over sqrt 2, in the order w x y z), scale
-11-10-11, and colour with opacity 8-8-8-8. The element "sh" has f_rest_* as bytes over -4 … 4.
+Chunks of 256 Gaussians share bounds of place, of the logarithm of scale, and, in newer files, of colour. Within them a
+Gaussian is four numbers of 32 bits: place 11-10-11 bits, rotation 2-10-10-10 (which component is the largest, then the
+three others over sqrt 2, in the order w x y z), scale 11-10-11, and colour with opacity 8-8-8-8. The element "sh" has
+f_rest_* as bytes over -4 … 4.
 """
 
 from pathlib import Path
@@ -14,12 +14,7 @@ from corporeal.core.errors import BadFileError
 from corporeal.core.types import Gaussians
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.io.ply_container import COPY_AGAIN_ADVICE, PlyColumns, read_ply_elements
-from corporeal.io.splat.splat_ply import (
-    exponential,
-    gaussians_from_vertices,
-    sh_rest_coefficients,
-    stack_columns,
-)
+from corporeal.io.splat.splat_ply import exponential, gaussians_from_vertices, sh_rest_coefficients, stack_columns
 
 GAUSSIANS_PER_CHUNK = 256
 PACKED_PROPERTIES = ["packed_position", "packed_rotation", "packed_scale", "packed_color"]
@@ -60,14 +55,10 @@ def gaussians_from_chunks(path: Path, elements: dict[str, PlyColumns]) -> Gaussi
     missing = [n for n in (*sides, *sizes) if n not in chunks]
     missing += [n for n in PACKED_PROPERTIES if n not in vertices]
     if missing:
-        raise BadFileError(
-            path, f"is a compressed splat that lacks {', '.join(missing)}.", COPY_AGAIN_ADVICE
-        )
+        raise BadFileError(path, f"is a compressed splat that lacks {', '.join(missing)}.", COPY_AGAIN_ADVICE)
     count = len(vertices[PACKED_PROPERTIES[0]])
     if len(chunks["min_x"]) != -(-count // GAUSSIANS_PER_CHUNK):
-        what = (
-            f"has {len(chunks['min_x'])} chunks of {GAUSSIANS_PER_CHUNK} for {count:,} Gaussians."
-        )
+        what = f"has {len(chunks['min_x'])} chunks of {GAUSSIANS_PER_CHUNK} for {count:,} Gaussians."
         raise BadFileError(path, what, COPY_AGAIN_ADVICE)
     place, turn, size, colour = (vertices[n].astype(np.uint32) for n in PACKED_PROPERTIES)
     shades = _bit_fields(colour, (8, 8, 8, 8))
@@ -91,9 +82,7 @@ def unpacked_rotation(turn: np.ndarray) -> np.ndarray:
     others = (_bit_fields(turn & 0x3FFFFFFF, (2, 10, 10, 10))[:, 1:] - 0.5) * np.sqrt(2)
     largest = np.sqrt(np.maximum(0, 1 - (others**2).sum(axis=1)))
     four = np.concatenate([largest[:, None], others], axis=1)
-    return np.take_along_axis(four, COMPONENT_ORDER_OF_LARGEST[turn >> 30], axis=1).astype(
-        np.float32
-    )
+    return np.take_along_axis(four, COMPONENT_ORDER_OF_LARGEST[turn >> 30], axis=1).astype(np.float32)
 
 
 def _bit_fields(numbers: np.ndarray, bits: tuple[int, ...]) -> np.ndarray:
@@ -117,9 +106,7 @@ def _interpolate_in_chunks(chunks: PlyColumns, names: list[str], shares: np.ndar
 
 def _chunk_colours(chunks: PlyColumns, shares: np.ndarray) -> np.ndarray:
     names = [f"{end}_{channel}" for end in ("min", "max") for channel in "rgb"]
-    return (
-        _interpolate_in_chunks(chunks, names, shares) if all(n in chunks for n in names) else shares
-    )
+    return _interpolate_in_chunks(chunks, names, shares) if all(n in chunks for n in names) else shares
 
 
 def _sh_rest_coefficients(path: Path, elements: dict[str, PlyColumns], count: int) -> np.ndarray:
@@ -131,8 +118,6 @@ def _sh_rest_coefficients(path: Path, elements: dict[str, PlyColumns], count: in
         return np.zeros((count, 0, 3), np.float32)
     values = sh_rest_coefficients(path, elements["sh"])
     if len(values) != count:
-        raise BadFileError(
-            path, f"has harmonics for {len(values):,} of {count:,}.", COPY_AGAIN_ADVICE
-        )
+        raise BadFileError(path, f"has harmonics for {len(values):,} of {count:,}.", COPY_AGAIN_ADVICE)
     share = np.where(values == 0, 0, np.where(values == 255, 1, (values + 0.5) / 256))
     return (share - 0.5) * 2 * MAX_SH_REST_COEFFICIENT

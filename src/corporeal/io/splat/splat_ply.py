@@ -1,8 +1,8 @@
 """Gaussians as PLY in the layout of INRIA's 3D Gaussian splatting, which most tools read and write.
 
-Each vertex has x y z, f_dc_0…2 (band 0 of R, G, B), f_rest_0… (all other coefficients of R, then of
-G, then of B), opacity (its logit), scale_0…2 (logarithms) and rot_0…3 (w, x, y, z; any length).
-Normals and other properties are ignored.
+Each vertex has x y z, f_dc_0…2 (band 0 of R, G, B), f_rest_0… (all other coefficients of R, then of G, then of B),
+opacity (its logit), scale_0…2 (logarithms) and rot_0…3 (w, x, y, z; any length). Normals and other properties are
+ignored.
 """
 
 from pathlib import Path
@@ -19,13 +19,7 @@ MEAN_PROPERTIES = ["x", "y", "z"]
 COLOUR_PROPERTIES = [f"f_dc_{k}" for k in range(3)]
 SCALE_PROPERTIES = [f"scale_{k}" for k in range(3)]
 ROTATION_PROPERTIES = [f"rot_{k}" for k in range(4)]
-REQUIRED_PROPERTIES = [
-    *MEAN_PROPERTIES,
-    *COLOUR_PROPERTIES,
-    "opacity",
-    *SCALE_PROPERTIES,
-    *ROTATION_PROPERTIES,
-]
+REQUIRED_PROPERTIES = [*MEAN_PROPERTIES, *COLOUR_PROPERTIES, "opacity", *SCALE_PROPERTIES, *ROTATION_PROPERTIES]
 SH_COUNT_OF_REST_PROPERTIES = {3 * (K - 1): K for K in SH_DEGREE_OF_COUNT}
 """Number of coefficients per channel for each number of f_rest properties."""
 MAX_OPACITY = 1 - 2.0**-24
@@ -50,11 +44,7 @@ def gaussians_from_vertices(path: Path, vertices: PlyColumns) -> Gaussians:
         scale=exponential(stack_columns(vertices, SCALE_PROPERTIES)),
         opacity=logistic(vertices["opacity"]),
         sh=np.concatenate(
-            [
-                stack_columns(vertices, COLOUR_PROPERTIES)[:, None],
-                sh_rest_coefficients(path, vertices),
-            ],
-            axis=1,
+            [stack_columns(vertices, COLOUR_PROPERTIES)[:, None], sh_rest_coefficients(path, vertices)], axis=1
         ),
     )
 
@@ -67,9 +57,7 @@ def sh_rest_coefficients(path: Path, columns: PlyColumns) -> np.ndarray:
 
     """
     names = [name for name in columns if name.startswith("f_rest_")]
-    if len(names) not in SH_COUNT_OF_REST_PROPERTIES or set(names) != {
-        f"f_rest_{k}" for k in range(len(names))
-    }:
+    if len(names) not in SH_COUNT_OF_REST_PROPERTIES or set(names) != {f"f_rest_{k}" for k in range(len(names))}:
         fit = ", ".join(str(n) for n in SH_COUNT_OF_REST_PROPERTIES)
         what = f"has {len(names)} properties f_rest_*; degrees 0 to 3 have {fit}, from f_rest_0 on."
         raise BadFileError(path, what, "Export it again with harmonics of degree 3 or less.")

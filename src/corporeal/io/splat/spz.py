@@ -1,8 +1,8 @@
 """Gaussians as SPZ, versions 2 to 4, as Niantic's tools write them (github.com/nianticlabs/spz).
 
-After the header, attribute by attribute: places (fixed point, 24 bits), opacities, colours, scales,
-rotations, harmonics. Versions 2 and 3 are one gzip stream, version 4 has one Zstandard stream per
-attribute behind a table of their sizes. +Y is up, +Z is back (the others' Y and Z are opposite).
+After the header, attribute by attribute: places (fixed point, 24 bits), opacities, colours, scales, rotations,
+harmonics. Versions 2 and 3 are one gzip stream, version 4 has one Zstandard stream per attribute behind a table of
+their sizes. +Y is up, +Z is back (the others' Y and Z are opposite).
 """
 
 import struct
@@ -32,8 +32,8 @@ KEPT_SH_COEFFICIENTS = 15
 EXTENSIONS_FLAG = 2
 """The flag that says that there are extensions."""
 ADOBE_VENDOR_BYTES = b"\xbe\xad"
-"""Who made the extensions that some files of versions 2 and 3 have before their data; others have
-them behind it, where they are no matter."""
+"""Who made the extensions that some files of versions 2 and 3 have before their data; others have them behind it, where
+they are no matter."""
 SH_BOUNDS_EXTENSION = 0xADBE0001
 """An extension with bounds of the harmonics."""
 SPZ_COLOUR_SCALE = 0.15
@@ -54,9 +54,7 @@ class _SpzHeader:
     def sizes(self) -> list[int]:
         """Return the length of every attribute [bytes]."""
         turn = 3 if self.version == 2 else 4
-        return [
-            self.count * n for n in (9, 1, 3, 3, turn, 3 * SH_COEFFICIENTS_OF_DEGREE[self.degree])
-        ]
+        return [self.count * n for n in (9, 1, 3, 3, turn, 3 * SH_COEFFICIENTS_OF_DEGREE[self.degree])]
 
 
 def read_spz(path: Path, data: memoryview) -> Gaussians:
@@ -78,18 +76,11 @@ def read_spz(path: Path, data: memoryview) -> Gaussians:
     lost = header.degree > 3
     return Gaussians(
         mean=(_decode_fixed_point(place) * 2.0**-header.fraction_bits).astype(np.float32),
-        rotation=_decode_rotation_xyz(turn)
-        if header.version == 2
-        else _decode_smallest_three(turn),
+        rotation=_decode_rotation_xyz(turn) if header.version == 2 else _decode_smallest_three(turn),
         scale=exponential(scale.reshape(-1, 3) / np.float32(16) - 10),
         opacity=(opacity / np.float32(255)),
         sh=np.concatenate([band0, (higher.astype(np.float32) - 128) / 128], axis=1),
-        warnings=(
-            Note(
-                "Colour: harmonics of degree 4 were left out; up to 3 are used.", NoteKind.LEFT_OUT
-            ),
-        )
-        * lost,
+        warnings=(Note("Colour: harmonics of degree 4 were left out; up to 3 are used.", NoteKind.LEFT_OUT),) * lost,
     )
 
 
@@ -101,16 +92,12 @@ def _header(path: Path, data: bytes) -> _SpzHeader:
         raise BadFileError(path, "is no SPZ file.", COPY_AGAIN_ADVICE)
     _, version, count, degree, bits, flags, streams = SPZ_HEADER_STRUCT.unpack_from(data)
     if version not in (2, 3, 4):
-        raise BadFileError(
-            path, f"is SPZ version {version}; 2, 3 and 4 are read.", SPZ_CONVERT_ADVICE
-        )
+        raise BadFileError(path, f"is SPZ version {version}; 2, 3 and 4 are read.", SPZ_CONVERT_ADVICE)
     if degree >= len(SH_COEFFICIENTS_OF_DEGREE) or bits > 24:
         raise BadFileError(path, "its SPZ header is bad.", COPY_AGAIN_ADVICE)
     if count > MAX_SPZ_GAUSSIANS:
         raise BadFileError(
-            path,
-            f"claims {count:,} Gaussians; at most {MAX_SPZ_GAUSSIANS:,} are read.",
-            SPZ_CONVERT_ADVICE,
+            path, f"claims {count:,} Gaussians; at most {MAX_SPZ_GAUSSIANS:,} are read.", SPZ_CONVERT_ADVICE
         )
     return _SpzHeader(version, count, degree, bits, flags, streams)
 
@@ -123,9 +110,7 @@ def _one_stream(path: Path, data: memoryview) -> tuple[_SpzHeader, list[bytes]]:
         header = _header(path, start)
         body = stream.decompress(stream.unconsumed_tail, max(1, sum(header.sizes())))
     except zlib.error as problem:
-        raise BadFileError(
-            path, f"its gzip stream is broken ({problem}).", COPY_AGAIN_ADVICE
-        ) from None
+        raise BadFileError(path, f"its gzip stream is broken ({problem}).", COPY_AGAIN_ADVICE) from None
     return header, _plain(path, start + body, header)
 
 
@@ -154,13 +139,9 @@ def _streams(path: Path, data: memoryview, header: _SpzHeader) -> list[bytes]:
     _refuse_bounds(path, data, header, table)
     attributes = []
     for k, size in enumerate(sizes):
-        packed, unpacked = STREAM_SIZES_STRUCT.unpack_from(
-            data, table + STREAM_SIZES_STRUCT.size * k
-        )
+        packed, unpacked = STREAM_SIZES_STRUCT.unpack_from(data, table + STREAM_SIZES_STRUCT.size * k)
         if unpacked != size or packed > len(data) - at:
-            raise BadFileError(
-                path, "its streams are not as long as its table says.", COPY_AGAIN_ADVICE
-            )
+            raise BadFileError(path, "its streams are not as long as its table says.", COPY_AGAIN_ADVICE)
         attributes.append(_unpacked(path, data[at : at + packed], size))
         at += packed
     return attributes + [b""] * (6 - len(attributes))
@@ -170,16 +151,12 @@ def _unpacked(path: Path, data: memoryview, size: int) -> bytes:
     try:
         import zstandard
     except ImportError:
-        raise BadFileError(
-            path, "is packed with Zstandard (SPZ version 4).", ZSTANDARD_ADVICE
-        ) from None
+        raise BadFileError(path, "is packed with Zstandard (SPZ version 4).", ZSTANDARD_ADVICE) from None
     try:
         with zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data) as stream:
             found = stream.read(size)
     except zstandard.ZstdError as problem:
-        raise BadFileError(
-            path, f"a stream is broken ({str(problem)[:60]}).", COPY_AGAIN_ADVICE
-        ) from None
+        raise BadFileError(path, f"a stream is broken ({str(problem)[:60]}).", COPY_AGAIN_ADVICE) from None
     if len(found) != size:
         raise BadFileError(path, "a stream ends too early.", COPY_AGAIN_ADVICE)
     return found

@@ -1,7 +1,7 @@
 """Physics of USD stages: all data of files written here, UsdPhysics of others.
 
-Meshes are read elsewhere (``mesh_usd.py``); here is what objects weigh, how they move and what they
-are made of, each value with who stated it.
+Meshes are read elsewhere (``mesh_usd.py``); here is what objects weigh, how they move and what they are made of, each
+value with who stated it.
 """
 
 # usd-core is optional, and comes without types.
@@ -17,11 +17,7 @@ from corporeal.core.errors import BadFileError, UserError
 
 CUSTOM_DATA_KEY = "corporeal"
 """Name of our own customData."""
-FIELD_OF_PHYSICS_ATTRIBUTE = {
-    "density": "density",
-    "dynamicFriction": "friction",
-    "restitution": "restitution",
-}
+FIELD_OF_PHYSICS_ATTRIBUTE = {"density": "density", "dynamicFriction": "friction", "restitution": "restitution"}
 """Attribute of PhysicsMaterialAPI → field of ``Material``."""
 BODY_SCHEMAS = {"PhysicsRigidBodyAPI", "PhysicsDeformableBodyAPI"}
 USD_EXPORT_ADVICE = "Export it again as USD."
@@ -91,9 +87,7 @@ def read_usd_physics(path: str | Path) -> tuple[StatedBody, ...]:
     try:
         from pxr import Tf, Usd
     except ImportError as error:
-        raise UserError(
-            "Reading USD needs usd-core. Install it with: pip install 'corporeal[export]'."
-        ) from error
+        raise UserError("Reading USD needs usd-core. Install it with: pip install 'corporeal[export]'.") from error
     path = Path(path)
     if not path.is_file():
         raise BadFileError(path, "there is no such file.", "Check the path.")
@@ -148,10 +142,7 @@ class _StageUnits:
     def of(cls, stage: Any) -> "_StageUnits":
         from pxr import UsdGeom, UsdPhysics
 
-        mass, length = (
-            UsdPhysics.GetStageKilogramsPerUnit(stage),
-            UsdGeom.GetStageMetersPerUnit(stage),
-        )
+        mass, length = (UsdPhysics.GetStageKilogramsPerUnit(stage), UsdGeom.GetStageMetersPerUnit(stage))
         return cls(mass, mass / length**3, length)
 
 

@@ -2,13 +2,13 @@
 
 What UsdPhysics says of bodies and their material comes along (``usd_bodies.py``).
 
-Facts: OpenUSD 26.11, UsdGeom (mesh, subset, primvar, stage metrics), UsdShade (UsdPreviewSurface).
-A layer, and a picture, must lie in the file's own folder, or in the package itself.
+Facts: OpenUSD 26.11, UsdGeom (mesh, subset, primvar, stage metrics), UsdShade (UsdPreviewSurface). A layer, and a
+picture, must lie in the file's own folder, or in the package itself.
 
 Shapes that USD states by numbers (a cube, a sphere …) as triangles.
 
-Facts: OpenUSD 26.11, UsdGeom: ``size``, ``radius``, ``height``, ``axis``; a capsule's height is
-that of its cylinder alone, all stand about the origin, a cone's tip points along its axis.
+Facts: OpenUSD 26.11, UsdGeom: ``size``, ``radius``, ``height``, ``axis``; a capsule's height is that of its cylinder
+alone, all stand about the origin, a cone's tip points along its axis.
 """
 
 import io
@@ -27,13 +27,7 @@ from corporeal.core.types import STATED_MATTER_KEY, SUBSTANCE_KEY, Finish, Surfa
 from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
 from corporeal.io.image_decoder import as_reduced_array
 from corporeal.io.mesh.raw_mesh import MESH_EXPORT_ADVICE, NODE_NAMES_KEY, RawMesh
-from corporeal.io.usd.usd_bodies import (
-    StatedBody,
-    StatedMaterial,
-    custom_data_of,
-    physical_material,
-    read_stage_bodies,
-)
+from corporeal.io.usd.usd_bodies import StatedBody, StatedMaterial, custom_data_of, physical_material, read_stage_bodies
 
 CIRCLE_SEGMENTS = 48
 """Corners of a circle."""
@@ -66,9 +60,7 @@ def shape_triangles(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[np.ndarray, np.
         return None
     made = make(*sizes)
     axis = UsdGeom.Tokens.z if kind in ("Cube", "Sphere") else prim.GetAttribute("axis").Get(time)
-    return np.asarray(made.vertices) @ ROTATION_FROM_Z_TO_AXIS[str(axis)].T, np.asarray(
-        made.faces, np.int64
-    )
+    return np.asarray(made.vertices) @ ROTATION_FROM_Z_TO_AXIS[str(axis)].T, np.asarray(made.faces, np.int64)
 
 
 def _cone(radius: float, height: float) -> trimesh.Trimesh:
@@ -85,9 +77,7 @@ SHAPE_MAKERS = {
     ),
     "Capsule": (
         ("radius", "height"),
-        lambda radius, height: trimesh.creation.capsule(
-            height, radius, count=[CIRCLE_SEGMENTS, CIRCLE_SEGMENTS]
-        ),
+        lambda radius, height: trimesh.creation.capsule(height, radius, count=[CIRCLE_SEGMENTS, CIRCLE_SEGMENTS]),
     ),
     "Cone": (("radius", "height"), _cone),
 }
@@ -126,17 +116,12 @@ def read_usd(path: Path) -> RawMesh:
         up="+y" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y else "+z",
         unit=unit,
         lost=tuple(f"{what} ({count})" for what, count in (lost + looks.lost).items()),
-        bodies={
-            b.path: {"title": b.title, "mass": b.mass, "velocity": b.velocity, "custom": b.custom}
-            for b in bodies
-        },
+        bodies={b.path: {"title": b.title, "mass": b.mass, "velocity": b.velocity, "custom": b.custom} for b in bodies},
         custom=custom_data_of(stage.GetDefaultPrim()).get("scene", {}),
     )
 
 
-def _bound_substance(
-    prim: Usd.Prim, path: Path, bodies: tuple[StatedBody, ...]
-) -> StatedMaterial | None:
+def _bound_substance(prim: Usd.Prim, path: Path, bodies: tuple[StatedBody, ...]) -> StatedMaterial | None:
     """Return what a mesh is made of: as bound to it, else as all colliders of its body are."""
     own = physical_material(prim, path, prim.GetStage())
     about = [b for b in bodies if prim.GetPath().HasPrefix(Sdf.Path(b.path))]
@@ -307,9 +292,7 @@ def _fan_triangles(starts: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.stack([first, first + k, first + k + 1], axis=1)
 
 
-def _material_subsets(
-    mesh: UsdGeom.Mesh, faces: int
-) -> Iterator[tuple[np.ndarray, UsdShade.Material]]:
+def _material_subsets(mesh: UsdGeom.Mesh, faces: int) -> Iterator[tuple[np.ndarray, UsdShade.Material]]:
     """Yield the faces of each subset with a material, and the rest with the mesh's own."""
     own = UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0]
     rest = np.ones(faces, bool)

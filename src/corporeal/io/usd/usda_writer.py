@@ -1,8 +1,8 @@
 """Write OpenUSD's text format (.usda): layers of prims with attributes, samples and metadata.
 
 Text needs no library and is readable. Grammar: OpenUSD's "Crate and text file formats",
-https://openusd.org/release/spec.html. Numbers are written in nine digits, which single precision
-survives unchanged, or shortest in double.
+https://openusd.org/release/spec.html. Numbers are written in nine digits, which single precision survives unchanged, or
+shortest in double.
 """
 
 import re

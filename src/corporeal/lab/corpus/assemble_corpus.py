@@ -1,12 +1,12 @@
 """Assembly of the scenes of a corpus, each in its own process.
 
-A scene's folder below ``<corpus>/scenes`` appears whole or not at all, under an id that covers the
-settings, the seed and the bytes of its assets.
+A scene's folder below ``<corpus>/scenes`` appears whole or not at all, under an id that covers the settings, the seed
+and the bytes of its assets.
 
 Mass properties of the objects of a pool, for settling.
 
-Pieces of uniform density would do for a stone. A pot is heavier than its plant, a can is a wall
-around its contents, and a cup on its side rolls to where its handle is lowest.
+Pieces of uniform density would do for a stone. A pot is heavier than its plant, a can is a wall around its contents,
+and a cup on its side rolls to where its handle is lowest.
 """
 
 from collections.abc import Sequence
@@ -52,9 +52,7 @@ MASS_CACHE_VERSION = 6
 """Of the way objects are weighed: kept results of another version are made anew."""
 
 
-def asset_mass_properties(
-    asset: PoolAsset, extent: float, folder: Path | None = None
-) -> MassProperties:
+def asset_mass_properties(asset: PoolAsset, extent: float, folder: Path | None = None) -> MassProperties:
     """Fill an object of the pool with the materials that its names suggest, and weigh it.
 
     Args:
@@ -125,17 +123,14 @@ class Sources:
     """Which pictures are taken of it."""
 
 
-def assemble_corpus(
-    folder: Path, config: CorpusConfig, sources: Sources, hands: Executor
-) -> dict[str, ManifestRow]:
+def assemble_corpus(folder: Path, config: CorpusConfig, sources: Sources, hands: Executor) -> dict[str, ManifestRow]:
     """Plan a corpus and make its scenes; return what became of each.
 
-    A folder that was planned before with the same settings keeps its plan, whatever the pool has
-    got since.
+    A folder that was planned before with the same settings keeps its plan, whatever the pool has got since.
 
     Raises:
-        UserError: The pool is empty or lost what the plan needs, the folder holds a corpus that was
-            planned otherwise, or another process works in it.
+        UserError: The pool is empty or lost what the plan needs, the folder holds a corpus that was planned otherwise,
+            or another process works in it.
 
     """
     with store.lock_folder(folder):
@@ -155,11 +150,7 @@ def _planned_corpus(folder: Path, config: CorpusConfig, sources: Sources) -> Cor
             )
         return made
     pool = sources.pool
-    made = (
-        plan_corpus(pool.assets, config, _wind_test(pool, sources.composing))
-        if pool
-        else plan_corpus((), config)
-    )
+    made = plan_corpus(pool.assets, config, _wind_test(pool, sources.composing)) if pool else plan_corpus((), config)
     write_plan(folder, made)
     return made
 
@@ -181,10 +172,7 @@ def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]
         return [_showcase_job(folder, scene) for scene in made.scenes]
     return [
         _compose_job(
-            folder / SCENES_FOLDER / scene.name,
-            pool,
-            planned_compose_config(scene, sources.composing),
-            sources,
+            folder / SCENES_FOLDER / scene.name, pool, planned_compose_config(scene, sources.composing), sources
         )
         for scene in made.scenes
     ]
@@ -193,11 +181,7 @@ def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]
 def planned_compose_config(scene: PlannedScene, composing: ComposeConfig) -> ComposeConfig:
     """Return how one scene of a plan is composed."""
     return replace(
-        composing,
-        assets=scene.assets,
-        seed=scene.seed,
-        arrangement=scene.arrangement,
-        interaction=scene.interaction,
+        composing, assets=scene.assets, seed=scene.seed, arrangement=scene.arrangement, interaction=scene.interaction
     )
 
 
@@ -227,35 +211,21 @@ def _showcase_job(folder: Path, scene: PlannedScene) -> Job:
 
 
 def compose_scene(
-    folder: Path,
-    progress: ProgressCallback,
-    pool: AssetPool,
-    config: ComposeConfig,
-    capturing: CaptureConfig,
+    folder: Path, progress: ProgressCallback, pool: AssetPool, config: ComposeConfig, capturing: CaptureConfig
 ) -> None:
     """Compose one scene and take its pictures, in the process of a worker."""
     weigher = partial(asset_mass_properties, folder=pool.folder)
-    compose(
-        pool, folder, config, lambda d, words: progress(COMPOSE_TIME_FRACTION * d, words), weigher
-    )
+    compose(pool, folder, config, lambda d, words: progress(COMPOSE_TIME_FRACTION * d, words), weigher)
     if capturing.views:
         scene = read_gltf_model(folder / "scene.glb").scene
         views = capture(
-            scene,
-            capturing,
-            lambda d, words: progress(
-                COMPOSE_TIME_FRACTION + (1 - COMPOSE_TIME_FRACTION) * d, words
-            ),
+            scene, capturing, lambda d, words: progress(COMPOSE_TIME_FRACTION + (1 - COMPOSE_TIME_FRACTION) * d, words)
         )
         write_views(folder / VIEWS_FOLDER, views)
 
 
 def planned_scene(
-    folder: Path,
-    progress: ProgressCallback,
-    pool: AssetPool,
-    config: ComposeConfig,
-    capturing: CaptureConfig,
+    folder: Path, progress: ProgressCallback, pool: AssetPool, config: ComposeConfig, capturing: CaptureConfig
 ) -> None:
     """Compose a scene of a plan; where it does not come to rest, from other seeds and otherwise.
 

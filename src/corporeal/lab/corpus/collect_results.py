@@ -11,12 +11,7 @@ from corporeal.core.types import Law
 from corporeal.io.scene_toml import read_scene_file
 from corporeal.jobs.job import ManifestRow, read_manifest_rows
 from corporeal.lab.corpus.corpus_plan import CorpusPlan, PlannedScene, read_plan
-from corporeal.lab.corpus.run_corpus import (
-    RUNS_FOLDER,
-    SCENE_TOML_FILE,
-    SCENES_FOLDER,
-    VIEWS_FOLDER,
-)
+from corporeal.lab.corpus.run_corpus import RUNS_FOLDER, SCENE_TOML_FILE, SCENES_FOLDER, VIEWS_FOLDER
 from corporeal.materials import find_material_or_default
 from corporeal.pipeline.run_pipeline import Settings, read_run_request
 from corporeal.render.colours import LAW_COLOURS
@@ -169,9 +164,7 @@ def collect_results(folder: Path) -> CorpusResults:
     return CorpusResults(folder.resolve().name, plan, tuple(scenes))
 
 
-def _record(
-    folder: Path, planned: PlannedScene, assembled: ManifestRow | None, ran: ManifestRow | None
-) -> SceneRecord:
+def _record(folder: Path, planned: PlannedScene, assembled: ManifestRow | None, ran: ManifestRow | None) -> SceneRecord:
     scene, run = folder / SCENES_FOLDER / planned.name, folder / RUNS_FOLDER / planned.name
     finished = (run / store.META_FILE).exists() and (run / AUDIT_FILE).exists()
     audit = read_run_audit(run) if finished else None
@@ -183,9 +176,7 @@ def _record(
         ran=ran,
         certificate=read_certificate(scene) if (scene / CERTIFICATE_FILE).exists() else None,
         composition=read_composition(scene) if (scene / COMPOSITION_FILE).exists() else None,
-        numbers=None
-        if audit is None
-        else scene_measures(audit, planned.interaction, _launched_objects(scene)),
+        numbers=None if audit is None else scene_measures(audit, planned.interaction, _launched_objects(scene)),
         parts=() if audit is None or settings is None else _parts(planned.name, audit, settings),
         picture=_picture(run / "strip.png", scene / VIEWS_FOLDER / "rgb"),
         settings=settings,
@@ -209,9 +200,7 @@ def _launched_objects(scene: Path) -> list[str]:
 # ---------------------------------------------------------------- numbers of one scene
 
 
-def scene_measures(
-    audit: RunAudit, kind: InteractionKind, sent: Sequence[str] = ()
-) -> SceneMeasures:
+def scene_measures(audit: RunAudit, kind: InteractionKind, sent: Sequence[str] = ()) -> SceneMeasures:
     """Condense an audit into the numbers that scenes are compared by.
 
     Args:
@@ -234,9 +223,7 @@ def scene_measures(
         impacts=len(happened.order) + landed,
         met=len(met),
         separated=sum(bool(p.separated) for p in met),
-        seen=all(e.met for e in wanted)
-        if wanted
-        else _did_interaction_happen(kind, happened, landed, sent),
+        seen=all(e.met for e in wanted) if wanted else _did_interaction_happen(kind, happened, landed, sent),
         touched_before=tuple(
             " and ".join(name.split("|"))
             for name, pair in happened.pairs.items()
@@ -271,9 +258,7 @@ COPIED_AUDIT_FIELDS = (
 )
 
 
-def _did_interaction_happen(
-    kind: InteractionKind, happened: Outcome, landed: int, sent: Sequence[str]
-) -> bool:
+def _did_interaction_happen(kind: InteractionKind, happened: Outcome, landed: int, sent: Sequence[str]) -> bool:
     """Return whether what the interaction promises happened.
 
     fall: something came down on the floor or on another. fall-onto, collision: two objects met.

@@ -66,9 +66,7 @@ def total_line(corpus: CorpusResults) -> BreakdownLine | None:
 
 
 def _by_scene(
-    scenes: Sequence[SceneRecord],
-    key: Callable[[SceneRecord], str],
-    order: Sequence[str] = (),
+    scenes: Sequence[SceneRecord], key: Callable[[SceneRecord], str], order: Sequence[str] = ()
 ) -> list[BreakdownLine]:
     names = order or sorted({key(s) for s in scenes})
     groups = {name: [s for s in scenes if key(s) == name] for name in names}

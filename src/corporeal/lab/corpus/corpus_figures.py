@@ -1,7 +1,7 @@
 """Figures of a corpus as vector graphics: composition, audits, cost.
 
-Colours are Tol's bright scheme, which readers with any colour vision can tell apart; interactions
-have a mark of their own as well.
+Colours are Tol's bright scheme, which readers with any colour vision can tell apart; interactions have a mark of their
+own as well.
 """
 
 import io
@@ -26,12 +26,8 @@ BAR_COLOUR = "#4477aa"
 COLOUR_OF_INTERACTION: Mapping[InteractionKind, str] = dict(
     zip(INTERACTION_KINDS, ("#4477aa", "#aa3377", "#228833", "#ccbb44", "#66ccee"), strict=True)
 )
-MARKER_OF_INTERACTION: Mapping[InteractionKind, str] = dict(
-    zip(INTERACTION_KINDS, "osD^v", strict=True)
-)
-COLOUR_OF_LAW = {name: colour for name, colour in LAW_COLOURS.values()} | {
-    RIGID_BODY_LAW: "#bbbbbb"
-}
+MARKER_OF_INTERACTION: Mapping[InteractionKind, str] = dict(zip(INTERACTION_KINDS, "osD^v", strict=True))
+COLOUR_OF_LAW = {name: colour for name, colour in LAW_COLOURS.values()} | {RIGID_BODY_LAW: "#bbbbbb"}
 LOG_AXIS_MIN = 1e-8
 """What is smaller is drawn here on a logarithmic axis."""
 MAX_REST_DRIFT_MM_PER_M = 1.0
@@ -79,10 +75,7 @@ PanelPainter = Callable[[Axes, CorpusResults], None]
 
 
 def _draw_figure(
-    size: tuple[float, float],
-    widths: Sequence[float],
-    corpus: CorpusResults,
-    panels: Sequence[PanelPainter],
+    size: tuple[float, float], widths: Sequence[float], corpus: CorpusResults, panels: Sequence[PanelPainter]
 ) -> bytes:
     with matplotlib.rc_context(FIGURE_STYLE):
         figure = Figure(figsize=size, layout="constrained", facecolor="white")
@@ -108,23 +101,17 @@ def _classes(axes: Axes, corpus: CorpusResults) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("objects")
     axes.set_title("Classes", loc="left")
-    axes.tick_params(
-        axis="y", length=0, labelcolor=INK_COLOUR, labelsize=8 if len(names) < 22 else 6
-    )
+    axes.tick_params(axis="y", length=0, labelcolor=INK_COLOUR, labelsize=8 if len(names) < 22 else 6)
 
 
 def _matrix(axes: Axes, corpus: CorpusResults) -> None:
     numbers = sorted({s.planned.count for s in corpus.scenes})
     table = np.zeros((len(INTERACTION_KINDS), len(numbers)), int)
     for scene in corpus.scenes:
-        table[
-            INTERACTION_KINDS.index(scene.planned.interaction), numbers.index(scene.planned.count)
-        ] += 1
+        table[INTERACTION_KINDS.index(scene.planned.interaction), numbers.index(scene.planned.count)] += 1
     axes.imshow(table, cmap="Blues", vmin=0, vmax=max(1, table.max() * 1.6), aspect="auto")
     for (row, column), value in np.ndenumerate(table):
-        axes.text(
-            column, row, str(value) if value else "–", ha="center", va="center", color=INK_COLOUR
-        )
+        axes.text(column, row, str(value) if value else "–", ha="center", va="center", color=INK_COLOUR)
     rows = [f"{kind}  ({n})" for kind, n in zip(INTERACTION_KINDS, table.sum(axis=1), strict=True)]
     columns = [f"{n}\n({m})" for n, m in zip(numbers, table.sum(axis=0), strict=True)]
     axes.set_yticks(range(len(INTERACTION_KINDS)), rows, color=INK_COLOUR)
@@ -137,14 +124,13 @@ def _matrix(axes: Axes, corpus: CorpusResults) -> None:
 
 def _rest(axes: Axes, corpus: CorpusResults) -> None:
     for kind in INTERACTION_KINDS:
-        proofs = [
-            s.certificate for s in corpus.scenes if s.certificate and s.planned.interaction == kind
-        ]
+        proofs = [s.certificate for s in corpus.scenes if s.certificate and s.planned.interaction == kind]
         drift = [1e3 * p.drift_m / p.extent_m for p in proofs]
         depth = [1e3 * p.penetration_m / p.extent_m for p in proofs]
         axes.scatter(
             np.maximum(drift, 1e-6), np.maximum(depth, 1e-6), s=26, marker=MARKER_OF_INTERACTION[kind],
-            color=COLOUR_OF_INTERACTION[kind], edgecolor="white", linewidth=0.5, label=kind,
+            color=COLOUR_OF_INTERACTION[kind],
+            edgecolor="white", linewidth=0.5, label=kind,
         )  # fmt: skip
     axes.axvline(MAX_REST_DRIFT_MM_PER_M, color=INK_COLOUR, lw=0.9, ls="--")
     axes.set(xscale="log", yscale="log")
@@ -187,9 +173,7 @@ def _by_kind(axes: Axes, corpus: CorpusResults, name: str, log: bool) -> None:
             column + aside, values, s=22, marker=MARKER_OF_INTERACTION[kind], color=COLOUR_OF_INTERACTION[kind],
             edgecolor="white", linewidth=0.5, zorder=3,
         )  # fmt: skip
-        axes.hlines(
-            np.median(values), column - 0.36, column + 0.36, color=INK_COLOUR, lw=1.2, zorder=4
-        )
+        axes.hlines(np.median(values), column - 0.36, column + 0.36, color=INK_COLOUR, lw=1.2, zorder=4)
     axes.axhline(ALLOWED_BREACHES[name], color=INK_COLOUR, lw=0.9, ls="--")
     if log:
         axes.set_yscale("log")
@@ -199,9 +183,7 @@ def _by_kind(axes: Axes, corpus: CorpusResults, name: str, log: bool) -> None:
     axes.grid(axis="y", color=LINE_COLOUR, lw=0.5)
 
 
-def _values(
-    scenes: Sequence[SceneRecord], kind: InteractionKind, name: str, log: bool
-) -> list[float]:
+def _values(scenes: Sequence[SceneRecord], kind: InteractionKind, name: str, log: bool) -> list[float]:
     mine = [s.numbers for s in scenes if s.numbers and s.planned.interaction == kind]
     return [max(getattr(n, name), LOG_AXIS_MIN) if log else getattr(n, name) for n in mine]
 
@@ -232,7 +214,8 @@ def _cost(axes: Axes, corpus: CorpusResults) -> None:
         mine = [s.numbers for s in corpus.run if s.numbers and s.planned.interaction == kind]
         axes.scatter(
             [n.particles for n in mine], [n.seconds for n in mine], s=26,
-            marker=MARKER_OF_INTERACTION[kind], color=COLOUR_OF_INTERACTION[kind], edgecolor="white", linewidth=0.5, label=kind,
+            marker=MARKER_OF_INTERACTION[kind], color=COLOUR_OF_INTERACTION[kind],
+            edgecolor="white", linewidth=0.5, label=kind,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log")
     for axis in (axes.xaxis, axes.yaxis):

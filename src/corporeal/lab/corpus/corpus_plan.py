@@ -1,9 +1,8 @@
 """Plan of a corpus: classes, arrangements and interactions of its scenes.
 
-Everything is balanced and drawn by deficit: classes, models of a class, object counts, interaction
-kinds and arrangements each come out even to within one, as far as their needs allow. Wind blows
-where it moves something. A plan follows from the pool and the seed alone; it is written to
-``corpus.json``.
+Everything is balanced and drawn by deficit: classes, models of a class, object counts, interaction kinds and
+arrangements each come out even to within one, as far as their needs allow. Wind blows where it moves something. A plan
+follows from the pool and the seed alone; it is written to ``corpus.json``.
 """
 
 from collections import Counter
@@ -19,12 +18,7 @@ from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.pool.asset_pool import PoolAsset, draw_least_used, parse_count_range
 from corporeal.scene.arrange_bodies import BodyArrangement
-from corporeal.scene.interactions import (
-    ARRANGEMENTS_OF_KIND,
-    INTERACTION_KINDS,
-    MIN_OBJECTS_OF_KIND,
-    InteractionKind,
-)
+from corporeal.scene.interactions import ARRANGEMENTS_OF_KIND, INTERACTION_KINDS, MIN_OBJECTS_OF_KIND, InteractionKind
 from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS
 
 PLAN_FILE = "corpus.json"
@@ -109,9 +103,7 @@ class CorpusPlan:
     """What could not be as asked for."""
 
 
-def plan_corpus(
-    models: Sequence[PoolAsset], config: CorpusConfig, windy: WindTest | None = None
-) -> CorpusPlan:
+def plan_corpus(models: Sequence[PoolAsset], config: CorpusConfig, windy: WindTest | None = None) -> CorpusPlan:
     """Plan a corpus.
 
     Args:
@@ -127,9 +119,7 @@ def plan_corpus(
         ignored = " ".join(config.changes)
         ignores = (f"The showcase has scenes of its own: {ignored} changes nothing.",)
         return CorpusPlan(
-            config,
-            tuple(_showcase(name) for name in INTERACTION_OF_SHOWCASE),
-            ignores if ignored else (),
+            config, tuple(_showcase(name) for name in INTERACTION_OF_SHOWCASE), ignores if ignored else ()
         )
     _check(config)
     if not models:
@@ -137,9 +127,7 @@ def plan_corpus(
     rng = np.random.default_rng(config.seed)
     by_class = _by_class(models)
     classes = choose_classes(by_class, config.classes, rng)
-    messages = (
-        [_fewer_classes_note(len(classes), config.classes)] if len(classes) < config.classes else []
-    )
+    messages = [_fewer_classes_note(len(classes), config.classes)] if len(classes) < config.classes else []
     least, most = parse_count_range(config.count)
     if not config.repeat and most > len(classes):
         least, most = min(least, len(classes)), len(classes)
@@ -188,9 +176,7 @@ def read_plan(folder: Path) -> CorpusPlan:
 # ---------------------------------------------------------------- what is drawn
 
 
-def choose_classes(
-    by_class: Mapping[str, Sequence[str]], most: int, rng: np.random.Generator
-) -> list[str]:
+def choose_classes(by_class: Mapping[str, Sequence[str]], most: int, rng: np.random.Generator) -> list[str]:
     """Choose at most ``most`` classes: those with the most models first, by lot among equals.
 
     A class with more models repeats each of them less often.
@@ -234,9 +220,7 @@ def interactions_and_counts(
     return [pairs[k] for k in rng.permutation(len(pairs))]
 
 
-def _deal_counts(
-    numbers: Sequence[int], kinds: Sequence[InteractionKind]
-) -> list[tuple[InteractionKind, int]]:
+def _deal_counts(numbers: Sequence[int], kinds: Sequence[InteractionKind]) -> list[tuple[InteractionKind, int]]:
     """Deal numbers to interactions in turns, so that each gets its share of every number."""
     left = Counter(kinds)
     order: list[InteractionKind] = []
@@ -258,8 +242,8 @@ def with_wind(
 ) -> tuple[list[InteractionKind], list[str]]:
     """Let wind blow where it moves something.
 
-    A scene in which it would move nothing changes its interaction with another one, of as many
-    objects where there is one; where none can, its objects fall instead.
+    A scene in which it would move nothing changes its interaction with another one, of as many objects where there is
+    one; where none can, its objects fall instead.
 
     Args:
         kinds: What is to happen in every scene.
@@ -350,9 +334,7 @@ def _showcase(name: str) -> PlannedScene:
 
 
 def _fewer_classes_note(found: int, wanted: int) -> str:
-    return (
-        f"The pool has {found} class{'es' * (found != 1)}, {wanted} were asked for: all are used."
-    )
+    return f"The pool has {found} class{'es' * (found != 1)}, {wanted} were asked for: all are used."
 
 
 def _check(config: CorpusConfig) -> None:

@@ -10,12 +10,7 @@ from PIL import Image
 
 from corporeal.core import store
 from corporeal.jobs.job import ProgressCallback
-from corporeal.lab.corpus.collect_results import (
-    MIN_WIND_MOTION_M,
-    CorpusResults,
-    SceneRecord,
-    collect_results,
-)
+from corporeal.lab.corpus.collect_results import MIN_WIND_MOTION_M, CorpusResults, SceneRecord, collect_results
 from corporeal.lab.corpus.corpus_breakdown import (
     BreakdownLine,
     asset_credits,
@@ -49,9 +44,7 @@ BREAKDOWN_COLUMNS = (
 )
 
 
-def report_corpus(
-    folder: Path, progress: ProgressCallback = lambda fraction, words: None
-) -> list[Path]:
+def report_corpus(folder: Path, progress: ProgressCallback = lambda fraction, words: None) -> list[Path]:
     """Write the report beside the scenes; return the files.
 
     Raises:
@@ -72,9 +65,7 @@ def report_corpus(
 
 def render_corpus_page(corpus: CorpusResults) -> str:
     """Return the page as HTML."""
-    figures = [
-        html_figure(c, data_url(svg, "image/svg+xml")) for c, svg in corpus_figures(corpus).items()
-    ]
+    figures = [html_figure(c, data_url(svg, "image/svg+xml")) for c, svg in corpus_figures(corpus).items()]
     return fill_page(
         "corporeal.lab.corpus",
         "corpus_report.html",
@@ -185,11 +176,7 @@ def _line(line: BreakdownLine, style: str = "") -> str:
         f"{line.memory_worst_mb:,.0f}",
         f"<small>{escape_html(', '.join(line.materials))}</small>",
     )
-    return (
-        f'<tr class="{style}"><td>{escape_html(line.group)}</td>'
-        + "".join(f"<td>{c}</td>" for c in cells)
-        + "</tr>"
-    )
+    return f'<tr class="{style}"><td>{escape_html(line.group)}</td>' + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
 
 
 # ---------------------------------------------------------------- scenes
@@ -251,9 +238,7 @@ def _thumbnail(scene: SceneRecord) -> str:
 
 
 def _failures(corpus: CorpusResults) -> str:
-    lines = [
-        f"<li><b>{escape_html(s.name)}</b> {escape_html(s.error)}</li>" for s in _failed(corpus)
-    ]
+    lines = [f"<li><b>{escape_html(s.name)}</b> {escape_html(s.error)}</li>" for s in _failed(corpus)]
     measured = [(s.name, s.numbers) for s in corpus.run if s.numbers]
     unseen = [name for name, numbers in measured if not numbers.seen]
     text = f"<ul>{''.join(lines)}</ul>" if lines else '<p class="good">No scene failed.</p>'

@@ -1,7 +1,7 @@
 """Runs of all assembled scenes of a corpus, each in its own process.
 
-``<corpus>/scenes/<scene>/scene.toml`` becomes ``<corpus>/runs/<scene>/``, a run like any other. A
-scene that is interrupted goes on from its checkpoint.
+``<corpus>/scenes/<scene>/scene.toml`` becomes ``<corpus>/runs/<scene>/``, a run like any other. A scene that is
+interrupted goes on from its checkpoint.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,9 +44,7 @@ class RunConfig:
     """Keep what is finished and go on with what was interrupted; else begin all scenes anew."""
 
 
-def run_corpus(
-    folder: Path, config: RunConfig, settings: Settings, hands: Executor
-) -> dict[str, ManifestRow]:
+def run_corpus(folder: Path, config: RunConfig, settings: Settings, hands: Executor) -> dict[str, ManifestRow]:
     """Run the scenes of a corpus; return what became of each.
 
     Raises:
@@ -60,19 +58,13 @@ def run_corpus(
     planned = plan.scenes[: config.first]
     there = [s for s in planned if (folder / SCENES_FOLDER / s.name / store.META_FILE).exists()]
     if not there:
-        raise UserError(
-            f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}."
-        )
+        raise UserError(f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}.")
     if len(there) < len(planned):
-        hands.say(
-            f"{len(planned) - len(there)} of {len(planned)} scenes are not assembled: left out."
-        )
+        hands.say(f"{len(planned) - len(there)} of {len(planned)} scenes are not assembled: left out.")
     with store.lock_folder(folder):
         configs = [getattr(settings, f.name) for f in fields(Settings)]
         read = [name for config in configs for name in run_pipeline.digests_of_named_files(config)]
-        jobs = [
-            _job(folder, scene, _with_showcase_view(plan, scene, settings), read) for scene in there
-        ]
+        jobs = [_job(folder, scene, _with_showcase_view(plan, scene, settings), read) for scene in there]
         if not config.resume:
             forget_runs(jobs)
         return execute_jobs(folder, "run", jobs, hands)

@@ -33,8 +33,8 @@ class DropResult:
     young_ratio: float
     """Simulated over real Young's modulus [-]."""
     unbooked: float
-    """Energy lost that no loss accounts for, over that of the impact [-]; rigid ones lose theirs in
-    their restitution, and have none.
+    """Energy lost that no loss accounts for, over that of the impact [-]; rigid ones lose theirs in their restitution,
+    and have none.
     """
     steps: int
 
@@ -72,9 +72,7 @@ def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
     engine = build_engine(problem)
     first = engine.measure()
     speed = row.speed
-    last = advance_until_rise(
-        engine, row.diameter / speed / CHECKS_PER_DIAMETER * 10, 30.0 * row.diameter / speed
-    )
+    last = advance_until_rise(engine, row.diameter / speed / CHECKS_PER_DIAMETER * 10, 30.0 * row.diameter / speed)
     treatment = prepared.particles.treatments[0]
     met = contact_interval(last)
     after = last.momentum[0, 2] / last.mass[0] + GRAVITY_M_S2 * (last.time - met[1])

@@ -63,8 +63,8 @@ class MassErrors:
 def mass_errors(predicted: Sequence[float], measured: Sequence[float]) -> MassErrors:
     """Compare masses [kg], all above zero.
 
-    Definitions as in Zhai et al. 2024, *Physical property understanding from language-embedded
-    feature fields*, after Standley et al. 2017, *image2mass*.
+    Definitions as in Zhai et al. 2024, *Physical property understanding from language-embedded feature fields*, after
+    Standley et al. 2017, *image2mass*.
     """
     m, true = np.asarray(predicted, dtype=float), np.asarray(measured, dtype=float)
     apart = np.abs(np.log(m) - np.log(true))
@@ -78,9 +78,7 @@ def mass_errors(predicted: Sequence[float], measured: Sequence[float]) -> MassEr
     )
 
 
-def interval_coverage(
-    low: Sequence[float], high: Sequence[float], measured: Sequence[float]
-) -> float:
+def interval_coverage(low: Sequence[float], high: Sequence[float], measured: Sequence[float]) -> float:
     """Share of the measured masses that lie in their predicted intervals [-]."""
     true = np.asarray(measured, dtype=float)
     return float(np.mean((np.asarray(low) <= true) & (true <= np.asarray(high))))
@@ -144,8 +142,7 @@ class MassConfig:
     """Prediction of masses."""
 
     anonymous: bool = False
-    """Hide the names of files, classes, nodes and materials: a model sees pictures and a neutral
-    name only."""
+    """Hide the names of files, classes, nodes and materials: a model sees pictures and a neutral name only."""
     samples: int = SAMPLES_PER_SCENE
     """Number of sets of ways and values drawn for prediction and interval."""
     seed: int = 0
@@ -219,8 +216,8 @@ def predict_masses(
     """Predict every object's mass; a model that answers over a network is asked in parallel.
 
     Raises:
-        UserError: What the first object that failed says, or how many questions about all of them
-            wait for a person's answers.
+        UserError: What the first object that failed says, or how many questions about all of them wait for a person's
+            answers.
 
     """
     live = describing.vlm.partition(":")[0] in LIVE_CLIENTS
@@ -288,18 +285,10 @@ def anonymise(scene: Scene, file: Path) -> Scene:
         replace(o, name=_numbered(name, k), class_name="object", source=f"{name}.glb", credit="")
         for k, o in enumerate(scene.objects)
     )
-    surfaces = tuple(
-        replace(s, name=f"surface {k}", extras={}) for k, s in enumerate(scene.surfaces)
-    )
+    surfaces = tuple(replace(s, name=f"surface {k}", extras={}) for k, s in enumerate(scene.surfaces))
     finishes = tuple(replace(f, name=f"finish {k}") for k, f in enumerate(scene.finishes))
     return replace(
-        scene,
-        name=name,
-        source=f"{name}.glb",
-        objects=objects,
-        surfaces=surfaces,
-        finishes=finishes,
-        warnings=(),
+        scene, name=name, source=f"{name}.glb", objects=objects, surfaces=surfaces, finishes=finishes, warnings=()
     )
 
 
@@ -307,9 +296,7 @@ def _numbered(name: str, k: int) -> str:
     return name if k == 0 else f"{name}-{k}"
 
 
-def _map_parts(
-    inventory: Inventory, change: Callable[[PartDescription], PartDescription]
-) -> Inventory:
+def _map_parts(inventory: Inventory, change: Callable[[PartDescription], PartDescription]) -> Inventory:
     objects = tuple(replace(o, parts=tuple(change(p) for p in o.parts)) for o in inventory.objects)
     return replace(inventory, objects=objects)
 
@@ -351,10 +338,7 @@ def compare_masses(predictions: Sequence[MassPrediction]) -> MassComparison:
     weighed = [p for p in predictions if p.mass_true is not None]
     truth = [_true(p) for p in weighed]
     fits = zip(mean_mass(truth), hull_volume_mass([p.hull_m3 for p in weighed], truth), strict=True)
-    known = {
-        p.object: replace(p, constant=mean, hull_fit=fit)
-        for p, (mean, fit) in zip(weighed, fits, strict=True)
-    }
+    known = {p.object: replace(p, constant=mean, hull_fit=fit) for p, (mean, fit) in zip(weighed, fits, strict=True)}
     weighed = list(known.values())
     fills = sorted({p.fill for p in weighed})
     groups = {"all": weighed} if weighed else {}
@@ -365,13 +349,8 @@ def compare_masses(predictions: Sequence[MassPrediction]) -> MassComparison:
         metrics={name: _metrics(members) for name, members in groups.items()},
         coverage={name: _coverage(members, "low", "high") for name, members in groups.items()},
         width={name: _width(members, "low", "high") for name, members in groups.items()},
-        coverage_without={
-            name: _coverage(members, "mixture_low", "mixture_high")
-            for name, members in groups.items()
-        },
-        width_without={
-            name: _width(members, "mixture_low", "mixture_high") for name, members in groups.items()
-        },
+        coverage_without={name: _coverage(members, "mixture_low", "mixture_high") for name, members in groups.items()},
+        width_without={name: _width(members, "mixture_low", "mixture_high") for name, members in groups.items()},
     )
 
 
@@ -385,9 +364,7 @@ def _metrics(rows: Sequence[MassPrediction]) -> dict[str, MassErrors]:
     for method in MASS_METHODS:
         known = [r for r in rows if (getattr(r, method) or 0.0) > 0]
         if known:
-            found[method] = mass_errors(
-                [getattr(r, method) for r in known], [_true(r) for r in known]
-            )
+            found[method] = mass_errors([getattr(r, method) for r in known], [_true(r) for r in known])
     return found
 
 

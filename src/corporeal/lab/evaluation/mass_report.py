@@ -25,16 +25,7 @@ def _masses(result: MassComparison) -> ResultTable:
     """Every object's predicted mass beside the measured one."""
     heads = ("object", "filled", "measured [kg]", "predicted", "from", "to", "taken for")
     rows = [
-        (
-            r.object,
-            r.fill,
-            _kg(r.mass_true),
-            _kg(r.mass),
-            _kg(r.low),
-            _kg(r.high),
-            r.described,
-        )
-        for r in result.rows
+        (r.object, r.fill, _kg(r.mass_true), _kg(r.mass), _kg(r.low), _kg(r.high), r.described) for r in result.rows
     ]
     return ResultTable("Masses", heads, rows)
 
@@ -43,14 +34,7 @@ def _with_evidence(result: MassComparison) -> ResultTable:
     """Every object's mass with and without an estimate made without the library."""
     heads = ("object", "predicted [kg]", "without evidence", "from", "to", "asked directly")
     rows = [
-        (
-            r.object,
-            _kg(r.mass),
-            _kg(r.mixture),
-            _kg(r.mixture_low),
-            _kg(r.mixture_high),
-            _kg(r.direct),
-        )
+        (r.object, _kg(r.mass), _kg(r.mixture), _kg(r.mixture_low), _kg(r.mixture_high), _kg(r.direct))
         for r in result.rows
     ]
     return ResultTable("With and without outside evidence", heads, rows)
@@ -98,15 +82,12 @@ def mass_figure(rows: Sequence[MassPrediction], path: Path) -> None:
     every = [v for r in known for v in (r.mass_true or 0.0, r.low, r.high, r.mass)]
     ends = np.array([min(v for v in every if v > 0) / 2, max(every) * 2])
     axes.plot(ends, ends, color=INK_COLOUR, lw=1)
-    axes.fill_between(
-        ends, ends / 2, ends * 2, color=INK_COLOUR, alpha=0.07, lw=0, label="factor of 2"
-    )
+    axes.fill_between(ends, ends / 2, ends * 2, color=INK_COLOUR, alpha=0.07, lw=0, label="factor of 2")
     for k, fill in enumerate(sorted({r.fill for r in known})):
         colour = METHOD_COLOURS[k % len(METHOD_COLOURS)]
         own = [r for r in known if r.fill == fill]
         true, mass, low, high = (
-            np.array([getattr(r, name) for r in own])
-            for name in ("mass_true", "mass", "low", "high")
+            np.array([getattr(r, name) for r in own]) for name in ("mass_true", "mass", "low", "high")
         )
         reach = [np.maximum(mass - low, 0), np.maximum(high - mass, 0)]
         axes.errorbar(true, mass, reach, fmt="o", ms=5, lw=1, color=colour, label=fill)

@@ -60,11 +60,7 @@ class RecognitionScore:
 
 
 def evaluate_materials(
-    folder: Path,
-    truth: MaterialTruth,
-    config: DescribeConfig,
-    library: str,
-    progress: Callable[[float, str], None],
+    folder: Path, truth: MaterialTruth, config: DescribeConfig, library: str, progress: Callable[[float, str], None]
 ) -> list[RecognitionRow]:
     """Describe every model of a folder that the truth speaks of, and judge each part it names.
 
@@ -83,13 +79,9 @@ def evaluate_materials(
         words = {w.name: w for obj in told.objects for w in obj.parts}
         for part, accepted in truth[path.stem].items():
             if part not in words:
-                raise UserError(
-                    f"{path.stem} has no part {part!r}. Its parts: {', '.join(sorted(words))}."
-                )
+                raise UserError(f"{path.stem} has no part {part!r}. Its parts: {', '.join(sorted(words))}.")
             said = words[part]
-            rows.append(
-                RecognitionRow(path.stem, part, said.material, said.margin, accepted, said.reason)
-            )
+            rows.append(RecognitionRow(path.stem, part, said.material, said.margin, accepted, said.reason))
     return rows
 
 
@@ -109,18 +101,14 @@ def read_material_truth(path: Path, library: str = "default") -> MaterialTruth:
         nested = isinstance(table, dict) and all(isinstance(v, dict) for v in table.values())
         for file, parts in (table if nested else {name: table}).items():
             if not (isinstance(parts, dict) and parts):
-                raise BadFileError(
-                    path, f"{file}: must map part names to materials.", TRUTH_FILE_ADVICE
-                )
+                raise BadFileError(path, f"{file}: must map part names to materials.", TRUTH_FILE_ADVICE)
             truth[file] = {p: _accepted(path, f"{file}: {p}", m, library) for p, m in parts.items()}
     return truth
 
 
 def _accepted(path: Path, where: str, names: object, library: str) -> tuple[str, ...]:
     if not (isinstance(names, list) and names and all(isinstance(m, str) for m in names)):
-        raise BadFileError(
-            path, f"{where}: is {names!r}, not a list of materials.", TRUTH_FILE_ADVICE
-        )
+        raise BadFileError(path, f"{where}: is {names!r}, not a list of materials.", TRUTH_FILE_ADVICE)
     return tuple(materials.find_material_or_default(name, library).name for name in names)
 
 
@@ -135,16 +123,12 @@ def recognition_score(rows: Sequence[RecognitionRow]) -> RecognitionScore:
         return sum(r.verdict == verdict for r in rows) / total
 
     first = sum(r.answer == r.accepted[0] for r in rows) / total
-    return RecognitionScore(
-        total, share("right"), share("wrong"), share("unknown"), first, margin_roc_area(rows)
-    )
+    return RecognitionScore(total, share("right"), share("wrong"), share("unknown"), first, margin_roc_area(rows))
 
 
 def margin_roc_area(rows: Sequence[RecognitionRow]) -> float | None:
     """Return how often a right answer has a larger margin than a wrong one, as ``roc_area``."""
-    right, wrong = (
-        np.array([r.margin for r in rows if r.verdict == kind]) for kind in ("right", "wrong")
-    )
+    right, wrong = (np.array([r.margin for r in rows if r.verdict == kind]) for kind in ("right", "wrong"))
     return roc_area(right, wrong)
 
 
@@ -183,15 +167,9 @@ def recognition_tables(rows: Sequence[RecognitionRow]) -> list[ResultTable]:
     shares = (s.right, s.likeliest, s.wrong, s.unknown)
     order = "–" if s.ordering is None else f"{s.ordering:.2f}"
     heads = ("parts", "right", "likeliest", "wrong", "unknown", "margin orders")
-    wrong = [
-        (r.file, r.part, str(r.answer), f"{r.margin:.2f}", r.accepted[0])
-        for r in rows
-        if r.verdict == "wrong"
-    ]
+    wrong = [(r.file, r.part, str(r.answer), f"{r.margin:.2f}", r.accepted[0]) for r in rows if r.verdict == "wrong"]
     return [
-        ResultTable(
-            "Materials of parts", heads, [(str(s.parts), *(f"{x:.0%}" for x in shares), order)]
-        ),
+        ResultTable("Materials of parts", heads, [(str(s.parts), *(f"{x:.0%}" for x in shares), order)]),
         ResultTable("Wrong answers", ("object", "part", "answer", "margin", "likeliest"), wrong),
     ]
 

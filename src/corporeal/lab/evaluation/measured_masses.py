@@ -1,8 +1,8 @@
 """Measured masses: a table of one's own, or the layout of ABO-500.
 
-A table is a CSV file with a column that names the object's model (its file name, with or without
-folder and ending), one for its mass in kilograms, and optionally one for how it is filled (solid,
-hollow, full …) and one that says which rows to score.
+A table is a CSV file with a column that names the object's model (its file name, with or without folder and ending),
+one for its mass in kilograms, and optionally one for how it is filled (solid, hollow, full …) and one that says which
+rows to score.
 
 ABO-500 is a folder with ``splits.json`` (split →
 names of scenes), ``filtered_product_weights.json`` (product → kg; a scene's name begins with its
@@ -25,11 +25,7 @@ MASS_COLUMNS = ("mass_kg", "mass", "measured_mass_kg", "known_mass_kg", "weight_
 FILL_COLUMNS = ("fill", "group")
 SCORED_COLUMN = "scored"
 NO_VALUES = ("0", "no", "false", "n", "")
-ABO_SPLITS_FILE, ABO_WEIGHTS_FILE, ABO_SCENES_FOLDER = (
-    "splits.json",
-    "filtered_product_weights.json",
-    "scenes",
-)
+ABO_SPLITS_FILE, ABO_WEIGHTS_FILE, ABO_SCENES_FOLDER = ("splits.json", "filtered_product_weights.json", "scenes")
 UNGROUPED_NAME = "all"
 
 
@@ -141,17 +137,12 @@ def read_abo(folder: Path, split: str) -> list[WeighedObject]:
         UserError: There is no such split, or a scene has no mesh or no weight.
 
     """
-    splits, weights = (
-        store.read_json(folder / ABO_SPLITS_FILE),
-        store.read_json(folder / ABO_WEIGHTS_FILE),
-    )
+    splits, weights = (store.read_json(folder / ABO_SPLITS_FILE), store.read_json(folder / ABO_WEIGHTS_FILE))
     for path, given in ((folder / ABO_SPLITS_FILE, splits), (folder / ABO_WEIGHTS_FILE, weights)):
         if not isinstance(given, dict):
             raise BadFileError(path, "must map names.", "Download it again.")
     if split != "all" and split not in splits:
-        raise UserError(
-            f"{folder} has no split {split!r}. Choose one of: {', '.join(splits)}, all."
-        )
+        raise UserError(f"{folder} has no split {split!r}. Choose one of: {', '.join(splits)}, all.")
     scenes = [s for names in splits.values() for s in names] if split == "all" else splits[split]
     return [_abo_object(folder, str(scene), weights) for scene in scenes]
 
@@ -161,11 +152,7 @@ def _abo_object(folder: Path, scene: str, weights: dict) -> WeighedObject:
     place = folder / ABO_SCENES_FOLDER / scene
     models = model_files_in(place) if place.is_dir() else []
     if len(models) != 1:
-        raise UserError(
-            f"{place} must hold the product's mesh as one .glb file; it holds {len(models)}."
-        )
+        raise UserError(f"{place} must hold the product's mesh as one .glb file; it holds {len(models)}.")
     if product not in weights:
         raise BadFileError(folder / ABO_WEIGHTS_FILE, f"has no weight for {product!r}.")
-    return WeighedObject(
-        scene, models[0], _mass(folder / ABO_WEIGHTS_FILE, product, weights[product])
-    )
+    return WeighedObject(scene, models[0], _mass(folder / ABO_WEIGHTS_FILE, product, weights[product]))

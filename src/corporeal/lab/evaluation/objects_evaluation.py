@@ -1,10 +1,9 @@
 """Instance segmentation of objects that touch, in pictures of settled scenes with ground truth.
 
-Points are either spread over the surface that pictures show, or the means of Gaussians that were
-learned from the pictures. Three methods are compared: identity, which is the ground truth;
-superpoints cut by appearance features and concavity, with and without the number of objects, and
-with instance masks; and the connected components of each point's nearest neighbours, the rule of
-published pipelines.
+Points are either spread over the surface that pictures show, or the means of Gaussians that were learned from the
+pictures. Three methods are compared: identity, which is the ground truth; superpoints cut by appearance features and
+concavity, with and without the number of objects, and with instance masks; and the connected components of each point's
+nearest neighbours, the rule of published pipelines.
 """
 
 import time
@@ -130,9 +129,7 @@ class ObjectsResult:
 
 
 def evaluate_objects(
-    folder: Path,
-    config: ObjectsEvaluationConfig = DEFAULT_CONFIG,
-    progress: Progress = lambda share, words: None,
+    folder: Path, config: ObjectsEvaluationConfig = DEFAULT_CONFIG, progress: Progress = lambda share, words: None
 ) -> list[ObjectsResult]:
     """Segment every scene of a folder into objects, and compare with the truth.
 
@@ -152,11 +149,7 @@ def evaluate_objects(
         progress(number / len(paths), path.parent.name)
         scene = assemble([path])
         if len(scene.objects) > 1:
-            found.append(
-                evaluate_scene(
-                    path.parent.name, touching_from_photographs(path.parent.name, scene, config)
-                )
-            )
+            found.append(evaluate_scene(path.parent.name, touching_from_photographs(path.parent.name, scene, config)))
     if not found:
         raise UserError(
             f"{folder} holds no scene of several objects. Make some: corporeal assemble --from "
@@ -236,9 +229,7 @@ def bring_together(scene: Scene) -> Scene:
 
 def _on(scene: Scene, obj: int) -> np.ndarray:
     mesh, owner = join_meshes(scene.surfaces), scene.object_of_triangle
-    return sample_surface(mesh.only(owner == obj), MAX_SURFACE_POINTS, np.random.default_rng(obj))[
-        0
-    ]
+    return sample_surface(mesh.only(owner == obj), MAX_SURFACE_POINTS, np.random.default_rng(obj))[0]
 
 
 def _of_surface(scene: Scene, views: Views, config: ObjectsEvaluationConfig) -> TouchingObjects:
@@ -289,20 +280,14 @@ def _of_gaussians(scene: Scene, views: Views, gaussians: Gaussians) -> TouchingO
     kept = np.flatnonzero(foreground_gaussians(gaussians, views.cameras, shows))
     position = gaussians.mean[kept].astype(np.float64)
     shares = [csr_array(gaussian_weights(gaussians, camera)[kept]) for camera in views.cameras]
-    towards = mean_view_directions(
-        position, views.cameras, list(shows.share[:, kept]), MAX_SHOWING_THROUGH_FRACTION
-    )
+    towards = mean_view_directions(position, views.cameras, list(shows.share[:, kept]), MAX_SHOWING_THROUGH_FRACTION)
     colour = np.clip(0.5 + SH_DC_COEFFICIENT * gaussians.sh[kept, 0], 0, 1)
     surface = [_on(scene, k) for k in range(len(scene.objects))]
     nearest = KDTree(np.concatenate(surface)).query(position)[1]
     truth = np.repeat(np.arange(len(surface)), MAX_SURFACE_POINTS)[nearest]
-    taken = _touching_objects(
-        scene, views, _VisiblePoints(position, colour, towards, truth, shares)
-    )
+    taken = _touching_objects(scene, views, _VisiblePoints(position, colour, towards, truth, shares))
     of_object, seen = np.isin(np.arange(gaussians.count), kept), views.object_of_pixel >= 0
-    pieces = pieces_by_free_space(
-        position, gaussian_subset(gaussians, of_object), of_object[kept], views.cameras, seen
-    )
+    pieces = pieces_by_free_space(position, gaussian_subset(gaussians, of_object), of_object[kept], views.cameras, seen)
     return replace(taken, space=SpacePieces(pieces))
 
 
@@ -342,16 +327,7 @@ def _renumbered(objects_of_view: np.ndarray) -> list[np.ndarray]:
 # ---------------------------------------------------------------- how it is shown
 
 
-OBJECTS_HEADS = (
-    "scene",
-    "points",
-    "identity",
-    "ours",
-    "with masks",
-    "uncounted",
-    "components",
-    "seconds",
-)
+OBJECTS_HEADS = ("scene", "points", "identity", "ours", "with masks", "uncounted", "components", "seconds")
 
 
 def objects_tables(rows: Sequence[ObjectsRow]) -> list[ResultTable]:
@@ -369,11 +345,7 @@ def objects_tables(rows: Sequence[ObjectsRow]) -> list[ResultTable]:
         )
         for row in rows
     ]
-    return [
-        ResultTable(
-            "Mean IoU of objects; !: warned; (n): how many were counted", OBJECTS_HEADS, cells
-        )
-    ]
+    return [ResultTable("Mean IoU of objects; !: warned; (n): how many were counted", OBJECTS_HEADS, cells)]
 
 
 def objects_record(rows: Sequence[ObjectsRow]) -> dict:

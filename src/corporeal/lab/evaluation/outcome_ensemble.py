@@ -1,8 +1,7 @@
 """Uncertainty of the outcome by an ensemble of sampled material values.
 
-Every member is drawn as a whole (materials/value_sampling.py), filled anew and simulated; its
-frames are dropped once its outcome is known. A member that is done is not done again, and one that
-was cut off goes on, as a run does.
+Every member is drawn as a whole (materials/value_sampling.py), filled anew and simulated; its frames are dropped once
+its outcome is known. A member that is done is not done again, and one that was cut off goes on, as a run does.
 """
 
 import shutil
@@ -156,14 +155,7 @@ def simulate_ensemble(
             member = EnsembleMember(number, seed, folder / MEMBERS_FOLDER / f"{number:03d}", name)
             rows.append(_member(member, made, settings, _share(progress, number, samples)))
         known = outcome_spread(chosen, rows)
-        result = Ensemble(
-            samples,
-            seed,
-            (INTERVAL_LOW_QUANTILE, INTERVAL_HIGH_QUANTILE),
-            chosen,
-            tuple(rows),
-            known,
-        )
+        result = Ensemble(samples, seed, (INTERVAL_LOW_QUANTILE, INTERVAL_HIGH_QUANTILE), chosen, tuple(rows), known)
         store.write_json(folder / SPREAD_FILE, result)
     return result
 
@@ -175,9 +167,7 @@ def _share(progress: Progress, number: int, samples: int) -> Progress:
     return tell
 
 
-def _member(
-    member: EnsembleMember, made: StageResults, settings: Settings, progress: Progress
-) -> MemberOutcome:
+def _member(member: EnsembleMember, made: StageResults, settings: Settings, progress: Progress) -> MemberOutcome:
     """Return a member's outcome, from disk where it is done."""
     place = member.folder
     if store.is_fresh(place, member.key):
@@ -195,17 +185,13 @@ def _member(
     return row
 
 
-def _simulated(
-    member: EnsembleMember, made: StageResults, settings: Settings, progress: Progress
-) -> MemberOutcome:
+def _simulated(member: EnsembleMember, made: StageResults, settings: Settings, progress: Progress) -> MemberOutcome:
     random = member.random
     scene, parts, _ = made.assembled.all
     library, floor = settings.ground.library, settings.ground.floor
     words = sample_hypotheses(made.inventory, made.field.mixtures, random, library)
     field = ground(scene, parts, words, settings.ground)
-    field = sample_material_field(
-        field, [p.object for p in parts.catalogue], random, library, floor
-    )
+    field = sample_material_field(field, [p.object for p in parts.catalogue], random, library, floor)
     progress(0.0, "filling")
     particles = fill(scene, parts, field, settings.fill)
     drawn = tuple(
@@ -226,10 +212,7 @@ def outcome_row(made: StageResults) -> ObjectQuantities:
     happened = measure_outcome(scene, particles, made.field, made.trajectory).objects
     mass = np.bincount(particles.object, particles.mass, len(scene.objects))
     return {
-        obj.name: {
-            q: float(mass[k]) if q == "mass_kg" else getattr(happened[obj.name], q)
-            for q in SPREAD_QUANTITIES
-        }
+        obj.name: {q: float(mass[k]) if q == "mass_kg" else getattr(happened[obj.name], q) for q in SPREAD_QUANTITIES}
         for k, obj in enumerate(scene.objects)
     }
 
@@ -239,9 +222,7 @@ def outcome_spread(
 ) -> Mapping[str, Mapping[str, QuantitySpread]]:
     """Return how far each outcome number is spread over the members that came through."""
     return {
-        name: {
-            q: _spread(own[q], [r.objects[name][q] for r in rows if name in r.objects]) for q in own
-        }
+        name: {q: _spread(own[q], [r.objects[name][q] for r in rows if name in r.objects]) for q in own}
         for name, own in chosen.items()
     }
 
@@ -272,12 +253,7 @@ INK_COLOUR, MEMBER_COLOUR, CHOSEN_COLOUR = "#222222", "#9fb8c4", "#c8553d"
 def spread_rows(result: Ensemble) -> list[tuple[str, ...]]:
     """Return one row per object and quantity that anything can be said of."""
     return [
-        (
-            name,
-            SPREAD_QUANTITIES[quantity],
-            *map(_number, (s.chosen, s.low, s.median, s.high)),
-            str(s.count),
-        )
+        (name, SPREAD_QUANTITIES[quantity], *map(_number, (s.chosen, s.low, s.median, s.high)), str(s.count))
         for name, own in result.spread.items()
         for quantity, s in own.items()
         if s.count
@@ -286,11 +262,7 @@ def spread_rows(result: Ensemble) -> list[tuple[str, ...]]:
 
 def failed_members(result: Ensemble) -> list[str]:
     """Return which members could not be simulated to the end."""
-    return [
-        f"Member {member.number} stopped: {member.error}"
-        for member in result.members
-        if member.error
-    ]
+    return [f"Member {member.number} stopped: {member.error}" for member in result.members if member.error]
 
 
 def _number(value: float | None) -> str:

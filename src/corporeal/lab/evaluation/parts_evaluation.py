@@ -1,8 +1,7 @@
 """Evaluation of part segmentation on rendered models with ground truth.
 
-A model is pictured from all sides; points on its surface that a picture shows take their colours,
-and what models see, from the pictures, as points of photographs do. Which node or material a point
-is of stays secret, but for the names.
+A model is pictured from all sides; points on its surface that a picture shows take their colours, and what models see,
+from the pictures, as points of photographs do. Which node or material a point is of stays secret, but for the names.
 """
 
 import time
@@ -23,22 +22,14 @@ from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.scene_transforms import move_scene, surfaces_bounding_box
 from corporeal.io.input_files import model_files_in
 from corporeal.lab.evaluation.result_table import ResultTable
-from corporeal.lab.evaluation.segmentation_scores import (
-    majority_names,
-    matched_iou,
-    named_iou,
-    roc_area,
-)
+from corporeal.lab.evaluation.segmentation_scores import majority_names, matched_iou, named_iou, roc_area
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.segment import segment
 from corporeal.reconstruction import features
 from corporeal.reconstruction.features.feature_lifting import back_projection, visible_points
-from corporeal.reconstruction.features.point_descriptor import (
-    mean_view_directions,
-    point_descriptor,
-)
+from corporeal.reconstruction.features.point_descriptor import mean_view_directions, point_descriptor
 from corporeal.reconstruction.segment.part_clusters import PartsConfig, cluster_parts
 from corporeal.reconstruction.segment.part_naming import name_clusters, part_phrases
 from corporeal.showcase.showcase_scenes import build_single_prop_scene
@@ -65,8 +56,7 @@ class PartsEvaluationConfig:
     lying: bool = False
     """Lay each model on its side before it is rendered."""
     structural: str = "descriptor"
-    """Features that parts are segmented by: "descriptor", which needs no weights, "dinov2", or
-    "dinov2:FOLDER"."""
+    """Features that parts are segmented by: "descriptor", which needs no weights, "dinov2", or "dinov2:FOLDER"."""
     semantic: str = ""
     """Features that parts are named by: "clip", "clip:FOLDER"; "": colour, height and shape."""
 
@@ -151,10 +141,7 @@ class PartsResult:
 
 
 def evaluate_parts(
-    folder: Path | None,
-    names: PartNames,
-    how: PartsMethod,
-    progress: Progress = lambda share, text: None,
+    folder: Path | None, names: PartNames, how: PartsMethod, progress: Progress = lambda share, text: None
 ) -> list[PartsResult]:
     """Find the parts of every model that has several, and compare.
 
@@ -192,19 +179,14 @@ def feature_models(how: PartsEvaluationConfig) -> FeatureModels:
     """
     semantic = features.connect_encoder(how.semantic) if how.semantic else None
     if how.semantic and not isinstance(semantic, features.TextPictureEncoder):
-        raise UserError(
-            f"{how.semantic!r} does not compare points with words. Say --semantic clip, or leave "
-            "it out."
-        )
+        raise UserError(f"{how.semantic!r} does not compare points with words. Say --semantic clip, or leave it out.")
     return FeatureModels(features.connect_encoder(how.structural), semantic)
 
 
 def _models(folder: Path) -> list[Path]:
     found = model_files_in(folder) if folder.is_dir() else []
     if not found:
-        raise UserError(
-            f"There are no models in {folder}. Name a folder of GLB, glTF or mesh files."
-        )
+        raise UserError(f"There are no models in {folder}. Name a folder of GLB, glTF or mesh files.")
     return found
 
 
@@ -232,9 +214,7 @@ def photographed_object(
 def _laid_on_side(scene: Scene) -> Scene:
     """Turn a scene about y by a quarter, and put it on the floor."""
     turned = tuple(replace(s, vertices=s.vertices[:, ::-1] * [1, 1, -1]) for s in scene.surfaces)
-    return move_scene(
-        replace(scene, surfaces=turned), (0.0, 0.0, -float(surfaces_bounding_box(turned)[0, 2]))
-    )
+    return move_scene(replace(scene, surfaces=turned), (0.0, 0.0, -float(surfaces_bounding_box(turned)[0, 2])))
 
 
 def _cloud(
@@ -250,9 +230,7 @@ def _cloud(
     if look.structural is None:
         pairs = zip(views.cameras, depth, strict=True)
         shares = [visible_points(position, camera, d) for camera, d in pairs]
-        structural = point_descriptor(
-            position, colour, mean_view_directions(position, views.cameras, shares)
-        )
+        structural = point_descriptor(position, colour, mean_view_directions(position, views.cameras, shares))
     else:
         structural = lifted(look.structural)
     nothing = np.zeros((len(position), 0), np.float16)
@@ -269,11 +247,7 @@ def _cloud(
 
 
 def evaluate_object(
-    name: str,
-    taken: PhotographedObject,
-    names: Mapping[str, str],
-    look: FeatureModels,
-    config: PartsConfig,
+    name: str, taken: PhotographedObject, names: Mapping[str, str], look: FeatureModels, config: PartsConfig
 ) -> PartsResult:
     """Find one object's parts, and compare; only what a picture shows is asked for."""
     called = _named_parts(taken, names)
@@ -346,9 +320,7 @@ def read_names(path: Path) -> PartNames:
         raise BadFileError(path, f"cannot be read ({error}).", NAMES_FILE_ADVICE) from error
     for file, table in tables.items():
         if not isinstance(table, dict) or not all(isinstance(v, str) and v for v in table.values()):
-            raise BadFileError(
-                path, f"{file}: must map the file's names to names.", NAMES_FILE_ADVICE
-            )
+            raise BadFileError(path, f"{file}: must map the file's names to names.", NAMES_FILE_ADVICE)
     return tables
 
 
@@ -359,10 +331,7 @@ PARTS_HEADS = ("object", "parts", "clusters", "alone", "best", "segmented", "nam
 
 def parts_tables(rows: Sequence[PartsRow]) -> list[ResultTable]:
     """Return title, heads and cells of what a person is shown."""
-    cells = [
-        (r.object, str(len(r.parts)), f"{r.clusters} ({r.ratio:.1f}×)", *map(_share, _scores(r)))
-        for r in rows
-    ]
+    cells = [(r.object, str(len(r.parts)), f"{r.clusters} ({r.ratio:.1f}×)", *map(_share, _scores(r))) for r in rows]
     mean = np.mean([_scores(r) for r in rows], axis=0)
     ratio = np.mean([r.ratio for r in rows])
     last = ("mean", "", f"({ratio:.1f}×)", *map(_share, mean))

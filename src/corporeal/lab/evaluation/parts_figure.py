@@ -53,9 +53,7 @@ def project_points(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     towards = np.array(VIEW_DIRECTION) / np.linalg.norm(VIEW_DIRECTION)
     right = np.cross([0.0, 0.0, 1.0], towards)
     right /= np.linalg.norm(right)
-    return position @ np.stack([right, np.cross(towards, right)], axis=1), np.argsort(
-        position @ towards
-    )
+    return position @ np.stack([right, np.cross(towards, right)], axis=1), np.argsort(position @ towards)
 
 
 def number_colours(number: np.ndarray, palette: str) -> np.ndarray:

@@ -104,9 +104,7 @@ def _rebound(row: dict) -> MeasuredRebound:
     )
 
 
-def contradictory_rebounds(
-    rows: Sequence[MeasuredRebound], leeway: float
-) -> Iterator[tuple[MeasuredRebound, ...]]:
+def contradictory_rebounds(rows: Sequence[MeasuredRebound], leeway: float) -> Iterator[tuple[MeasuredRebound, ...]]:
     """Yield the rows of each scene that no value can meet, each within a leeway [-].
 
     Raises:
@@ -134,12 +132,7 @@ class _AirDrag:
     def terminal(self) -> float:
         """Square of the speed at which drag bears the weight, v_t² = 2 m g/(ρ c A) [m²/s²]."""
         area = 0.25 * pi * self.diameter**2
-        return (
-            2.0
-            * (self.mass or 0.0)
-            * GRAVITY_M_S2
-            / (AIR_DENSITY_KG_M3 * SPHERE_DRAG_COEFFICIENT * area)
-        )
+        return 2.0 * (self.mass or 0.0) * GRAVITY_M_S2 / (AIR_DENSITY_KG_M3 * SPHERE_DRAG_COEFFICIENT * area)
 
     def struck_at(self, height: float) -> float:
         """Speed after a fall from rest [m/s]."""

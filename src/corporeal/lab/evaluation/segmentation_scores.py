@@ -23,8 +23,8 @@ def iou_matrix(
 def matched_iou(truth: Int[np.ndarray, " N"], found: Int[np.ndarray, " N"]) -> float:
     """Return the mean over true parts of the IoU with the one cluster each is paired with.
 
-    Pairs are those of the largest sum (Hungarian method); a part without a cluster counts 0. A
-    cluster too many costs by what it takes from the others.
+    Pairs are those of the largest sum (Hungarian method); a part without a cluster counts 0. A cluster too many costs
+    by what it takes from the others.
     """
     present, part = np.unique(truth, return_inverse=True)
     shares = iou_matrix(part, found, len(present), int(found.max()) + 1)

@@ -38,8 +38,7 @@ RECORD_BYTES = {name: record.dtype.itemsize for name, record in CONTACT_LISTS.it
 BONDED_FRICTION = -1
 """Friction of a pair that is never in contact, to the native piece."""
 LEDGER_ARRAYS = (
-    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss "
-    "impact_of_pair"
+    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss impact_of_pair"
 )
 
 
@@ -260,13 +259,7 @@ class ContactMemory:
         self.slot = np.zeros(1 << (4 * room["past"]).bit_length(), np.int32)
         self.kept_slot = np.zeros(1 << (2 * room["kept"]).bit_length(), np.int32)
         self.stage["slots"] = len(self.slot)
-        write_pointers(
-            self.stage,
-            order=self.order,
-            slot=self.slot,
-            kept_slot=self.kept_slot,
-            **self.lists,
-        )
+        write_pointers(self.stage, order=self.order, slot=self.slot, kept_slot=self.kept_slot, **self.lists)
         self.past, self.kept = past, kept
         self.stage["most_junctions"], self.stage["most_meets"] = room["junction"], room["meet"]
         self.stage["most_sides"], self.stage["most_touches"] = room["side"], room["touch"]

@@ -1,7 +1,7 @@
 """The production engine: float32 particles in sorted batches, one sparse grid per body.
 
-Moving-least-squares MPM (Hu et al. 2018) with quadratic B-splines and affine FLIP; the loops over
-particles, nodes and contacts are the native pieces of ``cpu.program``, launched by Warp.
+Moving-least-squares MPM (Hu et al. 2018) with quadratic B-splines and affine FLIP; the loops over particles, nodes and
+contacts are the native pieces of ``cpu.program``, launched by Warp.
 """
 
 from collections.abc import Collection
@@ -77,8 +77,8 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
 
         Args:
             problem: What to simulate.
-            threads: How many threads share the loops; None: as many as there are cores, up to 4.
-                The result does not depend on it.
+            threads: How many threads share the loops; None: as many as there are cores, up to 4. The result does not
+                depend on it.
 
         """
         self.problem = problem
@@ -90,16 +90,9 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         everything = list(range(len(problem.bodies)))
         single = problem.contact == "single"
         self.members = [everything] if single else [[b] for b in everything]
-        self.rigid = {
-            b: native_tables.rigid_state(body)
-            for b, body in enumerate(problem.bodies)
-            if body.rigid
-        }
+        self.rigid = {b: native_tables.rigid_state(body) for b, body in enumerate(problem.bodies) if body.rigid}
         self.paths = prescribed_motion.path_followers(problem)
-        self.points = {
-            b: native_tables.rigid_points(problem.bodies[b], state)
-            for b, state in self.rigid.items()
-        }
+        self.points = {b: native_tables.rigid_points(problem.bodies[b], state) for b, state in self.rigid.items()}
         self._lay_out()
 
     def _is_rigid(self, field: int) -> bool:
@@ -115,21 +108,13 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         self.window: dict[int, FieldWindow] = {}
         walls = [[*plane.normal, plane.offset / problem.cell] for plane in problem.planes]
         sorter = ParticleSorter(
-            np.reshape(walls, (-1, 4)),
-            (MAX_WALL_DEPTH_DX, MAX_DISTANCE_FROM_ORIGIN_DX),
-            self.program,
+            np.reshape(walls, (-1, 4)), (MAX_WALL_DEPTH_DX, MAX_DISTANCE_FROM_ORIGIN_DX), self.program
         )
         self.reader = ParticleReader(problem.cell, self.program)
         self._fill_fields(sorter)
         separate = [b for b in self.rigid if self._is_rigid(b)]
         self.grids = [
-            rigid_grid(
-                self.field[b : b + 1],
-                problem.bodies[b],
-                self.rigid[b],
-                self.points[b],
-                problem.cell,
-            )
+            rigid_grid(self.field[b : b + 1], problem.bodies[b], self.rigid[b], self.points[b], problem.cell)
             for b in separate
         ]
         self.carried = [
@@ -138,16 +123,12 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
             if b not in separate
         ]
         self.contact = ContactMemory(self.world, problem, self.ledger)
-        self.winds = WindRecords(
-            problem, self.first, self.ledger.external_impulse, self.rigid, self.points
-        )
+        self.winds = WindRecords(problem, self.first, self.ledger.external_impulse, self.rigid, self.points)
         self.springs = SpringRecords(problem, self.first, self.ledger.external_impulse, self.rigid)
         self.grips: dict[int, Grip] = {}
         self.bond, self.bonded = native_tables.bond_records(problem)
         self._wind_clock()
-        self.saving = EngineCheckpoint(
-            self.ledger, self.window, self.rigid, self.contact, self.clock, self.world
-        )
+        self.saving = EngineCheckpoint(self.ledger, self.window, self.rigid, self.contact, self.clock, self.world)
         self.connect()
 
     def _fill_fields(self, sorter: ParticleSorter) -> None:
@@ -172,10 +153,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         problem, clock = self.problem, np.zeros(1, CLOCK_RECORD.dtype)
         self.clock = clock
         self.body_loads = pacing.body_loads(
-            problem,
-            self.rigid,
-            {f: material.body for f, material in self.material.items()},
-            self.paths,
+            problem, self.rigid, {f: material.body for f, material in self.material.items()}, self.paths
         )
         clock["gravity"], clock["ramp"] = problem.gravity, problem.gravity_ramp
         clock["courant"], clock["rigid_courant"] = problem.courant, RIGID_COURANT
@@ -199,9 +177,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         pulls = (self.problem.gravity, *self.body_loads["push"].tolist())
         pull = max(float(np.linalg.norm(a)) for a in pulls)
         fall = FREE_FALL_STEP_FRACTION * np.sqrt(self.problem.cell / max(pull, TINY))
-        return float(
-            min(fall, longest_step(self.problem), prescribed_motion.longest_step(self.problem))
-        )
+        return float(min(fall, longest_step(self.problem), prescribed_motion.longest_step(self.problem)))
 
     def _refuse_far(self, place: np.ndarray, bodies: list[int]) -> None:
         if not np.isfinite(place).all():
@@ -329,9 +305,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
 
     def _note_steps(self) -> None:
         clock = self.clock[0]
-        self.steps = StepStatistics(
-            int(clock["count"]), float(clock["smallest"]), float(clock["largest"])
-        )
+        self.steps = StepStatistics(int(clock["count"]), float(clock["smallest"]), float(clock["largest"]))
 
     def book(self) -> None:
         """Move what the tasks added up into the ledger."""
@@ -352,9 +326,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         wide = [f for f in sorted(fields) if not self.window[f].sort()]
         self.connect()
         if wide:
-            raise SimulationError(
-                window_too_wide_error(self.problem, self.members[wide[0]], self.time)
-            )
+            raise SimulationError(window_too_wide_error(self.problem, self.members[wide[0]], self.time))
 
     def _find_lost(self) -> None:
         """Raise when a particle is not finite or left the domain."""
@@ -363,9 +335,9 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         for window in self.window.values():
             place = window.position()
             rows = window.channel(VE, ST - VE)
-            good = (np.abs(rows) < MAX_FINITE_VALUE).all(axis=1) & (
-                np.abs(place) < MAX_DISTANCE_FROM_ORIGIN_DX
-            ).all(axis=1)
+            good = (np.abs(rows) < MAX_FINITE_VALUE).all(axis=1) & (np.abs(place) < MAX_DISTANCE_FROM_ORIGIN_DX).all(
+                axis=1
+            )
             for plane in self.problem.planes:
                 height = place @ np.array(plane.normal) - plane.offset / cell
                 good &= height > -MAX_WALL_DEPTH_DX
@@ -427,10 +399,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
 
     def _rigid_bodies(self) -> dict[int, RigidBody]:
         start = self.springs.start
-        return {
-            b: native_tables.rigid_body(state, start[b], self.points[b])
-            for b, state in self.rigid.items()
-        }
+        return {b: native_tables.rigid_body(state, start[b], self.points[b]) for b, state in self.rigid.items()}
 
     def _booked(self) -> EngineLedger:
         self.book()

@@ -52,18 +52,14 @@ class EngineCheckpoint:
         for name, value in zip(CLOCK_FIELDS, clocked, strict=True):
             self.clock[name] = value
 
-    def place_as(
-        self, saved: SavedArrays, fields: Collection[int], bodies: Collection[int]
-    ) -> None:
+    def place_as(self, saved: SavedArrays, fields: Collection[int], bodies: Collection[int]) -> None:
         """Take over some fields and rigid bodies, and how fast waves were there."""
         self._restore_bodies(saved, fields, self.rigid.keys() & set(bodies))
         self.contact.kept = np.zeros(0, np.uint8)  # who is here stands elsewhere there
         wave = float(saved["clock"][1 + CLOCK_FIELDS.index("wave")])
         self.clock["wave"] = max(float(self.clock["wave"][0]), wave)
 
-    def _restore_bodies(
-        self, saved: SavedArrays, fields: Collection[int], bodies: Collection[int]
-    ) -> None:
+    def _restore_bodies(self, saved: SavedArrays, fields: Collection[int], bodies: Collection[int]) -> None:
         for f in fields:
             head = f"field{f}."
             own = {k.removeprefix(head): v for k, v in saved.items() if k.startswith(head)}
@@ -75,9 +71,7 @@ class EngineCheckpoint:
         self.contact.kept = saved["choices"]
 
 
-def continued(
-    own: SavedArrays, saved: SavedArrays, change: BodyChange, shared: bool
-) -> SavedArrays:
+def continued(own: SavedArrays, saved: SavedArrays, change: BodyChange, shared: bool) -> SavedArrays:
     """Return the state of an engine with other bodies: their own, of all else what was saved.
 
     In a field that all share, ``Window.continue_as`` takes particles over by number afterwards.

@@ -1,7 +1,7 @@
 """A field's window on the grid: particles sorted into blocks of 4³ cells, and the nodes they reach.
 
-The window follows its particles: every sort places it anew around them, so the world has no walls
-of its own. Blocks that no particle reaches take no memory.
+The window follows its particles: every sort places it anew around them, so the world has no walls of its own. Blocks
+that no particle reaches take no memory.
 """
 
 from functools import cached_property
@@ -42,8 +42,7 @@ class FieldWindow:
     part: np.ndarray
     """Channels of all particles, (batches, CHANNELS, 8)."""
     history: np.ndarray
-    """What material that flows or is nearly incompressible remembers besides, (batches, HISTORY,
-    8); empty without any.
+    """What material that flows or is nearly incompressible remembers besides, (batches, HISTORY, 8); empty without any.
     """
     branch: np.ndarray
     """What Maxwell branches remember, (batches, MEMORY, 8); empty without any."""
@@ -69,9 +68,7 @@ class FieldWindow:
     relieves: bool
     """Whether the history, where there is any, is that of nearly incompressible material."""
 
-    def __init__(
-        self, place: np.ndarray, rows: np.ndarray, material: FieldMaterials, sorter: ParticleSorter
-    ) -> None:
+    def __init__(self, place: np.ndarray, rows: np.ndarray, material: FieldMaterials, sorter: ParticleSorter) -> None:
         """Sort particles into a first window.
 
         Args:
@@ -243,9 +240,7 @@ def _shifted_places(place: np.ndarray, shift: np.ndarray) -> np.ndarray:
     """Shift fixed-point places, which float32 channels hold."""
     fixed = np.ascontiguousarray(place).view(np.int32).astype(np.int64) + shift
     if (np.abs(fixed) >= 2**31).any():
-        raise SimulationError(
-            "The added body is too far from the others for one grid. Add it nearer."
-        )
+        raise SimulationError("The added body is too far from the others for one grid. Add it nearer.")
     return fixed.astype(np.int32).view(np.float32)
 
 

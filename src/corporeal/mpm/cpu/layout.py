@@ -1,7 +1,7 @@
 """Memory layout shared by Python and native loops: channels, columns, codes and structs.
 
-``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no
-number and no struct of this layout is written in ``loops``.
+``cpp_layout_numbers`` and the texts of the records stand in front of the loops that read them; no number and no struct
+of this layout is written in ``loops``.
 """
 
 from corporeal.mpm.constants import BRANCHES
@@ -14,18 +14,18 @@ PLACE = 22
 CELL_UNITS, HALF_CELL_UNITS = 1 << PLACE, 1 << (PLACE - 1)
 """A cell and half a cell [units]."""
 XI, VE, AF, DE, ST, MA, VO, MT, ID = 0, 3, 6, 15, 24, 30, 31, 32, 33
-"""First channels of a particle in its batch, [channel][8]: place (3), velocity (3), affine part (9,
-per cell: dx times the usual), F - 1 (9), stress (6), mass, volume, material and number."""
+"""First channels of a particle in its batch, [channel][8]: place (3), velocity (3), affine part (9, per cell: dx times
+the usual), F - 1 (9), stress (6), mass, volume, material and number."""
 CHANNELS = 34
 """Channels of a particle."""
 EP, VC, TM = 0, 1, 2
-"""First channels of what material that flows remembers besides: plastic strain, volume correction,
-whole motion - 1 (9).
+"""First channels of what material that flows remembers besides: plastic strain, volume correction, whole motion - 1
+(9).
 """
 LOG_VOLUME_RATIO, PRESSURE, OWN_DILATATION, CLUSTER, WAVE_BOUND = 1, 2, 3, 4, 5
-"""The same of nearly incompressible material: ln of the mean volume over its own and the Kirchhoff
-pressure of the mean [Pa]; within a step, its own dilatation, its cluster and the wave bound so far.
-Its plastic strain, in the channel before, stays 0.
+"""The same of nearly incompressible material: ln of the mean volume over its own and the Kirchhoff pressure of the mean
+[Pa]; within a step, its own dilatation, its cluster and the wave bound so far. Its plastic strain, in the channel
+before, stays 0.
 """
 HISTORY_CHANNELS = 11
 """Channels of that."""
@@ -36,9 +36,8 @@ BRANCH_CHANNELS = 7
 MAXWELL_CHANNELS = BRANCHES * BRANCH_CHANNELS
 """Channels of what all branches of a particle remember."""
 LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, FLIP_DAMPING_RATE, RHO, RIGID = range(12)
-"""Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain
-p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, FLIP damping rate [1/s], ρ [kg/m³], 1 where
-rigid."""
+"""Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain p₀/K, of a liquid
+K_c/dtⁿ in this step [Pa] and n, FLIP damping rate [1/s], ρ [kg/m³], 1 where rigid."""
 SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY, STIFFENING = (
     12,
     14,
@@ -49,9 +48,8 @@ SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY,
     25,
     26,
 )
-"""And of each Maxwell branch G, K [Pa], what this step leaves of old and of new strain, T [s]; this
-step's push [m/s] (3); K_c of a liquid [Pa sⁿ]; how many times stiffer waves find it with branches
-than without [-]."""
+"""And of each Maxwell branch G, K [Pa], what this step leaves of old and of new strain, T [s]; this step's push [m/s]
+(3); K_c of a liquid [Pa sⁿ]; how many times stiffer waves find it with branches than without [-]."""
 MATERIAL_COLUMNS = 32
 """Columns with room to spare: a row is two cache lines."""
 
@@ -66,14 +64,14 @@ OWN_BLOCK = NEIGHBOURS + 13
 RUN_INTEGERS = 5
 """Integers of a run of slots before a sort: the first of them."""
 ARENA_LAYER_NODES = 66
-"""Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third
-layer would wait for what was just written in the first, 4096 bytes before."""
+"""Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third layer would wait for
+what was just written in the first, 4096 bytes before."""
 ARENA_FLOATS = 8 * ARENA_LAYER_NODES
 LANES = 8
 """Numbers in a vector, in single precision."""
 COLOURS = 8
-"""Tasks on particles are pieces of columns of blocks. Those of one colour, the parities of their x,
-y and number in the column, never overlap."""
+"""Tasks on particles are pieces of columns of blocks. Those of one colour, the parities of their x, y and number in the
+column, never overlap."""
 SPEED2, WAVE2, PLASTIC, VISCOUS, REPORT_ASTRAY, REPORT_WORK = range(6)
 """Columns of a task's report."""
 REPORT_COLUMNS = 8
@@ -89,33 +87,20 @@ SORT_SURVEY, COUNT, RANK, SORT_COPY = range(4)
 READING_RUNS = 64
 """Runs of blocks that are added up on their own where particles are read."""
 BODY_SUMS = 13
-"""Of a body: m x (3), m v (3), angular momentum about the origin (3), kinetic and elastic energy,
-the energy in Maxwell branches, and the largest |v|²."""
+"""Of a body: m x (3), m v (3), angular momentum about the origin (3), kinetic and elastic energy, the energy in Maxwell
+branches, and the largest |v|²."""
 
 # ---------------------------------------------------------------- rigid bodies
 
-(
-    CENTRE,
-    TURN,
-    REST_INVERSE_INERTIA,
-    SPEED,
-    MOMENT,
-    INERTIA,
-    SPIN,
-    RADIUS,
-    KICK,
-    FRAME_MASS,
-    LOCAL_BOX,
-) = (
+(CENTRE, TURN, REST_INVERSE_INERTIA, SPEED, MOMENT, INERTIA, SPIN, RADIUS, KICK, FRAME_MASS, LOCAL_BOX) = (
     *(1, 4, 13, 22, 25, 28, 37, 40, 41),
     *(44, 48),
 )
 INVERSE_MASS, REST_INERTIA, NEXT_ROTATION = 54, 55, 64
-"""First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest
-(9), velocity (3), angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while
-a frame holds soft nodes its own mass and centre (4); lowest and highest corner of the box around
-its particles in its own frame (6). Then 1/M in contact (0: prescribed motion), and of what does its
-inertia at rest (9) and its rotation at the end of the step (9)."""
+"""First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest (9), velocity (3),
+angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while a frame holds soft nodes its own mass
+and centre (4); lowest and highest corner of the box around its particles in its own frame (6). Then 1/M in contact (0:
+prescribed motion), and of what does its inertia at rest (9) and its rotation at the end of the step (9)."""
 RIGID_STATE_COLUMNS = 80
 """Columns with room to spare."""
 
@@ -126,8 +111,8 @@ LIST_PARTS = 16
 FIELDS_IN_BLOCK = 12
 """Fields that may meet in one block of nodes."""
 PAIR_COLUMNS = 17
-"""Columns of a pair of fields in a step: its part in a round of impacts, normal sum, weighted place
-(3), spare; in such a round those of ``Backing`` in backing.h."""
+"""Columns of a pair of fields in a step: its part in a round of impacts, normal sum, weighted place (3), spare; in such
+a round those of ``Backing`` in backing.h."""
 
 
 def cpp_layout_numbers() -> str:
@@ -157,15 +142,13 @@ THREAD_POOL_RECORD = NativeRecord(
     (f"Post[{MAX_THREADS}]", "post"),
     within=(POST_RECORD,),
 )
-BOND_RECORD = (
-    NativeRecord(  # a frame and the soft nodes it holds in this step: see physics/inclusions.py
-        "Bond",
-        ("int *", "slot"),
-        ("float *", "mass volume"),
-        ("double *", "point"),  # [points][4] near the soft body: place in the frame's frame, volume
-        ("double", "per_soft"),  # volume per mass [m³/kg]
-        ("int", "frame soft points count"),
-    )
+BOND_RECORD = NativeRecord(  # a frame and the soft nodes it holds in this step: see physics/inclusions.py
+    "Bond",
+    ("int *", "slot"),
+    ("float *", "mass volume"),
+    ("double *", "point"),  # [points][4] near the soft body: place in the frame's frame, volume
+    ("double", "per_soft"),  # volume per mass [m³/kg]
+    ("int", "frame soft points count"),
 )
 BODY_LOAD_RECORD = NativeRecord(  # uniform accelerations of a body
     "BodyLoad",
@@ -188,9 +171,8 @@ CLOCK_RECORD = NativeRecord(
     ("long long", "count budget"),
     ("int", "body_loads started last laid fuse fused pushed spare"),
 )
-# Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level";
-# after the forces mass, velocity 3, velocity as it was 3, mean height. While a step reads its
-# nodes, the next one's are laid.
+# Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level"; after the forces
+# mass, velocity 3, velocity as it was 3, mean height. While a step reads its nodes, the next one's are laid.
 FIELD_RECORD = NativeRecord(
     "Field",
     ("float *", "part node next history branch material"),
@@ -233,19 +215,11 @@ WIND_RECORD = NativeRecord(  # a body in the wind: see wind_records.py
     ("double", "gust start end half_rho_c work"),
     ("int", "field first count free"),
 )
-TETHER_RECORD = (
-    NativeRecord(  # particles of a field on springs to a rigid body: see physics/springs.py
-        "Tether",
-        ("double *", "anchor rate holder"),
-        ("double", "damping lost"),
-        ("int", "field first count"),
-    )
+TETHER_RECORD = NativeRecord(  # particles of a field on springs to a rigid body: see physics/springs.py
+    "Tether", ("double *", "anchor rate holder"), ("double", "damping lost"), ("int", "field first count")
 )
 JOINT_RECORD = NativeRecord(  # two rigid bodies: arms in their own frames
-    "Joint",
-    ("double *", "first second"),
-    ("double[3]", "arm_first arm_second"),
-    ("double", "stiffness damping lost"),
+    "Joint", ("double *", "first second"), ("double[3]", "arm_first arm_second"), ("double", "stiffness damping lost")
 )
 GRIP_RECORD = NativeRecord(  # a spring from a body to a point outside: see physics/grips.py
     "Grip",
@@ -334,23 +308,16 @@ AIM_RECORD = NativeRecord(  # candidate normals of a possible contact of two fie
     ("float[3]", "chosen"),
     ("float", "weight"),
 )
-LEAN_RECORD = (
-    NativeRecord(  # what neighbours read of a possible contact: pair by pair of a block's fields
-        "Lean",
-        ("float[3]", "u"),  # weighted normal
-        ("int", "touch"),  # the contact, or the first of them
-    )
+LEAN_RECORD = NativeRecord(  # what neighbours read of a possible contact: pair by pair of a block's fields
+    "Lean",
+    ("float[3]", "u"),  # weighted normal
+    ("int", "touch"),  # the contact, or the first of them
 )
-CHOICE_RECORD = (
-    NativeRecord(  # which candidates won where two fields meet in a block: see physics/contact.py
-        "Choice",
-        ("int[3]", "at"),
-        ("int", "a c spare"),  # fields
-        (
-            "unsigned long long[2]",
-            "bits",
-        ),  # low and high bit of 1 + candidate, node by node; 0: none
-    )
+CHOICE_RECORD = NativeRecord(  # which candidates won where two fields meet in a block: see physics/contact.py
+    "Choice",
+    ("int[3]", "at"),
+    ("int", "a c spare"),  # fields
+    ("unsigned long long[2]", "bits"),  # low and high bit of 1 + candidate, node by node; 0: none
 )
 TOUCH_RECORD = NativeRecord(  # a possible contact of side a with side c, or with plane -1 - c
     "Touch",
@@ -367,11 +334,7 @@ TOUCH_RECORD = NativeRecord(  # a possible contact of side a with side c, or wit
     ("double", "instead"),  # of round on curved: nodes nearer transmit nothing [m]; else 0
 )
 ENTRY_RECORD = NativeRecord(  # what some contacts of one pair add to the books
-    "Entry",
-    ("int", "a c"),
-    ("double", "normal"),
-    ("double[3]", "place J"),
-    ("double", "loss impact"),
+    "Entry", ("int", "a c"), ("double", "normal"), ("double[3]", "place J"), ("double", "loss impact")
 )
 PAST_RECORD = NativeRecord(  # force of a contact in the last step
     "Past", ("unsigned long long", "key"), ("double[3]", "force")

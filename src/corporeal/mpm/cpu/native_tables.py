@@ -45,9 +45,7 @@ from corporeal.mpm.physics.inclusions import inclusion_and_soft_density, inclusi
 from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.problem import Body, Joint, Problem
 
-GUST_SIGNAL = np.stack(
-    [wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE]
-)
+GUST_SIGNAL = np.stack([wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE])
 """Of the gusts: share, frequency [Hz] and phase [rad] of every part."""
 
 
@@ -140,26 +138,18 @@ class FieldMaterials:
         table = np.zeros((len(s.body), MATERIAL_COLUMNS), np.float32)
         none = np.zeros(len(s.body))
         numbers = (s.mu, s.lam, s.yield_stress, s.hardening, s.cone, s.apex, none, s.flow_index)
-        table[:, :SHEAR] = np.column_stack(
-            [s.law, *numbers, s.flip_damping_rate, s.density, s.rigid]
-        )
+        table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.flip_damping_rate, s.density, s.rigid])
         table[:, CONSISTENCY] = s.consistency
         table[:, STIFFENING] = s.stiffening**2
         branches = s.branches
-        for first, column in (
-            (SHEAR, branches.shear),
-            (BULK, branches.bulk),
-            (BRANCH_TIME, branches.time),
-        ):
+        for first, column in ((SHEAR, branches.shear), (BULK, branches.bulk), (BRANCH_TIME, branches.time)):
             table[:, first : first + BRANCHES] = column
         kinds = (bool(s.uses_mean_dilatation.all()), bool(s.flows.any()), bool(s.relaxes.any()))
         pours = bool(np.isin(s.law, laws.LIQUID_LAWS).any() and not s.rigid.all())
         return cls(table, s.body, *kinds, pours)
 
 
-def particle_rows(
-    problem: Problem, bodies: list[int], first: list[int], kind: np.ndarray
-) -> np.ndarray:
+def particle_rows(problem: Problem, bodies: list[int], first: list[int], kind: np.ndarray) -> np.ndarray:
     """Channels of some bodies' particles at rest, (P, CHANNELS); places are filled in later."""
     parts = [problem.bodies[b] for b in bodies]
     rows = np.zeros((len(kind), CHANNELS), np.float32)
@@ -168,9 +158,7 @@ def particle_rows(
     rows[:, MA] = volume * np.concatenate([b.density for b in parts])
     rows[:, VO] = volume
     rows[:, MT] = kind.view(np.float32)
-    number = np.concatenate(
-        [first[b] + np.arange(len(p.position)) for b, p in zip(bodies, parts, strict=True)]
-    )
+    number = np.concatenate([first[b] + np.arange(len(p.position)) for b, p in zip(bodies, parts, strict=True)])
     rows[:, ID] = number.astype(np.int32).view(np.float32)
     return rows
 
@@ -234,10 +222,7 @@ def bond_records(problem: Problem) -> tuple[np.ndarray, list[np.ndarray]]:
     for row, (f, s) in zip(rows, pairs, strict=True):
         frame, soft = problem.bodies[f], problem.bodies[s]
         stiff, held = inclusion_and_soft_density(frame, soft, problem.cell)
-        mass, chosen = (
-            frame.volume * frame.density,
-            inclusion_particles_near(frame, soft, problem.cell),
-        )
+        mass, chosen = (frame.volume * frame.density, inclusion_particles_near(frame, soft, problem.cell))
         place = frame.position - mass @ frame.position / mass.sum()
         points.append(np.column_stack([place, mass / stiff])[chosen])
         row["point"], row["points"] = points[-1].ctypes.data, len(points[-1])
@@ -254,9 +239,7 @@ def rigid_points(body: Body, state: np.ndarray) -> np.ndarray:
 class SpringRecords:
     """Records of a problem's springs, and the arrays that they point to."""
 
-    def __init__(
-        self, problem: Problem, first: list[int], impulse: np.ndarray, rigid: dict[int, np.ndarray]
-    ) -> None:
+    def __init__(self, problem: Problem, first: list[int], impulse: np.ndarray, rigid: dict[int, np.ndarray]) -> None:
         """Lay out memory.
 
         Args:
@@ -272,10 +255,7 @@ class SpringRecords:
         apart = problem.contact == "multi"
         tied = [(b, body) for b, body in enumerate(problem.bodies) if body.tether and apart]
         joints = problem.joints if apart else ()
-        self.tether, self.joint = (
-            np.zeros(len(tied), TETHER_RECORD.dtype),
-            np.zeros(len(joints), JOINT_RECORD.dtype),
-        )
+        self.tether, self.joint = (np.zeros(len(tied), TETHER_RECORD.dtype), np.zeros(len(joints), JOINT_RECORD.dtype))
         self.grip = np.zeros(0, GRIP_RECORD.dtype)
         for row, (b, body) in enumerate(tied):
             self._tie(self.tether[row : row + 1], b, body)

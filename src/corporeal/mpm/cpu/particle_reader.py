@@ -35,12 +35,7 @@ class ParticleReader:
     def __init__(self, cell: float, program: CpuProgram) -> None:
         self.record = np.zeros(1, READING_RECORD.dtype)
         self.record["dx"], self.record["runs"] = cell, READING_RUNS
-        memory = wp.array(
-            ptr=self.record.ctypes.data,
-            dtype=wp.uint64,
-            shape=self.record.nbytes // 8,
-            device="cpu",
-        )
+        memory = wp.array(ptr=self.record.ctypes.data, dtype=wp.uint64, shape=self.record.nbytes // 8, device="cpu")
         self.launches = [
             wp.launch(read_particles, dim=1, inputs=[memory, 0, 0], device="cpu", record_cmd=True)
             for _ in range(program.threads)
@@ -72,9 +67,7 @@ class ParticleReader:
         total[:, -1] = sums[:, :, -1].max(axis=0)
         return total
 
-    def _read(
-        self, window: FieldWindow, material: FieldMaterials, **arrays: np.ndarray | None
-    ) -> None:
+    def _read(self, window: FieldWindow, material: FieldMaterials, **arrays: np.ndarray | None) -> None:
         record = self.record
         arrays |= {"part": window.part, "material": material.table, "block": window.block}
         arrays["history"] = window.history if len(window.history) else None

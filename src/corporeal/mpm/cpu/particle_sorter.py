@@ -41,8 +41,8 @@ def sort_particles(memory: MemoryArray, stage: int, low: int, high: int):
 
 
 GROWTH_DIVISOR, IDLE_DIVISOR = 16, 4
-"""Of what a sort fills: by which part more memory it is given, since blocks come and go, and how
-much more it may be given at most."""
+"""Of what a sort fills: by which part more memory it is given, since blocks come and go, and how much more it may be
+given at most."""
 
 
 class SortableWindow(Protocol):
@@ -80,9 +80,7 @@ class SpareMemory:
             if size <= kept.nbytes:
                 return array_in_bytes(kept, shape, np.float32)
             del kept  # before new memory is asked for
-        return aligned_zeros((batches + batches // GROWTH_DIVISOR, *shape[1:]), np.float32)[
-            :batches
-        ]
+        return aligned_zeros((batches + batches // GROWTH_DIVISOR, *shape[1:]), np.float32)[:batches]
 
     def keep(self, rows: np.ndarray) -> None:
         """Take back memory of ``rows`` or ``aligned_zeros`` that is unused, if it is the largest."""
@@ -94,9 +92,7 @@ class SpareMemory:
 class ParticleSorter:
     """Sorts windows one after the other, in memory of its own."""
 
-    def __init__(
-        self, planes: np.ndarray, domain: tuple[float, float], program: CpuProgram
-    ) -> None:
+    def __init__(self, planes: np.ndarray, domain: tuple[float, float], program: CpuProgram) -> None:
         """Prepare.
 
         Args:
@@ -109,27 +105,13 @@ class ParticleSorter:
         self.plane = np.ascontiguousarray(planes, float)
         self.record["plane"], self.record["planes"] = self.plane.ctypes.data, len(planes)
         self.record["deepest"], self.record["farthest"] = domain
-        memory = wp.array(
-            ptr=self.record.ctypes.data,
-            dtype=wp.uint64,
-            shape=self.record.nbytes // 8,
-            device="cpu",
-        )
+        memory = wp.array(ptr=self.record.ctypes.data, dtype=wp.uint64, shape=self.record.nbytes // 8, device="cpu")
         self.launches = [
-            wp.launch(
-                sort_particles,
-                dim=1,
-                inputs=[memory, min(k, SORT_COPY), 0, 0],
-                device="cpu",
-                record_cmd=True,
-            )
+            wp.launch(sort_particles, dim=1, inputs=[memory, min(k, SORT_COPY), 0, 0], device="cpu", record_cmd=True)
             for k in range(SORT_COPY + program.threads)
         ]
         self.share = program.share
-        self.spare = {
-            channels: SpareMemory(channels)
-            for channels in (CHANNELS, HISTORY_CHANNELS, MAXWELL_CHANNELS)
-        }
+        self.spare = {channels: SpareMemory(channels) for channels in (CHANNELS, HISTORY_CHANNELS, MAXWELL_CHANNELS)}
 
     def survey(self, window: SortableWindow) -> tuple[bool, float]:
         """See where a window's particles are.
@@ -183,9 +165,7 @@ class ParticleSorter:
         history = self.spare[HISTORY_CHANNELS].rows(batches if len(window.history) else 0)
         branch = self.spare[MAXWELL_CHANNELS].rows(batches if len(window.branch) else 0)
         self._point(to=part, past_to=history, branch_to=branch)
-        copies = self.launches[SORT_COPY:][
-            : max(1, 8 * batches // MIN_PARTICLES_PER_READING_THREAD)
-        ]
+        copies = self.launches[SORT_COPY:][: max(1, 8 * batches // MIN_PARTICLES_PER_READING_THREAD)]
         end = window.block[:, 1]
         cuts = np.searchsorted(end, np.linspace(0, end[-1], len(copies) + 1)[1:-1])
         for launch, (low, high) in zip(copies, pairwise([0, *cuts, len(end)]), strict=True):

@@ -1,19 +1,17 @@
 """Native code of the engine, compiled by Warp.
 
-Warp compiles C++ for the machine it runs on and keeps it in a cache; the pieces use vector
-extensions, so they build on any processor. What they share with Python stands in ``layout``.
+Warp compiles C++ for the machine it runs on and keeps it in a cache; the pieces use vector extensions, so they build on
+any processor. What they share with Python stands in ``layout``.
 
-A step is a list of phases, ``SCHEDULE``; a phase is a number of tasks of one piece, which any
-thread may take in any order. A new one needs four things: ``loops/NAME.cpp``, which does task
-``index`` and returns; a stub ``NAME_native``; a number and a branch in ``run_tasks``; a ``Phase``.
-How many tasks it has may be known only at run time: then it is an int in ``WORLD_RECORD``, which an
-earlier phase wrote. Tasks of one phase must not write to the same place, or what is written must
-not depend on their order. A piece ends the steps through ``World.full`` (a list was too short:
-Python lengthens it and goes on at the phase marked ``resume``, with ``World.again`` set) or
-``World.stop``.
+A step is a list of phases, ``SCHEDULE``; a phase is a number of tasks of one piece, which any thread may take in any
+order. A new one needs four things: ``loops/NAME.cpp``, which does task ``index`` and returns; a stub ``NAME_native``; a
+number and a branch in ``run_tasks``; a ``Phase``. How many tasks it has may be known only at run time: then it is an
+int in ``WORLD_RECORD``, which an earlier phase wrote. Tasks of one phase must not write to the same place, or what is
+written must not depend on their order. A piece ends the steps through ``World.full`` (a list was too short: Python
+lengthens it and goes on at the phase marked ``resume``, with ``World.again`` set) or ``World.stop``.
 
-Before ``PIECE_FORCES`` nodes hold mass, momentum and force: loads add to the force, so that affine
-FLIP sees them. After it they hold mass, velocity and the velocity as it was.
+Before ``PIECE_FORCES`` nodes hold mass, momentum and force: loads add to the force, so that affine FLIP sees them.
+After it they hold mass, velocity and the velocity as it was.
 """
 
 import ctypes
@@ -37,16 +35,7 @@ MIN_PARTICLES_PER_THREAD = 500
 MIN_PARTICLES_PER_READING_THREAD = 4096
 """… and where they are only read or copied, once."""
 
-(
-    PIECE_LAY,
-    PIECE_MOVE,
-    PIECE_TIMESTEP,
-    PIECE_CLEAR,
-    PIECE_WIND,
-    PIECE_SPRING,
-    PIECE_FORCES,
-    PIECE_CONTACT,
-) = range(8)
+(PIECE_LAY, PIECE_MOVE, PIECE_TIMESTEP, PIECE_CLEAR, PIECE_WIND, PIECE_SPRING, PIECE_FORCES, PIECE_CONTACT) = range(8)
 """Numbers of the pieces; those of contact follow from the last."""
 (
     PIECE_START,
@@ -100,8 +89,8 @@ SCHEDULE = (
     Phase(PIECE_RESOLVE),
     *(Phase(PIECE_MOVE, "colour", colour) for colour in range(COLOURS)),
 )
-"""A step. Particles lay the nodes of the next step when they move, so laying is skipped unless the
-nodes are bare: at the start, after a sort, and while a push acts."""
+"""A step. Particles lay the nodes of the next step when they move, so laying is skipped unless the nodes are bare: at
+the start, after a sort, and while a push acts."""
 
 _LOOPS = Path(__file__).parent / "loops"
 
@@ -117,9 +106,7 @@ _RECORDS_BEFORE_PIECE = {
 
 def native_source(*names: str) -> str:
     """Source of a piece: the layout's numbers, what all share, then its own files."""
-    return "\n".join(
-        [layout.cpp_layout_numbers(), *(_piece_source(part) for part in ("shared", *names))]
-    )
+    return "\n".join([layout.cpp_layout_numbers(), *(_piece_source(part) for part in ("shared", *names))])
 
 
 def _piece_source(part: str) -> str:
@@ -198,16 +185,14 @@ def run_tasks(memory: MemoryArray, thread: int):
 class CpuProgram:
     """Runs steps on several threads without coming back to Python in between.
 
-    Each thread runs one Warp kernel, which lets go of Python's lock, and takes tasks until the
-    steps end. Tasks of one phase never write to the same place and phases follow one another in a
-    fixed order, so the result does not depend on the number of threads.
+    Each thread runs one Warp kernel, which lets go of Python's lock, and takes tasks until the steps end. Tasks of one
+    phase never write to the same place and phases follow one another in a fixed order, so the result does not depend on
+    the number of threads.
     """
 
     def __init__(self, world: np.ndarray, threads: int) -> None:
         self.world = world
-        memory = wp.array(
-            ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
-        )
+        memory = wp.array(ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu")
         self.threads = min(threads, MAX_THREADS)
         self.thread_pool = aligned_zeros((1,), THREAD_POOL_RECORD.dtype)
         self.phase = np.zeros((len(SCHEDULE), 4), np.int32)
@@ -268,9 +253,7 @@ def cache_line_bytes(shape: tuple[int, ...], dtype: np.dtype | type) -> int:
     return int(np.prod(shape)) * np.dtype(dtype).itemsize + 64
 
 
-def array_in_bytes(
-    memory: np.ndarray, shape: tuple[int, ...], dtype: np.dtype | type
-) -> np.ndarray:
+def array_in_bytes(memory: np.ndarray, shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
     """Lay an array that begins on a cache line into bytes; its ``base`` are these bytes."""
     start, size = -memory.ctypes.data % 64, cache_line_bytes(shape, dtype) - 64
     return memory[start : start + size].view(dtype).reshape(shape)

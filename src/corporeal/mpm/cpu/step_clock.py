@@ -11,10 +11,7 @@ from corporeal.mpm.problem import Problem
 
 
 def body_loads(
-    problem: Problem,
-    rigid: dict[int, np.ndarray],
-    rows: dict[int, np.ndarray],
-    paths: dict[int, PathFollower],
+    problem: Problem, rigid: dict[int, np.ndarray], rows: dict[int, np.ndarray], paths: dict[int, PathFollower]
 ) -> np.ndarray:
     """Record of every body its mass, push, path, rigid state, and where its materials stand.
 

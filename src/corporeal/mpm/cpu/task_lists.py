@@ -1,12 +1,12 @@
 """Tasks on particles and nodes, and their schedule on threads.
 
-A task on particles is a piece of a column of blocks. Two that reach the same node must not run at
-once, and what they add to it must come in one order, so that the result does not depend on the
-number of threads: that of their colours, the parities of their z, x and y.
+A task on particles is a piece of a column of blocks. Two that reach the same node must not run at once, and what they
+add to it must come in one order, so that the result does not depend on the number of threads: that of their colours,
+the parities of their z, x and y.
 
-A phase for each colour keeps that order, and goes through all nodes once for each colour. What one
-thread does alone may run in any sequence that keeps it between neighbours: layer by layer, and
-strip by strip in a layer, finds the nodes where the last task left them, in a near cache.
+A phase for each colour keeps that order, and goes through all nodes once for each colour. What one thread does alone
+may run in any sequence that keeps it between neighbours: layer by layer, and strip by strip in a layer, finds the nodes
+where the last task left them, in a near cache.
 """
 
 from dataclasses import dataclass
@@ -47,8 +47,8 @@ class ParticleTasks:
 def list_particle_tasks(windows: dict[int, FieldWindow], threads: int) -> ParticleTasks:
     """List tasks on particles, and how threads share them.
 
-    The largest chores of a colour come first, so that those which end a phase are small, and no
-    thread waits long. Rows of the report are in an order that the number of threads has no part in.
+    The largest chores of a colour come first, so that those which end a phase are small, and no thread waits long. Rows
+    of the report are in an order that the number of threads has no part in.
     """
     column = _column_pieces(windows)
     colour = column[:, 1:4] % 2 @ (2, 1, 4)
@@ -63,9 +63,7 @@ def list_particle_tasks(windows: dict[int, FieldWindow], threads: int) -> Partic
     cuts = np.flatnonzero(np.diff(row[: alone.sum(), 0], prepend=-1, append=-1)).tolist()
     whole = np.reshape(list(pairwise(cuts)), (-1, 2)).astype(np.int32)
     size = np.add.reduceat(column[order, 6], whole[:, 0]) if len(whole) else np.zeros(0)
-    single = np.arange(alone.sum(), len(row), dtype=np.int32)[:, None] + np.arange(
-        2, dtype=np.int32
-    )
+    single = np.arange(alone.sum(), len(row), dtype=np.int32)[:, None] + np.arange(2, dtype=np.int32)
     colours = np.bincount(colour[~alone], minlength=COLOURS)
     colours[0] += len(whole)
     chore = np.concatenate([whole[np.argsort(-size, kind="stable")], single]).astype(np.int32)
@@ -94,11 +92,7 @@ def _column_pieces(windows: dict[int, FieldWindow]) -> np.ndarray:
 def _one_thread_fields(windows: dict[int, FieldWindow], threads: int) -> list[int]:
     """Name the fields of which one thread does all tasks."""
     total = sum(window.count for window in windows.values())
-    return [
-        f
-        for f, w in windows.items()
-        if threads == 1 or w.count * threads * ONE_THREAD_LOAD_RATIO <= total
-    ]
+    return [f for f, w in windows.items() if threads == 1 or w.count * threads * ONE_THREAD_LOAD_RATIO <= total]
 
 
 def _task_order(column: np.ndarray) -> np.ndarray:

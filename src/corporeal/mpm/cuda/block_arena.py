@@ -1,7 +1,7 @@
 """A block's nodes in a group's own memory, as functions that Warp kernels call: see ``arena.h``.
 
-A group is the threads of one CUDA block, or the processor's one thread. Its threads call all of
-these with the same block, each with its number ``lane`` among ``lanes``.
+A group is the threads of one CUDA block, or the processor's one thread. Its threads call all of these with the same
+block, each with its number ``lane`` among ``lanes``.
 """
 
 from pathlib import Path
@@ -108,9 +108,7 @@ def add_to_layer(
     ...
 
 
-@wp.func_native(
-    "mpm::Layer::leave(mpm::Arena::memory((float *)arena.data), &sums.c[0], cell, layer);"
-)
+@wp.func_native("mpm::Layer::leave(mpm::Arena::memory((float *)arena.data), &sums.c[0], cell, layer);")
 def add_layer_to_arena(arena: wp.array(dtype=wp.float32), sums: LayerSums, cell: int, layer: int):
     """Add a cell's sums of one layer to the arena."""
     ...
@@ -227,9 +225,7 @@ RETURN_RECEIVED = f"""
 """
     + RETURN_RECEIVED
 )
-def receive_motion(
-    arena: wp.array(dtype=wp.float32), cell: wp.vec3i, f: wp.vec3, before: int
-) -> ReceivedMotion:
+def receive_motion(arena: wp.array(dtype=wp.float32), cell: wp.vec3i, f: wp.vec3, before: int) -> ReceivedMotion:
     """What a particle of the group's block sees; ``before``: without forces too."""
     ...
 

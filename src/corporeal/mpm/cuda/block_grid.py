@@ -1,7 +1,7 @@
 """Node blocks on the device: found by hashing, and linked.
 
-A hash instead of a table with bounds: bodies may travel as far as they like, and nothing is laid
-out anew while they do. Particles remember their block: the hash is asked only when they change it.
+A hash instead of a table with bounds: bodies may travel as far as they like, and nothing is laid out anew while they
+do. Particles remember their block: the hash is asked only when they change it.
 """
 
 from corporeal.mpm.constants import FIELDS_AT_NODE, MIN_NODE_MASS_KG
@@ -117,9 +117,7 @@ def link_blocks(g: BlockGrid, s: StepGlobals, tid: int, stride: int):
     for b in range(tid, blocks, stride):
         at = g.where[b]
         for o in range(8):
-            g.near[8 * b + o] = find_block(
-                g, g.field[b], at + wp.vec3i(o >> 2, (o >> 1) & 1, o & 1)
-            )
+            g.near[8 * b + o] = find_block(g, g.field[b], at + wp.vec3i(o >> 2, (o >> 1) & 1, o & 1))
         n = int(0)
         for f in range(g.fields):
             if f != g.field[b] and n < FIELDS_AT_NODE:

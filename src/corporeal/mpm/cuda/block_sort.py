@@ -1,8 +1,7 @@
 """Counting sort of particles by block on the device, without host synchronisation or allocation.
 
-Blocks that particles are in come first and are numbered as particles reach them, so that on the
-processor sorting what is sorted changes nothing. A GPU's threads number them, and what is within
-one, in no fixed order.
+Blocks that particles are in come first and are numbered as particles reach them, so that on the processor sorting what
+is sorted changes nothing. A GPU's threads number them, and what is within one, in no fixed order.
 """
 
 from corporeal.mpm.cuda.block_grid import block_of, claim_block, claim_blocks_around, find_block

@@ -1,7 +1,7 @@
 """Rows of vectors and matrices, stored channel by channel: neighbouring threads read neighbours.
 
-A row of three or nine numbers that lie one after the other costs a warp of 32 threads three or nine
-times the transactions of one whose first numbers of all rows lie together, then all second ones.
+A row of three or nine numbers that lie one after the other costs a warp of 32 threads three or nine times the
+transactions of one whose first numbers of all rows lie together, then all second ones.
 """
 
 from corporeal.mpm.cuda.layout import vec6, vec14, wp

@@ -21,12 +21,7 @@ from corporeal.mpm.cuda import block_arena
 from corporeal.mpm.cuda.block_arena import node_of
 from corporeal.mpm.cuda.block_grid import block_of, find_block
 from corporeal.mpm.cuda.channel_rows import cell_at, matrix_at, vector_at
-from corporeal.mpm.cuda.contact_nodes import (
-    height_of,
-    is_dragged,
-    slides_along_plane,
-    wets_rigid_body,
-)
+from corporeal.mpm.cuda.contact_nodes import height_of, is_dragged, slides_along_plane, wets_rigid_body
 from corporeal.mpm.cuda.layout import (
     CLOCK_DT,
     FLAG_FULL,
@@ -89,9 +84,7 @@ def add_field_sample(
                     n = w[0, x] * w[1, y] * w[2, z]
                     wp.atomic_add(c.mean, e, m * n * offset)
                     slope = wp.vec3(
-                        d[0, x] * w[1, y] * w[2, z],
-                        w[0, x] * d[1, y] * w[2, z],
-                        w[0, x] * w[1, y] * d[2, z],
+                        d[0, x] * w[1, y] * w[2, z], w[0, x] * d[1, y] * w[2, z], w[0, x] * w[1, y] * d[2, z]
                     )
                     wp.atomic_add(c.outward, e, volume * slope)
     return 0
@@ -108,12 +101,7 @@ def contact_near(g: BlockGrid, home: int):
 
 @wp.kernel
 def sample_fields(
-    p: DeviceParticles,
-    r: DeviceRigidBodies,
-    g: BlockGrid,
-    c: DeviceContacts,
-    s: StepGlobals,
-    stride: int,
+    p: DeviceParticles, r: DeviceRigidBodies, g: BlockGrid, c: DeviceContacts, s: StepGlobals, stride: int
 ):
     """Second look at the particles around those nodes, and only them."""
     if s.flag[FLAG_FULL] == 2 or s.flag[FLAG_MEETS] == 0:
@@ -156,9 +144,7 @@ def cached_candidate(g: BlockGrid, c: DeviceContacts, s: StepGlobals, t: int):
 
 
 @wp.kernel
-def propose_normals(
-    g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int
-):
+def propose_normals(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """Candidates n1 = g_a - g_c, n2 = g_a, n3 = -g_c, normalised; which one is kept.
 
     What is small against the cell has no face of its own.
@@ -183,9 +169,7 @@ def propose_normals(
 
 
 @wp.func
-def push_support(
-    c: DeviceContacts, e: int, field: int, r: wp.vec3, F: wp.mat33, radius: wp.float32
-):
+def push_support(c: DeviceContacts, e: int, field: int, r: wp.vec3, F: wp.mat33, radius: wp.float32):
     """Let a particle at r [m] from a node push its field's support there outwards."""
     k = e // FIELDS_AT_NODE
     for t in range(c.first[k], c.last[k]):
@@ -228,12 +212,7 @@ def push_supports(
 
 @wp.kernel
 def push_all_supports(
-    p: DeviceParticles,
-    r: DeviceRigidBodies,
-    g: BlockGrid,
-    c: DeviceContacts,
-    s: StepGlobals,
-    stride: int,
+    p: DeviceParticles, r: DeviceRigidBodies, g: BlockGrid, c: DeviceContacts, s: StepGlobals, stride: int
 ):
     """Supports of all particles where a choice is made anew."""
     if s.flag[FLAG_FULL] == 2 or s.flag[FLAG_NORMALS_RENEWED] == 0:
@@ -320,9 +299,7 @@ def smoothed_normal(g: BlockGrid, c: DeviceContacts, s: StepGlobals, t: int):
                             if c.fa[o] == c.fa[t] and c.fc[o] == c.fc[t]:
                                 a = g.node[c.slot[c.a[o]]][0]
                                 b = g.node[c.slot[c.c[o]]][0]
-                                total += wp.min(a, b) * candidate_of(
-                                    c, o, chosen_candidate(c, s, o)
-                                )
+                                total += wp.min(a, b) * candidate_of(c, o, chosen_candidate(c, s, o))
     return unit(total)
 
 
@@ -341,9 +318,7 @@ def surface_start(r: DeviceRigidBodies, s: StepGlobals, b: int, x: wp.vec3d, n: 
 def is_thin(r: DeviceRigidBodies, s: StepGlobals, b: int, x: wp.vec3d):
     """Whether a rigid body is thin near there, though not as a whole."""
     y = wp.transpose(r.turn[b]) * (x - r.centre[b])
-    return sees_thin_place(
-        r.slim, r.slim_first[b], r.slim_count[b], y, wp.float64(NODE_SIGHT_DX) * s.dx
-    )
+    return sees_thin_place(r.slim, r.slim_first[b], r.slim_count[b], y, wp.float64(NODE_SIGHT_DX) * s.dx)
 
 
 @wp.func
@@ -364,9 +339,7 @@ def face_of(r: DeviceRigidBodies, s: StepGlobals, b: int, x: wp.vec3d, mean: wp.
 
 
 @wp.func
-def gap_of(
-    c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, xa: wp.float32, xc: wp.float32
-):
+def gap_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, xa: wp.float32, xc: wp.float32):
     """Open distance of two fields along n [cells], by surface points of what is thin or flat."""
     a = c.fa[t]
     b = c.fc[t]
@@ -395,9 +368,7 @@ def mean_of(c: DeviceContacts, g: BlockGrid, s: StepGlobals, entry: int):
 
 
 @wp.func
-def faces_seen(
-    g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, b: int, e: int
-):
+def faces_seen(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, b: int, e: int):
     """Return the flat faces of a rigid body as a node sees them."""
     x = wp.transpose(r.turn[b]) * (c.point[t] - r.centre[b])
     m = mean_of(c, g, s, e)
@@ -406,9 +377,7 @@ def faces_seen(
 
 
 @wp.func
-def facet_normal(
-    g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, n: wp.vec3
-):
+def facet_normal(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, n: wp.vec3):
     """Normal of a node, or of faces that meet there where its lean feigns an approach."""
     a = c.fa[t]
     b = c.fc[t]
@@ -432,9 +401,7 @@ def drag_span(s: StepGlobals, xi: wp.float32, h: wp.float32, mass: wp.float32, f
 
 
 @wp.kernel
-def measure_gaps(
-    g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int
-):
+def measure_gaps(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, stride: int):
     """Choose and smooth normals, and measure the open distance along them."""
     if s.flag[FLAG_FULL] == 2:
         return

@@ -1,7 +1,7 @@
 """Impacts of rigid bodies on the device, in rounds: see ``physics.contact_impulses.solve_impacts``.
 
-In every round the pairs that approach now rebound together, what is light is held by what it rests
-on, and all others wait; the last round is of all contacts together.
+In every round the pairs that approach now rebound together, what is light is held by what it rests on, and all others
+wait; the last round is of all contacts together.
 """
 
 from corporeal.mpm import formulas

@@ -1,11 +1,10 @@
 """Contact impulses on the device, with ledgers.
 
-Nodes of deformable fields are independent of one another: each is solved by its own thread with
-projected Gauss–Seidel. Rigid bodies couple many nodes. There every sweep is a Jacobi sweep in which
-a body with n busy contacts lends each of them an n-th of its mass (mass splitting, Tonge et al.
-2012, "Mass splitting for jitter-free parallel rigid body simulation"): it converges whatever the
-order of threads, and each impulse moves the whole body, so momentum is exact. Impacts of rigid
-bodies come first, in rounds of such sweeps: see ``contact_rounds``.
+Nodes of deformable fields are independent of one another: each is solved by its own thread with projected Gauss–Seidel.
+Rigid bodies couple many nodes. There every sweep is a Jacobi sweep in which a body with n busy contacts lends each of
+them an n-th of its mass (mass splitting, Tonge et al. 2012, "Mass splitting for jitter-free parallel rigid body
+simulation"): it converges whatever the order of threads, and each impulse moves the whole body, so momentum is exact.
+Impacts of rigid bodies come first, in rounds of such sweeps: see ``contact_rounds``.
 """
 
 from corporeal.mpm import constants, formulas
@@ -62,9 +61,7 @@ MIN_SLIP_SPEED = wp.constant(D(constants.MIN_SLIP_SPEED))
 
 
 @wp.func
-def side_speed(
-    c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, entry: int, field: int
-):
+def side_speed(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, entry: int, field: int):
     """Velocity of one side of a contact [m/s]."""
     if field >= s.bodies:
         return wp.vec3d(D(0.0))
@@ -81,15 +78,7 @@ def contact_slip(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int
 
 
 @wp.func
-def side_before(
-    c: DeviceContacts,
-    r: DeviceRigidBodies,
-    g: BlockGrid,
-    s: StepGlobals,
-    t: int,
-    entry: int,
-    field: int,
-):
+def side_before(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, t: int, entry: int, field: int):
     """Velocity of one side as the step began, before its forces [m/s]."""
     if field >= s.bodies:
         return wp.vec3d(D(0.0))
@@ -100,15 +89,7 @@ def side_before(
 
 
 @wp.func
-def side_softness(
-    c: DeviceContacts,
-    r: DeviceRigidBodies,
-    s: StepGlobals,
-    t: int,
-    entry: int,
-    field: int,
-    n: wp.vec3d,
-):
+def side_softness(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, entry: int, field: int, n: wp.vec3d):
     """1/m_eff of one side; a rigid body is shared among its busy contacts."""
     if field >= s.bodies:
         return D(0.0)
@@ -126,13 +107,7 @@ def softness_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int,
 
 @wp.func
 def give_contact_impulse(
-    c: DeviceContacts,
-    r: DeviceRigidBodies,
-    s: StepGlobals,
-    t: int,
-    entry: int,
-    field: int,
-    J: wp.vec3d,
+    c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, entry: int, field: int, J: wp.vec3d
 ):
     """Give an impulse to one side: nodes at once, rigid bodies at the end of the sweep."""
     if field < s.bodies:
@@ -183,9 +158,7 @@ def relax_contact(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: in
 
 
 @wp.func
-def add_rigid_contact(
-    c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, t: int
-):
+def add_rigid_contact(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, t: int):
     """Put a contact of two rigid bodies that meet at a node where both of them are."""
     rigid = c.meet[t] >= 0 and c.c[t] >= 0
     if rigid:
@@ -224,9 +197,7 @@ def prepare_contact(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: St
 
 
 @wp.kernel
-def begin_contact(
-    c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, stride: int
-):
+def begin_contact(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, stride: int):
     """Prepare all contacts, and solve every node that no rigid body takes part in."""
     if s.flag[FLAG_FULL] == 2:
         return
@@ -379,9 +350,7 @@ def write_velocities(g: BlockGrid, c: DeviceContacts, r: DeviceRigidBodies, k: i
 
 
 @wp.func
-def book_mover_impulse(
-    c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, field: int, J: wp.vec3d
-):
+def book_mover_impulse(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, field: int, J: wp.vec3d):
     """Book what a contact's impulse on a body that has a prescribed motion takes of its mover."""
     if r.path_count[field] > 0:
         work = wp.dot(J, speed_at(r, field, c.point[t]))

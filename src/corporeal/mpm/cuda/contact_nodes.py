@@ -96,15 +96,7 @@ def is_stiff(r: DeviceRigidBodies, s: StepGlobals, field: int):
 
 
 @wp.func
-def near_wall(
-    c: DeviceContacts,
-    s: StepGlobals,
-    r: DeviceRigidBodies,
-    field: int,
-    w: int,
-    at: wp.vec3i,
-    alone: bool,
-):
+def near_wall(c: DeviceContacts, s: StepGlobals, r: DeviceRigidBodies, field: int, w: int, at: wp.vec3i, alone: bool):
     """Whether a node of a field may touch a plane; with others there a body may lie between."""
     if r.pointed[field] == 1:
         return False
@@ -115,9 +107,7 @@ def near_wall(
 
 
 @wp.func
-def walls_near(
-    c: DeviceContacts, s: StepGlobals, r: DeviceRigidBodies, field: int, at: wp.vec3i, alone: bool
-):
+def walls_near(c: DeviceContacts, s: StepGlobals, r: DeviceRigidBodies, field: int, at: wp.vec3i, alone: bool):
     """How many planes a field meets at a node."""
     n = int(0)
     for w in range(s.planes):

@@ -1,7 +1,6 @@
 """Rolling friction on the device: after all contacts are solved.
 
-A body with n contacts on which it rolls lends each of them an n-th of its mass, as in
-``contact_impulses``.
+A body with n contacts on which it rolls lends each of them an n-th of its mass, as in ``contact_impulses``.
 """
 
 from corporeal.mpm import formulas
@@ -75,15 +74,7 @@ def arm_of(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: int, fiel
 
 
 @wp.func
-def give_brake(
-    r: DeviceRigidBodies,
-    s: StepGlobals,
-    t: int,
-    field: int,
-    arm: wp.vec3d,
-    M: wp.vec3d,
-    f: wp.vec3d,
-):
+def give_brake(r: DeviceRigidBodies, s: StepGlobals, t: int, field: int, arm: wp.vec3d, M: wp.vec3d, f: wp.vec3d):
     """Give a side its part, at the end of the kernel; book what a mover has to do."""
     if can_move(r, s, field):
         wp.atomic_add(r.speed_change, field, f * r.light[field])

@@ -6,16 +6,7 @@ Same rules as ``reference.contact.find``.
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.constants import VAST
 from corporeal.mpm.cuda.contact_nodes import add_touch
-from corporeal.mpm.cuda.layout import (
-    CLOCK_DT,
-    FLAG_FULL,
-    FLAG_NODES,
-    FLAG_STIFF,
-    FLAG_TOUCHES,
-    D,
-    StepGlobals,
-    wp,
-)
+from corporeal.mpm.cuda.layout import CLOCK_DT, FLAG_FULL, FLAG_NODES, FLAG_STIFF, FLAG_TOUCHES, D, StepGlobals, wp
 from corporeal.mpm.cuda.layout_bodies import DeviceRigidBodies
 from corporeal.mpm.cuda.layout_contact import DeviceContacts
 from corporeal.mpm.cuda.rigid import speed_at
@@ -44,16 +35,7 @@ VALLEY_ITERATIONS = wp.constant(constants.VALLEY_ITERATIONS)
 
 
 @wp.func
-def enter_point(
-    c: DeviceContacts,
-    s: StepGlobals,
-    a: int,
-    other: int,
-    side: int,
-    x: wp.vec3d,
-    n: wp.vec3d,
-    gap: D,
-):
+def enter_point(c: DeviceContacts, s: StepGlobals, a: int, other: int, side: int, x: wp.vec3d, n: wp.vec3d, gap: D):
     """Enter a contact on a surface point; side: whose point it is, 0 or 1."""
     t = wp.atomic_add(s.flag, FLAG_TOUCHES, 1)
     wp.atomic_add(s.flag, FLAG_STIFF, 1)
@@ -154,9 +136,7 @@ def nearest_curved(r: DeviceRigidBodies, p: int, b: int, other: int, far: D):
         square = wp.length_sq(d)
         if square < least and curved_may(r.curvature, r.surface, q, centre, far, first):
             out = wp.vec3d(
-                r.curvature[CURVATURE_ROW * q],
-                r.curvature[CURVATURE_ROW * q + 1],
-                r.curvature[CURVATURE_ROW * q + 2],
+                r.curvature[CURVATURE_ROW * q], r.curvature[CURVATURE_ROW * q + 1], r.curvature[CURVATURE_ROW * q + 2]
             )
             if wp.dot(d, out) > D(0.0):
                 least = square
@@ -192,9 +172,7 @@ def list_curves(r: DeviceRigidBodies, c: DeviceContacts, s: StepGlobals, tid: in
         met = curved_meet(r.curvature, r.surface, p, r.turn[b], q, r.turn[other], apart, reach)
         at = wp.vec3d(met[0], met[1], met[2])
         n = wp.vec3d(met[3], met[4], met[5])
-        if met[6] >= reach or not curved_owns(
-            r.curvature, r.surface, p, r.first[b], r.points[b], at
-        ):
+        if met[6] >= reach or not curved_owns(r.curvature, r.surface, p, r.first[b], r.points[b], at):
             continue
         x = r.centre[b] + r.turn[b] * at
         if b < other:

@@ -117,9 +117,7 @@ class DeviceMemory:
         r.heavy = self.put(matter.inertia, wp.mat33d)
         r.heading = self.put(np.tile(np.eye(3), (bodies, 1, 1)), wp.mat33d)
 
-    def _rigid_particles(
-        self, r: WarpStruct, problem: Problem, matter: ParticleConstants, chosen: np.ndarray
-    ) -> None:
+    def _rigid_particles(self, r: WarpStruct, problem: Problem, matter: ParticleConstants, chosen: np.ndarray) -> None:
         position = np.concatenate([b.position for b in problem.bodies])[chosen]
         cell, place = split_position(position / problem.cell)
         order = np.lexsort((*(cell >> 2).T, matter.body[chosen]))
@@ -132,9 +130,7 @@ class DeviceMemory:
         r.cell, r.place = self.put(cell[order], wp.vec3i), self.put(place[order], wp.vec3)
         r.home = self.zeros(r.count, wp.int32)
 
-    def _surfaces(
-        self, r: WarpStruct, matter: ParticleConstants, stiff: np.ndarray, cell: float
-    ) -> None:
+    def _surfaces(self, r: WarpStruct, matter: ParticleConstants, stiff: np.ndarray, cell: float) -> None:
         body = [np.full(len(matter.surface[b]), b) for b in stiff]
         points = [matter.surface[b] for b in stiff]
         r.surfaces = sum(len(p) for p in points)
@@ -177,9 +173,7 @@ class DeviceMemory:
         r.facet_first = self.put(np.cumsum(faces) - faces, wp.int32)
         r.facet_count = self.put(faces, wp.int32)
 
-    def _wetted(
-        self, r: WarpStruct, problem: Problem, matter: ParticleConstants, stiff: np.ndarray
-    ) -> None:
+    def _wetted(self, r: WarpStruct, problem: Problem, matter: ParticleConstants, stiff: np.ndarray) -> None:
         rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)
         for b in np.flatnonzero(stiff):
             wetted = problem.bodies[b].wetted_surface
@@ -232,14 +226,9 @@ class DeviceMemory:
     def _pairs(self, c: WarpStruct, problem: Problem) -> None:
         """Tables of all pairs of bodies and planes."""
         friction, restitution = _pair_tables(problem)
-        c.friction, c.restitution = (
-            self.put(friction, wp.float64),
-            self.put(restitution, wp.float64),
-        )
+        c.friction, c.restitution = (self.put(friction, wp.float64), self.put(restitution, wp.float64))
         c.restitution_law = self.put(problem.restitution_law_of_pair.reshape(-1, 5), wp.float64)
-        lengths = (
-            0.0 * friction if problem.rolling_resistance is None else problem.rolling_resistance
-        )
+        lengths = 0.0 * friction if problem.rolling_resistance is None else problem.rolling_resistance
         c.rolling = self.put(lengths, wp.float64)
         rows = np.zeros((friction.size, SUPPORT_ROW))
         rows[:, SUPPORT_LEAST_GAP] = VAST_DOUBLE
@@ -252,17 +241,13 @@ class DeviceMemory:
 
     def choices(self, contacts: WarpStruct, count: int) -> np.ndarray:
         """Copy the first choices of candidate normals, (N, 6): node, two fields, candidate."""
-        columns = [
-            getattr(contacts, f"kept_{name}").numpy()[:count] for name in NORMAL_CACHE_COLUMNS
-        ]
+        columns = [getattr(contacts, f"kept_{name}").numpy()[:count] for name in NORMAL_CACHE_COLUMNS]
         return np.column_stack(columns).astype(np.int32)
 
     def put_choices(self, contacts: WarpStruct, rows: np.ndarray) -> None:
         """Write choices that ``choices`` gave; there must be room."""
         at, fa, fc, pick = np.split(rows, [3, 4, 5], axis=1)
-        for name, values in zip(
-            NORMAL_CACHE_COLUMNS, (at, fa[:, 0], fc[:, 0], pick[:, 0]), strict=True
-        ):
+        for name, values in zip(NORMAL_CACHE_COLUMNS, (at, fa[:, 0], fc[:, 0], pick[:, 0]), strict=True):
             if len(values):
                 overwrite_rows(getattr(contacts, f"kept_{name}"), np.arange(len(values)), values)
 
@@ -273,10 +258,7 @@ class DeviceMemory:
         bodies, planes = len(problem.bodies), len(problem.planes)
         everything = bodies + planes
         s = StepGlobals()
-        s.clock, s.flag = (
-            self.zeros(layout.CLOCK_LENGTH, wp.float64),
-            self.zeros(layout.FLAG_COUNT, wp.int32),
-        )
+        s.clock, s.flag = (self.zeros(layout.CLOCK_LENGTH, wp.float64), self.zeros(layout.FLAG_COUNT, wp.int32))
         s.clock[int(layout.CLOCK_SMALLEST) : int(layout.CLOCK_SMALLEST) + 1].fill_(np.inf)
         s.fast, s.change = self.zeros(4, wp.float32), self.zeros(1, wp.float32)
         s.pace = self.zeros(4, wp.float64)

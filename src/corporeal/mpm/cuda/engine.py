@@ -35,14 +35,11 @@ KNOWN_FIELDS = {
 }
 """What this engine knows of a problem; anything else must be at its default."""
 INITIAL_CONTACT_ROOM = 4096
-WARM_START_ARRAYS = tuple(
-    "cell place strain motion stress plastic opened log_volume_ratio pressure".split()
-)
+WARM_START_ARRAYS = tuple("cell place strain motion stress plastic opened log_volume_ratio pressure".split())
 """What a warm start takes over of particles."""
 RIGID_STATE_ARRAYS = "centre turn speed moment inertia spin cell place"
 STEP_STATE_ARRAYS = (
-    "clock fast loss external plane_impulse pair_impulse impact_of_pair first_contact last_contact "
-    "contact_point"
+    "clock fast loss external plane_impulse pair_impulse impact_of_pair first_contact last_contact contact_point"
 )
 
 
@@ -92,9 +89,7 @@ class CudaEngine(EngineInteraction):
         """Blocks that particles reach now, and half as many again."""
         position = np.concatenate([b.position for b in self.problem.bodies]) / self.problem.cell
         if not np.isfinite(position).all():
-            raise SimulationError(
-                "There are positions that are not finite. Look at the mesh that was filled."
-            )
+            raise SimulationError("There are positions that are not finite. Look at the mesh that was filled.")
         low = split_position(position)[0] >> 2
         single = self.problem.contact == "single"
         field = self.matter.body * (not single)
@@ -109,11 +104,7 @@ class CudaEngine(EngineInteraction):
             ("rigid", self.arrays.rigid, RIGID_STATE_ARRAYS),
             ("sheet", self.arrays.sheet, STEP_STATE_ARRAYS),
         )
-        return {
-            f"{group}.{name}": getattr(struct, name)
-            for group, struct, names in groups
-            for name in names.split()
-        }
+        return {f"{group}.{name}": getattr(struct, name) for group, struct, names in groups for name in names.split()}
 
     def _start(self) -> None:
         """Return how fast objects are at the start, and find their blocks."""
@@ -240,9 +231,7 @@ class CudaEngine(EngineInteraction):
             self.program.forget()
             self._make_room_for_contacts(len(choices))
         self.memory.put_choices(self.arrays.contacts, choices)
-        device_memory.overwrite_rows(
-            self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), len(choices)
-        )
+        device_memory.overwrite_rows(self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), len(choices))
         self._arrange()
         self._read_steps()
 
@@ -396,9 +385,7 @@ class CudaEngine(EngineInteraction):
         for name in ("cell", "place"):
             device_memory.overwrite_rows(getattr(r, name), riding, saved[f"rigid.{name}"][riding])
         self._note_fast(3, saved["sheet.fast"][3])
-        device_memory.overwrite_rows(
-            self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), 0
-        )
+        device_memory.overwrite_rows(self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), 0)
         self._arrange()
 
 
@@ -439,9 +426,7 @@ def _refuse_unknown(problem: Problem) -> None:
         known = KNOWN_FIELDS[Problem if thing is problem else Body].split()
         for f in fields(thing):
             if f.name not in known and not _is_default(getattr(thing, f.name), f):
-                raise UserError(
-                    _unsupported_error(f"{f.name} (of {getattr(thing, 'name', 'the problem')!r})")
-                )
+                raise UserError(_unsupported_error(f"{f.name} (of {getattr(thing, 'name', 'the problem')!r})"))
 
 
 def _unsupported_error(what: str) -> str:

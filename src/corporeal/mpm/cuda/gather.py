@@ -102,10 +102,7 @@ def raise_maximum(s: StepGlobals, what: int, value: wp.float32):
 @wp.func
 def is_inside(s: StepGlobals, cell: wp.vec3i, f: wp.vec3):
     """Whether a particle is where particles may be."""
-    if (
-        wp.max(wp.max(wp.abs(cell[0]), wp.abs(cell[1])), wp.abs(cell[2]))
-        > MAX_DISTANCE_FROM_ORIGIN_DX
-    ):
+    if wp.max(wp.max(wp.abs(cell[0]), wp.abs(cell[1])), wp.abs(cell[2])) > MAX_DISTANCE_FROM_ORIGIN_DX:
         return False
     x = wp.vec3(float(cell[0]), float(cell[1]), float(cell[2])) + f
     for w in range(s.planes):
@@ -119,16 +116,12 @@ def maxwell_stress(p: DeviceParticles, row: int, memory: vec14):
     """Kirchhoff stress of the Maxwell branches [Pa]."""
     tau = vec6()
     for b in range(BRANCHES):
-        tau += branch_stress(
-            p.table[row, SHEAR + b], p.table[row, BULK + b], memory, BRANCH_CHANNELS * b
-        )
+        tau += branch_stress(p.table[row, SHEAR + b], p.table[row, BULK + b], memory, BRANCH_CHANNELS * b)
     return wp.mat33(tau[0], tau[1], tau[2], tau[1], tau[3], tau[4], tau[2], tau[4], tau[5])
 
 
 @wp.func
-def relax_branches(
-    p: DeviceParticles, i: int, row: int, A: wp.mat33, memory: vec14, dt: wp.float32
-):
+def relax_branches(p: DeviceParticles, i: int, row: int, A: wp.mat33, memory: vec14, dt: wp.float32):
     """Carry the branches' strain along by A = dt ∇v, and forget; give their stress then [Pa]."""
     after = memory
     for b in range(BRANCHES):
@@ -138,9 +131,7 @@ def relax_branches(
 
 
 @wp.kernel
-def gather(
-    p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals, stride: int, lanes: int
-):
+def gather(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals, stride: int, lanes: int):
     """Velocities, affine parts, places, strain, return map and stress: a group for each task."""
     if s.flag[FLAG_FULL] == 2:
         return
@@ -180,9 +171,7 @@ def gather_one(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals,
     v = wp.vec3(seen[0], seen[1], seen[2])
     L = wp.mat33(seen[3], seen[4], seen[5], seen[6], seen[7], seen[8], seen[9], seen[10], seen[11])
     u = wp.vec3(seen[12], seen[13], seen[14])
-    K = wp.mat33(
-        seen[15], seen[16], seen[17], seen[18], seen[19], seen[20], seen[21], seen[22], seen[23]
-    )
+    K = wp.mat33(seen[15], seen[16], seen[17], seen[18], seen[19], seen[20], seen[21], seen[22], seen[23])
     B = matrix_at(p.affine, i)
     before = vector_at(p.velocity, i)
     body = int(p.table[row, MATERIAL_BODY])
@@ -284,9 +273,7 @@ def mark_stray(p: DeviceParticles, g: BlockGrid, s: StepGlobals, i: int, home: i
 
 
 @wp.func
-def place_particle(
-    p: DeviceParticles, g: BlockGrid, s: StepGlobals, i: int, home: int, cell: wp.vec3i, f: wp.vec3
-):
+def place_particle(p: DeviceParticles, g: BlockGrid, s: StepGlobals, i: int, home: int, cell: wp.vec3i, f: wp.vec3):
     """Put a particle at f [cells] from its lowest node, if that is a place for particles."""
     shift = wp.vec3(wp.floor(f[0] - 0.5), wp.floor(f[1] - 0.5), wp.floor(f[2] - 0.5))
     good = wp.length(f) < MAX_TRAVEL_PER_STEP_DX

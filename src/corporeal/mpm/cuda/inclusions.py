@@ -1,19 +1,12 @@
 """Rigid inclusions on the device; twin of ``reference.inclusions``.
 
-Sums of what a frame holds are taken about the frame's centre. While contact is solved the frame
-stands for the whole: its centre, mass, inertia, velocity and spin are those of both together.
+Sums of what a frame holds are taken about the frame's centre. While contact is solved the frame stands for the whole:
+its centre, mass, inertia, velocity and spin are those of both together.
 """
 
 from corporeal.mpm import constants
 from corporeal.mpm.constants import FIELDS_AT_NODE
-from corporeal.mpm.cuda.layout import (
-    FLAG_BLOCKS,
-    FLAG_FULL,
-    BlockGrid,
-    D,
-    StepGlobals,
-    wp,
-)
+from corporeal.mpm.cuda.layout import FLAG_BLOCKS, FLAG_FULL, BlockGrid, D, StepGlobals, wp
 from corporeal.mpm.cuda.layout_bodies import DeviceBonds, DeviceRigidBodies
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 0})

@@ -272,8 +272,8 @@ class BlockGrid:
     old: wp.array(dtype=wp.vec4)
     """Velocity without the step's forces [m/s]."""
     pool: wp.array2d(dtype=wp.float32)
-    """Eight clusters of 2³ cells per block: volume, and volume times pressure and dilatation, of
-    nearly incompressible material.
+    """Eight clusters of 2³ cells per block: volume, and volume times pressure and dilatation, of nearly incompressible
+    material.
     """
     meet: wp.array(dtype=wp.int32)
     """1 + the field's entry where it meets others; 0: none."""

@@ -43,9 +43,7 @@ def _wind(out: Any, memory: DeviceMemory, problem: Problem) -> None:
     out.air = memory.put(air, wp.vec3d)
     out.gust = memory.put(np.array([w.gust if w else 0.0 for w in winds]), wp.float64)
     out.start, out.end = memory.put(window[:, 0], wp.float64), memory.put(window[:, 1], wp.float64)
-    parts = np.stack(
-        [wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE], axis=1
-    )
+    parts = np.stack([wind_pressure.GUST_SHARE, wind_pressure.GUST_FREQUENCY, wind_pressure.GUST_PHASE], axis=1)
     out.octave = memory.put(parts, wp.vec3d)
 
 
@@ -102,9 +100,7 @@ def _joints(out: Any, memory: DeviceMemory, problem: Problem, matter: ParticleCo
     out.friction = memory.put(np.array([j.damping for j in joints], float), wp.float64)
 
 
-def write_grips(
-    out: Any, problem: Problem, matter: ParticleConstants, grips: dict[int, Grip]
-) -> None:
+def write_grips(out: Any, problem: Problem, matter: ParticleConstants, grips: dict[int, Grip]) -> None:
     """Write what is held from outside, by body, in place of all earlier grips."""
     bodies = len(problem.bodies)
     gripped, share = np.zeros(bodies, np.int32), np.zeros(len(matter.mass), np.float32)
@@ -128,8 +124,7 @@ def lay_out_bonds(memory: DeviceMemory, problem: Problem) -> Any:
     pairs = sorted(problem.bonds) if problem.contact == "multi" else []
     bodies, h = len(problem.bodies), DeviceBonds()
     dense = [
-        inclusions.inclusion_and_soft_density(problem.bodies[f], problem.bodies[s], problem.cell)
-        for f, s in pairs
+        inclusions.inclusion_and_soft_density(problem.bodies[f], problem.bodies[s], problem.cell) for f, s in pairs
     ]
     density = np.array(dense, float).reshape(-1, 2)
     frame, soft = np.array(pairs, int).reshape(-1, 2).T

@@ -17,12 +17,7 @@ from corporeal.mpm.cuda.layout import (
 )
 from corporeal.mpm.cuda.layout_bodies import DeviceLoads, DeviceRigidBodies
 from corporeal.mpm.cuda.rigid import force_body, speed_at
-from corporeal.mpm.formulas.one_lane import (
-    grip_spring_impulse,
-    rotation_vector,
-    turned_area,
-    wind_impulse,
-)
+from corporeal.mpm.formulas.one_lane import grip_spring_impulse, rotation_vector, turned_area, wind_impulse
 from corporeal.mpm.physics.wind_pressure import HALF_RHO_C
 
 wp.set_module_options(formulas.formula_options(max_unroll=0))
@@ -64,9 +59,7 @@ def gust_signal(l: DeviceLoads, time: wp.float64):
 
 
 @wp.kernel
-def apply_wind(
-    p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int
-):
+def apply_wind(p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int):
     """Let the wind press on faces."""
     dt = wp.float32(s.clock[CLOCK_DT])
     time = s.clock[CLOCK_TIME] + D(0.5) * s.clock[CLOCK_DT]
@@ -106,9 +99,7 @@ def position_of(p: DeviceParticles, s: StepGlobals, i: int):
 
 
 @wp.kernel
-def pull_tethered(
-    p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int
-):
+def pull_tethered(p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int):
     """Pull tethered particles back; the holder gets the reaction where the particle is."""
     dt = s.clock[CLOCK_DT]
     for k in range(wp.tid(), l.tethers, stride):
@@ -241,7 +232,5 @@ def apply_rigid_grips(r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals):
         J = grip_impulse(l, b, r.centre[b] + arm, before, s.clock[CLOCK_DT])
         add_impulse(r, b, J, wp.cross(arm, J))
         moving = speed_at(r, b, r.centre[b] + arm) - s.kick[b]
-        wp.atomic_add(
-            s.loss, LOSS_PUSH_WORK, b % 256, wp.dot(J, D(0.5) * (before + moving) + s.kick[b])
-        )
+        wp.atomic_add(s.loss, LOSS_PUSH_WORK, b % 256, wp.dot(J, D(0.5) * (before + moving) + s.kick[b]))
         l.external[b] = l.external[b] + J

@@ -1,7 +1,7 @@
 """Memory of particles: one array of 32-bit words, (channels, lanes).
 
-Channels lie one after the other, each over all particles, so that neighbouring threads read
-neighbouring words, and sorting is one kernel that knows no names. The host works with rows.
+Channels lie one after the other, each over all particles, so that neighbouring threads read neighbouring words, and
+sorting is one kernel that knows no names. The host works with rows.
 """
 
 from typing import Any
@@ -42,9 +42,7 @@ CHANNELS_SORTED_AT_ONCE = 16
 PARTICLE_CHANNELS = 1 + sum(int(np.prod(shape)) for shape, _ in PARTICLE_STATE.values())
 
 
-def lay_out_particles(
-    memory: DeviceMemory, problem: Problem, matter: ParticleConstants, chosen: np.ndarray
-) -> Any:
+def lay_out_particles(memory: DeviceMemory, problem: Problem, matter: ParticleConstants, chosen: np.ndarray) -> Any:
     """Lay out the particles that move with a grid of their own."""
     p = DeviceParticles()
     p.count = len(chosen)

@@ -4,16 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from corporeal.mpm.cuda import block_grid as grids
-from corporeal.mpm.cuda import (
-    block_sort,
-    contact,
-    layout,
-    loads,
-    mean_dilatation,
-    rigid,
-    scatter,
-    timestep,
-)
+from corporeal.mpm.cuda import block_sort, contact, layout, loads, mean_dilatation, rigid, scatter, timestep
 from corporeal.mpm.cuda import contact_impact_rounds as rounds
 from corporeal.mpm.cuda import contact_impulses as impulses
 from corporeal.mpm.cuda import contact_nodes as meets

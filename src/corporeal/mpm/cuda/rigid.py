@@ -42,14 +42,7 @@ def follow_prescribed_path(r: DeviceRigidBodies, s: StepGlobals, b: int):
     """Let a body go where its path says, and book what that takes, but for contacts."""
     dt, R = s.clock[CLOCK_DT], r.turn[b]
     a = follow_path(
-        r.path,
-        r.path_first[b],
-        r.path_count[b],
-        r.path_arm[b],
-        s.clock[CLOCK_TIME] + dt,
-        dt,
-        r.centre[b],
-        R,
+        r.path, r.path_first[b], r.path_count[b], r.path_arm[b], s.clock[CLOCK_TIME] + dt, dt, r.centre[b], R
     )
     speed = wp.vec3d(a[0], a[1], a[2])
     spin = wp.vec3d(a[3], a[4], a[5])

@@ -59,9 +59,7 @@ def particle_share(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlob
 
 
 @wp.func
-def enlist_particle(
-    p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals, i: int, home: int, number: int
-):
+def enlist_particle(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals, i: int, home: int, number: int):
     """Put a particle on the list of its cell, or, where it has strayed, let it give at once."""
     cell = cell_at(p.cell, i)
     if p.home[i] < 0:
@@ -76,15 +74,7 @@ def enlist_particle(
 
 
 @wp.func
-def scatter_layer(
-    p: DeviceParticles,
-    g: BlockGrid,
-    l: DeviceLoads,
-    s: StepGlobals,
-    first: int,
-    cell: int,
-    layer: int,
-):
+def scatter_layer(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals, first: int, cell: int, layer: int):
     """Sum what a cell's particles give to one layer of nodes, and add it to the arena."""
     number = first_in_cell(g.arena, cell)
     if number < 0:
@@ -101,13 +91,7 @@ def scatter_layer(
 
 @wp.kernel
 def scatter(
-    p: DeviceParticles,
-    g: BlockGrid,
-    r: DeviceRigidBodies,
-    l: DeviceLoads,
-    s: StepGlobals,
-    stride: int,
-    lanes: int,
+    p: DeviceParticles, g: BlockGrid, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int, lanes: int
 ):
     """Sum mass, momentum and impulse: one group of threads for each task."""
     lane = wp.tid() % lanes

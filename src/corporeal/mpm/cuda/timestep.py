@@ -171,9 +171,7 @@ def book_step(s: StepGlobals, l: DeviceLoads):
 
 
 @wp.kernel
-def finish_step(
-    g: BlockGrid, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int, lanes: int
-):
+def finish_step(g: BlockGrid, r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals, stride: int, lanes: int):
     """End a step: link new blocks, empty clusters; and the first group books, and plans on."""
     link_blocks(g, s, wp.tid(), stride)
     for i in range(wp.tid(), 8 * s.flag[FLAG_BLOCKS], stride):

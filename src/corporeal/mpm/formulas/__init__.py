@@ -1,7 +1,7 @@
 """The formulas of the fast engines in C++, each once: eight lanes on processors, one on GPUs.
 
-The headers beside this file are templates on the number type (``lanes.h``). Warp includes them in
-every module that was given ``formula_options``, whatever the module is compiled for.
+The headers beside this file are templates on the number type (``lanes.h``). Warp includes them in every module that was
+given ``formula_options``, whatever the module is compiled for.
 """
 
 import re
@@ -48,15 +48,10 @@ def cpp_law_lists() -> list[str]:
         "MPM_LIQUID": [k for k in Law if menu[k].liquid],
         "MPM_BULKY": [k for k in Law if menu[k].volumetric],
     }
-    return [
-        f"#define {name}(X) " + " ".join(f"X(mpm::{k.name})" for k in members)
-        for name, members in groups.items()
-    ]
+    return [f"#define {name}(X) " + " ".join(f"X(mpm::{k.name})" for k in members) for name, members in groups.items()]
 
 
-def formula_options(
-    *headers: Path, numbers: Mapping[str, int] | None = None, **others: Any
-) -> dict[str, Any]:
+def formula_options(*headers: Path, numbers: Mapping[str, int] | None = None, **others: Any) -> dict[str, Any]:
     """Options of a Warp module that uses the formulas.
 
     Args:
@@ -73,9 +68,6 @@ def formula_options(
         extra_cuda_include_dirs=folders,
         extra_cpu_preamble=text,
         extra_cuda_preamble=text,
-        extra_build_dependencies=[
-            *(str(FORMULAS_FOLDER / name) for name in HEADERS),
-            *map(str, headers),
-        ],
+        extra_build_dependencies=[*(str(FORMULAS_FOLDER / name) for name in HEADERS), *map(str, headers)],
     )
     return {"enable_backward": False, "extra_build_options": build, **others}

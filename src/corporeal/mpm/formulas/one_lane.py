@@ -14,9 +14,9 @@ from corporeal.mpm.quiet_warp import wp
     RESPONSE_PLASTIC_WORK,
     RESPONSE_LENGTH,
 ) = 6, 15, 16, 17, 18, 19, 20
-"""First places in a ``Response``: F - 1 after the return map (9), bound on ρ c² [Pa], J - 1 of the
-trial strain, increment of the equivalent plastic strain, volume correction of granular material,
-plastic work per rest volume [J/m³]; before them τ (6: 00 01 02 11 12 22) [Pa].
+"""First places in a ``Response``: F - 1 after the return map (9), bound on ρ c² [Pa], J - 1 of the trial strain,
+increment of the equivalent plastic strain, volume correction of granular material, plastic work per rest volume [J/m³];
+before them τ (6: 00 01 02 11 12 22) [Pa].
 """
 Response = wp.types.vector(length=RESPONSE_LENGTH, dtype=wp.float32)
 
@@ -67,9 +67,7 @@ def mean_bulk(law: wp.float32, mu: wp.float32, lam: wp.float32) -> wp.float32: .
   float p = mpm::Laws<float>::mean_pressure(t, bulk, mpm::Strain<float>::volume(F), log_volume_ratio, wave);
   return wp::vec_t<2, wp::float32>(p, wave);
 """)
-def mean_pressure(
-    law: wp.float32, bulk: wp.float32, H: wp.mat33, log_volume_ratio: wp.float32
-) -> wp.vec2:
+def mean_pressure(law: wp.float32, bulk: wp.float32, H: wp.mat33, log_volume_ratio: wp.float32) -> wp.vec2:
     """Kirchhoff pressure of the mean dilatation and what it adds to ρ c² [Pa]."""
     ...
 
@@ -97,9 +95,7 @@ BranchState = wp.types.vector(length=14, dtype=wp.float32)
   m.c[first + 6] = q * m.c[first + 6] + r * trace;
   return m;
 """)
-def advance_branch(
-    A: wp.mat33, dt: wp.float32, time: wp.float32, memory: BranchState, first: int
-) -> BranchState: ...
+def advance_branch(A: wp.mat33, dt: wp.float32, time: wp.float32, memory: BranchState, first: int) -> BranchState: ...
 
 
 StressVector = wp.types.vector(length=6, dtype=wp.float32)
@@ -111,9 +107,7 @@ StressVector = wp.types.vector(length=6, dtype=wp.float32)
   mpm::Branch<float>::press(shear, bulk, &memory.c[first], memory.c[first + 6], &tau.c[0]);
   return tau;
 """)
-def branch_stress(
-    shear: wp.float32, bulk: wp.float32, memory: BranchState, first: int
-) -> StressVector: ...
+def branch_stress(shear: wp.float32, bulk: wp.float32, memory: BranchState, first: int) -> StressVector: ...
 
 
 # ---------------------------------------------------------------- splines
@@ -239,9 +233,7 @@ def turned_area(F: wp.mat33, area: wp.vec3) -> wp.vec3: ...
   mpm::Air<float>::press(half_rho_c, &area.c[0], &seen.c[0], mass, dt, &J.c[0]);
   return J;
 """)
-def wind_impulse(
-    half_rho_c: wp.float32, area: wp.vec3, seen: wp.vec3, mass: wp.float32, dt: wp.float32
-) -> wp.vec3: ...
+def wind_impulse(half_rho_c: wp.float32, area: wp.vec3, seen: wp.vec3, mass: wp.float32, dt: wp.float32) -> wp.vec3: ...
 
 
 @wp.func_native("""
@@ -250,12 +242,7 @@ def wind_impulse(
   return J;
 """)
 def grip_spring_impulse(
-    stiffness: wp.float64,
-    damping: wp.float64,
-    mass: wp.float64,
-    away: wp.vec3d,
-    velocity: wp.vec3d,
-    dt: wp.float64,
+    stiffness: wp.float64, damping: wp.float64, mass: wp.float64, away: wp.vec3d, velocity: wp.vec3d, dt: wp.float64
 ) -> wp.vec3d: ...
 
 

@@ -4,9 +4,7 @@ from corporeal.mpm.quiet_warp import wp
 
 
 @wp.func_native("return mpm::Face<float>::gap((const float *)table.data, mean_a, mean_c);")
-def gap_between(
-    table: wp.array(dtype=wp.float32), mean_a: wp.float32, mean_c: wp.float32
-) -> wp.float32: ...
+def gap_between(table: wp.array(dtype=wp.float32), mean_a: wp.float32, mean_c: wp.float32) -> wp.float32: ...
 
 
 @wp.func_native("return mpm::Face<float>::gap_to_plane(mean, height);")
@@ -41,9 +39,7 @@ def surface_begins(
   const double *from = (const double *)places.data + 3 * first;
   return mpm::Surface::thin_there(from, count, &x.c[0], far);
 """)
-def sees_thin_place(
-    places: wp.array(dtype=wp.vec3d), first: int, count: int, x: wp.vec3d, far: wp.float64
-) -> bool: ...
+def sees_thin_place(places: wp.array(dtype=wp.vec3d), first: int, count: int, x: wp.vec3d, far: wp.float64) -> bool: ...
 
 
 @wp.func_native("""
@@ -56,13 +52,7 @@ def sees_thin_place(
   return wp::vec4d(n[0], n[1], n[2], face[number].height);
 """)
 def wetted_face(
-    rows: wp.array(dtype=wp.vec3d),
-    first: int,
-    count: int,
-    x: wp.vec3d,
-    place: wp.vec3d,
-    dx: wp.float64,
-    number: int,
+    rows: wp.array(dtype=wp.vec3d), first: int, count: int, x: wp.vec3d, place: wp.vec3d, dx: wp.float64, number: int
 ) -> wp.vec4d: ...
 
 
@@ -72,17 +62,13 @@ def wetted_face(
   out[3] = mpm::Round::shift(row, &towards.c[0], &out.c[0]) ? 1.0 : 0.0;
   return out;
 """)
-def shift_to_contact(
-    rows: wp.array(dtype=wp.float64), number: int, towards: wp.vec3d
-) -> wp.vec4d: ...
+def shift_to_contact(rows: wp.array(dtype=wp.float64), number: int, towards: wp.vec3d) -> wp.vec4d: ...
 
 
 @wp.func_native("""
   return mpm::Facet::near((const double *)rows.data + mpm::FACET_ROW * number, &x.c[0], radius);
 """)
-def facet_near(
-    rows: wp.array(dtype=wp.float64), number: int, x: wp.vec3d, radius: wp.float64
-) -> bool: ...
+def facet_near(rows: wp.array(dtype=wp.float64), number: int, x: wp.vec3d, radius: wp.float64) -> bool: ...
 
 
 @wp.func_native("""
@@ -95,8 +81,8 @@ def facet_holds(
 
 
 SeenFromNode = wp.types.vector(length=8, dtype=wp.float64)
-"""Where a node is in a body's frame [m]; the body's mean offset from there in the world [cells];
-its first flat face, and how many it has."""
+"""Where a node is in a body's frame [m]; the body's mean offset from there in the world [cells]; its first flat face,
+and how many it has."""
 
 
 @wp.func_native("""
@@ -178,12 +164,7 @@ def curved_meet(
   return true;
 """)
 def curved_owns(
-    rows: wp.array(dtype=wp.float64),
-    points: wp.array(dtype=wp.vec3d),
-    p: int,
-    first: int,
-    count: int,
-    x: wp.vec3d,
+    rows: wp.array(dtype=wp.float64), points: wp.array(dtype=wp.vec3d), p: int, first: int, count: int, x: wp.vec3d
 ) -> bool: ...
 
 
@@ -191,9 +172,7 @@ def curved_owns(
   const double *row = (const double *)rows.data;
   return mpm::Curved::misjudged(row + mpm::CURVATURE_ROW * p, row + mpm::CURVATURE_ROW * q, dx);
 """)
-def curved_misjudged(
-    rows: wp.array(dtype=wp.float64), p: int, q: int, dx: wp.float64
-) -> wp.float64: ...
+def curved_misjudged(rows: wp.array(dtype=wp.float64), p: int, q: int, dx: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("""
@@ -211,9 +190,7 @@ def facet_misjudged(radius: wp.float64, dx: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("return mpm::Facet::replaces(&apart.c[0], cosine, reach, alike);")
-def facet_replaces(
-    apart: wp.vec3d, cosine: wp.float64, reach: wp.float64, alike: wp.float64
-) -> bool: ...
+def facet_replaces(apart: wp.vec3d, cosine: wp.float64, reach: wp.float64, alike: wp.float64) -> bool: ...
 
 
 @wp.func_native("""
@@ -221,9 +198,7 @@ def facet_replaces(
   mpm::Touched<float>::shift((const float *)table.data, &a.c[0], &c.c[0], &n.c[0], &out.c[0]);
   return out;
 """)
-def touching_offset(
-    table: wp.array(dtype=wp.float32), a: wp.vec3d, c: wp.vec3d, n: wp.vec3d
-) -> wp.vec3d: ...
+def touching_offset(table: wp.array(dtype=wp.float32), a: wp.vec3d, c: wp.vec3d, n: wp.vec3d) -> wp.vec3d: ...
 
 
 @wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height, full);")
@@ -239,30 +214,23 @@ def approach_of(speed: wp.float64, kick: wp.float64, feigned: wp.float64) -> wp.
 
 
 @wp.func_native("return mpm::Impact::begins(approach, speed, gap, dt);")
-def impact_begins(
-    approach: wp.float64, speed: wp.float64, gap: wp.float64, dt: wp.float64
-) -> bool: ...
+def impact_begins(approach: wp.float64, speed: wp.float64, gap: wp.float64, dt: wp.float64) -> bool: ...
 
 
 @wp.func_native("return mpm::Impact::target(e, approach, speed, gap, dt, dx);")
 def impact_target(
-    e: wp.float64,
-    approach: wp.float64,
-    speed: wp.float64,
-    gap: wp.float64,
-    dt: wp.float64,
-    dx: wp.float64,
+    e: wp.float64, approach: wp.float64, speed: wp.float64, gap: wp.float64, dt: wp.float64, dx: wp.float64
 ) -> wp.float64: ...
 
 
-(
-    SUPPORT_ROW,
-    SUPPORT_ROLE,
-    SUPPORT_RESTITUTION,
-    SUPPORT_LEAST_GAP,
-    SUPPORT_IMPACT_SPEED,
-    SUPPORT_SUMS,
-) = 17, 0, 1, 2, 3, 4
+(SUPPORT_ROW, SUPPORT_ROLE, SUPPORT_RESTITUTION, SUPPORT_LEAST_GAP, SUPPORT_IMPACT_SPEED, SUPPORT_SUMS) = (
+    17,
+    0,
+    1,
+    2,
+    3,
+    4,
+)
 """Columns of ``Backing`` in backing.h: how many, and some of them; from BACKING_SUMS on sums."""
 STRUCK_PAIR, HELD_PAIR = 1, 2
 """What its role may be, where it is not 0: waiting."""
@@ -317,9 +285,7 @@ def closing_speed(gap: wp.float64, dt: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("return mpm::Coulomb::push(old, speed, target, softness);")
-def normal_impulse(
-    old: wp.float64, speed: wp.float64, target: wp.float64, softness: wp.float64
-) -> wp.float64: ...
+def normal_impulse(old: wp.float64, speed: wp.float64, target: wp.float64, softness: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("""
@@ -331,9 +297,7 @@ def within_cone(friction: wp.float64, push: wp.float64, n: wp.vec3d, rub: wp.vec
 
 
 @wp.func_native("return mpm::WallStress::span(mass, full, height, dx, dt);")
-def wall_span(
-    mass: wp.float64, full: wp.float64, height: wp.float64, dx: wp.float64, dt: wp.float64
-) -> wp.float64: ...
+def wall_span(mass: wp.float64, full: wp.float64, height: wp.float64, dx: wp.float64, dt: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("""
@@ -343,10 +307,5 @@ def wall_span(
   return J;
 """)
 def drag_impulse(
-    softness: wp.float64,
-    span: wp.float64,
-    curve: wp.vec3d,
-    push: wp.float64,
-    n: wp.vec3d,
-    rub: wp.vec3d,
+    softness: wp.float64, span: wp.float64, curve: wp.vec3d, push: wp.float64, n: wp.vec3d, rub: wp.vec3d
 ) -> wp.vec3d: ...

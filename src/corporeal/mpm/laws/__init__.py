@@ -1,7 +1,7 @@
 """Constitutive laws, one per file, and their dispatch.
 
-A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``.
-The functions below answer for particles of different laws at once.
+A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``. The functions below
+answer for particles of different laws at once.
 """
 
 from importlib import import_module
@@ -74,9 +74,7 @@ def wave_modulus(law: LawNumbers, F: Matrices, mu: Scalars, lam: Scalars) -> Sca
     return out
 
 
-def flow(
-    law: LawNumbers, F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
-) -> ReturnMapResult:
+def flow(law: LawNumbers, F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars) -> ReturnMapResult:
     """Bring granular and plastic material back to what it can bear.
 
     Args:
@@ -101,9 +99,7 @@ def is_stiff_in_bulk(law: LawNumbers, mu: Scalars, lam: Scalars) -> Bool[np.ndar
 
     Where ν is 0.4 to within rounding it is not above.
     """
-    return np.isin(law, _VOLUMETRIC_LAWS) & (
-        lam > LOCAL_BULK_RATIO * (1.0 + BULK_ROUNDING_FRACTION) * mu
-    )
+    return np.isin(law, _VOLUMETRIC_LAWS) & (lam > LOCAL_BULK_RATIO * (1.0 + BULK_ROUNDING_FRACTION) * mu)
 
 
 def mean_pressure(law: LawNumbers, J: Scalars, bulk: Scalars) -> Scalars:
@@ -131,7 +127,4 @@ def _volumetric_by_law(measure: str, law: LawNumbers, J: Scalars) -> Scalars:
 
 def _by_law(law: LawNumbers) -> list[tuple[ConstitutiveLaw, np.ndarray]]:
     """List the laws that occur, each with the particles that follow it."""
-    return [
-        (CONSTITUTIVE_LAWS[Law(value)], np.flatnonzero(law == value))
-        for value in np.unique(law).tolist()
-    ]
+    return [(CONSTITUTIVE_LAWS[Law(value)], np.flatnonzero(law == value)) for value in np.unique(law).tolist()]

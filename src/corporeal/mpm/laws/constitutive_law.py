@@ -38,14 +38,10 @@ def _stretched(J: Scalars) -> Scalars:
 
 
 QUADRATIC_VOLUMETRIC = VolumetricEnergy(
-    psi=lambda J: 0.5 * (J - 1.0) ** 2,
-    pressure=lambda J: J * (J - 1.0),
-    modulus=_stretched,
+    psi=lambda J: 0.5 * (J - 1.0) ** 2, pressure=lambda J: J * (J - 1.0), modulus=_stretched
 )
 """e = J - 1."""
-LOGARITHMIC_VOLUMETRIC = VolumetricEnergy(
-    psi=lambda J: 0.5 * _log(J) ** 2, pressure=_log, modulus=np.ones_like
-)
+LOGARITHMIC_VOLUMETRIC = VolumetricEnergy(psi=lambda J: 0.5 * _log(J) ** 2, pressure=_log, modulus=np.ones_like)
 """e = ln J."""
 
 
@@ -57,10 +53,7 @@ def lame_parameters(young: Number, poisson: Number) -> tuple[Number, Number]:
 
     μ = E / 2(1 + ν),  λ = E ν / ((1 + ν)(1 - 2ν))
     """
-    return (
-        young / (2.0 * (1.0 + poisson)),
-        young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
-    )
+    return (young / (2.0 * (1.0 + poisson)), young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)))
 
 
 @dataclass(frozen=True)
@@ -102,9 +95,8 @@ class ReturnMapResult(NamedTuple):
     loss: Scalars
     """Plastic work per rest volume τ : Δε_p [J/m³], with the stress after the return.
 
-    This is what the grid really pays. The elastic energy given up would also count the overshoot of
-    the trial, for which no force did work: several times too much where a step passes the yield
-    strain.
+    This is what the grid really pays. The elastic energy given up would also count the overshoot of the trial, for
+    which no force did work: several times too much where a step passes the yield strain.
     """
 
 

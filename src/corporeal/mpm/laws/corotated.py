@@ -27,9 +27,7 @@ def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """τ = 2μ (F - R) Fᵀ + λ J (J - 1) 1."""
     J = determinant(F)
-    return 2.0 * per_particle(mu) * (F - polar(F)[0]) @ transpose(F) + isotropic_tensors(
-        lam * J * (J - 1.0)
-    )
+    return 2.0 * per_particle(mu) * (F - polar(F)[0]) @ transpose(F) + isotropic_tensors(lam * J * (J - 1.0))
 
 
 def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
@@ -41,9 +39,7 @@ def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
 def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = 2μ (F - R) + λ J (J - 1) F⁻ᵀ."""
     J = determinant(F)
-    return 2.0 * per_particle(mu) * (F - polar(F)[0]) + per_particle(
-        lam * J * (J - 1.0)
-    ) * inverse_transpose(F)
+    return 2.0 * per_particle(mu) * (F - polar(F)[0]) + per_particle(lam * J * (J - 1.0)) * inverse_transpose(F)
 
 
 def wave_modulus(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
@@ -54,8 +50,7 @@ def wave_modulus(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 
 LAW = ConstitutiveLaw(
     name="fixed corotated",
-    source="Stomakhin, Howes, Schroeder and Teran 2012, Energetically consistent invertible "
-    "elasticity",
+    source="Stomakhin, Howes, Schroeder and Teran 2012, Energetically consistent invertible elasticity",
     psi=psi,
     tau=tau,
     principal_tau=principal_tau,

@@ -3,18 +3,8 @@
 import numpy as np
 
 from corporeal.mpm.laws import hencky
-from corporeal.mpm.laws.constitutive_law import (
-    ConstitutiveLaw,
-    Number,
-    ReturnMapResult,
-    YieldParameters,
-)
-from corporeal.mpm.laws.hencky import (
-    PrincipalReturn,
-    apply_return_map,
-    deviator,
-    scaled_deviator,
-)
+from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, Number, ReturnMapResult, YieldParameters
+from corporeal.mpm.laws.hencky import PrincipalReturn, apply_return_map, deviator, scaled_deviator
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 
 MIN_FRICTION_ANGLE_RAD = 1e-4
@@ -24,9 +14,9 @@ MIN_FRICTION_ANGLE_RAD = 1e-4
 def cone_slope(friction_angle: Number) -> Number:
     """α = (√2/3) sin φ: Mohr–Coulomb's strength in plane strain, flowing without dilation.
 
-    There √J₂ = p sin φ (Davis 1968), and ‖s‖ = √(2 J₂) ≤ 3 α p. Through triaxial compression
-    instead, as in Klar et al. 2016, a slope of φ = 30° would be as strong as one of 44°, and sand
-    pushed aside, in extension, stronger still (decision laws-sand).
+    There √J₂ = p sin φ (Davis 1968), and ‖s‖ = √(2 J₂) ≤ 3 α p. Through triaxial compression instead, as in Klar et al.
+    2016, a slope of φ = 30° would be as strong as one of 44°, and sand pushed aside, in extension, stronger still
+    (decision laws-sand).
     """
     return np.sqrt(2.0) / 3.0 * np.sin(np.maximum(friction_angle, MIN_FRICTION_ANGLE_RAD))
 
@@ -70,14 +60,10 @@ def return_drucker_prager(
     return PrincipalReturn(returned, excess, equivalent, trace - np.sum(returned, axis=1))
 
 
-def flow(
-    F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
-) -> ReturnMapResult:
+def flow(F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars) -> ReturnMapResult:
     """Apply ``return_drucker_prager`` to trial deformation gradients; grains do not harden."""
     n = numbers
-    return apply_return_map(
-        F, n, lambda trial: return_drucker_prager(trial, n.mu, n.lam, n.cone, n.apex, volume)
-    )
+    return apply_return_map(F, n, lambda trial: return_drucker_prager(trial, n.mu, n.lam, n.cone, n.apex, volume))
 
 
 LAW = ConstitutiveLaw(

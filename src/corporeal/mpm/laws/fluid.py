@@ -1,21 +1,15 @@
 """Liquids and pastes: pressure of their volume, and a Maxwell branch without a spring beside it.
 
-Herschel and Bulkley's law τ = τ_y + K_c γ̇ⁿ; with n = 1 Bingham's, and without a yield stress
-Newton's of viscosity K_c. Elastic is what a step adds: the shear modulus μ and the bulk modulus are
-numbers of the method (``physics.liquid_stiffness``), and a stress fades as fast as the law says,
-however long the step.
+Herschel and Bulkley's law τ = τ_y + K_c γ̇ⁿ; with n = 1 Bingham's, and without a yield stress Newton's of viscosity
+K_c. Elastic is what a step adds: the shear modulus μ and the bulk modulus are numbers of the method
+(``physics.liquid_stiffness``), and a stress fades as fast as the law says, however long the step.
 """
 
 import numpy as np
 
 from corporeal.mpm.laws import hencky
 from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
-from corporeal.mpm.laws.hencky import (
-    PrincipalReturn,
-    apply_return_map,
-    deviator,
-    scaled_deviator,
-)
+from corporeal.mpm.laws.hencky import PrincipalReturn, apply_return_map, deviator, scaled_deviator
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 
 SLIP_NEWTON_ITERATIONS = 12
@@ -54,9 +48,7 @@ def return_fluid(strain: Vectors, numbers: YieldParameters) -> PrincipalReturn:
     return PrincipalReturn(returned, strain - returned, equivalent, np.zeros(len(strain)))
 
 
-def flow(
-    F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
-) -> ReturnMapResult:
+def flow(F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars) -> ReturnMapResult:
     """Apply ``return_fluid`` to trial deformation gradients; no volume opens."""
     return apply_return_map(F, numbers, lambda trial: return_fluid(trial, numbers))
 

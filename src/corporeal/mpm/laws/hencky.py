@@ -1,12 +1,11 @@
 """Hencky's elasticity: quadratic in the logarithmic strain ε = ln Σ.
 
-"StVK" in the graphics literature, where it carries plasticity; but Saint-Venant's and Kirchhoff's
-law is quadratic in Green's strain.
+"StVK" in the graphics literature, where it carries plasticity; but Saint-Venant's and Kirchhoff's law is quadratic in
+Green's strain.
 
 Return maps of Hencky's elasticity, shared by all plastic laws.
 
-A map takes the trial strains ε = ln Σ of a step that was taken elastically and gives back the
-nearest admissible ones.
+A map takes the trial strains ε = ln Σ of a step that was taken elastically and gives back the nearest admissible ones.
 """
 
 from collections.abc import Callable
@@ -20,15 +19,7 @@ from corporeal.mpm.laws.constitutive_law import (
     ReturnMapResult,
     YieldParameters,
 )
-from corporeal.mpm.laws.kinematics import (
-    Matrices,
-    Scalars,
-    Vectors,
-    from_stretches,
-    log_strain,
-    signed_svd,
-    stretches,
-)
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors, from_stretches, log_strain, signed_svd, stretches
 
 
 def principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
@@ -106,9 +97,7 @@ def apply_return_map(
     moved = np.any(new.strain != strain, axis=1)
     rebuilt = from_stretches(U, np.exp(new.strain), V)
     loss = np.sum(principal_tau(new.strain, numbers.mu, numbers.lam) * new.slip, axis=1)
-    return ReturnMapResult(
-        np.where(moved[:, None, None], rebuilt, F), new.plastic_strain, new.volume, loss
-    )
+    return ReturnMapResult(np.where(moved[:, None, None], rebuilt, F), new.plastic_strain, new.volume, loss)
 
 
 def deviator(strain: Vectors) -> tuple[Vectors, Scalars]:

@@ -38,9 +38,9 @@ def polar(F: Matrices) -> tuple[Matrices, Matrices]:
 def stretches(F: Matrices) -> Vectors:
     """Return Σ as ``signed_svd`` does, without U and V and in a tenth of the time.
 
-    In closed form from E = FᵀF - 1 (Smith 1961), formed from F - 1 so that small strains stay
-    exact; what is pressed nearly flat is decomposed. Two that are nearly equal come 1e-5 apart, but
-    their sums and products, and so energies, are exact.
+    In closed form from E = FᵀF - 1 (Smith 1961), formed from F - 1 so that small strains stay exact; what is pressed
+    nearly flat is decomposed. Two that are nearly equal come 1e-5 apart, but their sums and products, and so energies,
+    are exact.
     """
     # Each component in a row of its own: sums of three numbers a matrix take three times as long.
     H = np.ascontiguousarray(np.moveaxis(F, 0, -1)) - np.eye(3)[:, :, None]

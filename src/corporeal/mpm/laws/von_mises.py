@@ -4,12 +4,7 @@ import numpy as np
 
 from corporeal.mpm.laws import hencky
 from corporeal.mpm.laws.constitutive_law import ConstitutiveLaw, ReturnMapResult, YieldParameters
-from corporeal.mpm.laws.hencky import (
-    PrincipalReturn,
-    apply_return_map,
-    deviator,
-    scaled_deviator,
-)
+from corporeal.mpm.laws.hencky import PrincipalReturn, apply_return_map, deviator, scaled_deviator
 from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 
 
@@ -39,14 +34,10 @@ def return_von_mises(
     return PrincipalReturn(returned, strain - returned, equivalent, np.zeros(len(strain)))
 
 
-def flow(
-    F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars
-) -> ReturnMapResult:
+def flow(F: Matrices, numbers: YieldParameters, plastic: Scalars, volume: Scalars) -> ReturnMapResult:
     """Apply ``return_von_mises`` to trial deformation gradients; no volume opens."""
     n = numbers
-    return apply_return_map(
-        F, n, lambda trial: return_von_mises(trial, n.mu, n.yield_stress, n.hardening, plastic)
-    )
+    return apply_return_map(F, n, lambda trial: return_von_mises(trial, n.mu, n.yield_stress, n.hardening, plastic))
 
 
 LAW = ConstitutiveLaw(

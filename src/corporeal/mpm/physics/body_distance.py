@@ -1,7 +1,7 @@
 """Distances between bodies, and penetration into each other and into planes.
 
-A particle stands for a ball of a quarter cell (two particles per cell and axis); its surface is
-that far outside its centre.
+A particle stands for a ball of a quarter cell (two particles per cell and axis); its surface is that far outside its
+centre.
 """
 
 from collections.abc import Sequence
@@ -26,17 +26,14 @@ _CAP_FRACTIONS = 0.5 + 0.75 * _CAP_HEIGHTS - 0.25 * _CAP_HEIGHTS**3
 
 
 def pair_gaps(
-    bodies: Sequence[Float[np.ndarray, "_ 3"]],
-    cell: float,
-    squeezed: Sequence[Float[np.ndarray, " _"]] | None = None,
+    bodies: Sequence[Float[np.ndarray, "_ 3"]], cell: float, squeezed: Sequence[Float[np.ndarray, " _"]] | None = None
 ) -> tuple[Float[np.ndarray, "B B"], Float[np.ndarray, "B B"]]:
     """Distance of surfaces and depth of overlap of every two bodies, both [m].
 
     Args:
         bodies: Particle positions of each body [m].
         cell: Grid spacing dx [m].
-        squeezed: Volume of each of these particles over its volume at rest, at most 1 [-]; None:
-            all at rest.
+        squeezed: Volume of each of these particles over its volume at rest, at most 1 [-]; None: all at rest.
 
     Returns:
         Gap, negative when particles interleave, inf on the diagonal; depth, 0 when apart.
@@ -98,8 +95,7 @@ def pair_gap(a: BodyPoints, c: BodyPoints, cell: float) -> tuple[float, float]:
 def _close_gap(a: BodyPoints, c: BodyPoints, cell: float) -> tuple[float, float]:
     """Smallest distance of particles and depth of overlap [m]; inf and 0: none is in reach.
 
-    Only particles in reach of the other body's box are looked at: of a body that lies on a large
-    one most are not.
+    Only particles in reach of the other body's box are looked at: of a body that lies on a large one most are not.
     """
     close = OVERLAP_RADIUS_DX * cell
     near_a, near_c = a.near(c, close), c.near(a, close)
@@ -119,9 +115,7 @@ def _close_gap(a: BodyPoints, c: BodyPoints, cell: float) -> tuple[float, float]
     return float(to_c.min()), depth
 
 
-def overlap_depth(
-    points: np.ndarray, tree: KDTree, squeezed: np.ndarray | None, cell: float
-) -> float:
+def overlap_depth(points: np.ndarray, tree: KDTree, squeezed: np.ndarray | None, cell: float) -> float:
     """How deep the deepest of some points, as balls, lie below the surface of a body [m].
 
     The share φ of a ball of radius r that lies in a half space whose face is s away is
@@ -150,10 +144,7 @@ def overlap_depth(
 
 
 def plane_depth(
-    points: Float[np.ndarray, "N 3"],
-    plane: Plane,
-    motion: Float[np.ndarray, "N 3 3"] | None,
-    cell: float,
+    points: Float[np.ndarray, "N 3"], plane: Plane, motion: Float[np.ndarray, "N 3 3"] | None, cell: float
 ) -> float:
     """How deep a body reaches into a wall [m].
 

@@ -66,17 +66,14 @@ def half_space_mean(face: np.ndarray) -> np.ndarray:
     inner = -13.0 / 64.0 + 0.375 * near**2 - 0.25 * near**4
     moment = np.where(near < -0.5, w**4 / 8.0 - w**3 / 4.0, inner)
     weight = half_space_weight(s)
-    return np.where(
-        weight > MIN_HALF_SPACE_WEIGHT, moment / np.maximum(weight, MIN_HALF_SPACE_WEIGHT), near
-    )
+    return np.where(weight > MIN_HALF_SPACE_WEIGHT, moment / np.maximum(weight, MIN_HALF_SPACE_WEIGHT), near)
 
 
 def lattice_mean(face: np.ndarray) -> np.ndarray:
     """Mean offset [dx] of a lattice that fills the half space u < s, two points per cell and axis.
 
-    The first row lies a quarter of a cell behind the face. It is what a field at rest shows of
-    itself, where e(s) is what a continuum would: up to .05 dx less from s = -½ on, and nothing for
-    s = ½.
+    The first row lies a quarter of a cell behind the face. It is what a field at rest shows of itself, where e(s) is
+    what a continuum would: up to .05 dx less from s = -½ on, and nothing for s = ½.
     """
     s = np.minimum(np.asarray(face, dtype=np.float64), 1.5)
     u = s[..., None] - PARTICLE_RADIUS_DX * (1.0 + 2.0 * np.arange(LATTICE_ROWS))
@@ -104,17 +101,15 @@ def face_table() -> Float[np.ndarray, " K"]:
 def touching_distance(face: np.ndarray) -> np.ndarray:
     """t(s): distance of the mean offsets [dx] of two half spaces that touch s dx from the node.
 
-    t(s) = -e(s) - e(-s) + .05 + .25 max(0, s - .7): .84 with the face on the node, .95 mid-cell,
-    1.27 one cell off. A constant would start contact early or sink heavy bodies.
+    t(s) = -e(s) - e(-s) + .05 + .25 max(0, s - .7): .84 with the face on the node, .95 mid-cell, 1.27 one cell off. A
+    constant would start contact early or sink heavy bodies.
     """
     s = np.minimum(np.abs(face), MAX_FACE_DEPTH_DX)
     lattice = LATTICE_GAP_DX + LATTICE_SLOPE * np.maximum(0.0, s - LATTICE_START_DX)
     return -half_space_mean(s) - half_space_mean(-s) + lattice
 
 
-def gap_between(
-    mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float
-) -> Float[np.ndarray, " E"]:
+def gap_between(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> Float[np.ndarray, " E"]:
     """Open distance g along n [m] of two fields; negative where they overlap.
 
     The face lies at s = ½ (D(ξ_a) - D(-ξ_c)), ξ = X̄·n/dx, and g = (X̄_c - X̄_a)·n - t(|s|) dx.
@@ -141,14 +136,12 @@ def gap_to_plane(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -
     return (-half_space_mean(-h) - xi - touching_distance(h)) * cell
 
 
-def surface_begins(
-    points: Vectors, node: Vectors, normal: Vectors, around: float, behind: float
-) -> Scalars:
+def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: float, behind: float) -> Scalars:
     """Where a thin rigid body begins along n, seen from each node [m]: least (p - x)·n.
 
-    Its surface points nearer than ``around`` [m] to the line through the node along n count; where
-    there are none, the one nearest to the line does. What is farther than ``behind`` [m] behind a
-    node is another wall, and does not count; without any others it is infinite.
+    Its surface points nearer than ``around`` [m] to the line through the node along n count; where there are none, the
+    one nearest to the line does. What is farther than ``behind`` [m] behind a node is another wall, and does not count;
+    without any others it is infinite.
 
     Args:
         points: On its surface [m].
@@ -237,22 +230,17 @@ def full_cell_mass(body: Body, cell: float) -> float:
     return float(body.volume @ body.density / body.volume.sum()) * cell**3
 
 
-def gap_of_liquid(
-    mean: Vectors, height: Scalars, normal: Vectors, full: Scalars, cell: float
-) -> Scalars:
+def gap_of_liquid(mean: Vectors, height: Scalars, normal: Vectors, full: Scalars, cell: float) -> Scalars:
     """Open distance [m] along n of a liquid to a surface that lies ``height`` [m] below the node.
 
-    Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
-    face alone would let the first layer of a liquid be squeezed along it. So nodes up to
-    ``LIQUID_WALL_REACH_DX`` above are in contact too, where the liquid fills the half space up to
-    the face as far as the node can tell: by its mean place, and by how ``full`` the node is, its
-    mass over that of a full cell. A sheet or a drop would hover at such a node otherwise.
+    Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its face alone would let
+    the first layer of a liquid be squeezed along it. So nodes up to ``LIQUID_WALL_REACH_DX`` above are in contact too,
+    where the liquid fills the half space up to the face as far as the node can tell: by its mean place, and by how
+    ``full`` the node is, its mass over that of a full cell. A sheet or a drop would hover at such a node otherwise.
     """
     h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
     deep = gap_to_plane(mean, height, normal, cell)
-    like = (np.abs(half_space_mean(h) - xi) < HALF_SPACE_TOLERANCE_DX) & (
-        full >= MIN_FILLED_FRACTION
-    )
+    like = (np.abs(half_space_mean(h) - xi) < HALF_SPACE_TOLERANCE_DX) & (full >= MIN_FILLED_FRACTION)
     held = (h > WALL_REACH) & (h <= LIQUID_WALL_REACH_DX) & like
     return np.where(held, deep, gap_to_wall(mean, height, normal, cell))
 
@@ -329,10 +317,7 @@ def take_candidate(candidates: Float[np.ndarray, "E 3 3"], which: Indices) -> Ve
 
 
 def widest_candidate(
-    candidates: np.ndarray,
-    reach_a: Float[np.ndarray, "E 3"],
-    reach_c: Float[np.ndarray, "E 3"],
-    cell: float,
+    candidates: np.ndarray, reach_a: Float[np.ndarray, "E 3"], reach_c: Float[np.ndarray, "E 3"], cell: float
 ) -> Indices:
     """Say along which candidate the two fields are farthest apart.
 

@@ -41,9 +41,7 @@ class Movers:
     spin: Float[np.ndarray, "D 3"]
     """[rad/s]; changed by ``solve``."""
 
-    def velocity_at(
-        self, mover: Int[np.ndarray, " E"], point: Float[np.ndarray, "E 3"]
-    ) -> Float[np.ndarray, "E 3"]:
+    def velocity_at(self, mover: Int[np.ndarray, " E"], point: Float[np.ndarray, "E 3"]) -> Float[np.ndarray, "E 3"]:
         """V + ω × r of each mover at a point [m/s]."""
         (p, q, r), (x, y, z) = self.spin[mover].T, (point - self.centre[mover]).T
         turning = np.stack([q * z - r * y, r * x - p * z, p * y - q * x], axis=1)
@@ -66,11 +64,11 @@ class ContactList(NamedTuple):
     friction: Scalars
     """Coulomb μ."""
     group: Indices | None = None
-    """Contacts of one pair of bodies, found in one way, are swept together, groups one after the
-    other; None: all are one group."""
+    """Contacts of one pair of bodies, found in one way, are swept together, groups one after the other; None: all are
+    one group."""
     layer: Float[np.ndarray, "E 4"] | None = None
-    """Of walls that drag on a liquid (``wall_stress``): span [m² s], yield stress [Pa], drag and
-    index; without a span it is Coulomb's friction. None: none does."""
+    """Of walls that drag on a liquid (``wall_stress``): span [m² s], yield stress [Pa], drag and index; without a span
+    it is Coulomb's friction. None: none does."""
     guided: Bool[np.ndarray, " E"] | None = None
     """Which are of a rigid body with one that follows a prescribed path; None: none is."""
 
@@ -88,15 +86,15 @@ class ReboundRules(NamedTuple):
     """What decides whether rigid contacts bounce in this step."""
 
     pair: Indices
-    """Which pair the contact belongs to: number of its first body times how many bodies and planes
-    there are, and the second's."""
+    """Which pair the contact belongs to: number of its first body times how many bodies and planes there are, and the
+    second's."""
     restitution: Scalars
     """Newton's e; 0 unless both partners are rigid or a wall."""
     kick: Scalars
     """Approach speed that gravity and pushes added in this step [m/s]."""
     feigned: Scalars
-    """Speed at which a body that rolls on its surface points meets the next one [m/s]: its spin
-    times their distance. What closes no faster than that and .05 m/s does not rebound."""
+    """Speed at which a body that rolls on its surface points meets the next one [m/s]: its spin times their distance.
+    What closes no faster than that and .05 m/s does not rebound."""
     bodies: impact_support.ImpactBodies | None = None
     """What may hold them from behind; None: nothing does."""
 
@@ -106,9 +104,9 @@ def target_speeds(
 ) -> tuple[Scalars, Bool[np.ndarray, " E"]]:
     """Return the normal speed each contact may keep [m/s], and whose pairs are in an impact.
 
-    An open gap may close within the step, max(g, 0)/dt. Where one contact of a rigid pair closes
-    with v_app > .05 m/s, all its contacts within .1 dx or closing get -e v_app: one impact is one
-    event. v_app leaves out this step's gravity, so that nothing rebounds faster than it fell.
+    An open gap may close within the step, max(g, 0)/dt. Where one contact of a rigid pair closes with v_app > .05 m/s,
+    all its contacts within .1 dx or closing get -e v_app: one impact is one event. v_app leaves out this step's
+    gravity, so that nothing rebounds faster than it fell.
 
     Args:
         contacts: Where objects touch.
@@ -132,24 +130,20 @@ def approach_of(speed: Scalars, rebound: ReboundRules) -> Scalars:
     return speed - np.maximum(rebound.kick, 0.0)
 
 
-def closing_fast(
-    contacts: ContactList, speed: Scalars, rebound: ReboundRules, dt: float
-) -> Bool[np.ndarray, " E"]:
+def closing_fast(contacts: ContactList, speed: Scalars, rebound: ReboundRules, dt: float) -> Bool[np.ndarray, " E"]:
     """Which contacts close within the step fast enough to begin an impact."""
     fast = approach_of(speed, rebound) > MIN_REBOUND_SPEED + rebound.feigned
     return (speed * dt > contacts.gap) & fast & (rebound.restitution > 0.0)
 
 
-def solve_impacts(
-    contacts: ContactList, movers: Movers, rebound: ReboundRules, cell: float, dt: float
-) -> Vectors:
+def solve_impacts(contacts: ContactList, movers: Movers, rebound: ReboundRules, cell: float, dt: float) -> Vectors:
     """Let rigid pairs that are hit rebound, one impact after the other, and move the movers.
 
-    The struck body passes the impact on to what it touches: in every round the pairs that approach
-    now rebound together and all others wait (generalized reflections: Smith, Kaufman, Vouga,
-    Tamstorf and Grinspun 2012, "Reflections on simultaneous impact"). Solved at once, all pairs of
-    a row of touching balls would share the impact; in rounds it runs through to the last. What is
-    light between what strikes it and what it rests on is held in the same round (``backing``).
+    The struck body passes the impact on to what it touches: in every round the pairs that approach now rebound together
+    and all others wait (generalized reflections: Smith, Kaufman, Vouga, Tamstorf and Grinspun 2012, "Reflections on
+    simultaneous impact"). Solved at once, all pairs of a row of touching balls would share the impact; in rounds it
+    runs through to the last. What is light between what strikes it and what it rests on is held in the same round
+    (``backing``).
 
     Returns:
         Impulses J [N s], as of ``solve``.
@@ -165,9 +159,7 @@ def solve_impacts(
         if rebound.bodies is not None:
             c = contacts
             blow = np.where(closing_fast(c, speed, rebound, dt), approach_of(speed, rebound), 0.0)
-            seen = impact_support.ImpactContacts(
-                rebound.pair, c.point, c.normal, c.gap, speed, hit, blow
-            )
+            seen = impact_support.ImpactContacts(rebound.pair, c.point, c.normal, c.gap, speed, hit, blow)
             now = impact_support.ImpactRound.of(rebound.bodies, seen, cell)
             bounces = rebound._replace(restitution=now.bounce(rebound.restitution))
             target, _ = target_speeds(contacts, speed, bounces, cell, dt)
@@ -178,11 +170,7 @@ def solve_impacts(
 
 
 def solve(
-    contacts: ContactList,
-    movers: Movers,
-    target: Scalars,
-    sweeps: int,
-    only: Bool[np.ndarray, " E"] | None = None,
+    contacts: ContactList, movers: Movers, target: Scalars, sweeps: int, only: Bool[np.ndarray, " E"] | None = None
 ) -> Vectors:
     """Find all impulses J [N s], -J on a and +J on c, and move the movers.
 
@@ -205,8 +193,7 @@ def solve(
         impulse,
     )
     _sweep(*given, orders)
-    # What follows a prescribed path may leave no room between: sweeps then end as the last contacts
-    # have it.
+    # What follows a prescribed path may leave no room between: sweeps then end as the last contacts have it.
     if contacts.guided is not None and contacts.guided[orders[0]].any():
         _solve_simultaneously(*given, orders[0])
     return impulse
@@ -215,9 +202,9 @@ def solve(
 def _sweep_orders(contacts: ContactList, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
     """Return the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
 
-    In the order in which the contacts of a rigid body lie next to one another the first would carry
-    more, and what rests on many points would tilt and sink; with one order for all sweeps stacks
-    creep. Nodes without a rigid body have few contacts each, which stay as they are.
+    In the order in which the contacts of a rigid body lie next to one another the first would carry more, and what
+    rests on many points would tilt and sink; with one order for all sweeps stacks creep. Nodes without a rigid body
+    have few contacts each, which stay as they are.
     """
     rigid = np.any(movers.inverse_inertia != 0.0, axis=(1, 2))
     either = np.logical_or(rigid[contacts.a], rigid[contacts.c])
@@ -289,9 +276,7 @@ def _tangential(impulse, slip, softness, limit, layer):
     if along_slip > 0.0:
         impulse = _plus(impulse, 1.0 / along_slip, slip)
     if layer[0] > 0.0:
-        stopped = drag_impulse(
-            np.array(impulse), along_slip if along_slip > 0.0 else along_n, layer
-        )
+        stopped = drag_impulse(np.array(impulse), along_slip if along_slip > 0.0 else along_n, layer)
         return stopped[0], stopped[1], stopped[2]
     size = np.sqrt(_dot(impulse, impulse))
     return _plus((0.0, 0.0, 0.0), min(1.0, limit / size) if size > 0.0 else 1.0, impulse)
@@ -327,9 +312,7 @@ def _sweep(contacts, rules, masses, motion, impulse, orders):
             n = (normals[e, 0], normals[e, 1], normals[e, 2])
             old = (impulse[e, 0], impulse[e, 1], impulse[e, 2])
             arm_a, arm_c = _minus(point[e], centre[a]), _minus(point[e], centre[c])
-            slip = _minus(
-                _speed_at(velocity[a], spin[a], arm_a), _speed_at(velocity[c], spin[c], arm_c)
-            )
+            slip = _minus(_speed_at(velocity[a], spin[a], arm_a), _speed_at(velocity[c], spin[c], arm_c))
             along_n = _softness(inverse_mass[a], inverse_inertia[a], arm_a, n)
             along_n += _softness(inverse_mass[c], inverse_inertia[c], arm_c, n)
             speed, old_n = _dot(slip, n), _dot(old, n)
@@ -378,8 +361,8 @@ def _solve_simultaneously(contacts, rules, masses, motion, impulse, order):
 def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> Scalars:
     """Kinetic energy [J] that each normal impulse took: J_n · ½ (u_before + u_after).
 
-    Of a rigid rebound ½ m (1 - e²) v². Material that is soft stops at a node at once, half a cell
-    of it: so much the more, the coarser the grid.
+    Of a rigid rebound ½ m (1 - e²) v². Material that is soft stops at a node at once, half a cell of it: so much the
+    more, the coarser the grid.
     """
     along = np.sum(impulse * normal, axis=1, keepdims=True) * normal
     return np.sum(along * 0.5 * (before + after), axis=1)
@@ -388,9 +371,9 @@ def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vecto
 def friction_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> float:
     """Kinetic energy [J] that the tangential impulses took: Σ J_t · ½ (u_before + u_after).
 
-    ``before`` is the relative velocity as the step began, before its forces: then the works of
-    stress, gravity and contact, each at the mean velocity of the step, add up to what the kinetic
-    energy gained. After the forces, a contact that only holds against them would seem to slip.
+    ``before`` is the relative velocity as the step began, before its forces: then the works of stress, gravity and
+    contact, each at the mean velocity of the step, add up to what the kinetic energy gained. After the forces, a
+    contact that only holds against them would seem to slip.
     """
     tangential = impulse - np.sum(impulse * normal, axis=1, keepdims=True) * normal
     return float(np.sum(tangential * 0.5 * (before + after)))

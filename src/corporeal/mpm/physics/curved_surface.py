@@ -24,17 +24,16 @@ def support_point_shift(
 ) -> tuple[Float[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
     """How far from its point each rounded surface goes on in a direction [m].
 
-    The surface around a point is that of a ball moved along an arc, whose support in the direction
-    d is p + ρ (d - n) + δ (d' - n), with d' the direction of d in the plane of the arc. Angles from
-    n are bounded by what the point stands for.
+    The surface around a point is that of a ball moved along an arc, whose support in the direction d is p + ρ (d - n) +
+    δ (d' - n), with d' the direction of d in the plane of the arc. Angles from n are bounded by what the point stands
+    for.
 
     Args:
         curvature: See ``types.CURVATURE_COLUMNS``; what is not round is not shifted.
         towards: Unit, in the frame of the curvature.
 
     Returns:
-        The shifts, and whether each point is the surface in that direction at all, and not its
-        neighbours.
+        The shifts, and whether each point is the surface in that direction at all, and not its neighbours.
 
     """
     normal, along = curvature[:, :3], curvature[:, 3:6]
@@ -48,9 +47,7 @@ def support_point_shift(
     size = np.linalg.norm(aside, axis=1)
     tilt = np.where((ball > 0.0) & (size > 0.0), np.arctan2(size, outward), 0.0)
     tilted = _bounded_angle(tilt, reach, ball)
-    shift = shift + _arc_offset(
-        ball, tilted, aside / np.maximum(size, TINY_DOUBLE)[:, None], normal
-    )
+    shift = shift + _arc_offset(ball, tilted, aside / np.maximum(size, TINY_DOUBLE)[:, None], normal)
     beyond = (turned != angle) | (tilted != tilt)
     return shift, ~beyond | (curvature[:, 9] == 0.0)
 
@@ -60,9 +57,7 @@ def _bounded_angle(angle: np.ndarray, reach: np.ndarray, radius: np.ndarray) -> 
     return np.clip(angle, -limit, limit)
 
 
-def _arc_offset(
-    radius: np.ndarray, angle: np.ndarray, along: np.ndarray, normal: np.ndarray
-) -> np.ndarray:
+def _arc_offset(radius: np.ndarray, angle: np.ndarray, along: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Way from the top of an arc to where it looks so far aside [m]."""
     aside, down = radius * np.sin(angle), radius * (np.cos(angle) - 1.0)
     return aside[:, None] * along + down[:, None] * normal
@@ -104,8 +99,8 @@ def is_hollow(rows: Rows) -> Bool[np.ndarray, " N"]:
 def height_over(rows: Rows, place: Vectors) -> HeightsOverCurve:
     """Height of places over the surfaces around points: an arc that is moved along an arc.
 
-    Exact for balls and cylinders, from inside and from outside, and for a torus where its ring runs
-    in the plane of the normal; of third order elsewhere.
+    Exact for balls and cylinders, from inside and from outside, and for a torus where its ring runs in the plane of the
+    normal; of third order elsewhere.
 
     Args:
         rows: One for each place.
@@ -166,9 +161,7 @@ def node_gap_error_reach(round_rows: Rows, rows: Rows, cell: float) -> Scalars:
     """
     own, least = 1.0 / ball_radius(round_rows), rows[:, 10:].min(axis=1)
     bent = own + np.abs(rows[:, 10:]).max(axis=1)
-    return FACET_REPLACES_NODES_DX * cell + np.sqrt(
-        (0.5 + CURVED_GAP_ERROR_DX2 * bent * cell) * cell / (own + least)
-    )
+    return FACET_REPLACES_NODES_DX * cell + np.sqrt((0.5 + CURVED_GAP_ERROR_DX2 * bent * cell) * cell / (own + least))
 
 
 def speed_into_hollow(round_rows: Rows, rows: Rows, square: Scalars, dt: float) -> Scalars:

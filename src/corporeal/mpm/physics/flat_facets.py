@@ -25,15 +25,13 @@ class BodyFacets(NamedTuple):
     """F faces of a body in its own frame, and N points on them, face after face."""
 
     row: Float[np.ndarray, "F 11"]
-    """Outward unit normal (3) and offset along it [m]; middle (3) and radius [m] of a ball around
-    the points; how far from a point the face goes on [m]; its first and last point."""
+    """Outward unit normal (3) and offset along it [m]; middle (3) and radius [m] of a ball around the points; how far
+    from a point the face goes on [m]; its first and last point."""
     point: Float[np.ndarray, "N 3"]
     """[m]"""
 
 
-def facets_of(
-    surface: Float[np.ndarray, "S 3"], curvature: Float[np.ndarray, "S 12"]
-) -> BodyFacets:
+def facets_of(surface: Float[np.ndarray, "S 3"], curvature: Float[np.ndarray, "S 12"]) -> BodyFacets:
     """Find the flat faces among a body's surface points: those that look alike and lie in a plane.
 
     Args:
@@ -54,9 +52,7 @@ def facets_of(
         if mine.sum() >= MIN_POINTS_PER_FACET:
             held = surface[left[mine]]
             stands = float(np.median(curvature[left[mine], 8]))
-            reach = max(
-                FACET_SPREAD_RATIO * stands, _widest_hole(held, normal, FACET_HOLE_RATIO * stands)
-            )
+            reach = max(FACET_SPREAD_RATIO * stands, _widest_hole(held, normal, FACET_HOLE_RATIO * stands))
             middle = 0.5 * (held.min(axis=0) + held.max(axis=0))
             radius = np.linalg.norm(held - middle, axis=1).max()
             ends = count, count + len(held)
@@ -76,18 +72,15 @@ def has_edges(rows: Float[np.ndarray, "S W"]) -> bool:
     """Return whether a body has any: whether it is known not to be round all over.
 
     Args:
-        rows: How its surface curves at its points, ``types.CURVATURE_COLUMNS``; without normals where that
-            is not known.
+        rows: How its surface curves at its points, ``types.CURVATURE_COLUMNS``; without normals where that is not
+            known.
 
     """
     return bool(np.any(rows[:, :3].any(axis=1) & (rows[:, 6:8].sum(axis=1) <= 0.0)))
 
 
 def lies_over_facet(
-    points: Float[np.ndarray, "N 3"],
-    normal: Float[np.ndarray, "3"],
-    reach: float,
-    place: Float[np.ndarray, "M 3"],
+    points: Float[np.ndarray, "N 3"], normal: Float[np.ndarray, "3"], reach: float, place: Float[np.ndarray, "M 3"]
 ) -> Bool[np.ndarray, " M"]:
     """Whether places lie over a face: one of its points is no farther aside [m]."""
     apart = place[:, None] - points
@@ -106,20 +99,16 @@ class FacetsAtNodes(NamedTuple):
 
 
 def facet_normals(
-    normal: Float[np.ndarray, "E 3"],
-    slip: Float[np.ndarray, "E 3"],
-    first: FacetsAtNodes,
-    second: FacetsAtNodes,
+    normal: Float[np.ndarray, "E 3"], slip: Float[np.ndarray, "E 3"], first: FacetsAtNodes, second: FacetsAtNodes
 ) -> Float[np.ndarray, "E 3"]:
     """Return the normals along which two bodies of flat faces meet at nodes, a to c.
 
-    Near an edge the normal of a node leans, and what slides along a face seems to come nearer:
-    where the lean feigns more of that than there is, the normal becomes that of the face, which is
-    known. It is of each body the one that looks most along the node's normal, or, where that leans
-    far from all, those two that look at one another. Of these the two count that are farthest
-    apart, in cells and by how much they look along the normal. Of two faces, each weighs as much as
-    the node sees of an edge of the other body, by how far that one's mean offset lies aside from
-    its face's normal. A node whose normal is of no face is of two edges, and keeps it.
+    Near an edge the normal of a node leans, and what slides along a face seems to come nearer: where the lean feigns
+    more of that than there is, the normal becomes that of the face, which is known. It is of each body the one that
+    looks most along the node's normal, or, where that leans far from all, those two that look at one another. Of these
+    the two count that are farthest apart, in cells and by how much they look along the normal. Of two faces, each
+    weighs as much as the node sees of an edge of the other body, by how far that one's mean offset lies aside from its
+    face's normal. A node whose normal is of no face is of two edges, and keeps it.
 
     Args:
         normal: Unit, of the nodes.
@@ -156,14 +145,11 @@ def _aside(mean: Float[np.ndarray, "E 3"], face: Float[np.ndarray, "E 3"]) -> np
     return np.sum(mean**2, axis=1) - np.sum(mean * face, axis=1) ** 2 + FACE_SCATTER_DX**2
 
 
-def _widest_hole(
-    points: Float[np.ndarray, "N 3"], normal: Float[np.ndarray, "3"], at_most: float
-) -> float:
+def _widest_hole(points: Float[np.ndarray, "N 3"], normal: Float[np.ndarray, "3"], at_most: float) -> float:
     """How far the middle of the widest hole between points of a face is from them [m].
 
-    Points at random leave some: what rolls must not fall into one. What is wider than ``at_most``
-    is an opening of the face. The places farthest from points are the middles of circles around
-    triangles of Delaunay's.
+    Points at random leave some: what rolls must not fall into one. What is wider than ``at_most`` is an opening of the
+    face. The places farthest from points are the middles of circles around triangles of Delaunay's.
     """
     across = np.linalg.svd(normal[None])[2][1:]
     flat = points @ across.T

@@ -46,9 +46,7 @@ class Stencil:
         i, j, k = OFFSETS.T
         return self.spline[:, i, 0] * self.spline[:, j, 1] * self.spline[:, k, 2]
 
-    def gradient(
-        self, particle: Int[np.ndarray, " M"], near: Int[np.ndarray, " M"]
-    ) -> Float[np.ndarray, "M 3"]:
+    def gradient(self, particle: Int[np.ndarray, " M"], near: Int[np.ndarray, " M"]) -> Float[np.ndarray, "M 3"]:
         """∇N of some particles' nodes [1/m]."""
         out = np.ones((len(particle), 3))
         for axis, offset in enumerate(OFFSETS[near].T):
@@ -90,9 +88,7 @@ class Stencil:
         return 4.0 / self.cell**2 * np.stack([m @ values for m in self._moments], axis=2)
 
 
-def stencil(
-    position: Float[np.ndarray, "P 3"], field: Int[np.ndarray, " P"], cell: float
-) -> Stencil:
+def stencil(position: Float[np.ndarray, "P 3"], field: Int[np.ndarray, " P"], cell: float) -> Stencil:
     """Find every particle's nodes and spline values."""
     scaled = position / cell
     base = np.floor(scaled - 0.5).astype(np.int64)

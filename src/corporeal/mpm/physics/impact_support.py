@@ -1,8 +1,8 @@
 """Support of a rigid body during an impact: twin of formulas/backing.h.
 
-A body between what strikes it and what it rests on is squeezed at once where it is light, or where
-the contact behind is the wider one: its own vibration between the two contacts is then much quicker
-than the impact, so that both contacts are springs in series (decision restitution-soft-and-layered).
+A body between what strikes it and what it rests on is squeezed at once where it is light, or where the contact behind
+is the wider one: its own vibration between the two contacts is then much quicker than the impact, so that both contacts
+are springs in series (decision restitution-soft-and-layered).
 """
 
 from dataclasses import dataclass
@@ -76,8 +76,8 @@ class ImpactPair:
 def restitution_at_speed(restitution: float, law: Float[np.ndarray, "5"], speed: float) -> float:
     """Restitution at the speed of an impact [-]: twin of ``Impact::bounce`` in contact.h.
 
-    e = e_r (v/v_r)^(-q) - s (v - v_r), within bounds: q = 1/4 where a metal yields, a slope s where
-    a rubber ball was rated at two speeds (decision restitution-speed).
+    e = e_r (v/v_r)^(-q) - s (v - v_r), within bounds: q = 1/4 where a metal yields, a slope s where a rubber ball was
+    rated at two speeds (decision restitution-speed).
 
     Args:
         restitution: e_r: at the law's speed [-].
@@ -103,8 +103,7 @@ def contact_disc_radius(points: Vectors, normal: Float[np.ndarray, "3"], cell: f
 def equivalent_punch_radius(radius: float, thickness: float, cell: float) -> float:
     """How stiff a contact behind is, as the radius of a punch on a half-space that is as stiff [m].
 
-    What is thin and lies on its face is pressed as a layer: E π a²/h, which is more than 2 E* a
-    from a = 2h/π on.
+    What is thin and lies on its face is pressed as a layer: E π a²/h, which is more than 2 E* a from a = 2h/π on.
 
     Args:
         radius: Of the disc over which it spreads, with its cell [m].
@@ -119,8 +118,8 @@ def equivalent_punch_radius(radius: float, thickness: float, cell: float) -> flo
 def responds_within_impact(stiffness: float, mass: float, strikes: float, behind: float) -> bool:
     """Whether what lies between swings much quicker than the impact lasts.
 
-    ω² = k (1/m + 1/m_behind) + 1/m between both springs, against 1/m_strikes + 1/(m + m_behind) of
-    the impact, over the stiffness of the contact that is struck.
+    ω² = k (1/m + 1/m_behind) + 1/m between both springs, against 1/m_strikes + 1/(m + m_behind) of the impact, over the
+    stiffness of the contact that is struck.
 
     Args:
         stiffness: k: of the contact behind over that of the one that is struck [-].
@@ -153,25 +152,17 @@ class ImpactRound:
             mine = number == pair
             struck = bool(seen.struck[mine].any())
             least = max(float(seen.gap[mine].min()), 0.0) if struck else 0.0
-            near = (
-                mine
-                & (seen.speed > -MAX_RESTING_SPEED)
-                & (seen.gap < least + IMPACT_PATCH_DX * cell)
-            )
+            near = mine & (seen.speed > -MAX_RESTING_SPEED) & (seen.gap < least + IMPACT_PATCH_DX * cell)
             if not near.any():
                 continue
             normal = seen.normal[near].sum(axis=0)
             normal = normal / max(float(np.linalg.norm(normal)), TINY_DOUBLE)
             both = np.divmod(pair, len(bodies.light))
             blow = float(seen.blow[mine].max())
-            e = restitution_at_speed(
-                float(bodies.restitution[both]), bodies.restitution_law[both], blow
-            )
+            e = restitution_at_speed(float(bodies.restitution[both]), bodies.restitution_law[both], blow)
             width = contact_disc_radius(seen.point[near], normal, cell)
             place = seen.point[near].mean(axis=0)
-            found[int(pair)] = ImpactPair(
-                ROLE_REBOUNDS if struck else ROLE_WAITS, e, width, normal, place
-            )
+            found[int(pair)] = ImpactPair(ROLE_REBOUNDS if struck else ROLE_WAITS, e, width, normal, place)
         now = cls(bodies, number, found, cell)
         for pair, blow in found.items():
             if blow.role == ROLE_REBOUNDS:
@@ -216,16 +207,10 @@ class ImpactRound:
     def _between(self, one: int, other: int) -> ImpactPair | None:
         return self.pairs.get(min(one, other) * len(self.bodies.light) + max(one, other))
 
-    def _backs(
-        self, pair: ImpactPair, body: int, other: int, along: Float[np.ndarray, "3"]
-    ) -> bool:
+    def _backs(self, pair: ImpactPair, body: int, other: int, along: Float[np.ndarray, "3"]) -> bool:
         """Whether another body lies behind a struck one, and is not much lighter."""
         light = self.bodies.light
-        if (
-            pair.role == ROLE_REBOUNDS
-            or light[other] < 0.0
-            or SUPPORT_MASS_RATIO * light[other] > light[body]
-        ):
+        if pair.role == ROLE_REBOUNDS or light[other] < 0.0 or SUPPORT_MASS_RATIO * light[other] > light[body]:
             return False
         cosine = float(pair.normal @ along)
         return (cosine if body < other else -cosine) >= SUPPORT_NORMAL_COSINE

@@ -17,8 +17,8 @@ from corporeal.mpm.problem import Body
 def inclusion_and_soft_density(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
     """Mean densities [kg/m³] of a frame and of the soft material around it; masses give volumes.
 
-    On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin
-    as in reality it would hold nothing.
+    On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin as in reality it
+    would hold nothing.
     """
     far = KDTree(frame.position).query(soft.position, distance_upper_bound=FRAME_LAYER_DX * cell)[0]
     near = np.isfinite(far)

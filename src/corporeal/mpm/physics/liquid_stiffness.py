@@ -1,9 +1,9 @@
 """Artificial bulk modulus of liquids, chosen by their speed.
 
-A liquid's own sound (1480 m/s in water) would make steps a hundred times shorter than its motion
-needs. With K = ρ c₀² and c₀ ten times its largest speed its density changes by one per cent (weak
-compressibility: Monaghan 1994, "Simulating free surface flows with SPH"). The shear modulus is the
-spring that a Maxwell branch needs within a step; what is transmitted slowly is the viscosity alone.
+A liquid's own sound (1480 m/s in water) would make steps a hundred times shorter than its motion needs. With K = ρ c₀²
+and c₀ ten times its largest speed its density changes by one per cent (weak compressibility: Monaghan 1994, "Simulating
+free surface flows with SPH"). The shear modulus is the spring that a Maxwell branch needs within a step; what is
+transmitted slowly is the viscosity alone.
 """
 
 from math import sqrt

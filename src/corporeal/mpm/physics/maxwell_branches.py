@@ -62,8 +62,7 @@ class BranchFit:
 def fit_branches(loss: float) -> BranchFit:
     """Fit two branches to a loss factor that is the same all over the band.
 
-    Least squares on loss(ω)/loss - 1 at sixty frequencies, evenly spaced in their logarithm; within
-    3 % of it.
+    Least squares on loss(ω)/loss - 1 at sixty frequencies, evenly spaced in their logarithm; within 3 % of it.
 
     Args:
         loss: tan δ [-], from 0.02 to 2.
@@ -87,9 +86,7 @@ def fit_branches(loss: float) -> BranchFit:
     return BranchFit(strength, time, float(stiffening))
 
 
-def relaxing_bulk(
-    mu: Float[np.ndarray, " *N"], lam: Float[np.ndarray, " *N"]
-) -> Float[np.ndarray, " *N"]:
+def relaxing_bulk(mu: Float[np.ndarray, " *N"], lam: Float[np.ndarray, " *N"]) -> Float[np.ndarray, " *N"]:
     """Bulk modulus [Pa] of which the branches have their share.
 
     All of it up to ν = 0.4. What λ exceeds 4 μ by hardly strains, and stores and loses nothing.
@@ -105,8 +102,8 @@ def relaxing_bulk(
 def stiffening(loss: float, poisson: float) -> float:
     """P-wave modulus of what is resisted at once over that of what is resisted slowly [-].
 
-    1 + (g₁ + g₂) (K_r + 4/3 μ)/(λ + 2 μ), with the ``relaxing_bulk`` K_r; its root is the ratio of
-    wave speeds, and so of steps.
+    1 + (g₁ + g₂) (K_r + 4/3 μ)/(λ + 2 μ), with the ``relaxing_bulk`` K_r; its root is the ratio of wave speeds, and so
+    of steps.
 
     Args:
         loss: tan δ [-].
@@ -121,9 +118,7 @@ def stiffening(loss: float, poisson: float) -> float:
 
 
 def complex_modulus(
-    strength: Float[np.ndarray, " K"],
-    time: Float[np.ndarray, " K"],
-    frequency: Float[np.ndarray, " N"],
+    strength: Float[np.ndarray, " K"], time: Float[np.ndarray, " K"], frequency: Float[np.ndarray, " N"]
 ) -> np.ndarray:
     """G*(ω)/G(0) = 1 + Σ g iωT/(1 + iωT).
 
@@ -143,18 +138,15 @@ def complex_modulus(
 def branch_decay(dt: float, time: Float[np.ndarray, " *N"]) -> tuple[np.ndarray, np.ndarray]:
     """Return what is left of old strain, and of strain made evenly during the step [-].
 
-    Exact for a constant rate of strain. With T far below dt the second is T/dt: the branch is then
-    a viscosity G T, without the time step that an explicit viscosity asks for.
+    Exact for a constant rate of strain. With T far below dt the second is T/dt: the branch is then a viscosity G T,
+    without the time step that an explicit viscosity asks for.
     """
     old = np.exp(-dt / time)
     return old, -np.expm1(-dt / time) * time / dt
 
 
 def advance_branches(
-    memory: BranchMemory,
-    increment: Float[np.ndarray, "P 3 3"],
-    time: Float[np.ndarray, "P 2"],
-    dt: float,
+    memory: BranchMemory, increment: Float[np.ndarray, "P 3 3"], time: Float[np.ndarray, "P 2"], dt: float
 ) -> BranchMemory:
     """Carry the branches' strain along for one step, and forget.
 

@@ -1,8 +1,8 @@
 """Prescribed motion of rigid bodies along paths.
 
-In contact it is as heavy as a wall, with the velocity that takes it, in this step, to where its
-path says. Whatever that takes is booked: its momentum and energy change by what contacts give it
-and by what its mover does, J = Δp - Σ J_contact and W = ΔE - Σ J_contact · v.
+In contact it is as heavy as a wall, with the velocity that takes it, in this step, to where its path says. Whatever
+that takes is booked: its momentum and energy change by what contacts give it and by what its mover does, J = Δp - Σ
+J_contact and W = ΔE - Σ J_contact · v.
 """
 
 from dataclasses import dataclass
@@ -14,15 +14,7 @@ from numpy.typing import ArrayLike
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Keyframes, Vector
-from corporeal.mpm.constants import (
-    KEY_FRAME,
-    KEY_PLACE,
-    KEY_ROW,
-    KEY_SPAN,
-    KEY_START,
-    KEY_TURN,
-    RIGID_COURANT,
-)
+from corporeal.mpm.constants import KEY_FRAME, KEY_PLACE, KEY_ROW, KEY_SPAN, KEY_START, KEY_TURN, RIGID_COURANT
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.springs import rotation_vector
 from corporeal.mpm.problem import Body, Problem
@@ -56,8 +48,8 @@ class PathStep(NamedTuple):
 def path_rows(path: Keyframes, pivot: Vector) -> Float[np.ndarray, "N K"]:
     """Write a path from a point [m] as engines read it: cubics for each interval, see ``KEY_ROW``.
 
-    Monotone cubics (Fritsch and Carlson 1980): they pass through every row and overshoot nowhere,
-    so that a body prescribed to rest rests.
+    Monotone cubics (Fritsch and Carlson 1980): they pass through every row and overshoot nowhere, so that a body
+    prescribed to rest rests.
     """
     time = np.array(path.time, float)
     if len(time) == 1:
@@ -78,9 +70,7 @@ def path_rows(path: Keyframes, pivot: Vector) -> Float[np.ndarray, "N K"]:
     return rows
 
 
-def _cubics(
-    time: Float[np.ndarray, " N"], value: Float[np.ndarray, "N 3"]
-) -> Float[np.ndarray, "N1 12"]:
+def _cubics(time: Float[np.ndarray, " N"], value: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N1 12"]:
     """Coefficients from the constant on of every interval's cubics, component after component."""
     curve = _smooth_curve(time, value)
     return curve.c[::-1].transpose(1, 2, 0).reshape(len(time) - 1, 12)
@@ -101,9 +91,7 @@ def path_pose(rows: Float[np.ndarray, "N K"], time: float) -> PathPose:
     powers = t ** np.arange(4)
     turn = row[KEY_TURN:KEY_FRAME].reshape(3, 4) @ powers
     frame = row[KEY_FRAME:].reshape(3, 3)
-    return PathPose(
-        row[KEY_PLACE:KEY_TURN].reshape(3, 4) @ powers, rigid.rotation_matrix(turn) @ frame
-    )
+    return PathPose(row[KEY_PLACE:KEY_TURN].reshape(3, 4) @ powers, rigid.rotation_matrix(turn) @ frame)
 
 
 @dataclass(frozen=True)
@@ -129,11 +117,7 @@ class PathFollower:
         return cls(rows, centre - np.array(body.pivot), reach)
 
     def follow(
-        self,
-        end: float,
-        dt: float,
-        centre: Float[np.ndarray, "3"],
-        rotation: Float[np.ndarray, "3 3"],
+        self, end: float, dt: float, centre: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]
     ) -> PathStep:
         """Return how the body moves in a step of dt [s] that ends at ``end`` [s].
 
@@ -205,9 +189,7 @@ def longest_step(problem: Problem) -> float:
     return RIGID_COURANT * problem.cell / fastest if fastest > 0.0 else float("inf")
 
 
-def start_velocity(
-    path: Keyframes, pivot: Vector, points: Float[np.ndarray, "P 3"]
-) -> Float[np.ndarray, "P 3"]:
+def start_velocity(path: Keyframes, pivot: Vector, points: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, "P 3"]:
     """Velocities [m/s] of points of a body [m] as its path begins, if it does at time 0."""
     first = path_rows(path, pivot)[0]
     if first[KEY_START] > 0.0:

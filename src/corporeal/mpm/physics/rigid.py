@@ -68,9 +68,7 @@ class RigidBody:
 
 
 def mass_and_inertia(
-    position: Float[np.ndarray, "P 3"],
-    mass: Float[np.ndarray, " P"],
-    volume: Float[np.ndarray, " P"],
+    position: Float[np.ndarray, "P 3"], mass: Float[np.ndarray, " P"], volume: Float[np.ndarray, " P"]
 ) -> BodyInertia:
     """Mass, centre and inertia of particles, each a small cube of edge h = V^(1/3).
 
@@ -112,8 +110,8 @@ def rotation_matrix(turn: Vector3) -> Matrix3:
 def integrate_rotation(R: Matrix3, inertia: Matrix3, momentum: Vector3, dt: float) -> Matrix3:
     """Give R after a free turn of dt [s] with constant angular momentum L, in the middle's ω.
 
-    R ← exp(ω_½ dt) R with ω_½ = I⁻¹ L half a step ahead: second order, and the energy of a spin
-    about any axis stays; with the ω of the step's start it would grow or fade.
+    R ← exp(ω_½ dt) R with ω_½ = I⁻¹ L half a step ahead: second order, and the energy of a spin about any axis stays;
+    with the ω of the step's start it would grow or fade.
     """
     now = world_inverse_inertia(R, inertia) @ momentum
     middle = world_inverse_inertia(rotation_matrix(0.5 * dt * now) @ R, inertia) @ momentum
@@ -131,9 +129,7 @@ def world_inverse_inertia(R: Matrix3, inertia: Matrix3) -> Matrix3:
     return R @ np.linalg.inv(inertia) @ R.T
 
 
-def thinness(
-    surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], cell: float
-) -> int:
+def thinness(surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], cell: float) -> int:
     """How thin a body is against the cell: 2 in all directions, 1 in some, or in its walls, 0 not.
 
     Args:
@@ -149,14 +145,10 @@ def thinness(
     below = np.ptp(arm @ axes.T, axis=0) < THIN_BODY_DX * cell
     if below.all():
         return 2
-    return int(
-        below.any() or thin_walls(surface, normal, THIN_BODY_DX * cell) > MIN_THIN_WALL_FRACTION
-    )
+    return int(below.any() or thin_walls(surface, normal, THIN_BODY_DX * cell) > MIN_THIN_WALL_FRACTION)
 
 
-def thin_walls(
-    surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], thick: float
-) -> float:
+def thin_walls(surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], thick: float) -> float:
     """Share of a surface behind which its wall is less than ``thick`` [m] deep.
 
     A few hundred points speak for all of those whose normals are known.
@@ -176,20 +168,14 @@ def thin_places(
     None of a body that is thin as a whole, see ``thinness``, of which every point counts.
     """
     places = np.zeros(len(surface), dtype=bool)
-    if (
-        thinness(surface, normal, cell) == 0
-        and thin_walls(surface, normal, THIN_BODY_DX * cell) > 0.0
-    ):
+    if thinness(surface, normal, cell) == 0 and thin_walls(surface, normal, THIN_BODY_DX * cell) > 0.0:
         known = np.flatnonzero(np.any(normal != 0.0, axis=1))
         places[known] = _has_far_side_within(surface, normal, THIN_BODY_DX * cell, known)
     return places
 
 
 def _has_far_side_within(
-    surface: Float[np.ndarray, "S 3"],
-    normal: Float[np.ndarray, "S 3"],
-    thick: float,
-    asked: Int[np.ndarray, " A"],
+    surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], thick: float, asked: Int[np.ndarray, " A"]
 ) -> Bool[np.ndarray, " A"]:
     """Tell behind which of some points, less than ``thick`` [m] deep, another side looks away."""
     known = np.flatnonzero(np.any(normal != 0.0, axis=1))

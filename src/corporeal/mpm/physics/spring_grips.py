@@ -1,8 +1,7 @@
 """Grips: an impulse at a point of a body, and a spring that pulls it.
 
-Both reach the particles within r = ``GRIP_RADIUS_DX`` cells of the point, weighted by (1 - d²/r²)²
-and mass; a point that lies farther out takes hold of the nearest particle's surroundings. A rigid
-body is taken exactly at the point.
+Both reach the particles within r = ``GRIP_RADIUS_DX`` cells of the point, weighted by (1 - d²/r²)² and mass; a point
+that lies farther out takes hold of the nearest particle's surroundings. A rigid body is taken exactly at the point.
 """
 
 from dataclasses import dataclass
@@ -54,9 +53,7 @@ class Grip:
         return dt * (stiffness * (self.target - place) - damping * velocity)
 
 
-def take_hold(
-    body: Body, position: Float[np.ndarray, "P 3"], point: Vector, cell: float
-) -> GripHold:
+def take_hold(body: Body, position: Float[np.ndarray, "P 3"], point: Vector, cell: float) -> GripHold:
     """Hold a body that bends at a point [m] of space; its particles are where they are now."""
     away = np.linalg.norm(position - np.array(point), axis=1)
     if away.min() > GRIP_RADIUS_DX * cell:

@@ -1,19 +1,14 @@
 """Springs: tethers of particles, joints of rigid bodies, and grips from outside.
 
-Tethers and grips are explicit, J = -dt (k u + c v): ``longest_step`` keeps them stable. A joint is
-implicit in both its point, which is kept together, and its turn, which is sprung at mid-step (soft
-constraints: Catto 2011, "Soft Constraints", Game Developers Conference).
+Tethers and grips are explicit, J = -dt (k u + c v): ``longest_step`` keeps them stable. A joint is implicit in both its
+point, which is kept together, and its turn, which is sprung at mid-step (soft constraints: Catto 2011, "Soft
+Constraints", Game Developers Conference).
 """
 
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.constants import (
-    JOINT_STEP_FRACTION,
-    MIN_ROTATION_SINE,
-    TETHER_STEP_FRACTION,
-    TINY,
-)
+from corporeal.mpm.constants import JOINT_STEP_FRACTION, MIN_ROTATION_SINE, TETHER_STEP_FRACTION, TINY
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.problem import Problem
 
@@ -31,9 +26,7 @@ def has_springs(problem: Problem) -> bool:
 
 
 def stored_spring_energy(
-    problem: Problem,
-    position: Float[np.ndarray, "P 3"],
-    bodies: dict[int, rigid.RigidBody],
+    problem: Problem, position: Float[np.ndarray, "P 3"], bodies: dict[int, rigid.RigidBody]
 ) -> Float[np.ndarray, " B"]:
     """Energy in the springs [J]: of a tether with its body, of a joint with its second one.
 
@@ -65,9 +58,7 @@ def longest_step(problem: Problem) -> float:
     rates = [float(tether.rate.max()) / TETHER_STEP_FRACTION for tether in tethers]
     for joint in problem.joints:
         pair = [problem.bodies[b] for b in (joint.first, joint.second)]
-        inertia = [
-            rigid.mass_and_inertia(b.position, b.volume * b.density, b.volume).inertia for b in pair
-        ]
+        inertia = [rigid.mass_and_inertia(b.position, b.volume * b.density, b.volume).inertia for b in pair]
         lightest = min(float(np.linalg.eigvalsh(i)[0]) for i in inertia)
         rates.append(float(np.sqrt(joint.stiffness / lightest)) / JOINT_STEP_FRACTION)
     return 1.0 / max([*rates, TINY])

@@ -66,9 +66,8 @@ def flip_damping_rate(
 ) -> Float[np.ndarray, " P"]:
     """Rate at which material forgets the velocities that its grid cannot see [1/s].
 
-    κ c/dx: what rings, rings away within some passages of its waves. What flows like sand does not
-    ring, and the stiffness of a grain must not tell how far a heap runs out: ½ √(g/dx) for it
-    (decision laws-sand).
+    κ c/dx: what rings, rings away within some passages of its waves. What flows like sand does not ring, and the
+    stiffness of a grain must not tell how far a heap runs out: ½ √(g/dx) for it (decision laws-sand).
 
     Args:
         wave: Wave speed c [m/s].
@@ -93,8 +92,8 @@ def yield_speed(yield_stress: float | None, wave: float, density: float) -> floa
 def thin_wall_factors(ratio: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) for a wall simulated thicker than it is.
 
-    With r = t / t_num: E r³ keeps the bending stiffness E t³/12(1 - ν²), σ_y r² the moment of the
-    plastic hinge σ_y t²/4, ρ r the areal mass ρ t.
+    With r = t / t_num: E r³ keeps the bending stiffness E t³/12(1 - ν²), σ_y r² the moment of the plastic hinge σ_y
+    t²/4, ρ r the areal mass ρ t.
     """
     return ratio**3, ratio**2, ratio
 
@@ -102,8 +101,8 @@ def thin_wall_factors(ratio: float) -> tuple[float, float, float]:
 def limp_wall_factors(ratio: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) for a thickened wall that hangs down as cloth does.
 
-    How it bends is not seen, but it must not be pulled to pieces: E r and σ_y r keep what it
-    resists in its plane, per width.
+    How it bends is not seen, but it must not be pulled to pieces: E r and σ_y r keep what it resists in its plane, per
+    width.
     """
     return ratio, ratio, ratio
 
@@ -111,9 +110,9 @@ def limp_wall_factors(ratio: float) -> tuple[float, float, float]:
 def closed_wall_factors(ratio: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) for a thickened wall that goes all around and does not flow.
 
-    A closed convex surface cannot bend without stretching (Cohn-Vossen's theorem), so what an
-    impact feels is the indentation stiffness k = 4 E t² / (R √(3(1 - ν²))) of a spherical shell
-    (Reissner 1946): E r² keeps it. E r³ would make a rubber duck t_num/t times too soft.
+    A closed convex surface cannot bend without stretching (Cohn-Vossen's theorem), so what an impact feels is the
+    indentation stiffness k = 4 E t² / (R √(3(1 - ν²))) of a spherical shell (Reissner 1946): E r² keeps it. E r³ would
+    make a rubber duck t_num/t times too soft.
     """
     return ratio**2, ratio**2, ratio
 
@@ -122,9 +121,9 @@ def fold_stiffness_factor(thickness: float, simulated: float, radius: float) -> 
     """Factor on E r³ that lets a fold in a thickened wall yield at the same angle as in reality.
 
     A wall of thickness t and radius of curvature R folds over √(R t) (the boundary layer of thin
-    shells: Pogorelov, Bendings of Surfaces and Stability of Shells, 1988), on the grid over t_num.
-    A fold's moment per angle E t³/12 over its width is kept by E r³ t_num/√(R t). Without it a
-    coarse can would have to fold by a right angle before it yields, and would spring back.
+    shells: Pogorelov, Bendings of Surfaces and Stability of Shells, 1988), on the grid over t_num. A fold's moment per
+    angle E t³/12 over its width is kept by E r³ t_num/√(R t). Without it a coarse can would have to fold by a right
+    angle before it yields, and would spring back.
     """
     if simulated <= thickness:
         return 1.0
@@ -132,13 +131,11 @@ def fold_stiffness_factor(thickness: float, simulated: float, radius: float) -> 
     return max(1.0, simulated / sqrt(max(radius, thickness) * thickness))
 
 
-def fit_young_compression(
-    parts: Sequence[tuple[float, float]], limit: float
-) -> tuple[float, float]:
+def fit_young_compression(parts: Sequence[tuple[float, float]], limit: float) -> tuple[float, float]:
     """Knee K [Pa] and power q of the compression that keeps every wave below ``limit`` [m/s].
 
-    E ↦ K (E/K)^q above K, E below. The knee lies at half the limit's wave speed in the part that
-    exceeds it most for its stiffness, and q is the largest that slows all enough; 0 < q < 1.
+    E ↦ K (E/K)^q above K, E below. The knee lies at half the limit's wave speed in the part that exceeds it most for
+    its stiffness, and q is the largest that slows all enough; 0 < q < 1.
 
     Args:
         parts: Young's modulus [Pa] and wave speed [m/s] of each.
@@ -153,8 +150,8 @@ def fit_young_compression(
 def compress_young(young: float, knee: float, power: float) -> float:
     """Compress Young's modulus [Pa]: K (E/K)^q above the knee.
 
-    Monotone in E, so the order of stiffness is kept, whatever the densities; a compression of wave
-    speeds would make heavy soft material stiffer than light stiff material. Never above E.
+    Monotone in E, so the order of stiffness is kept, whatever the densities; a compression of wave speeds would make
+    heavy soft material stiffer than light stiff material. Never above E.
     """
     return young if young <= knee else knee * (young / knee) ** power
 

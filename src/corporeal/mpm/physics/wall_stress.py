@@ -15,13 +15,7 @@ from jaxtyping import Float
 from numba import njit
 
 from corporeal.mpm import laws
-from corporeal.mpm.constants import (
-    LIQUID_TOUCH_DX,
-    LIQUID_WALL_REACH_DX,
-    MIN_HALF_SPACE_WEIGHT,
-    TINY,
-    WALL_LAYER_DX,
-)
+from corporeal.mpm.constants import LIQUID_TOUCH_DX, LIQUID_WALL_REACH_DX, MIN_HALF_SPACE_WEIGHT, TINY, WALL_LAYER_DX
 from corporeal.mpm.laws.fluid import SLIP_NEWTON_ITERATIONS
 from corporeal.mpm.physics.contact import Scalars, Vectors, gap_to_plane, half_space_weight
 from corporeal.mpm.problem import Body
@@ -59,9 +53,8 @@ def flow_curve(body: Body, cell: float) -> FlowCurve:
 def drag_span(mass: Scalars, full: float, height: Scalars, cell: float, dt: float) -> Scalars:
     """Area of the wall that drags on each node, times the step [m² s].
 
-    dx² dt N(h)/W(h) m/(ρ dx³): N, the spline's weight on the wall, adds up to 1 over the nodes of a
-    column; m over the mass that the half space above the wall has at the node, ρ dx³ W, is how far
-    the liquid covers the wall there.
+    dx² dt N(h)/W(h) m/(ρ dx³): N, the spline's weight on the wall, adds up to 1 over the nodes of a column; m over the
+    mass that the half space above the wall has at the node, ρ dx³ W, is how far the liquid covers the wall there.
 
     Args:
         mass: Of the nodes [kg].
@@ -88,8 +81,8 @@ def touches_wall(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -
 def wall_slip(free: float, softness: float, layer: Float[np.ndarray, " 4"]) -> float:
     """Slip u [m/s] that a wall leaves of one of ``free``: u + s (τ_y + K/dⁿ uⁿ) = free.
 
-    Newton's steps from below, as in ``laws.fluid.slip_of``; any softness s, and so any viscosity
-    and any step, leaves a slip between 0 and ``free``.
+    Newton's steps from below, as in ``laws.fluid.slip_of``; any softness s, and so any viscosity and any step, leaves a
+    slip between 0 and ``free``.
 
     Args:
         free: Without the wall's drag [m/s].

@@ -5,26 +5,19 @@ air seen from the face and θ the angle between u and the face's inward normal,
 
     p = ½ ρ_air C |u|² cos³θ   where cos θ > 0, nothing in the lee.
 
-C = 1.17 is a square plate or disc facing the wind, and the third power is the one with which the
-pressure on a sphere's front adds up to its drag: C_d = 2 C/5 = .468 (Hoerner 1965, Fluid-Dynamic
-Drag, ch. 3: plate 1.17, sphere .47 below the drag crisis). The same rule gives a cylinder across
-the wind 3π C/16 = .69 (short ones .63–.74 there), a cube face on 1.17 (1.05 there) and leaves in
-all directions C/5 = .23 per area of one side (canopy models take .2: Katul et al. 2004,
-Boundary-Layer Meteorology 113). Skin friction, lift of wings and the shelter that one part of an
-object gives another are left out.
+C = 1.17 is a square plate or disc facing the wind, and the third power is the one with which the pressure on a sphere's
+front adds up to its drag: C_d = 2 C/5 = .468 (Hoerner 1965, Fluid-Dynamic Drag, ch. 3: plate 1.17, sphere .47 below the
+drag crisis). The same rule gives a cylinder across the wind 3π C/16 = .69 (short ones .63–.74 there), a cube face on
+1.17 (1.05 there) and leaves in all directions C/5 = .23 per area of one side (canopy models take .2: Katul et al. 2004,
+Boundary-Layer Meteorology 113). Skin friction, lift of wings and the shelter that one part of an object gives another
+are left out.
 """
 
 import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.types import Wind
-from corporeal.mpm.constants import (
-    AIR_DENSITY,
-    GUST_SINES,
-    MIN_GUST_FREQUENCY_HZ,
-    PLATE_DRAG_COEFFICIENT,
-    TINY,
-)
+from corporeal.mpm.constants import AIR_DENSITY, GUST_SINES, MIN_GUST_FREQUENCY_HZ, PLATE_DRAG_COEFFICIENT, TINY
 
 HALF_RHO_C = 0.5 * AIR_DENSITY * PLATE_DRAG_COEFFICIENT
 """½ ρ C: what the square of a wind's speed presses with on a plate that faces it [kg/m³]."""
@@ -52,10 +45,7 @@ def air_velocity(wind: Wind, time: float) -> Float[np.ndarray, "3"] | None:
 
 
 def wind_impulses(
-    area: Float[np.ndarray, "A 3"],
-    seen: Float[np.ndarray, "A 3"],
-    mass: Float[np.ndarray, " A"],
-    dt: float,
+    area: Float[np.ndarray, "A 3"], seen: Float[np.ndarray, "A 3"], mass: Float[np.ndarray, " A"], dt: float
 ) -> Float[np.ndarray, "A 3"]:
     """Impulses of the air on faces in one step [N s].
 

@@ -24,12 +24,7 @@ from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import contact, contact_impulses, impact_support
 from corporeal.mpm.physics.flat_facets import facet_normals
 from corporeal.mpm.physics.grid_spline import Stencil
-from corporeal.mpm.reference.contact_scene import (
-    ContactScene,
-    NormalCache,
-    PossibleContacts,
-    friction_table,
-)
+from corporeal.mpm.reference.contact_scene import ContactScene, NormalCache, PossibleContacts, friction_table
 from corporeal.mpm.reference.curved_contacts import list_curved_contacts
 from corporeal.mpm.reference.rolling_contacts import brake_rolling
 from corporeal.mpm.reference.surface_point_contacts import (
@@ -64,9 +59,7 @@ class ContactOutcome:
     """Angular impulse of rolling friction on each body [N m s]."""
 
 
-def resolve_contacts(
-    scene: ContactScene, velocity: Float[np.ndarray, "A 3"], dt: float
-) -> ContactOutcome:
+def resolve_contacts(scene: ContactScene, velocity: Float[np.ndarray, "A 3"], dt: float) -> ContactOutcome:
     """Let everything that touches exchange impulses."""
     possible = find_contacts(scene)
     touches = [_drop_impossible(touch) for touch in possible]
@@ -86,9 +79,7 @@ def resolve_contacts(
     rolls = np.repeat([t.rolls for t in touches], [len(t.gap) for t in touches]).astype(np.int64)
     rebound = _rebound(scene, movers, pair, contacts, rolls)
     struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
-    target = np.maximum(contacts.gap, 0.0) / dt - _joined(
-        [t.inwards for t in touches], (0,)
-    ).astype(np.float64)
+    target = np.maximum(contacts.gap, 0.0) / dt - _joined([t.inwards for t in touches], (0,)).astype(np.float64)
     sweeps = _sweeps(scene, contacts, bool(struck.any()))
     impulse = struck + contact_impulses.solve(contacts, movers, target, sweeps)
     rounds = np.concatenate([t.rounds for t in touches]) if touches else np.zeros(0, dtype=bool)
@@ -103,17 +94,14 @@ def resolve_contacts(
         pair=pair,
         contacts=contacts,
         impulse=impulse,
-        friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after)
-        + braked.energy,
+        friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after) + braked.energy,
         impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
         kept=NormalCache.of_all(touch.kept for touch in possible),
         moment=braked.moment,
     )
 
 
-def _touches_prescribed_body(
-    scene: ContactScene, pair: Int[np.ndarray, "E 2"]
-) -> Bool[np.ndarray, " E"]:
+def _touches_prescribed_body(scene: ContactScene, pair: Int[np.ndarray, "E 2"]) -> Bool[np.ndarray, " E"]:
     """Return which contacts are of a rigid body with one that follows a prescribed path."""
     bodies, walls = scene.problem.bodies, len(scene.problem.planes)
     rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
@@ -202,30 +190,20 @@ def find_contacts(scene: ContactScene) -> list[PossibleContacts]:
     pairs = {p: _common_slots(scene.grid, rows, p) for p in apart}
     shared = [np.zeros(0, np.int64), *(slot for both in pairs.values() for slot in both)]
     alone = np.setdiff1d(np.arange(scene.grid.count), np.concatenate(shared))
-    walls = {
-        (f, w): _slots_near_wall(scene, rows[f], alone, (f, w))
-        for f in fields
-        for w in _walls_on_nodes(scene, f)
-    }
+    walls = {(f, w): _slots_near_wall(scene, rows[f], alone, (f, w)) for f in fields for w in _walls_on_nodes(scene, f)}
     shown = [*shared, *walls.values()]
     look = NodeSamples.at(scene, np.concatenate(shown))
-    touches = [
-        _field_contacts(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])
-    ]
+    touches = [_field_contacts(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
     touches += [_wall_contacts(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
     faces = list_facet_contacts(scene) + list_curved_contacts(scene)
     nodes = [touch.placed for touch in drop_replaced_nodes(scene, touches, faces)]
     return nodes + sort_by_pair(faces + list_plane_contacts(scene))
 
 
-def _common_slots(
-    grid: Stencil, rows: dict[int, np.ndarray], pair: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray]:
+def _common_slots(grid: Stencil, rows: dict[int, np.ndarray], pair: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
     """Slots of two fields at the nodes where both have mass."""
     a, c = rows[pair[0]], rows[pair[1]]
-    _, in_a, in_c = np.intersect1d(
-        grid.key[a], grid.key[c], assume_unique=True, return_indices=True
-    )
+    _, in_a, in_c = np.intersect1d(grid.key[a], grid.key[c], assume_unique=True, return_indices=True)
     return a[in_a], c[in_c]
 
 
@@ -241,9 +219,8 @@ def _slots_near_wall(
 ) -> Int[np.ndarray, " E"]:
     """Slots of a field that a plane may touch.
 
-    Pressure of a liquid that slides along it pushes all nodes whose splines reach it, and a plane
-    drags on all such nodes of one that sticks. Where fields meet, there may be a body between, and
-    only the nodes near the plane count.
+    Pressure of a liquid that slides along it pushes all nodes whose splines reach it, and a plane drags on all such
+    nodes of one that sticks. Where fields meet, there may be a body between, and only the nodes near the plane count.
     """
     height = _height(scene, slot, pair[1]) / scene.problem.cell
     near = height <= WALL_REACH
@@ -307,10 +284,7 @@ class NodeSamples:
 
 
 def _field_contacts(
-    scene: ContactScene,
-    look: NodeSamples,
-    pair: tuple[int, int],
-    slots: tuple[np.ndarray, np.ndarray],
+    scene: ContactScene, look: NodeSamples, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
 ) -> PossibleContacts:
     """Contacts of two fields on their common nodes, with separating-axis normals, smoothed."""
     wet = _liquid_contacts(scene, look, pair, slots)
@@ -346,9 +320,7 @@ def _field_contacts(
     return PossibleContacts(pair, *movers, index * cell, normal, gap, kept=kept, acts=acts)
 
 
-def _candidates(
-    look: NodeSamples, slots: tuple[np.ndarray, np.ndarray], thin: list[int]
-) -> Float[np.ndarray, "E 3 3"]:
+def _candidates(look: NodeSamples, slots: tuple[np.ndarray, np.ndarray], thin: list[int]) -> Float[np.ndarray, "E 3 3"]:
     """Candidate normals; what is small against the cell has no face of its own."""
     found = contact.candidate_normals(*(look.outward[slot] for slot in slots))
     if (thin[0] == 2) != (thin[1] == 2):
@@ -367,10 +339,7 @@ def _facet_normals(
     if not all(map(scene.flat, pair)):
         return normal
     node = scene.grid.index[slots[0]] * scene.problem.cell
-    first, second = (
-        scene.seen_faces(body, node, look.mean[slot])
-        for body, slot in zip(pair, slots, strict=True)
-    )
+    first, second = (scene.seen_faces(body, node, look.mean[slot]) for body, slot in zip(pair, slots, strict=True))
     slip = scene.speed_at(pair[0], node) - scene.speed_at(pair[1], node)
     known = np.any(normal != 0.0, axis=1)[:, None]
     return np.where(known, facet_normals(normal, slip, first, second), normal)
@@ -390,15 +359,12 @@ def _edge_distances(
 
 
 def _liquid_contacts(
-    scene: ContactScene,
-    look: NodeSamples,
-    pair: tuple[int, int],
-    slots: tuple[np.ndarray, np.ndarray],
+    scene: ContactScene, look: NodeSamples, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
 ) -> PossibleContacts | None:
     """Contacts of a liquid with a rigid body that says where liquids touch it; None: another pair.
 
-    Its walls may be thinner than a cell, and its corners concave: its surface says how high a node
-    lies over it, and which way it looks.
+    Its walls may be thinner than a cell, and its corners concave: its surface says how high a node lies over it, and
+    which way it looks.
     """
     for rigid_side, liquid_side in ((0, 1), (1, 0)):
         surface = scene.wetted(pair[rigid_side])
@@ -423,9 +389,7 @@ def _liquid_contacts(
     return PossibleContacts(pair, *movers, node[k], normal, gap, slips, layer)
 
 
-def _thin_there(
-    scene: ContactScene, pair: tuple[int, int], node: Float[np.ndarray, "E 3"]
-) -> Bool[np.ndarray, " E"]:
+def _thin_there(scene: ContactScene, pair: tuple[int, int], node: Float[np.ndarray, "E 3"]) -> Bool[np.ndarray, " E"]:
     """Tell at which nodes rigid bodies meet where one is thin, though not as a whole."""
     there = np.zeros(len(node), dtype=bool)
     if all(scene.is_rigid(body) and len(scene.surface(body)) for body in pair):
@@ -444,8 +408,8 @@ def _surface_gap(
 ) -> Float[np.ndarray, " E"]:
     """Open distance where surface points say where a rigid body begins [m].
 
-    They do where it is thin: as a whole, or between two rigid bodies there, and between two that
-    are bounded by flat faces.
+    They do where it is thin: as a whole, or between two rigid bodies there, and between two that are bounded by flat
+    faces.
     """
     cell, node = scene.problem.cell, scene.grid.index[slots[0]] * scene.problem.cell
     found: list[np.ndarray | None] = []
@@ -462,9 +426,7 @@ def _surface_gap(
     return np.asarray(first) + np.asarray(second)
 
 
-def _wall_contacts(
-    scene: ContactScene, look: NodeSamples, pair: tuple[int, int], slot: np.ndarray
-) -> PossibleContacts:
+def _wall_contacts(scene: ContactScene, look: NodeSamples, pair: tuple[int, int], slot: np.ndarray) -> PossibleContacts:
     """Contacts of a field with a plane, on nodes."""
     field, wall = pair
     cell, bodies = scene.problem.cell, len(scene.problem.bodies)

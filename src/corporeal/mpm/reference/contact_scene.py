@@ -146,9 +146,7 @@ class ContactScene:
 
     def sticks(self, field: int, other: int) -> bool:
         """Whether a field is a liquid on which a body, or B + plane, drags by a viscous stress."""
-        return self.pours(field) and bool(
-            friction_table(self.problem)[field, other] >= STICKING_FRICTION
-        )
+        return self.pours(field) and bool(friction_table(self.problem)[field, other] >= STICKING_FRICTION)
 
     def layer(
         self, field: int, slot: np.ndarray, mean: np.ndarray, height: np.ndarray, normal: np.ndarray
@@ -180,9 +178,7 @@ class ContactScene:
         """Whether a field is rigid and bounded by flat faces for the most part."""
         return self.is_rigid(field) and self.matter.flat[field]
 
-    def seen_faces(
-        self, body: int, node: Float[np.ndarray, "E 3"], mean: Float[np.ndarray, "E 3"]
-    ) -> FacetsAtNodes:
+    def seen_faces(self, body: int, node: Float[np.ndarray, "E 3"], mean: Float[np.ndarray, "E 3"]) -> FacetsAtNodes:
         """Flat faces of a rigid body now, from some nodes [m] with its mean offsets there [m]."""
         rows, cell = self.matter.facets[body].row, self.problem.cell
         outward = rows[:, :3] @ self.state.rotation[body].T
@@ -214,9 +210,7 @@ class ContactScene:
         # A body with prescribed motion is as heavy as a wall.
         free = stiff & [body.path is None for body in self.problem.bodies]
         inertia = np.zeros((self.wall_mover + len(still), 3, 3))
-        inertia[:bodies] = np.where(
-            free[:, None, None], self.state.inverse_inertia(self.matter), 0.0
-        )
+        inertia[:bodies] = np.where(free[:, None, None], self.state.inverse_inertia(self.matter), 0.0)
         spin = np.zeros((self.wall_mover + len(still), 3))
         spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
         light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, TINY_DOUBLE), 0.0)

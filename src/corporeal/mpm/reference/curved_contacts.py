@@ -20,8 +20,8 @@ from corporeal.mpm.reference.contact_scene import ContactScene, PossibleContacts
 def list_curved_contacts(scene: ContactScene) -> list[PossibleContacts]:
     """List contacts of round surface points with curved faces of other rigid bodies.
 
-    The ball under a round point lies so far over the face around the curved point that is nearest
-    to its middle. Where both are round, points of the first body count.
+    The ball under a round point lies so far over the face around the curved point that is nearest to its middle. Where
+    both are round, points of the first body count.
     """
     bodies = scene.problem.bodies
     bonded = {tuple(sorted(bond)) for bond in scene.problem.all_excluded_pairs}
@@ -115,9 +115,7 @@ class RoundOnCurved:
         faces &= np.sum(self.faces[q, :3] * normal, axis=1) <= -FACING_POINTS_COSINE
         return p[faces], q[faces]
 
-    def _owned(
-        self, p: Int[np.ndarray, " E"], place: Float[np.ndarray, "E 3"]
-    ) -> Bool[np.ndarray, " E"]:
+    def _owned(self, p: Int[np.ndarray, " E"], place: Float[np.ndarray, "E 3"]) -> Bool[np.ndarray, " E"]:
         """Whether places of contact belong to their points, and not to those points' neighbours."""
         away = np.sum((place[:, None] - self.points) ** 2, axis=2)
         own = away[np.arange(len(p)), p]
@@ -126,12 +124,7 @@ class RoundOnCurved:
         return ~np.any(others & (NEAREST_POINT_FACTOR**2 * away < own[:, None]), axis=1)
 
     def _listed(
-        self,
-        rows: np.ndarray,
-        faces: np.ndarray,
-        place: np.ndarray,
-        out: np.ndarray,
-        gap: np.ndarray,
+        self, rows: np.ndarray, faces: np.ndarray, place: np.ndarray, out: np.ndarray, gap: np.ndarray
     ) -> PossibleContacts:
         scene, pair = self.scene, (min(self.body, self.other), max(self.body, self.other))
         middle = place + curved_surface.ball_radius(rows)[:, None] * out

@@ -1,7 +1,7 @@
 """The reference engine: NumPy in double precision, slow, for verification.
 
-Moving-least-squares MPM (Hu et al. 2018) with one field per body and explicit contact between
-fields. Every other engine is compared with this one.
+Moving-least-squares MPM (Hu et al. 2018) with one field per body and explicit contact between fields. Every other
+engine is compared with this one.
 """
 
 from collections.abc import Collection
@@ -161,10 +161,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
             limits.append(RIGID_COURANT * cell / max(speed[m.rigid].max(), TINY))
         pulls = [body.push.acceleration for body in self.problem.bodies if body.push is not None]
         strongest = max(float(np.linalg.norm(p)) for p in [self.problem.gravity, *pulls])
-        limits += [
-            FREE_FALL_STEP_FRACTION * np.sqrt(cell / max(strongest, TINY)),
-            longest_step(self.problem),
-        ]
+        limits += [FREE_FALL_STEP_FRACTION * np.sqrt(cell / max(strongest, TINY)), longest_step(self.problem)]
         limits.append(self.guides.longest_step)
         return float(min(min(limits), MAX_STEP_S))
 
@@ -297,17 +294,13 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         cell, prescribed = self.problem.cell, np.isin(self.matter.body, list(self.guides.guide))
         finite = np.isfinite(state.position).all(axis=1) & np.isfinite(state.F).all(axis=(1, 2))
         with np.errstate(invalid="ignore"):
-            inside = finite & (np.abs(state.position) < MAX_DISTANCE_FROM_ORIGIN_DX * cell).all(
-                axis=1
-            )
+            inside = finite & (np.abs(state.position) < MAX_DISTANCE_FROM_ORIGIN_DX * cell).all(axis=1)
             for plane in self.problem.planes:
                 height = state.position @ np.array(plane.normal) - plane.offset
                 inside &= (height > -MAX_WALL_DEPTH_DX * cell) | prescribed
         return np.logical_not(inside)
 
-    def _book_step(
-        self, meeting: ContactOutcome, grid: Stencil, kick: np.ndarray, push: np.ndarray
-    ) -> None:
+    def _book_step(self, meeting: ContactOutcome, grid: Stencil, kick: np.ndarray, push: np.ndarray) -> None:
         """Book the step: impulses, work and losses."""
         m, s, book = self.matter, self.state, self.ledger
         book.external_impulse += m.total[:, None] * kick
@@ -370,9 +363,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
 
     def _sums(self) -> BodySums:
         m, s = self.matter, self.state
-        energy = ParticleEnergy(
-            strain_energy(m, s.F, s.log_volume_ratio), branch_energy(m, s.memory)
-        )
+        energy = ParticleEnergy(strain_energy(m, s.F, s.log_volume_ratio), branch_energy(m, s.memory))
         return BodySums.of(m, self._particles(), s.affine, energy, self.problem.cell)
 
     def _rigid_bodies(self) -> dict[int, rigid.RigidBody]:

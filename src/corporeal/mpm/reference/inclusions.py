@@ -88,9 +88,7 @@ class FrameBonds:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         bodies = problem.bodies
-        self.density = [
-            inclusion_and_soft_density(bodies[f], bodies[s], problem.cell) for f, s in problem.bonds
-        ]
+        self.density = [inclusion_and_soft_density(bodies[f], bodies[s], problem.cell) for f, s in problem.bonds]
         self.pairs = problem.bonds if problem.contact == "multi" else ()
 
     def compose(
@@ -134,17 +132,13 @@ class FrameBonds:
             if f != frame:
                 continue
             other = np.flatnonzero((grid.field == soft) & (mass > 0.0))
-            _, a, c = np.intersect1d(
-                grid.key[mine], grid.key[other], assume_unique=True, return_indices=True
-            )
+            _, a, c = np.intersect1d(grid.key[mine], grid.key[other], assume_unique=True, return_indices=True)
             stiff, yielding = mass[mine[a]] / density, mass[other[c]] / held
             slots.append(other[c[stiff >= MIN_FRAME_VOLUME_FRACTION * (stiff + yielding)]])
         return np.concatenate(slots)
 
 
-def without_held_nodes(
-    mass: Float[np.ndarray, " A"], made: tuple[FrameComposite, ...]
-) -> Float[np.ndarray, " A"]:
+def without_held_nodes(mass: Float[np.ndarray, " A"], made: tuple[FrameComposite, ...]) -> Float[np.ndarray, " A"]:
     """Leave held nodes out of contact: there the frame's surface is felt."""
     free: Bool[np.ndarray, " A"] = np.ones(len(mass), bool)
     for composite in made:

@@ -1,7 +1,6 @@
 """Loads on particles in the reference engine.
 
-A load gives impulses to particles; the particles of a body that bends hand them to the grid, a
-rigid body adds them up.
+A load gives impulses to particles; the particles of a body that bends hand them to the grid, a rigid body adds them up.
 """
 
 from dataclasses import dataclass, replace
@@ -32,8 +31,7 @@ class ParticleLoads:
     def joined(self, other: "ParticleLoads") -> "ParticleLoads":
         """Give both."""
         return ParticleLoads(
-            np.concatenate([self.particle, other.particle]),
-            np.concatenate([self.impulse, other.impulse]),
+            np.concatenate([self.particle, other.particle]), np.concatenate([self.impulse, other.impulse])
         )
 
     def of(self, chosen: Bool[np.ndarray, " P"]) -> "ParticleLoads":
@@ -57,11 +55,7 @@ class LoadedMotion:
 
 
 def apply_loads(
-    load: ParticleLoads,
-    matter: ParticleConstants,
-    state: State,
-    grid: Stencil,
-    slots: tuple[np.ndarray, np.ndarray],
+    load: ParticleLoads, matter: ParticleConstants, state: State, grid: Stencil, slots: tuple[np.ndarray, np.ndarray]
 ) -> LoadedMotion:
     """Hand loads to the grid and to rigid bodies with a field of their own.
 
@@ -91,9 +85,7 @@ def apply_loads(
     return LoadedMotion(velocity + gained, turned, impulse, work + rigid_work)
 
 
-def _load_rigid(
-    load: ParticleLoads, matter: ParticleConstants, state: State
-) -> tuple[State, float]:
+def _load_rigid(load: ParticleLoads, matter: ParticleConstants, state: State) -> tuple[State, float]:
     """Add a load up to force and torque; give the state after it and the work [J]."""
     body = matter.body[load.particle]
     force, moment = np.zeros_like(state.speed), np.zeros_like(state.speed)
@@ -101,26 +93,18 @@ def _load_rigid(
     np.add.at(force, body, load.impulse)
     np.add.at(moment, body, np.cross(arm, load.impulse))
     after = replace(
-        state,
-        speed=state.speed + force / matter.total[:, None],
-        spin_momentum=state.spin_momentum + moment,
+        state, speed=state.speed + force / matter.total[:, None], spin_momentum=state.spin_momentum + moment
     )
     mean = 0.5 * (state.speed + after.speed)
     spin = 0.5 * (state.spin(matter) + after.spin(matter))
     return after, float(np.sum(force * mean) + np.sum(moment * spin))
 
 
-def wind_loads(
-    problem: Problem, matter: ParticleConstants, state: State, dt: float
-) -> ParticleLoads:
+def wind_loads(problem: Problem, matter: ParticleConstants, state: State, dt: float) -> ParticleLoads:
     """Let the wind press on every body that is in it."""
     load, first = ParticleLoads.none(), 0
     for b, body in enumerate(problem.bodies):
-        moving = (
-            None
-            if body.wind is None
-            else wind_pressure.air_velocity(body.wind, float(state.time) + 0.5 * dt)
-        )
+        moving = None if body.wind is None else wind_pressure.air_velocity(body.wind, float(state.time) + 0.5 * dt)
         particle = first + body.faces.particle
         first += len(body.position)
         if moving is None or not len(particle):
@@ -128,17 +112,11 @@ def wind_loads(
         F = state.rotation[[b]] if body.rigid else state.motion[particle]
         seen = moving - state.velocity[particle]
         area = deformed_area(body.faces.area, F)
-        load = load.joined(
-            ParticleLoads(
-                particle, wind_pressure.wind_impulses(area, seen, matter.mass[particle], dt)
-            )
-        )
+        load = load.joined(ParticleLoads(particle, wind_pressure.wind_impulses(area, seen, matter.mass[particle], dt)))
     return load
 
 
-def deformed_area(
-    area: Float[np.ndarray, "A 3"], F: Float[np.ndarray, "K 3 3"]
-) -> Float[np.ndarray, "A 3"]:
+def deformed_area(area: Float[np.ndarray, "A 3"], F: Float[np.ndarray, "K 3 3"]) -> Float[np.ndarray, "A 3"]:
     """Area vectors after a deformation: n da = cof(F) N dA (Nanson's formula)."""
     a, b, c = F[:, :, 0], F[:, :, 1], F[:, :, 2]
     cofactor = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=2)

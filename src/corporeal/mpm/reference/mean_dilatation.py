@@ -1,7 +1,7 @@
 """Mean dilatation of nearly incompressible material (decision laws-mean-dilatation).
 
-Taken from every particle's own J, pressure would lock: eight constraints in a cell that has three
-nodes' worth of freedom make a block of ν = 0.49 up to a sixth too stiff.
+Taken from every particle's own J, pressure would lock: eight constraints in a cell that has three nodes' worth of
+freedom make a block of ν = 0.49 up to a sixth too stiff.
 """
 
 from dataclasses import dataclass
@@ -27,9 +27,8 @@ class DilatationClusters:
     def mean(self, values: Float[np.ndarray, " P"]) -> Float[np.ndarray, " P"]:
         """Σ V a / Σ V over the particle's group; 0 for particles without one.
 
-        This map A is a projection and V-symmetric, Σ V a (A b) = Σ V (A a) b: used on the rates of
-        dilatation and on the pressures of one step, it makes forces that are the slope of the
-        stored energy.
+        This map A is a projection and V-symmetric, Σ V a (A b) = Σ V (A a) b: used on the rates of dilatation and on
+        the pressures of one step, it makes forces that are the slope of the stored energy.
         """
         weight = np.bincount(self.of, self.volume)
         total = np.bincount(self.of, self.volume * values[self.chosen])

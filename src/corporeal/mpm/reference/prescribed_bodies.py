@@ -5,12 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from corporeal.mpm.ledger import EngineLedger
-from corporeal.mpm.physics.prescribed_motion import (
-    PathFollower,
-    PathStep,
-    longest_step,
-    path_followers,
-)
+from corporeal.mpm.physics.prescribed_motion import PathFollower, PathStep, longest_step, path_followers
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.reference.contact import ContactOutcome
 from corporeal.mpm.state import ParticleConstants, State
@@ -25,9 +20,7 @@ class PrescribedBodies:
         """[s]"""
         self.gravity = np.array(problem.gravity)
 
-    def steer(
-        self, state: State, matter: ParticleConstants, dt: float
-    ) -> tuple[State, dict[int, PathStep]]:
+    def steer(self, state: State, matter: ParticleConstants, dt: float) -> tuple[State, dict[int, PathStep]]:
         """Give bodies the velocities that take them where their paths say in a step of dt [s]."""
         end, found = float(state.time) + dt, {}
         speed, momentum = state.speed.copy(), state.spin_momentum.copy()
@@ -49,12 +42,7 @@ class PrescribedBodies:
         return replace(state, rotation=rotation, spin_momentum=momentum).follow_rigid(matter)
 
     def book(
-        self,
-        book: EngineLedger,
-        matter: ParticleConstants,
-        before: State,
-        after: State,
-        meeting: ContactOutcome,
+        self, book: EngineLedger, matter: ParticleConstants, before: State, after: State, meeting: ContactOutcome
     ) -> None:
         """Book what moving the bodies took in a step: see ``physics.prescribed``."""
         for b in self.guide:

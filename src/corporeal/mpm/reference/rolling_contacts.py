@@ -45,12 +45,7 @@ NO_BRAKE = RollingBrake(np.zeros(3), np.zeros(3), 0.0)
 
 
 def brake_roll(
-    a: RollingSide,
-    c: RollingSide,
-    spin: Vector,
-    normal: Vector,
-    impulse: Vector,
-    bounds: tuple[float, float],
+    a: RollingSide, c: RollingSide, spin: Vector, normal: Vector, impulse: Vector, bounds: tuple[float, float]
 ) -> RollingBrake:
     """Take from two bodies the spin with which one rolls over the other, as far as c J_n reaches.
 
@@ -133,14 +128,8 @@ def brake_rolling(
         push = float(impulse[e] @ n)
         if push <= 0.0 or problem.rolling_resistance is None:
             continue
-        one, other = (
-            _rolling_side(movers, a, contacts.point[e]),
-            _rolling_side(movers, c, contacts.point[e]),
-        )
-        bounds = (
-            float(contacts.friction[e]),
-            float(problem.rolling_resistance[tuple(pair[e])]) * push,
-        )
+        one, other = (_rolling_side(movers, a, contacts.point[e]), _rolling_side(movers, c, contacts.point[e]))
+        bounds = (float(contacts.friction[e]), float(problem.rolling_resistance[tuple(pair[e])]) * push)
         done = brake_roll(one, other, movers.spin[a] - movers.spin[c], n, impulse[e], bounds)
         for m, side, sign in ((a, one, -1.0), (c, other, 1.0)):
             given = done.moment + np.cross(side.arm, done.impulse)

@@ -38,8 +38,7 @@ def apply_springs(
         problem: Where the springs are.
         matter: All particles.
         state: Before gravity and pushes.
-        kicks: What both add to the bodies' velocities in this step, and the pushes alone [m/s]; the
-            result has them.
+        kicks: What both add to the bodies' velocities in this step, and the pushes alone [m/s]; the result has them.
         dt: [s]
 
     """
@@ -75,18 +74,12 @@ def pull_tethered(
     middle = v + 0.5 * impulse / mass[:, None]
     loss = float(np.sum(mass * dt * brake * np.sum(v * middle, axis=1)))
     place = state.position[own] - state.centre[h]
-    after = add_impulse(
-        state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0)
-    )
+    after = add_impulse(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
     return SpringOutcome(after, pulled.load.joined(ParticleLoads(own, impulse)), pulled.loss + loss)
 
 
 def load_holder(
-    pulled: SpringOutcome,
-    tether: Tether,
-    first: int,
-    matter: ParticleConstants,
-    gained: Float[np.ndarray, "3"],
+    pulled: SpringOutcome, tether: Tether, first: int, matter: ParticleConstants, gained: Float[np.ndarray, "3"]
 ) -> SpringOutcome:
     """Let the holder bear the weight of what is tethered to it.
 
@@ -102,18 +95,12 @@ def load_holder(
     own = first + np.flatnonzero(tether.rate)
     impulse = -matter.mass[own][:, None] * gained
     place = state.position[own] - state.centre[h]
-    after = add_impulse(
-        state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0)
-    )
+    after = add_impulse(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
     return replace(pulled, state=after, load=pulled.load.joined(ParticleLoads(own, impulse)))
 
 
 def add_impulse(
-    state: State,
-    matter: ParticleConstants,
-    body: int,
-    impulse: Float[np.ndarray, "3"],
-    moment: Float[np.ndarray, "3"],
+    state: State, matter: ParticleConstants, body: int, impulse: Float[np.ndarray, "3"], moment: Float[np.ndarray, "3"]
 ) -> State:
     """Give a rigid body an impulse [N s] and an angular one about its centre [N m s]."""
     speed, spin = state.speed.copy(), state.spin_momentum.copy()
@@ -122,9 +109,7 @@ def add_impulse(
     return replace(state, speed=speed, spin_momentum=spin)
 
 
-def hold_joint(
-    pulled: SpringOutcome, joint: Joint, matter: ParticleConstants, dt: float
-) -> SpringOutcome:
+def hold_joint(pulled: SpringOutcome, joint: Joint, matter: ParticleConstants, dt: float) -> SpringOutcome:
     """Keep a joint's point together and spring its turn, both at once and implicitly.
 
     [A  B     ] [J]   [-v - .2 e/dt      ]
@@ -146,10 +131,7 @@ def hold_joint(
     A = light * np.eye(3) - lever[0] @ crossed[0] - lever[1] @ crossed[1]
     B = -lever[0] - lever[1]
     D = inverse[0] + inverse[1] + np.eye(3) / (dt * stiff)
-    wanted = [
-        -v - JOINT_GAP_FRACTION_PER_STEP / dt * gap,
-        spin[a] - spin[c] - joint.stiffness / stiff * turn,
-    ]
+    wanted = [-v - JOINT_GAP_FRACTION_PER_STEP / dt * gap, spin[a] - spin[c] - joint.stiffness / stiff * turn]
     given = np.linalg.solve(np.block([[A, B], [B.T, D]]), np.concatenate(wanted))
     J, T = given[:3], given[3:]
     after = add_impulse(state, matter, a, -J, -np.cross(arms[0], J) - T)

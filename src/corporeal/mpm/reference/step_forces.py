@@ -28,9 +28,7 @@ class StepForces:
     grips: Mapping[int, Grip]
     """By body."""
 
-    def act(
-        self, slots: tuple[np.ndarray, np.ndarray], kicks: BodyKicks, dt: float
-    ) -> tuple[LoadedMotion, float]:
+    def act(self, slots: tuple[np.ndarray, np.ndarray], kicks: BodyKicks, dt: float) -> tuple[LoadedMotion, float]:
         """Let everything act: wind, then springs, then grips.
 
         Args:
@@ -51,17 +49,11 @@ class StepForces:
         sprung = apply_loads(pulled.load, matter, pulled.state, self.grid, (mass, blown.velocity))
         held, state, work = self._grasp(sprung.state, kick, dt)
         after = apply_loads(held, matter, state, self.grid, (mass, sprung.velocity))
-        given = (
-            blown.impulse
-            + after.impulse
-            + (state.speed - sprung.state.speed) * (matter.total[:, None])
-        )
+        given = blown.impulse + after.impulse + (state.speed - sprung.state.speed) * (matter.total[:, None])
         outside = blown.work + after.work + work
         return LoadedMotion(after.velocity, after.state, given, outside), pulled.loss
 
-    def _grasp(
-        self, state: State, kick: Float[np.ndarray, "B 3"], dt: float
-    ) -> tuple[ParticleLoads, State, float]:
+    def _grasp(self, state: State, kick: Float[np.ndarray, "B 3"], dt: float) -> tuple[ParticleLoads, State, float]:
         """Let grips act: loads on particles, rigid bodies' new velocities, work on these [J]."""
         load, work, body = ParticleLoads.none(), 0.0, self.matter.body
         for b, grip in self.grips.items():

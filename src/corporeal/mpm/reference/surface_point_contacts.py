@@ -36,9 +36,7 @@ def list_plane_contacts(scene: ContactScene) -> list[PossibleContacts]:
             mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
             at = point[near], normal, height[near]
             corner = scene.matter.curvature[b][near, 6:8].sum(axis=1) <= 0.0
-            touches.append(
-                PossibleContacts((b, bodies + w), mover, wall, *at, rolls=b, corner=corner)
-            )
+            touches.append(PossibleContacts((b, bodies + w), mover, wall, *at, rolls=b, corner=corner))
     return touches
 
 
@@ -94,9 +92,7 @@ def drop_replaced_nodes(
             reach, alike = face.instead, CURVED_NORMAL_COSINE
             if reach is None:
                 wide = scene.matter.radius[face.rolls]
-                reach = FACET_REPLACES_NODES_DX * cell + np.sqrt(
-                    (0.5 * wide + CURVED_GAP_ERROR_DX2 * cell) * cell
-                )
+                reach = FACET_REPLACES_NODES_DX * cell + np.sqrt((0.5 * wide + CURVED_GAP_ERROR_DX2 * cell) * cell)
                 thin = scene.thinness(sum(face.pair) - face.rolls)
                 alike = CURVED_NORMAL_COSINE if thin else FACET_NORMAL_COSINE
             apart = np.linalg.norm(touch.point[:, None] - face.point, axis=2)
@@ -114,8 +110,8 @@ def in_valley(
 ) -> Bool[np.ndarray, " E"]:
     """Return which normals on nodes are sums of those of faces near them, as far as they are known.
 
-    What is round and touches two faces of a body touches nothing between them, but nodes there see
-    both, and look halfway. The face that a normal looks at most is taken off it, again and again.
+    What is round and touches two faces of a body touches nothing between them, but nodes there see both, and look
+    halfway. The face that a normal looks at most is taken off it, again and again.
     """
     rest = normal.copy()
     for _ in range(VALLEY_ITERATIONS if near.any() else 0):

@@ -12,9 +12,8 @@ class AssembleConfig:
     """How files become a scene."""
 
     objects: Literal["auto", "one", "nodes"] = "auto"
-    """Grouping of a file into objects: the nodes that state a class, else the pieces that touch no
-    other or are named as objects of their own (auto); the whole file (one); every branch below the
-    root (nodes).
+    """Grouping of a file into objects: the nodes that state a class, else the pieces that touch no other or are named
+    as objects of their own (auto); the whole file (one); every branch below the root (nodes).
     """
     stack: bool = False
     """Put the files above each other, the first at the bottom, instead of side by side."""

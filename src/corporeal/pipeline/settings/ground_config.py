@@ -22,8 +22,8 @@ class GroundConfig:
     neutral: str = "plastics-PP"
     """Material assumed for parts of unknown material."""
     field: Annotated[str, ReadsPath(prefixes=FIELD_FILES)] = ""
-    """Material values of another method: vomp:PATH, pixie:PATH or table:PATH.csv (a file of the
-    scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs.
+    """Material values of another method: vomp:PATH, pixie:PATH or table:PATH.csv (a file of the scene, or a folder with
+    one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs.
     """
 
 
@@ -36,7 +36,5 @@ def validate(config: GroundConfig) -> None:
 
     library_entry(config.floor, config.library)
     if library_entry(config.neutral, config.library).group == "liquid":
-        raise UserError(
-            f"--neutral {config.neutral} is a liquid and cannot be the material of a part."
-        )
+        raise UserError(f"--neutral {config.neutral} is a liquid and cannot be the material of a part.")
     parse_field_specification(config.field)

@@ -14,16 +14,16 @@ class SimulateConfig:
     """Solver settings; none of them changes material values."""
 
     engine: Literal["cpu", "cuda", "reference"] = DEFAULT_ENGINE
-    """cpu: the fast engine; cuda: the same on a CUDA GPU; reference: NumPy in double precision,
-    slow, which the others are tested against.
+    """cpu: the fast engine; cuda: the same on a CUDA GPU; reference: NumPy in double precision, slow, which the others
+    are tested against.
     """
     contact: Literal["multi", "single"] = "multi"
     """multi: one velocity field per object, with friction between them; single: one shared
     field, a control in which touching objects stick together.
     """
     breaking: bool = False
-    """Break brittle objects that are struck with ten times the energy they withstand; else a
-    warning says what would break.
+    """Break brittle objects that are struck with ten times the energy they withstand; else a warning says what would
+    break.
     """
 
 
@@ -35,6 +35,4 @@ def validate(config: SimulateConfig) -> None:
         if config.contact != "multi":
             raise UserError("--breaking works with contact multi alone. Leave out --contact.")
     if config.engine == "cuda":
-        registry.load_backend(
-            "engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:require_device"}
-        )("cuda")
+        registry.load_backend("engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:require_device"})("cuda")

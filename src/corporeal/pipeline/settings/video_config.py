@@ -33,8 +33,8 @@ class VideoConfig:
     colour_by: Literal["itself", "speed"] | ColourQuantity = "itself"
     """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
     shot: CameraShot = "wide"
-    """wide: everything within 2.5 sizes of the scene; close: the first contact or the largest
-    motion; follow: the camera tracks what moves.
+    """wide: everything within 2.5 sizes of the scene; close: the first contact or the largest motion; follow: the
+    camera tracks what moves.
     """
     slow: float = 1.0
     """Slow-motion factor about the first contact."""
@@ -53,6 +53,4 @@ def validate(config: VideoConfig) -> None:
     check_range("--slow", config.slow, 1.0, MAX_SLOW_MOTION_RATIO)
     if config.view is not None and not 0 < math.hypot(*config.view) < math.inf:
         given = " ".join(f"{x:g}" for x in config.view)
-        raise UserError(
-            f"--view is {given}, which is not a direction. For example: --view 1 -1 0.5."
-        )
+        raise UserError(f"--view is {given}, which is not a direction. For example: --view 1 -1 0.5.")

@@ -21,22 +21,11 @@ from corporeal.geometry.scene_transforms import (
     scale_scene,
     surfaces_bounding_box,
 )
-from corporeal.io.input_files import (
-    images_in_folder,
-    is_scene_file,
-    model_files_in,
-    read_scene,
-    videos_in_folder,
-)
+from corporeal.io.input_files import images_in_folder, is_scene_file, model_files_in, read_scene, videos_in_folder
 from corporeal.io.load_model import MeshFrame, load_model, readable_model_formats
 from corporeal.io.scene_toml import ObjectEntry, SceneFile
 from corporeal.pipeline.settings.assemble_config import AssembleConfig, validate
-from corporeal.recognition.length_unit_inference import (
-    InferredUnit,
-    infer_length_unit,
-    infer_shared_unit,
-    unit_notes,
-)
+from corporeal.recognition.length_unit_inference import InferredUnit, infer_length_unit, infer_shared_unit, unit_notes
 from corporeal.recognition.readable_names import safe_name, unique_names
 from corporeal.recognition.typical_extents import extent_warning
 from corporeal.scene.initial_state import with_initial_state
@@ -62,9 +51,7 @@ class _FileObjects:
     """Whether its lengths are metres; else the unit is not stated."""
 
 
-def assemble(
-    inputs: Sequence[Path], config: AssembleConfig = DEFAULT_CONFIG, up: UpAxis | None = None
-) -> Scene:
+def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT_CONFIG, up: UpAxis | None = None) -> Scene:
     """Return one scene from models, a folder of them, or one ``scene.toml``.
 
     Args:
@@ -120,9 +107,7 @@ def _models_in(folder: Path) -> list[Path]:
         what = f"the folder holds {len(videos)} videos and no model."
         raise BadFileError(folder, what, f"Name the video itself: {videos[0]}.")
     step = "Name a model, a folder of models, or photographs with poses."
-    raise BadFileError(
-        folder, f"the folder holds no model ({readable_model_formats()}) and no pictures.", step
-    )
+    raise BadFileError(folder, f"the folder holds no model ({readable_model_formats()}) and no pictures.", step)
 
 
 def _read(plan: SceneFile, objects: ObjectGrouping, frame: MeshFrame) -> list[_FileObjects]:
@@ -174,12 +159,7 @@ def _unique_names(blocks: list[_FileObjects]) -> list[_FileObjects]:
     """Return the blocks with names that occur once in the whole scene."""
     names = iter(unique_names([safe_name(o.name) for b in blocks for o in b.scene.objects]))
     return [
-        replace(
-            b,
-            scene=replace(
-                b.scene, objects=tuple(replace(o, name=next(names)) for o in b.scene.objects)
-            ),
-        )
+        replace(b, scene=replace(b.scene, objects=tuple(replace(o, name=next(names)) for o in b.scene.objects)))
         for b in blocks
     ]
 
@@ -266,9 +246,7 @@ def _at_working_extent(scene: Scene, extent: float | None) -> Scene:
     """Scale everything about the origin, which lies on the floor."""
     if extent is None:
         return scene
-    return scale_scene(
-        scene, extent / float(np.ptp(surfaces_bounding_box(scene.surfaces), axis=0).max())
-    )
+    return scale_scene(scene, extent / float(np.ptp(surfaces_bounding_box(scene.surfaces), axis=0).max()))
 
 
 # ---------------------------------------------------------------- where
@@ -364,9 +342,7 @@ def scene_title(path: Path) -> str:
     return safe_name(path.resolve().parent.name if path.stem == "scene" else path.stem) or "scene"
 
 
-def _with_timing(
-    scene: Scene, blocks: list[_FileObjects], plan: SceneFile, config: AssembleConfig
-) -> Scene:
+def _with_timing(scene: Scene, blocks: list[_FileObjects], plan: SceneFile, config: AssembleConfig) -> Scene:
     """Set gravity, duration and the like: the options first, then the scene file, then our GLB."""
     own = blocks[0].scene if len(blocks) == 1 and blocks[0].ours else None
     scene = replace(

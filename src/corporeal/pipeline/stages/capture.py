@@ -1,7 +1,6 @@
 """Capture: posed views of a scene at rest, with depth, normals and object ids.
 
-The cameras are spread evenly over a hemisphere, each as near as possible with every object in view.
-Deterministic.
+The cameras are spread evenly over a hemisphere, each as near as possible with every object in view. Deterministic.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,12 +15,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
 from corporeal.core.types import Camera, Scene, Views
 from corporeal.geometry.scene_transforms import object_boxes
-from corporeal.render.camera_placement import (
-    VIEW_DIRECTION,
-    CameraAim,
-    camera_from_aim,
-    fit_cameras_around,
-)
+from corporeal.render.camera_placement import VIEW_DIRECTION, CameraAim, camera_from_aim, fit_cameras_around
 from corporeal.render.embree import first_seen, render_image
 from corporeal.render.kernels_hits import HIT_NOTHING
 from corporeal.render.ray_scene import RayScene, StudioLight
@@ -52,9 +46,7 @@ DEFAULT_CONFIG = CaptureConfig()
 
 
 def capture(
-    scene: Scene,
-    config: CaptureConfig = DEFAULT_CONFIG,
-    progress: Progress = lambda fraction, words: None,
+    scene: Scene, config: CaptureConfig = DEFAULT_CONFIG, progress: Progress = lambda fraction, words: None
 ) -> Views:
     """Render views of a scene and its floor from a hemisphere.
 
@@ -64,9 +56,7 @@ def capture(
     """
     _check(scene, config)
     progress(0.0, "placing the cameras")
-    aims = fit_cameras_around(
-        object_boxes(scene)[None], config.views, config.size, PICTURE_FILL_FRACTION
-    )
+    aims = fit_cameras_around(object_boxes(scene)[None], config.views, config.size, PICTURE_FILL_FRACTION)
     return render_views(scene, aims, config, progress)
 
 

@@ -1,8 +1,7 @@
 """Compose a scene of objects from a pool: sample, scale, settle, certify, choose an interaction, write.
 
-A composed scene is a folder: ``scene.glb`` (everything at rest), ``scene.toml`` (what happens),
-``certificate.json`` (that it is at rest), ``composition.json`` (what it is made of, and why so
-large), and ``views/`` (posed pictures).
+A composed scene is a folder: ``scene.glb`` (everything at rest), ``scene.toml`` (what happens), ``certificate.json``
+(that it is at rest), ``composition.json`` (what it is made of, and why so large), and ``views/`` (posed pictures).
 """
 
 from collections.abc import Callable, Sequence
@@ -23,13 +22,7 @@ from corporeal.io.gltf.glb_merge import MergeMember, merge_glb_files
 from corporeal.io.gltf.gltf_reader import read_gltf_model
 from corporeal.io.scene_toml import SceneFile, write_scene_file
 from corporeal.materials import find_material, friction_between
-from corporeal.pool.asset_pool import (
-    UNKNOWN_LICENCE,
-    AssetPool,
-    PoolAsset,
-    draw_least_used,
-    parse_count_range,
-)
+from corporeal.pool.asset_pool import UNKNOWN_LICENCE, AssetPool, PoolAsset, draw_least_used, parse_count_range
 from corporeal.recognition.readable_names import numbered_names
 from corporeal.scene.arrange_bodies import BodyArrangement
 from corporeal.scene.interactions import (
@@ -42,12 +35,7 @@ from corporeal.scene.interactions import (
     SceneInteraction,
 )
 from corporeal.scene.rest_certificate import RestCertificate
-from corporeal.scene.scene_composition import (
-    ComposedObject,
-    SceneComposition,
-    write_certificate,
-    write_composition,
-)
+from corporeal.scene.scene_composition import ComposedObject, SceneComposition, write_certificate, write_composition
 from corporeal.scene.settle_bodies import SettleConfig, SettlingEngine
 from corporeal.scene.settle_for_interaction import SettledInteraction, settle_for_interaction
 from corporeal.scene.settling_body import BodyPose, MassProperties, SettlingBody
@@ -126,8 +114,7 @@ def compose(
         weigh: Returns the mass properties of an object; None: those of a homogeneous solid.
 
     Raises:
-        UserError: The pool lacks what is asked for, no rest is found, or no interaction is
-            possible.
+        UserError: The pool lacks what is asked for, no rest is found, or no interaction is possible.
 
     """
     tell = progress or (lambda fraction, words: None)
@@ -149,9 +136,7 @@ def compose(
     stated = tuple(dict.fromkeys([*(w for s in sizes for w in s.warnings), *warnings]))
     _write_certificate(folder, objects, settled, config, stated)
     names = tuple(t.name for t in objects)
-    return ComposedScene(
-        folder, names, settled.arrangement, settled.action, settled.certificate, stated
-    )
+    return ComposedScene(folder, names, settled.arrangement, settled.action, settled.certificate, stated)
 
 
 def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: Weigh) -> bool:
@@ -176,9 +161,7 @@ def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: We
 # ---------------------------------------------------------------- what is in it
 
 
-def _possible_kinds(
-    config: ComposeConfig, count: int, rng: np.random.Generator
-) -> list[InteractionKind]:
+def _possible_kinds(config: ComposeConfig, count: int, rng: np.random.Generator) -> list[InteractionKind]:
     """Return the possible interactions of the objects, in random order."""
     if config.interaction == "none":
         return []
@@ -186,8 +169,7 @@ def _possible_kinds(
     able: list[InteractionKind] = [
         k
         for k in INTERACTION_KINDS
-        if MIN_OBJECTS_OF_KIND[k] <= count
-        and (count == 1 or stands in ("auto", *ARRANGEMENTS_OF_KIND[k]))
+        if MIN_OBJECTS_OF_KIND[k] <= count and (count == 1 or stands in ("auto", *ARRANGEMENTS_OF_KIND[k]))
     ]
     return [able[k] for k in rng.permutation(len(able))] or ["fall"]
 
@@ -200,9 +182,7 @@ def _choose_assets(
         return [_asset_by_name(pool, name) for name in config.assets]
     by_class = pool.classes
     if not by_class:
-        raise UserError(
-            f"The pool {pool.folder} has no usable asset. See why: corporeal assets list --rejected"
-        )
+        raise UserError(f"The pool {pool.folder} has no usable asset. See why: corporeal assets list --rejected")
     for name in config.classes:
         if name not in by_class:
             raise UnknownChoiceError("class", name, list(by_class))
@@ -276,9 +256,7 @@ def _objects(
     return objects
 
 
-def _with_mass_properties(
-    objects: list[_ObjectToPlace], weigh: Weigh | None
-) -> list[_ObjectToPlace]:
+def _with_mass_properties(objects: list[_ObjectToPlace], weigh: Weigh | None) -> list[_ObjectToPlace]:
     """Set mass properties of bodies; wall thickness scales with the object."""
     if weigh is None:
         return objects
@@ -300,9 +278,7 @@ def _least_friction(
     found = {}
     for k, (other, matter) in enumerate(zip(objects, matters, strict=True)):
         meeting = product(matters[number].materials, matter.materials)
-        pairs = [
-            friction_between(find_material(a), find_material(b)).sliding.typical for a, b in meeting
-        ]
+        pairs = [friction_between(find_material(a), find_material(b)).sliding.typical for a, b in meeting]
         if k != number and pairs:
             found[other.name] = min(pairs)
     return found
@@ -319,21 +295,13 @@ def _shape(asset: PoolAsset, extent: float) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _write(
-    folder: Path,
-    objects: Sequence[_ObjectToPlace],
-    settled: SettledInteraction,
-    config: ComposeConfig,
+    folder: Path, objects: Sequence[_ObjectToPlace], settled: SettledInteraction, config: ComposeConfig
 ) -> tuple[str, ...]:
     """Write ``scene.glb`` and ``scene.toml``; return what was left out of the files."""
     action = settled.action
     duration = action.duration if action else DURATION_AT_REST_S
     members = [_member(t, p) for t, p in zip(objects, settled.poses, strict=True)]
-    extras = {
-        "gravity_m_s2": list(GRAVITY_VECTOR),
-        "duration_s": duration,
-        "fps": 30,
-        "settled": True,
-    }
+    extras = {"gravity_m_s2": list(GRAVITY_VECTOR), "duration_s": duration, "fps": 30, "settled": True}
     warnings = merge_glb_files(folder / "scene.glb", members, "scene", extras)
     scene_file = SceneFile(
         folder / "scene.toml",

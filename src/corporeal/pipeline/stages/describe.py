@@ -3,20 +3,13 @@
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
-from corporeal.core.types import (
-    Inventory,
-    ObjectDescription,
-    PartDescription,
-    Scene,
-)
+from corporeal.core.types import Inventory, ObjectDescription, PartDescription, Scene
 from corporeal.description.apply_annotations import apply_annotations, load_annotations
 from corporeal.description.describe_config import DEFAULT_DESCRIBE_CONFIG, DescribeConfig, validate
 from corporeal.description.describe_from_file import open_ware_notes, parts_from_file
 from corporeal.description.query_scene import SceneQuery
 from corporeal.recognition.contents_from_name import unused_contents_notes
-from corporeal.recognition.metadata_recognition import (
-    substance_hint,
-)
+from corporeal.recognition.metadata_recognition import substance_hint
 from corporeal.recognition.parts_by_name import identify_parts
 from corporeal.vlm import choose_critic, connect_vlm
 
@@ -32,21 +25,21 @@ def describe(
 ) -> Inventory:
     """Name every object's parts and their materials.
 
-    Answers are taken, in this order, from the annotation file, a model (or its recorded answers)
-    and the names in the file; the rest is unknown. A model is also asked where in the measured
-    ranges each value lies, and how large such objects usually are.
+    Answers are taken, in this order, from the annotation file, a model (or its recorded answers) and the names in the
+    file; the rest is unknown. A model is also asked where in the measured ranges each value lies, and how large such
+    objects usually are.
 
     Args:
         scene: What was assembled.
         config: Sources of answers.
         library: The library whose names and ranges a model is offered.
         progress: Called with the fraction done and a description.
-        from_pictures: Objects from pictures, by number: one surface each. An annotation may name
-            their pieces; their surface does not show the thickness of walls, as those of models do.
+        from_pictures: Objects from pictures, by number: one surface each. An annotation may name their pieces; their
+            surface does not show the thickness of walls, as those of models do.
 
     Raises:
-        UserError: An annotation or a recording does not fit the scene, a model is unavailable, or
-            questions wait for a person's answers.
+        UserError: An annotation or a recording does not fit the scene, a model is unavailable, or questions wait for a
+            person's answers.
 
     """
     made = _describe_scene(scene, config, library, progress, from_pictures)
@@ -65,11 +58,7 @@ def _wall_unseen(words: PartDescription) -> PartDescription:
 
 
 def _describe_scene(
-    scene: Scene,
-    config: DescribeConfig,
-    library: str,
-    progress: Progress,
-    from_pictures: Collection[int],
+    scene: Scene, config: DescribeConfig, library: str, progress: Progress, from_pictures: Collection[int]
 ) -> Inventory:
     validate(config)
     identity = identify_parts(scene, substance_hint)
@@ -86,9 +75,7 @@ def _describe_scene(
             for obj, words in zip(scene.objects, file, strict=True)
         ]
         open_made = open_ware_notes([o for k, o in enumerate(objects) if k in from_pictures])
-        return Inventory(
-            tuple(objects), warnings=(*open_made, *unused_contents_notes(scene, objects))
-        )
+        return Inventory(tuple(objects), warnings=(*open_made, *unused_contents_notes(scene, objects)))
     critic = connect_vlm(choose_critic(config.vlm, config.critic), config.record) or model
     asking = SceneQuery(scene, identity, config, library, model, critic)
     return asking.inventory(file, annotations, progress)

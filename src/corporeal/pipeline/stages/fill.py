@@ -17,20 +17,12 @@ from corporeal.core.types import (
     Scene,
     with_text,
 )
-from corporeal.discretization.choose_resolution import (
-    MeasuredScene,
-    SimulationAccuracy,
-    choose_resolution,
-)
+from corporeal.discretization.choose_resolution import MeasuredScene, SimulationAccuracy, choose_resolution
 from corporeal.discretization.contact_points import sample_contact_points
 from corporeal.discretization.discretization_plan import DiscretizationPlan, QualityPreset
 from corporeal.discretization.exposed_surface import exposed_faces
 from corporeal.discretization.foliage import weigh_bulk_foliage, with_plant_springs
-from corporeal.discretization.granular_bed_objects import (
-    describe_beds,
-    fill_all_beds,
-    warn_of_loose_sheets,
-)
+from corporeal.discretization.granular_bed_objects import describe_beds, fill_all_beds, warn_of_loose_sheets
 from corporeal.discretization.mesh_measures import (
     MeasuredObject,
     measure_objects,
@@ -38,11 +30,7 @@ from corporeal.discretization.mesh_measures import (
     refuse_flat_scene,
 )
 from corporeal.discretization.missing_walls import close_all_missing_walls, describe_missing_wall
-from corporeal.discretization.mobile_contents import (
-    add_wetted_points,
-    pour_loose_contents,
-    vessels_with_contents,
-)
+from corporeal.discretization.mobile_contents import add_wetted_points, pour_loose_contents, vessels_with_contents
 from corporeal.discretization.object_filling import FillRecipe, ObjectFilling, fill_object
 from corporeal.discretization.object_masses import (
     scale_to_stated_masses,
@@ -50,17 +38,8 @@ from corporeal.discretization.object_masses import (
     warn_of_masses_not_as_named,
     warn_of_thick_walls,
 )
-from corporeal.discretization.object_scaling import (
-    field_in_scene_scale,
-    is_not_life_size,
-    part_scales,
-)
-from corporeal.discretization.part_model import (
-    PartModel,
-    describe_fill,
-    fill_recipe,
-    infer_part_model,
-)
+from corporeal.discretization.object_scaling import field_in_scene_scale, is_not_life_size, part_scales
+from corporeal.discretization.part_model import PartModel, describe_fill, fill_recipe, infer_part_model
 from corporeal.discretization.plant_roots import extend_plants_into_ground
 from corporeal.discretization.point_masses import remove_mixed_points, weigh_points
 from corporeal.discretization.rods import Rod, find_rod
@@ -101,9 +80,7 @@ def fill(
     field = field_in_scene_scale(field, part_scales(scene, parts))
     scene, drawn = extend_plants_into_ground(scene, parts, field)
     # Granular material fills its container; hollow parts are closed below soft ones.
-    bedded = fill_all_beds(
-        hollow_all_vessels(measure_objects(scene, parts, config.seed), field), field
-    )
+    bedded = fill_all_beds(hollow_all_vessels(measure_objects(scene, parts, config.seed), field), field)
     anatomies = close_all_missing_walls(bedded, field)
     # Construction of every part; masses stated in files are kept.
     leaf = find_material("leaf_tissue")
@@ -112,9 +89,7 @@ def fill(
     makes, heavy = scale_to_stated_masses(scene, anatomies, makes)
     refuse_flat_scene(scene, anatomies)
     rods = solid_rods(anatomies, makes, config.seed)
-    bodies = MeasuredScene(
-        scene, field, anatomies, makes, rods, vessels_of_contents(scene, contents)
-    )
+    bodies = MeasuredScene(scene, field, anatomies, makes, rods, vessels_of_contents(scene, contents))
     # Grid spacing and treatments follow from all of it.
     asked = SimulationAccuracy(quality or config.detail, config.stiffness, config.seed)
     bodies, chosen = choose_resolution(bodies, asked)
@@ -122,9 +97,7 @@ def fill(
     # Remove overlaps; volumes and densities add up to the masses.
     together = vessels_with_contents(parts, field)
     packings = remove_mixed_points(pack_objects(bodies, chosen, config.seed), chosen.cell, together)
-    particles = add_wetted_points(
-        gather_particles(parts, bodies, chosen, packings), bodies, config.seed
-    )
+    particles = add_wetted_points(gather_particles(parts, bodies, chosen, packings), bodies, config.seed)
     doubted = warn_of_implausible_masses(scene, anatomies, particles.mass_real)
     unlike = warn_of_masses_not_as_named(scene, anatomies, particles.mass_real)
     thick = warn_of_thick_walls(scene, anatomies, makes, field)
@@ -137,9 +110,7 @@ def fill(
 def name_objects(warnings: Iterable[str], scene: Scene) -> tuple[str, ...]:
     """Return sentences with the names of objects in place of their numbers."""
     return tuple(
-        with_text(
-            w, OBJECT_NUMBER_PATTERN.sub(lambda found: scene.objects[int(found[1]) - 1].name, w)
-        )
+        with_text(w, OBJECT_NUMBER_PATTERN.sub(lambda found: scene.objects[int(found[1]) - 1].name, w))
         for w in warnings
     )
 
@@ -153,21 +124,14 @@ def part_models(
     """How each part is made; crowns of leaves from ``tissue``."""
     return {
         m.part: weigh_bulk_foliage(
-            infer_part_model(a, m, field, np.random.default_rng([seed, m.part, 5])),
-            a,
-            m,
-            field,
-            tissue,
-            obj.scale,
+            infer_part_model(a, m, field, np.random.default_rng([seed, m.part, 5])), a, m, field, tissue, obj.scale
         )
         for obj, a in zip(scene.objects, anatomies, strict=True)
         for m in a.members
     }
 
 
-def solid_rods(
-    anatomies: list[MeasuredObject], makes: dict[int, PartModel], seed: int
-) -> dict[int, Rod]:
+def solid_rods(anatomies: list[MeasuredObject], makes: dict[int, PartModel], seed: int) -> dict[int, Rod]:
     """Find solid rods, which are represented by rings of points where they bend."""
     return {
         m.part: rod
@@ -180,9 +144,7 @@ def solid_rods(
 # ------------------------------------------------------------------ points
 
 
-def pack_objects(
-    bodies: MeasuredScene, chosen: DiscretizationPlan, seed: int
-) -> list[ObjectFilling]:
+def pack_objects(bodies: MeasuredScene, chosen: DiscretizationPlan, seed: int) -> list[ObjectFilling]:
     """Place points in every object."""
     packings = []
     for number, anatomy in enumerate(bodies.anatomies):
@@ -201,9 +163,7 @@ def pack_objects(
     return packings
 
 
-def ring_points(
-    recipe: FillRecipe, rod: Rod | None, treatment: Discretization, cell: float
-) -> FillRecipe:
+def ring_points(recipe: FillRecipe, rod: Rod | None, treatment: Discretization, cell: float) -> FillRecipe:
     """Represent a bending rod that is thinner than two cells by rings of points."""
     if rod is None or treatment.kind != "deformable" or rod.diameter >= 2 * cell:
         return recipe
@@ -229,9 +189,7 @@ def gather_particles(
     part = np.concatenate([p.part for p in packings])
     return Particles(
         position=np.concatenate([p.points for p in packings]),
-        velocity=np.concatenate(
-            [initial_velocities(scene, k, p.points) for k, p in enumerate(packings)]
-        ),
+        velocity=np.concatenate([initial_velocities(scene, k, p.points) for k, p in enumerate(packings)]),
         volume=np.concatenate([volume for volume, _ in weighed]),
         density=np.concatenate([density for _, density in weighed]),
         object=np.repeat(np.arange(len(packings)), counts),
@@ -242,9 +200,7 @@ def gather_particles(
         object_of_surface=np.repeat(np.arange(len(surfaces)), [len(s) for s, _ in surfaces]),
         curvature=np.concatenate([curvature for _, curvature in surfaces]),
         face=np.concatenate([face for face, _ in windward]),
-        particle_of_face=np.concatenate(
-            [first + bearer for first, (_, bearer) in zip(firsts, windward, strict=True)]
-        ),
+        particle_of_face=np.concatenate([first + bearer for first, (_, bearer) in zip(firsts, windward, strict=True)]),
         mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
         fills=fill_sentences(parts, bodies, chosen, part),
         walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
@@ -272,9 +228,7 @@ def wind_faces(
     return exposed_faces(anatomy, packing.points, cell / 4)
 
 
-def initial_velocities(
-    scene: Scene, number: int, points: Float[np.ndarray, "N 3"]
-) -> Float[np.ndarray, "N 3"]:
+def initial_velocities(scene: Scene, number: int, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
     """Velocity at the start of each point of object ``number`` [m/s]."""
     obj = scene.objects[number]
     if obj.path is not None:
@@ -286,10 +240,7 @@ def initial_velocities(
 
 
 def fill_sentences(
-    parts: Parts,
-    bodies: MeasuredScene,
-    chosen: DiscretizationPlan,
-    part_of_particle: Int[np.ndarray, " P"],
+    parts: Parts, bodies: MeasuredScene, chosen: DiscretizationPlan, part_of_particle: Int[np.ndarray, " P"]
 ) -> tuple[str, ...]:
     """One sentence per part; a second one where its object is not life-size."""
     members = {m.part: m for a in bodies.anatomies for m in a.members}

@@ -73,9 +73,7 @@ NEUTRAL_MATERIAL_WARNING = (
 )
 
 
-def ground(
-    scene: Scene, parts: Parts, inventory: Inventory, config: GroundConfig = DEFAULT_CONFIG
-) -> MaterialField:
+def ground(scene: Scene, parts: Parts, inventory: Inventory, config: GroundConfig = DEFAULT_CONFIG) -> MaterialField:
     """Choose every value of every part, each with its range, its source and a reason.
 
     Raises:
@@ -90,9 +88,7 @@ def ground(
         _structure_of_part(m, w, config, scene, part.object)
         for m, w, part in zip(made, words, parts.catalogue, strict=True)
     )
-    made = tuple(
-        _structure_rebound(m, s, w.rebound) for m, s, w in zip(made, structures, words, strict=True)
-    )
+    made = tuple(_structure_rebound(m, s, w.rebound) for m, s, w in zip(made, structures, words, strict=True))
     touching = pair_coefficients(words, made, structures, config)
     found = MaterialField(
         materials=made,
@@ -121,8 +117,7 @@ def grounding_warnings(field: MaterialField, parts: Parts, scene: Scene) -> tupl
 
 def _part_warnings(where: str, material: Material, words: PartDescription) -> list[str]:
     unknown = Note(
-        f"{where} is of unknown material; {material.name} is assumed. State its material with "
-        "--annotations.",
+        f"{where} is of unknown material; {material.name} is assumed. State its material with --annotations.",
         NoteKind.GRAVE,
     )
     return ([unknown] if words.material is None else []) + [
@@ -168,9 +163,7 @@ def _material(entry: MaterialEntry, words: PartDescription) -> Material:
         if allowed is None:
             known = ", ".join(entry.ranges)
             raise UserError(f"{entry.name} has no {field} in the library. It has: {known}.")
-        grounds[field] = Provenance(
-            value, allowed, "annotation", "stated in the annotation file", 1.0
-        )
+        grounds[field] = Provenance(value, allowed, "annotation", "stated in the annotation file", 1.0)
     graded = {f: g.value for f, g in grounds.items() if not _has_own_range(g, entry.ranges.get(f))}
     unfit = value_contradictions(entry.group, entry.ranges, graded)
     for field, clause in unfit.items():
@@ -216,9 +209,7 @@ def _typical_values(entry: MaterialEntry, words: PartDescription) -> dict[str, P
     """Take every typical value, and state where its range is an estimate."""
     grounds = {f: replace(g, margin=words.margin) for f, g in entry.typical().items()}
     return {
-        f: replace(g, reason=g.reason.replace("measured", "estimated"))
-        if materials.is_estimate(g.range.source)
-        else g
+        f: replace(g, reason=g.reason.replace("measured", "estimated")) if materials.is_estimate(g.range.source) else g
         for f, g in grounds.items()
     }
 
@@ -283,9 +274,7 @@ def _structure_rebound(material: Material, structure: Structure, rebound: float 
     """Set restitution of a sealed wall from its bulk loss, and of a solid ball from the rules of its sport."""
     if structure.sealed:
         return sealed_wall_material(material)
-    return (
-        solid_with_ruled_restitution(material, rebound) if structure.kind == "solid" else material
-    )
+    return solid_with_ruled_restitution(material, rebound) if structure.kind == "solid" else material
 
 
 def ball_radius(scene: Scene, number: int) -> float:
@@ -294,9 +283,7 @@ def ball_radius(scene: Scene, number: int) -> float:
     return 0.5 * float(np.median(np.ptp(points, axis=0))) / scene.objects[number].scale
 
 
-def with_sealed_air(
-    structure: Structure, material: Material, words: PartDescription, radius: float
-) -> Structure:
+def with_sealed_air(structure: Structure, material: Material, words: PartDescription, radius: float) -> Structure:
     """Replace a wall with sealed air by an equivalent soft solid, unless it yields when dented.
 
     Args:
@@ -309,17 +296,14 @@ def with_sealed_air(
     gauge = words.inflation
     if structure.kind != "shell" or structure.thickness is None or gauge is None:
         return structure
-    sealed = (
-        f"{structure.reason} Air at {gauge / 1e3:.3g} kPa above its surroundings is sealed in it"
-    )
+    sealed = f"{structure.reason} Air at {gauge / 1e3:.3g} kPa above its surroundings is sealed in it"
     if not is_carried_by_air(gauge, material, structure.thickness, radius):
         if CONSTITUTIVE_LAWS[material.law].flows:
             reason = f"{sealed}, which dents it less than its wall resists."
             return replace(structure, reason=reason, sealed=True)
         reason = f"{sealed}: wall and air act in parallel, as one soft solid."
         inner = air_with_ruled_restitution(
-            inflated_ball_material(InflatedBall(gauge, material, structure.thickness, radius)),
-            words.rebound,
+            inflated_ball_material(InflatedBall(gauge, material, structure.thickness, radius)), words.rebound
         )
         built = Structure("filled", structure.thickness, reason, inner, 1.0, inflated=True)
         return replace(built, gauge_pressure=gauge, rebound=words.rebound)
@@ -352,21 +336,15 @@ def _wall_thickness(material: Material, words: PartDescription) -> _WallThicknes
         whose = "usual of such objects" if words.wall_usual else "stated"
         if words.wall_usual and words.wall_why:
             whose += f": {words.wall_why}"
-        return _WallThickness(
-            words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is {whose}."
-        )
+        return _WallThickness(words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is {whose}.")
     if material.shell_thickness:
         ground = material.grounds["shell_thickness"]
         where = f"{_mm(ground.value)} mm, in the range of {material.name}: " + " to ".join(
             (_mm(ground.range.low), f"{_mm(ground.range.high)} mm.")
         )
         if ground.chosen_by in THICKNESS_SOURCE_WORDS:
-            return _WallThickness(
-                ground.value, f"{THICKNESS_SOURCE_WORDS[ground.chosen_by]} its thickness at {where}"
-            )
-        return _WallThickness(
-            ground.value, f"Its thickness, unless its mesh shows it, is the usual {where}"
-        )
+            return _WallThickness(ground.value, f"{THICKNESS_SOURCE_WORDS[ground.chosen_by]} its thickness at {where}")
+        return _WallThickness(ground.value, f"Its thickness, unless its mesh shows it, is the usual {where}")
     raise UserError(
         f"{words.name} is described as a {words.structure or 'shell'} of {material.name}, but the "
         "thickness of its wall is not known. Give thickness_mm in the annotation file."
@@ -413,9 +391,7 @@ def pair_coefficients(
     strikers = [materials.ImpactBody(*s) for s in zip(surfaces, bodies, solid, strict=True)]
     return PairCoefficients(
         _matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
-        _matrix(
-            len(bodies), lambda a, b: materials.pair_restitution(strikers[a], strikers[b]).value
-        ),
+        _matrix(len(bodies), lambda a, b: materials.pair_restitution(strikers[a], strikers[b]).value),
     )
 
 

@@ -1,7 +1,6 @@
 """Reconstruct: from posed photographs, or a trained splat, to objects with closed surfaces.
 
-The result is a GLB, which ``assemble`` reads, and the Gaussians, for the video and for part
-segmentation.
+The result is a GLB, which ``assemble`` reads, and the Gaussians, for the video and for part segmentation.
 """
 
 from collections.abc import Sequence
@@ -46,11 +45,7 @@ from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene, tur
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.masks.grown_masks import describe_masks_in
 from corporeal.reconstruction.masks_figure import MASKS_FIGURE_FILE, draw_masks_over
-from corporeal.reconstruction.object_points import (
-    foreground_of,
-    labels_from_masks,
-    points_on_objects,
-)
+from corporeal.reconstruction.object_points import foreground_of, labels_from_masks, points_on_objects
 from corporeal.reconstruction.reconstruct_config import (
     DEFAULT_RECONSTRUCT,
     ReconstructConfig,
@@ -60,10 +55,7 @@ from corporeal.reconstruction.reconstruct_config import (
 from corporeal.reconstruction.segment.instance_assignment import assign_instances
 from corporeal.reconstruction.segment.object_segmentation import SpacePieces
 from corporeal.reconstruction.surface.backing_surfels import add_backing_surfels
-from corporeal.reconstruction.surface.object_surfaces import (
-    build_object_surfaces,
-    pieces_of_objects,
-)
+from corporeal.reconstruction.surface.object_surfaces import build_object_surfaces, pieces_of_objects
 from corporeal.reconstruction.surface.reconstruction_acceptance import (
     boxes_rejection_reason,
     colour_rejection_reason,
@@ -129,24 +121,19 @@ def reconstruct(
         progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: The input cannot be used, holds nothing that could be an object, or an option
-            does not fit it.
+        UserError: The input cannot be used, holds nothing that could be an object, or an option does not fit it.
 
     """
     validate_reconstruct(config, extents, viewer.model is not None, scene_name(source))
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
-    taken, masked = gaussians_from_source(
-        source, config, folder, subprogress(progress, 0.0, PROGRESS_AFTER_TRAINING)
-    )
+    taken, masked = gaussians_from_source(source, config, folder, subprogress(progress, 0.0, PROGRESS_AFTER_TRAINING))
     grown = taken.masks is not None and not masked  # the cameras' common focus: one object
     taken = _align_upright(source, taken, config, folder)
     photographers = taken.cameras
     if not taken.cameras:
         taken = replace(
             taken,
-            cameras=cameras_around(
-                taken.solid, config.resolution.rendered_views, config.resolution.rendered_size_px
-            ),
+            cameras=cameras_around(taken.solid, config.resolution.rendered_views, config.resolution.rendered_size_px),
         )
     # Points of the foreground, with features of what the pictures show.
     progress(PROGRESS_AFTER_TRAINING, "segmenting foreground from background")
@@ -164,13 +151,8 @@ def reconstruct(
     # Objects among them.
     progress(PROGRESS_AFTER_VIEWS, "finding objects")
     wanted = named_objects(config, viewer, taken)
-    normal = point_normals(
-        cloud.position, nearest_neighbours(cloud.position, NORMAL_NEIGHBOURS), placed.outside
-    )
-    count, drawn = (
-        config.count or len(wanted) or None,
-        labels_from_masks(taken, cloud, front.on_objects),
-    )
+    normal = point_normals(cloud.position, nearest_neighbours(cloud.position, NORMAL_NEIGHBOURS), placed.outside)
+    count, drawn = (config.count or len(wanted) or None, labels_from_masks(taken, cloud, front.on_objects))
     space = SpacePieces(pieces_of_objects(taken, front.on_objects, cloud.position), alone=grown)
     split = assign_instances(cloud, config.apart, count, normal, drawn, space)
     # One closed surface for each object.
@@ -182,9 +164,7 @@ def reconstruct(
     if not config.force and (why := _reason_not_worth(found, photographers, masked, count)):
         raise _not_worth_error(source, why, describe_masks_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
-    known = _name_objects(
-        source, found, recognise_objects(wanted, found, config, viewer), config, extents
-    )
+    known = _name_objects(source, found, recognise_objects(wanted, found, config, viewer), config, extents)
     warnings = [*known.warnings, *viewer.asked().warnings, *taken.warnings, *split.warnings]
     shown = _video_gaussians(found, photographers)
     said = (*placed.statements, split.statement, *shown.statements, *known.statements)
@@ -212,11 +192,7 @@ class _NamedObjects:
 
 
 def _name_objects(
-    source: Path,
-    found: FoundObjects,
-    objects: Sequence[SeenObject],
-    config: ReconstructConfig,
-    extents: Sequence[str],
+    source: Path, found: FoundObjects, objects: Sequence[SeenObject], config: ReconstructConfig, extents: Sequence[str]
 ) -> _NamedObjects:
     """Name objects, and decide how large they are; a lone one may be called as its folder.
 
@@ -247,9 +223,7 @@ def _name_objects(
     return _NamedObjects(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
 
 
-def _align_upright(
-    source: Path, taken: GaussianScene, config: ReconstructConfig, folder: Path | None
-) -> GaussianScene:
+def _align_upright(source: Path, taken: GaussianScene, config: ReconstructConfig, folder: Path | None) -> GaussianScene:
     """Align the reconstruction with gravity, and find objects in photographs without masks.
 
     Args:
@@ -272,9 +246,7 @@ def _align_upright(
         numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
         draw_masks_over(list(made.views.rgb), cut_out, numbers, folder / MASKS_FIGURE_FILE)
     if cut_out is not None and made.coloured is not None:
-        told = Note(
-            f"{SPLIT_BY_PLACE_WARNING} {describe_masks_in(folder)}".rstrip(), NoteKind.GRAVE
-        )
+        told = Note(f"{SPLIT_BY_PLACE_WARNING} {describe_masks_in(folder)}".rstrip(), NoteKind.GRAVE)
         made = replace(made, doubts=(*made.doubts, told))
     return made
 
@@ -328,9 +300,7 @@ def _video_gaussians(found: FoundObjects, photographers: tuple[Camera, ...]) -> 
         return _VideoGaussians(gaussian_subset(own, kept), owner[kept])
     with ThreadPool() as pool:
         rendering = render_depth(gaussian_subset(own, owner >= 0), photographers, pool)
-    gaussians, whose = add_backing_surfels(
-        gaussian_subset(own, kept), owner[kept], found.solids, rendering
-    )
+    gaussians, whose = add_backing_surfels(gaussian_subset(own, kept), owner[kept], found.solids, rendering)
     said = f"{gaussians.count - np.count_nonzero(kept):,} discs {BACKING_SURFELS_STATEMENT}"
     return _VideoGaussians(gaussians, whose, (said,))
 

@@ -30,13 +30,7 @@ from corporeal.core.types import (
 from corporeal.discretization.object_scaling import describe_mass, describe_scales
 from corporeal.materials.material_candidates import fraction_of, is_logarithmic
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
-from corporeal.render.html_page import (
-    data_url_of_file,
-    escape_html,
-    fill_page,
-    html_figure,
-    table_cells,
-)
+from corporeal.render.html_page import data_url_of_file, escape_html, fill_page, html_figure, table_cells
 from corporeal.render.mass_tables import mass_table
 from corporeal.render.warning_subjects import parts_named_in
 from corporeal.simulation.audit_messages import breakage_message, equilibrium_message
@@ -114,9 +108,7 @@ def report(story: ReportContent, path: Path) -> None:
         video=data_url_of_file(story.video.path),
         width=story.video.width,
         caption=_caption(audit.breakage),
-        figures="".join(
-            html_figure(caption, data_url_of_file(file)) for caption, file in story.figures.items()
-        ),
+        figures="".join(html_figure(caption, data_url_of_file(file)) for caption, file in story.figures.items()),
         verdict=_verdict(story),
         expectations=_expectations(audit.expectations),
         parts="".join(_part_row(story, k) for k in range(len(story.parts.catalogue))),
@@ -278,15 +270,9 @@ def _part_row(story: ReportContent, k: int) -> str:
     row = (
         table_cells(*map(escape_html, names), wrap=True),
         table_cells(f"<b>{escape_html(material.name)}</b>"),
-        table_cells(
-            SOURCE_WORDS[words.answered_by], CONSTITUTIVE_LAWS[material.law].full_name, wrap=True
-        ),
+        table_cells(SOURCE_WORDS[words.answered_by], CONSTITUTIVE_LAWS[material.law].full_name, wrap=True),
         table_cells(*numbers),
-        table_cells(
-            escape_html(structure_words(story.field.structures[k])),
-            escape_html(treatment.kind),
-            wrap=True,
-        ),
+        table_cells(escape_html(structure_words(story.field.structures[k])), escape_html(treatment.kind), wrap=True),
         table_cells(stiffness_words(treatment, liquid=liquid), wrap=True),
     )
     return f"<tr>{''.join(row)}</tr>"
@@ -377,10 +363,7 @@ def _shared_reason(reasons: Sequence[str]) -> str:
 def alternative_words(words: PartDescription) -> str:
     """Return alternatives to a part's material, and its components."""
     maybe = [f"{name} ({p:.0%})" for name, p in words.alternatives]
-    pieces = [
-        f"{p.name}: {p.material or 'unknown'} ({p.volume_share:.0%} of the volume)"
-        for p in words.pieces
-    ]
+    pieces = [f"{p.name}: {p.material or 'unknown'} ({p.volume_share:.0%} of the volume)" for p in words.pieces]
     rest = f" Alternatives: {', '.join(maybe)}." if maybe else ""
     return escape_html(rest + (f" Components: {'; '.join(pieces)}." if pieces else ""))
 
@@ -433,17 +416,12 @@ def _sources(story: ReportContent) -> str:
     held = [s.contents for s in made if s.contents is not None]
     known = [*story.field.materials, *(p.material for p in pieces), *held]
     used = sorted({g.range.source for m in known for g in m.grounds.values()})
-    return "".join(
-        f"<dt>{escape_html(k)}</dt><dd>{escape_html(story.sources.get(k, k))}</dd>" for k in used
-    )
+    return "".join(f"<dt>{escape_html(k)}</dt><dd>{escape_html(story.sources.get(k, k))}</dd>" for k in used)
 
 
 def _credits(scene: Scene) -> str:
     credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)
-    return (
-        "".join(f"<li>{escape_html(c)}</li>" for c in credits)
-        or "<li>none stated in the files</li>"
-    )
+    return "".join(f"<li>{escape_html(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
 
 
 def _settings(audit: RunAudit) -> str:
@@ -461,11 +439,7 @@ def usage_words(questions: ModelUsage) -> str:
     if not questions.calls:
         return f"<br>{number} questions, answered from the disk by {who}, at no cost."
     cost = questions.dollars
-    paid = (
-        "price not known"
-        if cost is None
-        else f"about ${cost:.3f} at the list prices of {questions.prices_of}"
-    )
+    paid = "price not known" if cost is None else f"about ${cost:.3f} at the list prices of {questions.prices_of}"
     return (
         f"<br>{number} questions to {who}: "
         f"{questions.calls} calls, {questions.input_tokens:,} tokens in, "

@@ -45,9 +45,9 @@ def segment(
 ) -> Parts:
     """Assign every triangle to an object and a part.
 
-    Points are the scene's triangles in order. Nodes and materials of a file are exact, with
-    confidence 1. An object from pictures is one surface: if its description names several pieces,
-    they are found among the points of the reconstruction.
+    Points are the scene's triangles in order. Nodes and materials of a file are exact, with confidence 1. An object
+    from pictures is one surface: if its description names several pieces, they are found among the points of the
+    reconstruction.
 
     Args:
         scene: The assembled scene.
@@ -83,9 +83,7 @@ def segment(
             vectors = _vectors(semantic, obj)
             named = name_parts(cloud, obj, vectors, PartsConfig(config.position_weight))
             parts = _replace_with_pieces(parts, number, obj, named, cloud, middle)
-    return replace(
-        parts, warnings=(*parts.warnings, *_undivided_objects_warning([obj for _, obj in shown]))
-    )
+    return replace(parts, warnings=(*parts.warnings, *_undivided_objects_warning([obj for _, obj in shown])))
 
 
 def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
@@ -176,10 +174,7 @@ def _replace_with_pieces(
 
 
 def _nearest_votes(
-    places: Float[np.ndarray, "T 3"],
-    points: Float[np.ndarray, "N 3"],
-    named: NamedParts,
-    count: int,
+    places: Float[np.ndarray, "T 3"], points: Float[np.ndarray, "N 3"], named: NamedParts, count: int
 ) -> Float[np.ndarray, "T K"]:
     """Return the mean confidence of the nearest points for each place and part."""
     near = np.asarray(KDTree(points).query(places, k=min(NEAREST_VOTING_POINTS, len(points)))[1])
@@ -193,7 +188,5 @@ def _nearest_votes(
 
 def _doubts(named: NamedParts, obj: ObjectDescription, kept: Sequence[int]) -> list[str]:
     lost = [p.name for k, p in enumerate(obj.parts) if k not in kept]
-    gone = Note(
-        f"{', '.join(lost)} has no place on its surface, and is left out.", NoteKind.LEFT_OUT
-    )
+    gone = Note(f"{', '.join(lost)} has no place on its surface, and is left out.", NoteKind.LEFT_OUT)
     return [*named.warnings, *([gone] if lost and not named.warnings else [])]

@@ -1,7 +1,7 @@
 """Simulate: step the scene through time, write every frame, and audit the result.
 
-Frames are streamed to the disk with checkpoints: an interrupted simulation resumes bit for bit. A
-scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
+Frames are streamed to the disk with checkpoints: an interrupted simulation resumes bit for bit. A scene declared as
+settled is brought to equilibrium first (``trajectory.static_equilibrium``).
 """
 
 from collections.abc import Callable
@@ -30,11 +30,7 @@ from corporeal.simulation.fracture_simulation import fracture_body, next_breakin
 from corporeal.simulation.fracture_state import FractureState
 from corporeal.simulation.ledger_row import ledger_row
 from corporeal.simulation.rewrite_history import rewrite_history
-from corporeal.simulation.static_equilibrium import (
-    DynamicRelaxation,
-    StaticEquilibrium,
-    settling_problem,
-)
+from corporeal.simulation.static_equilibrium import DynamicRelaxation, StaticEquilibrium, settling_problem
 from corporeal.simulation.trajectory_files import (
     BREAKS_FILE,
     FRAMES_FOLDER,
@@ -93,9 +89,7 @@ def simulate(
         run = SimulationRun(build(posed.problem), begun, folder, times, kept, config.breaking)
         run.through(progress, lying, relax)
         trajectory = gather_ledgers(folder, len(times))
-        found = (
-            from_plain(SettlingOutcome, store.read_json(folder / SETTLING_FILE)) if lying else None
-        )
+        found = from_plain(SettlingOutcome, store.read_json(folder / SETTLING_FILE)) if lying else None
         end = run.stage
         write_audit(folder, audit(end.scene, end.particles, end.field, trajectory, found))
         kept.forget()
@@ -153,9 +147,7 @@ def relax_to_equilibrium(
     return balance.state
 
 
-def equilibrium_found(
-    scene: Scene, posed: ModelMapping, balance: StaticEquilibrium
-) -> SettlingOutcome:
+def equilibrium_found(scene: Scene, posed: ModelMapping, balance: StaticEquilibrium) -> SettlingOutcome:
     """Return how equilibrium was found, by object."""
     cell = posed.problem.cell
     moved = zip(scene.objects, balance.moved.tolist(), balance.farthest.tolist(), strict=True)
@@ -230,9 +222,7 @@ class SimulationRun:
                 self.checkpoints.keep(saved, done)
             raise
         except SimulationError as error:
-            raise SimulationError(
-                f"{error} {done} of {len(self.times)} frames are in {self.folder}."
-            ) from error
+            raise SimulationError(f"{error} {done} of {len(self.times)} frames are in {self.folder}.") from error
 
     def _break(self, number: int, since: float, saved: dict[str, np.ndarray]) -> None:
         """Fracture what was overloaded since the last frame, and simulate again from there.
@@ -244,9 +234,7 @@ class SimulationRun:
 
         """
         while True:
-            blow = next_breaking_impact(
-                self.stage, self.breaks, self.whole, self.folder, number, since
-            )
+            blow = next_breaking_impact(self.stage, self.breaks, self.whole, self.folder, number, since)
             if blow is None:
                 return
             self.engine.restore(saved)

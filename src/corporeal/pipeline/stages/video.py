@@ -1,10 +1,10 @@
 """Video: render the scene's surfaces or Gaussians, which move with the particles.
 
-Either textured surfaces, or the Gaussians of a reconstruction, whose covariances deform with the
-material (F Σ F^T); their surfaces then only cast shadows on the floor.
+Either textured surfaces, or the Gaussians of a reconstruction, whose covariances deform with the material (F Σ F^T);
+their surfaces then only cast shadows on the floor.
 
-The camera sees the whole motion and is fixed, as is the light; random numbers of the ray caster are
-fixed per pixel, which prevents flicker.
+The camera sees the whole motion and is fixed, as is the light; random numbers of the ray caster are fixed per pixel,
+which prevents flicker.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,15 +19,7 @@ from PIL import Image
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
-from corporeal.core.types import (
-    Frame,
-    Gaussians,
-    Particles,
-    Scene,
-    Trajectory,
-    Vector,
-    Video,
-)
+from corporeal.core.types import Frame, Gaussians, Particles, Scene, Trajectory, Vector, Video
 from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.pipeline.settings.video_config import VideoConfig
@@ -53,12 +45,7 @@ from corporeal.render.skin_binding import SkinBinding, bind_vertices
 from corporeal.render.time_remap import frame_positions, interpolate_frames, is_slow
 from corporeal.render.unoccluded_view import unoccluded_view
 from corporeal.render.video_raycaster import VideoRaycaster
-from corporeal.simulation.moving_gaussians import (
-    MovingGaussians,
-    fluid_parts,
-    granular_parts,
-    moving_gaussians,
-)
+from corporeal.simulation.moving_gaussians import MovingGaussians, fluid_parts, granular_parts, moving_gaussians
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
 VIDEO_FILE = "video.mp4"
@@ -85,16 +72,13 @@ Progress = Callable[[float, str], None]
 
 
 def render_video(
-    played: SimulationResult,
-    config: VideoConfig,
-    folder: Path,
-    progress: Progress = lambda fraction, words: None,
+    played: SimulationResult, config: VideoConfig, folder: Path, progress: Progress = lambda fraction, words: None
 ) -> Video:
     """Write ``video.mp4`` and ``thumbnail.png``: the scene, moved by its particles.
 
     Args:
-        played: Surfaces, or Gaussians if the scene was reconstructed, bound to material points at
-            the start; those of no object are static.
+        played: Surfaces, or Gaussians if the scene was reconstructed, bound to material points at the start; those of
+            no object are static.
         config: Size, quality, view.
         folder: Folder of the video.
         progress: Called with the fraction done and a description.
@@ -143,9 +127,7 @@ def _video_setup(played: SimulationResult, config: VideoConfig) -> _VideoSetup:
     """Bind surfaces to particles, and place the camera."""
     prepared, trajectory = played.prepared, played.trajectory
     scene, field = prepared.scene, prepared.field
-    skin = bind_vertices(
-        scene, prepared.parts, prepared.particles, granular_parts(field), fluid_parts(field)
-    )
+    skin = bind_vertices(scene, prepared.parts, prepared.particles, granular_parts(field), fluid_parts(field))
     reel = motion_summary(skin, scene, prepared.particles, trajectory)
     size, stage = (config.width, config.height), RayScene(scene)
     if config.view is None:
@@ -171,12 +153,7 @@ def frame_scenes(
 
 
 def _clear_view(
-    scene: Scene,
-    stage: RayScene,
-    skin: SkinBinding,
-    reel: MotionBounds,
-    trajectory: Trajectory,
-    size: tuple[int, int],
+    scene: Scene, stage: RayScene, skin: SkinBinding, reel: MotionBounds, trajectory: Trajectory, size: tuple[int, int]
 ) -> Vector | None:
     """Return a view direction without occlusion between objects."""
     if len(scene.objects) < 2:
@@ -189,11 +166,7 @@ def _clear_view(
 
 
 def _close_up(
-    troupe: "_AnimatedScene",
-    reel: MotionBounds,
-    trajectory: Trajectory,
-    config: VideoConfig,
-    folder: Path,
+    troupe: "_AnimatedScene", reel: MotionBounds, trajectory: Trajectory, config: VideoConfig, folder: Path
 ) -> None:
     """Render the first contact from close by as a row of pictures, if there is one."""
     if reel.contact is None:
@@ -210,9 +183,7 @@ def _close_up(
     write_image_row(pictures, [f"{t:.3f} s" for t in times.tolist()], folder / CLOSE_UP_FILE)
 
 
-def write_caption(
-    picture: np.ndarray, time: float, config: VideoConfig, about: float | None
-) -> np.ndarray:
+def write_caption(picture: np.ndarray, time: float, config: VideoConfig, about: float | None) -> np.ndarray:
     """Write the time [s] into a picture, and the slow motion."""
     if not config.caption:
         return picture
@@ -225,14 +196,10 @@ def write_caption(
     return video_overlay.draw_caption(picture, words)
 
 
-def motion_summary(
-    skin: SkinBinding, scene: Scene, particles: Particles, trajectory: Trajectory
-) -> MotionBounds:
+def motion_summary(skin: SkinBinding, scene: Scene, particles: Particles, trajectory: Trajectory) -> MotionBounds:
     """Return the motion for the camera: boxes of the initial surfaces, then of particles."""
     count = len(trajectory.frames)
-    numbers = np.unique(
-        np.linspace(0, count - 1, min(count, MAX_FRAMES_FOR_CAMERA)).round().astype(int)
-    )
+    numbers = np.unique(np.linspace(0, count - 1, min(count, MAX_FRAMES_FOR_CAMERA)).round().astype(int))
     members = [np.flatnonzero(particles.object == k) for k in range(len(scene.objects))]
     fullness = [_reach_ratio(particles.position[mine], particles.mass[mine]) for mine in members]
     boxes = [_surface_boxes(skin, scene)]
@@ -240,10 +207,7 @@ def motion_summary(
         place = trajectory.frames[int(k)].position
         boxes.append(
             np.array(
-                [
-                    _box(place[mine], particles.mass[mine], full)
-                    for mine, full in zip(members, fullness, strict=True)
-                ]
+                [_box(place[mine], particles.mass[mine], full) for mine, full in zip(members, fullness, strict=True)]
             )
         )
     time = np.concatenate([trajectory.time[:1], trajectory.time[numbers]])
@@ -257,9 +221,7 @@ def _mass_core(points: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]
     away = np.linalg.norm(points - middle, axis=1)
     order = np.argsort(away)
     share = np.cumsum(mass[order]) / mass.sum()
-    return middle, float(
-        away[order][min(np.searchsorted(share, CORE_MASS_FRACTION), len(away) - 1)]
-    )
+    return middle, float(away[order][min(np.searchsorted(share, CORE_MASS_FRACTION), len(away) - 1)])
 
 
 def _reach_ratio(points: np.ndarray, mass: np.ndarray) -> float:
@@ -273,16 +235,14 @@ def _reach_ratio(points: np.ndarray, mass: np.ndarray) -> float:
 def _box(points: np.ndarray, mass: np.ndarray, fullness: float) -> np.ndarray:
     """Corners (2, 3) of an object [m], of which a few stray points are left out.
 
-    It is as large about its middle as it was at the start, for how far most of its mass reaches:
-    what keeps its shape is seen whole, and of what scatters where half of it is.
+    It is as large about its middle as it was at the start, for how far most of its mass reaches: what keeps its shape
+    is seen whole, and of what scatters where half of it is.
     """
     here = np.isfinite(points).all(axis=1)
     points, mass = points[here], mass[here]
     if len(points) == 0:
         return np.full((2, 3), np.nan)
-    low, high = np.percentile(
-        points, (STRAY_PARTICLES_PERCENT, 100 - STRAY_PARTICLES_PERCENT), axis=0
-    )
+    low, high = np.percentile(points, (STRAY_PARTICLES_PERCENT, 100 - STRAY_PARTICLES_PERCENT), axis=0)
     middle, core = _mass_core(points, mass)
     reach = core * fullness if core > 0.0 else np.inf
     return np.array([np.maximum(low, middle - reach), np.minimum(high, middle + reach)])
@@ -380,8 +340,7 @@ def _gaussian_deformer(config: VideoConfig, played: SimulationResult) -> MovingG
         return None
     if found is None:
         raise UserError(
-            "This scene has no Gaussians to render. Use look 'surfaces', or run it from "
-            "photographs or a splat."
+            "This scene has no Gaussians to render. Use look 'surfaces', or run it from photographs or a splat."
         )
     return moving_gaussians(found, played.prepared)
 
@@ -409,9 +368,7 @@ class _ParticleColours:
         p = self.panel
         if isinstance(p, CategoryPanel):
             return video_overlay.draw_names(picture, p.title, p.label, p.colour)
-        return video_overlay.draw_scale(
-            picture, p.title, *(si_prefix_text(f(p.value), p.unit) for f in (min, max))
-        )
+        return video_overlay.draw_scale(picture, p.title, *(si_prefix_text(f(p.value), p.unit) for f in (min, max)))
 
 
 def _particle_colours(
@@ -422,13 +379,9 @@ def _particle_colours(
         return None
     if colour_by == "speed":
         count = len(trajectory.frames)
-        some = np.unique(
-            np.linspace(0, count - 1, min(count, MAX_FRAMES_FOR_CAMERA)).round().astype(int)
-        )
+        some = np.unique(np.linspace(0, count - 1, min(count, MAX_FRAMES_FOR_CAMERA)).round().astype(int))
         top = max(float(np.percentile(particle_speeds(trajectory, int(k)), 99.5)) for k in some)
-        return _ParticleColours(
-            NumericPanel("Speed", "m/s", [0.0, top]), None, trajectory, max(top, 1e-9)
-        )
+        return _ParticleColours(NumericPanel("Speed", "m/s", [0.0, top]), None, trajectory, max(top, 1e-9))
     panel = colour_panels(prepared.scene, prepared.parts, prepared.field)[colour_by]
     return _ParticleColours(panel, part_colours(panel)[prepared.particles.part], trajectory)
 
@@ -519,9 +472,7 @@ def _frame_scenes(
             yield current
 
 
-def _save_stills(
-    picture: np.ndarray, number: int, count: int, config: VideoConfig, folder: Path
-) -> None:
+def _save_stills(picture: np.ndarray, number: int, count: int, config: VideoConfig, folder: Path) -> None:
     """Save the thumbnail (at two thirds of the video) and the stills asked for."""
     names = [f"stills/{number:05d}.png"] if config.stills else []
     names += [THUMBNAIL_FILE] if number == (2 * (count - 1)) // 3 else []

@@ -48,8 +48,8 @@ def connect_encoder(spec: str, folder: Path | None = None) -> PictureEncoder | N
     """Connect to ``"clip"`` and the like; ``"descriptor"`` is no model and gives None.
 
     Args:
-        spec: ``"clip"`` or ``"dinov2"``; then, after a colon, other weights of that kind: a folder,
-            OWNER/NAME on the hub, or OWNER/NAME@REVISION.
+        spec: ``"clip"`` or ``"dinov2"``; then, after a colon, other weights of that kind: a folder, OWNER/NAME on the
+            hub, or OWNER/NAME@REVISION.
         folder: Where maps that were made once are kept.
 
     Raises:
@@ -72,7 +72,5 @@ def connect_encoder(spec: str, folder: Path | None = None) -> PictureEncoder | N
     if folder is None:
         return encoder
     return registry.load_backend(
-        "wrapper",
-        "kept",
-        {"kept": "corporeal.reconstruction.features.feature_map_cache:CachedEncoder"},
+        "wrapper", "kept", {"kept": "corporeal.reconstruction.features.feature_map_cache:CachedEncoder"}
     )(encoder, folder)

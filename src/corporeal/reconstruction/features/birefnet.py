@@ -35,9 +35,7 @@ class BiRefNet:
     def __init__(self, folder: Path) -> None:
         found = [folder / name for name in MODEL_FILES if (folder / name).is_file()]
         if not found:
-            raise BadFileError(
-                folder, f"there is no {' or '.join(MODEL_FILES)}.", "Fetch BiRefNet as ONNX."
-            )
+            raise BadFileError(folder, f"there is no {' or '.join(MODEL_FILES)}.", "Fetch BiRefNet as ONNX.")
         self.file = found[0]
 
     def name(self) -> str:

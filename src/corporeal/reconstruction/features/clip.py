@@ -1,8 +1,7 @@
 """Dense CLIP features, comparable with words.
 
-CLIP (Radford et al. 2021) gives one vector per picture. Its last layer's value path, without the
-attention that would mix the patches, gives one per patch (MaskCLIP, Zhou et al., ECCV 2022; F3RM,
-Shen et al., CoRL 2023).
+CLIP (Radford et al. 2021) gives one vector per picture. Its last layer's value path, without the attention that would
+mix the patches, gives one per patch (MaskCLIP, Zhou et al., ECCV 2022; F3RM, Shen et al., CoRL 2023).
 """
 
 from collections.abc import Sequence
@@ -16,12 +15,7 @@ from transformers import CLIPModel, CLIPTokenizer  # pyright: ignore[reportMissi
 from transformers.utils import logging  # pyright: ignore[reportMissingImports]
 
 from corporeal.reconstruction.features.model_weights import PREPROCESSOR_FILE, find_weights
-from corporeal.reconstruction.features.vit_pictures import (
-    feature_map,
-    patch_grid,
-    prepare_picture,
-    unit_rows,
-)
+from corporeal.reconstruction.features.vit_pictures import feature_map, patch_grid, prepare_picture, unit_rows
 
 DEFAULT_CLIP = "openai/clip-vit-large-patch14-336"
 TOKENIZER_FILES = ("tokenizer.json", "vocab.json")
@@ -105,9 +99,9 @@ class Clip:
 def dense_features(model: Any, pixels: torch.Tensor) -> torch.Tensor:
     """Return B x (h w) x D features of patches in the space that words share.
 
-    All layers but the last as they are; of that one ``layer_norm1 → v_proj → out_proj``, then
-    ``post_layernorm → visual_projection``: no residual, no MLP. Positions are interpolated for
-    pictures of another size than the model was trained on.
+    All layers but the last as they are; of that one ``layer_norm1 → v_proj → out_proj``, then ``post_layernorm →
+    visual_projection``: no residual, no MLP. Positions are interpolated for pictures of another size than the model was
+    trained on.
     """
     vision = model.vision_model
     hidden = vision.pre_layrnorm(vision.embeddings(pixels, interpolate_pos_encoding=True))

@@ -1,10 +1,9 @@
 """Lifting of feature maps to points: mean over the views that see a point.
 
-Two ways to say how much of which pixel belongs to a point, and one sum over the views:
-``back_projection`` asks where the point falls and whether it is seen there; ``uplift_features``
-takes the weights a rasteriser blended Gaussians with. With the density frozen, training features by
-rendering them is a sparse linear problem of which that sum is the normalised first step (Marrie et
-al., "LUDVIG", ICCV 2025; "Splat Feature Solver", arXiv 2508.12216).
+Two ways to say how much of which pixel belongs to a point, and one sum over the views: ``back_projection`` asks where
+the point falls and whether it is seen there; ``uplift_features`` takes the weights a rasteriser blended Gaussians with.
+With the density frozen, training features by rendering them is a sparse linear problem of which that sum is the
+normalised first step (Marrie et al., "LUDVIG", ICCV 2025; "Splat Feature Solver", arXiv 2508.12216).
 """
 
 from collections.abc import Callable, Sequence
@@ -22,8 +21,8 @@ from corporeal.geometry.grid_interpolation import bilinear_weights
 from corporeal.reconstruction.features.vit_pictures import row_batches, unit_rows
 
 MIN_VIEW_WEIGHT_PX = 0.1
-"""A Gaussian that has less weight in a view is not seen in it [px]: what little shows of those
-behind shows through others' soft edges, at outlines, where the map is another object's."""
+"""A Gaussian that has less weight in a view is not seen in it [px]: what little shows of those behind shows through
+others' soft edges, at outlines, where the map is another object's."""
 DEPTH_TOLERANCE = 0.005
 """A point this much deeper than what its pixel shows is still seen, as a share of its depth."""
 DEPTH_CONTINUATION_PX = 0.75
@@ -52,22 +51,19 @@ class LiftedFeatures:
         return made
 
 
-def lift_features(
-    weights: PointWeights, maps: Sequence[np.ndarray], count: int, least: float = 0.0
-) -> LiftedFeatures:
+def lift_features(weights: PointWeights, maps: Sequence[np.ndarray], count: int, least: float = 0.0) -> LiftedFeatures:
     """Average maps onto points, each place by its weight.
 
     f_n = Σ_v Σ_c W_v[n, c] F_v[c] / Σ_v Σ_c W_v[n, c]
 
-    Maps are taken one after the other, so that they may be read when they are asked for. Memory:
-    one float32 per point and channel, and a little.
+    Maps are taken one after the other, so that they may be read when they are asked for. Memory: one float32 per point
+    and channel, and a little.
 
     Args:
         weights: Of each view.
         maps: Of each view, h x w x D.
         count: Number of points N.
-        least: Weight in a view from which a point counts as seen in it, and below which that view
-            has no say.
+        least: Weight in a view from which a point counts as seen in it, and below which that view has no say.
 
     Raises:
         UserError: A map's size does not agree with its weights', or with the other maps' depth.
@@ -128,29 +124,25 @@ def uplift_features(
     """Average maps onto Gaussians, each place by the weight that the Gaussian was blended with.
 
     Args:
-        weights: View → blending weights T α [px] of each Gaussian (row) in each cell (column, row
-            by row of cells), summed over the cell's pixels.
+        weights: View → blending weights T α [px] of each Gaussian (row) in each cell (column, row by row of cells),
+            summed over the cell's pixels.
         cells: Rows and columns of cells that cover a picture.
         maps: Of each view, h x w x D, over the same picture, in any resolution.
         count: Number of Gaussians.
-        least: Weight in a view from which a Gaussian counts as seen in it [px]; less where there
-            are more Gaussians than pixels.
+        least: Weight in a view from which a Gaussian counts as seen in it [px]; less where there are more Gaussians
+            than pixels.
 
     """
     return lift_features(_resample_maps(weights, cells, maps), maps, count, least)
 
 
-def _resample_maps(
-    weights: PointWeights, cells: tuple[int, int], maps: Sequence[np.ndarray]
-) -> PointWeights:
+def _resample_maps(weights: PointWeights, cells: tuple[int, int], maps: Sequence[np.ndarray]) -> PointWeights:
     def of(view: int) -> csr_array:
         size = maps[view].shape[:2]
         share = weights(view)
         given = _map_size(share)[1]
         if given != cells[0] * cells[1]:
-            raise UserError(
-                f"View {view} has weights for {given} cells, not {cells[0]} x {cells[1]}."
-            )
+            raise UserError(f"View {view} has weights for {given} cells, not {cells[0]} x {cells[1]}.")
         if tuple(size) == tuple(cells):
             return share
         y, x = np.divmod(np.arange(cells[0] * cells[1]), cells[1])
@@ -191,16 +183,13 @@ def back_projection(
 
 
 def visible_points(
-    position: Float[np.ndarray, "N 3"],
-    camera: Camera,
-    depth: Float[np.ndarray, "H W"],
-    leeway: float = DEPTH_TOLERANCE,
+    position: Float[np.ndarray, "N 3"], camera: Camera, depth: Float[np.ndarray, "H W"], leeway: float = DEPTH_TOLERANCE
 ) -> Bool[np.ndarray, " N"]:
     """Return which points nothing hides from a camera.
 
-    A pixel's depth is that of its middle, and a point falls beside it: depth is continued along the
-    surface by the smaller of the two differences to the neighbours on either side, in each
-    direction, which at an outline is the one that stays on the surface.
+    A pixel's depth is that of its middle, and a point falls beside it: depth is continued along the surface by the
+    smaller of the two differences to the neighbours on either side, in each direction, which at an outline is the one
+    that stays on the surface.
     """
     place, z = _project_points(position, camera)
     return _visible_at(place, z, depth, camera.K[0, 0], leeway)
@@ -216,9 +205,7 @@ def _project_points(position: np.ndarray, camera: Camera) -> tuple[np.ndarray, n
     return flat[:, :2] / ahead[:, None], z
 
 
-def _visible_at(
-    place: np.ndarray, z: np.ndarray, depth: np.ndarray, focal: float, leeway: float
-) -> np.ndarray:
+def _visible_at(place: np.ndarray, z: np.ndarray, depth: np.ndarray, focal: float, leeway: float) -> np.ndarray:
     high, wide = depth.shape
     column, row = np.floor(place).astype(np.int64).T
     inside = (z > 0) & (column >= 0) & (column < wide) & (row >= 0) & (row < high)
@@ -238,9 +225,7 @@ def _depth_slope(depth: np.ndarray, axis: int) -> np.ndarray:
     step = np.where(np.isfinite(step), step, np.inf)
     first, last = [(0, 0), (0, 0)], [(0, 0), (0, 0)]
     first[axis], last[axis] = (1, 0), (0, 1)
-    smaller = np.minimum(
-        np.pad(step, first, constant_values=np.inf), np.pad(step, last, constant_values=np.inf)
-    )
+    smaller = np.minimum(np.pad(step, first, constant_values=np.inf), np.pad(step, last, constant_values=np.inf))
     return np.where(np.isfinite(smaller), smaller, 0.0)
 
 
@@ -262,10 +247,7 @@ def fill_unseen_points(
     if not len(missing):
         return lifted
     if not len(known):
-        raise UserError(
-            "No view shows any of the points. Check that cameras and points share one frame and "
-            "one unit."
-        )
+        raise UserError("No view shows any of the points. Check that cameras and points share one frame and one unit.")
     near = min(neighbours, len(known))
     distance, who = KDTree(position[known]).query(position[missing], k=near)
     distance, who = distance.reshape(-1, near), who.reshape(-1, near)

@@ -21,12 +21,7 @@ from corporeal.io.photos.mask_files import (
     write_mask,
     write_mask_record,
 )
-from corporeal.io.photos.posed_photos import (
-    INSTANCE_FOLDERS,
-    MASK_FOLDERS,
-    list_posed_photos,
-    read_posed_photos,
-)
+from corporeal.io.photos.posed_photos import INSTANCE_FOLDERS, MASK_FOLDERS, list_posed_photos, read_posed_photos
 from corporeal.multiview.epipolar import projection_matrix
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.features.mask_models import MaskInstance, MaskModel
@@ -59,15 +54,15 @@ def learned_masks(
 
     Args:
         source: A folder of photographs with poses.
-        folder: Gets ``masks``, ``instances`` and ``masks.json``. Those that lie there by the same
-            model are kept, with their corrections.
+        folder: Gets ``masks``, ``instances`` and ``masks.json``. Those that lie there by the same model are kept, with
+            their corrections.
         masker: The model.
         words: What is looked for.
         progress: Called with the fraction done and a description.
 
     Raises:
-        UserError: The photographs or the weights cannot be used, words are missing, or most
-            photographs show nothing that was looked for.
+        UserError: The photographs or the weights cannot be used, words are missing, or most photographs show nothing
+            that was looked for.
 
     """
     if masker.needs_words and not words:
@@ -116,9 +111,7 @@ def _ask_for_masks(
     return counts
 
 
-def number_instances(
-    found: Sequence[MaskInstance], size: tuple[int, int]
-) -> Int[np.ndarray, "H W"]:
+def number_instances(found: Sequence[MaskInstance], size: tuple[int, int]) -> Int[np.ndarray, "H W"]:
     """Return which object each pixel shows, 1 for the surest; 0: none. Surer ones are in front."""
     number = np.zeros(size, np.int64)
     for k, instance in reversed([*enumerate(found)]):
@@ -144,6 +137,4 @@ def _read_picture(shot: PosedPhotoFile) -> UInt8[np.ndarray, "H W 3"]:
     picture = decode_image(shot.picture.read_bytes(), MAX_MODEL_PICTURE_PX)[..., :3]
     size = stored_size(shot)
     turned = size is not None and (size[0] > size[1]) != (picture.shape[1] > picture.shape[0])
-    return np.ascontiguousarray(
-        np.rot90(picture, exif_quarter_turns_of_file(shot.picture)) if turned else picture
-    )
+    return np.ascontiguousarray(np.rot90(picture, exif_quarter_turns_of_file(shot.picture)) if turned else picture)

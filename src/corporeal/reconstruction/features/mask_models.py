@@ -69,9 +69,7 @@ def split_model_spec(spec: str) -> tuple[str, str] | None:
     if not colon or not kind.isalnum() or len(kind) == 1 or Path(spec).exists():
         return None
     if kind not in MASK_MODEL_REGISTRY:
-        raise UnknownChoiceError(
-            "kind of masks", kind, [*MASK_MODEL_REGISTRY, "or a folder of masks"]
-        )
+        raise UnknownChoiceError("kind of masks", kind, [*MASK_MODEL_REGISTRY, "or a folder of masks"])
     return kind, place
 
 
@@ -79,8 +77,8 @@ def connect_mask_model(spec: str) -> MaskModel:
     """Connect to ``"sam3:FOLDER"`` and the like.
 
     Raises:
-        UserError: The name is unknown, its packages are not installed, or the folder holds no such
-            weights. Nothing is fetched.
+        UserError: The name is unknown, its packages are not installed, or the folder holds no such weights. Nothing is
+            fetched.
 
     """
     named = split_model_spec(spec)

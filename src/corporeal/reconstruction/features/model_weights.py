@@ -65,9 +65,7 @@ class ModelWeights:
         """
         kind = self.read(CONFIG_FILE).get("model_type")
         if kind != self.kind:
-            raise BadFileError(
-                self.place, f"holds a model of kind {kind!r}, not {self.kind!r}.", "Name another."
-            )
+            raise BadFileError(self.place, f"holds a model of kind {kind!r}, not {self.kind!r}.", "Name another.")
 
     def holds(self, names: Sequence[str]) -> None:
         """Reject a folder that has none of some files; ``transformers`` would make something up.
@@ -77,9 +75,7 @@ class ModelWeights:
 
         """
         if self.local and not any((Path(self.place) / name).is_file() for name in names):
-            raise BadFileError(
-                self.place, f"there is no {' or '.join(names)}.", "Save it with save_pretrained."
-            )
+            raise BadFileError(self.place, f"there is no {' or '.join(names)}.", "Save it with save_pretrained.")
 
     def load(self, cls: Any) -> Any:
         """Load a model's weights with the class that ``transformers`` has for them.
@@ -97,9 +93,7 @@ class ModelWeights:
         if report["missing_keys"] or report["mismatched_keys"]:
             lacking = sorted(map(str, [*report["missing_keys"], *report["mismatched_keys"]]))
             raise BadFileError(
-                self.place,
-                f"lacks {len(lacking)} of the model's arrays ({lacking[0]} …).",
-                "Fetch it again.",
+                self.place, f"lacks {len(lacking)} of the model's arrays ({lacking[0]} …).", "Fetch it again."
             )
         return model.eval()
 

@@ -12,11 +12,7 @@ from jaxtyping import Float, Float16, Int
 from skimage.color import rgb2lab
 
 from corporeal.core.types import Camera
-from corporeal.multiview.point_cloud_geometry import (
-    medial_ball_thickness,
-    nearest_neighbours,
-    point_normals,
-)
+from corporeal.multiview.point_cloud_geometry import medial_ball_thickness, nearest_neighbours, point_normals
 
 GREY_LAB = np.array([50.0, 0.0, 0.0])
 """The middle of CIELAB."""
@@ -62,8 +58,8 @@ def point_descriptor(
 ) -> Float16[np.ndarray, "N 11"]:
     """Describe every point by a unit vector.
 
-    All looks, weighted, are x, |x| ≤ R; the descriptor is (x, √(R² − |x|²)) / R. So equal looks
-    make equal vectors, and others are at least |x − y| / R apart.
+    All looks, weighted, are x, |x| ≤ R; the descriptor is (x, √(R² − |x|²)) / R. So equal looks make equal vectors, and
+    others are at least |x − y| / R apart.
 
     Args:
         position: World [m].
@@ -82,11 +78,7 @@ def point_descriptor(
         (config.spread, MAX_COLOUR_SPREAD_LAB100, _colour_spread(hue, near)[:, None]),
         (config.normal, 1.0, normal),
         (config.finish, np.sqrt(0.5), known - 0.5),
-        (
-            config.thickness,
-            0.5,
-            _thickness_share(medial_ball_thickness(position, normal), position)[:, None],
-        ),
+        (config.thickness, 0.5, _thickness_share(medial_ball_thickness(position, normal), position)[:, None]),
     )
     radius = np.sqrt(sum((weight * bound) ** 2 for weight, bound, _ in features))
     x = np.concatenate([weight * feature for weight, _, feature in features], axis=1)
@@ -104,17 +96,12 @@ def _colour_spread(hue: np.ndarray, near: Int[np.ndarray, "N k"]) -> np.ndarray:
 def _thickness_share(thick: np.ndarray, position: np.ndarray) -> np.ndarray:
     """Return thickness between -0.5 and 0.5, from thinnest to all of the extent."""
     extent = np.linalg.norm(np.ptp(position, axis=0))
-    share = (
-        np.clip(thick / extent, MIN_THICKNESS_FRACTION, 1) if extent > 0 else np.ones(len(thick))
-    )
+    share = np.clip(thick / extent, MIN_THICKNESS_FRACTION, 1) if extent > 0 else np.ones(len(thick))
     return 0.5 - np.log(share) / np.log(MIN_THICKNESS_FRACTION)
 
 
 def mean_view_directions(
-    position: Float[np.ndarray, "N 3"],
-    cameras: Sequence[Camera],
-    shares: Sequence[np.ndarray],
-    least: float = 0.0,
+    position: Float[np.ndarray, "N 3"], cameras: Sequence[Camera], shares: Sequence[np.ndarray], least: float = 0.0
 ) -> Float[np.ndarray, "N 3"]:
     """Return the mean direction that points are seen from; its length says nothing.
 
@@ -123,10 +110,10 @@ def mean_view_directions(
     Args:
         position: World [m].
         cameras: One per view.
-        shares: Of each view, how much each point has to show in it: 0 or 1 from
-            ``lifting.visible``, or a Gaussian's weight.
-        least: Views with a smaller share speak for the other side. Gaussians let some light
-            through, so that all views see a little of what is behind others.
+        shares: Of each view, how much each point has to show in it: 0 or 1 from ``lifting.visible``, or a Gaussian's
+            weight.
+        least: Views with a smaller share speak for the other side. Gaussians let some light through, so that all views
+            see a little of what is behind others.
 
     """
     seen, ahead = np.zeros(position.shape), np.zeros(position.shape)

@@ -15,14 +15,11 @@ from corporeal.reconstruction.features.feature_lifting import (
     fill_unseen_points,
     visible_points,
 )
-from corporeal.reconstruction.features.point_descriptor import (
-    mean_view_directions,
-    point_descriptor,
-)
+from corporeal.reconstruction.features.point_descriptor import mean_view_directions, point_descriptor
 
 LEARNED_DEPTH_TOLERANCE = 0.02
-"""A learned point this much deeper than what its pixel shows is still seen, as a share of its
-depth: learned points lie in a layer, not on a surface."""
+"""A learned point this much deeper than what its pixel shows is still seen, as a share of its depth: learned points lie
+in a layer, not on a surface."""
 
 PictureSource = Callable[[], Sequence[np.ndarray]]
 """Gives one picture per view."""
@@ -57,9 +54,7 @@ def points_by_projection(
 ) -> PlacedPoints:
     """Return points that take what they look like from where they fall, see ``back_projection``."""
     pairs = zip(cameras, depth, strict=True)
-    shown = np.stack(
-        [visible_points(position, camera, d, LEARNED_DEPTH_TOLERANCE) for camera, d in pairs]
-    )
+    shown = np.stack([visible_points(position, camera, d, LEARNED_DEPTH_TOLERANCE) for camera, d in pairs])
     outside, seen = mean_view_directions(position, cameras, list(shown)), shown.sum(axis=0)
 
     def lift(maps: Sequence[np.ndarray]) -> LiftedFeatures:
@@ -69,10 +64,7 @@ def points_by_projection(
 
 
 def add_point_features(
-    placed: PlacedPoints,
-    pictures: PictureSource,
-    specs: tuple[str, str],
-    folder: Path | None = None,
+    placed: PlacedPoints, pictures: PictureSource, specs: tuple[str, str], folder: Path | None = None
 ) -> FeatureCloud:
     """Return points with what they look like.
 

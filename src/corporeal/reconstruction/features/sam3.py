@@ -65,15 +65,10 @@ class Sam3:
 
     def _named(self, seen: Any, word: str, size: tuple[int, int]) -> list[MaskInstance]:
         longest = self.model.config.text_config.max_position_embeddings
-        tokens = self._tokenizer(
-            [word], padding="max_length", truncation=True, max_length=longest, return_tensors="pt"
-        )
+        tokens = self._tokenizer([word], padding="max_length", truncation=True, max_length=longest, return_tensors="pt")
         said = self.model(vision_embeds=seen, **tokens)
         score = said.pred_logits[0].sigmoid()
         if said.presence_logits is not None:
             score = score * said.presence_logits[0].sigmoid()
         found = torch.nonzero(score > self.min_score)[:, 0].tolist()
-        return [
-            MaskInstance(enlarge_logits(said.pred_masks[0, k], size) > 0, float(score[k]), word)
-            for k in found
-        ]
+        return [MaskInstance(enlarge_logits(said.pred_masks[0, k], size) > 0, float(score[k]), word) for k in found]

@@ -39,8 +39,8 @@ MAX_U8 = 255.0
 def patch_grid(picture: UInt8[np.ndarray, "H W 3"], side: int, patch: int) -> tuple[int, int]:
     """Return how many rows and columns of patches cover a picture.
 
-    Its shorter side becomes ``side`` pixels, the other one keeps the proportions; both are rounded
-    to whole patches, so that the map covers all of the picture and nothing else.
+    Its shorter side becomes ``side`` pixels, the other one keeps the proportions; both are rounded to whole patches, so
+    that the map covers all of the picture and nothing else.
     """
     high, wide = picture.shape[:2]
     scale = side / min(high, wide) / patch
@@ -72,7 +72,5 @@ def feature_map(patches: torch.Tensor, size: tuple[int, int]) -> Float16[np.ndar
 
 def enlarge_logits(logits: torch.Tensor, size: tuple[int, int]) -> Float32[np.ndarray, "H W"]:
     """Return a map of logits at a picture's size (rows, columns), interpolated."""
-    large = torch.nn.functional.interpolate(
-        logits[None, None].float(), size=size, mode="bilinear", align_corners=False
-    )
+    large = torch.nn.functional.interpolate(logits[None, None].float(), size=size, mode="bilinear", align_corners=False)
     return large[0, 0].numpy()

@@ -1,7 +1,7 @@
 """Background model for textureless surroundings: a floor under a dome.
 
-A floor without texture agrees with itself at any depth. Were nothing known of it, Gaussians would
-float before single cameras; a plane that the rest of the floor is on says where it belongs.
+A floor without texture agrees with itself at any depth. Were nothing known of it, Gaussians would float before single
+cameras; a plane that the rest of the floor is on says where it belongs.
 """
 
 from dataclasses import dataclass
@@ -41,9 +41,7 @@ class BackgroundModel:
     thick: float
     """Distance from the floor of what is on it [m]."""
 
-    def reach(
-        self, eye: Float[np.ndarray, "N 3"], ray: Float[np.ndarray, "N 3"]
-    ) -> Float[np.ndarray, " N"]:
+    def reach(self, eye: Float[np.ndarray, "N 3"], ray: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
         """Return how far along rays from within floor or dome are, in lengths of the ray."""
         out = eye - self.centre
         a, b = (ray * ray).sum(axis=1), (ray * out).sum(axis=1)

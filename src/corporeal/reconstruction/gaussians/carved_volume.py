@@ -22,8 +22,8 @@ def carve_volume(
 ) -> CarvedVolume:
     """Carve the visual hull, and empty it where stereo sees past it and points were seen through.
 
-    Points are where they are to a part of a pixel, so that nothing is ever learned on the way to
-    them. What stereo sees past is only where nothing begins: thin walls come back.
+    Points are where they are to a part of a pixel, so that nothing is ever learned on the way to them. What stereo sees
+    past is only where nothing begins: thin walls come back.
 
     lines: from the views' cameras; None: nothing is known to be seen through it.
     config: how the hull is carved.

@@ -1,12 +1,12 @@
 """Densification: dead Gaussians move to where live ones are, and more join them.
 
-3DGS-MCMC (Kheradmand et al. 2024): a new one takes the place of a share of an old one such that
-their sum looks as before.
+3DGS-MCMC (Kheradmand et al. 2024): a new one takes the place of a share of an old one such that their sum looks as
+before.
 
 Scale limits of Gaussians, and trainable parameters.
 
-Where masks forbid haze, there is one limit for all, if any. Where there are none, what is wide is
-flat, and small in every picture; what few views see has one colour for all sides.
+Where masks forbid haze, there is one limit for all, if any. Where there are none, what is wide is flat, and small in
+every picture; what few views see has one colour for all sides.
 """
 
 from math import comb
@@ -34,9 +34,8 @@ MAX_SCALE_RADII = 10.0
 """No scale is more, in radii of what the cameras look at."""
 
 ScaleLimits = Float32[np.ndarray, "N 4"]
-"""Of each Gaussian: logarithms of the greatest scale and of the greatest least scale that it may
-have; how many of its numbers move; whether it stays as it is, moments too, while out of the picture
-(1), or fades (0)."""
+"""Of each Gaussian: logarithms of the greatest scale and of the greatest least scale that it may have; how many of its
+numbers move; whether it stays as it is, moments too, while out of the picture (1), or fades (0)."""
 
 
 def equal_scale_limits(theta: ParameterMatrix, widest: float) -> ScaleLimits:
@@ -66,9 +65,7 @@ GROWTH_FACTOR = 1.05
 """Factor by which their number grows a round."""
 MAX_COPIES = 51
 """As many stand in for one at most."""
-BINOMIAL_COEFFICIENTS = np.array(
-    [[comb(i, k) * (-1.0) ** k for k in range(MAX_COPIES)] for i in range(MAX_COPIES)]
-)
+BINOMIAL_COEFFICIENTS = np.array([[comb(i, k) * (-1.0) ** k for k in range(MAX_COPIES)] for i in range(MAX_COPIES)])
 
 
 def densify(
@@ -119,25 +116,16 @@ def split_opacity_and_scale(
 def random_steps(theta: ParameterMatrix, reach: float, rng: np.random.Generator) -> ParameterMatrix:
     """Return steps at random for the means, in the shape of each Gaussian; opaque ones stay.
 
-    reach: in standard deviations. Σ^½ η reach / (1 + exp(100 (o - 0.005))), η normal. The paper has
-    Σ for Σ^½, which makes the reach depend on the unit of length.
+    reach: in standard deviations. Σ^½ η reach / (1 + exp(100 (o - 0.005))), η normal. The paper has Σ for Σ^½, which
+    makes the reach depend on the unit of length.
     """
-    q = (
-        theta[:, PARAM_ROTATION:PARAM_SCALE]
-        / np.linalg.norm(theta[:, PARAM_ROTATION:PARAM_SCALE], axis=1)[:, None]
-    )
+    q = theta[:, PARAM_ROTATION:PARAM_SCALE] / np.linalg.norm(theta[:, PARAM_ROTATION:PARAM_SCALE], axis=1)[:, None]
     loose = reach / (1 + np.exp(np.minimum(100 * (opacities(theta) - DEAD_OPACITY), 80)))
-    step = (
-        loose[:, None]
-        * np.exp(theta[:, PARAM_SCALE:PARAM_OPACITY])
-        * rng.normal(size=(len(theta), 3))
-    )
+    step = loose[:, None] * np.exp(theta[:, PARAM_SCALE:PARAM_OPACITY]) * rng.normal(size=(len(theta), 3))
     return rotate_by_quaternions(q, step).astype(np.float32)
 
 
-def rotate_by_quaternions(
-    q: Float[np.ndarray, "N 4"], x: Float[np.ndarray, "N 3"]
-) -> Float[np.ndarray, "N 3"]:
+def rotate_by_quaternions(q: Float[np.ndarray, "N 4"], x: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
     """Return vectors turned by unit quaternions."""
     t = 2 * np.cross(q[:, 1:], x)
     return x + q[:, :1] * t + np.cross(q[:, 1:], t)

@@ -11,12 +11,7 @@ from corporeal.reconstruction.gaussians.gaussian_initialisation import free_dept
 from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
 from corporeal.reconstruction.gaussians.kernels_project import PinholeCamera
 from corporeal.reconstruction.gaussians.kernels_space_carving import depth_slopes, meet_surfaces
-from corporeal.reconstruction.gaussians.rasteriser_numba import (
-    deal_tiles,
-    draw,
-    picture_of_drawing,
-    pinhole_of_camera,
-)
+from corporeal.reconstruction.gaussians.rasteriser_numba import deal_tiles, draw, picture_of_drawing, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 
@@ -36,9 +31,7 @@ class DepthRendering:
     """Cameras as kernels read them: camera from world (3 × 4), fx, fy, cx, cy, width, height."""
 
 
-def render_depth(
-    gaussians: Gaussians, cameras: tuple[Camera, ...], pool: ThreadPool
-) -> DepthRendering:
+def render_depth(gaussians: Gaussians, cameras: tuple[Camera, ...], pool: ThreadPool) -> DepthRendering:
     """Render Gaussians, and their depth, from every camera."""
     theta, clear = parameters_of_gaussians(gaussians), free_depths(cameras)
     eyes = [pinhole_of_camera(c, near=near) for c, near in zip(cameras, clear, strict=True)]
@@ -64,9 +57,7 @@ def render_depth(
 
 
 def restrict_depth_to_objects(
-    rendering: DepthRendering,
-    of_object: Bool[np.ndarray, " N"],
-    masks: Bool[np.ndarray, "V H W"] | None,
+    rendering: DepthRendering, of_object: Bool[np.ndarray, " N"], masks: Bool[np.ndarray, "V H W"] | None
 ) -> DepthRendering:
     """Let only what is of objects be met; where masks have none, nothing is there.
 

@@ -1,7 +1,7 @@
 """Per-photograph gains for exposure and white balance.
 
-One gain for each photograph and channel, on sRGB values: an exposure multiplies light, and sRGB is
-nearly a power of light. Gains are relative: their geometric mean over all photographs is 1.
+One gain for each photograph and channel, on sRGB values: an exposure multiplies light, and sRGB is nearly a power of
+light. Gains are relative: their geometric mean over all photographs is 1.
 """
 
 import numpy as np

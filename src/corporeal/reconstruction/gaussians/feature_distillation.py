@@ -1,9 +1,9 @@
 """Feature distillation: features in space, from a model's maps on pictures, as a radiance field.
 
-A map's feature f on a ray is to be Σ w F, the field's features weighted as its colours are (F3RM,
-Shen et al., CoRL 2023). Density stays as it is, so that w is known and F solves a sparse linear
-system. It is approached from 0 by simultaneous iterative reconstruction (Gilbert 1972): every
-node's F moves by the mean of what is missing on the rays that it is seen on, each by its weight.
+A map's feature f on a ray is to be Σ w F, the field's features weighted as its colours are (F3RM, Shen et al., CoRL
+2023). Density stays as it is, so that w is known and F solves a sparse linear system. It is approached from 0 by
+simultaneous iterative reconstruction (Gilbert 1972): every node's F moves by the mean of what is missing on the rays
+that it is seen on, each by its weight.
 """
 
 from collections.abc import Sequence
@@ -17,19 +17,15 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Camera
 from corporeal.geometry.grid_interpolation import bilinear_weights, trilinear_weights
 from corporeal.reconstruction.gaussians import kernels_radiance
-from corporeal.reconstruction.gaussians.radiance_field import (
-    RadianceField,
-    field_arrays,
-    field_camera_rows,
-)
+from corporeal.reconstruction.gaussians.radiance_field import RadianceField, field_arrays, field_camera_rows
 from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 NODE_SPACING_RATIO = 2
 """Distance between nodes, in those of the field: maps of features are no finer."""
 DISTILLATION_ITERATIONS = 2
-"""Of moving features towards the maps; the first is the mean over all rays. With more, features are
-sharper, and so is noise: of maps that disagree."""
+"""Of moving features towards the maps; the first is the mean over all rays. With more, features are sharper, and so is
+noise: of maps that disagree."""
 RAYS_ACROSS_PICTURE = 96
 """Rays along a picture's shorter side."""
 MIN_LIGHT_FRACTION = 0.02
@@ -53,9 +49,7 @@ class FeatureField:
 
     def at(self, position: Float[np.ndarray, "N 3"]) -> Float32[np.ndarray, "N D"]:
         """Return features at places [m], between nodes that have some; 0 where none around has."""
-        share = trilinear_weights(
-            (position - np.array(self.grid.low)) / self.grid.cell, self.grid.shape
-        )
+        share = trilinear_weights((position - np.array(self.grid.low)) / self.grid.cell, self.grid.shape)
         known = np.flatnonzero(self.row >= 0)
         own = csr_array(share[:, known], dtype=np.float32)
         total = np.asarray(own.sum(axis=1))[:, None]
@@ -97,9 +91,7 @@ def distil_features(
     """
     _check(cameras, maps)
     x, y, z = (-(-(n - 1) // NODE_SPACING_RATIO) + 1 for n in field.row.shape)
-    grid = VoxelGrid(
-        field.grid.low, NODE_SPACING_RATIO * field.grid.cell, (max(x, 2), max(y, 2), max(z, 2))
-    )
+    grid = VoxelGrid(field.grid.low, NODE_SPACING_RATIO * field.grid.cell, (max(x, 2), max(y, 2), max(z, 2)))
     # What each ray sees of the nodes, weighted as its colours are, and of the map.
     with ThreadPool(threads) as pool:
         seen = _view_rays(field, grid, cameras, [m.shape[:2] for m in maps], pool)
@@ -117,9 +109,7 @@ def distil_features(
     values = np.empty((len(known), maps[0].shape[2]), np.float16)
     # Iterative reconstruction, some channels at a time: what is missing on rays, back to nodes.
     for some in _batches(values.shape[1]):
-        aim = np.concatenate(
-            [one.place @ _flat(m[..., some]) for one, m in zip(seen, maps, strict=True)]
-        )
+        aim = np.concatenate([one.place @ _flat(m[..., some]) for one, m in zip(seen, maps, strict=True)])
         made = np.zeros((len(known), aim.shape[1]), np.float32)
         for _ in range(rounds):
             made += each * (back @ (aim - share @ made))
@@ -132,17 +122,11 @@ def _check(cameras: Sequence[Camera], maps: Sequence[np.ndarray]) -> None:
         raise UserError(f"There are {len(maps)} maps for {len(cameras)} cameras. Give one each.")
     depths = sorted({m.shape[2] for m in maps})
     if len(depths) > 1:
-        raise UserError(
-            f"Maps have {depths[0]} and {depths[-1]} channels. Make all with one model."
-        )
+        raise UserError(f"Maps have {depths[0]} and {depths[-1]} channels. Make all with one model.")
 
 
 def _view_rays(
-    field: RadianceField,
-    grid: VoxelGrid,
-    cameras: Sequence[Camera],
-    sizes: Sequence[tuple[int, int]],
-    pool: ThreadPool,
+    field: RadianceField, grid: VoxelGrid, cameras: Sequence[Camera], sizes: Sequence[tuple[int, int]], pool: ThreadPool
 ) -> list[_ViewRays]:
     rows, walk = field_camera_rows(field.grid, tuple(cameras)), field_arrays(field)
     made = []
@@ -155,9 +139,7 @@ def _view_rays(
         spans = [slice(*span) for span in pool.spans(len(pixels))]
         deals = [(pixels[d], *rest, count[d], place[d], weight[d]) for d in spans]
         pool.each(kernels_radiance.light_sources, deals)
-        made.append(
-            _ray_by_ray(camera, pixels, place / NODE_SPACING_RATIO, weight, grid.shape, size)
-        )
+        made.append(_ray_by_ray(camera, pixels, place / NODE_SPACING_RATIO, weight, grid.shape, size))
     return made
 
 
@@ -192,6 +174,4 @@ def _flat(pixels: np.ndarray) -> Float32[np.ndarray, "P C"]:
 
 
 def _batches(count: int) -> list[slice]:
-    return [
-        slice(k, min(k + CHANNELS_PER_BATCH, count)) for k in range(0, count, CHANNELS_PER_BATCH)
-    ]
+    return [slice(k, min(k + CHANNELS_PER_BATCH, count)) for k in range(0, count, CHANNELS_PER_BATCH)]

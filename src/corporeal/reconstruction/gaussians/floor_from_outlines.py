@@ -1,11 +1,10 @@
 """Height of the floor from the outlines of objects.
 
-Gaussians show it badly: undersides are not seen, and what all masks allow bulges below them. But
-where an object touches the floor its lower outlines all meet: a ray through an outline touches what
-all masks allow in a short stretch there, and that lies on the object. Of what stands on a flat foot
-most rays say the same height but for noise, and the floor is there: the lowest of them are wrong by
-twice their noise. What is round below touches no outline where it touches the floor, and its rays
-say many heights.
+Gaussians show it badly: undersides are not seen, and what all masks allow bulges below them. But where an object
+touches the floor its lower outlines all meet: a ray through an outline touches what all masks allow in a short stretch
+there, and that lies on the object. Of what stands on a flat foot most rays say the same height but for noise, and the
+floor is there: the lowest of them are wrong by twice their noise. What is round below touches no outline where it
+touches the floor, and its rays say many heights.
 """
 
 import numpy as np
@@ -16,12 +15,7 @@ from corporeal.core.types import Camera, Views
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.visual_hull import (
-    VisualHull,
-    camera_rows,
-    carve_tight_hull,
-    pixel_width,
-)
+from corporeal.reconstruction.gaussians.visual_hull import VisualHull, camera_rows, carve_tight_hull, pixel_width
 
 MIN_DOWN_IN_PICTURE = 0.3
 """Length of a unit vector down in a picture, below which the view is too steep to show it."""
@@ -30,8 +24,8 @@ MAX_HEIGHT_STRETCH_RADII = 0.04
 LOWEST_PERCENTILE = 5
 """Percentile of heights below which nothing is: of rays through rims, all but a few."""
 OUTLINE_ERROR_PX, MAX_HEIGHT_SPREAD_PX = 0.5, 2.0
-"""Error of outlines [px], by which heights are smoothed; and how far below the height at which most
-rays touch something the lowest may lie for these to be one height and its noise [px]."""
+"""Error of outlines [px], by which heights are smoothed; and how far below the height at which most rays touch
+something the lowest may lie for these to be one height and its noise [px]."""
 BINS_PER_OUTLINE_ERROR = 8
 """Steps of height in one such error: so finely heights are counted."""
 MIN_FLOOR_RAYS = 20
@@ -39,10 +33,7 @@ MIN_FLOOR_RAYS = 20
 
 
 def floor_height_from_outlines(
-    views: Views,
-    masks: Bool[np.ndarray, "V H W"],
-    threads: int | None = None,
-    config: HullConfig = DEFAULT_HULL,
+    views: Views, masks: Bool[np.ndarray, "V H W"], threads: int | None = None, config: HullConfig = DEFAULT_HULL
 ) -> float | None:
     """Return the height that objects stand on [m], +z up; None: outlines do not tell.
 
@@ -69,9 +60,7 @@ def _foot_height(height: Float[np.ndarray, " N"], pixel: float) -> float:
     near = height[height < least + 2 * MAX_HEIGHT_SPREAD_PX * pixel]
     step = OUTLINE_ERROR_PX * pixel / BINS_PER_OUTLINE_ERROR
     counts = np.bincount(((near - near.min()) / step).astype(int)).astype(float)
-    most = float(
-        near.min() + (gaussian_filter1d(counts, BINS_PER_OUTLINE_ERROR).argmax() + 0.5) * step
-    )
+    most = float(near.min() + (gaussian_filter1d(counts, BINS_PER_OUTLINE_ERROR).argmax() + 0.5) * step)
     return most if most - least < MAX_HEIGHT_SPREAD_PX * pixel else least
 
 

@@ -10,16 +10,13 @@ from scipy.spatial import KDTree
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Gaussians
 from corporeal.multiview.viewed_region import find_viewed_region
-from corporeal.reconstruction.gaussians.rasteriser_numba import (
-    gaussian_contributions,
-    gaussian_weights,
-)
+from corporeal.reconstruction.gaussians.rasteriser_numba import gaussian_contributions, gaussian_weights
 
 CELL_WITH_MASKS_PX, CELL_WITHOUT_MASKS_PX = 4, 16
 """Pixels along a cell in which contributions are summed, with masks and without."""
 MIN_VISIBLE_CONTRIBUTION = 0.1
-"""Least contribution to a picture, in pixels, for a view to count as having seen it. Where there
-are more Gaussians than pixels, this share of what those that show contribute in the mean."""
+"""Least contribution to a picture, in pixels, for a view to count as having seen it. Where there are more Gaussians
+than pixels, this share of what those that show contribute in the mean."""
 MIN_INSIDE_MASKS_FRACTION = 0.5
 """Share of what shows of a Gaussian that must be inside masks."""
 FAINT_OPACITY = 0.05
@@ -100,9 +97,8 @@ def foreground_gaussians(
 ) -> Bool[np.ndarray, " N"]:
     """Return which Gaussians belong to the objects.
 
-    With masks: those that show mostly inside them. Without: those that are above the floor, within
-    the ball that the cameras look at, in a fair share of the pictures, and neither faint nor as
-    wide as haze.
+    With masks: those that show mostly inside them. Without: those that are above the floor, within the ball that the
+    cameras look at, in a fair share of the pictures, and neither faint nor as wide as haze.
 
     Args:
         gaussians: In the world's frame: +z up, the floor at z = 0.
@@ -131,12 +127,7 @@ def pixels_covered(
     """Return the pixels that show mostly Gaussians of objects."""
     shares = [gaussian_weights(gaussians, c, 1)[of_objects].sum(axis=0) for c in cameras]
     pairs = zip(shares, cameras, strict=True)
-    return np.stack(
-        [
-            np.asarray(share).reshape(c.height, c.width) > COVERED_PIXEL_FRACTION
-            for share, c in pairs
-        ]
-    )
+    return np.stack([np.asarray(share).reshape(c.height, c.width) > COVERED_PIXEL_FRACTION for share, c in pairs])
 
 
 def places_near_objects(
@@ -150,9 +141,7 @@ def places_near_objects(
     return distance < NEAR_NEIGHBOUR_DISTANCES * np.maximum(apart, widest[nearest])
 
 
-def assign_hidden_gaussians(
-    gaussians: Gaussians, owner: Int[np.ndarray, " N"], floor: bool
-) -> Int[np.ndarray, " N"]:
+def assign_hidden_gaussians(gaussians: Gaussians, owner: Int[np.ndarray, " N"], floor: bool) -> Int[np.ndarray, " N"]:
     """Let faint and hidden Gaussians go with the object they are near, or they would stay behind.
 
     Faint ones are near what they reach. Where a floor is among them, only those above it go.
@@ -162,11 +151,7 @@ def assign_hidden_gaussians(
     tree = KDTree(mean[own])
     apart = float(np.median(np.asarray(tree.query(mean[own], k=2)[0])[:, 1]))
     distance, nearest = map(np.asarray, tree.query(mean[rest]))
-    reach = (
-        FAINT_REACH_SIGMAS
-        * gaussians.scale[rest].max(axis=1)
-        * (gaussians.opacity[rest] < COVERED_PIXEL_FRACTION)
-    )
+    reach = FAINT_REACH_SIGMAS * gaussians.scale[rest].max(axis=1) * (gaussians.opacity[rest] < COVERED_PIXEL_FRACTION)
     goes = (distance < np.maximum(NEAR_NEIGHBOUR_DISTANCES * apart, reach)) & (
         mean[rest, 2] > NEAR_NEIGHBOUR_DISTANCES * apart
     )
@@ -176,13 +161,11 @@ def assign_hidden_gaussians(
     return made
 
 
-def gaussians_below_floor(
-    gaussians: Gaussians, owner: Int[np.ndarray, " N"], longest: float
-) -> Bool[np.ndarray, " N"]:
+def gaussians_below_floor(gaussians: Gaussians, owner: Int[np.ndarray, " N"], longest: float) -> Bool[np.ndarray, " N"]:
     """Return which Gaussians of objects are below the floor.
 
-    Where nobody looks from below, the visual hull goes on under it, as a cone that nothing denies.
-    The floor ends the surface there; in a video of an object that is lifted the cone would show.
+    Where nobody looks from below, the visual hull goes on under it, as a cone that nothing denies. The floor ends the
+    surface there; in a video of an object that is lifted the cone would show.
 
     Args:
         gaussians: In the world's frame: +z up, the floor at z = 0.
@@ -195,10 +178,7 @@ def gaussians_below_floor(
 
 def _inside_fraction(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "h w"]:
     """Return the share of each cell that is inside."""
-    rows, columns = (
-        np.arange(0, mask.shape[0], CELL_WITH_MASKS_PX),
-        np.arange(0, mask.shape[1], CELL_WITH_MASKS_PX),
-    )
+    rows, columns = (np.arange(0, mask.shape[0], CELL_WITH_MASKS_PX), np.arange(0, mask.shape[1], CELL_WITH_MASKS_PX))
     sums = np.add.reduceat(np.add.reduceat(mask.astype(float), rows, axis=0), columns, axis=1)
     ones = np.ones(mask.shape)
     return sums / np.add.reduceat(np.add.reduceat(ones, rows, axis=0), columns, axis=1)

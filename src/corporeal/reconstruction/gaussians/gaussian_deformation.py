@@ -13,13 +13,11 @@ PROBE_DIRECTIONS = np.random.default_rng(0).normal(size=(12, 3))
 """Directions that tell how a band turns: more than it has functions, in general position."""
 
 
-def deform_gaussians(
-    gaussians: Gaussians, F: Float[np.ndarray, "N 3 3"], x: Float[np.ndarray, "N 3"]
-) -> Gaussians:
+def deform_gaussians(gaussians: Gaussians, F: Float[np.ndarray, "N 3 3"], x: Float[np.ndarray, "N 3"]) -> Gaussians:
     """Return Gaussians carried along by deformation gradients F [-] to new means x [m].
 
-    Σ' = F Σ F^T (Xie et al. 2024, PhysGaussian); colours turn by the rotation R of the polar
-    decomposition F = R U. F may be singular or inverted: R is the rotation nearest to it.
+    Σ' = F Σ F^T (Xie et al. 2024, PhysGaussian); colours turn by the rotation R of the polar decomposition F = R U. F
+    may be singular or inverted: R is the rotation nearest to it.
     """
     kind = gaussians.mean.dtype
     axes = Rotation.from_quat(gaussians.rotation, scalar_first=True).as_matrix()
@@ -39,9 +37,7 @@ def nearest_rotations(F: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "N 3 3
     return _flip_last_axis(left, np.linalg.det(left) * np.linalg.det(right)) @ right
 
 
-def rotate_harmonics(
-    sh: Float[np.ndarray, "N K 3"], turn: Float[np.ndarray, "N 3 3"]
-) -> Float[np.ndarray, "N K 3"]:
+def rotate_harmonics(sh: Float[np.ndarray, "N K 3"], turn: Float[np.ndarray, "N 3 3"]) -> Float[np.ndarray, "N K 3"]:
     """Return the coefficients after every Gaussian turned by a rotation of its own.
 
     As ``geometry.harmonics.turned``, which has one rotation for all: f'(d) = f(R^T d).

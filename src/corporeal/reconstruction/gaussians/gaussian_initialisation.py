@@ -83,25 +83,18 @@ def free_depths(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
 
 
 def points_on_hull(
-    outlines: CarvedVolume,
-    count: int,
-    rng: np.random.Generator,
-    pool: ThreadPool,
-    within: float = 0.0,
+    outlines: CarvedVolume, count: int, rng: np.random.Generator, pool: ThreadPool, within: float = 0.0
 ) -> StartPoints:
     """Return points on the visual hull, the surface of what masks and lines of sight allow.
 
-    within: share of them that is inside, as small as those on the hull: wide ones would show
-    through plain faces.
+    within: share of them that is inside, as small as those on the hull: wide ones would show through plain faces.
 
     """
     views, masks, fine = outlines.views, outlines.masks, outlines.hull
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
     deep = round(within * count)
     on = count - deep
-    position = np.concatenate(
-        [_sample_cells(fine.cells[fine.inside], deep, rng), _sample_cells(shell, on, rng)]
-    )
+    position = np.concatenate([_sample_cells(fine.cells[fine.inside], deep, rng), _sample_cells(shell, on, rng)])
     position += fine.side * rng.uniform(-0.5, 0.5, position.shape)
     seen = mask_votes_at_points(position, views, masks, pool)
     apart = fine.side * np.sqrt(len(shell) / on)
@@ -113,15 +106,11 @@ def points_on_hull(
     )
 
 
-def _sample_cells(
-    cells: Float[np.ndarray, "N 3"], count: int, rng: np.random.Generator
-) -> np.ndarray:
+def _sample_cells(cells: Float[np.ndarray, "N 3"], count: int, rng: np.random.Generator) -> np.ndarray:
     return cells[rng.choice(len(cells), count, replace=len(cells) < count)]
 
 
-def initial_gaussians(
-    points: StartPoints, count: int, degree: int, rng: np.random.Generator
-) -> ParameterMatrix:
+def initial_gaussians(points: StartPoints, count: int, degree: int, rng: np.random.Generator) -> ParameterMatrix:
     """Return Gaussians on some of the points, as wide as these are apart; flat on surfaces."""
     if len(points.position) > count:
         points = choose_points(points, rng.choice(len(points.position), count, replace=False))
@@ -129,9 +118,7 @@ def initial_gaussians(
     theta = np.zeros((n, PARAM_COLOUR + 3 * (degree + 1) ** 2), np.float32)
     theta[:, PARAM_MEAN:PARAM_ROTATION] = points.position
     theta[:, PARAM_ROTATION:PARAM_SCALE] = rng.normal(size=(n, 4))
-    theta[:, PARAM_ROTATION:PARAM_SCALE] /= np.linalg.norm(
-        theta[:, PARAM_ROTATION:PARAM_SCALE], axis=1, keepdims=True
-    )
+    theta[:, PARAM_ROTATION:PARAM_SCALE] /= np.linalg.norm(theta[:, PARAM_ROTATION:PARAM_SCALE], axis=1, keepdims=True)
     near, _ = KDTree(points.position).query(points.position, k=min(4, n))
     apart = np.atleast_2d(near.T).T[:, 1:].mean(axis=1) if n > 1 else np.ones(1)
     middle = float(np.median(apart)) or 1.0

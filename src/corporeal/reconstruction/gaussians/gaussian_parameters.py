@@ -1,7 +1,7 @@
 """Gaussians as a matrix of unconstrained training parameters.
 
-A row holds mean (3), quaternion (4), logarithms of the scales (3), logit of the opacity (1) and the
-spherical harmonics coefficient by coefficient (3 K).
+A row holds mean (3), quaternion (4), logarithms of the scales (3), logit of the opacity (1) and the spherical harmonics
+coefficient by coefficient (3 K).
 """
 
 import numpy as np
@@ -21,9 +21,7 @@ ParameterMatrix = Float[np.ndarray, "N D"]
 
 def parameters_of_gaussians(gaussians: Gaussians) -> ParameterMatrix:
     """Return the matrix of some Gaussians, in single precision."""
-    opacity = np.clip(
-        gaussians.opacity.astype(np.float64), MIN_OPACITY_MARGIN, 1 - MIN_OPACITY_MARGIN
-    )
+    opacity = np.clip(gaussians.opacity.astype(np.float64), MIN_OPACITY_MARGIN, 1 - MIN_OPACITY_MARGIN)
     return np.concatenate(
         [
             gaussians.mean,
@@ -45,9 +43,7 @@ def gaussians_of_parameters(theta: ParameterMatrix) -> Gaussians:
         rotation=q / np.linalg.norm(q, axis=1, keepdims=True),
         scale=np.exp(theta[:, PARAM_SCALE:PARAM_OPACITY]),
         opacity=opacities(theta),
-        sh=theta[:, PARAM_COLOUR:]
-        .reshape(len(theta), (theta.shape[1] - PARAM_COLOUR) // 3, 3)
-        .copy(),
+        sh=theta[:, PARAM_COLOUR:].reshape(len(theta), (theta.shape[1] - PARAM_COLOUR) // 3, 3).copy(),
     )
 
 

@@ -30,17 +30,10 @@ from corporeal.multiview.world_alignment import StatedFrame, WorldAlignment, ali
 from corporeal.reconstruction.gaussians.floor_from_outlines import floor_height_from_outlines
 from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints
 from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality
-from corporeal.reconstruction.gaussians.mask_contamination import (
-    drop_thin_pieces,
-    mask_contamination,
-)
+from corporeal.reconstruction.gaussians.mask_contamination import drop_thin_pieces, mask_contamination
 from corporeal.reconstruction.gaussians.rasteriser_numba import render
 from corporeal.reconstruction.gaussians.swept_floor_masks import masks_above_floor
-from corporeal.reconstruction.gaussians.train_gaussians import (
-    MIN_TRIAL_GAIN_DB,
-    TrainedGaussians,
-    train_gaussians,
-)
+from corporeal.reconstruction.gaussians.train_gaussians import MIN_TRIAL_GAIN_DB, TrainedGaussians, train_gaussians
 from corporeal.reconstruction.gaussians.training_schedule import TRAINING_PRESETS, TrainConfig
 
 MIN_SOLID_OPACITY = 0.5
@@ -63,13 +56,12 @@ INVERTED_MASKS_MESSAGE = (
     "the pictures: they are inverted, or of the background. White is what counts: invert them."
 )
 MIN_CONTAMINATION_FRACTION = 0.01
-"""Share of masks that nobody gave from which on it is worth learning again without: of pieces that
-are not thin."""
+"""Share of masks that nobody gave from which on it is worth learning again without: of pieces that are not thin."""
 RETRAINING_CHECKPOINT = "training-again"
 """Name of the file in which that is kept."""
 FIRST_TRAINING_PROGRESS = 0.8
-"""Share of the work that is done when such masks were learned from once: four of 21 sets are
-learned from again, so that 1.2 trainings are to be expected."""
+"""Share of the work that is done when such masks were learned from once: four of 21 sets are learned from again, so
+that 1.2 trainings are to be expected."""
 OVERVIEW_PICTURES = 4
 """Pictures of the whole scene for questions to a model."""
 UP_BY_AXIS = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -121,21 +113,15 @@ class GaussianScene:
     def some(self) -> dict[int, UInt8[np.ndarray, "H W 3"]]:
         """Return a few pictures from all sides, each with the number of its camera."""
         count = len(self.cameras)
-        which = np.unique(
-            np.linspace(0, count - 1, min(count, OVERVIEW_PICTURES)).round().astype(int)
-        )
+        which = np.unique(np.linspace(0, count - 1, min(count, OVERVIEW_PICTURES)).round().astype(int))
         own = None if self.views is None else self.views.rgb
         pairs = ((k, self.cameras[k]) for k in which.tolist())
         return {k: render_on_black(self.gaussians, c) if own is None else own[k] for k, c in pairs}
 
     def painted(self, rgb: Float[np.ndarray, "N 3"]) -> list[UInt8[np.ndarray, "H W 3"]]:
         """Return the same pictures, each followed by itself with Gaussians in flat sRGB."""
-        flat = replace(
-            self.gaussians, sh=((rgb - 0.5)[:, None] / SH_DC_COEFFICIENT).astype(np.float32)
-        )
-        pairs = (
-            (shown, render_on_black(flat, self.cameras[k])) for k, shown in self.some().items()
-        )
+        flat = replace(self.gaussians, sh=((rgb - 0.5)[:, None] / SH_DC_COEFFICIENT).astype(np.float32))
+        pairs = ((shown, render_on_black(flat, self.cameras[k])) for k, shown in self.some().items())
         return [one for pair in pairs for one in pair]
 
 
@@ -152,8 +138,7 @@ class MaskSource:
     by: Path | None = None
     """A folder of masks; None: the photographs' own, if there are any."""
     grown: bool = False
-    """Whether nobody, and no model, made these: what is in them that no other photograph shows is
-    left out."""
+    """Whether nobody, and no model, made these: what is in them that no other photograph shows is left out."""
 
 
 MASKS_BESIDE_PICTURES = MaskSource()
@@ -186,14 +171,11 @@ def load_or_train_gaussians(
         if instances:
             raise UserError(f"{source} is a splat, which has no instance masks. Leave --apart out.")
         return _load_splat(source)
-    shown, masks = _load_photographs(
-        source, TRAINING_PRESETS[training.preset].longest, instances, masked
-    )
+    shown, masks = _load_photographs(source, TRAINING_PRESETS[training.preset].longest, instances, masked)
     doubt = pose_warnings(source, masked.by, shown)
     points = _sparse_points(shown)
     wrong = [said for said in shown.warnings if said not in shown.done]
-    # With masks, where sparse points are says less than what masks carve; what they are seen
-    # through is empty.
+    # With masks, where sparse points are says less than what masks carve; what they are seen through is empty.
     start = points if masks is None else shown.lines
     learning = _TrainingInput(shown.views, start, training, checkpoint, progress)
     try:
@@ -256,9 +238,7 @@ class _TrainingInput:
 
     def of(self, masks: Bool[np.ndarray, "V H W"] | None) -> TrainedGaussians:
         """Learn from masks that are right, or without any."""
-        return train_gaussians(
-            self.views, masks, self.start, self.how, self.checkpoint, self.progress
-        )
+        return train_gaussians(self.views, masks, self.start, self.how, self.checkpoint, self.progress)
 
     def of_grown(
         self, masks: Bool[np.ndarray, "V H W"]
@@ -269,18 +249,12 @@ class _TrainingInput:
             What was learned, from which masks, and what was left out of these, in a sentence.
 
         """
-        trained = replace(
-            self, progress=subprogress(self.progress, 0.0, FIRST_TRAINING_PROGRESS)
-        ).of(masks)
+        trained = replace(self, progress=subprogress(self.progress, 0.0, FIRST_TRAINING_PROGRESS)).of(masks)
         odd = mask_contamination(trained.gaussians, self.views, masks)
-        if np.count_nonzero(
-            drop_thin_pieces(odd, masks)
-        ) <= MIN_CONTAMINATION_FRACTION * np.count_nonzero(masks):
+        if np.count_nonzero(drop_thin_pieces(odd, masks)) <= MIN_CONTAMINATION_FRACTION * np.count_nonzero(masks):
             return trained, masks, ()
         kept = None if self.checkpoint is None else self.checkpoint.with_stem(RETRAINING_CHECKPOINT)
-        later = subprogress(
-            self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the object"
-        )
+        later = subprogress(self.progress, FIRST_TRAINING_PROGRESS, 1.0, ", without what is not the object")
         left = masks & ~odd
         share = np.count_nonzero(odd) / np.count_nonzero(masks)
         views = np.count_nonzero(odd.any(axis=(1, 2)))
@@ -291,9 +265,7 @@ class _TrainingInput:
         return replace(self, checkpoint=kept, progress=later).of(left), left, (said,)
 
 
-def turn_upright(
-    taken: GaussianScene, up: UpAxisChoice = "auto", floor: float | None = None
-) -> GaussianScene:
+def turn_upright(taken: GaussianScene, up: UpAxisChoice = "auto", floor: float | None = None) -> GaussianScene:
     """Return the same with +z up, the floor at z = 0, and what is looked at above the origin.
 
     Photographs without masks get some.
@@ -329,9 +301,7 @@ def turn_upright(
     return made if made.views is None or made.masks is not None else _add_masks_above_floor(made)
 
 
-def _lower_to_silhouettes(
-    frame: WorldAlignment, views: Views, masks: Bool[np.ndarray, "V H W"]
-) -> WorldAlignment:
+def _lower_to_silhouettes(frame: WorldAlignment, views: Views, masks: Bool[np.ndarray, "V H W"]) -> WorldAlignment:
     """Put the floor where the outlines in masks say that objects touch it."""
     cameras = apply_similarity_to_cameras(views.cameras, frame.world_from_file)
     try:
@@ -369,19 +339,16 @@ def _drop_inconsistent(shown: PosedPhotos) -> PosedPhotos:
     return replace(shown.only(kept.tolist()), warnings=(*shown.warnings, said))
 
 
-def pose_warnings(
-    source: Path, masked_by: Path | None = None, shown: PosedPhotos | None = None
-) -> tuple[str, ...]:
+def pose_warnings(source: Path, masked_by: Path | None = None, shown: PosedPhotos | None = None) -> tuple[str, ...]:
     """Return what seems wrong with the poses, as warnings.
 
-    Points are matched in pictures as large as that was measured on: where little ones are learned
-    from, a third of the points that wrong poses contradict would still be near enough.
+    Points are matched in pictures as large as that was measured on: where little ones are learned from, a third of the
+    points that wrong poses contradict would still be near enough.
 
     Args:
         source: A folder of photographs with poses.
         masked_by: A folder of masks instead of the photographs' own.
-        shown: What was read of them and is used: no other counts, and it serves if it is large
-            enough.
+        shown: What was read of them and is used: no other counts, and it serves if it is large enough.
 
     Raises:
         UserError: They are certainly wrong.
@@ -449,9 +416,7 @@ def _training_statements(trained: TrainedGaussians, photographs: int) -> tuple[s
 
 
 def _agreement_words(quality: HeldOutQuality) -> str:
-    shown = (
-        "" if quality.psnr_on_objects is None else f", {quality.psnr_on_objects:.1f} dB on objects"
-    )
+    shown = "" if quality.psnr_on_objects is None else f", {quality.psnr_on_objects:.1f} dB on objects"
     return (
         f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
         f"from to {quality.psnr:.1f} dB{shown}."

@@ -11,12 +11,7 @@ from corporeal.reconstruction.gaussians.exposure_gains import exposure_gain
 from corporeal.reconstruction.gaussians.gaussian_initialisation import free_depths
 from corporeal.reconstruction.gaussians.gaussian_parameters import parameters_of_gaussians
 from corporeal.reconstruction.gaussians.kernels_training import sum_ssim
-from corporeal.reconstruction.gaussians.rasteriser_numba import (
-    BLACK_RGB,
-    draw,
-    picture_of_drawing,
-    pinhole_of_camera,
-)
+from corporeal.reconstruction.gaussians.rasteriser_numba import BLACK_RGB, draw, picture_of_drawing, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 RgbImage = Float[np.ndarray, "H W 3"]
@@ -46,10 +41,9 @@ def heldout_quality(
 ) -> HeldOutQuality:
     """Compare pictures with views.
 
-    masks: which pixels are on objects. background: where given, what is beside objects is that in
-    both; else whole photographs are compared, and black is behind everything. What is nearer to a
-    camera than its ``start.clearance`` is not drawn. apart: photographs differ in exposure; each
-    drawing has the gain that suits it best.
+    masks: which pixels are on objects. background: where given, what is beside objects is that in both; else whole
+    photographs are compared, and black is behind everything. What is nearer to a camera than its ``start.clearance`` is
+    not drawn. apart: photographs differ in exposure; each drawing has the gain that suits it best.
     """
     theta, rows, clear = parameters_of_gaussians(gaussians), [], free_depths(views.cameras)
     behind = np.array(BLACK_RGB if background is None else background, np.float32)

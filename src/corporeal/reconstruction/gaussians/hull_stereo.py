@@ -1,10 +1,9 @@
 """Stereo inside the visual hull, for concavities.
 
-No silhouette shows the mouth of a vessel seen from above: the hull closes it. For pixels of every
-view, the depth is looked for between the front and the back of the hull at which patches of
-neighbouring views correlate best, as Goesele, Curless and Seitz (2006) do, and those kept that
-other views do not contradict. What lies on the way there is empty where two views see past it, and
-more of them than see something there.
+No silhouette shows the mouth of a vessel seen from above: the hull closes it. For pixels of every view, the depth is
+looked for between the front and the back of the hull at which patches of neighbouring views correlate best, as Goesele,
+Curless and Seitz (2006) do, and those kept that other views do not contradict. What lies on the way there is empty
+where two views see past it, and more of them than see something there.
 """
 
 import numpy as np
@@ -29,16 +28,16 @@ MAX_STEREO_PICTURE_PX = 256
 MAX_STEREO_DEPTHS = 40_000
 """Depths that are looked for in all views together, about."""
 MIN_STEREO_PATCH_DEVIATION, MIN_STEREO_CORRELATION, MIN_STEREO_CORRELATION_GAIN = 0.01, 0.7, 0.1
-"""Least deviation of a patch [0–1]; least correlation of what is the same; by how much that must
-exceed the correlation at the hull's front for something deeper to be accepted.
+"""Least deviation of a patch [0–1]; least correlation of what is the same; by how much that must exceed the correlation
+at the hull's front for something deeper to be accepted.
 """
 STEREO_DEPTH_TOLERANCE = 0.015
 """Relative difference of depths that agree."""
 DEPTH_ERROR_CELLS = 2.0
 """Error of depths [cells]."""
 MIN_CONFIRMING_VIEWS = 2
-"""Views that must see past a cell before it is emptied. As many must confirm a depth that is used
-without such a vote."""
+"""Views that must see past a cell before it is emptied. As many must confirm a depth that is used without such a
+vote."""
 
 
 def hull_cells_seen_past(
@@ -54,8 +53,8 @@ def hull_cells_seen_past(
 
     """
     looks = HullStereoImages(views, masks)
-    # Of plain faces few views know a depth. One without support stays, since what it empties is
-    # voted on once more, cell by cell.
+    # Of plain faces few views know a depth. One without support stays, since what it empties is voted on once more,
+    # cell by cell.
     depths = looks.depths(hull, 0, pool)
     points = hull.cells[hull.inside]
     votes = np.empty((len(points), 2))
@@ -72,9 +71,7 @@ class HullStereoImages:
     def __init__(self, views: Views, masks: Bool[np.ndarray, "V H W"]) -> None:
         factor = -(-max(views.rgb.shape[1:3]) // MAX_STEREO_PICTURE_PX)
         self.cameras = views.cameras
-        self.pictures = (
-            np.stack([shrink_picture(p, factor) for p in views.rgb]).astype(np.float32) / 255
-        )
+        self.pictures = np.stack([shrink_picture(p, factor) for p in views.rgb]).astype(np.float32) / 255
         self.rows = camera_rows(views.cameras)
         self.rows[:, 12:] /= factor
         self.lenses = self.rows[:, 12:].copy()
@@ -87,9 +84,7 @@ class HullStereoImages:
         masks = minimum_filter(masks, (1, patch, patch))
         self.on = self._at_looks(masks, self.every)
 
-    def depths(
-        self, hull: VisualHull, confirmed: int, pool: ThreadPool
-    ) -> Float[np.ndarray, "V h w"]:
+    def depths(self, hull: VisualHull, confirmed: int, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
         """Return how deep views see within a hull [m]; inf: unknown or contradicted.
 
         Args:
@@ -104,9 +99,7 @@ class HullStereoImages:
         found[~self.stands(found, confirmed, pool)] = np.inf
         return found
 
-    def fill(
-        self, k: int, depth: Float[np.ndarray, "h w"], hull: VisualHull, pool: ThreadPool
-    ) -> None:
+    def fill(self, k: int, depth: Float[np.ndarray, "h w"], hull: VisualHull, pool: ThreadPool) -> None:
         """Fill in how deep a view sees where its mask is."""
         rows, columns = np.nonzero(self.on[k])
         places = self.places(k)
@@ -116,17 +109,13 @@ class HullStereoImages:
         pool.each(hull_chords, [(*span, *rest) for span in pool.spans(len(places))])
         found, rule = (
             np.full(len(places), np.inf),
-            np.array(
-                [MIN_STEREO_PATCH_DEVIATION, MIN_STEREO_CORRELATION, MIN_STEREO_CORRELATION_GAIN]
-            ),
+            np.array([MIN_STEREO_PATCH_DEVIATION, MIN_STEREO_CORRELATION, MIN_STEREO_CORRELATION_GAIN]),
         )
         rest = places, self.pictures, self.lenses, *self.mates(k), chord, rule, found
         pool.each(search_depths, [(k, *span, *rest) for span in pool.spans(len(places))])
         depth[rows, columns] = found
 
-    def stands(
-        self, depths: Float[np.ndarray, "V h w"], confirmed: int, pool: ThreadPool
-    ) -> Bool[np.ndarray, "V h w"]:
+    def stands(self, depths: Float[np.ndarray, "V h w"], confirmed: int, pool: ThreadPool) -> Bool[np.ndarray, "V h w"]:
         """Return which depths so many of the other views confirm, and no more of them deny."""
         known = np.isfinite(depths)
         points, view = self.points(depths), np.nonzero(self.on)[0]
@@ -145,13 +134,9 @@ class HullStereoImages:
         for one in channels:
             mean = uniform_filter(one, side)
             variance += (uniform_filter(one * one, side) - mean * mean) / len(channels)
-        return self._at_looks(
-            np.sqrt(np.maximum(variance, 0)) < MIN_STEREO_PATCH_DEVIATION, self.pace
-        )
+        return self._at_looks(np.sqrt(np.maximum(variance, 0)) < MIN_STEREO_PATCH_DEVIATION, self.pace)
 
-    def _at_looks(
-        self, pixels: Bool[np.ndarray, "*V H W"], every: int
-    ) -> Bool[np.ndarray, "*V h w"]:
+    def _at_looks(self, pixels: Bool[np.ndarray, "*V H W"], every: int) -> Bool[np.ndarray, "*V h w"]:
         """Return what is so at the pixels that are looked at."""
         height, width = self.grid
         return pixels[..., every // 2 :: every, every // 2 :: every][..., :height, :width]

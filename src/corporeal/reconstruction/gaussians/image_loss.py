@@ -64,11 +64,7 @@ def image_loss(drawing: Drawing, aim: TargetImage, pool: ThreadPool) -> ImageLos
     spans = pool.spans(height)
     sums = np.zeros((len(spans), 4))
     rest = drawing.planes, aim.planes, aim.mask, weights
-    pool.each(
-        loss_slope, [(*rest, *span, slope, row) for span, row in zip(spans, sums, strict=True)]
-    )
+    pool.each(loss_slope, [(*rest, *span, slope, row) for span, row in zip(spans, sums, strict=True)])
     l1, alike, cover, l2 = sums.sum(axis=0)
-    value = (
-        L1_WEIGHT * l1 / 3 + SSIM_WEIGHT * (pixels - alike / 3) + COVERAGE_WEIGHT * cover
-    ) / pixels
+    value = (L1_WEIGHT * l1 / 3 + SSIM_WEIGHT * (pixels - alike / 3) + COVERAGE_WEIGHT * cover) / pixels
     return ImageLoss(float(value), float(l2 / 3 / pixels), slope)

@@ -6,8 +6,8 @@ one along rows of pixels, which the compiler turns into vector instructions. Per
 
     colour = Σ T_i α_i c_i + T background
 
-Gradients are found from front to back too, so that no list per pixel is kept: with g = dL/dcolour,
-G = g · colour and A_i = Σ_{j≤i} T_j α_j g · c_j,
+Gradients are found from front to back too, so that no list per pixel is kept: with g = dL/dcolour, G = g · colour and
+A_i = Σ_{j≤i} T_j α_j g · c_j,
 
     dL/dα_i = T_i g · c_i - (G - A_i) / (1 - α_i)
 """
@@ -43,9 +43,7 @@ ELLIPSES_PER_FULL_CHECK = 16
 """Ellipses between looks whether the tile is full."""
 PICTURE_PLANES = 5
 """Of a picture: red, green, blue, transmittance, Σ w z."""
-EXP_C1, EXP_C2, EXP_C3, EXP_C4, EXP_C5 = (
-    f4(c) for c in (0.99999976, 0.49999114, 0.16655975, 0.04109651, 0.00692332)
-)
+EXP_C1, EXP_C2, EXP_C3, EXP_C4, EXP_C5 = (f4(c) for c in (0.99999976, 0.49999114, 0.16655975, 0.04109651, 0.00692332))
 
 
 @numba.njit(inline="always", **JIT_OPTIONS)

@@ -112,14 +112,12 @@ def _mate_correlation(own, deviation, ray, z, mates, turns, shifts, lenses, pict
 
 
 @numba.njit(**JIT_OPTIONS)
-def search_depths(
-    k, first, last, places, pictures, lenses, mates, turns, shifts, chord, rule, depth
-):
+def search_depths(k, first, last, places, pictures, lenses, mates, turns, shifts, chord, rule, depth):
     """Fill depth[first:last] of view k's places (N, 2), column and row, with what mates agree on.
 
-    chord (N, 2): depths between which is looked; rule: least deviation of a patch [0–1], least
-    correlation, and by how much it must exceed that at the front for something deeper to be
-    accepted. Of what is rejected the front is the depth; inf: nothing is known.
+    chord (N, 2): depths between which is looked; rule: least deviation of a patch [0–1], least correlation, and by how
+    much it must exceed that at the front for something deeper to be accepted. Of what is rejected the front is the
+    depth; inf: nothing is known.
     """
     picture = pictures[k]
     height, width, _ = picture.shape
@@ -137,17 +135,11 @@ def search_depths(
         near, far = chord[n]
         if not far < np.inf:
             continue
-        if not (
-            PATCH_RADIUS_PX <= x < width - PATCH_RADIUS_PX
-            and PATCH_RADIUS_PX <= y < height - PATCH_RADIUS_PX
-        ):
+        if not (PATCH_RADIUS_PX <= x < width - PATCH_RADIUS_PX and PATCH_RADIUS_PX <= y < height - PATCH_RADIUS_PX):
             continue
         ray[0] = (x + 0.5 - lenses[k, 2]) / lenses[k, 0]
         ray[1] = (y + 0.5 - lenses[k, 3]) / lenses[k, 1]
-        own[:] = picture[
-            y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1,
-            x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1,
-        ]
+        own[:] = picture[y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1, x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1]
         deviation = _normalise_patch(own)
         if deviation < rule[0]:
             continue
@@ -175,8 +167,8 @@ def search_depths(
 def count_past_votes(points, first, last, cameras, depths, pace, margin, votes):
     """Count for points first to last the views that see something there, and that see past it.
 
-    cameras (V, 16): ``hull.camera_rows``; depths (V, h, w) [m], inf: unknown; pace: pixels from one
-    depth to the next; margin: error of depths [m]; votes (N, 2).
+    cameras (V, 16): ``hull.camera_rows``; depths (V, h, w) [m], inf: unknown; pace: pixels from one depth to the next;
+    margin: error of depths [m]; votes (N, 2).
     """
     views = len(depths)
     for n in range(first, last):

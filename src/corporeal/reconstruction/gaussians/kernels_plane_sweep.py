@@ -25,8 +25,8 @@ OUTSIDE_DIFFERENCE = f4(9)
 def _patch_difference(patch, ray, z, turn, shift, lens, picture, step):
     """Mean difference between a patch and what a neighbour shows at depth z.
 
-    turn, shift: neighbour from the patch's camera; step (2,): a pixel of that camera along x and y
-    at depth 1. The patch is taken to face its camera; its projection is linearised.
+    turn, shift: neighbour from the patch's camera; step (2,): a pixel of that camera along x and y at depth 1. The
+    patch is taken to face its camera; its projection is linearised.
     """
     height, width, _ = picture.shape
     p0 = z * (turn[0, 0] * ray[0] + turn[0, 1] * ray[1] + turn[0, 2]) + shift[0]
@@ -36,10 +36,7 @@ def _patch_difference(patch, ray, z, turn, shift, lens, picture, step):
         return OUTSIDE_DIFFERENCE
     fx, fy = lens[0] / p2, lens[1] / p2
     u, v = fx * p0 + lens[2], fy * p1 + lens[3]
-    if not (
-        PATCH_RADIUS_PX < u < width - PATCH_RADIUS_PX - 1
-        and PATCH_RADIUS_PX < v < height - PATCH_RADIUS_PX - 1
-    ):
+    if not (PATCH_RADIUS_PX < u < width - PATCH_RADIUS_PX - 1 and PATCH_RADIUS_PX < v < height - PATCH_RADIUS_PX - 1):
         return OUTSIDE_DIFFERENCE
     x, y = p0 / p2, p1 / p2
     sx, sy = z * step[0], z * step[1]
@@ -73,8 +70,8 @@ def _mates_mismatch(patch, ray, z, k, mates, turns, shifts, lenses, pictures, st
 def sweep_rows(k, first, last, pace, pictures, lenses, mates, turns, shifts, planes, depth):
     """Fill in rows first to last of view k's depths; inf where no neighbour looks.
 
-    pace: pixels from one depth to the next; planes: inverse depths, rising, evenly spaced. Of
-    depths that look alike the farthest is taken: what is smooth hides nothing then.
+    pace: pixels from one depth to the next; planes: inverse depths, rising, evenly spaced. Of depths that look alike
+    the farthest is taken: what is smooth hides nothing then.
     """
     picture = pictures[k]
     height, width, _ = picture.shape
@@ -85,22 +82,16 @@ def sweep_rows(k, first, last, pace, pictures, lenses, mates, turns, shifts, pla
         for gx in range(depth.shape[1]):
             x = gx * pace + pace // 2
             depth[gy, gx] = np.inf
-            if not (
-                PATCH_RADIUS_PX <= x < width - PATCH_RADIUS_PX
-                and PATCH_RADIUS_PX <= y < height - PATCH_RADIUS_PX
-            ):
+            if not (PATCH_RADIUS_PX <= x < width - PATCH_RADIUS_PX and PATCH_RADIUS_PX <= y < height - PATCH_RADIUS_PX):
                 continue
             ray[0] = (x + 0.5 - lenses[k, 2]) / lenses[k, 0]
             ray[1] = (y + 0.5 - lenses[k, 3]) / lenses[k, 1]
             patch = picture[
-                y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1,
-                x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1,
+                y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1, x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1
             ]
             best, at = OUTSIDE_DIFFERENCE, -1.0
             for w in planes:
-                d = _mates_mismatch(
-                    patch, ray, 1 / w, k, mates, turns, shifts, lenses, pictures, step
-                )
+                d = _mates_mismatch(patch, ray, 1 / w, k, mates, turns, shifts, lenses, pictures, step)
                 if d < NEARER_DIFFERENCE_RATIO * best - NEARER_DIFFERENCE_MARGIN:
                     best, at = d, w
             if at < 0:
@@ -110,9 +101,7 @@ def sweep_rows(k, first, last, pace, pictures, lenses, mates, turns, shifts, pla
                 w = middle + apart * s / REFINED_DEPTHS
                 if w <= 0:
                     continue
-                d = _mates_mismatch(
-                    patch, ray, 1 / w, k, mates, turns, shifts, lenses, pictures, step
-                )
+                d = _mates_mismatch(patch, ray, 1 / w, k, mates, turns, shifts, lenses, pictures, step)
                 if d < best:
                     best, at = d, w
             depth[gy, gx] = 1 / at
@@ -148,17 +137,12 @@ def prefer_depths(k, first, last, pace, pictures, lenses, mates, turns, shifts, 
             ray[0] = (x + 0.5 - lenses[k, 2]) / lenses[k, 0]
             ray[1] = (y + 0.5 - lenses[k, 3]) / lenses[k, 1]
             patch = picture[
-                y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1,
-                x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1,
+                y - PATCH_RADIUS_PX : y + PATCH_RADIUS_PX + 1, x - PATCH_RADIUS_PX : x + PATCH_RADIUS_PX + 1
             ]
             z, w = depth[gy, gx], wanted[gy, gx]
             found = _mates_mismatch(patch, ray, z, k, mates, turns, shifts, lenses, pictures, step)
             other = _mates_mismatch(patch, ray, w, k, mates, turns, shifts, lenses, pictures, step)
-            slack = (
-                PLAIN_PATCH_MISMATCH
-                if _patch_texture(patch) < MIN_PATCH_TEXTURE
-                else NEARER_DIFFERENCE_MARGIN
-            )
+            slack = PLAIN_PATCH_MISMATCH if _patch_texture(patch) < MIN_PATCH_TEXTURE else NEARER_DIFFERENCE_MARGIN
             if NEARER_DIFFERENCE_RATIO * other - slack < found:
                 depth[gy, gx] = w
 
@@ -183,9 +167,9 @@ def depth_at_point(c, point, depth, pace):
 def count_support(points, owners, first, last, cameras, depths, pace, near, votes):
     """Count for points first to last the views that see them where they are, and that see past.
 
-    cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; owners: the view that each comes
-    from, which is not asked; depths (V, h, w) [m], inf: unknown, which is neither; near: relative
-    difference of depths that agree; votes (N, 2).
+    cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; owners: the view that each comes from, which is not
+    asked; depths (V, h, w) [m], inf: unknown, which is neither; near: relative difference of depths that agree; votes
+    (N, 2).
     """
     views = len(depths)
     for i in range(first, last):
@@ -228,9 +212,6 @@ def count_floater_votes(points, widths, first, last, cameras, depths, behind, cl
                 votes[i, 0] += abs(ahead - z) <= CLEAR_DEPTH_DIFFERENCE_RATIO * z
                 votes[i, 1] += ahead < (1 - CLEAR_DEPTH_DIFFERENCE_RATIO) * z
             else:
-                votes[i, 2] += (
-                    ahead
-                    < (1 - CLEAR_DEPTH_DIFFERENCE_RATIO) * behind[k, int(v / pace), int(u / pace)]
-                )
+                votes[i, 2] += ahead < (1 - CLEAR_DEPTH_DIFFERENCE_RATIO) * behind[k, int(v / pace), int(u / pace)]
             votes[i, 3] += widths[i] * c[12] > pace * ahead
             votes[i, 4] = min(votes[i, 4], ahead)

@@ -1,8 +1,8 @@
 """Projection of Gaussians to ellipses, with gradients. Loops compiled by numba.
 
-EWA projection (Zwicker et al. 2001) as in Kerbl et al. 2023: Σ' = J W Σ W^T J^T plus a dilation;
-opacity is multiplied by sqrt(det Σ' / det(Σ' + dilation)), so that what is dilated does not grow
-denser (Yu et al. 2024, Mip-Splatting). Numbers are double within, single between kernels.
+EWA projection (Zwicker et al. 2001) as in Kerbl et al. 2023: Σ' = J W Σ W^T J^T plus a dilation; opacity is multiplied
+by sqrt(det Σ' / det(Σ' + dilation)), so that what is dilated does not grow denser (Yu et al. 2024, Mip-Splatting).
+Numbers are double within, single between kernels.
 
 Projection of points to cameras. Compiled by numba.
 
@@ -21,11 +21,7 @@ from corporeal.reconstruction.gaussians.gaussian_parameters import (
     PARAM_ROTATION,
     PARAM_SCALE,
 )
-from corporeal.reconstruction.gaussians.kernels_harmonics import (
-    JIT_OPTIONS,
-    harmonics,
-    harmonics_gradient,
-)
+from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS, harmonics, harmonics_gradient
 
 
 @numba.njit(**JIT_OPTIONS)
@@ -53,19 +49,9 @@ def sample_colour(picture, u, v, out):
         out[q] = (1 - b) * above + b * below
 
 
-COL_U, COL_V, COL_A, COL_B, COL_C, COL_OPACITY, COL_RED, COL_DEPTH, COL_EXTENT = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    9,
-    10,
-)
-"""Columns of an ellipse: middle (2) [px], inverse covariance (3) [1/px²], opacity, colour (3),
-depth [m], half extents (2) [px], negative where it is not in the picture."""
+COL_U, COL_V, COL_A, COL_B, COL_C, COL_OPACITY, COL_RED, COL_DEPTH, COL_EXTENT = (0, 1, 2, 3, 4, 5, 6, 9, 10)
+"""Columns of an ellipse: middle (2) [px], inverse covariance (3) [1/px²], opacity, colour (3), depth [m], half extents
+(2) [px], negative where it is not in the picture."""
 ELLIPSE_COLUMNS = 12
 GRADIENT_COLUMNS = 9
 """Of an ellipse: middle, inverse covariance, opacity, colour."""
@@ -200,8 +186,8 @@ def project(theta, first, last, camera, ellipses):
 def project_back(theta, first, last, camera, ellipses, entries, places, spans, gradient):
     """Fill in dL/dθ of Gaussians first to last.
 
-    entries: dL/d(ellipse) of each Gaussian in each tile; places[spans[i, 0] : spans[i, 1]] says
-    which of them are Gaussian i's.
+    entries: dL/d(ellipse) of each Gaussian in each tile; places[spans[i, 0] : spans[i, 1]] says which of them are
+    Gaussian i's.
     """
     coefficients = (theta.shape[1] - PARAM_COLOUR) // 3
     T, R, P = np.empty((2, 3)), np.empty((3, 3)), np.empty((2, 3))

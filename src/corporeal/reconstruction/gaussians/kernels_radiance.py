@@ -1,10 +1,9 @@
 """Volume rendering of a grid of density and colour, with gradients. Compiled by numba.
 
-A grid has nodes; between eight of them is a cube. ``row`` (X, Y, Z) says where a node's four
-numbers are among ``values`` (N, 4): the density's, then the logits of red, green and blue. ``gap``
-(X-1, Y-1, Z-1) is 0 in cubes that may hold something, else how many cubes away the nearest of these
-is. Lengths are in cubes, but depths along a camera's z. A camera is a row: world from camera (3 x
-3), the eye's place in the grid, fx, fy, cx, cy.
+A grid has nodes; between eight of them is a cube. ``row`` (X, Y, Z) says where a node's four numbers are among
+``values`` (N, 4): the density's, then the logits of red, green and blue. ``gap`` (X-1, Y-1, Z-1) is 0 in cubes that may
+hold something, else how many cubes away the nearest of these is. Lengths are in cubes, but depths along a camera's z. A
+camera is a row: world from camera (3 x 3), the eye's place in the grid, fx, fy, cx, cy.
 """
 
 import numba
@@ -13,14 +12,7 @@ import numpy as np
 from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
 
 f4 = np.float32
-SAMPLE_WEIGHT, SAMPLE_BEHIND, SAMPLE_RED, SAMPLE_SLOPE, SAMPLE_DEPTH, SAMPLE_COLUMNS = (
-    0,
-    1,
-    2,
-    5,
-    6,
-    7,
-)
+SAMPLE_WEIGHT, SAMPLE_BEHIND, SAMPLE_RED, SAMPLE_SLOPE, SAMPLE_DEPTH, SAMPLE_COLUMNS = (0, 1, 2, 5, 6, 7)
 """Columns of a sample: w, the transmittance behind it, three colours, dτ/ds, depth."""
 RAY_END_TRANSMITTANCE = f4(1e-4)
 """Transmittance at which a ray ends."""
@@ -111,9 +103,7 @@ def _walk_ray(ray, length, jitter, stride, row, gap, values, samples, rows, shar
 
 
 @numba.njit(**JIT_OPTIONS)
-def ray_loss_gradient(
-    rays, jitter, background, width, cameras, pictures, masks, grid, gradient, sums
-):
+def ray_loss_gradient(rays, jitter, background, width, cameras, pictures, masks, grid, gradient, sums):
     """Add the loss's gradient (N, 4) for some rays; sums: Σ of the loss, of Δ², and of samples.
 
     L = Σ_rays |C - Y|² + COVER (α - M)², Y the pixel before the background.
@@ -129,9 +119,7 @@ def ray_loss_gradient(
     for r in range(len(rays)):
         view, pixel = rays[r, 0], rays[r, 1]
         length = _aim_ray(cameras[view], pixel, width, ray)
-        n, light = _walk_ray(
-            ray, length, jitter[r], stride, row, gap, values, samples, rows, shares
-        )
+        n, light = _walk_ray(ray, length, jitter[r], stride, row, gap, values, samples, rows, shares)
         cover = masks[view, pixel] / f4(255)
         total = f4(0)
         for q in range(3):
@@ -156,9 +144,7 @@ def ray_loss_gradient(
                 own += c * off[q]
                 slope[1 + q] = w * off[q] * c * (f4(1) - c)
             total -= w * own  # what is left is of all that is behind
-            slope[0] = (samples[m, SAMPLE_BEHIND] * own - total + uncover) * samples[
-                m, SAMPLE_SLOPE
-            ]
+            slope[0] = (samples[m, SAMPLE_BEHIND] * own - total + uncover) * samples[m, SAMPLE_SLOPE]
             for corner in range(8):
                 for q in range(4):
                     gradient[rows[m, corner], q] += shares[m, corner] * slope[q]

@@ -25,8 +25,8 @@ from corporeal.reconstruction.gaussians.kernels_project import (
 
 f4 = np.float32
 SURFACE_TRANSMITTANCE = f4(0.85)
-"""Transmittance at which a ray has met a surface. Learned Gaussians lie in a layer, and where half
-of the light is lost is already below what is seen."""
+"""Transmittance at which a ray has met a surface. Learned Gaussians lie in a layer, and where half of the light is lost
+is already below what is seen."""
 MAX_OBJECT_TRANSMITTANCE = f4(0.5)
 """A pixel that lets more light through shows no object."""
 MAX_MEETING_SIGMAS = 3.0
@@ -39,9 +39,9 @@ OVERRELAXATION_FACTOR = 1.6
 def depth_slopes(first, last, mean, spread, ellipses, camera, out):
     """Fill out[first:last] (N, 4): how the depth of a Gaussian's densest point changes with pixels.
 
-    In the affine approximation of the projection (u, v, z) is Gaussian, and z given (u, v) has the
-    mean z_0 + Σ_z,uv Σ_uv^-1 (u - u_0, v - v_0): two slopes. Then how far from z_0 that may be, and
-    how far before it the Gaussian begins: one standard deviation of z given (u, v).
+    In the affine approximation of the projection (u, v, z) is Gaussian, and z given (u, v) has the mean z_0 + Σ_z,uv
+    Σ_uv^-1 (u - u_0, v - v_0): two slopes. Then how far from z_0 that may be, and how far before it the Gaussian
+    begins: one standard deviation of z given (u, v).
 
     mean (N, 3) and covariance (N, 3, 3) [m], ellipses as drawn: of others nothing is filled in.
     """
@@ -84,8 +84,8 @@ def meet_surfaces(tiles, first, ids, ellipses, slopes, depth, far, met):
 
     depth and far (H, W) stay inf and met (H, W) stays -1 where half of the light gets through.
 
-    slopes (N, 4): how the depth of a Gaussian's densest point along a ray changes with the pixel,
-    along u and v [m/px], by how much at most, and how far before it the Gaussian begins [m].
+    slopes (N, 4): how the depth of a Gaussian's densest point along a ray changes with the pixel, along u and v [m/px],
+    by how much at most, and how far before it the Gaussian begins [m].
     """
     height, width = depth.shape
     across = (width + RASTER_TILE_PX - 1) // RASTER_TILE_PX
@@ -272,8 +272,8 @@ def relax_unknown_cells(field, unknown, rounds):
 def paint_points(first, last, points, normals, cameras, depths, pictures, reach, out):
     """Sum what the views see of points first to last: out (N, 4): red, green, blue, weight.
 
-    A view counts by the square of the cosine at which it sees the surface, and only where nothing
-    nearer than reach [m] is before the point.
+    A view counts by the square of the cosine at which it sees the surface, and only where nothing nearer than reach [m]
+    is before the point.
     """
     for i in range(first, last):
         out[i] = 0

@@ -51,11 +51,11 @@ def sum_ssim(x, y, top, bottom, weight, slope):
         for c in range(width):
             a, b = x[r, c], y[r, c]
             wide[0, c + SSIM_RADIUS_PX], wide[1, c + SSIM_RADIUS_PX] = a, b
-            (
-                wide[2, c + SSIM_RADIUS_PX],
-                wide[3, c + SSIM_RADIUS_PX],
-                wide[4, c + SSIM_RADIUS_PX],
-            ) = a * a, b * b, a * b
+            (wide[2, c + SSIM_RADIUS_PX], wide[3, c + SSIM_RADIUS_PX], wide[4, c + SSIM_RADIUS_PX]) = (
+                a * a,
+                b * b,
+                a * b,
+            )
         for q in range(5):
             _blur_row(wide[q], flat[q, r - high])
     first, last = max(0, top - SSIM_RADIUS_PX), min(height, bottom + SSIM_RADIUS_PX)
@@ -69,16 +69,11 @@ def sum_ssim(x, y, top, bottom, weight, slope):
         for c in range(width):
             mx, my = mean[0, c], mean[1, c]
             a1, a2 = f4(2) * mx * my + SSIM_C1, f4(2) * (mean[4, c] - mx * my) + SSIM_C2
-            b1, b2 = (
-                mx * mx + my * my + SSIM_C1,
-                mean[2, c] - mx * mx + mean[3, c] - my * my + SSIM_C2,
-            )
+            b1, b2 = (mx * mx + my * my + SSIM_C1, mean[2, c] - mx * mx + mean[3, c] - my * my + SSIM_C2)
             below = f4(1) / (b1 * b2)
             s = a1 * a2 * below
             own += s
-            wide[0, c + SSIM_RADIUS_PX] = f4(2) * (
-                my * (a2 - a1) * below + s * mx * (f4(1) / b2 - f4(1) / b1)
-            )
+            wide[0, c + SSIM_RADIUS_PX] = f4(2) * (my * (a2 - a1) * below + s * mx * (f4(1) / b2 - f4(1) / b1))
             wide[1, c + SSIM_RADIUS_PX] = -s / b2
             wide[2, c + SSIM_RADIUS_PX] = f4(2) * a1 * below
         total += own if top <= r < bottom else 0.0
@@ -97,8 +92,8 @@ def sum_ssim(x, y, top, bottom, weight, slope):
 def loss_slope(planes, target, mask, weights, top, bottom, slope, sums):
     """Fill in rows top to bottom of the loss's slope; sums: Σ|Δ|, Σ SSIM, Σ|α - mask|, Σ Δ².
 
-    planes, slope: red, green, blue, transmittance; target (3, H, W); mask (H, W), or (0, 0) where
-    there is none; weights: of the three terms, each per pixel and channel.
+    planes, slope: red, green, blue, transmittance; target (3, H, W); mask (H, W), or (0, 0) where there is none;
+    weights: of the three terms, each per pixel and channel.
     """
     _, _, width = target.shape
     l1, l2, cover = 0.0, 0.0, 0.0
@@ -143,9 +138,7 @@ def adam_rows(theta, gradient, first, second, rates, step, decay, limits, spans,
             v = ADAM_BETA2 * second[i, j] + (f4(1) - ADAM_BETA2) * g * g
             first[i, j], second[i, j] = m, v
             theta[i, j] -= rates[j] * f4(unbias) * m / (np.sqrt(v) + ADAM_EPSILON)
-        theta[i, PARAM_OPACITY] = min(
-            max(theta[i, PARAM_OPACITY], -MAX_OPACITY_LOGIT), MAX_OPACITY_LOGIT
-        )
+        theta[i, PARAM_OPACITY] = min(max(theta[i, PARAM_OPACITY], -MAX_OPACITY_LOGIT), MAX_OPACITY_LOGIT)
         flat = PARAM_SCALE
         for j in range(PARAM_SCALE, PARAM_SCALE + 3):
             flat = j if theta[i, j] < theta[i, flat] else flat

@@ -24,21 +24,17 @@ EXPLAINED_TOLERANCE_PX = 1.5
 THIN_MASK_DEPTH_PX = 2.0
 """Where masks reach no deeper [px], they are four wide: legs and wires so thin are not learned."""
 MIN_BARE_FRACTION, MIN_HUE_DIFFERENCE_FRACTION = 0.5, 0.1
-"""Share of a piece that Gaussians leave bare, at least; or of the square of its mean difference,
-what is not the same in all channels: what they cover and is but lighter, or darker, may be a
-highlight, or a shade."""
+"""Share of a piece that Gaussians leave bare, at least; or of the square of its mean difference, what is not the same
+in all channels: what they cover and is but lighter, or darker, may be a highlight, or a shade."""
 MAX_CONTAMINATION_FRACTION = 0.25
-"""Share of a view's mask. Where more is unexplained, that view is placed wrongly, or shows the
-object in another light, which says nothing of its mask."""
+"""Share of a view's mask. Where more is unexplained, that view is placed wrongly, or shows the object in another light,
+which says nothing of its mask."""
 PIXEL_OFFSETS = np.argwhere(np.ones((3, 3))) - 1
 """Pixels that a colour is looked for in: what was learned is as sharp as that."""
 
 
 def mask_contamination(
-    gaussians: Gaussians,
-    views: Views,
-    masks: Bool[np.ndarray, "V H W"],
-    threads: int | None = None,
+    gaussians: Gaussians, views: Views, masks: Bool[np.ndarray, "V H W"], threads: int | None = None
 ) -> Bool[np.ndarray, "V H W"]:
     """Return the pieces of masks that reach their rim and show what Gaussians do not.
 
@@ -59,14 +55,10 @@ def mask_contamination(
     if not len(known):
         return np.zeros_like(masks)
     same = off < COLOUR_DIFFERENCE_RMS * np.sqrt(np.mean(known**2))
-    return np.stack(
-        [_beyond_explained(*one) for one in zip(masks, masks & same, more, strict=True)]
-    )
+    return np.stack([_beyond_explained(*one) for one in zip(masks, masks & same, more, strict=True)])
 
 
-def drop_thin_pieces(
-    pieces: Bool[np.ndarray, "V H W"], masks: Bool[np.ndarray, "V H W"]
-) -> Bool[np.ndarray, "V H W"]:
+def drop_thin_pieces(pieces: Bool[np.ndarray, "V H W"], masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, "V H W"]:
     """Return those pieces of masks that are not thin, as legs are that no Gaussians show."""
     out = np.zeros_like(pieces)
     for made, found, mask in zip(out, pieces, masks, strict=True):
@@ -77,9 +69,7 @@ def drop_thin_pieces(
 
 
 def _colour_excess(
-    real: Float[np.ndarray, "H W 3"],
-    made: Float[np.ndarray, "H W 3"],
-    both: Bool[np.ndarray, "H W"],
+    real: Float[np.ndarray, "H W 3"], made: Float[np.ndarray, "H W 3"], both: Bool[np.ndarray, "H W"]
 ) -> Float[np.ndarray, "H W 3"]:
     """Return a photograph less a picture after the gain that suits it, in sRGB; inf: bare."""
     power = np.square(made[both]).sum(axis=0)
@@ -87,9 +77,7 @@ def _colour_excess(
     return np.where(both[..., None], real - gain * made, np.inf)
 
 
-def _pixel_differences(
-    real: Float[np.ndarray, "H W 3"], more: Float[np.ndarray, "H W 3"]
-) -> Float[np.ndarray, "H W"]:
+def _pixel_differences(real: Float[np.ndarray, "H W 3"], more: Float[np.ndarray, "H W 3"]) -> Float[np.ndarray, "H W"]:
     """Return how far each pixel is from the most alike of those beside it; inf: all are bare.
 
     Root mean square of the channels.
@@ -121,19 +109,11 @@ def _beyond_explained(
     for k in range(1, len(strange)):
         off = more[piece == k]
         shown = off[np.isfinite(off).all(axis=1)]
-        strange[k] = len(off) - len(shown) > MIN_BARE_FRACTION * len(off) or _has_other_hue(
-            shown.mean(axis=0)
-        )
+        strange[k] = len(off) - len(shown) > MIN_BARE_FRACTION * len(off) or _has_other_hue(shown.mean(axis=0))
     found = strange[piece]
-    return (
-        found
-        if np.count_nonzero(found) <= MAX_CONTAMINATION_FRACTION * np.count_nonzero(mask)
-        else none
-    )
+    return found if np.count_nonzero(found) <= MAX_CONTAMINATION_FRACTION * np.count_nonzero(mask) else none
 
 
 def _has_other_hue(off: Float[np.ndarray, "3"]) -> bool:
     """Return whether a difference is not one of light alone."""
-    return bool(
-        np.square(off - off.mean()).sum() > MIN_HUE_DIFFERENCE_FRACTION * np.square(off).sum()
-    )
+    return bool(np.square(off - off.mean()).sum() > MIN_HUE_DIFFERENCE_FRACTION * np.square(off).sum())

@@ -1,8 +1,8 @@
 """Points by plane-sweep stereo of posed pictures (Collins 1996).
 
-For pixels of every view, the depth at which the views beside it show the same; kept is what other
-views confirm. No mask and no mesh is needed. Where pictures are too smooth to say, objects are
-taken to be as far away as the background model.
+For pixels of every view, the depth at which the views beside it show the same; kept is what other views confirm. No
+mask and no mesh is needed. Where pictures are too smooth to say, objects are taken to be as far away as the background
+model.
 """
 
 from dataclasses import dataclass
@@ -14,16 +14,8 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Views
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians.background_model import background_model, cover_background
-from corporeal.reconstruction.gaussians.gaussian_initialisation import (
-    StartPoints,
-    free_depths,
-    join_points,
-)
-from corporeal.reconstruction.gaussians.kernels_plane_sweep import (
-    count_support,
-    prefer_depths,
-    sweep_rows,
-)
+from corporeal.reconstruction.gaussians.gaussian_initialisation import StartPoints, free_depths, join_points
+from corporeal.reconstruction.gaussians.kernels_plane_sweep import count_support, prefer_depths, sweep_rows
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.view_depths import ViewDepths
 from corporeal.reconstruction.gaussians.visual_hull import camera_rows
@@ -66,11 +58,7 @@ class SweepResult:
 
 
 def sweep_planes(
-    views: Views,
-    count: int,
-    rng: np.random.Generator,
-    pool: ThreadPool,
-    config: PlaneSweepConfig = DEFAULT_SWEEP,
+    views: Views, count: int, rng: np.random.Generator, pool: ThreadPool, config: PlaneSweepConfig = DEFAULT_SWEEP
 ) -> SweepResult:
     """Find points on what the pictures show, at most so many.
 
@@ -91,9 +79,7 @@ def sweep_planes(
     depths = looks.preferred(depths, behind, pool)
     good = looks.confirmed(depths, pool)
     unit = count // (OBJECT_POINTS_WEIGHT + BACKGROUND_POINTS_WEIGHT + COVER_POINTS_WEIGHT)
-    own = _sample_pixels(
-        np.flatnonzero(good & (depths != behind)), OBJECT_POINTS_WEIGHT * unit, rng
-    )
+    own = _sample_pixels(np.flatnonzero(good & (depths != behind)), OBJECT_POINTS_WEIGHT * unit, rng)
     beyond = _sample_pixels(np.arange(depths.size), BACKGROUND_POINTS_WEIGHT * unit, rng)
     hit = looks.points(behind)
     smooth = np.flatnonzero(np.logical_not(good) | (depths == behind))
@@ -101,9 +87,7 @@ def sweep_planes(
     points = join_points(
         StartPoints(looks.points(depths)[own], looks.colours[own]),
         StartPoints(hit[beyond], looks.colours[beyond], normal=about.normals(hit[beyond])),
-        cover_background(
-            about, views.cameras, COVER_POINTS_WEIGHT * unit, hit[smooth], looks.colours[smooth]
-        ),
+        cover_background(about, views.cameras, COVER_POINTS_WEIGHT * unit, hit[smooth], looks.colours[smooth]),
     )
     known = np.where(good, depths, np.inf)
     clear = free_depths(views.cameras)
@@ -135,9 +119,7 @@ class _SweepImages:
     def points(self, depths: Float[np.ndarray, "V h w"]) -> Float[np.ndarray, "N 3"]:
         """Return what every pixel shows; nan where it has no depth."""
         with np.errstate(invalid="ignore"):
-            return np.where(
-                np.isfinite(z := depths.reshape(-1, 1)), self.eyes + z * self.rays, np.nan
-            )
+            return np.where(np.isfinite(z := depths.reshape(-1, 1)), self.eyes + z * self.rays, np.nan)
 
     def depths(self, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
         """Sweep every view."""
@@ -146,18 +128,13 @@ class _SweepImages:
         for k, camera in enumerate(self.cameras):
             middle = float(np.linalg.norm(camera.world_from_camera[:3, 3] - around.centre))
             near = max(0.1 * middle, middle - 1.5 * around.radius)
-            planes = np.linspace(
-                1 / (middle + LAST_PLANE_RADII * around.radius), 1 / near, SWEEP_PLANES
-            )
+            planes = np.linspace(1 / (middle + LAST_PLANE_RADII * around.radius), 1 / near, SWEEP_PLANES)
             rest = *self._mates(k), planes, depths[k]
             pool.each(sweep_rows, [(k, *span, *rest) for span in pool.spans(self.grid[1])])
         return depths
 
     def preferred(
-        self,
-        depths: Float[np.ndarray, "V h w"],
-        wanted: Float[np.ndarray, "V h w"],
-        pool: ThreadPool,
+        self, depths: Float[np.ndarray, "V h w"], wanted: Float[np.ndarray, "V h w"], pool: ThreadPool
     ) -> Float[np.ndarray, "V h w"]:
         """Return other depths where they look as good."""
         depths = depths.copy()
@@ -166,9 +143,7 @@ class _SweepImages:
             pool.each(prefer_depths, [(k, *span, *rest) for span in pool.spans(self.grid[1])])
         return depths
 
-    def confirmed(
-        self, depths: Float[np.ndarray, "V h w"], pool: ThreadPool
-    ) -> Bool[np.ndarray, "V h w"]:
+    def confirmed(self, depths: Float[np.ndarray, "V h w"], pool: ThreadPool) -> Bool[np.ndarray, "V h w"]:
         """Return which depths more of the other views confirm than deny, and enough of them."""
         found = np.flatnonzero(np.isfinite(depths))
         points, view = self.points(depths)[found], self.view[found]
@@ -189,17 +164,13 @@ class _SweepImages:
         return *shared, ways[:, :3, :3].copy(), ways[:, :3, 3].copy()
 
 
-def _sample_pixels(
-    which: np.ndarray, count: int, rng: np.random.Generator
-) -> Int[np.ndarray, " n"]:
+def _sample_pixels(which: np.ndarray, count: int, rng: np.random.Generator) -> Int[np.ndarray, " n"]:
     return rng.choice(which, min(count, len(which)), replace=False)
 
 
 def neighbouring_views(cameras: tuple[Camera, ...], k: int) -> Int[np.ndarray, " mates"]:
     """Return the views that see the region from directions nearest to view k's, but not its own."""
-    eyes = (
-        np.stack([c.world_from_camera[:3, 3] for c in cameras]) - find_viewed_region(cameras).centre
-    )
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras]) - find_viewed_region(cameras).centre
     directions = eyes / np.linalg.norm(eyes, axis=1, keepdims=True)
     alike = directions @ directions[k]
     alike[alike > MAX_MATE_COSINE] = -2 - np.arange(len(cameras))[alike > MAX_MATE_COSINE]

@@ -1,8 +1,8 @@
 """A radiance field on a voxel grid, learned from posed pictures: density and colour in space.
 
-Light along a ray is Σ T_i α_i c_i, α = 1 - exp(-σ δ) (Max 1995; Mildenhall et al. 2020); density
-and colour are interpolated between the nodes of a grid, before they are made positive (Sun et al.,
-"Direct Voxel Grid Optimization", CVPR 2022). Nodes are only where the masks' visual hull is.
+Light along a ray is Σ T_i α_i c_i, α = 1 - exp(-σ δ) (Max 1995; Mildenhall et al. 2020); density and colour are
+interpolated between the nodes of a grid, before they are made positive (Sun et al., "Direct Voxel Grid Optimization",
+CVPR 2022). Nodes are only where the masks' visual hull is.
 """
 
 import time
@@ -26,11 +26,7 @@ from corporeal.reconstruction.gaussians.rasteriser_numba import RenderedPicture
 from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import GREY_BACKGROUND
-from corporeal.reconstruction.gaussians.training_schedule import (
-    Masks,
-    check_training_views,
-    shrink_picture,
-)
+from corporeal.reconstruction.gaussians.training_schedule import Masks, check_training_views, shrink_picture
 from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
 
 Progress = Callable[[float, str], None]
@@ -66,11 +62,7 @@ class FieldPreset:
     """Rays that a step learns from [1]."""
 
 
-FIELD_PRESETS = {
-    "preview": FieldPreset(100, 128),
-    "draft": FieldPreset(400, 256),
-    "normal": FieldPreset(1000, 512),
-}
+FIELD_PRESETS = {"preview": FieldPreset(100, 128), "draft": FieldPreset(400, 256), "normal": FieldPreset(1000, 512)}
 
 
 @dataclass(frozen=True)
@@ -99,8 +91,8 @@ DEFAULT_FIELD = RadianceFieldConfig()
 class RadianceField:
     """Density and colour in space; N nodes of a grid have them, everywhere else there is nothing.
 
-    Between nodes numbers are interpolated linearly. Density σ [1/m] is softplus(s) / cell, a colour
-    in sRGB the logistic function of its logit.
+    Between nodes numbers are interpolated linearly. Density σ [1/m] is softplus(s) / cell, a colour in sRGB the
+    logistic function of its logit.
     """
 
     grid: VoxelGrid
@@ -139,9 +131,7 @@ class TrainedField:
 # ---------------------------------------------------------------- a field and what it looks like
 
 
-def haze_field(
-    low: Float[np.ndarray, "3"], cell: float, filled: Bool[np.ndarray, "X1 Y1 Z1"]
-) -> RadianceField:
+def haze_field(low: Float[np.ndarray, "3"], cell: float, filled: Bool[np.ndarray, "X1 Y1 Z1"]) -> RadianceField:
     """Return a field of grey haze.
 
     Args:
@@ -163,9 +153,7 @@ def haze_field(
     return RadianceField(VoxelGrid(start, cell, (x + 1, y + 1, z + 1)), row, filled, values)
 
 
-def render_field(
-    field: RadianceField, camera: Camera, threads: int | None = None
-) -> RenderedPicture:
+def render_field(field: RadianceField, camera: Camera, threads: int | None = None) -> RenderedPicture:
     """Picture a field before black; the depth is where half of the light is lost [m]."""
     out = np.empty((camera.height * camera.width, 5), np.float32)
     rest = field_camera_rows(field.grid, (camera,))[0], camera.width, field_arrays(field), out
@@ -176,9 +164,7 @@ def render_field(
     return RenderedPicture(rgb.reshape(*size, 3).copy(), alpha.reshape(size), depth.reshape(size))
 
 
-def field_colours(
-    field: RadianceField, position: Float[np.ndarray, "N 3"]
-) -> Float[np.ndarray, "N 3"]:
+def field_colours(field: RadianceField, position: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
     """Return the field's colour at places [m], sRGB in [0, 1]; what has none is grey."""
     inside = (position - np.array(field.grid.low)) / field.grid.cell
     share = trilinear_weights(inside, field.grid.shape)
@@ -216,8 +202,8 @@ def field_surface_points(
         cameras: That it was learned from.
         most: No more points than that, by chance.
         seed: Of chance.
-        allowed: Tells places (N, 3) where objects are from others. Where few views see, nothing
-            tells them that it is empty, and something may float.
+        allowed: Tells places (N, 3) where objects are from others. Where few views see, nothing tells them that it is
+            empty, and something may float.
         threads: None: one per processor.
 
     Raises:
@@ -247,9 +233,7 @@ def field_surface_points(
 
 
 def _ray_ends(
-    cameras: Sequence[Camera],
-    depth: Float32[np.ndarray, "V H W"],
-    max_pixels: int = MAX_SAMPLED_PIXELS,
+    cameras: Sequence[Camera], depth: Float32[np.ndarray, "V H W"], max_pixels: int = MAX_SAMPLED_PIXELS
 ) -> tuple[Float[np.ndarray, "R 3"], Int[np.ndarray, " R"]]:
     """Return where rays lose half of their light [m], and of which view each is.
 
@@ -314,17 +298,14 @@ def train_field(
         progress: Called with the fraction done and what is being done.
 
     Raises:
-        UserError: There are too few pictures, masks of another shape, or cameras and pictures do
-            not belong together.
+        UserError: There are too few pictures, masks of another shape, or cameras and pictures do not belong together.
 
     """
     begun = time.monotonic()
     check_training_views(views, masks)
     preset = FIELD_PRESETS[config.preset]
     preset = replace(
-        preset,
-        steps=config.steps or preset.steps,
-        rays_per_step=config.rays_per_step or preset.rays_per_step,
+        preset, steps=config.steps or preset.steps, rays_per_step=config.rays_per_step or preset.rays_per_step
     )
     count, every = len(views.cameras), config.held_out
     held = tuple(range(every // 2, count, every)) if every and count > every else ()
@@ -357,14 +338,10 @@ def _field_from_state(state: dict[str, np.ndarray]) -> RadianceField:
     return begun
 
 
-def _haze_in_hull(
-    views: Views, masks: Masks, pool: ThreadPool, config: HullConfig
-) -> RadianceField:
+def _haze_in_hull(views: Views, masks: Masks, pool: ThreadPool, config: HullConfig) -> RadianceField:
     """Return a field of haze in the visual hull of masks."""
     hull = carve_tight_hull(views, masks, pool, config)
-    filled = binary_dilation(
-        np.pad(hull.inside, HULL_PADDING_CUBES), np.ones((3, 3, 3)), iterations=HULL_PADDING_CUBES
-    )
+    filled = binary_dilation(np.pad(hull.inside, HULL_PADDING_CUBES), np.ones((3, 3, 3)), iterations=HULL_PADDING_CUBES)
     low = hull.cells[0, 0, 0] - (0.5 + HULL_PADDING_CUBES) * hull.side
     return haze_field(low, hull.side, filled)
 
@@ -372,14 +349,7 @@ def _haze_in_hull(
 class _TrainingData:
     """What there is to learn from."""
 
-    def __init__(
-        self,
-        made: RadianceField,
-        views: Views,
-        masks: Masks,
-        preset: FieldPreset,
-        seed: int,
-    ) -> None:
+    def __init__(self, made: RadianceField, views: Views, masks: Masks, preset: FieldPreset, seed: int) -> None:
         factor = -(-max(views.rgb.shape[1:3]) // preset.longest)
         full = masks[..., None] * np.uint8(255)
         rgb = np.stack([shrink_picture(picture, factor) for picture in views.rgb])
@@ -410,10 +380,7 @@ def _optimise_field(data: _TrainingData, pool: ThreadPool, progress: Progress) -
         deals = [slice(k, None, GRADIENT_SHARES) for k in range(GRADIENT_SHARES)]
         pool.each(
             kernels_radiance.ray_loss_gradient,
-            [
-                (rays[d], jitter[d], background, *shown, gradients[k], sums[k])
-                for k, d in enumerate(deals)
-            ],
+            [(rays[d], jitter[d], background, *shown, gradients[k], sums[k]) for k, d in enumerate(deals)],
         )
         # Adam on the sum of all shares' gradients.
         rate = np.float32(LEARNING_RATE * FINAL_RATE_FRACTION ** (step / steps))
@@ -424,9 +391,7 @@ def _optimise_field(data: _TrainingData, pool: ThreadPool, progress: Progress) -
         progress((step + 1) / steps, words)
 
 
-def _field_quality(
-    made: RadianceField, views: Views, masks: Masks, held: tuple[int, ...]
-) -> HeldOutQuality:
+def _field_quality(made: RadianceField, views: Views, masks: Masks, held: tuple[int, ...]) -> HeldOutQuality:
     """Compare a field with views that it was not learned from, before grey."""
     rows, behind = [], np.array(GREY_BACKGROUND)
     for k in held:

@@ -1,7 +1,7 @@
 """Rasteriser of Gaussians with gradients on a GPU, by gsplat 1.5 (Ye et al. 2025) on CUDA.
 
-The same two functions as ``raster``. What is drawn differs a little: an alpha may be 0.999 instead
-of 0.99, and a Gaussian ends at three standard deviations.
+The same two functions as ``raster``. What is drawn differs a little: an alpha may be 0.999 instead of 0.99, and a
+Gaussian ends at three standard deviations.
 """
 
 from dataclasses import dataclass
@@ -20,11 +20,7 @@ from corporeal.reconstruction.gaussians.gaussian_parameters import (
     PARAM_SCALE,
     ParameterMatrix,
 )
-from corporeal.reconstruction.gaussians.kernels_project import (
-    DILATION_PX2,
-    ELLIPSE_COLUMNS,
-    PinholeCamera,
-)
+from corporeal.reconstruction.gaussians.kernels_project import DILATION_PX2, ELLIPSE_COLUMNS, PinholeCamera
 from corporeal.reconstruction.gaussians.rasteriser_numba import Drawing
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
@@ -43,14 +39,11 @@ def require_cuda() -> None:
     """Raise UserError where there is no GPU."""
     if not torch.cuda.is_available():
         raise UserError(
-            "The rasteriser 'gsplat' needs a GPU with CUDA, and torch finds none. "
-            "Choose the rasteriser 'numba'."
+            "The rasteriser 'gsplat' needs a GPU with CUDA, and torch finds none. Choose the rasteriser 'numba'."
         )
 
 
-def draw(
-    theta: ParameterMatrix, camera: PinholeCamera, background: np.ndarray, pool: ThreadPool
-) -> GsplatDrawing:
+def draw(theta: ParameterMatrix, camera: PinholeCamera, background: np.ndarray, pool: ThreadPool) -> GsplatDrawing:
     """Draw Gaussians before a background; the GPU shares the work itself.
 
     Raises:

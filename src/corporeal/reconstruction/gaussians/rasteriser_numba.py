@@ -12,10 +12,7 @@ from scipy.sparse import csr_array
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Gaussians, Vector
 from corporeal.reconstruction.gaussians import kernels_blend, kernels_project
-from corporeal.reconstruction.gaussians.gaussian_parameters import (
-    ParameterMatrix,
-    parameters_of_gaussians,
-)
+from corporeal.reconstruction.gaussians.gaussian_parameters import ParameterMatrix, parameters_of_gaussians
 from corporeal.reconstruction.gaussians.kernels_blend import PICTURE_PLANES, RASTER_TILE_PX
 from corporeal.reconstruction.gaussians.kernels_project import (
     COL_A,
@@ -76,8 +73,7 @@ def render(
 ) -> RenderedPicture:
     """Picture some Gaussians before a background.
 
-    near: what is nearer is not drawn [m]; where a training left something before the cameras,
-    ``start.clearance``.
+    near: what is nearer is not drawn [m]; where a training left something before the cameras, ``start.clearance``.
 
     Raises:
         UserError: The camera is skewed.
@@ -85,9 +81,7 @@ def render(
     """
     with ThreadPool(threads) as pool:
         eye = pinhole_of_camera(camera, near=near)
-        return picture_of_drawing(
-            draw(parameters_of_gaussians(gaussians), eye, np.array(background), pool)
-        )
+        return picture_of_drawing(draw(parameters_of_gaussians(gaussians), eye, np.array(background), pool))
 
 
 def picture_of_drawing(drawing: Drawing) -> RenderedPicture:
@@ -100,10 +94,7 @@ def picture_of_drawing(drawing: Drawing) -> RenderedPicture:
 
 
 def draw(
-    theta: ParameterMatrix,
-    camera: PinholeCamera,
-    background: Float[np.ndarray, "3"],
-    pool: ThreadPool,
+    theta: ParameterMatrix, camera: PinholeCamera, background: Float[np.ndarray, "3"], pool: ThreadPool
 ) -> Drawing:
     """Draw Gaussians from front to back."""
     ellipses, first, ids, places, spans = _sort_into_tiles(theta, camera, pool)
@@ -114,9 +105,7 @@ def draw(
     return Drawing(theta, camera, ellipses, first, ids, places, spans, planes)
 
 
-def _sort_into_tiles(
-    theta: ParameterMatrix, camera: PinholeCamera, pool: ThreadPool
-) -> tuple[np.ndarray, ...]:
+def _sort_into_tiles(theta: ParameterMatrix, camera: PinholeCamera, pool: ThreadPool) -> tuple[np.ndarray, ...]:
     """Return a drawing's ellipses and their entries, tile by tile, front to back in each."""
     ellipses = np.zeros((len(theta), ELLIPSE_COLUMNS), np.float32)
     shares = [(theta, *span, camera, ellipses) for span in pool.spans(len(theta))]
@@ -127,9 +116,7 @@ def _sort_into_tiles(
     return ellipses, *kernels_blend.sort_into_tiles(order, ellipses, across, down)
 
 
-def back(
-    drawing: Drawing, slope: Float32[np.ndarray, "4 H W"], pool: ThreadPool
-) -> Float32[np.ndarray, "N D"]:
+def back(drawing: Drawing, slope: Float32[np.ndarray, "4 H W"], pool: ThreadPool) -> Float32[np.ndarray, "N D"]:
     """Return dL/dθ from the slope, dL/d(red, green, blue, transmittance) of every pixel."""
     d = drawing
     entries = np.empty((len(d.ids), GRADIENT_COLUMNS), np.float32)
@@ -143,13 +130,11 @@ def back(
     return gradient
 
 
-def gaussian_weights(
-    gaussians: Gaussians, camera: Camera, cell: int = 1, threads: int | None = None
-) -> csr_array:
+def gaussian_weights(gaussians: Gaussians, camera: Camera, cell: int = 1, threads: int | None = None) -> csr_array:
     """Return how much each Gaussian contributes to each cell of a picture.
 
-    cell: pixels along a cell: 1, 2, 4, 8 or 16. Row: Gaussian; column: row of cells times cells in
-    a row plus column of cells; value: sum of the weights T α over the cell's pixels.
+    cell: pixels along a cell: 1, 2, 4, 8 or 16. Row: Gaussian; column: row of cells times cells in a row plus column of
+    cells; value: sum of the weights T α over the cell's pixels.
     """
     return gaussian_contributions(gaussians, camera, cell, threads)[0]
 
@@ -189,9 +174,7 @@ def _unhidden_contribution(ellipses: Float32[np.ndarray, "N 12"]) -> Float[np.nd
     return whole
 
 
-def pinhole_of_camera(
-    camera: Camera, scale: float = 1.0, near: float = NEAR_DEPTH_M
-) -> PinholeCamera:
+def pinhole_of_camera(camera: Camera, scale: float = 1.0, near: float = NEAR_DEPTH_M) -> PinholeCamera:
     """Return a camera as kernels read it; a scale of 0.5 halves the picture.
 
     near: what is nearer is not drawn [m].
@@ -210,9 +193,7 @@ def pinhole_of_camera(
     return PinholeCamera(turn, -turn @ eye, eye, fx, fy, cx, cy, *size, float(near))
 
 
-def deal_tiles(
-    first: Int[np.ndarray, " tiles_and_1"], pool: ThreadPool
-) -> list[Int[np.ndarray, " t"]]:
+def deal_tiles(first: Int[np.ndarray, " tiles_and_1"], pool: ThreadPool) -> list[Int[np.ndarray, " t"]]:
     """Deal tiles to threads, the fullest first, so that all have about as much to do."""
     order = np.argsort(-np.diff(first), kind="stable")
     return [np.ascontiguousarray(order[k :: pool.threads]) for k in range(pool.threads)]

@@ -1,13 +1,12 @@
 """Space carving (Kutulakos and Seitz 2000) as a signed distance on a grid.
 
-A place is free where views see past it. One view may err, and all do along outlines; so a cell's
-distance is not the largest that any view allows, but the one that four in ten of those views exceed
-that see the cell at all. Both sides of a thin wall are seen by about as many, and each side's views
-agree among themselves, so that the wall stays. A view says nothing of what is well behind the
-surface that it sees, so that behind a surface of faint Gaussians the few rays that leak through it
-are alone, and agree on a cavern: what is free must be looked into through free places. What no view
-observes, inside objects and below them, is filled in smoothly between (∇²f = 0), which closes a
-seat from below with about the least area.
+A place is free where views see past it. One view may err, and all do along outlines; so a cell's distance is not the
+largest that any view allows, but the one that four in ten of those views exceed that see the cell at all. Both sides of
+a thin wall are seen by about as many, and each side's views agree among themselves, so that the wall stays. A view says
+nothing of what is well behind the surface that it sees, so that behind a surface of faint Gaussians the few rays that
+leak through it are alone, and agree on a cavern: what is free must be looked into through free places. What no view
+observes, inside objects and below them, is filled in smoothly between (∇²f = 0), which closes a seat from below with
+about the least area.
 """
 
 from dataclasses import dataclass
@@ -18,11 +17,7 @@ from scipy.ndimage import binary_dilation
 
 from corporeal.core.types import Vector
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
-from corporeal.reconstruction.gaussians.kernels_space_carving import (
-    carve_grid,
-    mark_hidden_cells,
-    relax_unknown_cells,
-)
+from corporeal.reconstruction.gaussians.kernels_space_carving import carve_grid, mark_hidden_cells, relax_unknown_cells
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 MAX_TRUSTED_DISTANCE_CELLS = 3.0
@@ -67,9 +62,7 @@ class VoxelGrid:
         return np.clip(found, 0, np.array(self.shape) - 1)
 
 
-def grid_over_box(
-    low: np.ndarray, high: np.ndarray, cells: int, floor: float, finest: float = 0.0
-) -> VoxelGrid:
+def grid_over_box(low: np.ndarray, high: np.ndarray, cells: int, floor: float, finest: float = 0.0) -> VoxelGrid:
     """Return a grid of about so many cells over a box, with the floor half-way between two layers.
 
     finest: no cell is smaller [m].
@@ -92,13 +85,7 @@ def carve_signed_distance(
     field = np.empty(grid.shape, np.float32)
     place = np.array([*grid.low, grid.cell])
     reach = MAX_TRUSTED_DISTANCE_CELLS * grid.cell
-    rule = np.array(
-        [
-            reach,
-            EMPTIER_VIEWS_FRACTION,
-            max(1, round(MIN_WITNESS_VIEWS_FRACTION * len(rendering.depth))),
-        ]
-    )
+    rule = np.array([reach, EMPTIER_VIEWS_FRACTION, max(1, round(MIN_WITNESS_VIEWS_FRACTION * len(rendering.depth)))])
     rest = (
         place,
         rendering.rows,

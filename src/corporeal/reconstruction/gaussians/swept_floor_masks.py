@@ -1,7 +1,7 @@
 """Masks of objects on a floor from Gaussians of whole photographs.
 
-Where objects are decides, not how they look: what lies in the floor's plane is floor, whatever its
-colour. So shadows are none of the objects, and objects of the floor's own colour are.
+Where objects are decides, not how they look: what lies in the floor's plane is floor, whatever its colour. So shadows
+are none of the objects, and objects of the floor's own colour are.
 """
 
 import numpy as np
@@ -30,11 +30,7 @@ from corporeal.reconstruction.gaussians.gaussian_parameters import (
     ParameterMatrix,
     parameters_of_gaussians,
 )
-from corporeal.reconstruction.gaussians.rasteriser_numba import (
-    draw,
-    picture_of_drawing,
-    pinhole_of_camera,
-)
+from corporeal.reconstruction.gaussians.rasteriser_numba import draw, picture_of_drawing, pinhole_of_camera
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 
 CONNECTED_GAP_RADII = 0.04
@@ -69,16 +65,10 @@ def masks_above_floor(
     """
     radius = find_viewed_region(cameras, gaussians.mean).radius
     of_objects = foreground_gaussians(
-        gaussians,
-        cameras,
-        gaussian_visibility(gaussians, cameras, None, threads),
-        floor,
-        layer_radii,
+        gaussians, cameras, gaussian_visibility(gaussians, cameras, None, threads), floor, layer_radii
     )
     if of_objects.any():
-        of_objects[of_objects] = _connected_with_many(
-            gaussians, of_objects, CONNECTED_GAP_RADII * radius
-        )
+        of_objects[of_objects] = _connected_with_many(gaussians, of_objects, CONNECTED_GAP_RADII * radius)
     theta = np.full((gaussians.count, PARAM_COLOUR + 3), BLACK_HARMONIC, np.float32)
     theta[:, :PARAM_COLOUR] = parameters_of_gaussians(gaussians)[:, :PARAM_COLOUR]
     theta[of_objects, PARAM_COLOUR:] = WHITE_HARMONIC
@@ -92,9 +82,7 @@ def masks_above_floor(
     return np.stack(masks)
 
 
-def _connected_with_many(
-    gaussians: Gaussians, which: np.ndarray, cell: float
-) -> Bool[np.ndarray, " M"]:
+def _connected_with_many(gaussians: Gaussians, which: np.ndarray, cell: float) -> Bool[np.ndarray, " M"]:
     """Return which of the chosen Gaussians hang together with many others."""
     turn = Rotation.from_quat(gaussians.rotation[which], scalar_first=True).as_matrix()
     axes = GAUSSIAN_EXTENT_SIGMAS * (turn * gaussians.scale[which, None]).transpose(0, 2, 1)
@@ -113,9 +101,7 @@ def _connected_with_many(
     return np.bincount(own)[own] >= MIN_PIECE_GAUSSIANS_FRACTION * count
 
 
-def _mirror_feet(
-    theta: ParameterMatrix, of_objects: Bool[np.ndarray, " N"], top: float
-) -> ParameterMatrix:
+def _mirror_feet(theta: ParameterMatrix, of_objects: Bool[np.ndarray, " N"], top: float) -> ParameterMatrix:
     """Return Gaussians with a mirror image of objects in place of what is in a layer below them."""
     height = theta[:, PARAM_MEAN + 2]
     feet = theta[of_objects & (height < 2 * top) & (theta[:, PARAM_OPACITY] > 0)]
@@ -123,8 +109,5 @@ def _mirror_feet(
         return theta
     feet[:, PARAM_MEAN + 2] = 2 * top - feet[:, PARAM_MEAN + 2]
     feet[:, PARAM_ROTATION + 1 : PARAM_ROTATION + 3] *= -1  # M R M turns by (w, -x, -y, z)
-    near = (
-        KDTree(feet[:, PARAM_MEAN:PARAM_ROTATION]).query(theta[:, PARAM_MEAN:PARAM_ROTATION])[0]
-        < top
-    )
+    near = KDTree(feet[:, PARAM_MEAN:PARAM_ROTATION]).query(theta[:, PARAM_MEAN:PARAM_ROTATION])[0] < top
     return np.concatenate([theta[of_objects | ~near], feet])

@@ -1,9 +1,9 @@
 """Training of Gaussians on posed pictures.
 
-Adam on the loss of ``image_loss``, one view a step, before random backgrounds: where there are
-masks, nothing beside the objects is drawn, and without, no place is left empty. The first steps
-look at pictures of half the size. Everything left to chance comes from the seed and the number of
-the step, so that a training that was cut off goes on as if it had not been.
+Adam on the loss of ``image_loss``, one view a step, before random backgrounds: where there are masks, nothing beside
+the objects is drawn, and without, no place is left empty. The first steps look at pictures of half the size. Everything
+left to chance comes from the seed and the number of the step, so that a training that was cut off goes on as if it had
+not been.
 """
 
 import time
@@ -16,11 +16,7 @@ from jaxtyping import Bool, Float32
 
 from corporeal.core.types import Gaussians, Vector, Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
-from corporeal.reconstruction.gaussians import (
-    densification,
-    exposure_gains,
-    training_checkpoint,
-)
+from corporeal.reconstruction.gaussians import densification, exposure_gains, training_checkpoint
 from corporeal.reconstruction.gaussians.carved_volume import carve_volume
 from corporeal.reconstruction.gaussians.densification import ScaleLimits
 from corporeal.reconstruction.gaussians.gaussian_initialisation import (
@@ -44,12 +40,7 @@ from corporeal.reconstruction.gaussians.image_loss import image_loss, target_ima
 from corporeal.reconstruction.gaussians.kernels_training import adam_rows
 from corporeal.reconstruction.gaussians.plane_sweep import sweep_planes
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.gaussians.training_schedule import (
-    DEFAULT_TRAINING,
-    Masks,
-    TrainConfig,
-    TrainingSchedule,
-)
+from corporeal.reconstruction.gaussians.training_schedule import DEFAULT_TRAINING, Masks, TrainConfig, TrainingSchedule
 
 Progress = Callable[[float, str], None]
 
@@ -105,18 +96,17 @@ def train_gaussians(
 ) -> TrainedGaussians:
     """Learn Gaussians from posed pictures.
 
-    masks: what belongs to the objects; only that is learned then. points: where to start, too, or
-    with masks instead of their visual hull; without masks a plane sweep finds where objects are.
-    Lines of sight in their place empty the visual hull where they pass.
-    checkpoint: a file that is written now and then; a training that was cut off goes on from it,
-    and one that was finished is not done again.
+    masks: what belongs to the objects; only that is learned then. points: where to start, too, or with masks instead of
+    their visual hull; without masks a plane sweep finds where objects are. Lines of sight in their place empty the
+    visual hull where they pass.
+    checkpoint: a file that is written now and then; a training that was cut off goes on from it, and one that was
+    finished is not done again.
 
-    Where exposures differ, Gaussians have the mean one, and held-out views are compared after the
-    gain that suits each.
+    Where exposures differ, Gaussians have the mean one, and held-out views are compared after the gain that suits each.
 
     Raises:
-        UserError: There are too few pictures, masks of another shape, a skewed camera, or cameras
-            and pictures do not belong together.
+        UserError: There are too few pictures, masks of another shape, a skewed camera, or cameras and pictures do not
+            belong together.
 
     """
     begun = time.monotonic()
@@ -129,9 +119,7 @@ def train_gaussians(
             progress(fraction, words)
     if checkpoint is not None:
         training_checkpoint.save_checkpoint(checkpoint, schedule.name, vars(training))
-    left = (opacities(training.theta) > densification.DEAD_OPACITY) & ~_in_empty_space(
-        training.theta, schedule
-    )
+    left = (opacities(training.theta) > densification.DEAD_OPACITY) & ~_in_empty_space(training.theta, schedule)
     made = gaussians_of_parameters(training.theta[left])
     behind = None if masks is None else GREY_BACKGROUND
     apart = exposure_gains.exposures_differ(training.gains)
@@ -178,30 +166,20 @@ def _begin_or_resume(
     if points is None and masks is not None:
         own = None if lines is None else lines.only(schedule.learned)
         schedule.outlines = carve_volume(views, masks, own, pool, schedule.config.hull)
-    state = (
-        training_checkpoint.load_checkpoint(checkpoint, schedule.name)
-        if checkpoint is not None
-        else {}
-    )
+    state = training_checkpoint.load_checkpoint(checkpoint, schedule.name) if checkpoint is not None else {}
     if state:
         learned = state["theta"], state["first"], state["second"]
         rest = state["limits"], state["gains"], float(state["widest"]), float(state["ahead"])
         return TrainingState(*learned, *rest, int(state["step"]), float(state["seconds"]))
-    widest, ahead, begin = (
-        densification.MAX_SCALE_RADII * schedule.radius,
-        np.nan,
-        schedule.config.begin,
-    )
+    widest, ahead, begin = (densification.MAX_SCALE_RADII * schedule.radius, np.nan, schedule.config.begin)
     if schedule.outlines is not None:
         ahead = _trial_gain(schedule, progress) if begin == "auto" else np.nan
         inside = begin == "inside" or ahead > MIN_TRIAL_GAIN_DB
         if inside:
-            # As far as so many are apart on a sphere. One that is wider shows all of a plain face
-            # from below it, and costs less of PULL than those that lie on it.
+            # As far as so many are apart on a sphere. One that is wider shows all of a plain face from below it, and
+            # costs less of PULL than those that lie on it.
             widest = schedule.radius * np.sqrt(4 * np.pi / preset.gaussians)
-        points = points_on_hull(
-            schedule.outlines, preset.gaussians, rng, pool, INSIDE_HULL_FRACTION * inside
-        )
+        points = points_on_hull(schedule.outlines, preset.gaussians, rng, pool, INSIDE_HULL_FRACTION * inside)
     assert points is not None
     theta = initial_gaussians(points, preset.gaussians, preset.degree, rng)
     bounds, _ = _limits_and_haze(theta, widest, schedule, pool)
@@ -227,9 +205,7 @@ def _trial_gain(schedule: TrainingSchedule, progress: Progress) -> float:
     return inside.psnr_on_objects - hull_alone.psnr_on_objects
 
 
-def _learn(
-    training: TrainingState, schedule: TrainingSchedule, checkpoint: Path | None, pool: ThreadPool
-):
+def _learn(training: TrainingState, schedule: TrainingSchedule, checkpoint: Path | None, pool: ThreadPool):
     """Take the steps that are left; yields fraction done and words."""
     steps = schedule.preset.steps
     start, begun = schedule.cost(training.step), time.monotonic()
@@ -263,10 +239,7 @@ def _step(training: TrainingState, schedule: TrainingSchedule, pool: ThreadPool)
     # Adam, with a decay that lets what no picture needs fade.
     rates = _column_rates(schedule, training)
     count = len(training.theta)
-    decay = (
-        np.float32(OPACITY_SCALE_PENALTY / count),
-        np.float32(OPACITY_SCALE_PENALTY / 3 / count / schedule.radius),
-    )
+    decay = (np.float32(OPACITY_SCALE_PENALTY / count), np.float32(OPACITY_SCALE_PENALTY / 3 / count / schedule.radius))
     rest = gradient, training.first, training.second, rates, training.step + 1, decay
     bounds = training.limits, drawing.spans
     pool.each(adam_rows, [(training.theta, *rest, *bounds, *span) for span in pool.spans(count)])
@@ -279,11 +252,7 @@ def _step(training: TrainingState, schedule: TrainingSchedule, pool: ThreadPool)
 
 
 def _densify_and_wander(
-    training: TrainingState,
-    schedule: TrainingSchedule,
-    rate: float,
-    rng: np.random.Generator,
-    pool: ThreadPool,
+    training: TrainingState, schedule: TrainingSchedule, rate: float, rng: np.random.Generator, pool: ThreadPool
 ) -> None:
     """Move Gaussians that are dead to live ones now and then; let faint ones wander."""
     when = schedule.config.densification
@@ -301,9 +270,7 @@ def _densify_and_wander(
         training.limits, _ = _limits_and_haze(training.theta, training.widest, schedule, pool)
     faint = np.flatnonzero(opacities(training.theta) < 0.1)
     reach = STIR_SIGMAS_PER_RATE * rate / schedule.radius
-    training.theta[faint, PARAM_MEAN:PARAM_ROTATION] += densification.random_steps(
-        training.theta[faint], reach, rng
-    )
+    training.theta[faint, PARAM_MEAN:PARAM_ROTATION] += densification.random_steps(training.theta[faint], reach, rng)
 
 
 def _limits_and_haze(
@@ -335,13 +302,9 @@ def _column_rates(schedule: TrainingSchedule, training: TrainingState) -> Float3
 def _view_of_step(schedule: TrainingSchedule, step: int) -> int:
     """Return whose turn it is: every view once, then again in another order."""
     lap, place = divmod(step, len(schedule.learned))
-    return schedule.learned[
-        np.random.default_rng([schedule.seed, 2, lap]).permutation(len(schedule.learned))[place]
-    ]
+    return schedule.learned[np.random.default_rng([schedule.seed, 2, lap]).permutation(len(schedule.learned))[place]]
 
 
-def _subset_of_views(
-    views: Views, masks: Masks | None, which: list[int]
-) -> tuple[Views, Masks | None]:
+def _subset_of_views(views: Views, masks: Masks | None, which: list[int]) -> tuple[Views, Masks | None]:
     cameras = tuple(views.cameras[k] for k in which)
     return Views(views.rgb[which], cameras), None if masks is None else masks[which]

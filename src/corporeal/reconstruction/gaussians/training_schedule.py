@@ -69,8 +69,7 @@ class TrainConfig:
     """How to learn Gaussians from pictures."""
 
     preset: Literal["preview", "draft", "normal"] = "normal"
-    """preview: rough shapes in some seconds; draft: within a minute on two cores; normal: within
-    four."""
+    """preview: rough shapes in some seconds; draft: within a minute on two cores; normal: within four."""
     gaussians: int | None = None
     """How many at most; None: as the preset says."""
     steps: int | None = None
@@ -78,10 +77,9 @@ class TrainConfig:
     longest: int | None = None
     """Larger pictures are shrunk until no side is longer [px]; None: as the preset says."""
     begin: Literal["auto", "hull", "inside"] = "auto"
-    """With masks: on their visual hull, or some Gaussians inside it, too. A seat between its arms
-    lies below the hull, and what begins on that would have to sink there; in an open bowl what
-    begins inside stays there, if that is plain. auto: what a small training finds the better; the
-    hull where views are too few to tell."""
+    """With masks: on their visual hull, or some Gaussians inside it, too. A seat between its arms lies below the hull,
+    and what begins on that would have to sink there; in an open bowl what begins inside stays there, if that is plain.
+    auto: what a small training finds the better; the hull where views are too few to tell."""
     held_out: int = 8
     """Every so-many-th view is not learned from but compared with; 0: none is."""
     seed: int = 0
@@ -112,9 +110,7 @@ def validate_rasteriser(rasteriser: str) -> None:
     """Raise UserError where there is no such rasteriser here."""
     if rasteriser == "gsplat":
         load_backend(
-            "rasteriser",
-            rasteriser,
-            {"gsplat": "corporeal.reconstruction.gaussians.rasteriser_gsplat:require_cuda"},
+            "rasteriser", rasteriser, {"gsplat": "corporeal.reconstruction.gaussians.rasteriser_gsplat:require_cuda"}
         )()
 
 
@@ -122,11 +118,7 @@ class TrainingSchedule:
     """What each step of a training looks at, and how: pictures in two sizes."""
 
     def __init__(
-        self,
-        views: Views,
-        masks: Masks | None,
-        points: StartPoints | LinesOfSight | None,
-        config: TrainConfig,
+        self, views: Views, masks: Masks | None, points: StartPoints | LinesOfSight | None, config: TrainConfig
     ) -> None:
         check_training_views(views, masks)
         preset = TRAINING_PRESETS[config.preset]
@@ -139,11 +131,7 @@ class TrainingSchedule:
         self.config = config
         self.seed, self.rasteriser = config.seed, config.rasteriser
         self.draw, self.back = (
-            load_backend(
-                "rasteriser",
-                self.rasteriser,
-                {k: f"{m}:{do}" for k, m in RASTERISER_REGISTRY.items()},
-            )
+            load_backend("rasteriser", self.rasteriser, {k: f"{m}:{do}" for k, m in RASTERISER_REGISTRY.items()})
             for do in ("draw", "back")
         )
         self.views, self.masks, self.points = views, masks, points
@@ -157,12 +145,8 @@ class TrainingSchedule:
         halves = min(views.rgb.shape[1:3]) // factor >= MIN_HALVED_WIDTH_PX
         self.surfaces: ViewDepths | None = None
         self.outlines: CarvedVolume | None = None
-        self.coarse = (
-            COARSE_STEPS_FRACTION_UNMASKED if masks is None else COARSE_STEPS_FRACTION
-        ) * self.preset.steps
-        self.sizes = [_PictureSize(self, factor)] + (
-            [_PictureSize(self, 2 * factor)] if halves else []
-        )
+        self.coarse = (COARSE_STEPS_FRACTION_UNMASKED if masks is None else COARSE_STEPS_FRACTION) * self.preset.steps
+        self.sizes = [_PictureSize(self, factor)] + ([_PictureSize(self, 2 * factor)] if halves else [])
 
     @property
     def name(self) -> str:
@@ -192,9 +176,7 @@ class _PictureSize:
         views, masks = schedule.views, schedule.masks
         self.rgb = {k: shrink_picture(views.rgb[k], factor) for k in schedule.learned}
         full = {} if masks is None else {k: masks[k] * np.uint8(255) for k in schedule.learned}
-        self.masks = {
-            k: shrink_picture(mask[..., None], factor)[..., 0] for k, mask in full.items()
-        }
+        self.masks = {k: shrink_picture(mask[..., None], factor)[..., 0] for k, mask in full.items()}
         self.cameras: dict[int, PinholeCamera] = {}
         for k, picture in self.rgb.items():
             eye = pinhole_of_camera(views.cameras[k], 1 / factor, schedule.clear[k])

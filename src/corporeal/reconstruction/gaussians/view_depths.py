@@ -39,9 +39,7 @@ class ViewDepths:
     behind: Float[np.ndarray, "V h w"]
     """Of what encloses everything [m]."""
 
-    def judge(
-        self, position: Float[np.ndarray, "N 3"], width: Float[np.ndarray, " N"], pool: ThreadPool
-    ) -> DepthVotes:
+    def judge(self, position: Float[np.ndarray, "N 3"], width: Float[np.ndarray, " N"], pool: ThreadPool) -> DepthVotes:
         """Ask all views about Gaussians; width: their greatest standard deviation [m].
 
         Where a view knows no depth it sees past what few others see, maybe as far as the enclosure.

@@ -64,10 +64,7 @@ class CarvedVolume:
 
 
 def carve_tight_hull(
-    views: Views,
-    masks: Bool[np.ndarray, "V H W"],
-    pool: ThreadPool,
-    config: HullConfig = DEFAULT_HULL,
+    views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool, config: HullConfig = DEFAULT_HULL
 ) -> VisualHull:
     """Return the visual hull in a box that hardly holds more.
 
@@ -110,8 +107,7 @@ def carve_hull(
     compared = min(COHERENCE_IMAGE_SIDE_PX, int(COMPARED_PX_PER_CELL * max(cells.shape[:3])))
     if (
         count >= MANY_VIEWS
-        and mask_fill_fraction(points[inside], views.cameras, masks, compared)
-        < config.min_mask_fill_fraction
+        and mask_fill_fraction(points[inside], views.cameras, masks, compared) < config.min_mask_fill_fraction
     ):
         inside = enough & ~is_outside_silhouettes(seen[:, 1], seen[:, 0] + seen[:, 1])
     if not inside.any():
@@ -132,8 +128,8 @@ def _without_phantoms(
 ) -> VisualHull:
     """Drop pieces that few views see and that fill little of the masks that others do not fill.
 
-    A piece that stands for an object fills all of its silhouettes, one where silhouettes cross by
-    chance only what they share: those that fill most are taken first.
+    A piece that stands for an object fills all of its silhouettes, one where silhouettes cross by chance only what they
+    share: those that fill most are taken first.
     """
     piece = np.empty(hull.inside.shape, np.int32)
     label(hull.inside, np.ones((3, 3, 3)), piece)
@@ -183,16 +179,11 @@ def mask_fill_fraction(
 
 
 def mask_votes_at_points(
-    points: np.ndarray,
-    views: Views,
-    masks: np.ndarray,
-    pool: ThreadPool,
-    patience: float | None = None,
+    points: np.ndarray, views: Views, masks: np.ndarray, pool: ThreadPool, patience: float | None = None
 ) -> Float[np.ndarray, "N 5"]:
     """Return what views say of points, as ``kernels_learn.witness`` has it.
 
-    patience: after more views that see a point beside objects nobody else is asked; None: as many
-    as ASTRAY forgives.
+    patience: after more views that see a point beside objects nobody else is asked; None: as many as ASTRAY forgives.
     """
     out = np.empty((len(points), 5))
     patience = ASTRAY_VIEWS_FRACTION * len(views.cameras) if patience is None else float(patience)

@@ -1,7 +1,7 @@
 """Colour models of objects and background: histograms in CIELAB, as in GrabCut.
 
-Rother, Kolmogorov and Blake, "GrabCut" (2004), learn a mixture of Gaussians for either side; over
-all pictures together there are enough pixels for a histogram.
+Rother, Kolmogorov and Blake, "GrabCut" (2004), learn a mixture of Gaussians for either side; over all pictures together
+there are enough pixels for a histogram.
 """
 
 import numpy as np
@@ -23,9 +23,7 @@ MAX_LOG_LIKELIHOOD_RATIO = 3.0
 """Largest log-likelihood ratio that one pixel's colour may have."""
 
 
-def colour_bins(
-    rgb: UInt8[np.ndarray, "V H W 3"], level: UInt8[np.ndarray, "V H W"]
-) -> Int32[np.ndarray, "V H W"]:
+def colour_bins(rgb: UInt8[np.ndarray, "V H W 3"], level: UInt8[np.ndarray, "V H W"]) -> Int32[np.ndarray, "V H W"]:
     """Return the number of the bin that each pixel's colour falls into, at its level."""
     made = np.empty(rgb.shape[:3], np.int32)
     for one, picture in zip(made, rgb, strict=True):
@@ -35,28 +33,20 @@ def colour_bins(
     return made + BINS_PER_AXIS**3 * level.astype(np.int32)
 
 
-def colour_histogram(
-    bins: Int32[np.ndarray, "V H W"], weight: Float[np.ndarray, "V H W"]
-) -> Float[np.ndarray, " K"]:
+def colour_histogram(bins: Int32[np.ndarray, "V H W"], weight: Float[np.ndarray, "V H W"]) -> Float[np.ndarray, " K"]:
     """Return the share of the weight that falls into each bin."""
     counts = np.bincount(bins.ravel(), weight.ravel().astype(float), FIT_LEVELS * BINS_PER_AXIS**3)
     counts = counts.reshape(FIT_LEVELS, BINS_PER_AXIS, BINS_PER_AXIS, BINS_PER_AXIS)
-    smooth = gaussian_filter(
-        counts, (0, HISTOGRAM_BLUR_BINS, HISTOGRAM_BLUR_BINS, HISTOGRAM_BLUR_BINS)
-    ).ravel()
+    smooth = gaussian_filter(counts, (0, HISTOGRAM_BLUR_BINS, HISTOGRAM_BLUR_BINS, HISTOGRAM_BLUR_BINS)).ravel()
     return smooth / max(smooth.sum(), BIN_FLOOR_FRACTION)
 
 
 def background_log_likelihood(
-    bins: Int32[np.ndarray, "V H W"],
-    inside: Float[np.ndarray, " K"],
-    outside: Float[np.ndarray, " K"],
+    bins: Int32[np.ndarray, "V H W"], inside: Float[np.ndarray, " K"], outside: Float[np.ndarray, " K"]
 ) -> Float32[np.ndarray, "V H W"]:
     """Return log p(colour | outside) / p(colour | inside) of every pixel, limited to ± SUREST."""
     ratio = np.log((outside + BIN_FLOOR_FRACTION) / (inside + BIN_FLOOR_FRACTION))
-    return np.clip(ratio, -MAX_LOG_LIKELIHOOD_RATIO, MAX_LOG_LIKELIHOOD_RATIO).astype(np.float32)[
-        bins
-    ]
+    return np.clip(ratio, -MAX_LOG_LIKELIHOOD_RATIO, MAX_LOG_LIKELIHOOD_RATIO).astype(np.float32)[bins]
 
 
 def colour_overlap(inside: Float[np.ndarray, " K"], outside: Float[np.ndarray, " K"]) -> float:

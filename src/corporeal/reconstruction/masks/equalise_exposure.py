@@ -22,9 +22,7 @@ from corporeal.reconstruction.masks.floor_grid import MIN_AGREEING_PARTNERS, flo
 from corporeal.reconstruction.masks.reduce_views import reduce_views
 
 
-def equalise_exposure(
-    views: Views, floor: GroundPlane | None, around: ViewedRegion, longest: int
-) -> Views:
+def equalise_exposure(views: Views, floor: GroundPlane | None, around: ViewedRegion, longest: int) -> Views:
     """Return the pictures, each channel of each times one number; as they are: nobody knows these.
 
     Args:
@@ -40,12 +38,7 @@ def equalise_exposure(
     ground = floor_grid(rough.cameras, floor, around)
     pairs = zip(rough.rgb, rough.cameras, strict=True)
     gain = picture_gains(
-        np.stack(
-            [
-                floor_cell_colours(ground, rgb, c, COLOUR_PATCH_CELLS, DARK_FLOOR_U8)
-                for rgb, c in pairs
-            ]
-        )
+        np.stack([floor_cell_colours(ground, rgb, c, COLOUR_PATCH_CELLS, DARK_FLOOR_U8) for rgb, c in pairs])
     )
     rgb = np.empty_like(views.rgb)
     for one, picture, g in zip(rgb, views.rgb, gain, strict=True):

@@ -1,11 +1,10 @@
 """Detection of floor pixels, lit or in shadow, by colour and plane.
 
-A shadow lies beside the object in every picture, has colours that the rest of the floor has not,
-and so is taken for a part of the object where colours alone decide. But a shadow only takes light
-away: it leaves the ratios of the channels as they are on the lit floor (Finlayson, Hordley, Lu and
-Drew 2006 build on the same). And it lies on one plane: taken to it by its homography, views from
-different sides see one colour there, which they do not of what stands above it. A floor that is
-grey has the ratios of everything grey and of every shade of it, and nothing is said.
+A shadow lies beside the object in every picture, has colours that the rest of the floor has not, and so is taken for a
+part of the object where colours alone decide. But a shadow only takes light away: it leaves the ratios of the channels
+as they are on the lit floor (Finlayson, Hordley, Lu and Drew 2006 build on the same). And it lies on one plane: taken
+to it by its homography, views from different sides see one colour there, which they do not of what stands above it. A
+floor that is grey has the ratios of everything grey and of every shade of it, and nothing is said.
 """
 
 import numpy as np
@@ -43,9 +42,7 @@ GAIN_ITERATIONS = 3
 """Of finding the pictures' gains, by the median of all, and that median."""
 
 
-def shaded_floor(
-    views: Views, floor: GroundPlane | None, around: ViewedRegion
-) -> Bool[np.ndarray, "V H W"]:
+def shaded_floor(views: Views, floor: GroundPlane | None, around: ViewedRegion) -> Bool[np.ndarray, "V H W"]:
     """Return which pixels show the floor's own colour, or a shade of it, on the floor.
 
     None where the floor is unknown, or where it is grey.
@@ -61,9 +58,7 @@ def shaded_floor(
         return nowhere
     ground = floor_grid(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
-    colours = np.stack(
-        [floor_cell_colours(ground, rgb, c, COLOUR_PATCH_CELLS, 1.0) for rgb, c in pairs]
-    )
+    colours = np.stack([floor_cell_colours(ground, rgb, c, COLOUR_PATCH_CELLS, 1.0) for rgb, c in pairs])
     light, ratios = lightness_and_ratios(equalise_floor_colour(colours))
     like = _is_floor_coloured(light, ratios)
     if like is None:
@@ -72,9 +67,7 @@ def shaded_floor(
     def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
         with np.errstate(invalid="ignore"):
             agreed = np.abs(light[others] - light[k]) < MAX_VIEW_DIFFERENCE_LOG
-            agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * MAX_VIEW_DIFFERENCE_LOG).all(
-                axis=-1
-            )
+            agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * MAX_VIEW_DIFFERENCE_LOG).all(axis=-1)
         return agreed & like[k]
 
     return pixels_on_agreed_floor(views.cameras, floor, around, agreeing, wide=True)

@@ -14,11 +14,10 @@ from corporeal.multiview.viewed_region import ViewedRegion
 MAX_CELLS_ACROSS = 400
 """Most cells along the square."""
 MIN_PARALLAX_RATIO = 1.0
-"""What is h above the floor is seen at places of the floor at least that many h apart by views that
-are compared. Steep views from opposite sides do not do: both see a pot's floor where it is."""
+"""What is h above the floor is seen at places of the floor at least that many h apart by views that are compared. Steep
+views from opposite sides do not do: both see a pot's floor where it is."""
 PARTNERS_PER_VIEW, MIN_AGREEING_PARTNERS = 6, 3
-"""Views that each is compared with, and how many of them must agree: two may by chance, along an
-edge."""
+"""Views that each is compared with, and how many of them must agree: two may by chance, along an edge."""
 MIN_CAMERA_HEIGHT_RATIO = 1e-3
 """Height over the floor of a camera that is not above it, in distances from the middle."""
 
@@ -104,9 +103,7 @@ def pixels_on_agreed_floor(
     return made
 
 
-def ray_slants(
-    cameras: tuple[Camera, ...], floor: GroundPlane, around: ViewedRegion
-) -> Float[np.ndarray, "V 2"]:
+def ray_slants(cameras: tuple[Camera, ...], floor: GroundPlane, around: ViewedRegion) -> Float[np.ndarray, "V 2"]:
     """Return how far along the floor a ray to the middle goes for each unit that it goes down."""
     along = np.linalg.svd(floor.normal[None])[2][1:]
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras]) - np.array(around.centre)
@@ -127,9 +124,7 @@ def floor_intersections(camera: Camera, floor: GroundPlane) -> Float[np.ndarray,
         return np.where(np.isfinite(far)[:, None], eye + far[:, None] * rays, np.inf)
 
 
-def comparison_partners(
-    slant: Float[np.ndarray, "V 2"], k: int, wide: bool = False
-) -> Int[np.ndarray, " P"]:
+def comparison_partners(slant: Float[np.ndarray, "V 2"], k: int, wide: bool = False) -> Int[np.ndarray, " P"]:
     """Return the views that view k is compared with: those that look the least otherwise.
 
     With ``wide`` as many of the rest, from the nearest to the farthest, come to these.

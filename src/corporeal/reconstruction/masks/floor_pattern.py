@@ -1,9 +1,9 @@
 """Certain floor pixels by consistency of their texture over views.
 
-Where an object stands its contact shadow may have the colours of the object, and an outline that is
-found by colour spreads over the floor. But a pattern on the floor is one plane's: taken to that
-plane by its homography, views from different sides agree about it, and about nothing that stands
-above it. Patches are compared by normalised cross-correlation, which shadows leave as it is.
+Where an object stands its contact shadow may have the colours of the object, and an outline that is found by colour
+spreads over the floor. But a pattern on the floor is one plane's: taken to that plane by its homography, views from
+different sides agree about it, and about nothing that stands above it. Patches are compared by normalised
+cross-correlation, which shadows leave as it is.
 """
 
 from dataclasses import dataclass
@@ -30,9 +30,7 @@ MIN_PATTERN_CORRELATION = 0.8
 """Correlation from which on two patches are one pattern."""
 
 
-def shows_floor_pattern(
-    views: Views, floor: GroundPlane | None, around: ViewedRegion
-) -> Bool[np.ndarray, "V H W"]:
+def shows_floor_pattern(views: Views, floor: GroundPlane | None, around: ViewedRegion) -> Bool[np.ndarray, "V H W"]:
     """Return which pixels show a pattern that lies on the floor; none where the floor is unknown.
 
     Args:
@@ -47,9 +45,7 @@ def shows_floor_pattern(
     seen = [_floor_view(rgb, c, ground) for rgb, c in zip(views.rgb, views.cameras, strict=True)]
 
     def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
-        return np.stack(
-            [_patch_correlation(seen[k], seen[p]) > MIN_PATTERN_CORRELATION for p in others]
-        )
+        return np.stack([_patch_correlation(seen[k], seen[p]) > MIN_PATTERN_CORRELATION for p in others])
 
     return pixels_on_agreed_floor(views.cameras, floor, around, agreeing)
 

@@ -1,9 +1,9 @@
 """Floor height by plane sweep, where no points show it.
 
-A table top of smooth wood has no corners that pictures could be matched by, and yet has a grain.
-Where level cameras say what up is, a level plane is moved through the ball that all look at
-(Collins, "A space-sweep approach to true multi-image matching", CVPR 1996): where it is the floor,
-views from different sides see one pattern on it, and anywhere else they do not.
+A table top of smooth wood has no corners that pictures could be matched by, and yet has a grain. Where level cameras
+say what up is, a level plane is moved through the ball that all look at (Collins, "A space-sweep approach to true
+multi-image matching", CVPR 1996): where it is the floor, views from different sides see one pattern on it, and anywhere
+else they do not.
 """
 
 from dataclasses import dataclass
@@ -37,8 +37,8 @@ class FloorSweepConfig:
     planes: int = 35
     """Planes that are tried, evenly spaced [1]."""
     min_pattern_fraction: float = 0.12
-    """Fraction of the pixels before a plane that must show its pattern [1]: tables have .24 to .30,
-    a bed with folds, which is no plane, has .07."""
+    """Fraction of the pixels before a plane that must show its pattern [1]: tables have .24 to .30, a bed with folds,
+    which is no plane, has .07."""
 
 
 DEFAULT_FLOOR_SWEEP = FloorSweepConfig()
@@ -60,9 +60,7 @@ def sweep_floor_plane(
         return None
 
     def shares(heights: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-        return np.array(
-            [_pattern_fraction(views, level_plane(found.up, h, around), around) for h in heights]
-        )
+        return np.array([_pattern_fraction(views, level_plane(found.up, h, around), around) for h in heights])
 
     tried = np.linspace(config.lowest_radii, config.highest_radii, config.planes)
     coarse = shares(tried)

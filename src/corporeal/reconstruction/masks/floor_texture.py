@@ -1,18 +1,16 @@
 """Likelihood of pixels under the floor's texture at their place.
 
-An object on a newspaper is as white and black as this, so that colours alone do not tell them
-apart. But the floor is one plane: taken to it, all views see one print there, but for light. A
-pixel that has another colour than the print at its place, and is no shade of it, does not show the
-floor; nor does one at a place about which views do not agree, since something stands on it. How
-well it fits is learned with colours, as if it were one more channel: an object that is as white as
-paper fits the print before which it is seen here and there, by chance, and paper everywhere.
+An object on a newspaper is as white and black as this, so that colours alone do not tell them apart. But the floor is
+one plane: taken to it, all views see one print there, but for light. A pixel that has another colour than the print at
+its place, and is no shade of it, does not show the floor; nor does one at a place about which views do not agree, since
+something stands on it. How well it fits is learned with colours, as if it were one more channel: an object that is as
+white as paper fits the print before which it is seen here and there, by chance, and paper everywhere.
 
 Texture of the floor, and its lighting in each picture.
 
-A picture has its own exposure and white balance, and a flash lights what is near more than what is
-far, from another place in every picture. Both are smooth over the floor, and its print is not: of
-the logarithms of what all views see there, print is the median of all views, and light what a view
-has beside that, as a polynomial of the second degree.
+A picture has its own exposure and white balance, and a flash lights what is near more than what is far, from another
+place in every picture. Both are smooth over the floor, and its print is not: of the logarithms of what all views see
+there, print is the median of all views, and light what a view has beside that, as a polynomial of the second degree.
 """
 
 from dataclasses import replace
@@ -26,16 +24,8 @@ from corporeal.core.types import Views
 from corporeal.multiview.ground_plane import GroundPlane
 from corporeal.multiview.point_cloud_geometry import SIGMA_PER_MEDIAN_DEVIATION
 from corporeal.multiview.viewed_region import ViewedRegion
-from corporeal.reconstruction.masks.floor_colour import (
-    DARK_FLOOR_U8,
-    MIN_SHADOW_LOG,
-    floor_cell_colours,
-)
-from corporeal.reconstruction.masks.floor_grid import (
-    MIN_AGREEING_PARTNERS,
-    floor_grid,
-    floor_intersections,
-)
+from corporeal.reconstruction.masks.floor_colour import DARK_FLOOR_U8, MIN_SHADOW_LOG, floor_cell_colours
+from corporeal.reconstruction.masks.floor_grid import MIN_AGREEING_PARTNERS, floor_grid, floor_intersections
 
 LIGHT_SAMPLE_SPACING_CELLS = 3
 """Cells from one that light is fitted at to the next."""
@@ -49,9 +39,7 @@ EVEN_LIGHT_WEIGHT = 0.02
 """Weight of light that is even, for each cell's of what is seen."""
 
 
-def floor_light(
-    seen: Float[np.ndarray, "V n n 3"],
-) -> Float[np.ndarray, "V n n 3"]:
+def floor_light(seen: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
     """Return the light of each view on each cell of the floor, in logarithms.
 
     Args:
@@ -103,8 +91,8 @@ def _fit_light(
 FIT_UNKNOWN, FIT_AGREES, FIT_PARTLY, FIT_CONTRADICTS = range(4)
 """Levels: nobody knows what the floor has there, it is that, or nearly or darker, or it is not."""
 FLOOR_EXTENT_RADII = 1.6
-"""How much of the floor is looked at, in radii of the ball that all cameras look at: before what
-lies beyond the ball, the upper half of an object is seen.
+"""How much of the floor is looked at, in radii of the ball that all cameras look at: before what lies beyond the ball,
+the upper half of an object is seen.
 """
 MIN_FLOOR_SIGMA_LAB = 2.0
 """Least standard deviation of what a place of the floor shows, in CIELAB."""
@@ -113,8 +101,8 @@ PLAIN_CONTRAST_PERCENTILE, EDGED_CONTRAST_PERCENTILE = 30, 70
 AGREEING_SIGMAS = 2.5
 """Standard deviations within which views agree."""
 MIN_AGREEING_VIEWS_FRACTION = 1 / 3
-"""Share of the views that see a place that must agree about it: half of them may see something that
-stands before it."""
+"""Share of the views that see a place that must agree about it: half of them may see something that stands before
+it."""
 MAX_TRIED_VIEWS = 24
 """Views at most that others are compared with."""
 PRIOR_OTHER_PROBABILITY = 0.1
@@ -126,10 +114,7 @@ OTHER_PROBABILITY_LEVELS = 0.3, 0.8
 
 
 def floor_fit(
-    views: Views,
-    floor: GroundPlane | None,
-    around: ViewedRegion,
-    sure: Bool[np.ndarray, "V H W"],
+    views: Views, floor: GroundPlane | None, around: ViewedRegion, sure: Bool[np.ndarray, "V H W"]
 ) -> UInt8[np.ndarray, "V H W"]:
     """Return how well each pixel fits the floor, as a level.
 
@@ -143,9 +128,7 @@ def floor_fit(
     made = np.full(views.rgb.shape[:3], FIT_UNKNOWN, np.uint8)
     if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:
         return made
-    ground = floor_grid(
-        views.cameras, floor, replace(around, radius=FLOOR_EXTENT_RADII * around.radius)
-    )
+    ground = floor_grid(views.cameras, floor, replace(around, radius=FLOOR_EXTENT_RADII * around.radius))
     pairs = zip(views.rgb, views.cameras, strict=True)
     seen = np.stack([floor_cell_colours(ground, rgb, c, 1, DARK_FLOOR_U8) for rgb, c in pairs])
     light = floor_light(seen)
@@ -157,9 +140,7 @@ def floor_fit(
         cell = ground.cells(places).reshape(rgb.shape[:2])
         told = (cell >= 0) & (looking[cell] >= 2 * MIN_AGREEING_PARTNERS)
         at = ground.at(places.reshape(*rgb.shape)[told]).T - 0.5
-        own = np.log(np.maximum(rgb[told].astype(float), DARK_FLOOR_U8) / 255) - _interpolate_cells(
-            light[k], at
-        )
+        own = np.log(np.maximum(rgb[told].astype(float), DARK_FLOOR_U8) / 255) - _interpolate_cells(light[k], at)
         expected, reach = _interpolate_cells(print_, at), _interpolate_cells(between, at)
         off = _lab_of_logarithms(own) - expected
         off = np.sign(off) * np.maximum(np.abs(off) - reach, 0)
@@ -168,8 +149,7 @@ def floor_fit(
         other = np.where(
             sure[k][told],
             0.0,
-            PRIOR_OTHER_PROBABILITY
-            / (PRIOR_OTHER_PROBABILITY + (1 - PRIOR_OTHER_PROBABILITY) * fit),
+            PRIOR_OTHER_PROBABILITY / (PRIOR_OTHER_PROBABILITY + (1 - PRIOR_OTHER_PROBABILITY) * fit),
         )
         made[k][told] = FIT_AGREES + np.searchsorted(OTHER_PROBABILITY_LEVELS, other)
     return made
@@ -183,9 +163,7 @@ def _lab_of_logarithms(logarithms: Float[np.ndarray, "*N 3"]) -> Float[np.ndarra
     return np.where(known, np.asarray(rgb2lab(np.exp(clear))), np.nan)
 
 
-def _interpolate_cells(
-    table: Float[np.ndarray, "n n 3"], at: Float[np.ndarray, "2 N"]
-) -> Float[np.ndarray, "N 3"]:
+def _interpolate_cells(table: Float[np.ndarray, "n n 3"], at: Float[np.ndarray, "2 N"]) -> Float[np.ndarray, "N 3"]:
     """Return what a table of cells has at rows and columns between them."""
     channels = np.moveaxis(np.nan_to_num(table), -1, 0)
     found = [map_coordinates(one, at, order=1, mode="nearest") for one in channels]
@@ -203,13 +181,10 @@ def _agreed_floor(
     known = np.isfinite(usual).all(axis=-1)
     contrast = _local_contrast(np.where(known, usual[..., 0], 0.0))
     away = np.abs(lab - usual)
-    low, high = np.percentile(
-        contrast[known], [PLAIN_CONTRAST_PERCENTILE, EDGED_CONTRAST_PERCENTILE]
-    )
+    low, high = np.percentile(contrast[known], [PLAIN_CONTRAST_PERCENTILE, EDGED_CONTRAST_PERCENTILE])
     plain, edged = known & (contrast <= low), known & (contrast >= high)
     least = np.maximum(
-        np.median(SIGMA_PER_MEDIAN_DEVIATION * known_median(away[:, plain]), axis=0),
-        MIN_FLOOR_SIGMA_LAB,
+        np.median(SIGMA_PER_MEDIAN_DEVIATION * known_median(away[:, plain]), axis=0), MIN_FLOOR_SIGMA_LAB
     )
     by_edges = away[:, edged] / np.maximum(contrast[edged], MIN_FLOOR_SIGMA_LAB)[:, None]
     slope = SIGMA_PER_MEDIAN_DEVIATION * np.nan_to_num(known_median(np.moveaxis(by_edges, 1, 0)))
@@ -225,11 +200,7 @@ def _agreed_floor(
         found[more], most[more] = total[more] / count[more][:, None], count[more]
     with np.errstate(invalid="ignore"):
         agree = (np.abs(lab - found) < AGREEING_SIGMAS * spread).all(axis=-1).sum(axis=0)
-    return (
-        found,
-        spread,
-        agree >= MIN_AGREEING_VIEWS_FRACTION * np.isfinite(lab[..., 0]).sum(axis=0),
-    )
+    return (found, spread, agree >= MIN_AGREEING_VIEWS_FRACTION * np.isfinite(lab[..., 0]).sum(axis=0))
 
 
 def _local_contrast(lightness: Float[np.ndarray, "n n"]) -> Float[np.ndarray, "n n"]:
@@ -246,9 +217,7 @@ def _half_cell_differences(print_: Float[np.ndarray, "n n 3"]) -> Float[np.ndarr
 
 
 def _floor_likelihood(
-    off: Float[np.ndarray, "N 3"],
-    spread: Float[np.ndarray, "N 3"],
-    lightness: Float[np.ndarray, " N"],
+    off: Float[np.ndarray, "N 3"], spread: Float[np.ndarray, "N 3"], lightness: Float[np.ndarray, " N"]
 ) -> Float[np.ndarray, " N"]:
     """Return how likely the floor looks like that, against its own colour there: 1."""
     each = np.exp(-0.5 * np.square(off / spread))

@@ -17,17 +17,8 @@ from corporeal.io.photos.mask_files import (
     write_mask,
     write_mask_record,
 )
-from corporeal.io.photos.posed_photos import (
-    MASK_FOLDERS,
-    PosedPhotos,
-    list_posed_photos,
-    read_posed_photos,
-)
-from corporeal.reconstruction.masks.mask_prompts import (
-    MaskPrompt,
-    picture_prompt,
-    seeds_from_prompt,
-)
+from corporeal.io.photos.posed_photos import MASK_FOLDERS, PosedPhotos, list_posed_photos, read_posed_photos
+from corporeal.reconstruction.masks.mask_prompts import MaskPrompt, picture_prompt, seeds_from_prompt
 from corporeal.reconstruction.masks.mask_quality import (
     MAX_COLOUR_OVERLAP,
     bordering_fraction,
@@ -59,13 +50,12 @@ PAINT_MASKS_HINT = (
     "the names of the pictures); 'corporeal masks' with --at grows masks of it alone."
 )
 UNSURE_OVERLAP_FRACTION = 0.5
-"""Share of the overlap of colours that is doubted, from which on the floor is asked, too. Not where
-masks test poses: outlines of what was turned over leave some of it in what is around it."""
+"""Share of the overlap of colours that is doubted, from which on the floor is asked, too. Not where masks test poses:
+outlines of what was turned over leave some of it in what is around it."""
 GROWN_PROGRESS = 0.8
 """Share of the work that is done when masks are grown."""
 GROWN_ONCE_PROGRESS, GROWN_TWICE_PROGRESS, GROWN_THRICE_PROGRESS = 0.4, 0.6, 0.8
-"""Share of growing them that is done when they were grown once, with what lies flat, and with what
-borders on them."""
+"""Share of growing them that is done when they were grown once, with what lies flat, and with what borders on them."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +71,8 @@ class GrownMasks:
     incomplete: str = ""
     """Why nobody can tell all of what the photographs are of, in a clause; empty: masks do."""
     beside: str = ""
-    """What stands on the floor beside what they show, in sentences; empty: nothing is known of it,
-    or somebody corrected them."""
+    """What stands on the floor beside what they show, in sentences; empty: nothing is known of it, or somebody
+    corrected them."""
     contradict: bool = False
     """Whether they are unreliable because their outlines contradict each other."""
 
@@ -99,23 +89,20 @@ def grown_masks(
 
     Args:
         source: A folder of photographs with poses. Masks that it has are not looked at.
-        folder: Gets ``masks`` and ``masks.json``, or ``doubted/masks``. Masks of the same that lie
-            there are kept, with their corrections.
+        folder: Gets ``masks`` and ``masks.json``, or ``doubted/masks``. Masks of the same that lie there are kept, with
+            their corrections.
         pointed: At what, in which photograph; None: at what all cameras look at.
         progress: Called with the fraction done and a description.
-        testing: Whether poses are tested by them: places of the floor, which these poses know, are
-            asked less.
-        doubted: Whether something else speaks against these poses, too: where outlines then
-            contradict each other, growing ends.
+        testing: Whether poses are tested by them: places of the floor, which these poses know, are asked less.
+        doubted: Whether something else speaks against these poses, too: where outlines then contradict each other,
+            growing ends.
 
     Raises:
         UserError: The photographs cannot be used, or nothing is at the place that is pointed at.
 
     """
     made_by = store.result_key(
-        f"grown masks {MASKS_METHOD_VERSION}",
-        (pointed, testing, *("doubted",) * doubted),
-        [store.path_digest(source)],
+        f"grown masks {MASKS_METHOD_VERSION}", (pointed, testing, *("doubted",) * doubted), [store.path_digest(source)]
     )
     if (kept := _load_kept_masks(folder, made_by)) is not None:
         return kept
@@ -124,10 +111,7 @@ def grown_masks(
     rough = reduce_views(shown.views, ROUND_PICTURE_PX)
     seeds = _seeds_of_growing(source, shown, rough, pointed)
     alone = pointed is not None
-    growing, unsure = (
-        subprogress(progress, 0.0, GROWN_PROGRESS),
-        1.0 if testing else UNSURE_OVERLAP_FRACTION,
-    )
+    growing, unsure = (subprogress(progress, 0.0, GROWN_PROGRESS), 1.0 if testing else UNSURE_OVERLAP_FRACTION)
     grown, more = _grow_and_describe(shown.views, seeds, alone, growing, unsure, doubted)
     why = mask_doubt(grown)
     lacks = (
@@ -145,11 +129,7 @@ def grown_masks(
         write_mask_record(folder, made_by, said, lacks, contradict=apart)
         return GrownMasks(None, said, _doubted_folder(folder), lacks, contradict=apart)
     _write_masks(source, shown, grown, folder, progress)
-    said = (
-        _mask_statements(grown, pointed),
-        *more,
-        *(f"Check them: {w}." for w in (why, lacks) if w),
-    )
+    said = (_mask_statements(grown, pointed), *more, *(f"Check them: {w}." for w in (why, lacks) if w))
     other = _beside_sentence(grown, shown.names) if pointed is None else ""
     write_mask_record(folder, made_by, said, lacks, other)
     return GrownMasks(folder, said, incomplete=lacks, beside=other)
@@ -167,9 +147,7 @@ def _load_kept_masks(folder: Path, made_by: str) -> GrownMasks | None:
     return GrownMasks(believed, said, _doubted_folder(folder), lacks, other, record.contradict)
 
 
-def _seeds_of_growing(
-    source: Path, shown: PosedPhotos, rough: Views, pointed: MaskPrompt | None
-) -> MaskSeeds:
+def _seeds_of_growing(source: Path, shown: PosedPhotos, rough: Views, pointed: MaskPrompt | None) -> MaskSeeds:
     if pointed is None:
         return seeds_from_cameras(rough, shown.points)
     return seeds_from_prompt(rough, shown.points, picture_prompt(source, shown, rough, pointed))
@@ -185,24 +163,18 @@ def _grow_and_describe(
 ) -> tuple[RegionGrowingResult | None, list[str]]:
     """Grow masks, and say what is in them beside what has their colours and stands.
 
-    Plates are as flat as print on paper, which is no object. Where so much of the colours of
-    objects lies beside them, colours decide, if masks are complete and not doubted then. What hangs
-    on it in other colours is taken in unless it is asked for alone. Where masks are then still
-    doubted, or lack what has other colours, or are near to being doubted for their colours, the
-    floor has the colours of the object, and how well these fit it at their place counts, too, if
-    masks are right by it, and better than masks that were not doubted. None of that mends outlines
-    that contradict each other under poses that something else speaks against, too.
+    Plates are as flat as print on paper, which is no object. Where so much of the colours of objects lies beside them,
+    colours decide, if masks are complete and not doubted then. What hangs on it in other colours is taken in unless it
+    is asked for alone. Where masks are then still doubted, or lack what has other colours, or are near to being doubted
+    for their colours, the floor has the colours of the object, and how well these fit it at their place counts, too, if
+    masks are right by it, and better than masks that were not doubted. None of that mends outlines that contradict each
+    other under poses that something else speaks against, too.
     """
     grown, flat = grow_masks(views, seeds, subprogress(progress, 0.0, GROWN_ONCE_PROGRESS)), False
     if doubted_poses and outlines_contradict(grown):
         return grown, []
     if incompleteness_reason(grown) is not None:
-        again = subprogress(
-            progress,
-            GROWN_ONCE_PROGRESS,
-            GROWN_TWICE_PROGRESS,
-            ", with what lies flat on the floor",
-        )
+        again = subprogress(progress, GROWN_ONCE_PROGRESS, GROWN_TWICE_PROGRESS, ", with what lies flat on the floor")
         wider = grow_masks(views, seeds, again, flat=True)
         flat = mask_doubt(wider) is None and incompleteness_reason(wider) is None
         grown = wider if flat else grown
@@ -210,10 +182,7 @@ def _grow_and_describe(
     if grown is not None and alone:
         return grown, [*said, *_part_sentence(bordering_fraction(grown))]
     last = subprogress(
-        progress,
-        GROWN_TWICE_PROGRESS,
-        GROWN_THRICE_PROGRESS,
-        ", with what borders on it in other colours",
+        progress, GROWN_TWICE_PROGRESS, GROWN_THRICE_PROGRESS, ", with what borders on it in other colours"
     )
     whole = grown and merge_attachments(views, seeds, grown, last, flat)
     said = said if whole is grown else [*said, OTHER_COLOURS_STATEMENT]
@@ -222,9 +191,7 @@ def _grow_and_describe(
         return whole, said
     bad = doubted or lacking_attachment_reason(whole) is not None
     if whole is None or bad or whole.alike > unsure * MAX_COLOUR_OVERLAP:
-        by_floor = subprogress(
-            progress, GROWN_THRICE_PROGRESS, 1.0, ", by what the floor shows at each place"
-        )
+        by_floor = subprogress(progress, GROWN_THRICE_PROGRESS, 1.0, ", by what the floor shows at each place")
         fitted = grow_masks(views, seeds, by_floor, fitting=True)
         if fitted is not None and _is_sound(fitted):
             if whole is None or bad or _is_better(fitted, whole):
@@ -234,9 +201,7 @@ def _grow_and_describe(
 
 def _is_sound(grown: RegionGrowingResult) -> bool:
     return (
-        mask_doubt(grown) is None
-        and incompleteness_reason(grown) is None
-        and lacking_attachment_reason(grown) is None
+        mask_doubt(grown) is None and incompleteness_reason(grown) is None and lacking_attachment_reason(grown) is None
     )
 
 

@@ -1,8 +1,7 @@
 """Attached parts of objects with other colours than their masks.
 
-The grey head of a hammer whose handle is yellow is in no mask that grows from the handle's colours.
-Of the hull of all that stands, which knows no colours, it is the part beside masks that borders on
-theirs.
+The grey head of a hammer whose handle is yellow is in no mask that grows from the handle's colours. Of the hull of all
+that stands, which knows no colours, it is the part beside masks that borders on theirs.
 """
 
 from dataclasses import dataclass
@@ -10,11 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from corporeal.reconstruction.masks.floor_parallax import (
-    MIN_PIECE_TO_MASK_RATIO,
-    StandingRegions,
-    pixels_to_mask_ratio,
-)
+from corporeal.reconstruction.masks.floor_parallax import MIN_PIECE_TO_MASK_RATIO, StandingRegions, pixels_to_mask_ratio
 
 
 @dataclass(frozen=True)
@@ -27,9 +22,7 @@ class MaskAttachments:
     """Silhouettes of its hull, which no view's colours make smaller."""
 
 
-def find_mask_attachments(
-    stands: StandingRegions, masks: Bool[np.ndarray, "V H W"]
-) -> MaskAttachments | None:
+def find_mask_attachments(stands: StandingRegions, masks: Bool[np.ndarray, "V H W"]) -> MaskAttachments | None:
     """Find what hangs on masks; None: nothing does.
 
     Args:
@@ -47,8 +40,4 @@ def find_mask_attachments(
             seen = room.silhouettes(piece == k)
             within |= seen & (pixels_to_mask_ratio(seen, masks) >= MIN_PIECE_TO_MASK_RATIO)
     shown = within & stands.shown & ~masks
-    return (
-        MaskAttachments(shown, within)
-        if pixels_to_mask_ratio(shown, masks) >= MIN_PIECE_TO_MASK_RATIO
-        else None
-    )
+    return MaskAttachments(shown, within) if pixels_to_mask_ratio(shown, masks) >= MIN_PIECE_TO_MASK_RATIO else None

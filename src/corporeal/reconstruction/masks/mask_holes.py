@@ -64,17 +64,13 @@ def _see_through_holes(
         looks = there >= 0
         if not (here == number).any():
             continue  # smaller than a cell: noise
-        met = np.take_along_axis(
-            masks.reshape(len(masks), holes.size), np.maximum(there, 0), axis=1
-        )
+        met = np.take_along_axis(masks.reshape(len(masks), holes.size), np.maximum(there, 0), axis=1)
         if not looks.any() or met[looks].mean() < MIN_COVERED_LOOKS_FRACTION:
             open_ |= piece == number
     return open_
 
 
-def _fill_closed_holes(
-    inside: Float32[np.ndarray, "h w"], through: Bool[np.ndarray, "H W"]
-) -> None:
+def _fill_closed_holes(inside: Float32[np.ndarray, "h w"], through: Bool[np.ndarray, "H W"]) -> None:
     """Fill the holes of one mask but those that are open, which ``through`` marks at its size."""
     wide = inside.shape[1], inside.shape[0]
     open_ = Image.fromarray(binary_dilation(through))

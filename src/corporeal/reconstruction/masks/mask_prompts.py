@@ -13,11 +13,7 @@ from corporeal.io.photos.image_loader import stored_size
 from corporeal.io.photos.posed_photos import PosedPhotos, list_posed_photos
 from corporeal.multiview.lens_distortion import undistort_points
 from corporeal.multiview.viewed_region import ViewedRegion, find_viewed_region
-from corporeal.reconstruction.masks.colour_likelihood import (
-    background_log_likelihood,
-    colour_bins,
-    colour_histogram,
-)
+from corporeal.reconstruction.masks.colour_likelihood import background_log_likelihood, colour_bins, colour_histogram
 from corporeal.reconstruction.masks.mask_seeds import (
     FLOOR_SEARCH_RADII,
     MaskSeeds,
@@ -66,9 +62,7 @@ class PicturePrompt:
     """A point, or the upper left and the lower right corner of a box: columns and rows."""
 
 
-def picture_prompt(
-    source: Path, shown: PosedPhotos, views: Views, pointed: MaskPrompt
-) -> PicturePrompt:
+def picture_prompt(source: Path, shown: PosedPhotos, views: Views, pointed: MaskPrompt) -> PicturePrompt:
     """Find what a person points at in the pictures that are looked at.
 
     Raises:
@@ -104,9 +98,7 @@ def _find_photograph(source: Path, shown: PosedPhotos, wanted: str) -> int:
     return found[0]
 
 
-def seeds_from_prompt(
-    views: Views, points: Float[np.ndarray, "N 3"] | None, spot: PicturePrompt
-) -> MaskSeeds:
+def seeds_from_prompt(views: Views, points: Float[np.ndarray, "N 3"] | None, spot: PicturePrompt) -> MaskSeeds:
     """Cut one picture in two, and say where in space what is inside must be.
 
     Args:
@@ -128,9 +120,7 @@ def seeds_from_prompt(
     around = _ball_of_mask(views, points, k, first)
     far = picture_distance_radii(views, around)
     all_around = find_viewed_region(views.cameras)
-    known = (
-        np.zeros((0, 3)) if points is None else points_near(points, all_around, FLOOR_SEARCH_RADII)
-    )
+    known = np.zeros((0, 3)) if points is None else points_near(points, all_around, FLOOR_SEARCH_RADII)
     never, cone = far > 1, np.ones(far.shape, bool)
     cone[k] = binary_dilation(first, iterations=max(1, round(FIRST_MASK_BAND_WIDTHS * width)))
     never[k] = ~cone[k]
@@ -140,9 +130,7 @@ def seeds_from_prompt(
     return MaskSeeds(around, floor, inside, outside, never, cone)
 
 
-def cut_at_prompt(
-    rgb: UInt8[np.ndarray, "H W 3"], corners: Float[np.ndarray, "M 2"]
-) -> Bool[np.ndarray, "H W"]:
+def cut_at_prompt(rgb: UInt8[np.ndarray, "H W 3"], corners: Float[np.ndarray, "M 2"]) -> Bool[np.ndarray, "H W"]:
     """Return what is at a point, or in a box, of one picture (GrabCut's rounds)."""
     height, width = rgb.shape[:2]
     v, u = np.mgrid[:height, :width] + 0.5
@@ -157,15 +145,10 @@ def cut_at_prompt(
         inside = (u >= left) & (u <= right) & (v >= top) & (v <= bottom)
         outside = ~inside
         prior[0, outside] = PROMPT_EVIDENCE
-    bins, cutter = (
-        colour_bins(rgb[None], np.zeros((1, *rgb.shape[:2]), np.uint8)),
-        TotalVariationCutter(rgb[None]),
-    )
+    bins, cutter = (colour_bins(rgb[None], np.zeros((1, *rgb.shape[:2]), np.uint8)), TotalVariationCutter(rgb[None]))
     fixed = outside
     for _ in range(PROMPT_CUT_ROUNDS):
-        colours = background_log_likelihood(
-            bins, *(colour_histogram(bins, w[None]) for w in (inside, outside))
-        )
+        colours = background_log_likelihood(bins, *(colour_histogram(bins, w[None]) for w in (inside, outside)))
         inside = cutter.cut(colours + prior)[0] > MASK_THRESHOLD
         inside = _piece_at(inside, middle)
         outside = ~inside if len(corners) == 2 else fixed | ~inside
@@ -198,11 +181,7 @@ def _ball_of_mask(
     if points is not None:
         pixel = pixels_of(points, camera)
         seen = points[(pixel >= 0) & first.ravel()[pixel]]
-    target = (
-        np.array(find_viewed_region(views.cameras).centre)[None]
-        if len(seen) < MIN_POINTS_IN_MASK
-        else seen
-    )
+    target = np.array(find_viewed_region(views.cameras).centre)[None] if len(seen) < MIN_POINTS_IN_MASK else seen
     depth = float(np.median((target - eye) @ ahead))
     radius = max(np.ptp(columns), np.ptp(rows)) / 2 / camera.K[0, 0] * depth
     x, y, z = eye + depth * direction

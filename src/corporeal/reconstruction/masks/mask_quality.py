@@ -9,8 +9,7 @@ outline is unreliable. It parts little: right masks have up to .23, .42 on a pri
 the floor is asked, wrong ones .02 to .64 (decision masks-acceptance).
 """
 MIN_HULL_AGREEMENT = 0.7
-"""Masks and the silhouettes of their hull must agree by so much; those of the last two rounds by
-SETTLED."""
+"""Masks and the silhouettes of their hull must agree by so much; those of the last two rounds by SETTLED."""
 MAX_OUTER_HULL_FRACTION = 0.25
 """Share of the hull at the edge of what all cameras look at, above which it goes on beyond."""
 MAX_CROPPED_FRACTION = 0.5
@@ -18,20 +17,20 @@ MAX_CROPPED_FRACTION = 0.5
 MIN_OBJECT_FRACTION, MAX_OBJECT_FRACTION = 0.005, 0.7
 """Shares of the photographs that objects may fill."""
 MAX_RESIDUAL_FRACTION = 0.25
-"""As much again as masks hold, with their colours and on the floor in the middle, above which masks
-are not of all of the object: they would overlap with right ones by less than .8.
+"""As much again as masks hold, with their colours and on the floor in the middle, above which masks are not of all of
+the object: they would overlap with right ones by less than .8.
 """
 
 MAX_ATTACHED_FRACTION = 0.5
-"""The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were
-the object's, the rest shadows and edges beside it, so that masks lack as much.
+"""The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were the object's, the rest
+shadows and edges beside it, so that masks lack as much.
 """
 MAX_FAINT_OUTLINE_FRACTION = 0.1
-"""Share of the outlines along which no edge is seen, above which they are chance: as large as what
-hulls forgive of views."""
+"""Share of the outlines along which no edge is seen, above which they are chance: as large as what hulls forgive of
+views."""
 MAX_RIM_FRACTION = 0.2
-"""Share of masks that are their outermost pixels: if masks are but a pixel too wide, as they were
-where colours tell best, they overlap with right ones by less than .8."""
+"""Share of masks that are their outermost pixels: if masks are but a pixel too wide, as they were where colours tell
+best, they overlap with right ones by less than .8."""
 TAKEN_FOR_OBJECT = "what was taken for the object"
 
 
@@ -85,14 +84,10 @@ def lacking_attachment_reason(grown: RegionGrowingResult | None) -> str | None:
     if grown is None:
         return None
     hovers = grown.lowest > MIN_TOP_HEIGHT_RADII
-    if (much := bordering_fraction(grown)) <= (
-        MAX_RESIDUAL_FRACTION if hovers else MAX_ATTACHED_FRACTION
-    ):
+    if (much := bordering_fraction(grown)) <= (MAX_RESIDUAL_FRACTION if hovers else MAX_ATTACHED_FRACTION):
         return None
     taken = f"{TAKEN_FOR_OBJECT}, which hovers above the floor" if hovers else TAKEN_FOR_OBJECT
-    return _incompleteness_clause(
-        taken, much, "in other colours stands on the floor and borders on it"
-    )
+    return _incompleteness_clause(taken, much, "in other colours stands on the floor and borders on it")
 
 
 def _incompleteness_clause(taken: str, much: float, more: str) -> str:

@@ -53,9 +53,8 @@ class MaskSeeds:
 def seeds_from_cameras(views: Views, points: Float[np.ndarray, "N 3"] | None) -> MaskSeeds:
     """Take for an object what all cameras look at (Campbell et al., volumetric graph cuts, 2010).
 
-    Where points say where the floor is, or a pattern that is seen on a level plane, points above it
-    are on objects and those on it are not; otherwise the middle of the ball that all look at is,
-    and what is beside it is not.
+    Where points say where the floor is, or a pattern that is seen on a level plane, points above it are on objects and
+    those on it are not; otherwise the middle of the ball that all look at is, and what is beside it is not.
 
     Args:
         views: The pictures.
@@ -87,15 +86,11 @@ def floor_from_points(
     if not length:
         return None
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
-    search = GroundSearch(
-        up / length, float(MAX_FLOOR_TILT_RAD), around.radius, eyes, np.array(around.centre)
-    )
+    search = GroundSearch(up / length, float(MAX_FLOOR_TILT_RAD), around.radius, eyes, np.array(around.centre))
     return find_ground_plane(known, search, np.random.default_rng(0))
 
 
-def points_near(
-    points: Float[np.ndarray, "N 3"], around: ViewedRegion, radii: float
-) -> Float[np.ndarray, "M 3"]:
+def points_near(points: Float[np.ndarray, "N 3"], around: ViewedRegion, radii: float) -> Float[np.ndarray, "M 3"]:
     """Return the points within so many radii of a ball's middle."""
     away = np.linalg.norm(points - np.array(around.centre), axis=1)
     return points[away < radii * around.radius]

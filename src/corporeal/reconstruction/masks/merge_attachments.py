@@ -1,9 +1,9 @@
 """Merging of attached parts of other colours into grown masks.
 
-What stands on the floor and borders on masks is an example of what objects look like, as they are.
-Growing decides about it as about any seed: what has the colours of its surroundings too, a shadow
-or a piece of wall, does not last. New masks are taken if they hold all of the old ones and more,
-most of which hangs on these, and agree with their hull as well as before.
+What stands on the floor and borders on masks is an example of what objects look like, as they are. Growing decides
+about it as about any seed: what has the colours of its surroundings too, a shadow or a piece of wall, does not last.
+New masks are taken if they hold all of the old ones and more, most of which hangs on these, and agree with their hull
+as well as before.
 """
 
 from collections.abc import Callable
@@ -13,10 +13,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from corporeal.core.types import Views
-from corporeal.reconstruction.masks.floor_parallax import (
-    MIN_PIECE_TO_MASK_RATIO,
-    pixels_to_mask_ratio,
-)
+from corporeal.reconstruction.masks.floor_parallax import MIN_PIECE_TO_MASK_RATIO, pixels_to_mask_ratio
 from corporeal.reconstruction.masks.mask_attachments import MaskAttachments
 from corporeal.reconstruction.masks.mask_quality import incompleteness_reason, mask_doubt
 from corporeal.reconstruction.masks.mask_seeds import MaskSeeds
@@ -37,16 +34,12 @@ MAX_AGREEMENT_LOSS = 0.01
 """Agreement of masks with their hull that may be lost: where growing again changes nothing to
 speak of it moves by .001."""
 MAX_PART_AGREEMENT_LOSS = 0.05
-"""The same of a part for itself, below that of the rest: a large part has outlines of its own. A
-hammer's head agreed by .04 less, a ball that stands apart by .08, a wall by .16."""
+"""The same of a part for itself, below that of the rest: a large part has outlines of its own. A hammer's head agreed
+by .04 less, a ball that stands apart by .08, a wall by .16."""
 
 
 def merge_attachments(
-    views: Views,
-    seeds: MaskSeeds,
-    grown: RegionGrowingResult,
-    progress: Progress,
-    flat: bool = False,
+    views: Views, seeds: MaskSeeds, grown: RegionGrowingResult, progress: Progress, flat: bool = False
 ) -> RegionGrowingResult:
     """Return masks of what was found and of what hangs on it, or those that were given.
 
@@ -66,9 +59,7 @@ def merge_attachments(
     return wider if _is_merge_better(wider, grown, grown.hanging) else grown
 
 
-def _is_merge_better(
-    wider: RegionGrowingResult, grown: RegionGrowingResult, more: MaskAttachments
-) -> bool:
+def _is_merge_better(wider: RegionGrowingResult, grown: RegionGrowingResult, more: MaskAttachments) -> bool:
     before = np.maximum(grown.masks.sum(axis=(1, 2)), 1)
     held = (wider.masks & grown.masks).sum(axis=(1, 2)) / before
     new = wider.masks & ~grown.masks
@@ -83,9 +74,7 @@ def _is_merge_better(
     )
 
 
-def _seeds_from_masks(
-    seeds: MaskSeeds, masks: Bool[np.ndarray, "V H W"], more: MaskAttachments
-) -> MaskSeeds:
+def _seeds_from_masks(seeds: MaskSeeds, masks: Bool[np.ndarray, "V H W"], more: MaskAttachments) -> MaskSeeds:
     """Begin at what is known to be inside, told from what is near it, and do not go far beyond.
 
     What is farther off has its colours by chance: the grey of a head is a wall's, too.
@@ -97,6 +86,5 @@ def _seeds_from_masks(
         inside=inside.astype(np.float32),
         outside=outside.astype(np.float32),
         cone=cone if seeds.cone is None else cone & seeds.cone,
-        piece=MIN_PIECE_TO_MASK_RATIO
-        ** 1.5,  # what covers that share of pixels has that of the volume
+        piece=MIN_PIECE_TO_MASK_RATIO**1.5,  # what covers that share of pixels has that of the volume
     )

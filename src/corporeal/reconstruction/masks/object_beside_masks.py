@@ -1,8 +1,7 @@
 """Detection of objects beside the masks.
 
-Masks are of what has the colours of the middle, so that a second object of other colours is lost
-without a word. But it stands up, and what of the hull of all that does is seen beside masks is
-something else.
+Masks are of what has the colours of the middle, so that a second object of other colours is lost without a word. But it
+stands up, and what of the hull of all that does is seen beside masks is something else.
 """
 
 from dataclasses import dataclass
@@ -10,15 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from corporeal.reconstruction.masks.floor_parallax import (
-    MIN_PIECE_TO_MASK_RATIO,
-    StandingRegions,
-    pixels_to_mask_ratio,
-)
+from corporeal.reconstruction.masks.floor_parallax import MIN_PIECE_TO_MASK_RATIO, StandingRegions, pixels_to_mask_ratio
 
 MIN_ASIDE_FRACTION = 0.6
-"""Of the pixels of a piece, in the median view, that are beside masks: what masks lack of an object
-has .0 to .5, other objects .9.
+"""Of the pixels of a piece, in the median view, that are beside masks: what masks lack of an object has .0 to .5, other
+objects .9.
 """
 
 
@@ -63,10 +58,7 @@ def _place_in_picture(
     count = seen.sum(axis=(1, 2))
     apart = (seen & ~near).sum(axis=(1, 2))
     large = pixels_to_mask_ratio(seen, masks)
-    if (
-        large < MIN_PIECE_TO_MASK_RATIO
-        or np.median(apart / np.maximum(count, 1)) < MIN_ASIDE_FRACTION
-    ):
+    if large < MIN_PIECE_TO_MASK_RATIO or np.median(apart / np.maximum(count, 1)) < MIN_ASIDE_FRACTION:
         return None
     view = int(apart.argmax())
     down, across = (np.argwhere(seen[view]).mean(axis=0) + 0.5) / seen.shape[1:]

@@ -1,18 +1,12 @@
 """Quality of mask outlines: image edges, and thickness.
 
-A cut through a table, where the light of a flash falls off, has colours of its own on either side
-and agrees with its hull as well as any. But nothing changes across it.
+A cut through a table, where the light of a flash falls off, has colours of its own on either side and agrees with its
+hull as well as any. But nothing changes across it.
 """
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, UInt8
-from scipy.ndimage import (
-    binary_erosion,
-    find_objects,
-    gaussian_filter,
-    gaussian_filter1d,
-    maximum_filter,
-)
+from scipy.ndimage import binary_erosion, find_objects, gaussian_filter, gaussian_filter1d, maximum_filter
 from skimage.color import rgb2lab
 
 NOTICEABLE_COLOUR_STEP_LAB = 2.3
@@ -25,9 +19,7 @@ MASK_THRESHOLD = 0.5
 """Of a pixel: from here on it is inside."""
 
 
-def faint_outline_fraction(
-    rgb: UInt8[np.ndarray, "V H W 3"], inside: Float32[np.ndarray, "V H W"]
-) -> float:
+def faint_outline_fraction(rgb: UInt8[np.ndarray, "V H W 3"], inside: Float32[np.ndarray, "V H W"]) -> float:
     """Return along which share of the outlines no edge is seen, the median of all views.
 
     Args:
@@ -40,18 +32,10 @@ def faint_outline_fraction(
         box = find_objects(mask.astype(np.uint8))
         if not box:
             continue
-        about = tuple(
-            slice(max(s.start - 4 * EDGE_SEARCH_PX, 0), s.stop + 4 * EDGE_SEARCH_PX) for s in box[0]
-        )
+        about = tuple(slice(max(s.start - 4 * EDGE_SEARCH_PX, 0), s.stop + 4 * EDGE_SEARCH_PX) for s in box[0])
         rim = _outline_pixels(mask[about]) & ~_at_border(mask.shape)[about]
         if rim.any():
-            shares.append(
-                float(
-                    (
-                        _colour_step(picture[about], mask[about])[rim] < NOTICEABLE_COLOUR_STEP_LAB
-                    ).mean()
-                )
-            )
+            shares.append(float((_colour_step(picture[about], mask[about])[rim] < NOTICEABLE_COLOUR_STEP_LAB).mean()))
     return float(np.median(shares)) if shares else 0.0
 
 
@@ -76,13 +60,11 @@ def _at_border(shape: tuple[int, ...]) -> Bool[np.ndarray, "H W"]:
     return border
 
 
-def _colour_step(
-    picture: UInt8[np.ndarray, "h w 3"], mask: Bool[np.ndarray, "h w"]
-) -> Float[np.ndarray, "h w"]:
+def _colour_step(picture: UInt8[np.ndarray, "h w 3"], mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "h w"]:
     """Return the highest step of colour across the outline near each pixel, in CIELAB.
 
-    A step of height h that is smoothed is h / (σ √(2π)) steep. What crosses an outline, such as the
-    grain of a table, is no edge of it.
+    A step of height h that is smoothed is h / (σ √(2π)) steep. What crosses an outline, such as the grain of a table,
+    is no edge of it.
     """
     across = np.array(np.gradient(gaussian_filter(mask.astype(float), EDGE_SEARCH_PX)))
     across /= np.maximum(np.linalg.norm(across, axis=0), np.finfo(float).tiny)
@@ -93,6 +75,4 @@ def _colour_step(
 
 
 def _colour_slope(one: Float[np.ndarray, "h w"], axis: int) -> Float[np.ndarray, "h w"]:
-    return gaussian_filter1d(
-        gaussian_filter1d(one, GRADIENT_SIGMA_PX, axis, order=1), GRADIENT_SIGMA_PX, 1 - axis
-    )
+    return gaussian_filter1d(gaussian_filter1d(one, GRADIENT_SIGMA_PX, axis, order=1), GRADIENT_SIGMA_PX, 1 - axis)

@@ -30,10 +30,7 @@ from corporeal.reconstruction.masks.floor_texture import floor_fit
 from corporeal.reconstruction.masks.mask_attachments import MaskAttachments, find_mask_attachments
 from corporeal.reconstruction.masks.mask_holes import close_mask_holes
 from corporeal.reconstruction.masks.mask_seeds import MaskSeeds
-from corporeal.reconstruction.masks.object_beside_masks import (
-    ObjectBesideMasks,
-    find_object_beside_masks,
-)
+from corporeal.reconstruction.masks.object_beside_masks import ObjectBesideMasks, find_object_beside_masks
 from corporeal.reconstruction.masks.outline_quality import faint_outline_fraction, rim_fraction
 from corporeal.reconstruction.masks.reduce_views import reduce_views
 from corporeal.reconstruction.masks.residual_pixels import pixels_before_floor, residual_fraction
@@ -49,19 +46,17 @@ MIN_GROW_ROUNDS, MAX_GROW_ROUNDS = 4, 12
 SETTLED_AGREEMENT = 0.95
 """Masks of two rounds that agree so well do not change any more."""
 FLOOR_EVIDENCE = 6.0
-"""Evidence against a pixel that shows the floor's pattern, or a shade of its colour: more than any
-colour's for it."""
+"""Evidence against a pixel that shows the floor's pattern, or a shade of its colour: more than any colour's for it."""
 IN_HULL_EVIDENCE, BESIDE_HULL_EVIDENCE = -0.5, 2.0
 """Evidence against a pixel that is in the silhouette of the hull, and of one well beside it."""
 SILHOUETTE_BAND_WIDTHS = 0.03
-"""Width of the band around silhouettes in which only colours and edges count, in widths of the
-picture."""
+"""Width of the band around silhouettes in which only colours and edges count, in widths of the picture."""
 MAX_MASK_OVERHANG_WIDTHS = 0.06
-"""How far beyond silhouettes masks are drawn, in the same widths: what the hull lacks may be a thin
-leg that some pictures lost, but no wall of the same colour that touches outlines."""
+"""How far beyond silhouettes masks are drawn, in the same widths: what the hull lacks may be a thin leg that some
+pictures lost, but no wall of the same colour that touches outlines."""
 COLOUR_BAND_WIDTHS = 0.2
-"""How far around silhouettes colours are learned that objects are told from, in the same widths:
-what pictures show farther away, such as a wall of their colour, does not border on them."""
+"""How far around silhouettes colours are learned that objects are told from, in the same widths: what pictures show
+farther away, such as a wall of their colour, does not border on them."""
 MASK_THRESHOLD = 0.5
 """Of a pixel: from here on it is inside."""
 MIN_PIECE_FILL_RATIO = 0.02
@@ -79,8 +74,8 @@ class RegionGrowingResult:
     settled: float
     """The same, of masks of the last round and the one before."""
     alike: float
-    """Overlap of the colours inside and outside, 0 to 1, times the share of the pixels next to the
-    outlines that colours alone tell."""
+    """Overlap of the colours inside and outside, 0 to 1, times the share of the pixels next to the outlines that
+    colours alone tell."""
     outer: float
     """Share of the hull's cells at the edge of the ball that cameras look at."""
     cropped: float
@@ -143,8 +138,8 @@ def grow_masks(
         seeds: For the same pictures at ROUGH pixels, as ``reduce_views`` returns them.
         progress: Called with the fraction done and a description.
         flat: Whether what lies flat on the floor may be objects, too: only colours tell then.
-        fitting: Whether colours count together with how well they fit the floor at their place.
-            Outlines are then a pixel wide of the object, since what is mixed does not fit.
+        fitting: Whether colours count together with how well they fit the floor at their place. Outlines are then a
+            pixel wide of the object, since what is mixed does not fit.
 
     """
     views = equalise_exposure(views, seeds.floor, seeds.around, ROUND_PICTURE_PX)
@@ -163,9 +158,7 @@ def grow_masks(
     state, settled, on_floor = found
     progress(MAX_GROW_ROUNDS / (MAX_GROW_ROUNDS + 1), "drawing their outlines")
     middle = ~seeds.never & pixels_before_floor(rough.cameras, seeds.floor, seeds.around)
-    middle &= ~widen_silhouettes(state.silhouettes) & (
-        _shrink_marks(shaded, rough.rgb.shape[1:3]) < MASK_THRESHOLD
-    )
+    middle &= ~widen_silhouettes(state.silhouettes) & (_shrink_marks(shaded, rough.rgb.shape[1:3]) < MASK_THRESHOLD)
     by_colour = side.cut(replace(state.evidence, prior=np.zeros_like(on_floor))) > MASK_THRESHOLD
     stands = find_standing_regions(rough, state.masks, seeds.floor, seeds.around)
     near = widen_silhouettes(state.masks)
@@ -200,16 +193,14 @@ class _GrowRound:
     lowest: float
     """Height of the hull's lowest cell, in radii of the ball."""
     alike: float
-    """Overlap of the colours of objects with what is near them, or with all that is around them,
-    whichever is less: either tells them apart. Outlines that contradict one another, of what was
-    moved, leave some of the object in what is near."""
+    """Overlap of the colours of objects with what is near them, or with all that is around them, whichever is less:
+    either tells them apart. Outlines that contradict one another, of what was moved, leave some of the object in what
+    is near."""
     evidence: CutEvidence
     """For the next round."""
 
 
-def _grow_round(
-    side: _CutPictures, room: VoxelVolume, evidence: CutEvidence, piece: float | None
-) -> _GrowRound | None:
+def _grow_round(side: _CutPictures, room: VoxelVolume, evidence: CutEvidence, piece: float | None) -> _GrowRound | None:
     """Cut all pictures, carve, and learn colours anew; None: nothing is left."""
     masks = side.cut(evidence) > MASK_THRESHOLD
     hull = room.carved(masks, piece)
@@ -221,31 +212,21 @@ def _grow_round(
     inside = colour_histogram(side.bins, masks & seen)
     beside = ~band | ~(seen | masks)
     outside = colour_histogram(side.bins, widen_silhouettes(seen, COLOUR_BAND_WIDTHS) & beside)
-    alike = min(
-        colour_overlap(inside, outside), colour_overlap(inside, colour_histogram(side.bins, beside))
-    )
-    prior = np.where(seen, IN_HULL_EVIDENCE, np.where(band, 0, BESIDE_HULL_EVIDENCE)).astype(
-        np.float32
-    )
+    alike = min(colour_overlap(inside, outside), colour_overlap(inside, colour_histogram(side.bins, beside)))
+    prior = np.where(seen, IN_HULL_EVIDENCE, np.where(band, 0, BESIDE_HULL_EVIDENCE)).astype(np.float32)
     outer = float(room.outer[hull].mean())
     hiding = room.silhouettes(hull & room.tall)
     lowest = float(room.height[hull].min())
-    return _GrowRound(
-        masks, seen, hiding, outer, lowest, alike, CutEvidence(inside, outside, prior)
-    )
+    return _GrowRound(masks, seen, hiding, outer, lowest, alike, CutEvidence(inside, outside, prior))
 
 
 def _grow_until_settled(
-    side: _CutPictures,
-    room: VoxelVolume,
-    seeds: MaskSeeds,
-    on_floor: Float32[np.ndarray, "V H W"],
-    progress: Progress,
+    side: _CutPictures, room: VoxelVolume, seeds: MaskSeeds, on_floor: Float32[np.ndarray, "V H W"], progress: Progress
 ) -> tuple[_GrowRound, float, Float32[np.ndarray, "V H W"]] | None:
     """Cut, carve and learn until masks settle; None: nothing is left.
 
-    Returns the last round, how much of the one before it has, and evidence of the floor that is
-    left where nothing tall hides it.
+    Returns the last round, how much of the one before it has, and evidence of the floor that is left where nothing tall
+    hides it.
     """
     inside, outside = (colour_histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
     never = np.where(seeds.never, np.float32(BESIDE_HULL_EVIDENCE), np.float32(0)) + on_floor
@@ -265,26 +246,18 @@ def _grow_until_settled(
 
 
 def _draw_masks(
-    views: Views,
-    level: UInt8[np.ndarray, "V H W"],
-    state: _GrowRound,
-    floor: Bool[np.ndarray, "V h w"],
+    views: Views, level: UInt8[np.ndarray, "V H W"], state: _GrowRound, floor: Bool[np.ndarray, "V h w"]
 ) -> Float32[np.ndarray, "V h w"]:
     """Cut the pictures at their full size, and keep what hangs together about silhouettes."""
     size, seen = views.rgb.shape[1:3], state.silhouettes
     floor = floor & (_enlarge_pictures(state.hiding.astype(np.float32), size) <= MASK_THRESHOLD)
-    prior = _enlarge_pictures(state.evidence.prior, size) + np.float32(
-        FLOOR_EVIDENCE
-    ) * floor.astype(np.float32)
+    prior = _enlarge_pictures(state.evidence.prior, size) + np.float32(FLOOR_EVIDENCE) * floor.astype(np.float32)
     fine = replace(state.evidence, prior=prior)
     wide = size[1], size[0]
     fit = [Image.fromarray(p).resize(wide, Image.Resampling.NEAREST) for p in level]
     inside = _CutPictures(views, np.stack([np.asarray(p) for p in fit])).cut(fine)
     inside[
-        _enlarge_pictures(
-            widen_silhouettes(seen, MAX_MASK_OVERHANG_WIDTHS).astype(np.float32), size
-        )
-        <= MASK_THRESHOLD
+        _enlarge_pictures(widen_silhouettes(seen, MAX_MASK_OVERHANG_WIDTHS).astype(np.float32), size) <= MASK_THRESHOLD
     ] = 0
     for one, hull in zip(inside, _enlarge_pictures(seen.astype(np.float32), size), strict=True):
         pieces = label(one > MASK_THRESHOLD)
@@ -296,17 +269,13 @@ def _draw_masks(
     return inside
 
 
-def _enlarge_pictures(
-    pictures: Float32[np.ndarray, "V H W"], size: tuple[int, int]
-) -> Float32[np.ndarray, "V h w"]:
+def _enlarge_pictures(pictures: Float32[np.ndarray, "V H W"], size: tuple[int, int]) -> Float32[np.ndarray, "V h w"]:
     wide = size[1], size[0]
     made = [Image.fromarray(p).resize(wide, Image.Resampling.BILINEAR) for p in pictures]
     return np.stack([np.asarray(p) for p in made])
 
 
-def _shrink_marks(
-    pixels: Bool[np.ndarray, "V h w"], size: tuple[int, int]
-) -> Float32[np.ndarray, "V H W"]:
+def _shrink_marks(pixels: Bool[np.ndarray, "V h w"], size: tuple[int, int]) -> Float32[np.ndarray, "V H W"]:
     """Return which share of each larger pixel is marked."""
     wide = size[1], size[0]
     whole = pixels.astype(np.float32)
@@ -314,17 +283,13 @@ def _shrink_marks(
     return np.stack([np.asarray(p) for p in made])
 
 
-def widen_silhouettes(
-    seen: Bool[np.ndarray, "V H W"], by: float = SILHOUETTE_BAND_WIDTHS
-) -> Bool[np.ndarray, "V H W"]:
+def widen_silhouettes(seen: Bool[np.ndarray, "V H W"], by: float = SILHOUETTE_BAND_WIDTHS) -> Bool[np.ndarray, "V H W"]:
     """Add what is within so many widths of the picture to silhouettes."""
     steps = max(1, round(by * seen.shape[2]))
     return np.stack([binary_dilation(one, iterations=steps) for one in seen])
 
 
-def _told_by_floor(
-    masks: Bool[np.ndarray, "V H W"], on_floor: Float32[np.ndarray, "V H W"]
-) -> float:
+def _told_by_floor(masks: Bool[np.ndarray, "V H W"], on_floor: Float32[np.ndarray, "V H W"]) -> float:
     """Return the share of the pixels around masks that are on the floor for certain."""
     around = widen_silhouettes(masks) & ~masks
     return float((on_floor[around] > 0).mean()) if around.any() else 0.0

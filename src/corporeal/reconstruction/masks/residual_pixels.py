@@ -1,7 +1,7 @@
 """Pixels with the colours of objects outside the silhouettes of the hull.
 
-Masks agree with their hull because they are kept to it. What it lost is seen beside it: pieces so
-flat that they pass for a pattern on the floor, or what pictures of other places would not carve.
+Masks agree with their hull because they are kept to it. What it lost is seen beside it: pieces so flat that they pass
+for a pattern on the floor, or what pictures of other places would not carve.
 """
 
 import numpy as np
@@ -14,9 +14,7 @@ from corporeal.reconstruction.masks.floor_grid import floor_grid, floor_intersec
 
 
 def residual_fraction(
-    coloured: Bool[np.ndarray, "V H W"],
-    masks: Bool[np.ndarray, "V H W"],
-    where: Bool[np.ndarray, "V H W"],
+    coloured: Bool[np.ndarray, "V H W"], masks: Bool[np.ndarray, "V H W"], where: Bool[np.ndarray, "V H W"]
 ) -> float:
     """Return how much has the colours of objects where none was taken, over what was taken [-].
 

@@ -2,9 +2,9 @@
 
     min over 0 ≤ u ≤ 1 of  Σ f u + λ Σ w |∇u|,   w = floor + (1 - floor) exp(-|Δ|² / 2 σ²)
 
-f is the evidence against each pixel, Δ the difference of colour to the next pixel, σ its root mean
-square in the picture. Every threshold of a minimiser is one of the binary problem (Nikolova,
-Esedoğlu and Chan 2006); found by Chambolle and Pock's primal-dual iteration (2011).
+f is the evidence against each pixel, Δ the difference of colour to the next pixel, σ its root mean square in the
+picture. Every threshold of a minimiser is one of the binary problem (Nikolova, Esedoğlu and Chan 2006); found by
+Chambolle and Pock's primal-dual iteration (2011).
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -48,9 +48,7 @@ def _edge_weights(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     down = np.square(np.diff(lab, axis=0, append=lab[-1:])).sum(axis=2)
     right = np.square(np.diff(lab, axis=1, append=lab[:, -1:])).sum(axis=2)
     usual = max(float(down.mean() + right.mean()) / 2, np.finfo(np.float32).tiny)
-    below, beside = (
-        MIN_EDGE_WEIGHT + (1 - MIN_EDGE_WEIGHT) * np.exp(-d / (2 * usual)) for d in (down, right)
-    )
+    below, beside = (MIN_EDGE_WEIGHT + (1 - MIN_EDGE_WEIGHT) * np.exp(-d / (2 * usual)) for d in (down, right))
     below[-1], beside[:, -1] = 0, 0
     return np.float32(OUTLINE_COST) * below, np.float32(OUTLINE_COST) * beside
 

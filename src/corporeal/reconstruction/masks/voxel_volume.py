@@ -50,9 +50,7 @@ class VoxelVolume:
         """Whether a cell is so high above the floor that before it no floor is seen."""
         return self.height > HIDING_HEIGHT_RADII
 
-    def carved(
-        self, masks: Bool[np.ndarray, "V H W"], piece: float | None = None
-    ) -> Bool[np.ndarray, " M"]:
+    def carved(self, masks: Bool[np.ndarray, "V H W"], piece: float | None = None) -> Bool[np.ndarray, " M"]:
         """Return which cells masks leave, without pieces smaller than a share of the largest.
 
         That share is ``piece``, or PIECE.
@@ -60,16 +58,10 @@ class VoxelVolume:
         Where something is above the floor, what hovers at the edge of the ball is not of it.
         """
         beside, looking = self.votes(masks)
-        kept = ~is_outside_silhouettes(beside, looking) & (
-            looking >= MIN_SEEING_VIEWS_FRACTION * len(masks)
-        )
-        return self._without_walls(
-            self._without_crumbs(kept, MIN_PIECE_TO_LARGEST if piece is None else piece)
-        )
+        kept = ~is_outside_silhouettes(beside, looking) & (looking >= MIN_SEEING_VIEWS_FRACTION * len(masks))
+        return self._without_walls(self._without_crumbs(kept, MIN_PIECE_TO_LARGEST if piece is None else piece))
 
-    def votes(
-        self, masks: Bool[np.ndarray, "V H W"]
-    ) -> tuple[Int32[np.ndarray, " M"], Int32[np.ndarray, " M"]]:
+    def votes(self, masks: Bool[np.ndarray, "V H W"]) -> tuple[Int32[np.ndarray, " M"], Int32[np.ndarray, " M"]]:
         """Return how many views see each cell beside masks, and how many see it at all."""
         beside = np.zeros(len(self.index), np.int32)
         looking = np.zeros(len(self.index), np.int32)

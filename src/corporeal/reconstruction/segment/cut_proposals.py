@@ -1,7 +1,7 @@
 """Cut proposals: two sets of ways to cut a graph in two, ``SweepProposals`` and ``MergeTreeProposals``.
 
-``SweepProposals``: nodes sorted by a number, cut between each two. ``MergeTreeProposals``: nodes merged pair by pair, what
-holds best first, and each of what they merge into cut from the rest.
+``SweepProposals``: nodes sorted by a number, cut between each two. ``MergeTreeProposals``: nodes merged pair by pair,
+what holds best first, and each of what they merge into cut from the rest.
 """
 
 import heapq

@@ -2,13 +2,12 @@
 
     score = (cut / all + narrowest) (1 / A + 1 / (1 - A)) (1 - R²)²
 
-cut: the weight of what is cut; all: the weight that nothing would have taken from; A: the share of
-one side; R²: the share of the variance of appearance features that the sides explain. With the
-weights' degrees for sizes and the first two factors' ``best_graph_cut`` alone it is the normalised
-cut of Shi and Malik ("Normalized cuts and image segmentation", 2000), which would rather cut off a
-crumb that hangs by nothing, and does not know that a table is brown and a cat is black. Sides are
-looked for as they do, sorted by the first eigenvectors of the normalised weights, and among what
-merges first.
+cut: the weight of what is cut; all: the weight that nothing would have taken from; A: the share of one side; R²: the
+share of the variance of appearance features that the sides explain. With the weights' degrees for sizes and the first
+two factors' ``best_graph_cut`` alone it is the normalised cut of Shi and Malik ("Normalized cuts and image
+segmentation", 2000), which would rather cut off a crumb that hangs by nothing, and does not know that a table is brown
+and a cat is black. Sides are looked for as they do, sorted by the first eigenvectors of the normalised weights, and
+among what merges first.
 """
 
 from dataclasses import dataclass
@@ -18,12 +17,7 @@ from jaxtyping import Bool, Float
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
-from corporeal.reconstruction.segment.cut_proposals import (
-    CutProposals,
-    MergeTreeProposals,
-    PatchGraph,
-    SweepProposals,
-)
+from corporeal.reconstruction.segment.cut_proposals import CutProposals, MergeTreeProposals, PatchGraph, SweepProposals
 
 TRIED_EIGENVECTORS = 4
 """Eigenvectors that are tried beside the one that is the same everywhere."""
@@ -51,9 +45,7 @@ def best_graph_cut(graph: PatchGraph, narrowest: float) -> GraphCut | None:
     """Return the best cut in two; None where there is nothing to cut."""
     if len(graph.size) < 2:
         return None
-    families: list[CutProposals] = [
-        SweepProposals(graph, np.argsort(f, kind="stable")) for f in _eigenvectors(graph)
-    ]
+    families: list[CutProposals] = [SweepProposals(graph, np.argsort(f, kind="stable")) for f in _eigenvectors(graph)]
     families.append(MergeTreeProposals(graph))
     scores = [_cut_scores(graph, proposals, narrowest) for proposals in families]
     best = int(np.argmin([s.min(initial=np.inf) for s in scores]))
@@ -77,18 +69,14 @@ def _eigenvectors(graph: PatchGraph) -> np.ndarray:
         vectors = np.linalg.eigh(scaled.toarray())[1][:, ::-1][:, : TRIED_EIGENVECTORS + 1]
     else:
         start = np.random.default_rng(0).uniform(0.5, 1.0, count)
-        # Inverted about a place above all eigenvalues, which are 2 at most: those of pieces that
-        # hang by next to nothing are nearly the same, and are not found otherwise.
-        values, vectors = eigsh(
-            csc_array(scaled), k=TRIED_EIGENVECTORS + 1, sigma=EIGENVALUE_SHIFT, v0=start
-        )
+        # Inverted about a place above all eigenvalues, which are 2 at most: those of pieces that hang by next to
+        # nothing are nearly the same, and are not found otherwise.
+        values, vectors = eigsh(csc_array(scaled), k=TRIED_EIGENVECTORS + 1, sigma=EIGENVALUE_SHIFT, v0=start)
         vectors = vectors[:, np.argsort(-values)]
     return (vectors[:, 1:] * root[:, None]).T
 
 
-def _cut_scores(
-    graph: PatchGraph, proposals: CutProposals, narrowest: float
-) -> Float[np.ndarray, " K"]:
+def _cut_scores(graph: PatchGraph, proposals: CutProposals, narrowest: float) -> Float[np.ndarray, " K"]:
     part = graph.size / graph.size.sum()
     share = np.clip(proposals.sums(part[:, None])[:, 0], 1e-9, 1 - 1e-9)
     unequal = 1 / share + 1 / (1 - share)
@@ -97,18 +85,14 @@ def _cut_scores(
     return (across + narrowest) * unequal * (1 - np.minimum(explained, 1)) ** 2
 
 
-def _explained_variance(
-    appearance: np.ndarray, part: np.ndarray, proposals: CutProposals
-) -> np.ndarray:
+def _explained_variance(appearance: np.ndarray, part: np.ndarray, proposals: CutProposals) -> np.ndarray:
     """Return A (1 - A) R², R² the share of the variance of appearance between the sides."""
     away = appearance - part @ appearance
     variance = max(float(np.sum(part[:, None] * away**2)), MIN_APPEARANCE_VARIANCE)
     return np.sum(proposals.sums(part[:, None] * away) ** 2, axis=1) / variance
 
 
-def _cut_similarity(
-    graph: PatchGraph, proposals: CutProposals, side: np.ndarray
-) -> Float[np.ndarray, " K"]:
+def _cut_similarity(graph: PatchGraph, proposals: CutProposals, side: np.ndarray) -> Float[np.ndarray, " K"]:
     """Return how much each candidate is the cut given.
 
     Mean over the sides of the intersection over the union with the side that fits.

@@ -1,7 +1,7 @@
 """Density-based clustering (HDBSCAN).
 
-Campello, Moulavi and Sander, "Density-based clustering based on hierarchical density estimates"
-(PAKDD 2013). For a few thousand points: all distances are held at once.
+Campello, Moulavi and Sander, "Density-based clustering based on hierarchical density estimates" (PAKDD 2013). For a few
+thousand points: all distances are held at once.
 """
 
 from dataclasses import dataclass
@@ -44,10 +44,7 @@ class _CondensedTree:
 
 
 def hdbscan(
-    points: Float[np.ndarray, "N D"],
-    smallest: int = 20,
-    samples: int = 5,
-    selection: ClusterSelection = "mass",
+    points: Float[np.ndarray, "N D"], smallest: int = 20, samples: int = 5, selection: ClusterSelection = "mass"
 ) -> DenseClusters:
     """Find dense clusters. Everything is never one cluster; where nothing parts, all is noise.
 
@@ -94,9 +91,7 @@ def _condense_tree(merges: np.ndarray, count: int, smallest: int) -> _CondensedT
         tree.mass[cluster] += (len(members[node]) - staying) * (density - tree.birth[cluster])
         rows = members[node] if not large else _small_half(members, halves, large)
         tree.left[rows], tree.last[rows] = density, cluster
-        at += [
-            (h, _add_cluster(tree, cluster, density) if len(large) == 2 else cluster) for h in large
-        ]
+        at += [(h, _add_cluster(tree, cluster, density) if len(large) == 2 else cluster) for h in large]
     return tree
 
 

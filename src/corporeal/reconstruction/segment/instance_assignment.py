@@ -20,17 +20,13 @@ from corporeal.reconstruction.segment.object_segmentation import (
 )
 
 MIN_SAME_NUMBER_FRACTION = 0.9
-"""Share of what views say of points that must be one number each, for numbers to mean the same in
-all views; two objects numbered at random in each view give 0.6."""
+"""Share of what views say of points that must be one number each, for numbers to mean the same in all views; two
+objects numbered at random in each view give 0.6."""
 MIN_OBJECT_POINTS_FRACTION = 0.003
 """Share of the points below which what masks or neighbours separate is no object."""
-FOUND_BY_PUBLISHED_RULE = (
-    "the connected components of each point's 20 nearest, as published: a control"
-)
+FOUND_BY_PUBLISHED_RULE = "the connected components of each point's 20 nearest, as published: a control"
 FOUND_BY_NUMBERS = "instance masks, whose numbers mean the same in all pictures"
-FOUND_BY_MATCHED_MASKS = (
-    "instance masks, matched from picture to picture by the points that they share"
-)
+FOUND_BY_MATCHED_MASKS = "instance masks, matched from picture to picture by the points that they share"
 
 
 def assign_instances(
@@ -49,12 +45,11 @@ def assign_instances(
         count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points.
         masks: What each view takes each point for; -1: unknown. None: nobody drew any.
-        space: What space tells; where that alone does, appearance and concavity segment nothing
-            that touches, unless the rule asks for it or ``count`` is given. None: nothing.
+        space: What space tells; where that alone does, appearance and concavity segment nothing that touches, unless
+            the rule asks for it or ``count`` is given. None: nothing.
 
     Raises:
-        UserError: Masks are asked for and there are none, there are no points, or more objects than
-            can be.
+        UserError: Masks are asked for and there are none, there are no points, or more objects than can be.
 
     """
     if rule == "components":
@@ -95,9 +90,7 @@ def assign_by_numbers(
         return None
     sure = np.where(total > 0, best / np.maximum(total, 1), 0.0)
     owner = _without_crumbs(cloud, np.where(total > 0, votes.argmax(axis=1), -1))
-    return ObjectSegmentation(
-        owner, sure, tuple(_other_count_warnings(count, owner, "instance masks")), found_by
-    )
+    return ObjectSegmentation(owner, sure, tuple(_other_count_warnings(count, owner, "instance masks")), found_by)
 
 
 def _assign_by_masks(
@@ -123,11 +116,7 @@ def _without_crumbs(cloud: FeatureCloud, number: Int[np.ndarray, " N"]) -> Int[n
     """Return objects from 0, what has most points first; crumbs and -1 go with what is nearest."""
     known, index, sizes = np.unique(number, return_inverse=True, return_counts=True)
     sizes = np.where(known < 0, 0, sizes)
-    kept = [
-        k
-        for k in np.argsort(-sizes, kind="stable")
-        if sizes[k] >= MIN_OBJECT_POINTS_FRACTION * cloud.count
-    ]
+    kept = [k for k in np.argsort(-sizes, kind="stable") if sizes[k] >= MIN_OBJECT_POINTS_FRACTION * cloud.count]
     rank = np.full(len(known), -1, np.int64)
     rank[kept] = np.arange(len(kept))
     owner = rank[index]

@@ -1,8 +1,8 @@
 """Lifting of instance masks to points.
 
-Numbers need not mean the same from view to view: what counts is whether two points have one number
-where both are seen. Some views take two objects for one, some take one for several; over all views,
-what belongs together mostly has one number.
+Numbers need not mean the same from view to view: what counts is whether two points have one number where both are seen.
+Some views take two objects for one, some take one for several; over all views, what belongs together mostly has one
+number.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,11 +54,10 @@ def lift_labels(
 def renumber_labels(label_of_point: Int[np.ndarray, "V N"]) -> Int[np.ndarray, "V N"]:
     """Return labels that mean the same in all views, where masks of two views show one instance.
 
-    Two masks do where they share more than half of the points that either has, of those that both
-    views see: then no third shares as many with either. What is matched in that way, directly or
-    through others, gets one number, pairs that share most points first; but no two masks of one
-    view, whose drawer says that they are two objects. So a false match, where two views see only a
-    rim in common, joins nothing that other views tell apart.
+    Two masks do where they share more than half of the points that either has, of those that both views see: then no
+    third shares as many with either. What is matched in that way, directly or through others, gets one number, pairs
+    that share most points first; but no two masks of one view, whose drawer says that they are two objects. So a false
+    match, where two views see only a rim in common, joins nothing that other views tell apart.
     """
     known, node = np.unique(_separate_labels(label_of_point), return_inverse=True)
     nodes = node.reshape(label_of_point.shape)

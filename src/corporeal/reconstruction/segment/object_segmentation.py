@@ -78,9 +78,9 @@ MAX_GAP_RATIO = 0.5
 def count_stacked_objects(found: SurfacePatches, instance: Int[np.ndarray, " M"]) -> int:
     """Return how many objects are thin and lie on or under another.
 
-    An object's box stands upright, turned about the vertical as its patches lie. It is thin where
-    it is less than a third as high as wide; the other lies on it, or under it, where their outlines
-    overlap by half of the smaller and one begins where the other ends.
+    An object's box stands upright, turned about the vertical as its patches lie. It is thin where it is less than a
+    third as high as wide; the other lies on it, or under it, where their outlines overlap by half of the smaller and
+    one begins where the other ends.
     """
     count = int(instance.max()) + 1
     rows = [found.centre[instance == k] for k in range(count)]
@@ -88,8 +88,7 @@ def count_stacked_objects(found: SurfacePatches, instance: Int[np.ndarray, " M"]
     width = np.array([_outline_width(r[:, :2]) for r in rows])
     thin = (height < MAX_THIN_RATIO * width) & (width > 0)
     return sum(
-        any(_are_touching(rows[a], rows[b], height[a]) for b in range(count) if b != a)
-        for a in np.flatnonzero(thin)
+        any(_are_touching(rows[a], rows[b], height[a]) for b in range(count) if b != a) for a in np.flatnonzero(thin)
     )
 
 
@@ -128,13 +127,12 @@ class ObjectSegmentationConfig:
     patches: int = 2000
     """Into which the points are cut, about."""
     unlike: float = 1.5
-    """Difference of appearance at which two patches hold together by e^-1/2, over the scene's own
-    root mean square difference between neighbours."""
+    """Difference of appearance at which two patches hold together by e^-1/2, over the scene's own root mean square
+    difference between neighbours."""
     concave: float = 0.2
     """Inward fold at which two patches hold together by e^-1/2: roughly the sine of the angle."""
     disagreement: float = 0.3
-    """Share of views that take two patches for two objects at which they hold together by
-    e^-1/2."""
+    """Share of views that take two patches for two objects at which they hold together by e^-1/2."""
     narrowest: float = 0.003
     """Share of all borders that a cut counts for at least, so that crumbs are not cut off."""
     apart: float = 0.018
@@ -180,11 +178,11 @@ def segment_objects(
         cloud: Points with features; ``semantic`` decides, or ``structural`` where that is empty.
         count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points, which is less sure.
-        masks: What each view takes each point for, where somebody drew instance masks (see
-            ``masks.lifted``); -1: unknown.
+        masks: What each view takes each point for, where somebody drew instance masks (see ``masks.lifted``); -1:
+            unknown.
         config: How objects are segmented.
-        piece_of_point: Which connected piece each is of, from 0, where somebody saw empty space
-            between these; None: all may be one.
+        piece_of_point: Which connected piece each is of, from 0, where somebody saw empty space between these; None:
+            all may be one.
 
     Raises:
         UserError: There are no points, or more objects than can be.
@@ -211,9 +209,7 @@ def segment_objects(
     # What has space between is apart already; the rest is cut where that costs least.
     start = np.zeros(len(found.size), np.int64)
     if piece_of_point is not None:
-        start = _objects_of_patches(
-            join_nearest_pieces(piece_of_point, cloud.position, count), found
-        )
+        start = _objects_of_patches(join_nearest_pieces(piece_of_point, cloud.position, count), found)
     instance, cuts = _cut_into_objects(graph, count, config, start)
     spaces = int(start.max()) + 1
     instance = _number_by_size(instance, found.size)
@@ -233,27 +229,21 @@ def _found_by_clause(spaces: int, count: int, masks: bool) -> str:
     return " and ".join(by)
 
 
-def _objects_of_patches(
-    of_point: Int[np.ndarray, " N"], found: SurfacePatches
-) -> Int[np.ndarray, " M"]:
+def _objects_of_patches(of_point: Int[np.ndarray, " N"], found: SurfacePatches) -> Int[np.ndarray, " M"]:
     """Return what most points of each patch are of, numbered without gaps."""
     votes = np.zeros((len(found.size), int(of_point.max()) + 1))
     np.add.at(votes, (found.of_point, of_point), 1)
     return np.unique(votes.argmax(axis=1), return_inverse=True)[1]
 
 
-def nearest_neighbour_components(
-    position: Float[np.ndarray, "N 3"], k: int = 20
-) -> Int[np.ndarray, " N"]:
+def nearest_neighbour_components(position: Float[np.ndarray, "N 3"], k: int = 20) -> Int[np.ndarray, " N"]:
     """Return the connected components of each point's k nearest: objects only where none touch.
 
     The rule of published pipelines; numbered by their points, most first.
     """
     near = nearest_neighbours(position, k + 1)[:, 1:]
     rows = np.repeat(np.arange(len(position)), near.shape[1])
-    graph = csr_array(
-        (np.ones(near.size, np.int8), (rows, near.ravel())), shape=(len(position),) * 2
-    )
+    graph = csr_array((np.ones(near.size, np.int8), (rows, near.ravel())), shape=(len(position),) * 2)
     return _number_by_size(connected_components(graph, directed=False)[1])
 
 
@@ -270,36 +260,25 @@ def _check_cloud(cloud: FeatureCloud, count: int | None) -> None:
         raise UserError("There are no points to find objects in. Check what the pictures show.")
     if count is not None and not 1 <= count <= min(MAX_OBJECTS, cloud.count):
         raise UserError(
-            f"{count} objects are to be found among {cloud.count} points. "
-            f"Ask for 1 to {min(MAX_OBJECTS, cloud.count)}."
+            f"{count} objects are to be found among {cloud.count} points. Ask for 1 to {min(MAX_OBJECTS, cloud.count)}."
         )
 
 
-def _border_strength(
-    found: SurfacePatches, borders: PatchBorders, config: ObjectSegmentationConfig
-) -> np.ndarray:
+def _border_strength(found: SurfacePatches, borders: PatchBorders, config: ObjectSegmentationConfig) -> np.ndarray:
     """Return how well patches hold together: exp(-(difference / δ)² / 2 - (concavity / c)² / 2)."""
-    unlike, fold = (
-        border_difference(found, borders),
-        np.maximum(border_concavity(found, borders), 0),
-    )
+    unlike, fold = (border_difference(found, borders), np.maximum(border_concavity(found, borders), 0))
     usual = np.sqrt(np.average(unlike**2, weights=borders.length)) if len(unlike) else 0.0
     scale = config.unlike * max(float(usual), MIN_APPEARANCE_DIFFERENCE)
     return np.exp(-((unlike / scale) ** 2) / 2 - (fold / config.concave) ** 2 / 2)
 
 
 def _cut_into_objects(
-    graph: PatchGraph,
-    count: int | None,
-    config: ObjectSegmentationConfig,
-    start: Int[np.ndarray, " M"],
+    graph: PatchGraph, count: int | None, config: ObjectSegmentationConfig, start: Int[np.ndarray, " M"]
 ) -> tuple[np.ndarray, list[GraphCut]]:
     """Cut where it costs least until there are ``count`` objects, or until it costs too much."""
     instance = start.copy()
     groups = (np.flatnonzero(instance == k) for k in range(int(instance.max()) + 1))
-    possible = {
-        k: best_graph_cut(graph.only(own), config.narrowest) for k, own in enumerate(groups)
-    }
+    possible = {k: best_graph_cut(graph.only(own), config.narrowest) for k, own in enumerate(groups)}
     made: list[GraphCut] = []
     while count is None or len(possible) < count:
         scores = {k: found.score for k, found in possible.items() if found is not None}
@@ -327,19 +306,14 @@ def _object_confidence(graph: PatchGraph, instance: np.ndarray) -> np.ndarray:
     return np.where(own + other > 0, own / np.maximum(own + other, 1e-300), 1.0)
 
 
-def _count_warnings(
-    count: int | None, instance: np.ndarray, config: ObjectSegmentationConfig
-) -> list[str]:
+def _count_warnings(count: int | None, instance: np.ndarray, config: ObjectSegmentationConfig) -> list[str]:
     found = int(instance.max()) + 1
     if count is None:
         by = "where the scene is narrow, appearance and notches"
         if not config.apart:
             by = "the space between them; touching objects count as one"
         was = "was" if found == 1 else "were"
-        return [
-            f"The number of objects was not given: {found} {was} counted, by {by}. Give --count if "
-            "it is known."
-        ]
+        return [f"The number of objects was not given: {found} {was} counted, by {by}. Give --count if it is known."]
     if found < count:
         return [f"{count} objects are to be found; there are points for {found} only."]
     return []
@@ -349,10 +323,7 @@ def _doubt_warnings(found: SurfacePatches, instance: np.ndarray, cuts: list[Grap
     """Return where another answer is nearly as good, and where objects are too thin to be sure of."""
     doubts = []
     if any(made.other < DOUBTFUL_SCORE_RATIO * made.score for made in cuts):
-        doubts.append(
-            "Another segmentation into objects is nearly as good as this one. Instance "
-            "masks would decide."
-        )
+        doubts.append("Another segmentation into objects is nearly as good as this one. Instance masks would decide.")
     thin = count_stacked_objects(found, instance)
     if thin:
         doubts.append(

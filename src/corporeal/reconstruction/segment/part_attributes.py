@@ -1,8 +1,8 @@
 """Attributes of parts in descriptions, matched to points without a model.
 
-Three properties that words say and points show: colour, height, and whether it is long and thin.
-What words leave open counts against no cluster, but neither for it: a name that says "green" gets
-what is green, and a name that says nothing of colour gets what no other name explains.
+Three properties that words say and points show: colour, height, and whether it is long and thin. What words leave open
+counts against no cluster, but neither for it: a name that says "green" gets what is green, and a name that says nothing
+of colour gets what no other name explains.
 """
 
 import re
@@ -83,21 +83,16 @@ class ObservedAttributes:
 def described_attributes(part: PartDescription) -> DescribedAttributes:
     """Read a part's name and its material's.
 
-    A colour that the name states decides; without one it is that of the substances it names, and
-    without those that of the material.
+    A colour that the name states decides; without one it is that of the substances it names, and without those that of
+    the material.
     """
     name, material = _words_of_name(part.name), _words_of_name(part.material or "")
     small = bool(set(name) & _attribute_table()["small"]["words"])
-    return DescribedAttributes(
-        _named_colours(name, material), _named_heights(name), _named_thinness(name), small
-    )
+    return DescribedAttributes(_named_colours(name, material), _named_heights(name), _named_thinness(name), small)
 
 
 def observed_attributes(
-    cloud: FeatureCloud,
-    cluster_of_point: Int[np.ndarray, " N"],
-    count: int,
-    up: np.ndarray = UP_VECTOR,
+    cloud: FeatureCloud, cluster_of_point: Int[np.ndarray, " N"], count: int, up: np.ndarray = UP_VECTOR
 ) -> ObservedAttributes:
     """Measure clusters; each must have points."""
     seen = rgb2lab(np.clip(cloud.colour, 0, 1)[None])[0]
@@ -110,9 +105,7 @@ def observed_attributes(
     )
 
 
-def relative_heights(
-    position: Float[np.ndarray, "N 3"], up: np.ndarray = UP_VECTOR
-) -> Float[np.ndarray, " N"]:
+def relative_heights(position: Float[np.ndarray, "N 3"], up: np.ndarray = UP_VECTOR) -> Float[np.ndarray, " N"]:
     """Return how high each point is, as a share of the object's height."""
     z = position @ up
     return (z - z.min()) / (np.ptp(z) or 1.0)
@@ -123,15 +116,12 @@ def _means(rows: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
 
 
 def top_direction(
-    cloud: FeatureCloud,
-    cluster_of_point: Int[np.ndarray, " N"],
-    count: int,
-    parsed: Sequence[DescribedAttributes],
+    cloud: FeatureCloud, cluster_of_point: Int[np.ndarray, " N"], count: int, parsed: Sequence[DescribedAttributes]
 ) -> Float[np.ndarray, "3"]:
     """Return where an object's top is: up, but in a long object that lies, where words fit better.
 
-    Of something that has fallen over along its longest axis they say most when heights are measured
-    along it. They have to be likelier by ``MIN_LYING_LOG_GAIN`` in the mean over points.
+    Of something that has fallen over along its longest axis they say most when heights are measured along it. They have
+    to be likelier by ``MIN_LYING_LOG_GAIN`` in the mean over points.
     """
     local = cloud.position - cloud.position.mean(axis=0)
     axis = np.linalg.eigh(local.T @ local)[1][:, 2]
@@ -148,23 +138,16 @@ def top_direction(
     return best if fit(best) > fit(UP_VECTOR) + MIN_LYING_LOG_GAIN else UP_VECTOR
 
 
-def log_likelihood(
-    seen: ObservedAttributes, parsed: Sequence[DescribedAttributes]
-) -> Float[np.ndarray, "C K"]:
+def log_likelihood(seen: ObservedAttributes, parsed: Sequence[DescribedAttributes]) -> Float[np.ndarray, "C K"]:
     """Return how well each cluster fits each description, up to a constant.
 
-    -½ Σ (deviation / σ)² over colour, height and thinness, each at most ``MAX_SIGMAS`` σ, and
-    ``UNSAID_SIGMAS`` σ where words do not say; less ``SMALL_PART_PENALTY`` for what is small.
+    -½ Σ (deviation / σ)² over colour, height and thinness, each at most ``MAX_SIGMAS`` σ, and ``UNSAID_SIGMAS`` σ where
+    words do not say; less ``SMALL_PART_PENALTY`` for what is small.
     """
     made = np.empty((len(seen.height), len(parsed)))
     for k, part in enumerate(parsed):
-        off = np.stack(
-            [_colour_misfit(seen, part), _height_misfit(seen, part), _thinness_misfit(seen, part)]
-        )
-        made[:, k] = (
-            -0.5 * np.sum(np.minimum(off, MAX_SIGMAS) ** 2, axis=0)
-            - SMALL_PART_PENALTY * part.small
-        )
+        off = np.stack([_colour_misfit(seen, part), _height_misfit(seen, part), _thinness_misfit(seen, part)])
+        made[:, k] = -0.5 * np.sum(np.minimum(off, MAX_SIGMAS) ** 2, axis=0) - SMALL_PART_PENALTY * part.small
     return made
 
 
@@ -244,13 +227,7 @@ def _named_colours(name: list[str], material: list[str]) -> np.ndarray:
         return np.zeros((0, 3))
     srgb = [[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in found]
     lab = rgb2lab(np.array(srgb)[None])[0]
-    lab[:, 0] *= (
-        DARKER_LIGHTNESS_FACTOR
-        if "dark" in name
-        else LIGHTER_LIGHTNESS_FACTOR
-        if "light" in name
-        else 1.0
-    )
+    lab[:, 0] *= DARKER_LIGHTNESS_FACTOR if "dark" in name else LIGHTER_LIGHTNESS_FACTOR if "light" in name else 1.0
     lab[:, 0] = np.minimum(lab[:, 0], 100.0)
     return lab
 
@@ -268,11 +245,7 @@ def _named_thinness(name: list[str]) -> float | None:
 
 @cache
 def _attribute_table() -> dict:
-    text = (
-        files("corporeal.reconstruction.segment")
-        .joinpath("attributes.toml")
-        .read_text(encoding="utf-8")
-    )
+    text = files("corporeal.reconstruction.segment").joinpath("attributes.toml").read_text(encoding="utf-8")
     table = tomllib.loads(text)
     rows = [*table["substance"], *table["place"], *table["form"], table["small"]]
     for row in rows:

@@ -2,8 +2,8 @@
 
 Place and look in one vector, z_i = [ĝ_i ; w x_i]: ĝ unit, x over the object's diagonal, so that
 |z_i - z_j|² = |ĝ_i - ĝ_j|² + w² |x_i - x_j|². A few thousand superpoints stand for all points, and
-density parts them (``regions.hdbscan``). Too many clusters do no harm, too few do: names join what
-belongs together (``regions.naming``).
+density parts them (``regions.hdbscan``). Too many clusters do no harm, too few do: names join what belongs together
+(``regions.naming``).
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,7 @@ from jaxtyping import Float, Float32, Int
 from scipy.spatial import KDTree
 
 from corporeal.core.types import FeatureCloud
-from corporeal.reconstruction.segment.hdbscan import (
-    NOISE_LABEL,
-    ClusterSelection,
-    DenseClusters,
-    hdbscan,
-)
+from corporeal.reconstruction.segment.hdbscan import NOISE_LABEL, ClusterSelection, DenseClusters, hdbscan
 from corporeal.reconstruction.segment.superpoints import superpoints
 
 ROWS_PER_BATCH = 8192
@@ -27,14 +22,12 @@ AXES_SAMPLE_ROWS = 20_000
 """Rows that the principal axes are found from; more change them little and take longer."""
 
 
-def reduce_features(
-    features: Float[np.ndarray, "N D"], channels: int = 64
-) -> Float32[np.ndarray, "N C"]:
+def reduce_features(features: Float[np.ndarray, "N D"], channels: int = 64) -> Float32[np.ndarray, "N C"]:
     """Return features at unit length on their first principal axes; C = min(D, channels).
 
     |x_i - x_j|² is nearly 2 (1 - cos) of the features i and j: all of it where D ≤ channels, and
-    else all but what the axes left out had of it. Rows of zeros are taken as zeros. Features may be
-    in half precision, and are only ever widened ``ROWS_PER_BATCH`` rows at a time.
+    else all but what the axes left out had of it. Rows of zeros are taken as zeros. Features may be in half precision,
+    and are only ever widened ``ROWS_PER_BATCH`` rows at a time.
 
     Args:
         features: Of any length.
@@ -98,8 +91,8 @@ class PartClusters:
     cluster_of_point: Int[np.ndarray, " N"]
     """0 … C - 1."""
     confidence: Float[np.ndarray, " N"]
-    """In [0, 1]: how far inside its cluster a point's patch is; of patches in no dense place how
-    near the nearest cluster is, one patch's usual distance counting as 1."""
+    """In [0, 1]: how far inside its cluster a point's patch is; of patches in no dense place how near the nearest
+    cluster is, one patch's usual distance counting as 1."""
 
     @property
     def count(self) -> int:

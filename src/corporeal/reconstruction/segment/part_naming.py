@@ -74,9 +74,7 @@ def name_parts(
     """
     none = np.zeros(cloud.count, np.int64)
     if not cloud.count:
-        return NamedParts(
-            none, np.ones(0), "no points", _missing_part_warnings(none, described_object.parts)
-        )
+        return NamedParts(none, np.ones(0), "no points", _missing_part_warnings(none, described_object.parts))
     if len(described_object.parts) == 1:
         return NamedParts(none, np.ones(cloud.count), "one part")
     return name_clusters(cluster_parts(cloud, config), cloud, words, described_object.parts)
@@ -90,8 +88,8 @@ def name_clusters(
 ) -> NamedParts:
     """Give every cluster a part's name; each part gets a cluster where there are enough.
 
-    Without a model every layer of a cluster gets its own: what words say of place is the surest of
-    what they say, and a cluster may reach from foot to top.
+    Without a model every layer of a cluster gets its own: what words say of place is the surest of what they say, and a
+    cluster may reach from foot to top.
 
     Args:
         clusters: Of the cloud's points.
@@ -117,9 +115,7 @@ def name_clusters(
     )
 
 
-def _missing_part_warnings(
-    part_of_point: np.ndarray, parsed: Sequence[PartDescription]
-) -> tuple[str, ...]:
+def _missing_part_warnings(part_of_point: np.ndarray, parsed: Sequence[PartDescription]) -> tuple[str, ...]:
     points = np.bincount(part_of_point, minlength=len(parsed))
     lost = [f"'{part.name}'" for part, n in zip(parsed, points, strict=True) if not n]
     return (f"No points were found for {', '.join(lost)}.",) if lost else ()
@@ -128,8 +124,7 @@ def _missing_part_warnings(
 def _claim_clusters(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
     """Give each name the cluster that is most surely its own, and each other cluster its best name.
 
-    A name that something else beats everywhere is still somebody's: who described the object saw
-    it.
+    A name that something else beats everywhere is still somebody's: who described the object saw it.
     """
     part = score.argmax(axis=1)
     own = optimal_assignment(log_softmax(score, axis=1).T)
@@ -147,9 +142,7 @@ def _score_by_attributes(
     """Cut clusters into layers of the object's height, and compare each with the names."""
     attributes = [described_attributes(part) for part in parsed]
     up = top_direction(cloud, clusters.cluster_of_point, clusters.count, attributes)
-    layer = np.minimum(
-        relative_heights(cloud.position, up) * HEIGHT_LAYERS, HEIGHT_LAYERS - 1
-    ).astype(int)
+    layer = np.minimum(relative_heights(cloud.position, up) * HEIGHT_LAYERS, HEIGHT_LAYERS - 1).astype(int)
     cut = clusters.cluster_of_point * HEIGHT_LAYERS + layer
     clusters = replace(clusters, cluster_of_point=np.unique(cut, return_inverse=True)[1])
     seen = observed_attributes(cloud, clusters.cluster_of_point, clusters.count, up)
@@ -159,9 +152,7 @@ def _score_by_attributes(
 # ---------------------------------------------------------------- with words' vectors
 
 
-def _score_by_words(
-    clusters: PartClusters, cloud: FeatureCloud, words: np.ndarray
-) -> Float[np.ndarray, "C K"]:
+def _score_by_words(clusters: PartClusters, cloud: FeatureCloud, words: np.ndarray) -> Float[np.ndarray, "C K"]:
     """Compare prototypes with words, in units of ``CLIP_TEMPERATURE``."""
     of, count = clusters.cluster_of_point, clusters.count
     mean = _unit(_cluster_sums(cloud.structural, of, count)).astype(np.float32)
@@ -189,13 +180,11 @@ def _batches(count: int) -> list[slice]:
     return [slice(k, k + ROWS_PER_BATCH) for k in range(0, count, ROWS_PER_BATCH)]
 
 
-def _agree_on_appearance(
-    appearance: np.ndarray, score: np.ndarray, part: np.ndarray
-) -> Int[np.ndarray, " C"]:
+def _agree_on_appearance(appearance: np.ndarray, score: np.ndarray, part: np.ndarray) -> Int[np.ndarray, " C"]:
     """Let each cluster go over to the name whose other clusters it looks most like.
 
-    Once, all by the result of the first pass. The last cluster of a name stays, and none takes a
-    name that words find less probable than one in a hundred of their own.
+    Once, all by the result of the first pass. The last cluster of a name stays, and none takes a name that words find
+    less probable than one in a hundred of their own.
     """
     total = np.stack([appearance[part == k].sum(axis=0) for k in range(score.shape[1])])
     left = np.bincount(part, minlength=score.shape[1])

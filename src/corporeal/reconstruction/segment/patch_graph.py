@@ -1,8 +1,8 @@
 """Graph of superpoints: adjacency, difference of appearance, concavity.
 
-Whether a surface folds inwards or outwards between two patches is read from their normals n and
-centres c, d = (c_j - c_i) / |c_j - c_i|: (n_i - n_j) · d is positive at a notch and negative at an
-edge (Stein et al., "Object partitioning using local convexity", CVPR 2014).
+Whether a surface folds inwards or outwards between two patches is read from their normals n and centres c, d = (c_j -
+c_i) / |c_j - c_i|: (n_i - n_j) · d is positive at a notch and negative at an edge (Stein et al., "Object partitioning
+using local convexity", CVPR 2014).
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ NORMAL_NEIGHBOURS = 16
 MEETING_NEIGHBOURS = 12
 """Nearest points of a point: where two patches have such a pair, they meet."""
 PATCH_APPEARANCE_SCALE, NORMAL_APPEARANCE_WEIGHT = 0.15, 0.15
-"""Difference of appearance that keeps points out of a patch as one patch's width does; what a unit
-of normal counts as difference of appearance."""
+"""Difference of appearance that keeps points out of a patch as one patch's width does; what a unit of normal counts as
+difference of appearance."""
 MIN_POINTS_PER_PATCH = 10
 """To a patch, at least."""
 
@@ -98,9 +98,7 @@ def border_concavity(found: SurfacePatches, borders: PatchBorders) -> Float[np.n
 
 def border_difference(found: SurfacePatches, borders: PatchBorders) -> Float[np.ndarray, " E"]:
     """Return how unlike two patches look: the distance of their mean looks."""
-    return np.linalg.norm(
-        found.appearance[borders.first] - found.appearance[borders.second], axis=1
-    )
+    return np.linalg.norm(found.appearance[borders.first] - found.appearance[borders.second], axis=1)
 
 
 def join_pieces(found: SurfacePatches, borders: PatchBorders) -> PatchBorders:
@@ -170,9 +168,7 @@ def _leading_direction(tensor: np.ndarray) -> np.ndarray:
     return np.linalg.eigh(full)[1][:, :, 2]
 
 
-def _sparse_graph(
-    i: np.ndarray, j: np.ndarray, count: int, weight: np.ndarray | None = None
-) -> csr_array:
+def _sparse_graph(i: np.ndarray, j: np.ndarray, count: int, weight: np.ndarray | None = None) -> csr_array:
     entries = np.ones(len(i)) if weight is None else weight
     return csr_array((entries, (i, j)), shape=(count, count))
 

@@ -1,8 +1,8 @@
 """Superpoints after SLIC.
 
-Achanta et al., "SLIC superpixels compared to state-of-the-art superpixel methods", 2012: k-means of
-place and look together in which a point only ever goes to one of the patches that began near it, so
-that it takes time in proportion to the points, however many patches there are.
+Achanta et al., "SLIC superpixels compared to state-of-the-art superpixel methods", 2012: k-means of place and look
+together in which a point only ever goes to one of the patches that began near it, so that it takes time in proportion
+to the points, however many patches there are.
 """
 
 import numpy as np

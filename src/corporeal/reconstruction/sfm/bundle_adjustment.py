@@ -1,8 +1,7 @@
 """Bundle adjustment with anisotropic image noise.
 
-pycolmap's adjustment takes all points for equally exact in all directions. Levenberg and
-Marquardt's method, the points eliminated (Triggs et al., "Bundle adjustment, a modern synthesis",
-2000).
+pycolmap's adjustment takes all points for equally exact in all directions. Levenberg and Marquardt's method, the points
+eliminated (Triggs et al., "Bundle adjustment, a modern synthesis", 2000).
 """
 
 from dataclasses import dataclass, replace
@@ -111,9 +110,7 @@ def _jacobian(bundle: Bundle) -> _Jacobian:
     square = np.square(flat).sum(axis=1)
     focal, *_, bend = bundle.lens[bundle.lens_of[bundle.view]].T
     bent = 1 + bend * square
-    by_flat = bent[:, None, None] * np.eye(2) + 2 * bend[:, None, None] * (
-        flat[:, :, None] * flat[:, None]
-    )
+    by_flat = bent[:, None, None] * np.eye(2) + 2 * bend[:, None, None] * (flat[:, :, None] * flat[:, None])
     by_local = np.zeros((len(depth), 2, 3))
     by_local[:, 0, 0] = by_local[:, 1, 1] = 1 / depth
     by_local[:, :, 2] = -flat / depth[:, None]
@@ -132,9 +129,7 @@ def _jacobian(bundle: Bundle) -> _Jacobian:
 class _NormalEquations:
     """Normal equations about where a bundle is, each sighting weighted by what it counts."""
 
-    def __init__(
-        self, bundle: Bundle, error: Float[np.ndarray, "S 2"], slopes: _Jacobian, exact: float
-    ) -> None:
+    def __init__(self, bundle: Bundle, error: Float[np.ndarray, "S 2"], slopes: _Jacobian, exact: float) -> None:
         self.bundle = bundle
         self.views, count, total = len(bundle.rotation), len(bundle.points), len(error)
         size = POSE_PARAMETERS * self.views + LENS_PARAMETERS * len(bundle.lens)
@@ -143,11 +138,7 @@ class _NormalEquations:
         camera, point = slopes.camera * root[:, None, None], slopes.point * root[:, None, None]
         own = bundle.lens_of[bundle.view]
         pose = POSE_PARAMETERS * bundle.view[:, None] + np.arange(POSE_PARAMETERS)
-        lens = (
-            POSE_PARAMETERS * self.views
-            + LENS_PARAMETERS * own[:, None]
-            + np.arange(LENS_PARAMETERS)
-        )
+        lens = POSE_PARAMETERS * self.views + LENS_PARAMETERS * own[:, None] + np.arange(LENS_PARAMETERS)
         by_camera = _sparse_rows(camera, np.concatenate([pose, lens], axis=1), size)
         by_point = _sparse_rows(point, 3 * bundle.point[:, None] + np.arange(3), 3 * count)
         self.cameras = (by_camera.T @ by_camera).toarray()
@@ -160,9 +151,7 @@ class _NormalEquations:
     def step(self, damping: float) -> Bundle:
         """Return the bundle a step further."""
         count, size = len(self.points), len(self.cameras)
-        inverse = np.linalg.inv(
-            self.points * (1 + damping * np.eye(3)) + DAMPING_FLOOR**2 * np.eye(3)
-        )
+        inverse = np.linalg.inv(self.points * (1 + damping * np.eye(3)) + DAMPING_FLOOR**2 * np.eye(3))
         blocks = bsr_array((inverse, np.arange(count), np.arange(count + 1)))
         reduced = self.between @ blocks
         whole = self.cameras + damping * np.diag(np.diag(self.cameras) + DAMPING_FLOOR)
@@ -183,9 +172,7 @@ class _NormalEquations:
         )
 
 
-def _sparse_rows(
-    slopes: Float[np.ndarray, "S 2 K"], columns: Int[np.ndarray, "S K"], size: int
-) -> csr_array:
+def _sparse_rows(slopes: Float[np.ndarray, "S 2 K"], columns: Int[np.ndarray, "S K"], size: int) -> csr_array:
     """Return a matrix with two rows for each sighting."""
     total, _, each = slopes.shape
     where = np.broadcast_to(columns[:, None], slopes.shape).ravel()

@@ -9,9 +9,9 @@ motion?", CVPR 2008).
 
 Detection of mirrored photographs of front cameras.
 
-A printed sheet that is seen in a mirror is a sheet that is seen from below: both fit one model,
-with a low reprojection error, half of its cameras under the floor and what stands on it there
-twice. But nobody sees one point of a surface from both of its sides.
+A printed sheet that is seen in a mirror is a sheet that is seen from below: both fit one model, with a low reprojection
+error, half of its cameras under the floor and what stands on it there twice. But nobody sees one point of a surface
+from both of its sides.
 """
 
 from collections.abc import Collection
@@ -24,18 +24,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from corporeal.io.photos.colmap import ColmapModel, read_colmap
-from corporeal.reconstruction.sfm.pose_acceptance import (
-    MIN_POINTS_PER_PICTURE,
-    model_doubts,
-    only_sparse,
-)
+from corporeal.reconstruction.sfm.pose_acceptance import MIN_POINTS_PER_PICTURE, model_doubts, only_sparse
 from corporeal.reconstruction.sfm.prepare_images import PreparedImages
-from corporeal.reconstruction.sfm.sfm_run import (
-    MIN_REGISTERED_FRACTION,
-    SfmRun,
-    pairs_to_match,
-    remove_pictures,
-)
+from corporeal.reconstruction.sfm.sfm_run import MIN_REGISTERED_FRACTION, SfmRun, pairs_to_match, remove_pictures
 
 PLANE_SAMPLES = 300
 """Planes through three points that are tried."""
@@ -44,8 +35,8 @@ ON_PLANE_FRACTION = 0.01
 MIN_POINTS_BOTH_SIDES = 30
 """Points on it that both sides see."""
 MIN_BOTH_SIDES_FRACTION = 0.1
-"""Of all points on it, how many these must be: .33 where half of the pictures are mirrored, .03 for
-a thin axe head that was turned over, 0 for twenty other sets."""
+"""Of all points on it, how many these must be: .33 where half of the pictures are mirrored, .03 for a thin axe head
+that was turned over, 0 for twenty other sets."""
 ONE_CAMERA_HINT = (
     "Take all with one camera, and no mirrored pictures of a phone's front camera; or turn "
     "those back that are mirrored."
@@ -71,9 +62,7 @@ def describe_mirrored(model: ColmapModel) -> str | None:
     )
 
 
-def _dominant_plane(
-    points: Float[np.ndarray, "N 3"], near: float
-) -> tuple[Float[np.ndarray, "3"], float]:
+def _dominant_plane(points: Float[np.ndarray, "N 3"], near: float) -> tuple[Float[np.ndarray, "3"], float]:
     """Return normal and offset of the plane through three points that most are on."""
     rng = np.random.default_rng(0)
     corners = points[rng.integers(0, len(points), (PLANE_SAMPLES, 3))]
@@ -94,19 +83,18 @@ def _points_seen_from(model: ColmapModel, which: Bool[np.ndarray, " V"]) -> Bool
 
 
 MAX_COMPARED_ANGLE_DEG = 18.0
-"""Largest angle between the lines of sight of two pictures that are compared, the median [deg]. At
-20° to 25° right ones of a dark chair before a wall share points in .28 to .45 only."""
+"""Largest angle between the lines of sight of two pictures that are compared, the median [deg]. At 20° to 25° right
+ones of a dark chair before a wall share points in .28 to .45 only."""
 MIN_POINTS_WITHIN = 20
 """Points of a picture that must lie within the other."""
 CELLS_ACROSS_PICTURE, MIN_POINTS_PER_CELL = 10, 3
 """Cells of a picture along each side; points without which a cell says nothing."""
 NEUTRAL_COVERAGE = 0.55
-"""Share of the cells in which neighbours share points, that is as likely of one place as of two
-that look alike: of right poses of seven sets the median is .78 to 1 and the fifth percentile .58 to
-1; five pictures of a block among those of its other side have .4 to .5 in the median."""
+"""Share of the cells in which neighbours share points, that is as likely of one place as of two that look alike: of
+right poses of seven sets the median is .78 to 1 and the fifth percentile .58 to 1; five pictures of a block among those
+of its other side have .4 to .5 in the median."""
 MIN_DISAGREEING_PAIRS = 3
-"""Neighbours that do not agree, without which two groups are taken for one place: a single picture
-may be smeared."""
+"""Neighbours that do not agree, without which two groups are taken for one place: a single picture may be smeared."""
 MIN_MOVE_GAIN = 1e-9
 """Below it nothing is gained by moving a picture to another group."""
 
@@ -114,8 +102,8 @@ MIN_MOVE_GAIN = 1e-9
 def remove_doppelgangers(told: SfmRun, place: Path, gathered: PreparedImages) -> SfmRun:
     """Take pictures that stand where they cannot out of a model; return what is left of it.
 
-    Where these are too many, it is left as it is: an object that was turned over between two rounds
-    on one card parts them as well, and masks can tell.
+    Where these are too many, it is left as it is: an object that was turned over between two rounds on one card parts
+    them as well, and masks can tell.
 
     Args:
         told: What came of the attempt.
@@ -137,9 +125,7 @@ def remove_doppelgangers(told: SfmRun, place: Path, gathered: PreparedImages) ->
     return replace(told, registered=registered, points=points, misplaced=misplaced)
 
 
-def doppelganger_groups(
-    model: ColmapModel, compared: Collection[tuple[str, str]]
-) -> tuple[tuple[str, ...], ...]:
+def doppelganger_groups(model: ColmapModel, compared: Collection[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
     """Return groups of pictures that cannot all stand where a model puts them, the largest first.
 
     Args:
@@ -157,9 +143,8 @@ def doppelganger_groups(
 def neighbours_support_model(told: SfmRun, place: Path, gathered: PreparedImages) -> bool:
     """Return whether neighbours speak for a model against which only is that its points are few.
 
-    Many pictures of little that has a pattern share few points, of which each sees enough: what
-    places it are those. That nothing contradicts is not enough: neighbours must agree, and join all
-    that must be placed.
+    Many pictures of little that has a pattern share few points, of which each sees enough: what places it are those.
+    That nothing contradicts is not enough: neighbours must agree, and join all that must be placed.
 
     Args:
         told: What came of the attempt.
@@ -176,15 +161,10 @@ def neighbours_support_model(told: SfmRun, place: Path, gathered: PreparedImages
     agreed = _pair_agreement(model, compared)
     _, label = connected_components(csr_array(agreed > 0), directed=False)
     joined = int(np.bincount(label).max())
-    return (
-        len(agreeing_groups(np.nan_to_num(agreed))) == 1
-        and joined >= MIN_REGISTERED_FRACTION * told.pictures
-    )
+    return len(agreeing_groups(np.nan_to_num(agreed))) == 1 and joined >= MIN_REGISTERED_FRACTION * told.pictures
 
 
-def _pair_agreement(
-    model: ColmapModel, compared: Collection[tuple[str, str]]
-) -> Float[np.ndarray, "N N"]:
+def _pair_agreement(model: ColmapModel, compared: Collection[tuple[str, str]]) -> Float[np.ndarray, "N N"]:
     """Return how far pairs speak for one place; NaN: they are no neighbours, or not compared."""
     names = [image.name for image in model.images]
     place = {name: k for k, name in enumerate(names)}
@@ -237,10 +217,10 @@ def _point_cells(model: ColmapModel, k: int) -> tuple[np.ndarray, np.ndarray]:
 def agreeing_groups(agreed: Float[np.ndarray, "N N"]) -> list[list[int]]:
     """Part pictures so that what agrees is together and what does not is apart; largest first.
 
-    Correlation clustering: groups are joined while the sum between two is positive, the largest
-    first (Keuper et al., "Efficient decomposition of image and mesh graphs by lifted multicuts",
-    ICCV 2015); then pictures change sides while that gains (Kernighan and Lin 1970). Groups between
-    which too little is negative are joined in the end: nothing says that they are two places.
+    Correlation clustering: groups are joined while the sum between two is positive, the largest first (Keuper et al.,
+    "Efficient decomposition of image and mesh graphs by lifted multicuts", ICCV 2015); then pictures change sides while
+    that gains (Kernighan and Lin 1970). Groups between which too little is negative are joined in the end: nothing says
+    that they are two places.
 
     Args:
         agreed: Positive: in favour of one place; 0: nothing is known.

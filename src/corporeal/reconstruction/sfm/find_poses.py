@@ -94,8 +94,7 @@ PREPARED_PROGRESS = 0.1
 PLACES_PROGRESS = 0.15
 """The same, when it is known whether they show one place."""
 SPARSE_POINTS_WARNING = (
-    "Points that pictures share are few, but they agree with what neighbours show. A search for "
-    "more was rejected."
+    "Points that pictures share are few, but they agree with what neighbours show. A search for more was rejected."
 )
 LOOKING_MESSAGE = "looking whether all show one place"
 STRATEGY_PROGRESS: dict[SfmStrategy, float] = {"plain": 0.5, "masked": 0.7, "thorough": 1.0}
@@ -129,9 +128,7 @@ class _PosesRecord:
 
 
 def _save_record(folder: Path, found: _PosesRecord) -> None:
-    store.write_json(
-        folder / FOUND_POSES_FILE, replace(found, kind_of_warning=note_kinds(found.warnings))
-    )
+    store.write_json(folder / FOUND_POSES_FILE, replace(found, kind_of_warning=note_kinds(found.warnings)))
 
 
 def _load_record(folder: Path) -> _PosesRecord:
@@ -155,10 +152,7 @@ def find_poses(source: Path, folder: Path, progress: Progress) -> FoundPoses:
         raise BadFileError(source, "there is no such file or folder.", "Check the path.")
     require_pycolmap()
     begun = {"source": store.path_digest(source), "method": POSES_METHOD_VERSION}
-    if (
-        not (folder / BEGUN_POSES_FILE).exists()
-        or store.read_json(folder / BEGUN_POSES_FILE) != begun
-    ):
+    if not (folder / BEGUN_POSES_FILE).exists() or store.read_json(folder / BEGUN_POSES_FILE) != begun:
         shutil.rmtree(folder, ignore_errors=True)
         store.write_json(folder / BEGUN_POSES_FILE, begun)
     if (folder / FOUND_POSES_FILE).exists():
@@ -194,8 +188,8 @@ def describe_moved_object(posed: FoundPoses, masks: Path) -> str | None:
 def drop_pictures_of_something_else(posed: FoundPoses, masks: Path) -> FoundPoses:
     """Leave out pictures that show something else where the others show the object, and say so.
 
-    What stood on the same floor is placed by this, as well as the object is. It is kept with the
-    poses that they were left out.
+    What stood on the same floor is placed by this, as well as the object is. It is kept with the poses that they were
+    left out.
 
     Args:
         posed: Poses that were found from whole pictures.
@@ -219,9 +213,7 @@ def drop_pictures_of_something_else(posed: FoundPoses, masks: Path) -> FoundPose
     return replace(posed, warnings=kept.warnings)
 
 
-def find_object_poses(
-    posed: FoundPoses, masks: Path, folder: Path, progress: Progress
-) -> FoundPoses | None:
+def find_object_poses(posed: FoundPoses, masks: Path, folder: Path, progress: Progress) -> FoundPoses | None:
     """Find the poses again, from points on the object alone.
 
     Args:
@@ -239,24 +231,16 @@ def find_object_poses(
         "masks": store.path_digest(masks),
         "method": POSES_METHOD_VERSION,
     }
-    if (
-        not (folder / BEGUN_POSES_FILE).exists()
-        or store.read_json(folder / BEGUN_POSES_FILE) != begun
-    ):
+    if not (folder / BEGUN_POSES_FILE).exists() or store.read_json(folder / BEGUN_POSES_FILE) != begun:
         shutil.rmtree(folder, ignore_errors=True)
         store.write_json(folder / BEGUN_POSES_FILE, begun)
     if (folder / FOUND_POSES_FILE).exists():
         kept = _load_record(folder)
     else:
-        for name, place in (
-            (IMAGES_FOLDER, posed.folder / IMAGES_FOLDER),
-            (MASK_FOLDERS[0], masks),
-        ):
+        for name, place in ((IMAGES_FOLDER, posed.folder / IMAGES_FOLDER), (MASK_FOLDERS[0], masks)):
             shutil.copytree(place, folder / name, dirs_exist_ok=True)
         gathered = load_prepared_images(folder)
-        told = _check_model(
-            run_sfm(folder, folder / "masked", gathered, "masked", progress), folder, gathered
-        )
+        told = _check_model(run_sfm(folder, folder / "masked", gathered, "masked", progress), folder, gathered)
         why = [*model_doubts(told), *filter(None, [mask_contradiction_doubt(told)])]
         shutil.rmtree(folder / MASK_FOLDERS[0])  # they were grown under other poses
         if why:
@@ -272,9 +256,7 @@ def _find_or_load_poses(source: Path, folder: Path, progress: Progress) -> _Pose
     if (count := len(gathered.names)) < MIN_PHOTOGRAPHS:
         few = f"{count} photographs are too few to find where they were taken from."
         return _PosesRecord((), gathered.said, few, (), PHOTOGRAPHS_HINT)
-    looked = _find_places(
-        folder, gathered, subprogress(progress, PREPARED_PROGRESS, PLACES_PROGRESS)
-    )
+    looked = _find_places(folder, gathered, subprogress(progress, PREPARED_PROGRESS, PLACES_PROGRESS))
     if isinstance(looked, _PosesRecord):
         return looked
     gathered, others = looked
@@ -285,13 +267,7 @@ def _find_or_load_poses(source: Path, folder: Path, progress: Progress) -> _Pose
             return _refusal([why], gathered, smeared, tried=tuple(tried))
         place = folder / best.way / "sparse" / "0"
         if (why := describe_mirrored(read_colmap(place))) is not None:
-            return _PosesRecord(
-                (),
-                gathered.said,
-                describe_missing_poses([why], others),
-                tuple(tried),
-                ONE_CAMERA_HINT,
-            )
+            return _PosesRecord((), gathered.said, describe_missing_poses([why], others), tuple(tried), ONE_CAMERA_HINT)
         if (spread := principal_point_spread(place)) >= CROPPED_SPREAD_FRACTION:
             why = describe_missing_poses([spread_clause(spread)], others)
             return _PosesRecord((), gathered.said, why, tuple(tried), UNCROPPED_HINT)
@@ -303,26 +279,18 @@ def _find_or_load_poses(source: Path, folder: Path, progress: Progress) -> _Pose
 
 
 def _refusal(
-    why: list[str],
-    gathered: PreparedImages,
-    smeared: tuple[str, ...],
-    others: int = 0,
-    tried: tuple[SfmRun, ...] = (),
+    why: list[str], gathered: PreparedImages, smeared: tuple[str, ...], others: int = 0, tried: tuple[SfmRun, ...] = ()
 ) -> _PosesRecord:
     """Reject, and say which pictures are blurred, if that may be why."""
     total = len(gathered.names)
     if smeared:
         why = [*why, f"{len(smeared)} of {total} pictures are blurred ({some_names(smeared)})"]
-    what_to_do = (
-        HOLD_STILL_HINT if len(smeared) >= MAX_BLURRED_FRACTION * total else MORE_OVERLAP_HINT
-    )
+    what_to_do = HOLD_STILL_HINT if len(smeared) >= MAX_BLURRED_FRACTION * total else MORE_OVERLAP_HINT
     what_to_do = UNCROPPED_HINT if count_single_sizes(gathered.sizes) else what_to_do
     return _PosesRecord((), gathered.said, describe_missing_poses(why, others), tried, what_to_do)
 
 
-def _try_strategies(
-    folder: Path, gathered: PreparedImages, progress: Progress
-) -> tuple[list[SfmRun], tuple[str, ...]]:
+def _try_strategies(folder: Path, gathered: PreparedImages, progress: Progress) -> tuple[list[SfmRun], tuple[str, ...]]:
     """Attempt until one is accepted; return all, and which pictures are blurred if one was not."""
     tried: list[SfmRun] = []
     smeared: tuple[str, ...] = ()
@@ -354,15 +322,11 @@ def _find_places(
     if (why := hopelessness_reason(looked.shared)) is not None:
         return _refusal([why], gathered, blurred_pictures(folder / IMAGES_FOLDER, gathered.names))
     if (why := looked.stood_still) is not None:
-        return _PosesRecord(
-            (), gathered.said, describe_missing_poses([why], 0), (), WALK_AROUND_HINT
-        )
+        return _PosesRecord((), gathered.said, describe_missing_poses([why], 0), (), WALK_AROUND_HINT)
     gathered = replace(gathered, said=(*gathered.said, *filter(None, [looked.said])))
     groups = place_groups(looked.shared)
     if groups.mixed:
-        return _PosesRecord(
-            (), gathered.said, describe_places(groups, gathered.names), (), SORT_PHOTOGRAPHS_HINT
-        )
+        return _PosesRecord((), gathered.said, describe_places(groups, gathered.names), (), SORT_PHOTOGRAPHS_HINT)
     kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
     if groups.beside:
         gathered = drop_other_places(gathered, groups)
@@ -381,8 +345,8 @@ def _check_model(told: SfmRun, folder: Path, gathered: PreparedImages) -> SfmRun
 def _best_by_masks(tried: list[SfmRun], folder: Path, gathered: PreparedImages) -> SfmRun | None:
     """Return the first attempt of those that masks agree with best, as masks may be poor; or None.
 
-    Where its neighbours contradict, one that was doubted for few points alone, and with which
-    neighbours and masks agree, is taken.
+    Where its neighbours contradict, one that was doubted for few points alone, and with which neighbours and masks
+    agree, is taken.
     """
     believed = [told for told in tried if not model_doubts(told)]
     best = max(believed, key=lambda told: told.filled, default=None)
@@ -390,9 +354,7 @@ def _best_by_masks(tried: list[SfmRun], folder: Path, gathered: PreparedImages) 
         return best
     for told in tried:
         place = folder / told.way / "sparse" / "0"
-        if mask_contradiction_doubt(told) is None and neighbours_support_model(
-            told, place, gathered
-        ):
+        if mask_contradiction_doubt(told) is None and neighbours_support_model(told, place, gathered):
             return told
     return best
 
@@ -406,9 +368,7 @@ def _is_worth_trying(way: SfmStrategy, folder: Path, tried: list[SfmRun], smeare
     return all(model_doubts(told) for told in tried) and not thorough_in_vain(tried[0], smeared)
 
 
-def _prepare_source(
-    source: Path, folder: Path, progress: Progress
-) -> tuple[list[str], PreparedImages]:
+def _prepare_source(source: Path, folder: Path, progress: Progress) -> tuple[list[str], PreparedImages]:
     if source.suffix.lower() not in VIDEO_SUFFIXES:
         return [], prepare_images(source, folder, progress)
     frames = folder / "frames"
@@ -427,11 +387,7 @@ def _accept_model(out: Path, folder: Path) -> None:
 
 
 def _record_of_runs(
-    folder: Path,
-    gathered: PreparedImages,
-    said: tuple[str, ...],
-    tried: tuple[SfmRun, ...],
-    last: SfmRun,
+    folder: Path, gathered: PreparedImages, said: tuple[str, ...], tried: tuple[SfmRun, ...], last: SfmRun
 ) -> _PosesRecord:
     _accept_model(folder / last.way, folder)
     statement = (

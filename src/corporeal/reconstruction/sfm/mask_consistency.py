@@ -1,8 +1,7 @@
 """Consistency of masks and poses by silhouette coherence.
 
-A pattern that repeats puts a camera on the wrong one of its pieces, and an object that was turned
-over between two rounds leaves all cameras right about the floor alone. Neither shows in the
-reprojection error.
+A pattern that repeats puts a camera on the wrong one of its pieces, and an object that was turned over between two
+rounds leaves all cameras right about the floor alone. Neither shows in the reprojection error.
 """
 
 from dataclasses import dataclass, replace
@@ -51,13 +50,7 @@ def remove_by_masks(told: SfmRun, folder: Path, place: Path) -> SfmRun:
     filled = silhouette_coherence(drawn[right], tuple(cameras[k] for k in right))
     astray = tuple(sorted(shown[k].name for k in wrong))
     left = remove_pictures(place, astray) if astray else (told.registered, told.points)
-    return replace(
-        told,
-        registered=left[0],
-        points=left[1],
-        astray=astray,
-        filled=round(filled, 3),
-    )
+    return replace(told, registered=left[0], points=left[1], astray=astray, filled=round(filled, 3))
 
 
 def pictures_of_something_else(place: Path, masks: Path) -> tuple[str, ...]:
@@ -78,9 +71,9 @@ def pictures_of_something_else(place: Path, masks: Path) -> tuple[str, ...]:
 def hull_fill_fraction(place: Path, masks: Path) -> float:
     """Return which share of a mask the hull fills, the median of all views; 1: too few to tell.
 
-    Of all in small pictures, or of the others in larger ones, whichever is more: a thin object is
-    lost in the former (a guitar under right poses .84 and .99), and to small errors of poses in the
-    latter; an axe head that was turned over has .86 and .82.
+    Of all in small pictures, or of the others in larger ones, whichever is more: a thin object is lost in the former (a
+    guitar under right poses .84 and .99), and to small errors of poses in the latter; an axe head that was turned over
+    has .86 and .82.
 
     Args:
         place: Holds the model.

@@ -2,12 +2,11 @@
 
 Position uncertainty of image points across and along edges.
 
-A point on a straight edge, such as the gap between two planks, is found again anywhere along it.
-How exactly a point lies in each direction, the gradients around it say: the structure tensor
-(Förstner and Gülch 1987, "A fast operator for detection and precise location of distinct points,
-corners and centres of circular features"). That points of scale and affine shape have errors like
-that, and that adjustments gain by it: Zeisl et al., "Estimation of location uncertainty for scale
-invariant feature points", BMVC 2009.
+A point on a straight edge, such as the gap between two planks, is found again anywhere along it. How exactly a point
+lies in each direction, the gradients around it say: the structure tensor (Förstner and Gülch 1987, "A fast operator for
+detection and precise location of distinct points, corners and centres of circular features"). That points of scale and
+affine shape have errors like that, and that adjustments gain by it: Zeisl et al., "Estimation of location uncertainty
+for scale invariant feature points", BMVC 2009.
 """
 
 from collections import Counter
@@ -29,17 +28,15 @@ EDGE_GRADIENT_SIGMA_PX, TENSOR_SIGMA_PX = 1.0, 3.0
 WINDOW_SIGMAS = 3.0
 """Of the Gaussians, in standard deviations."""
 EIGENVALUE_POWER = 0.25
-"""Of the ratio of the tensor's eigenvalues. By least squares of white noise it would be a half.
-Measured on a chair, a bin and a hammer under true poses: points on the straightest edges (ratio
-.01) are 1.8 times as far off along as across in the median and 2.0 at the 80th percentile, at .03
-1.5, from .4 on 1.2; with one half a box on a table is turned by .12° more than without."""
+"""Of the ratio of the tensor's eigenvalues. By least squares of white noise it would be a half. Measured on a chair, a
+bin and a hammer under true poses: points on the straightest edges (ratio .01) are 1.8 times as far off along as across
+in the median and 2.0 at the 80th percentile, at .03 1.5, from .4 on 1.2; with one half a box on a table is turned by
+.12° more than without."""
 MIN_EIGENVALUE_RATIO = 1e-3
 """Least ratio: pictures have noise."""
 
 
-def whitening_matrices(
-    grey: Float[np.ndarray, "H W"], points: Float[np.ndarray, "N 2"]
-) -> Float[np.ndarray, "N 2 2"]:
+def whitening_matrices(grey: Float[np.ndarray, "H W"], points: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2 2"]:
     """Return what turns errors of points into errors that are alike in all directions.
 
     Args:
@@ -71,8 +68,8 @@ def whitening_matrices(
 ROBUST_SCALE_PX = 0.5
 """Reprojection error [px] from which on a point counts for less (Cauchy's loss)."""
 MIN_PICTURES_PER_SIZE = 3
-"""Pictures of one size, either way up, below which somebody cut them to it: a camera writes few
-sizes, and has its lens before the middle of each."""
+"""Pictures of one size, either way up, below which somebody cut them to it: a camera writes few sizes, and has its lens
+before the middle of each."""
 REFINEMENT_ROUNDS = 3
 """Of finding the middles of cropped pictures, and the lens that all were taken through."""
 
@@ -90,12 +87,12 @@ class LensPrior:
 def refine_model(pycolmap: Any, model: Any, taken: Mapping[str, LensPrior], images: Path) -> Any:
     """Adjust cameras and points once more, so that wrong matches count for little.
 
-    COLMAP's last adjustment is one of least squares, which points that are 4 px off pull with 64
-    times the weight of those that are half a pixel off.
+    COLMAP's last adjustment is one of least squares, which points that are 4 px off pull with 64 times the weight of
+    those that are half a pixel off.
 
-    Where the lens was in pictures that somebody cropped nobody knows: taken for their middles, it
-    turns and moves cameras, and gives each another lens. One lens before middles of their own takes
-    as many numbers, and is accepted where it fits better.
+    Where the lens was in pictures that somebody cropped nobody knows: taken for their middles, it turns and moves
+    cameras, and gives each another lens. One lens before middles of their own takes as many numbers, and is accepted
+    where it fits better.
 
     In the end points on edges count along these for less.
 
@@ -138,9 +135,7 @@ def cropped_cameras(model: Any) -> set[int]:
     return {camera for camera in placed if count[size[camera]] < MIN_PICTURES_PER_SIZE}
 
 
-def _share_lens_parameters(
-    model: Any, loose: Collection[int], taken: Mapping[str, LensPrior]
-) -> None:
+def _share_lens_parameters(model: Any, loose: Collection[int], taken: Mapping[str, LensPrior]) -> None:
     """Give cropped pictures the focal length and distortion that most of their lens have."""
     images = [model.images[number] for number in model.reg_image_ids()]
     for lens in {taken[image.name].lens for image in images}:
@@ -156,10 +151,7 @@ def _share_lens_parameters(
 
 
 def adjust_bundle(
-    pycolmap: Any,
-    model: Any,
-    loose: Collection[int] = (),
-    of_lens: Literal["shape", "middle", "nothing"] = "shape",
+    pycolmap: Any, model: Any, loose: Collection[int] = (), of_lens: Literal["shape", "middle", "nothing"] = "shape"
 ) -> None:
     """Adjust poses and points, and of lenses focal length and distortion, the middle, or nothing.
 

@@ -1,9 +1,9 @@
 """Detection of pictures from one viewpoint: a tripod, or crops of one picture.
 
-There nothing is nearer than anything else. What two such pictures share differs by a shift, a turn
-and a scale alone, and COLMAP looks for depth in vain, or finds what is not there. Whoever takes but
-five degrees around an object, or above it, shortens what lies on its floor: that is no similarity.
-Where a camera turns on the spot, its pictures differ by a rotation in space, seen through one lens.
+There nothing is nearer than anything else. What two such pictures share differs by a shift, a turn and a scale alone,
+and COLMAP looks for depth in vain, or finds what is not there. Whoever takes but five degrees around an object, or
+above it, shortens what lies on its floor: that is no similarity. Where a camera turns on the spot, its pictures differ
+by a rotation in space, seen through one lens.
 """
 
 from collections.abc import Sequence
@@ -14,11 +14,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 MAX_POINT_SHIFT_FRACTION = 0.0025
-"""Median distance of points after a similarity, in the longer side of pictures, up to which two
-were taken from one place: compression and noise move points by less."""
+"""Median distance of points after a similarity, in the longer side of pictures, up to which two were taken from one
+place: compression and noise move points by less."""
 MIN_EXPLAINED_PAIRS_FRACTION = 0.8
-"""Share of the pairs of pictures with points in common that one place explains, from which on all
-were taken there. Of bursts on a way around an object few pairs are of one burst.
+"""Share of the pairs of pictures with points in common that one place explains, from which on all were taken there. Of
+bursts on a way around an object few pairs are of one burst.
 """
 MIN_PAIRS = 10
 """Pairs without which nothing is said."""
@@ -34,9 +34,7 @@ PointPair = tuple[Float[np.ndarray, "M 2"], Float[np.ndarray, "M 2"]]
 """Points of one picture and the same of another, from the middle of each, in its longer side."""
 
 
-def is_same_viewpoint(
-    a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int
-) -> bool:
+def is_same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int) -> bool:
     """Return whether a shift, a turn and a scale take points of one picture to those of another.
 
     Args:
@@ -62,18 +60,13 @@ def pairs_of_rotation(pairs: Sequence[PointPair]) -> Bool[np.ndarray, " P"]:
     """Return which pairs a rotation of one camera explains, whose focal length explains the most."""
     some = pairs[:: max(1, len(pairs) // FOCAL_SAMPLE_PAIRS)]
     counts = [
-        sum(_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in some)
-        for focal in TRIED_FOCAL_RATIOS
+        sum(_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in some) for focal in TRIED_FOCAL_RATIOS
     ]
     focal = TRIED_FOCAL_RATIOS[int(np.argmax(counts))]
-    return np.array(
-        [_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in pairs], bool
-    )
+    return np.array([_rotation_error(a, b, focal) < MAX_POINT_SHIFT_FRACTION for a, b in pairs], bool)
 
 
-def _rotation_error(
-    a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], focal: float
-) -> float:
+def _rotation_error(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], focal: float) -> float:
     """Return the median distance after the best rotation, in the longer side."""
     x, y = (np.c_[points / focal, np.ones(len(points))] for points in (a, b))
     x, y = (rays / np.linalg.norm(rays, axis=1, keepdims=True) for rays in (x, y))
@@ -87,9 +80,7 @@ def _rotation_error(
 
 
 def describe_one_viewpoint(
-    joined: Bool[np.ndarray, "N N"],
-    same: Bool[np.ndarray, "N N"],
-    by: str = "a shift, a turn and a scale alone",
+    joined: Bool[np.ndarray, "N N"], same: Bool[np.ndarray, "N N"], by: str = "a shift, a turn and a scale alone"
 ) -> str | None:
     """Return in a clause that most of N pictures are from one place, if they are.
 

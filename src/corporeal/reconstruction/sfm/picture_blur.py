@@ -15,8 +15,8 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 BLURRED_SIGMA_PX = 5.0
-"""Standard deviation of a blur [px] from which on points that pictures share are lost: photographs
-of four real sets and of twelve made ones have up to 4.8."""
+"""Standard deviation of a blur [px] from which on points that pictures share are lost: photographs of four real sets
+and of twelve made ones have up to 4.8."""
 FINE_SIGMA_PX, COARSE_SIGMA_PX = 2.0, 6.0
 """Standard deviations of the two smoothings [px]."""
 MIDDLE_SIDE_PX = 640
@@ -53,9 +53,7 @@ def picture_blur(grey: Float[np.ndarray, "H W"]) -> float:
     height, width = grey.shape
     top, left = max(0, height - MIDDLE_SIDE_PX) // 2, max(0, width - MIDDLE_SIDE_PX) // 2
     part = grey[top : top + MIDDLE_SIDE_PX, left : left + MIDDLE_SIDE_PX]
-    pairs = zip(
-        _steepest_slopes(part, FINE_SIGMA_PX), _steepest_slopes(part, COARSE_SIGMA_PX), strict=True
-    )
+    pairs = zip(_steepest_slopes(part, FINE_SIGMA_PX), _steepest_slopes(part, COARSE_SIGMA_PX), strict=True)
     return max(_blur_from_slopes(fine, coarse) for fine, coarse in pairs)
 
 

@@ -1,10 +1,9 @@
 """Grouping of photographs by place on downscaled copies, before pose estimation.
 
-A folder of which a part shows something else would cost many minutes before COLMAP says that the
-pictures fall apart. Small pictures share enough points with their neighbours to see two separate
-circles of pictures, each well joined within; where they share few, nothing is said. Real sets of
-48, 49 and 97 photographs are one group each, with 5 to 27 partners in the median; 16 of a banana,
-far apart, fall into groups of 7, 4 and 3 whose median is 2.
+A folder of which a part shows something else would cost many minutes before COLMAP says that the pictures fall apart.
+Small pictures share enough points with their neighbours to see two separate circles of pictures, each well joined
+within; where they share few, nothing is said. Real sets of 48, 49 and 97 photographs are one group each, with 5 to 27
+partners in the median; 16 of a banana, far apart, fall into groups of 7, 4 and 3 whose median is 2.
 """
 
 import shutil
@@ -30,11 +29,7 @@ from corporeal.reconstruction.sfm.pose_acceptance import some_names
 from corporeal.reconstruction.sfm.prepare_images import IMAGES_FOLDER, PreparedImages
 from corporeal.reconstruction.sfm.sfm_run import require_pycolmap
 from corporeal.reconstruction.sfm.watermarks import WATERMARKS_FOLDER as STAMPS
-from corporeal.reconstruction.sfm.watermarks import (
-    PictureSize,
-    WatermarkDetector,
-    write_watermark_masks,
-)
+from corporeal.reconstruction.sfm.watermarks import PictureSize, WatermarkDetector, write_watermark_masks
 
 SMALL_COPY_PX, FEATURES_PER_SMALL_COPY = 480, 1024
 """Longer side of the copies [px]; points of each."""
@@ -43,8 +38,8 @@ RANSAC_TRIALS = 1000
 MIN_SHARED_POINTS = 15
 """Points that two pictures share by epipolar geometry, as COLMAP asks of a pair."""
 WELL_JOINED_PICTURES = 8
-"""Pictures that each is joined with, in the median, from which on the finest points are spared,
-which are two thirds of the cost of looking for points."""
+"""Pictures that each is joined with, in the median, from which on the finest points are spared, which are two thirds of
+the cost of looking for points."""
 LARGE_PICTURE_RATIO = 2
 """Times as long as the copies, at least, the pictures are of which that is true."""
 MIN_JOINED_PICTURES = 4
@@ -57,8 +52,8 @@ SORT_PHOTOGRAPHS_HINT = (
     "or turned over, give masks of it."
 )
 MAX_ALONE_FRACTION = 0.2
-"""Share of pictures of no place, above which the one that is meant is searched without them: COLMAP
-leaves out fewer itself, and of more it would seem that nothing fits together."""
+"""Share of pictures of no place, above which the one that is meant is searched without them: COLMAP leaves out fewer
+itself, and of more it would seem that nothing fits together."""
 ALONE_EXPLANATION = (
     "They show another place, or sides from which nothing with a pattern is seen: put a newspaper "
     "under the object, and photograph it in steps of at most 15°."
@@ -73,8 +68,8 @@ MEANT_GROUP_RATIO = 3.0
 
 
 MIN_JOINED_FRACTION = 0.4
-"""Share of the pictures that must share points with another, or the long search is in vain: of sets
-that were posed at last .88 to 1 do, also where the plain attempt placed two of 24."""
+"""Share of the pictures that must share points with another, or the long search is in vain: of sets that were posed at
+last .88 to 1 do, also where the plain attempt placed two of 24."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +84,7 @@ class PlaceGroups:
     @property
     def mixed(self) -> bool:
         """Whether the folder shows several places, and none is clearly meant."""
-        return len(self.certain) > 1 and len(self.certain[0]) < MEANT_GROUP_RATIO * len(
-            self.certain[1]
-        )
+        return len(self.certain) > 1 and len(self.certain[0]) < MEANT_GROUP_RATIO * len(self.certain[1])
 
     @property
     def beside(self) -> tuple[int, ...]:
@@ -112,11 +105,7 @@ def place_groups(shared: Int[np.ndarray, "N N"]) -> PlaceGroups:
     _, label = connected_components(csr_array(joined), directed=False)
     least = max(MIN_GROUP_PICTURES, MIN_GROUP_FRACTION * len(shared))
     members = [np.flatnonzero(label == k) for k in np.unique(label)]
-    large = [
-        m
-        for m in members
-        if len(m) >= least and np.median(joined[m].sum(axis=1)) >= MIN_JOINED_PICTURES
-    ]
+    large = [m for m in members if len(m) >= least and np.median(joined[m].sum(axis=1)) >= MIN_JOINED_PICTURES]
     large.sort(key=len, reverse=True)
     placed = {int(k) for m in large for k in m}
     alone = tuple(k for k in range(len(shared)) if k not in placed)
@@ -156,10 +145,7 @@ def hopelessness_reason(shared: Int[np.ndarray, "N N"]) -> str | None:
 def describe_places(groups: PlaceGroups, names: Sequence[str]) -> str:
     """Return which places a folder shows, each by its first picture."""
     each = [f"{len(group)} like {names[group[0]]}" for group in groups.certain[:MAX_NAMED_PLACES]]
-    return (
-        f"the photographs show {len(groups.certain)} objects or places that share nothing: "
-        f"{', '.join(each)}."
-    )
+    return f"the photographs show {len(groups.certain)} objects or places that share nothing: {', '.join(each)}."
 
 
 def describe_missing_poses(doubts: Sequence[str], others: int) -> str:
@@ -179,12 +165,7 @@ def drop_other_places(gathered: PreparedImages, groups: PlaceGroups) -> Prepared
         said.append(Note(f"{what} and were left out: {some_names(elsewhere)}.", NoteKind.LEFT_OUT))
     if alone:
         what = f"{len(alone)} photographs share too few points with the others"
-        said.append(
-            Note(
-                f"{what} and were left out: {some_names(alone)}. {ALONE_EXPLANATION}",
-                NoteKind.LEFT_OUT,
-            )
-        )
+        said.append(Note(f"{what} and were left out: {some_names(alone)}. {ALONE_EXPLANATION}", NoteKind.LEFT_OUT))
     return replace(
         gathered,
         names=tuple(gathered.names[k] for k in kept),
@@ -218,9 +199,7 @@ class SmallCopyMatches:
         )
 
 
-def match_small_copies(
-    folder: Path, gathered: PreparedImages, told: Callable[[float], None]
-) -> SmallCopyMatches:
+def match_small_copies(folder: Path, gathered: PreparedImages, told: Callable[[float], None]) -> SmallCopyMatches:
     """Look for points that each two of the pictures share, in small copies.
 
     Where something stands at the same place of all of them, they are looked at again without it.
@@ -268,10 +247,7 @@ def _match_copies(pycolmap: Any, folder: Path, gathered: PreparedImages) -> Smal
     checking = pycolmap.TwoViewGeometryOptions()
     checking.ransac.random_seed, checking.ransac.max_num_trials = 0, RANSAC_TRIALS
     pycolmap.match_exhaustive(
-        database,
-        matching_options=matching,
-        verification_options=checking,
-        device=pycolmap.Device.cpu,
+        database, matching_options=matching, verification_options=checking, device=pycolmap.Device.cpu
     )
     found = _read_matches(pycolmap, database, gathered)
     database.unlink()
@@ -282,9 +258,7 @@ def _read_matches(pycolmap: Any, database: Path, gathered: PreparedImages) -> Sm
     opened = pycolmap.Database.open(str(database))
     number = {name: k for k, name in enumerate(gathered.names)}
     images = {number[image.name]: image.image_id for image in opened.read_all_images()}
-    points = [
-        np.asarray(opened.read_keypoints(images[k]))[:, :2].astype(float) for k in sorted(images)
-    ]
+    points = [np.asarray(opened.read_keypoints(images[k]))[:, :2].astype(float) for k in sorted(images)]
     place = {image: k for k, image in images.items()}
     shared = np.zeros((len(number), len(number)), np.int64)
     same = np.zeros(shared.shape, np.bool_)
@@ -299,12 +273,8 @@ def _read_matches(pycolmap: Any, database: Path, gathered: PreparedImages) -> Sm
         shared[a, b] = shared[b, a] = len(geometry.inlier_matches)
         if shared[a, b] >= MIN_SHARED_POINTS:
             m, n = geometry.inlier_matches.T
-            same[a, b] = same[b, a] = is_same_viewpoint(
-                points[a][m], points[b][n], longest=SMALL_COPY_PX
-            )
-            own, other = (
-                (points[k][i] - sizes[k] / 2) / max(sizes[k]) for k, i in ((a, m), (b, n))
-            )
+            same[a, b] = same[b, a] = is_same_viewpoint(points[a][m], points[b][n], longest=SMALL_COPY_PX)
+            own, other = ((points[k][i] - sizes[k] / 2) / max(sizes[k]) for k, i in ((a, m), (b, n)))
             pairs[a, b] = own, other
     opened.close()
     spun = np.zeros(same.shape, np.bool_)

@@ -1,8 +1,7 @@
 """Acceptance tests of COLMAP models, with advice.
 
-A wrong model looks like a model: low reprojection error says nothing. What speaks against one was
-found on right and wrong models of the same pictures, docs/reference/input-files.md, "Photographs
-without poses".
+A wrong model looks like a model: low reprojection error says nothing. What speaks against one was found on right and
+wrong models of the same pictures, docs/reference/input-files.md, "Photographs without poses".
 """
 
 from dataclasses import replace
@@ -20,11 +19,11 @@ MAX_RADIAL_DISTORTION = 0.25
 RIVAL_GROUP_FRACTION = 1 / 3
 """Share of the first group from which on a second one rivals it."""
 MIN_PLACED_FRACTION = 0.5
-"""Share of all photographs of a folder that must be placed, those counted, too, that were left out
-before the search: of a television 8 of 18 were, from a fifth of the circle."""
+"""Share of all photographs of a folder that must be placed, those counted, too, that were left out before the search:
+of a television 8 of 18 were, from a fifth of the circle."""
 MIN_JOINED_BY_PLAIN_FRACTION = 0.4
-"""Share of the pictures that the plain attempt must join by points, or the thorough one is in vain:
-of sets that it posed alone all 15, 20 and 24 were joined."""
+"""Share of the pictures that the plain attempt must join by points, or the thorough one is in vain: of sets that it
+posed alone all 15, 20 and 24 were joined."""
 MAX_BLURRED_FRACTION = 0.5
 """Share of heavily blurred pictures from which on there is no use in looking longer."""
 HOLD_STILL_HINT = (
@@ -53,14 +52,8 @@ def model_doubts(told: SfmRun) -> list[str]:
     if told.points < MIN_POINTS_PER_PICTURE * told.registered:
         each = told.points / told.registered
         found.append(f"there are {each:.0f} points per picture, too few to trust")
-    if (
-        not FOCAL_RANGE_RATIO[0] < told.focal < FOCAL_RANGE_RATIO[1]
-        or told.bent > MAX_RADIAL_DISTORTION
-    ):
-        found.append(
-            f"it needs an implausible lens (focal length {told.focal:g} × the longer side, "
-            f"k1 {told.bent:g})"
-        )
+    if not FOCAL_RANGE_RATIO[0] < told.focal < FOCAL_RANGE_RATIO[1] or told.bent > MAX_RADIAL_DISTORTION:
+        found.append(f"it needs an implausible lens (focal length {told.focal:g} × the longer side, k1 {told.bent:g})")
     if told.others and told.others[0] > RIVAL_GROUP_FRACTION * told.registered:
         groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
         found.append(f"the pictures fall into groups of {groups} that share nothing")
@@ -131,9 +124,5 @@ def mask_contradiction_doubt(told: SfmRun) -> str | None:
 
 def some_names(left_out: tuple[str, ...]) -> str:
     """Return up to eight names and how many more there are."""
-    more = (
-        f" and {len(left_out) - MAX_NAMED_PICTURES} more"
-        if len(left_out) > MAX_NAMED_PICTURES
-        else ""
-    )
+    more = f" and {len(left_out) - MAX_NAMED_PICTURES} more" if len(left_out) > MAX_NAMED_PICTURES else ""
     return ", ".join(left_out[:MAX_NAMED_PICTURES]) + more

@@ -13,12 +13,7 @@ from PIL import Image, ImageOps
 from corporeal.core import store
 from corporeal.core.errors import BadFileError
 from corporeal.io.image_decoder import IMAGE_FORMATS, MAX_IMAGE_PIXELS, as_eight_bit_image
-from corporeal.io.input_files import (
-    nested_images,
-    photos_in_folder,
-    unread_images_note,
-    unused_nested_images_note,
-)
+from corporeal.io.input_files import nested_images, photos_in_folder, unread_images_note, unused_nested_images_note
 from corporeal.io.photos.image_loader import (
     MIN_PHOTOS,
     UnusablePhoto,
@@ -26,12 +21,7 @@ from corporeal.io.photos.image_loader import (
     unreadable_reason,
     unusable_photos_notes,
 )
-from corporeal.io.photos.posed_photos import (
-    INSTANCE_FOLDERS,
-    MASK_FOLDERS,
-    find_companion_image,
-    unused_masks_note,
-)
+from corporeal.io.photos.posed_photos import INSTANCE_FOLDERS, MASK_FOLDERS, find_companion_image, unused_masks_note
 from corporeal.recognition.readable_names import safe_name, single_line_text
 
 Progress = Callable[[float, str], None]
@@ -60,8 +50,8 @@ OPAQUE_ALPHA_U8 = 255
 ALPHA_THRESHOLD_U8 = 127
 """Alpha above which it is rather seen than not."""
 MAX_ASPECT_RATIO = 2.4
-"""Longer side over the shorter, above which a picture is no camera's: videos have 21 : 9. For one
-of 1600 × 120 a lens was found that nobody has, and 24 good photographs were refused with it.
+"""Longer side over the shorter, above which a picture is no camera's: videos have 21 : 9. For one of 1600 × 120 a lens
+was found that nobody has, and 24 good photographs were refused with it.
 """
 JPEG_QUALITY = 95
 """Of JPEG copies."""
@@ -112,10 +102,7 @@ def prepare_images(source: Path, folder: Path, progress: Progress) -> PreparedIm
             picture, alpha = _read_upright(file, file in strips)
             thumbnail = _thumbnail(picture)
             _check_thumbnail(thumbnail, known, list(names))
-            masks = [
-                _find_mask(file, source, kinds, picture.size)
-                for kinds in (MASK_FOLDERS, INSTANCE_FOLDERS)
-            ]
+            masks = [_find_mask(file, source, kinds, picture.size) for kinds in (MASK_FOLDERS, INSTANCE_FOLDERS)]
         except _UnusablePhotographError as problem:
             bad.append((single_line_text(file.name), str(problem)))
             twins += isinstance(problem, _DuplicatePhotographError)
@@ -229,11 +216,7 @@ def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], t
         return
     if not bad:
         count = "1 photograph is" if good == 1 else f"{good} photographs are"
-        raise BadFileError(
-            source,
-            f"{count} too few to show an object.",
-            _elsewhere_hint(source) or PHOTOGRAPHS_HINT,
-        )
+        raise BadFileError(source, f"{count} too few to show an object.", _elsewhere_hint(source) or PHOTOGRAPHS_HINT)
     why = f" The first of the others, {bad[0][0]}, {bad[0][1]}."
     count = f"only {good}" if good else "none"
     what = f"{count} of {asked} photographs can be used.{why}"
@@ -289,8 +272,7 @@ def _read_upright(file: Path, strip: bool = False) -> tuple[Image.Image, Image.I
 def _lens_exif(exif: Image.Exif) -> bytes:
     """Return what EXIF says of camera and lens, as EXIF; b"" where it says nothing.
 
-    The rest is left out: it may be longer than a JPEG can hold, broken, or say where somebody
-    lives.
+    The rest is left out: it may be longer than a JPEG can hold, broken, or say where somebody lives.
     """
     kept = Image.Exif()
     own, of_lens = exif.get_ifd(EXIF_IFD_TAG), kept.get_ifd(EXIF_IFD_TAG)
@@ -300,9 +282,7 @@ def _lens_exif(exif: Image.Exif) -> bytes:
 
 
 def _is_short_value(stated: object) -> bool:
-    return isinstance(stated, numbers.Number) or (
-        isinstance(stated, str) and len(stated) <= MAX_TAG_LETTERS
-    )
+    return isinstance(stated, numbers.Number) or (isinstance(stated, str) and len(stated) <= MAX_TAG_LETTERS)
 
 
 def _thumbnail(picture: Image.Image) -> np.ndarray:
@@ -370,9 +350,7 @@ def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> l
     return []
 
 
-def _find_mask(
-    file: Path, source: Path, kinds: tuple[str, ...], size: tuple[int, int]
-) -> Image.Image | None:
+def _find_mask(file: Path, source: Path, kinds: tuple[str, ...], size: tuple[int, int]) -> Image.Image | None:
     """Return what goes with a photograph, turned with it where it is as the camera stored it.
 
     Raises:
@@ -383,10 +361,7 @@ def _find_mask(
     if mask is None:
         return None
     try:
-        with (
-            Image.open(file, formats=IMAGE_FORMATS) as stored,
-            Image.open(mask, formats=IMAGE_FORMATS) as own,
-        ):
+        with Image.open(file, formats=IMAGE_FORMATS) as stored, Image.open(mask, formats=IMAGE_FORMATS) as own:
             wide = stored.width > stored.height
             same = (own.width > own.height) == wide
             turn = stored.getexif() if same else Image.Exif()

@@ -1,9 +1,9 @@
 """Principal points, which reveal cropped photographs.
 
-Photographs that were cropped, each in another way, fit together as if their lenses were longer and
-stood elsewhere: 25 of 25 were placed, 6° wrong, with a reprojection error below 1 px. Where each
-may have a middle of its own, middles of cropped ones move apart, and their points then agree much
-better. Of whole ones they stay, or move for nothing: then points do not say where they are.
+Photographs that were cropped, each in another way, fit together as if their lenses were longer and stood elsewhere: 25
+of 25 were placed, 6° wrong, with a reprojection error below 1 px. Where each may have a middle of its own, middles of
+cropped ones move apart, and their points then agree much better. Of whole ones they stay, or move for nothing: then
+points do not say where they are.
 """
 
 from pathlib import Path
@@ -19,8 +19,8 @@ from corporeal.reconstruction.sfm.sfm_run import require_pycolmap
 MAX_PRINCIPAL_POINT_POINTS = 1500
 """Points that are asked, those that most pictures show: enough for 150 in each picture."""
 MAX_ERROR_RATIO = 0.9
-"""Share of the error that is left where it is a gain: .71 to .87 where pictures were cropped; .94
-to 1.0 in twenty sets that were not; .73 in one of a phone, whose lens moves by 1.3 %.
+"""Share of the error that is left where it is a gain: .71 to .87 where pictures were cropped; .94 to 1.0 in twenty sets
+that were not; .73 in one of a phone, whose lens moves by 1.3 %.
 """
 SLIGHT_SPREAD_FRACTION = 0.02
 """Spread of the middles, in the longer side, from which on it is said: it turns a view by 1.3°."""
@@ -38,9 +38,7 @@ def principal_point_spread(place: Path) -> float:
     """
     pycolmap = require_pycolmap()
     model = _one_camera_per_picture(pycolmap, pycolmap.Reconstruction(str(place)))
-    adjust_bundle(
-        pycolmap, model, of_lens="nothing"
-    )  # as they are found, points on edges count less
+    adjust_bundle(pycolmap, model, of_lens="nothing")  # as they are found, points on edges count less
     before = _median_error(model)
     adjust_bundle(pycolmap, model, of_lens="middle")
     spread = float(SIGMA_PER_MEDIAN_DEVIATION * _spread_of_points(_principal_points(model)).max())

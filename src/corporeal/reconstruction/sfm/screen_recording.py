@@ -1,11 +1,10 @@
 """Detection of screen recordings of scrolled pages.
 
-What a page shows is pushed aside as a whole, by many times the height of the screen in the end; all
-of it looks as it did, so that pictures share points and COLMAP looks for depth for minutes. Who
-walks around an object sees near and far move differently, from one chosen frame to the next by six
-degrees; and who turns a camera on the spot sees the middle of its pictures move less than their
-sides. The shift is that of the phase correlation (Kuglin and Hines, "The phase correlation image
-alignment method", 1975).
+What a page shows is pushed aside as a whole, by many times the height of the screen in the end; all of it looks as it
+did, so that pictures share points and COLMAP looks for depth for minutes. Who walks around an object sees near and far
+move differently, from one chosen frame to the next by six degrees; and who turns a camera on the spot sees the middle
+of its pictures move less than their sides. The shift is that of the phase correlation (Kuglin and Hines, "The phase
+correlation image alignment method", 1975).
 """
 
 from collections.abc import Sequence
@@ -28,8 +27,8 @@ MIN_BLOCK_CONTRAST_U8 = 6.0
 MIN_BLOCKS = 12
 """Blocks without which nothing is said of two pictures."""
 MIN_BLOCK_CORRELATION, MIN_SHIFTED_BLOCKS_FRACTION = 0.85, 0.6
-"""Correlation of a block with where it was pushed from, and share of the blocks that have it: a
-page has a header that stays."""
+"""Correlation of a block with where it was pushed from, and share of the blocks that have it: a page has a header that
+stays."""
 TRIED_SHIFTS = 4
 """Shifts that are tried: what stays is one."""
 MIN_SHIFTED_FRAMES_FRACTION = 0.6
@@ -49,9 +48,7 @@ def is_screen_recording(frames: Sequence[Path]) -> bool:
     return float((way.max(axis=0) - way.min(axis=0)).max()) >= MIN_TOTAL_SCROLL_RATIO
 
 
-def page_shift(
-    before: Float[np.ndarray, "H W"], after: Float[np.ndarray, "H W"]
-) -> tuple[int, int] | None:
+def page_shift(before: Float[np.ndarray, "H W"], after: Float[np.ndarray, "H W"]) -> tuple[int, int] | None:
     """Return by how much, down and right [px], one picture was pushed to give another; None: other.
 
     Args:
@@ -68,9 +65,7 @@ def page_shift(
             (int(at) + side // 2) % side - side // 2
             for at, side in zip(np.unravel_index(flat, peaks.shape), before.shape, strict=True)
         )
-        if (down or right) and _shifted_blocks_fraction(
-            before, after, down, right
-        ) >= MIN_SHIFTED_BLOCKS_FRACTION:
+        if (down or right) and _shifted_blocks_fraction(before, after, down, right) >= MIN_SHIFTED_BLOCKS_FRACTION:
             return down, right
     return None
 

@@ -6,8 +6,8 @@ no vocabulary tree (loop detection).
 
 Choice of picture pairs for matching.
 
-All pairs grow with the square of the pictures. Small copies have told which two share points
-(``groups.py``): of many partners a picture needs the best, whose points join it with the others.
+All pairs grow with the square of the pictures. Small copies have told which two share points (``groups.py``): of many
+partners a picture needs the best, whose points join it with the others.
 """
 
 import shutil
@@ -31,12 +31,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
 from corporeal.io.photos.posed_photos import MASK_FOLDERS
 from corporeal.reconstruction.sfm.model_refinement import LensPrior, refine_model
-from corporeal.reconstruction.sfm.prepare_images import (
-    IMAGES_FOLDER,
-    MAX_PICTURE_PX,
-    PreparedImages,
-    focal_from_exif,
-)
+from corporeal.reconstruction.sfm.prepare_images import IMAGES_FOLDER, MAX_PICTURE_PX, PreparedImages, focal_from_exif
 from corporeal.reconstruction.sfm.watermarks import WATERMARKS_FOLDER as STAMPS
 
 MAX_EXHAUSTIVE_PICTURES = 80
@@ -46,8 +41,8 @@ NAME_DISTANCES = (*range(1, 11), 16, 32, 64)
 MAX_PARTNERS = 16
 """Of pictures that share points with it when small, so many are matched, which share most."""
 FEW_PARTNERS = 4
-"""Partners when small below which a picture is matched as if small copies said nothing: pairs of a
-banana that share nothing when small carry its model."""
+"""Partners when small below which a picture is matched as if small copies said nothing: pairs of a banana that share
+nothing when small carry its model."""
 ALWAYS_MATCHED_DISTANCE = 3
 """Distance by name up to which pictures are matched whatever small copies say."""
 PicturePairs = list[tuple[int, int]]
@@ -55,9 +50,7 @@ PicturePairs = list[tuple[int, int]]
 
 def match_pairs(total: int) -> PicturePairs:
     """Return which of so many pictures, in order of their names, are matched with one another."""
-    return _pairs_at_distance(
-        range(1, total) if total <= MAX_EXHAUSTIVE_PICTURES else NAME_DISTANCES, total
-    )
+    return _pairs_at_distance(range(1, total) if total <= MAX_EXHAUSTIVE_PICTURES else NAME_DISTANCES, total)
 
 
 def match_partners(shared: Int[np.ndarray, "N N"]) -> PicturePairs:
@@ -73,9 +66,7 @@ def match_partners(shared: Int[np.ndarray, "N N"]) -> PicturePairs:
     kept = [(a, b) for a, row in enumerate(best) for b in row if shared[a, b] > 0]
     alike = {(min(a, b), max(a, b)) for a, b in kept}
     unsure = {(a, b) for a, b in match_pairs(total) if few[a] or few[b]}
-    return sorted(
-        alike | unsure | set(_pairs_at_distance(range(1, ALWAYS_MATCHED_DISTANCE + 1), total))
-    )
+    return sorted(alike | unsure | set(_pairs_at_distance(range(1, ALWAYS_MATCHED_DISTANCE + 1), total)))
 
 
 def _pairs_at_distance(apart: range | tuple[int, ...], total: int) -> PicturePairs:
@@ -85,9 +76,9 @@ def _pairs_at_distance(apart: range | tuple[int, ...], total: int) -> PicturePai
 Progress = Callable[[float, str], None]
 
 SfmStrategy = Literal["plain", "masked", "thorough"]
-"""masked: points on objects alone, for objects that were turned over or moved between pictures.
-thorough: affine shapes, pooling over scales, guided matching, lower minima, and points that two
-pictures alone share, for pictures that are far apart."""
+"""masked: points on objects alone, for objects that were turned over or moved between pictures. thorough: affine
+shapes, pooling over scales, guided matching, lower minima, and points that two pictures alone share, for pictures that
+are far apart."""
 STRATEGY_PREFIXES: dict[SfmStrategy, str] = {
     "plain": "",
     "masked": "attempt on masks alone: ",
@@ -129,8 +120,8 @@ class SfmRun:
     """Largest |k1| of its lens [-]."""
     left_out: tuple[str, ...] = ()
     misplaced: tuple[str, ...] = ()
-    """Registered pictures beside others that they share too little with, as another side that looks
-    alike does. They were taken out of the model, as were the next."""
+    """Registered pictures beside others that they share too little with, as another side that looks alike does. They
+    were taken out of the model, as were the next."""
     parted: tuple[int, ...] = ()
     """The same of so many pictures that nobody can say who is right: sizes of their groups."""
     astray: tuple[str, ...] = ()
@@ -138,8 +129,8 @@ class SfmRun:
     filled: float = 1.0
     """Share of a mask that the visual hull of all fills, the median; 1 without masks [-]."""
     joined: int | None = None
-    """Pictures that points join with one another, directly or through others: the most that can be
-    placed. None: it was not counted."""
+    """Pictures that points join with one another, directly or through others: the most that can be placed. None: it was
+    not counted."""
 
 
 def require_pycolmap() -> Any:
@@ -163,9 +154,7 @@ def require_pycolmap() -> Any:
     return pycolmap
 
 
-def run_sfm(
-    folder: Path, out: Path, gathered: PreparedImages, way: SfmStrategy, progress: Progress
-) -> SfmRun:
+def run_sfm(folder: Path, out: Path, gathered: PreparedImages, way: SfmStrategy, progress: Progress) -> SfmRun:
     """Find poses, and write the largest model as text to ``out / "sparse" / "0"``.
 
     What an interrupted attempt left in the database is not done again.
@@ -193,10 +182,7 @@ def run_sfm(
             progress(begin + (end - begin) * share, STRATEGY_PREFIXES[way] + what)
 
         _run_interruptibly(pycolmap, partial(step, told))
-    return replace(
-        _summarise_models(work.models, folder / IMAGES_FOLDER, out, gathered, way),
-        joined=work.joined,
-    )
+    return replace(_summarise_models(work.models, folder / IMAGES_FOLDER, out, gathered, way), joined=work.joined)
 
 
 def _run_interruptibly(pycolmap: Any, work: Callable[[Any], None]) -> None:
@@ -235,13 +221,11 @@ def pairs_to_match(gathered: PreparedImages, way: SfmStrategy) -> PicturePairs:
 class _SfmSteps:
     """The steps of one attempt; each takes whom to tell the share that is done, and a token.
 
-    Nobody else opens the database meanwhile: a second library of SQLite in one process breaks the
-    locks of the first (sqlite.org/howtocorrupt.html, 2.2.1).
+    Nobody else opens the database meanwhile: a second library of SQLite in one process breaks the locks of the first
+    (sqlite.org/howtocorrupt.html, 2.2.1).
     """
 
-    def __init__(
-        self, pycolmap: Any, folder: Path, out: Path, gathered: PreparedImages, way: SfmStrategy
-    ) -> None:
+    def __init__(self, pycolmap: Any, folder: Path, out: Path, gathered: PreparedImages, way: SfmStrategy) -> None:
         self.pycolmap, self.images, self.out = pycolmap, folder / IMAGES_FOLDER, out
         self.gathered, self.thorough = gathered, way == "thorough"
         self.way: SfmStrategy = way
@@ -325,9 +309,7 @@ class _SfmSteps:
             options.triangulation.ignore_two_view_tracks = False
         placed = count(1)
         total = len(self.gathered.names)
-        if (
-            self.joined < MIN_REGISTERED_FRACTION * total
-        ):  # whatever is placed, it would not be accepted
+        if self.joined < MIN_REGISTERED_FRACTION * total:  # whatever is placed, it would not be accepted
             return
         shutil.rmtree(self.out / "models", ignore_errors=True)
         (self.out / "models").mkdir()
@@ -379,16 +361,12 @@ def _write_feature_masks(masks: Path, out: Path, gathered: PreparedImages) -> Pa
     return place
 
 
-def _summarise_models(
-    models: Any, images: Path, out: Path, gathered: PreparedImages, way: SfmStrategy
-) -> SfmRun:
+def _summarise_models(models: Any, images: Path, out: Path, gathered: PreparedImages, way: SfmStrategy) -> SfmRun:
     total = len(gathered.names)
     first = best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
     if best is None:
         return SfmRun(way, total, left_out=gathered.names)
-    if (
-        best.num_reg_images() >= MIN_REGISTERED_FRACTION * total
-    ):  # of two pictures nothing can be adjusted
+    if best.num_reg_images() >= MIN_REGISTERED_FRACTION * total:  # of two pictures nothing can be adjusted
         best = refine_model(require_pycolmap(), best, lens_priors(images, gathered), images)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
@@ -419,8 +397,7 @@ def pictures_beside_first(first: Any, other: Any) -> int:
     COLMAP begins anew at pictures that it has placed before: such a group may say the same.
     """
     both = [
-        {i.name: i.cam_from_world().rotation.matrix() for i in m.images.values() if i.has_pose}
-        for m in (first, other)
+        {i.name: i.cam_from_world().rotation.matrix() for i in m.images.values() if i.has_pose} for m in (first, other)
     ]
     common = sorted(both[0].keys() & both[1].keys())
     turns = np.array([both[0][name].T @ both[1][name] for name in common]).reshape(-1, 3, 3)

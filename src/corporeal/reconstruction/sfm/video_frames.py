@@ -1,12 +1,12 @@
 """Selection of sharp, distinct frames of a video.
 
-ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen.
-It turns pictures as the video's own matrix says.
+ffmpeg decodes the video twice: once small and grey, to choose, and once to write what was chosen. It turns pictures as
+the video's own matrix says.
 
 Share of static pixels of a video: a screen's frame, or the surroundings of a turntable.
 
-Where a camera moves about an object, whatever has contrast moves in its pictures. What does not
-would be taken for the world that stands still, and all cameras put at one place.
+Where a camera moves about an object, whatever has contrast moves in its pictures. What does not would be taken for the
+world that stands still, and all cameras put at one place.
 """
 
 import contextlib
@@ -102,9 +102,7 @@ class VideoInfo:
         return min(self.rate, MAX_DECODED_FRAMES / max(self.seconds, 1e-3))
 
 
-def write_video_frames(
-    path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S
-) -> list[str]:
+def write_video_frames(path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S) -> list[str]:
     """Write the chosen frames of a video as PNG; return what is to be said of them.
 
     Args:
@@ -114,8 +112,8 @@ def write_video_frames(
         max_seconds: Longer videos are rejected [s].
 
     Raises:
-        BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it
-            is a recording of a screen.
+        BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it is a recording of a
+            screen.
 
     """
     video = _open_video(path, max_seconds)
@@ -123,9 +121,7 @@ def write_video_frames(
     before, standstill = None, StaticPixels()
     expected = max(video.looked * video.seconds, 1.0)
     for grey in _grey_frames(video):
-        small = np.asarray(
-            Image.fromarray(grey).resize(CHANGE_THUMBNAIL_PX, Image.Resampling.BOX), float
-        )
+        small = np.asarray(Image.fromarray(grey).resize(CHANGE_THUMBNAIL_PX, Image.Resampling.BOX), float)
         standstill.look(grey)
         sharp.append(float(laplace(grey.astype(np.float32)).var()))
         if before is not None:
@@ -133,9 +129,7 @@ def write_video_frames(
         before = small
         progress(min(len(sharp) / expected, 1.0) * 0.7, "looking for sharp frames")
     if len(sharp) < MIN_FRAMES:
-        raise BadFileError(
-            path, f"holds {len(sharp)} frames; at least {MIN_FRAMES} are needed.", VIDEO_HINT
-        )
+        raise BadFileError(path, f"holds {len(sharp)} frames; at least {MIN_FRAMES} are needed.", VIDEO_HINT)
     chosen = choose_frames(np.array(change), np.array(sharp), CHOSEN_FRAMES)
     if len(chosen) < MIN_FRAMES:
         count = f"only {len(chosen)}" if len(chosen) else "none"
@@ -156,9 +150,7 @@ def write_video_frames(
     ]
 
 
-def choose_frames(
-    change: Float[np.ndarray, " F"], sharp: Float[np.ndarray, " F"], count: int
-) -> list[int]:
+def choose_frames(change: Float[np.ndarray, " F"], sharp: Float[np.ndarray, " F"], count: int) -> list[int]:
     """Return the numbers of the sharpest frame of each stretch of equal change, if it is sharp.
 
     Args:
@@ -203,19 +195,8 @@ def _open_video(path: Path, max_seconds: float) -> VideoInfo:
 
 def _grey_frames(video: VideoInfo) -> Iterator[UInt8[np.ndarray, "H W"]]:
     """Yield the frames that are looked at, small and grey."""
-    scale = (
-        f"scale={SHARPNESS_PICTURE_PX}:{SHARPNESS_PICTURE_PX}:force_original_aspect_ratio=decrease"
-    )
-    command = [
-        *_decode_command(video, scale),
-        "-pix_fmt",
-        "gray",
-        "-c:v",
-        "pgm",
-        "-f",
-        "image2pipe",
-        "-",
-    ]
+    scale = f"scale={SHARPNESS_PICTURE_PX}:{SHARPNESS_PICTURE_PX}:force_original_aspect_ratio=decrease"
+    command = [*_decode_command(video, scale), "-pix_fmt", "gray", "-c:v", "pgm", "-f", "image2pipe", "-"]
     with subprocess.Popen(
         command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     ) as program:

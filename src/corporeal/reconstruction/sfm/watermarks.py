@@ -1,9 +1,8 @@
 """Detection of watermarks: dates, names and marks at a fixed place of all pictures.
 
-Its points are the same in every two of them, also in two that show nothing else in common. From
-them all pictures would be of one place, taken from one viewpoint. What a camera that stands shows
-is at the same place, too, but all over the pictures; and where somebody walks around an object, no
-place of the picture holds still from all sides.
+Its points are the same in every two of them, also in two that show nothing else in common. From them all pictures would
+be of one place, taken from one viewpoint. What a camera that stands shows is at the same place, too, but all over the
+pictures; and where somebody walks around an object, no place of the picture holds still from all sides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,8 +18,8 @@ WATERMARKS_FOLDER = "stamps"
 WATERMARK_CELLS = 24
 """Cells along the longer side of pictures."""
 MAX_STILL_SHIFT_FRACTION = 0.003
-"""Shift of a point, in the longer side, up to which it did not move: points of small copies are
-known to a third of that."""
+"""Shift of a point, in the longer side, up to which it did not move: points of small copies are known to a third of
+that."""
 MIN_STILL_PAIRS_FRACTION = 0.5
 """Share of all pairs of pictures in which a cell holds points that did not move: of these, most
 are from different sides."""
@@ -35,18 +34,14 @@ PictureSize = tuple[int, int]
 class WatermarkDetector:
     """Told of all pairs of pictures, one after the other."""
 
-    def __init__(
-        self, sizes: Sequence[PictureSize], points: Sequence[Float[np.ndarray, "K 2"]]
-    ) -> None:
+    def __init__(self, sizes: Sequence[PictureSize], points: Sequence[Float[np.ndarray, "K 2"]]) -> None:
         self.sizes = sizes
         self.held = {size: np.zeros(_cell_grid(size)) for size in set(sizes)}
         self.still = {size: np.zeros(_cell_grid(size)) for size in set(sizes)}
         for size, own in zip(sizes, points, strict=True):
             self.held[size][_point_cells(own, size)] += 1
 
-    def look(
-        self, a: int, b: int, own: Float[np.ndarray, "M 2"], other: Float[np.ndarray, "M 2"]
-    ) -> None:
+    def look(self, a: int, b: int, own: Float[np.ndarray, "M 2"], other: Float[np.ndarray, "M 2"]) -> None:
         """Take in what two pictures may share, whatever their geometry says of it.
 
         Args:
@@ -68,10 +63,7 @@ class WatermarkDetector:
             count = self.sizes.count(size)
             stamped = still > MIN_STILL_PAIRS_FRACTION * count * (count - 1) / 2
             held = np.count_nonzero(self.held[size] > count / 2)
-            if (
-                count >= MIN_PICTURES_OF_SIZE
-                and 0 < np.count_nonzero(stamped) <= MAX_STILL_CELLS_FRACTION * held
-            ):
+            if count >= MIN_PICTURES_OF_SIZE and 0 < np.count_nonzero(stamped) <= MAX_STILL_CELLS_FRACTION * held:
                 found[size] = binary_dilation(stamped, np.ones((3, 3)))
         return found
 
@@ -110,9 +102,7 @@ def _cell_grid(size: PictureSize) -> tuple[int, int]:
     return -(-height * WATERMARK_CELLS // max(size)), -(-width * WATERMARK_CELLS // max(size))
 
 
-def _point_cells(
-    points: Float[np.ndarray, "K 2"], size: PictureSize
-) -> tuple[np.ndarray, np.ndarray]:
+def _point_cells(points: Float[np.ndarray, "K 2"], size: PictureSize) -> tuple[np.ndarray, np.ndarray]:
     """Return rows and columns of the cells that hold points, each once."""
     high, wide = _cell_grid(size)
     row, column = (points[:, ::-1] * WATERMARK_CELLS / max(size)).astype(int).T

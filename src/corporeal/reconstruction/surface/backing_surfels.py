@@ -1,10 +1,9 @@
 """Surfels below a closed surface that back transparent Gaussians.
 
-Gaussians are learned to look right from where photographs were taken. From the side of a video they
-are thin where only those behind them, or those below the floor, which are taken away, made them
-full: a foot is ragged, and an underside that nobody photographed is a hole into a hollow shell. The
-closed surface is whole, with the colours that photographs show. A layer of opaque discs along it,
-below what was learned, leaves full pixels as they are.
+Gaussians are learned to look right from where photographs were taken. From the side of a video they are thin where only
+those behind them, or those below the floor, which are taken away, made them full: a foot is ragged, and an underside
+that nobody photographed is a hole into a hollow shell. The closed surface is whole, with the colours that photographs
+show. A layer of opaque discs along it, below what was learned, leaves full pixels as they are.
 """
 
 from collections.abc import Sequence
@@ -18,10 +17,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
-from corporeal.reconstruction.gaussians.space_carving import (
-    EMPTIER_VIEWS_FRACTION,
-    MAX_TRUSTED_DISTANCE_CELLS,
-)
+from corporeal.reconstruction.gaussians.space_carving import EMPTIER_VIEWS_FRACTION, MAX_TRUSTED_DISTANCE_CELLS
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface
 
 SURFEL_SPACING_CELLS = 1.5
@@ -37,10 +33,7 @@ SURFEL_OPACITY = 0.95
 
 
 def add_backing_surfels(
-    gaussians: Gaussians,
-    owner: Int[np.ndarray, " N"],
-    solids: Sequence[ClosedSurface],
-    rendering: DepthRendering,
+    gaussians: Gaussians, owner: Int[np.ndarray, " N"], solids: Sequence[ClosedSurface], rendering: DepthRendering
 ) -> tuple[Gaussians, Int[np.ndarray, " M"]]:
     """Add discs along closed surfaces, but where photographs look past these.
 
@@ -69,9 +62,9 @@ def places_seen_past(
 ) -> Bool[np.ndarray, " N"]:
     """Return which places photographs see to be empty.
 
-    A view sees a place unless something is farther before it than reach [m], and sees it empty if
-    the first surface is farther behind it than that. Two in five such views tell, as when space is
-    carved; or one in ten, and two at least, which see nothing there at all, as when outlines carve.
+    A view sees a place unless something is farther before it than reach [m], and sees it empty if the first surface is
+    farther behind it than that. Two in five such views tell, as when space is carved; or one in ten, and two at least,
+    which see nothing there at all, as when outlines carve.
     """
     seen, past, beside = (np.zeros(len(places), int) for _ in range(3))
     for depth, row in zip(rendering.depth, rendering.rows, strict=True):
@@ -84,9 +77,7 @@ def places_seen_past(
         seen[here] += behind > -reach
         past[here] += behind > reach
         beside[here] += np.isinf(behind)
-    return (past > EMPTIER_VIEWS_FRACTION * seen) | (
-        beside > np.maximum(EMPTY_VIEWS_FRACTION * seen, 1)
-    )
+    return (past > EMPTIER_VIEWS_FRACTION * seen) | (beside > np.maximum(EMPTY_VIEWS_FRACTION * seen, 1))
 
 
 def _surfels(solid: ClosedSurface, rendering: DepthRendering, like: Gaussians) -> Gaussians:
@@ -96,11 +87,7 @@ def _surfels(solid: ClosedSurface, rendering: DepthRendering, like: Gaussians) -
     some = np.unique(cubes, axis=0, return_index=True)[1]
     place, normal = solid.vertices[some], mesh.vertex_normals[some]
     # Below the surface, and at most half-way to the other side.
-    shape, deep, inside = (
-        QueryMesh(mesh),
-        np.full(len(some), SURFEL_DEPTH_RATIOS[0]),
-        np.ones(len(some), bool),
-    )
+    shape, deep, inside = (QueryMesh(mesh), np.full(len(some), SURFEL_DEPTH_RATIOS[0]), np.ones(len(some), bool))
     for depth in SURFEL_DEPTH_RATIOS[1:]:
         inside &= shape.winding(place - 2 * depth * apart * normal) > 0.5
         deep[inside] = depth
@@ -114,8 +101,7 @@ def _surfels(solid: ClosedSurface, rendering: DepthRendering, like: Gaussians) -
         mean=place.astype(kind),
         rotation=_quaternions_from_z(normal).astype(like.rotation.dtype),
         scale=np.tile(
-            apart * np.array([SURFEL_WIDTH_RATIO, SURFEL_WIDTH_RATIO, SURFEL_THICKNESS_RATIO]),
-            (len(some), 1),
+            apart * np.array([SURFEL_WIDTH_RATIO, SURFEL_WIDTH_RATIO, SURFEL_THICKNESS_RATIO]), (len(some), 1)
         ).astype(like.scale.dtype),
         opacity=np.full(len(some), SURFEL_OPACITY, like.opacity.dtype),
         sh=sh.astype(like.sh.dtype),

@@ -1,9 +1,9 @@
 """Morphological opening of carved cavities by a ball.
 
-Where a face shines, stereo finds highlights behind it, here and there. Carved as deep, a wet object
-is full of caverns with mouths of some pixels. What a camera truly looks into has a mouth as wide as
-what is seen in it: of what depths of photographs add to the carving, only that is accepted which a
-ball can enter from outside, and what is left of it in corners.
+Where a face shines, stereo finds highlights behind it, here and there. Carved as deep, a wet object is full of caverns
+with mouths of some pixels. What a camera truly looks into has a mouth as wide as what is seen in it: of what depths of
+photographs add to the carving, only that is accepted which a ball can enter from outside, and what is left of it in
+corners.
 """
 
 import numpy as np
@@ -33,9 +33,7 @@ def open_by_ball(
     away = _distance_to_swept(before >= 0, after >= 0, radius)
     piece = np.asarray(measure.label(taken & (away > 0), connectivity=1))
     number = np.arange(piece.max() + 1)
-    cavern = (np.asarray(ndimage.maximum(away, piece, number)) > CORNER_GAP_RADII * radius) & (
-        number > 0
-    )
+    cavern = (np.asarray(ndimage.maximum(away, piece, number)) > CORNER_GAP_RADII * radius) & (number > 0)
     return np.where(cavern[piece], before, after)
 
 

@@ -1,9 +1,8 @@
 """Closed surfaces of objects from Gaussians.
 
-Cameras look at the Gaussians, space is carved by what they see, the floor closes what stands on it,
-and where objects touch every place inside belongs to the nearer one's Gaussians. Marching cubes
-(Lewiner et al. 2003) make a surface of what is left. Where surfaces of two objects still overlap,
-both are drawn back to a common face.
+Cameras look at the Gaussians, space is carved by what they see, the floor closes what stands on it, and where objects
+touch every place inside belongs to the nearer one's Gaussians. Marching cubes (Lewiner et al. 2003) make a surface of
+what is left. Where surfaces of two objects still overlap, both are drawn back to a common face.
 """
 
 from dataclasses import dataclass, replace
@@ -21,17 +20,9 @@ from corporeal.discretization.mesh_kind import connected_pieces
 from corporeal.geometry.mesh import Mesh, signed_triangle_volumes, signed_volume
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
-from corporeal.reconstruction.gaussians.depth_rendering import (
-    DepthRendering,
-    render_depth,
-    restrict_depth_to_objects,
-)
+from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering, render_depth, restrict_depth_to_objects
 from corporeal.reconstruction.gaussians.kernels_space_carving import paint_points
-from corporeal.reconstruction.gaussians.space_carving import (
-    VoxelGrid,
-    carve_signed_distance,
-    grid_over_box,
-)
+from corporeal.reconstruction.gaussians.space_carving import VoxelGrid, carve_signed_distance, grid_over_box
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.surface.ball_opening import open_by_ball
 from corporeal.reconstruction.surface.fairing import (
@@ -43,19 +34,12 @@ from corporeal.reconstruction.surface.fairing import (
 from corporeal.reconstruction.surface.flatten_bumps import flatten_bumps
 from corporeal.reconstruction.surface.hull_top import HullTop, lower_hull_top
 from corporeal.reconstruction.surface.outline_fitting import find_object_outlines, fit_to_outlines
-from corporeal.reconstruction.surface.photo_consistency import (
-    AgreedSurface,
-    move_to_agreement,
-    object_photographs,
-)
+from corporeal.reconstruction.surface.photo_consistency import AgreedSurface, move_to_agreement, object_photographs
 from corporeal.reconstruction.surface.refine_depth import refine_depth
 from corporeal.reconstruction.surface.remove_flakes import remove_flakes
 from corporeal.reconstruction.surface.separate_overlaps import separate_overlaps
 from corporeal.reconstruction.surface.silhouette_guard import restore_silhouettes
-from corporeal.reconstruction.surface.surface_config import (
-    DEFAULT_CLOSED_SURFACE,
-    ClosedSurfaceConfig,
-)
+from corporeal.reconstruction.surface.surface_config import DEFAULT_CLOSED_SURFACE, ClosedSurfaceConfig
 
 FLOOR_HEIGHT_M = 0.0
 """Height that nothing is below [m]."""
@@ -139,12 +123,11 @@ def build_closed_surfaces(
     Args:
         gaussians: Of objects and, where there is one, of floor and background.
         object_of_gaussian: -1: floor or background, which hides objects but is none.
-        cameras: From where the Gaussians were learned, or are looked at: only what these see is
-            known.
+        cameras: From where the Gaussians were learned, or are looked at: only what these see is known.
         masks: Pixels of the cameras' pictures that show objects, where given: outlines
             are made to fit them. What Gaussians cover is too coarse for that.
-        views: Photographs by these cameras, in any frame of the same unit, where there are some and
-            masks: they may see deeper than Gaussians do.
+        views: Photographs by these cameras, in any frame of the same unit, where there are some and masks: they may see
+            deeper than Gaussians do.
         config: How finely.
 
     Raises:
@@ -164,9 +147,7 @@ def build_closed_surfaces(
         shallow, rgb = None, None if views is None else views.rgb
         if views is not None and masks is not None:
             shallow, rendering = rendering, refine_depth(rendering, views, masks, pool, config.hull)
-        scene = _SurfaceInput(
-            gaussians, object_of_gaussian, rendering, shallow, shown, rgb, FLOOR_HEIGHT_M
-        )
+        scene = _SurfaceInput(gaussians, object_of_gaussian, rendering, shallow, shown, rgb, FLOOR_HEIGHT_M)
         survey, made = _survey_objects(scene, count, pool, config), []
         for k in range(count):
             made.append(_build_closed_surface(scene, k, survey, pool))
@@ -195,9 +176,7 @@ class _SurfaceInput:
 
 
 def _owner_of_pixels(
-    rendering: DepthRendering,
-    object_of_gaussian: np.ndarray,
-    masks: Bool[np.ndarray, "V H W"],
+    rendering: DepthRendering, object_of_gaussian: np.ndarray, masks: Bool[np.ndarray, "V H W"]
 ) -> Int[np.ndarray, "V H W"]:
     """Return whose each pixel is: what only masks give to objects goes with what is next to it."""
     shown = np.where(rendering.met >= 0, object_of_gaussian[rendering.met], -1)
@@ -221,9 +200,7 @@ class _CoarseSurvey:
     """Of its triangles."""
 
 
-def _survey_objects(
-    scene: _SurfaceInput, count: int, pool: ThreadPool, config: ClosedSurfaceConfig
-) -> _CoarseSurvey:
+def _survey_objects(scene: _SurfaceInput, count: int, pool: ThreadPool, config: ClosedSurfaceConfig) -> _CoarseSurvey:
     """Find where each object is on a rough grid, and lay a fine one about it."""
     foreground = scene.gaussians.mean[scene.object_of_gaussian >= 0]
     low, high = np.percentile(foreground, (0.1, 99.9), axis=0)
@@ -252,9 +229,7 @@ def _missing_object_error(k: int) -> UserError:
     )
 
 
-def _build_closed_surface(
-    scene: _SurfaceInput, k: int, survey: _CoarseSurvey, pool: ThreadPool
-) -> ClosedSurface:
+def _build_closed_surface(scene: _SurfaceInput, k: int, survey: _CoarseSurvey, pool: ThreadPool) -> ClosedSurface:
     grid = survey.grids[k]
     distance, cut, count = _carve_object(grid, scene, k, survey, pool)
     mesh = _extract_surface(distance, grid)
@@ -276,9 +251,7 @@ def _build_closed_surface(
     return ClosedSurface(
         vertices=mesh.vertices,
         triangles=mesh.triangles,
-        colours=_vertex_colours(
-            mesh, scene, gaussian, _painted_vertices(mesh, scene.rendering, grid.cell, pool)
-        ),
+        colours=_vertex_colours(mesh, scene, gaussian, _painted_vertices(mesh, scene.rendering, grid.cell, pool)),
         gaussian_of_vertex=gaussian,
         cell=grid.cell,
         pieces=count,
@@ -311,8 +284,8 @@ def _carve_object(
 def _finer_grid(mesh: Mesh, grid: VoxelGrid, scene: _SurfaceInput, k: int) -> VoxelGrid | None:
     """Lay a finer grid close about an object with walls or legs of few cells; None: it has none.
 
-    2 V / A is a plate's thickness, half that of a rod and a third of a ball's diameter. Of what is
-    finer than a pixel pictures say nothing: there the surface would only be rough.
+    2 V / A is a plate's thickness, half that of a rod and a third of a ball's diameter. Of what is finer than a pixel
+    pictures say nothing: there the surface would only be rough.
     """
     thick = 2 * signed_volume(mesh) / float(mesh.areas.sum())
     finest = max(thick / WALL_THICKNESS_CELLS, _object_pixel_width(scene, k))
@@ -320,9 +293,7 @@ def _finer_grid(mesh: Mesh, grid: VoxelGrid, scene: _SurfaceInput, k: int) -> Vo
         return None
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     margin = MAX_SURFACE_MOVE_CELLS * grid.cell
-    return grid_over_box(
-        low - margin, high + margin, MAX_OBJECT_GRID_CELLS, scene.floor, finest=finest
-    )
+    return grid_over_box(low - margin, high + margin, MAX_OBJECT_GRID_CELLS, scene.floor, finest=finest)
 
 
 def _object_pixel_width(scene: _SurfaceInput, k: int) -> float:
@@ -355,17 +326,13 @@ def _remove_specks(mesh: Mesh) -> Mesh:
 
 
 def _yield_to_neighbours(
-    distance: Float[np.ndarray, "X Y Z"],
-    grid: VoxelGrid,
-    scene: _SurfaceInput,
-    k: int,
-    survey: _CoarseSurvey,
+    distance: Float[np.ndarray, "X Y Z"], grid: VoxelGrid, scene: _SurfaceInput, k: int, survey: _CoarseSurvey
 ) -> Bool[np.ndarray, "X Y Z"]:
     """Leave to others what is theirs, and return where that is.
 
-    Near Gaussians a place belongs to the nearer ones. Deep inside, below the rim of a contact, all
-    are as near; there it belongs to whose share of the common surface encloses it more (generalised
-    winding number, Jacobson et al. 2013), which spans the rim of the contact by a flat face.
+    Near Gaussians a place belongs to the nearer ones. Deep inside, below the rim of a contact, all are as near; there
+    it belongs to whose share of the common surface encloses it more (generalised winding number, Jacobson et al. 2013),
+    which spans the rim of the contact by a flat face.
     """
     mean, others = scene.gaussians.mean, scene.object_of_gaussian != k
     low, high = np.array(grid.low), np.array(grid.low) + grid.cell * np.array(grid.shape)
@@ -385,9 +352,7 @@ def _yield_to_neighbours(
     return cut
 
 
-def _mean_neighbour_distance(
-    mean: Float[np.ndarray, "N 3"], places: Float[np.ndarray, "M 3"]
-) -> np.ndarray:
+def _mean_neighbour_distance(mean: Float[np.ndarray, "N 3"], places: Float[np.ndarray, "M 3"]) -> np.ndarray:
     """Mean distance of places to the nearest few [m]."""
     found, _ = KDTree(mean).query(places, k=min(OWNER_NEIGHBOURS, len(mean)))
     return np.asarray(found).reshape(len(places), -1).mean(axis=1)
@@ -405,12 +370,7 @@ def _remove_crumbs(distance: Float[np.ndarray, "X Y Z"]) -> int:
 
 
 def _fit_surface(
-    mesh: Mesh,
-    scene: _SurfaceInput,
-    k: int,
-    contact: Bool[np.ndarray, " V"],
-    cell: float,
-    pool: ThreadPool,
+    mesh: Mesh, scene: _SurfaceInput, k: int, contact: Bool[np.ndarray, " V"], cell: float, pool: ThreadPool
 ) -> tuple[Mesh, Float[np.ndarray, " V"] | None]:
     """Take noise off a surface, give it the outlines that masks show, and close it where unseen.
 
@@ -439,12 +399,7 @@ def _fit_surface(
 
 
 def _fit_to_photographs(
-    mesh: Mesh,
-    scene: _SurfaceInput,
-    k: int,
-    movable: Bool[np.ndarray, " V"],
-    cell: float,
-    pool: ThreadPool,
+    mesh: Mesh, scene: _SurfaceInput, k: int, movable: Bool[np.ndarray, " V"], cell: float, pool: ThreadPool
 ) -> AgreedSurface:
     """Move a surface to where photographs agree, and what stands before that back."""
     assert scene.shown is not None and scene.rgb is not None
@@ -455,20 +410,10 @@ def _fit_to_photographs(
     return flatten_bumps(close, movable, pictures.pixel, cell, scene.floor)
 
 
-def _painted_vertices(
-    mesh: Mesh, rendering: DepthRendering, cell: float, pool: ThreadPool
-) -> Float[np.ndarray, "V 4"]:
+def _painted_vertices(mesh: Mesh, rendering: DepthRendering, cell: float, pool: ThreadPool) -> Float[np.ndarray, "V 4"]:
     """Return the sum of what cameras see of each vertex: red, green, blue, and its weight."""
     out = np.empty((len(mesh.vertices), 4))
-    rest = (
-        mesh.vertices,
-        mesh.vertex_normals,
-        rendering.rows,
-        rendering.depth,
-        rendering.rgb,
-        2 * cell,
-        out,
-    )
+    rest = (mesh.vertices, mesh.vertex_normals, rendering.rows, rendering.depth, rendering.rgb, 2 * cell, out)
     pool.each(paint_points, [(*span, *rest) for span in pool.spans(len(out))])
     return out
 
@@ -478,42 +423,27 @@ def _vertex_colours(
 ) -> Float[np.ndarray, "V 3"]:
     """Return what the cameras see of each vertex; where none does, the mean of seen ones about.
 
-    They count by a power of their distance (Shepard 1968): of the nearest alone an underside would
-    be patches.
+    They count by a power of their distance (Shepard 1968): of the nearest alone an underside would be patches.
     """
     seen = painted[:, 3] > MIN_SEEN_WEIGHT
-    colour = np.clip(
-        0.5 + SH_DC_COEFFICIENT * scene.gaussians.sh[gaussian, 0].astype(np.float64), 0, 1
-    )
+    colour = np.clip(0.5 + SH_DC_COEFFICIENT * scene.gaussians.sh[gaussian, 0].astype(np.float64), 0, 1)
     colour[seen] = painted[seen, :3] / painted[seen, 3:]
     some = np.flatnonzero(seen)[:: max(1, np.count_nonzero(seen) // COLOUR_NEIGHBOURS)]
     if len(some) and not seen.all():
         away = cdist(mesh.vertices[~seen], mesh.vertices[some])
-        share = (
-            1
-            / np.maximum(away, TINY_EXTENT_FRACTION * np.ptp(mesh.vertices)) ** COLOUR_FALLOFF_POWER
-        )
+        share = 1 / np.maximum(away, TINY_EXTENT_FRACTION * np.ptp(mesh.vertices)) ** COLOUR_FALLOFF_POWER
         colour[~seen] = share @ colour[some] / share.sum(axis=1, keepdims=True)
     return colour
 
 
-def _check_winding(
-    mesh: Mesh, distance: Float[np.ndarray, "X Y Z"], grid: VoxelGrid
-) -> tuple[str, ...]:
+def _check_winding(mesh: Mesh, distance: Float[np.ndarray, "X Y Z"], grid: VoxelGrid) -> tuple[str, ...]:
     """Compare the surface with the cells it was made from, by generalised winding numbers."""
     step = max(1, round(np.cbrt(distance.size / WINDING_CHECK_PLACES)))
     some = np.zeros(distance.shape, bool)
     some[::step, ::step, ::step] = True
-    some &= (
-        np.abs(distance) > MAX_SURFACE_MOVE_CELLS * grid.cell
-    )  # nearer, the surface was smoothed and fitted
+    some &= np.abs(distance) > MAX_SURFACE_MOVE_CELLS * grid.cell  # nearer, the surface was smoothed and fitted
     inside = QueryMesh(mesh).winding(grid.points(some)) > 0.5
     astray = np.mean(inside != (distance[some] < 0))
     if astray <= MAX_WINDING_ERROR_FRACTION:
         return ()
-    return (
-        Note(
-            f"Its surface is not sound: {astray:.1%} of space is on the wrong side of it.",
-            NoteKind.GRAVE,
-        ),
-    )
+    return (Note(f"Its surface is not sound: {astray:.1%} of space is on the wrong side of it.", NoteKind.GRAVE),)

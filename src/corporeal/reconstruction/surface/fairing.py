@@ -63,10 +63,9 @@ def fair_unobserved_patches(
 ) -> Mesh:
     """Round off the patches of a surface that no view observes, where that is likely.
 
-    Where the surface about a patch nearly faces as the patch does, as about the underside of a
-    ball, it goes on with the least bending. What is about it is known but for noise, which would
-    tilt the patch: within a band of ten times that the noise goes. Elsewhere, as below a table, all
-    stays.
+    Where the surface about a patch nearly faces as the patch does, as about the underside of a ball, it goes on with
+    the least bending. What is about it is known but for noise, which would tilt the patch: within a band of ten times
+    that the noise goes. Elsewhere, as below a table, all stays.
 
     Args:
         mesh: Closed.
@@ -101,9 +100,7 @@ def fair_unobserved_patches(
     return Mesh(v, mesh.triangles)
 
 
-def _vertices_within_rings(
-    own: Int[np.ndarray, " n"], rings: int, mean: csr_array
-) -> Int[np.ndarray, " m"]:
+def _vertices_within_rings(own: Int[np.ndarray, " n"], rings: int, mean: csr_array) -> Int[np.ndarray, " m"]:
     """Return the vertices that are so many edges from some, or fewer."""
     found = own
     for _ in range(rings):
@@ -116,9 +113,9 @@ def _bend_least(
 ) -> Float[np.ndarray, "N 3"]:
     """Return a mesh's vertices after some were moved so that it bends least.
 
-    That is where ∫ |Δx|² + |x - x₀|² / fine⁴ is least, the second over the band only (Botsch and
-    Kobbelt 2004; the Laplacian of Bobenko and Springborn 2007, which slivers do not spoil). The
-    patch's own shape is what areas and angles are measured on, so it is done again on the result.
+    That is where ∫ |Δx|² + |x - x₀|² / fine⁴ is least, the second over the band only (Botsch and Kobbelt 2004; the
+    Laplacian of Bobenko and Springborn 2007, which slivers do not spoil). The patch's own shape is what areas and
+    angles are measured on, so it is done again on the result.
     """
     free = np.concatenate([own, band])
     bent = _with_neighbours(mesh, free)  # their Laplacian changes
@@ -149,8 +146,8 @@ def _cotangent_laplacian(
 ) -> tuple[csc_array, Float[np.ndarray, " N"]]:
     """Return the integrated Laplacian by cotangents, and the area about each vertex [m²].
 
-    All edges are made longer by as little as it takes for no triangle to be degenerate (Sharp and
-    Crane 2020), and flipped until no angle's cotangent spoils the sum.
+    All edges are made longer by as little as it takes for no triangle to be degenerate (Sharp and Crane 2020), and
+    flipped until no angle's cotangent spoils the sum.
     """
     a, b, c = np.swapaxes(x[triangles], 0, 1)
     sides = np.stack([np.linalg.norm(p - q, axis=1) for p, q in ((b, c), (c, a), (a, b))], axis=1)

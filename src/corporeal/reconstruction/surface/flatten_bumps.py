@@ -1,10 +1,9 @@
 """Flattening of bumps at the rim of observed faces.
 
-A patch that is partly beside the object tells nothing, so that photographs know a face (see
-``photometric.py``) only from some pixels on from its edges and from the floor. In that strip it is
-as carving left it, with bumps of a pixel, and no outline sees these. What is known to be flat for
-some pixels goes on as a plane that far: what stands a little before that plane, and faces as it
-does, is laid on it. What lies behind it stays, since edges are round.
+A patch that is partly beside the object tells nothing, so that photographs know a face (see ``photometric.py``) only
+from some pixels on from its edges and from the floor. In that strip it is as carving left it, with bumps of a pixel,
+and no outline sees these. What is known to be flat for some pixels goes on as a plane that far: what stands a little
+before that plane, and faces as it does, is laid on it. What lies behind it stays, since edges are round.
 """
 
 import numpy as np
@@ -13,11 +12,7 @@ from scipy.spatial import KDTree
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.reconstruction.surface.fairing import neighbour_mean_matrix, smooth_taubin
-from corporeal.reconstruction.surface.photo_consistency import (
-    MIN_FILL_BELIEF,
-    AgreedSurface,
-    smoothed_normals,
-)
+from corporeal.reconstruction.surface.photo_consistency import MIN_FILL_BELIEF, AgreedSurface, smoothed_normals
 
 MAX_BUMP_DISTANCE_PX = 4.0
 """Bumps are no farther from what is known [px]: half a patch, and as much again for its confidence."""
@@ -54,18 +49,12 @@ def flatten_bumps(
     if len(some) < PLANE_FIT_NEIGHBOURS or not len(loose):
         return agreed
     tree = KDTree(mesh.vertices[known])
-    near, which = tree.query(
-        mesh.vertices[loose], distance_upper_bound=MAX_BUMP_DISTANCE_PX * pixel
-    )
+    near, which = tree.query(mesh.vertices[loose], distance_upper_bound=MAX_BUMP_DISTANCE_PX * pixel)
     found = np.isfinite(near)
     loose, beside = loose[found], known[np.asarray(which)[found]]
     places, mean = mesh.vertices[loose], neighbour_mean_matrix(mesh)
     normals = smoothed_normals(mesh, mean, (pixel / cell) ** 2)
-    about = some[
-        np.asarray(
-            KDTree(mesh.vertices[some]).query(mesh.vertices[beside], PLANE_FIT_NEIGHBOURS)[1]
-        )
-    ]
+    about = some[np.asarray(KDTree(mesh.vertices[some]).query(mesh.vertices[beside], PLANE_FIT_NEIGHBOURS)[1])]
     middle, across, flat = _fit_planes(mesh.vertices[about], normals[about].mean(axis=1), pixel)
     high = ((places - middle) * across).sum(axis=1)
     bump = flat & (high > 0) & (high < MAX_BUMP_HEIGHT_PX * pixel)
@@ -73,9 +62,7 @@ def flatten_bumps(
     vertices = mesh.vertices.copy()
     vertices[loose[bump]] -= high[bump, None] * across[bump]
     vertices[:, 2] = np.maximum(vertices[:, 2], floor)
-    return AgreedSurface(
-        smooth_taubin(Mesh(vertices, mesh.triangles), floor, 2, mean), agreed.belief
-    )
+    return AgreedSurface(smooth_taubin(Mesh(vertices, mesh.triangles), floor, 2, mean), agreed.belief)
 
 
 def _fit_planes(
@@ -98,9 +85,7 @@ def _fit_planes(
     across = axes[:, :, 0]
     towards = (across * ways).sum(axis=1)
     across *= np.sign(towards)[:, None]
-    flat = (spread[:, 0] < (MAX_PLANE_DEVIATION_PX * pixel) ** 2) & (
-        spread[:, 1] > (MIN_PLANE_EXTENT_PX * pixel) ** 2
-    )
+    flat = (spread[:, 0] < (MAX_PLANE_DEVIATION_PX * pixel) ** 2) & (spread[:, 1] > (MIN_PLANE_EXTENT_PX * pixel) ** 2)
     # Of what is round, the middle lies below the face.
     top = np.einsum("nki,ni->nk", off, across).max(axis=1)
     return middle + top[:, None] * across, across, flat & (np.abs(towards) > MIN_MEAN_NORMAL_LENGTH)

@@ -1,11 +1,11 @@
 """Separation of pieces by observed free space.
 
-Means of Gaussians are poor witnesses of gaps: a plain face or neck has few, far apart. Cameras see
-that it is there, and see through between objects that are apart. So space is carved by what they
-see, as for closed surfaces, and what lies about the same connected piece of the rest goes together.
+Means of Gaussians are poor witnesses of gaps: a plain face or neck has few, far apart. Cameras see that it is there,
+and see through between objects that are apart. So space is carved by what they see, as for closed surfaces, and what
+lies about the same connected piece of the rest goes together.
 
-A piece is taken as wide as the grid can lose a line, so that thin legs and necks, of which carving
-leaves crumbs, break nothing; gaps that are narrower than that are none.
+A piece is taken as wide as the grid can lose a line, so that thin legs and necks, of which carving leaves crumbs, break
+nothing; gaps that are narrower than that are none.
 """
 
 import numpy as np
@@ -15,16 +15,8 @@ from scipy.spatial import KDTree
 from skimage import measure
 
 from corporeal.core.types import Camera, Gaussians
-from corporeal.reconstruction.gaussians.depth_rendering import (
-    DepthRendering,
-    render_depth,
-    restrict_depth_to_objects,
-)
-from corporeal.reconstruction.gaussians.space_carving import (
-    VoxelGrid,
-    carve_signed_distance,
-    grid_over_box,
-)
+from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering, render_depth, restrict_depth_to_objects
+from corporeal.reconstruction.gaussians.space_carving import VoxelGrid, carve_signed_distance, grid_over_box
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.surface.surface_config import DEFAULT_FREE_SPACE, FreeSpaceConfig
 
@@ -33,8 +25,7 @@ GRID_PADDING_FRACTION = 0.1
 STRAY_POINTS_PERCENT = 0.1
 """Percentage of the points, at either end of each axis, that the grid need not hold."""
 HALF_DIAGONAL_CELLS = np.sqrt(3) / 2
-"""Half of a cell's diagonal [cells]: a line is nowhere farther from the middle of a cell that it
-passes through."""
+"""Half of a cell's diagonal [cells]: a line is nowhere farther from the middle of a cell that it passes through."""
 HALF_GAP_PX = 0.5
 """Half as wide a gap lets a ray pass between the pixels of what is on its sides [px]."""
 MIN_PIECE_FRACTION = 0.01
@@ -69,9 +60,7 @@ def pieces_by_free_space(
         rendering = render_depth(gaussians, cameras, pool)
         rendering = restrict_depth_to_objects(rendering, of_object, masks)
         distance = carve_signed_distance(grid, rendering, FLOOR_HEIGHT_M, pool)
-    held = distance < max(
-        HALF_DIAGONAL_CELLS * grid.cell, HALF_GAP_PX * _mean_pixel_width(rendering)
-    )
+    held = distance < max(HALF_DIAGONAL_CELLS * grid.cell, HALF_GAP_PX * _mean_pixel_width(rendering))
     held[:, :, grid.axes[2] < FLOOR_HEIGHT_M] = False
     if not of_object.all():  # the floor would join all that stands on it
         nearest = KDTree(gaussians.mean).query(grid.points(held))[1]

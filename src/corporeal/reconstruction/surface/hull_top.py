@@ -1,13 +1,12 @@
 """Lowering of the visual hull's roof over unobserved tops.
 
-Cameras that look down at an angle bound what is plain from above by nothing but the rays that graze
-it: the visual hull is a roof over it (Laurentini 1994). The object touches each of these rays
-somewhere between its eaves and its ridge (Franco, Lapierre and Boyer 2006), and outlines do not say
-where. How much that is comes from cutting the surface off, level, until its outlines lack more than
-a pixel in some views: a roof is cut down to its eaves, a flat face at once lacks its far edge. All
-heights between are as good, so that the top goes to the middle, and what is between goes along.
-Nothing is in doubt where photographs agree on where the top is (``photometric.py``), below what
-they know of it, or where it lies lower than outlines allow: something else held it there.
+Cameras that look down at an angle bound what is plain from above by nothing but the rays that graze it: the visual hull
+is a roof over it (Laurentini 1994). The object touches each of these rays somewhere between its eaves and its ridge
+(Franco, Lapierre and Boyer 2006), and outlines do not say where. How much that is comes from cutting the surface off,
+level, until its outlines lack more than a pixel in some views: a roof is cut down to its eaves, a flat face at once
+lacks its far edge. All heights between are as good, so that the top goes to the middle, and what is between goes along.
+Nothing is in doubt where photographs agree on where the top is (``photometric.py``), below what they know of it, or
+where it lies lower than outlines allow: something else held it there.
 """
 
 from dataclasses import dataclass
@@ -82,12 +81,7 @@ def lower_hull_top(
     area = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3, 3), len(z))
     over = z > eaves
     known = belief[over] @ area[over] > MIN_KNOWN_BELIEF * area[over].sum()
-    if (
-        not over.any()
-        or known
-        or still[over].any()
-        or not _is_bounded_by_outlines(mesh, own, cameras, pixel)
-    ):
+    if not over.any() or known or still[over].any() or not _is_bounded_by_outlines(mesh, own, cameras, pixel):
         return mesh, HullTop(0.0, lowest)
     eaves = max(eaves, _known_height(z, area * (belief > MIN_KNOWN_BELIEF), wide**2))
     vertices = mesh.vertices.copy()
@@ -96,9 +90,7 @@ def lower_hull_top(
     return Mesh(vertices, mesh.triangles), HullTop(float((top - eaves) / (top - low)), lowest)
 
 
-def _known_height(
-    z: Float[np.ndarray, " N"], known: Float[np.ndarray, " N"], pixel: float
-) -> float:
+def _known_height(z: Float[np.ndarray, " N"], known: Float[np.ndarray, " N"], pixel: float) -> float:
     """Return the height above which photographs know a pixel of surface [m²]; -inf: nowhere."""
     falling = np.argsort(-z)
     enough = np.flatnonzero(np.cumsum(known[falling]) >= pixel)
@@ -106,10 +98,7 @@ def _known_height(
 
 
 def _unmissed_height_fraction(
-    mesh: Mesh,
-    own: Bool[np.ndarray, "V H W"],
-    cameras: Float[np.ndarray, "V 18"],
-    pool: ThreadPool,
+    mesh: Mesh, own: Bool[np.ndarray, "V H W"], cameras: Float[np.ndarray, "V 18"], pool: ThreadPool
 ) -> float:
     """Return the share of a surface's height above which outlines lack a pixel at most."""
     z, looks, lost, most = mesh.vertices[:, 2], own.any(axis=(1, 2)), 0.0, 1.0
@@ -118,19 +107,14 @@ def _unmissed_height_fraction(
         vertices = mesh.vertices.copy()
         vertices[:, 2] = np.minimum(z, z.max() - share * np.ptp(z))
         cut = _silhouettes(Mesh(vertices, mesh.triangles), cameras, own.shape[1:], pool)
-        lacks = (own & ~np.asarray(binary_dilation(cut, PIXEL_NEIGHBOURHOOD), bool)).any(
-            axis=(1, 2)
-        )
+        lacks = (own & ~np.asarray(binary_dilation(cut, PIXEL_NEIGHBOURHOOD), bool)).any(axis=(1, 2))
         much = _is_no_accident(int(lacks.sum()), int(looks.sum()))
         lost, most = (lost, share) if much else (share, most)
     return lost
 
 
 def _is_bounded_by_outlines(
-    mesh: Mesh,
-    own: Bool[np.ndarray, "V H W"],
-    cameras: Float[np.ndarray, "V 18"],
-    pixel: float,
+    mesh: Mesh, own: Bool[np.ndarray, "V H W"], cameras: Float[np.ndarray, "V 18"], pixel: float
 ) -> bool:
     """Return whether the top of a surface would leave its outlines if it were higher by a pixel."""
     top = mesh.vertices[mesh.vertices[:, 2].argmax()] + (0, 0, pixel)

@@ -96,9 +96,8 @@ def _nearest_other_pixel(inside, y, x, reach):
 def outline_distance(first, last, inside, depths, margin, reach, out):
     """Fill out (V, H, W) with the distance to an object's outline [px], negative inside.
 
-    inside (V, H, W): pixels on the object; depths (V, H, W): of what is seen [m]. nan farther than
-    reach [px], and where what is outside is not farther away by margin [m]: there something hides
-    the object, or touches it.
+    inside (V, H, W): pixels on the object; depths (V, H, W): of what is seen [m]. nan farther than reach [px], and
+    where what is outside is not farther away by margin [m]: there something hides the object, or touches it.
     """
     _, height, width = inside.shape
     for v in range(first, last):
@@ -172,10 +171,9 @@ def _project(vertices, c, seen):
 def outline_error(first, last, vertices, triangles, normals, cameras, outlines, rule, out):
     """Fill out (V, N) with how far a surface's outline is inside the pictures' [m] at vertices.
 
-    Negative: outside; nan: the vertex is not on the outline. outlines: as ``outline_distance``
-        fills them;
-    rule: greatest cosine between normal and view on an outline, reach [px], and how near to its
-    outline what is on it lies [px].
+    Negative: outside; nan: the vertex is not on the outline. outlines: as ``outline_distance`` fills them;
+    rule: greatest cosine between normal and view on an outline, reach [px], and how near to its outline what is on it
+    lies [px].
     """
     _, height, width = outlines.shape
     count, steep, reach, edge = len(vertices), rule[0], int(rule[1]), rule[2]

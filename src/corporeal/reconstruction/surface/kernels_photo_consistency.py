@@ -4,11 +4,7 @@ import numba
 import numpy as np
 
 from corporeal.reconstruction.gaussians.kernels_harmonics import JIT_OPTIONS
-from corporeal.reconstruction.gaussians.kernels_project import (
-    from_camera,
-    project_to_pixel,
-    sample_colour,
-)
+from corporeal.reconstruction.gaussians.kernels_project import from_camera, project_to_pixel, sample_colour
 
 f4 = np.float32
 PATCH_RADIUS_PX = 2
@@ -129,23 +125,17 @@ def _centre_patch(patch):
 
 
 @numba.njit(**JIT_OPTIONS)
-def photo_consistency_curves(
-    first, last, places, normals, cameras, depths, inside, pictures, offsets, rule, curves
-):
+def photo_consistency_curves(first, last, places, normals, cameras, depths, inside, pictures, offsets, rule, curves):
     """Fill curves (N, K), places first to last, with how well views agree that a surface is there.
 
-    That is the mean correlation of all pairs of views of a square patch across the normal, moved
-    along it by each of the offsets (K,) [px]; a view weighs by the cosine at which it looks.
-    Colours may differ between views by a factor and a shift per channel. UNKNOWN: too few views.
-    depths (V, H, W): of the surface as it is, which says who sees what; inside (V, H, W): pixels
-    whose patch is wholly on the object; rule: least cosine, how far before a place something may be
-    [px], and least deviation of a patch [0–1].
+    That is the mean correlation of all pairs of views of a square patch across the normal, moved along it by each of
+    the offsets (K,) [px]; a view weighs by the cosine at which it looks. Colours may differ between views by a factor
+    and a shift per channel. UNKNOWN: too few views. depths (V, H, W): of the surface as it is, which says who sees
+    what; inside (V, H, W): pixels whose patch is wholly on the object; rule: least cosine, how far before a place
+    something may be [px], and least deviation of a patch [0–1].
     """
     view, cosine = np.empty(len(cameras), np.int64), np.empty(len(cameras))
-    patch, total = (
-        np.empty((PATCH_SAMPLES, 3), np.float32),
-        np.empty((PATCH_SAMPLES, 3), np.float32),
-    )
+    patch, total = (np.empty((PATCH_SAMPLES, 3), np.float32), np.empty((PATCH_SAMPLES, 3), np.float32))
     across, along = np.empty(3), np.empty(3)
     plain = f4(rule[2] * rule[2] * 3 * PATCH_SAMPLES)
     for n in range(first, last):

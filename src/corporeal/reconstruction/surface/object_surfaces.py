@@ -11,10 +11,7 @@ from corporeal.reconstruction.gaussians.foreground import assign_hidden_gaussian
 from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.surface.closed_surface import ClosedSurface, build_closed_surfaces
 from corporeal.reconstruction.surface.free_space import pieces_by_free_space
-from corporeal.reconstruction.surface.surface_config import (
-    DEFAULT_CLOSED_SURFACE,
-    ClosedSurfaceConfig,
-)
+from corporeal.reconstruction.surface.surface_config import DEFAULT_CLOSED_SURFACE, ClosedSurfaceConfig
 
 
 @dataclass(frozen=True)
@@ -51,9 +48,7 @@ def build_object_surfaces(
     nearest = KDTree(position).query(taken.gaussians.mean[of_objects])[1]
     owner, kept = _owner_with_company(taken, of_objects, object_of_point[nearest])
     shown = gaussian_subset(taken.gaussians, kept)
-    found = build_closed_surfaces(
-        shown, owner[kept], taken.cameras, taken.masks, taken.views, config
-    )
+    found = build_closed_surfaces(shown, owner[kept], taken.cameras, taken.masks, taken.views, config)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is no object's
     return ObjectSurfaces(tuple(found[k] for k in order), place[owner], place[object_of_point])

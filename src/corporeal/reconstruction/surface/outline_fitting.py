@@ -20,11 +20,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import pixel_width
-from corporeal.reconstruction.surface.fairing import (
-    FLOOR_TOLERANCE_M,
-    neighbour_mean_matrix,
-    smooth_taubin,
-)
+from corporeal.reconstruction.surface.fairing import FLOOR_TOLERANCE_M, neighbour_mean_matrix, smooth_taubin
 from corporeal.reconstruction.surface.kernels_outline import outline_distance, outline_error
 
 MAX_OUTLINE_MOVE_PX = 4
@@ -44,8 +40,8 @@ MEDIAN_OUTLINE_WEIGHT = 0.05
 MAX_MOVE_FRACTION = 0.4
 """Share of a wall's thickness, and of a gap's width, that either side of it may be moved by."""
 MAX_MOVE_SLOPE, MOVE_SLOPE_RINGS = 0.5, 12
-"""How much farther a vertex may be moved than one beside it, in the length between, and up to how
-many vertices away that is looked at."""
+"""How much farther a vertex may be moved than one beside it, in the length between, and up to how many vertices away
+that is looked at."""
 RAY_OFFSET_FRACTION = 1e-6
 """Rays begin so far off the surface, in its longest sides, so as not to meet where they begin."""
 

@@ -1,11 +1,10 @@
 """Refinement of surfaces by photo-consistency.
 
-Depths of Gaussians have bumps of a pixel or two, which no outline sees in the middle of a face.
-Where a face has a pattern, patches of all views that see it correlate best at its true depth, to a
-fraction of a pixel (as Vu, Labatut, Pons and Keriven 2012 refine meshes). So vertices are asked how
-far along the normal that is, those about a vertex are compared, and where most of them tell of one
-smooth face, the vertex is laid on it; so is one that does not know it, on a spike before the face.
-Where few know it, or they contradict each other, as on what is plain, all stays as it is.
+Depths of Gaussians have bumps of a pixel or two, which no outline sees in the middle of a face. Where a face has a
+pattern, patches of all views that see it correlate best at its true depth, to a fraction of a pixel (as Vu, Labatut,
+Pons and Keriven 2012 refine meshes). So vertices are asked how far along the normal that is, those about a vertex are
+compared, and where most of them tell of one smooth face, the vertex is laid on it; so is one that does not know it, on
+a spike before the face. Where few know it, or they contradict each other, as on what is plain, all stays as it is.
 """
 
 from dataclasses import dataclass
@@ -17,11 +16,7 @@ from scipy.sparse import csr_array
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.surface.fairing import (
-    FLOOR_TOLERANCE_M,
-    neighbour_mean_matrix,
-    smooth_taubin,
-)
+from corporeal.reconstruction.surface.fairing import FLOOR_TOLERANCE_M, neighbour_mean_matrix, smooth_taubin
 from corporeal.reconstruction.surface.kernels_photo_consistency import (
     NO_CORRELATION,
     PATCH_SIDE_PX,
@@ -34,11 +29,11 @@ MAX_OFFSETS_PX = (3.0, 1.5)
 OFFSET_STEP_PX = 0.5
 """and how far apart."""
 MIN_VIEW_COSINE, MAX_OCCLUDER_PX, MIN_PATCH_DEVIATION = 0.3, 1.5, 0.015
-"""Least cosine between normal and view; how far before a vertex something may be that a view sees
-[px]; least deviation of a patch [0–1]."""
+"""Least cosine between normal and view; how far before a vertex something may be that a view sees [px]; least deviation
+of a patch [0–1]."""
 MIN_PATCH_CORRELATION, MIN_CORRELATION_GAIN, MIN_PEAK_GAIN = 0.6, 0.1, 0.05
-"""Least correlation; by how much it must exceed the one where the vertex is, to be moved farther
-than NEAR, and the best of those a pixel or more beside it."""
+"""Least correlation; by how much it must exceed the one where the vertex is, to be moved farther than NEAR, and the
+best of those a pixel or more beside it."""
 NEAR_OFFSET_PX = 0.75
 """[px]"""
 NORMAL_SMOOTHING_ITERATIONS, PLACE_SMOOTHING_ITERATIONS = 10.0, 4.0
@@ -46,8 +41,8 @@ NORMAL_SMOOTHING_ITERATIONS, PLACE_SMOOTHING_ITERATIONS = 10.0, 4.0
 HALF_BELIEF_SCATTER_PX = 0.5
 """Standard deviation of the places that vertices tell at which half of their word is taken [px]."""
 HALF_KNOWING_FRACTION, BELIEF_POWER = 0.3, 4
-"""Share of vertices about one that must know where the face is for it to go half of the way there,
-and the power by which more makes that more."""
+"""Share of vertices about one that must know where the face is for it to go half of the way there, and the power by
+which more makes that more."""
 VERTICES_PER_SAMPLE = 1.2
 """Of vertices in a square pixel, one in so many is asked."""
 MAX_ROUND_MOVE_PX = 4.0
@@ -82,10 +77,7 @@ class AgreedSurface:
 
 
 def object_photographs(
-    rgb: UInt8[np.ndarray, "V H W 3"],
-    mine: Bool[np.ndarray, "V H W"],
-    cameras: Float[np.ndarray, "V 18"],
-    pixel: float,
+    rgb: UInt8[np.ndarray, "V H W 3"], mine: Bool[np.ndarray, "V H W"], cameras: Float[np.ndarray, "V 18"], pixel: float
 ) -> ObjectPhotographs:
     """Return photographs of an object; mine: their pixels on it, pixel: its width there [m]."""
     # A patch that is partly beside the object moves with the outline, which is no place.
@@ -122,20 +114,14 @@ def move_to_agreement(
         normals = smoothed_normals(mesh, mean, fine)
         told = _ask_offsets(mesh, normals, asked, pictures, farthest, pool)
         # Where places that vertices tell lie above the smoothed surface [px].
-        above = ((mesh.vertices - _neighbour_means(mesh.vertices, mean, along)) * normals).sum(
-            axis=1
-        )
+        above = ((mesh.vertices - _neighbour_means(mesh.vertices, mean, along)) * normals).sum(axis=1)
         above /= pictures.pixel
         face, belief = _face_height(above, asked, told, mean, along)
-        move = np.where(
-            movable, belief * np.clip(face - above, -MAX_ROUND_MOVE_PX, MAX_ROUND_MOVE_PX), 0
-        )
+        move = np.where(movable, belief * np.clip(face - above, -MAX_ROUND_MOVE_PX, MAX_ROUND_MOVE_PX), 0)
         vertices = mesh.vertices + pictures.pixel * move[:, None] * normals
         vertices[lies, 2] = floor
         _fill_unknown_vertices(
-            vertices,
-            movable & (belief > MIN_FILL_BELIEF) & ~_knowing_vertices(asked, told, movable),
-            mean,
+            vertices, movable & (belief > MIN_FILL_BELIEF) & ~_knowing_vertices(asked, told, movable), mean
         )
         mesh = smooth_taubin(Mesh(vertices, mesh.triangles), floor, 2, mean)
     return AgreedSurface(mesh, np.where(movable, belief, 0))
@@ -160,9 +146,7 @@ def smoothed_normals(mesh: Mesh, mean: csr_array, fine: float) -> Float[np.ndarr
         fine: Cells of the grid that it was carved from in a square pixel.
 
     """
-    normals = _neighbour_means(
-        mesh.vertex_normals, mean, max(1, round(NORMAL_SMOOTHING_ITERATIONS * fine))
-    )
+    normals = _neighbour_means(mesh.vertex_normals, mean, max(1, round(NORMAL_SMOOTHING_ITERATIONS * fine)))
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY_LENGTH)
 
 
@@ -195,9 +179,7 @@ def _ask_offsets(
     return _curve_peaks(curves, offsets)
 
 
-def _curve_peaks(
-    curves: Float32[np.ndarray, "A K"], offsets: Float[np.ndarray, " K"]
-) -> _VertexOffsets:
+def _curve_peaks(curves: Float32[np.ndarray, "A K"], offsets: Float[np.ndarray, " K"]) -> _VertexOffsets:
     """Return where curves have one clear peak, between samples (parabola), and how clear it is."""
     row, count = np.arange(len(curves)), len(offsets)
     top = curves.argmax(axis=1)
@@ -206,29 +188,16 @@ def _curve_peaks(
     bend = 2 * best - before - after
     beside = np.abs(np.arange(count) - top[:, None]) * OFFSET_STEP_PX >= 1 - TINY_LENGTH
     other = np.where(beside, curves, NO_CORRELATION).max(axis=1)
-    clear = (
-        (at == top)
-        & (best > MIN_PATCH_CORRELATION)
-        & (best - other > MIN_PEAK_GAIN)
-        & (bend > MIN_PEAK_CURVATURE)
-    )
+    clear = (at == top) & (best > MIN_PATCH_CORRELATION) & (best - other > MIN_PEAK_GAIN) & (bend > MIN_PEAK_CURVATURE)
     clear &= np.minimum(before, after) > NO_CORRELATION
-    offset = offsets[at] + OFFSET_STEP_PX * 0.5 * (after - before) / np.maximum(
-        bend, MIN_PEAK_CURVATURE
-    )
-    clear &= (np.abs(offset) <= NEAR_OFFSET_PX) | (
-        best > curves[row, count // 2] + MIN_CORRELATION_GAIN
-    )
+    offset = offsets[at] + OFFSET_STEP_PX * 0.5 * (after - before) / np.maximum(bend, MIN_PEAK_CURVATURE)
+    clear &= (np.abs(offset) <= NEAR_OFFSET_PX) | (best > curves[row, count // 2] + MIN_CORRELATION_GAIN)
     weight = np.where(clear, np.clip((best - np.maximum(other, 0)) * best, 0, 1), 0)
     return _VertexOffsets(np.where(clear, offset, 0), weight)
 
 
 def _face_height(
-    above: Float[np.ndarray, " N"],
-    asked: Int[np.ndarray, " A"],
-    told: _VertexOffsets,
-    mean: csr_array,
-    along: int,
+    above: Float[np.ndarray, " N"], asked: Int[np.ndarray, " A"], told: _VertexOffsets, mean: csr_array, along: int
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """Return how high over the smoothed surface vertices about each see a face [px], and confidence."""
     place, count = above[asked] + told.offset, len(above)
@@ -239,9 +208,7 @@ def _face_height(
     weight = np.maximum(weight, TINY_LENGTH)
     face = first / weight
     scatter = np.maximum(second / weight - face**2, 0)
-    share = knows / np.maximum(
-        every, max(0.5 * len(asked) / count, TINY_LENGTH)
-    )  # 0: nothing is seen
+    share = knows / np.maximum(every, max(0.5 * len(asked) / count, TINY_LENGTH))  # 0: nothing is seen
     power = (share / (1 + scatter / HALF_BELIEF_SCATTER_PX**2)) ** BELIEF_POWER
     return face, power / (power + HALF_KNOWING_FRACTION**BELIEF_POWER)
 
@@ -255,9 +222,7 @@ def _knowing_vertices(
     return out
 
 
-def _fill_unknown_vertices(
-    vertices: Float[np.ndarray, "N 3"], loose: Bool[np.ndarray, " N"], mean: csr_array
-) -> None:
+def _fill_unknown_vertices(vertices: Float[np.ndarray, "N 3"], loose: Bool[np.ndarray, " N"], mean: csr_array) -> None:
     """Lay vertices that know nothing, among many that do, as flat as these allow."""
     some = np.flatnonzero(loose)
     near = mean[some]

@@ -10,31 +10,27 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.multiview.silhouette_coherence import MIN_MASK_FILLED_FRACTION
 from corporeal.multiview.silhouette_outliers import find_cropped_masks
 from corporeal.multiview.silhouette_overlap import compare_silhouettes
-from corporeal.multiview.view_coverage import (
-    UNSEEN_HALF_GAP_DEG,
-    depth_doubt_text,
-    widest_unseen_angle,
-)
+from corporeal.multiview.view_coverage import UNSEEN_HALF_GAP_DEG, depth_doubt_text, widest_unseen_angle
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality
 
 CAMERAS_IN_BOX_FRACTION = 0.1
 """Share of the cameras that stand in an object's box, from which on the object is the room."""
 BOX_TO_REGION_RATIO = 2.0
-"""Longest side of an object's box over the radius of the ball that cameras look at, from which on,
-where nobody gave masks, it is all that is in the ball.
+"""Longest side of an object's box over the radius of the ball that cameras look at, from which on, where nobody gave
+masks, it is all that is in the ball.
 """
 MAX_CROPPED_FRACTION = 0.5
-"""Share of the photographs whose border may cut through what was taken for objects. Objects that
-right masks show reach it in a fifth, a pot from near above in .43, a bed and a wall in .60."""
+"""Share of the photographs whose border may cut through what was taken for objects. Objects that right masks show reach
+it in a fifth, a pot from near above in .43, a bed and a wall in .60."""
 GREY_PICTURE_PSNR_DB = 14.0
 """Held-out photographs agree with a plain grey picture as well as this [dB]."""
 MIN_COLOUR_OVERLAP = 0.5
-"""Median overlap of what was cut out by height above the floor and what colours tell, below which
-more is in dispute than agreed on: wrong cuts have .05 to .5, right ones .64 to .9."""
+"""Median overlap of what was cut out by height above the floor and what colours tell, below which more is in dispute
+than agreed on: wrong cuts have .05 to .5, right ones .64 to .9."""
 MIN_MASK_OVERLAP = 0.35
-"""Median overlap of surfaces with masks below which they are no shape of what masks show: 0.9 for
-most objects; foliage and wires, whose gaps close, have less."""
+"""Median overlap of surfaces with masks below which they are no shape of what masks show: 0.9 for most objects; foliage
+and wires, whose gaps close, have less."""
 COMPARED_VIEWS = 12
 """Views in which that is compared."""
 FORCE_HINT = "--force continues anyway."
@@ -46,10 +42,7 @@ MASKS_HINT = (
 
 
 def boxes_rejection_reason(
-    boxes: Float[np.ndarray, "K 2 3"],
-    cameras: Sequence[Camera],
-    masked: bool,
-    quality: HeldOutQuality | None = None,
+    boxes: Float[np.ndarray, "K 2 3"], cameras: Sequence[Camera], masked: bool, quality: HeldOutQuality | None = None
 ) -> str | None:
     """Return in a sentence or two why objects are not worth simulating; None: they may be.
 
@@ -87,8 +80,8 @@ def boxes_rejection_reason(
 def pieces_rejection_reason(pieces: int, cameras: Sequence[Camera]) -> str | None:
     """Return in a sentence or two why surfaces that nobody masked are unreliable; None.
 
-    One object is in one piece. Where half of the circle around it was not seen, nothing but colours
-    told it from what stands behind it.
+    One object is in one piece. Where half of the circle around it was not seen, nothing but colours told it from what
+    stands behind it.
 
     Args:
         pieces: That all came out in where nobody said of how many objects, else the most of one.
@@ -119,9 +112,7 @@ def cropping_rejection_reason(masks: Bool[np.ndarray, "V H W"]) -> str | None:
     return f"The object would extend beyond the pictures: {what}. {MASKS_HINT}"
 
 
-def colour_rejection_reason(
-    masks: Bool[np.ndarray, "V H W"], coloured: Bool[np.ndarray, "V H W"] | None
-) -> str | None:
+def colour_rejection_reason(masks: Bool[np.ndarray, "V H W"], coloured: Bool[np.ndarray, "V H W"] | None) -> str | None:
     """Return in a sentence or two why what was cut out is unreliable; None: it may be.
 
     Colours say something else of what the object is. Either may be wrong, and neither is sure.
@@ -142,10 +133,7 @@ def colour_rejection_reason(
 
 
 def overlap_rejection_reason(
-    meshes: Sequence[Mesh],
-    cameras: Sequence[Camera],
-    masks: Bool[np.ndarray, "V H W"],
-    given: bool = True,
+    meshes: Sequence[Mesh], cameras: Sequence[Camera], masks: Bool[np.ndarray, "V H W"], given: bool = True
 ) -> str | None:
     """Return in a sentence or two why surfaces are not worth simulating; None: they may be.
 

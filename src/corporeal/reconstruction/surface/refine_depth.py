@@ -1,13 +1,13 @@
 """Refinement of depths by stereo behind floating Gaussians.
 
-Gaussians are learned as balls some pixels wide, and of what is plain, such as the black inside of a
-pan, no picture says where they are: their depth is that of a hump. Neighbouring photographs say how
-deep they see (``hull_stereo.py``), and between such depths a plain face has none of the edges that
-a step would have: there it is taken to go on as flat as it can.
+Gaussians are learned as balls some pixels wide, and of what is plain, such as the black inside of a pan, no picture
+says where they are: their depth is that of a hump. Neighbouring photographs say how deep they see (``hull_stereo.py``),
+and between such depths a plain face has none of the edges that a step would have: there it is taken to go on as flat as
+it can.
 
-In a mirror photographs see far behind its face, and agree on where: a highlight on a ball lies half
-its radius deep. Gaussians stay on the face, since their colours change with the view. So nothing is
-taken to lie deeper than the far side of the Gaussian at which half of the light is lost.
+In a mirror photographs see far behind its face, and agree on where: a highlight on a ball lies half its radius deep.
+Gaussians stay on the face, since their colours change with the view. So nothing is taken to lie deeper than the far
+side of the Gaussian at which half of the light is lost.
 """
 
 from dataclasses import replace
@@ -20,11 +20,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Views
 from corporeal.reconstruction.gaussians.depth_rendering import DepthRendering
 from corporeal.reconstruction.gaussians.hull_config import DEFAULT_HULL, HullConfig
-from corporeal.reconstruction.gaussians.hull_stereo import (
-    DEPTH_ERROR_CELLS,
-    MIN_CONFIRMING_VIEWS,
-    HullStereoImages,
-)
+from corporeal.reconstruction.gaussians.hull_stereo import DEPTH_ERROR_CELLS, MIN_CONFIRMING_VIEWS, HullStereoImages
 from corporeal.reconstruction.gaussians.kernels_space_carving import relax_unknown_cells
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull

@@ -1,8 +1,8 @@
 """Removal of thin sheets before faces.
 
-Where views disagree by a hair, carving leaves sheets thinner than a pixel a pixel or two before a
-plain face. Fitting to outlines cannot take them away, since it moves no side of a wall as far as
-its middle. Nothing that is truly there is so thin, so near a thick body, and seen at that size.
+Where views disagree by a hair, carving leaves sheets thinner than a pixel a pixel or two before a plain face. Fitting
+to outlines cannot take them away, since it moves no side of a wall as far as its middle. Nothing that is truly there is
+so thin, so near a thick body, and seen at that size.
 """
 
 import numpy as np
@@ -10,11 +10,7 @@ from jaxtyping import Bool, Float
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import RayCaster
-from corporeal.reconstruction.surface.fairing import (
-    FLOOR_TOLERANCE_M,
-    neighbour_mean_matrix,
-    smooth_taubin,
-)
+from corporeal.reconstruction.surface.fairing import FLOOR_TOLERANCE_M, neighbour_mean_matrix, smooth_taubin
 
 MAX_FLAKE_THICKNESS_PX, MAX_FLAKE_GAP_PX, MIN_BODY_THICKNESS_PX = 1.2, 3.0, 3.0
 """A sheet is thinner, nearer to the body, and the body thicker than so many pixels."""
@@ -73,18 +69,12 @@ def _body_distance(mesh: Mesh, pixel: float) -> Float[np.ndarray, " N"]:
     return out
 
 
-def _is_body(
-    gap: Float[np.ndarray, " N"], thick: Float[np.ndarray, " N"], pixel: float
-) -> Bool[np.ndarray, " N"]:
+def _is_body(gap: Float[np.ndarray, " N"], thick: Float[np.ndarray, " N"], pixel: float) -> Bool[np.ndarray, " N"]:
     return (gap < MAX_FLAKE_GAP_PX * pixel) & (thick > MIN_BODY_THICKNESS_PX * pixel)
 
 
 def _ray_crossings(
-    caster: RayCaster,
-    begin: Float[np.ndarray, "N 3"],
-    way: Float[np.ndarray, "N 3"],
-    times: int,
-    pixel: float,
+    caster: RayCaster, begin: Float[np.ndarray, "N 3"], way: Float[np.ndarray, "N 3"], times: int, pixel: float
 ) -> Float[np.ndarray, "N {times}"]:
     """Return how far along rays they cross a surface the first times [m]; nan: not."""
     off, out = RAY_OFFSET_PX * pixel, np.full((len(begin), times), np.nan)

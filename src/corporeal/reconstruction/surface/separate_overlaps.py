@@ -1,9 +1,9 @@
 """Separation of overlapping surfaces of touching objects.
 
-Each was carved on its own grid and moved on its own, so that some end up a cell or two inside each
-other. What lies inside another goes half of the way out, again and again, as the other does: both
-give way alike, and what is clear of all others stays where it is. Meanwhile vertices spread along
-their surface, as what is pushed back far would fold otherwise.
+Each was carved on its own grid and moved on its own, so that some end up a cell or two inside each other. What lies
+inside another goes half of the way out, again and again, as the other does: both give way alike, and what is clear of
+all others stays where it is. Meanwhile vertices spread along their surface, as what is pushed back far would fold
+otherwise.
 """
 
 from collections.abc import Sequence
@@ -54,9 +54,7 @@ class _MovableSurface:
     def _near(self) -> QueryMesh:
         return QueryMesh(_mirror_at_floor(self.mesh, self.near, self.floor))
 
-    def way_out(
-        self, points: Float[np.ndarray, "P 3"]
-    ) -> tuple[Float[np.ndarray, " P"], Float[np.ndarray, "P 3"]]:
+    def way_out(self, points: Float[np.ndarray, "P 3"]) -> tuple[Float[np.ndarray, " P"], Float[np.ndarray, "P 3"]]:
         """How deep inside points are, 0: outside [m], and the way to the surface [m]."""
         depth, way = np.zeros(len(points)), np.zeros((len(points), 3))
         winding = _winding_numbers(self.far, points) + _winding_numbers(self._near, points)
@@ -65,9 +63,7 @@ class _MovableSurface:
         way[held] = on - points[held]
         return depth, way
 
-    def moved(
-        self, way: Float[np.ndarray, "V 3"], spread: Bool[np.ndarray, " V"]
-    ) -> "_MovableSurface":
+    def moved(self, way: Float[np.ndarray, "V 3"], spread: Bool[np.ndarray, " V"]) -> "_MovableSurface":
         """Move vertices, then spread some; what lies on the floor stays on it."""
         v = self.mesh.vertices + way
         own = np.flatnonzero(spread)
@@ -82,9 +78,7 @@ class _MovableSurface:
         return replace(self, mesh=Mesh(v, self.mesh.triangles))
 
 
-def separate_overlaps(
-    meshes: Sequence[Mesh], cells: Sequence[float], floor: float
-) -> tuple[Mesh, ...]:
+def separate_overlaps(meshes: Sequence[Mesh], cells: Sequence[float], floor: float) -> tuple[Mesh, ...]:
     """Return surfaces that hardly overlap; triangles stay the same, and what touches nothing.
 
     Where one goes through another, or deep into it, both stay as they are.
@@ -98,11 +92,7 @@ def separate_overlaps(
     seams = _overlaps(meshes, cells, floor)
     while seams:
         skins = _pull_back(meshes, seams, TOUCH_DEPTH_CELLS * min(cells), floor)
-        mended = [
-            s
-            for s in seams
-            if _remaining_overlap(skins, s) <= MAX_REMAINING_OVERLAP_FRACTION * s.volume
-        ]
+        mended = [s for s in seams if _remaining_overlap(skins, s) <= MAX_REMAINING_OVERLAP_FRACTION * s.volume]
         if len(mended) == len(seams):
             return tuple(skins[k].mesh if k in skins else mesh for k, mesh in enumerate(meshes))
         seams = mended
@@ -155,19 +145,12 @@ def _movable_surface(mesh: Mesh, seams: list[_Overlap], k: int, floor: float) ->
     chosen = near[mesh.triangles].any(axis=1)
     far = QueryMesh(_mirror_at_floor(mesh, mesh.triangles[~chosen], floor))
     lies = mesh.vertices[:, 2] < floor + FLOOR_TOLERANCE_M
-    return _MovableSurface(
-        mesh, mesh.triangles[chosen], far, neighbour_mean_matrix(mesh), lies, floor
-    )
+    return _MovableSurface(mesh, mesh.triangles[chosen], far, neighbour_mean_matrix(mesh), lies, floor)
 
 
-def _pull_back(
-    meshes: Sequence[Mesh], seams: list[_Overlap], still: float, floor: float
-) -> dict[int, _MovableSurface]:
+def _pull_back(meshes: Sequence[Mesh], seams: list[_Overlap], still: float, floor: float) -> dict[int, _MovableSurface]:
     """Draw objects back where they meet; still: what is no deeper stays [m]."""
-    skins = {
-        k: _movable_surface(meshes[k], seams, k, floor)
-        for k in sorted({k for s in seams for k in s.of})
-    }
+    skins = {k: _movable_surface(meshes[k], seams, k, floor) for k in sorted({k for s in seams for k in s.of})}
     others = {k: [j for s in seams if k in s.of for j in s.of if j != k] for k in skins}
     ever = {k: np.zeros(len(meshes[k].vertices), bool) for k in skins}
     for r in range(SEPARATION_ITERATIONS):
@@ -178,9 +161,7 @@ def _pull_back(
         for k, (depth, way) in ways.items():
             held = depth > still
             ever[k] |= held
-            skins[k] = skins[k].moved(
-                np.where(held[:, None], way / 2, 0), ever[k] & (r < SMOOTHING_ITERATIONS)
-            )
+            skins[k] = skins[k].moved(np.where(held[:, None], way / 2, 0), ever[k] & (r < SMOOTHING_ITERATIONS))
     return skins
 
 

@@ -1,11 +1,10 @@
 """Guard that keeps silhouettes filled during carving.
 
-A mirror image lies behind its face, and photographs agree on where: carved as deep, a ball of steel
-has a dent as wide as what it mirrors. But through every pixel of a mask something is met, and rays
-near an outline pass an object's face only (Kolev and Cremers 2008 ask the same of stereo). So what
-depths of photographs take away stays taken only where the masks remain full: cells are given back
-in whose pixel some view's ray meets nothing any more. A hollow that photographs truly look into has
-a wall or a bottom behind it, and loses nothing by this.
+A mirror image lies behind its face, and photographs agree on where: carved as deep, a ball of steel has a dent as wide
+as what it mirrors. But through every pixel of a mask something is met, and rays near an outline pass an object's face
+only (Kolev and Cremers 2008 ask the same of stereo). So what depths of photographs take away stays taken only where the
+masks remain full: cells are given back in whose pixel some view's ray meets nothing any more. A hollow that photographs
+truly look into has a wall or a bottom behind it, and loses nothing by this.
 """
 
 import numpy as np
@@ -14,10 +13,7 @@ from jaxtyping import Bool, Float
 from corporeal.multiview.silhouette_coherence import is_outside_silhouettes
 from corporeal.reconstruction.gaussians.space_carving import VoxelGrid
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
-from corporeal.reconstruction.surface.kernels_outline import (
-    count_lacking_views,
-    mark_unmet_pixels,
-)
+from corporeal.reconstruction.surface.kernels_outline import count_lacking_views, mark_unmet_pixels
 
 
 def restore_silhouettes(
@@ -50,7 +46,5 @@ def restore_silhouettes(
     rest = places, cameras, lacks, votes
     pool.each(count_lacking_views, [(*span, *rest) for span in pool.spans(len(places))])
     given = np.zeros(taken.shape, np.bool_)
-    given[taken] = is_outside_silhouettes(
-        *votes.T
-    )  # masks may err here as where they say that nothing is
+    given[taken] = is_outside_silhouettes(*votes.T)  # masks may err here as where they say that nothing is
     return np.where(given, before, after)

@@ -2,8 +2,8 @@
 
 Folders of an evaluation of dynamics.
 
-``OUT/SCENE/METHOD/`` is a run as ``corporeal run`` leaves it, done up to simulate, so that
-``pipeline.read_back`` reads it. The reference, ours at a finer detail, is a run like any other.
+``OUT/SCENE/METHOD/`` is a run as ``corporeal run`` leaves it, done up to simulate, so that ``pipeline.read_back`` reads
+it. The reference, ours at a finer detail, is a run like any other.
 """
 
 from dataclasses import dataclass, replace

@@ -10,17 +10,8 @@ from corporeal.jobs.executor import Executor, execute_jobs
 from corporeal.jobs.job import read_manifest_rows
 from corporeal.lab.corpus.corpus_plan import read_plan
 from corporeal.lab.corpus.run_corpus import SCENE_TOML_FILE, SCENES_FOLDER
-from corporeal.lab.evaluation.dynamics.compared_methods import (
-    INPUT_FOLDER,
-    OUR_METHOD,
-    ReferenceDetail,
-    parse_method,
-)
-from corporeal.lab.evaluation.dynamics.dynamics_jobs import (
-    EvaluatedScene,
-    MethodComparison,
-    dynamics_jobs,
-)
+from corporeal.lab.evaluation.dynamics.compared_methods import INPUT_FOLDER, OUR_METHOD, ReferenceDetail, parse_method
+from corporeal.lab.evaluation.dynamics.dynamics_jobs import EvaluatedScene, MethodComparison, dynamics_jobs
 from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary, summarise_dynamics
 from corporeal.lab.evaluation.dynamics.rebound_drops import drop_jobs
 from corporeal.pipeline import run_pipeline
@@ -35,8 +26,7 @@ class DynamicsConfig:
     """What is evaluated, against whom."""
 
     against: tuple[str, ...] = ("single", "capped", "one")
-    """Baselines: single, capped, one[:E=2e6,nu=.4,rho=200], omniphysgs, vomp:PATH, pixie:PATH,
-    table:PATH."""
+    """Baselines: single, capped, one[:E=2e6,nu=.4,rho=200], omniphysgs, vomp:PATH, pixie:PATH, table:PATH."""
     reference: ReferenceDetail = "normal"
     """Detail of the run of ours that paths and contacts are compared with."""
     only: tuple[str, ...] = ()
@@ -93,22 +83,16 @@ def scenes_of(target: str, out: Path) -> list[EvaluatedScene]:
         return [_showcase(name, out / name / INPUT_FOLDER) for name in SHOWCASE_SCENES]
     folder = Path(target)
     planned = read_plan(folder).scenes
-    there = [
-        EvaluatedScene(s.name, folder / SCENES_FOLDER / s.name / SCENE_TOML_FILE) for s in planned
-    ]
+    there = [EvaluatedScene(s.name, folder / SCENES_FOLDER / s.name / SCENE_TOML_FILE) for s in planned]
     there = [s for s in there if s.path.exists()]
     if not there:
-        raise UserError(
-            f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}."
-        )
+        raise UserError(f"No scene of {folder} is assembled. Next: corporeal corpus assemble {folder}.")
     return there
 
 
 def _showcase(name: str, folder: Path) -> EvaluatedScene:
     path = folder / f"{name}.glb"
-    return EvaluatedScene(
-        name, path if path.exists() else run_pipeline.write_showcase(name, folder)
-    )
+    return EvaluatedScene(name, path if path.exists() else run_pipeline.write_showcase(name, folder))
 
 
 def select_scenes(scenes: Sequence[EvaluatedScene], only: Sequence[str]) -> list[EvaluatedScene]:

@@ -52,9 +52,7 @@ def dynamics_jobs(scenes: Sequence[EvaluatedScene], comparison: MethodComparison
             folder = run_folder(comparison.out, scene.name, method.name)
             how = method_settings(method, comparison.settings, scene.name)
             found.append(_job(scene, folder, how))
-        finer = replace(
-            comparison.settings, fill=replace(comparison.settings.fill, detail=comparison.reference)
-        )
+        finer = replace(comparison.settings, fill=replace(comparison.settings.fill, detail=comparison.reference))
         folder = reference_folder(comparison.out, scene.name, comparison.reference)
         found.append(_job(scene, folder, method_settings(OUR_METHOD, finer, scene.name)))
     return found
@@ -74,9 +72,7 @@ def _job(scene: EvaluatedScene, folder: Path, settings: Settings) -> Job:
     )
 
 
-def run_and_measure(
-    folder: Path, progress: ProgressCallback, scene: Path, settings: Settings
-) -> None:
+def run_and_measure(folder: Path, progress: ProgressCallback, scene: Path, settings: Settings) -> None:
     """Run a scene up to simulate and keep what is compared, in the process of a worker."""
     with store.lock_folder(folder, ORPHAN_WAIT_S):
         pass

@@ -44,25 +44,17 @@ def draw_dynamics(found: DynamicsSummary, path: Path) -> None:
         above.bar(at, [_met_fraction(row) for row in rows], 0.9 * width, color=colour, label=method)
         off = [row.against.path if row.against else np.nan for row in rows]
         below.bar(at, off, 0.9 * width, color=colour)
-        marked = [
-            (x, _met_fraction(r) + 0.025)
-            for x, r in zip(at, rows, strict=True)
-            if r.numbers and not r.clean
-        ]
+        marked = [(x, _met_fraction(r) + 0.025) for x, r in zip(at, rows, strict=True) if r.numbers and not r.clean]
         above.plot(*np.array(marked or np.zeros((0, 2))).T, "x", color=INK_COLOUR, ms=5)
     above.set_ylabel("expectations met (×: audit not clean)")
     above.set_ylim(0, 1.05)
-    above.legend(
-        frameon=False, ncols=len(found.methods), loc="lower center", bbox_to_anchor=(0.5, 1)
-    )
+    above.legend(frameon=False, ncols=len(found.methods), loc="lower center", bbox_to_anchor=(0.5, 1))
     below.set_ylabel(f"path off ours at {found.reference}\n[diagonals], log")
     if any(row.against for row in found.rows):
         below.set_yscale("log")
     else:
         below.set_yticks([])
-        below.text(
-            0.5, 0.5, "no reference yet", transform=below.transAxes, ha="center", color=INK_COLOUR
-        )
+        below.text(0.5, 0.5, "no reference yet", transform=below.transAxes, ha="center", color=INK_COLOUR)
     below.set_xlim(-0.5, max(len(scenes), 1) - 0.5)
     below.set_xticks(range(len(scenes)), scenes, rotation=20, ha="right")
     save_figure(figure, path)
@@ -121,10 +113,7 @@ def write_dynamics_page(found: DynamicsSummary, path: Path) -> None:
         missing=missing,
         figure=figure,
         tables="".join(_html(t) for t in dynamics_tables(found) if t.rows),
-        columns="".join(
-            f"<dt>{escape_html(k)}</dt><dd>{escape_html(v)}</dd>"
-            for k, v in COLUMN_EXPLANATIONS.items()
-        ),
+        columns="".join(f"<dt>{escape_html(k)}</dt><dd>{escape_html(v)}</dd>" for k, v in COLUMN_EXPLANATIONS.items()),
         notes="".join(f"<li>{escape_html(s)}</li>" for s in borrowed_numbers(found)),
     )
     store.write_bytes(path, text.encode())
@@ -154,17 +143,13 @@ def _outdated_runs(found: DynamicsSummary) -> str:
 
 def borrowed_numbers(found: DynamicsSummary) -> list[str]:
     """Return which numbers of which method are ours, each sentence once."""
-    said = [
-        f"{row.method}: {note}" for row in found.rows if row.numbers for note in row.numbers.notes
-    ]
+    said = [f"{row.method}: {note}" for row in found.rows if row.numbers for note in row.numbers.notes]
     return list(dict.fromkeys(said)) or ["Nothing: no method has its own material values."]
 
 
 def _html(table: ResultTable) -> str:
     heads = "".join(f"<th>{escape_html(h)}</th>" for h in table.heads)
-    rows = "".join(
-        f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows
-    )
+    rows = "".join(f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows)
     return f'<h2>{escape_html(table.title)}</h2><div class="wide"><table><tr>{heads}</tr>{rows}</table></div>'
 
 

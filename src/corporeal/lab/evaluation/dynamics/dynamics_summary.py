@@ -9,16 +9,8 @@ from statistics import mean
 
 from corporeal.core import store
 from corporeal.core.audit_data import FLOOR_NAME
-from corporeal.lab.evaluation.dynamics.compared_methods import (
-    OURS_NAME,
-    reference_folder,
-    run_folder,
-)
-from corporeal.lab.evaluation.dynamics.dynamics_jobs import (
-    EvaluatedScene,
-    MethodComparison,
-    dynamics_jobs,
-)
+from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME, reference_folder, run_folder
+from corporeal.lab.evaluation.dynamics.dynamics_jobs import EvaluatedScene, MethodComparison, dynamics_jobs
 from corporeal.lab.evaluation.dynamics.method_ranking import (
     MethodResult,
     RankCorrelation,
@@ -27,18 +19,9 @@ from corporeal.lab.evaluation.dynamics.method_ranking import (
     rank_correlation,
     rank_scene,
 )
-from corporeal.lab.evaluation.dynamics.rebound_drops import (
-    RANGE_TOLERANCE,
-    MethodDrop,
-    has_rebound_data,
-    read_drops,
-)
+from corporeal.lab.evaluation.dynamics.rebound_drops import RANGE_TOLERANCE, MethodDrop, has_rebound_data, read_drops
 from corporeal.lab.evaluation.dynamics.run_difference import compare_runs
-from corporeal.lab.evaluation.dynamics.run_measures import (
-    ObjectMeasures,
-    RunMeasures,
-    read_run_measures,
-)
+from corporeal.lab.evaluation.dynamics.run_measures import ObjectMeasures, RunMeasures, read_run_measures
 from corporeal.simulation.audit import ALLOWED_BREACHES
 
 NOT_RUN_TEXT = "not run yet"
@@ -141,10 +124,7 @@ def summarise_dynamics(
         for method in methods
     ]
     by_scene = {s.name: {r.method: r for r in rows if r.scene == s.name} for s in scenes}
-    drops = {
-        m.name: read_drops(comparison.out, m) if has_rebound_data(m) else []
-        for m in comparison.methods
-    }
+    drops = {m.name: read_drops(comparison.out, m) if has_rebound_data(m) else [] for m in comparison.methods}
     return DynamicsSummary(
         detail=comparison.settings.fill.detail,
         reference=comparison.reference,
@@ -195,9 +175,7 @@ def _row(scene: str, method: str, reference: ReferenceRun, state: _EvaluationSta
         return MethodResult(scene, method, None, None, state.missing(name))
     numbers = read_run_measures(run_folder(state.comparison.out, scene, method))
     if numbers.growth > ALLOWED_BREACHES["mechanical_growth"]:
-        return MethodResult(
-            scene, method, numbers, None, f"failed: energy grew by {numbers.growth:.1%}"
-        )
+        return MethodResult(scene, method, numbers, None, f"failed: energy grew by {numbers.growth:.1%}")
     against = None if reference.numbers is None else compare_runs(numbers, reference.numbers)
     return MethodResult(scene, method, numbers, against)
 
@@ -221,9 +199,7 @@ def _means(
             for key in sorted({k for b in numbers.bodies for k in keys(b)} if numbers else ()):
                 groups.setdefault(key, []).append(name)
         found[kind] = tuple(
-            _mean(group, m, [by_scene[n][m] for n in names])
-            for group, names in sorted(groups.items())
-            for m in methods
+            _mean(group, m, [by_scene[n][m] for n in names]) for group, names in sorted(groups.items()) for m in methods
         )
     return found
 
@@ -256,9 +232,7 @@ def _mean(group: str, method: str, rows: Sequence[MethodResult]) -> MethodMean:
 # ---------------------------------------------------------------- ranks and life
 
 
-def _ranks(
-    method: str, by_scene: Mapping[str, Mapping[str, MethodResult]], drops: Sequence[MethodDrop]
-) -> MethodRanks:
+def _ranks(method: str, by_scene: Mapping[str, Mapping[str, MethodResult]], drops: Sequence[MethodDrop]) -> MethodRanks:
     """Correlate ranks within each scene; real numbers are those of ours."""
     stiff: list[list[RankedPair]] = []
     bouncy: list[list[RankedPair]] = [[(d.middle, d.restitution) for d in drops]]
@@ -270,9 +244,7 @@ def _ranks(
         happened = numbers.outcome.objects
         # Contents that move by themselves in ours alone are left out.
         bodies = [b for b in ours.bodies if b.name in happened]
-        stiff.append(
-            [(b.young_pa, -happened[b.name].shape_error_max) for b in bodies if b.name in touched]
-        )
+        stiff.append([(b.young_pa, -happened[b.name].shape_error_max) for b in bodies if b.name in touched])
         ratios = [(b.restitution, happened[b.name].rebound_ratio) for b in bodies]
         bouncy.append([(e, ratio) for e, ratio in ratios if ratio is not None])
     return MethodRanks(method, rank_correlation(stiff), rank_correlation(bouncy))

@@ -9,16 +9,7 @@ from corporeal.lab.evaluation.result_table import ResultTable
 
 NO_VALUE = "–"
 SCENE_HEADS = ("scene", "method", "expected", "path", "contacts", "parted", "audit")
-MEAN_TABLE_HEADS = (
-    "method",
-    "scenes",
-    "expected",
-    "clean",
-    "path",
-    "contacts",
-    "Δt [ms]",
-    "parted",
-)
+MEAN_TABLE_HEADS = ("method", "scenes", "expected", "clean", "path", "contacts", "Δt [ms]", "parted")
 MEAN_TABLE_HEADS = (*MEAN_TABLE_HEADS, "shape", "rebound")
 
 
@@ -30,9 +21,7 @@ def dynamics_tables(found: DynamicsSummary) -> list[ResultTable]:
 def scene_table(found: DynamicsSummary) -> ResultTable:
     """Return one row per scene and method."""
     rows = [_cells(row, found.row(row.scene, OURS_NAME)) for row in found.rows]
-    return ResultTable(
-        f"Scenes at {found.detail}, against ours at {found.reference}", SCENE_HEADS, rows
-    )
+    return ResultTable(f"Scenes at {found.detail}, against ours at {found.reference}", SCENE_HEADS, rows)
 
 
 def _cells(row: MethodResult, ours: MethodResult) -> tuple[str, ...]:
@@ -58,11 +47,7 @@ def group_tables(found: DynamicsSummary) -> list[ResultTable]:
         ResultTable(
             titles[kind],
             MEAN_TABLE_HEADS if kind == "all" else (kind, *MEAN_TABLE_HEADS),
-            [
-                mean_cells(m) if kind == "all" else (m.group, *mean_cells(m))
-                for m in means
-                if m.scenes
-            ],
+            [mean_cells(m) if kind == "all" else (m.group, *mean_cells(m)) for m in means if m.scenes],
         )
         for kind, means in found.means.items()
     ]

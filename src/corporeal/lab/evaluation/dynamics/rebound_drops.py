@@ -54,9 +54,7 @@ def drop_jobs(out: Path, methods: Sequence[Method], settings: Settings) -> list[
                 name=f"{REBOUNDS_FOLDER}.{safe_name(row.name)}.{method.name}",
                 function=drop_and_save,
                 folder=drop_folder(out, row, method),
-                key=store.result_key(
-                    "dynamics life", [row, how.fill, how.ground, how.simulate], []
-                ),
+                key=store.result_key("dynamics life", [row, how.fill, how.ground, how.simulate], []),
                 arguments={"row": row, "settings": how},
             )
             found.append(job)
@@ -68,9 +66,7 @@ def drop_folder(out: Path, row: MeasuredRebound, method: Method) -> Path:
     return out / REBOUNDS_FOLDER / safe_name(row.name) / method.name
 
 
-def drop_and_save(
-    folder: Path, progress: ProgressCallback, row: MeasuredRebound, settings: Settings
-) -> None:
+def drop_and_save(folder: Path, progress: ProgressCallback, row: MeasuredRebound, settings: Settings) -> None:
     """Drop one object, in the process of a worker."""
     progress(0.0, "dropping")
     store.write_json(folder / DROP_FILE, simulate_drop(row, settings))

@@ -10,8 +10,8 @@ from corporeal.core.audit_data import FLOOR_NAME, Outcome
 from corporeal.lab.evaluation.dynamics.run_measures import ObjectMeasures, RunMeasures
 
 PATH_TIME_AFTER_CONTACT_S = 0.2
-"""Paths count until so long after an object's first new contact [s]: small differences of a rebound
-part them from there on."""
+"""Paths count until so long after an object's first new contact [s]: small differences of a rebound part them from
+there on."""
 NEGLIGIBLE_SHAPE_ERROR = 1e-4
 """Shape errors below this are as good as none [-]."""
 MIN_DENT_DX = 1.0
@@ -23,8 +23,8 @@ class RunDifference:
     """Of a run from its reference; None where there is nothing to compare."""
 
     path: float
-    """Distance of the centres of mass, root mean square over time, over the object's diagonal; mean
-    over objects [-]."""
+    """Distance of the centres of mass, root mean square over time, over the object's diagonal; mean over objects
+    [-]."""
     contacts: float
     """Pairs that touched in both over pairs that touched in either (Jaccard), in [0, 1]."""
     delay: float | None
@@ -79,16 +79,10 @@ def compare_runs(run: RunMeasures, reference: RunMeasures) -> RunDifference:
     )
 
 
-def _path_distance(
-    run: RunMeasures, mine: ObjectMeasures, reference: RunMeasures, theirs: ObjectMeasures
-) -> float:
+def _path_distance(run: RunMeasures, mine: ObjectMeasures, reference: RunMeasures, theirs: ObjectMeasures) -> float:
     """Distance of one object's paths over its diagonal [-]."""
     time = np.array(reference.time)
-    until = min(
-        float(time[-1]),
-        run.time[-1],
-        _first_new_contact(reference, theirs) + PATH_TIME_AFTER_CONTACT_S,
-    )
+    until = min(float(time[-1]), run.time[-1], _first_new_contact(reference, theirs) + PATH_TIME_AFTER_CONTACT_S)
     time = time[time <= until + 1e-9]
     there = theirs.places[: len(time)]
     here = np.stack([np.interp(time, run.time, mine.places[:, axis]) for axis in range(3)], axis=1)
@@ -122,9 +116,7 @@ def _separation_agreement(mine: Outcome, theirs: Outcome) -> float | None:
 
 
 def _log_ratio(mine: float, theirs: float) -> float:
-    return abs(
-        float(np.log10(max(mine, NEGLIGIBLE_SHAPE_ERROR) / max(theirs, NEGLIGIBLE_SHAPE_ERROR)))
-    )
+    return abs(float(np.log10(max(mine, NEGLIGIBLE_SHAPE_ERROR) / max(theirs, NEGLIGIBLE_SHAPE_ERROR))))
 
 
 def _dents(mine: Outcome, theirs: Outcome) -> float | None:

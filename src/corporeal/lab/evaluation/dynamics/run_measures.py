@@ -92,9 +92,7 @@ def measure_run(folder: Path) -> RunMeasures:
         faults=(*breach_messages(audit), *passed),
         growth=audit.mechanical_growth,
         overlap_dx=audit.max_penetration_dx,
-        expectations=reject_expectations(
-            compare_with_expectations(made.scene.name, happened), audit
-        ),
+        expectations=reject_expectations(compare_with_expectations(made.scene.name, happened), audit),
         seconds=ran["simulate"] or 0.0,
         particles=audit.particles,
         steps=audit.steps,
@@ -103,9 +101,7 @@ def measure_run(folder: Path) -> RunMeasures:
     )
 
 
-def _body(
-    made: StageResults, number: int, rows: tuple[PartAudit, ...], library: str
-) -> ObjectMeasures:
+def _body(made: StageResults, number: int, rows: tuple[PartAudit, ...], library: str) -> ObjectMeasures:
     thing, particles = made.scene.objects[number], made.particles
     own = [k for k, part in enumerate(made.parts.catalogue) if part.object == number]
     mass = np.array([particles.mass_real[k] for k in own])
@@ -121,10 +117,7 @@ def _body(
         restitution=heaviest.restitution,
         groups=tuple(dict.fromkeys(_group(rows[k].material, library) for k in own)),
         laws=tuple(
-            dict.fromkeys(
-                "rigid body" if rows[k].treatment == "rigid" else rows[k].law.replace("_", " ")
-                for k in own
-            )
+            dict.fromkeys("rigid body" if rows[k].treatment == "rigid" else rows[k].law.replace("_", " ") for k in own)
         ),
     )
 

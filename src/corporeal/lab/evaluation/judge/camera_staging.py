@@ -82,12 +82,7 @@ class Staging:
             chosen = int(way.argmax())
         box = now[chosen] if np.isfinite(now[chosen]).all() else self.reel.boxes[0, chosen]
         fill = NO_CONTACT_FILL_FRACTION if close.contact is None else CONTACT_FILL_FRACTION
-        return fit_camera(
-            box[None, None],
-            PICTURE_SIZE_PX,
-            turn_about_vertical(self.view, LOOK_TURNS_DEG[look]),
-            fill,
-        )
+        return fit_camera(box[None, None], PICTURE_SIZE_PX, turn_about_vertical(self.view, LOOK_TURNS_DEG[look]), fill)
 
 
 def stage_scene(reference: SimulationResult) -> Staging:
@@ -149,9 +144,7 @@ def first_contacts(ledger: Ledger, objects: int) -> list[FirstContact]:
 def close_up_shots(found: list[FirstContact], end: float) -> tuple[CloseUpShot, ...]:
     """Look at the first two contacts just after they began, and at the end at what is left."""
     if not found:
-        return tuple(
-            CloseUpShot(end * (k + 1) / CLOSE_UP_PICTURES, None) for k in range(CLOSE_UP_PICTURES)
-        )
+        return tuple(CloseUpShot(end * (k + 1) / CLOSE_UP_PICTURES, None) for k in range(CLOSE_UP_PICTURES))
     first, second = found[0], found[min(1, len(found) - 1)]
     begun = min(first.time + CLOSE_UP_DELAY_S, end)
     then = min(second.time + (CLOSE_UP_DELAY_S if len(found) > 1 else 4 * CLOSE_UP_DELAY_S), end)

@@ -10,11 +10,11 @@ from corporeal.lab.evaluation.judge.video_motion import VideoMotion, object_diag
 MIN_YARDSTICK_RATIO = 2.0
 """A control must differ by more than so many times what a finer run does."""
 MIN_VISIBLE_PATH, MIN_VISIBLE_SHAPE = 0.02, 0.01
-"""Least difference that pictures can show, over an object's diagonal [-]: one or two pixels of an
-object 100 pixels wide."""
+"""Least difference that pictures can show, over an object's diagonal [-]: one or two pixels of an object 100 pixels
+wide."""
 COMPARED_AFTER_CONTACT_S = 0.2
-"""Draft and finer paths are compared until so long after an object's first contact [s]: from there
-on small differences of a rebound part them."""
+"""Draft and finer paths are compared until so long after an object's first contact [s]: from there on small differences
+of a rebound part them."""
 
 
 @dataclass(frozen=True)
@@ -65,16 +65,11 @@ def compare_motions(
     weight = counted / np.maximum(counted.sum(axis=0), 1)
     apart = np.linalg.norm(other.centres(times) - reference.centres(times), axis=-1) / size
     path = np.sqrt((apart**2 * weight).sum(axis=0))
-    changed = (
-        np.abs(principal_widths(other, times) - principal_widths(reference, times)).max(axis=-1)
-        / size
-    )
+    changed = np.abs(principal_widths(other, times) - principal_widths(reference, times)).max(axis=-1) / size
     return MotionDifference(float(path.max()), float((changed * counted).max()))
 
 
-def principal_widths(
-    video: VideoMotion, times: Float[np.ndarray, " T"]
-) -> Float[np.ndarray, "T B 3"]:
+def principal_widths(video: VideoMotion, times: Float[np.ndarray, " T"]) -> Float[np.ndarray, "T B 3"]:
     """Return standard deviations of every object's material along its principal axes [m]."""
     mass = video.prepared.particles.mass
     rows = []

@@ -12,12 +12,7 @@ from statistics import fmean
 import numpy as np
 from scipy.stats import beta
 
-from corporeal.lab.evaluation.judge.subquestions import (
-    MAX_MARK,
-    QuestionCatalogue,
-    Verdict,
-    question_catalogue,
-)
+from corporeal.lab.evaluation.judge.subquestions import MAX_MARK, QuestionCatalogue, Verdict, question_catalogue
 
 INTERVAL_LEVEL = 0.90
 """Of intervals [-]."""
@@ -112,8 +107,7 @@ def measure_detectability(
             both = [
                 (question_alarm(a, question), question_alarm(b, question))
                 for a, b in pairs
-                if question_alarm(a, question) is not None
-                and question_alarm(b, question) is not None
+                if question_alarm(a, question) is not None and question_alarm(b, question) is not None
             ]
             if both:
                 rows.append(_measure_detectability(control, question, np.array(both, dtype=float)))
@@ -143,16 +137,11 @@ def _measure_detectability(control: str, question: str, both: np.ndarray) -> Det
     )
 
 
-def trusted_questions(
-    rows: Sequence[Detectability], known: QuestionCatalogue | None = None
-) -> dict[str, list[str]]:
+def trusted_questions(rows: Sequence[Detectability], known: QuestionCatalogue | None = None) -> dict[str, list[str]]:
     """Return law of physics → questions that tell a control they are meant for; laws in order."""
     known = known or question_catalogue()
     telling = {r.question for r in rows if r.tells and r.meant}
-    return {
-        law: [q.id for q in known.question if q.law == law and q.id in telling]
-        for law in known.laws()
-    }
+    return {law: [q.id for q in known.question if q.law == law and q.id in telling] for law in known.laws()}
 
 
 # ---------------------------------------------------------------- methods
@@ -172,9 +161,7 @@ class MethodMark:
     """By drawing scenes with replacement, 90 %."""
 
 
-def method_mark(
-    videos: Sequence[VideoVerdict], method: str, group: str, questions: Sequence[str]
-) -> MethodMark | None:
+def method_mark(videos: Sequence[VideoVerdict], method: str, group: str, questions: Sequence[str]) -> MethodMark | None:
     """Mark a method by some questions; None: none of them applies to any of its videos.
 
     Args:
@@ -197,9 +184,7 @@ def method_mark(
 def bootstrap_interval(values: Sequence[float]) -> ConfidenceInterval:
     """Interval of a mean by drawing values with replacement, 90 %; equal input, equal result."""
     dice = np.random.default_rng(0)
-    means = np.array(values)[dice.integers(0, len(values), (BOOTSTRAP_DRAWS, len(values)))].mean(
-        axis=1
-    )
+    means = np.array(values)[dice.integers(0, len(values), (BOOTSTRAP_DRAWS, len(values)))].mean(axis=1)
     tail = 100 * (1 - INTERVAL_LEVEL) / 2
     low, high = np.percentile(means, [tail, 100 - tail])
     return ConfidenceInterval(float(low), float(high))

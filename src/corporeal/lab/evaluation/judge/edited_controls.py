@@ -1,7 +1,7 @@
 """Videos with one known fault, made from the reference: six by changing its motion.
 
-Frozen, reversed and slow change time; ghost, gain and glide change the motion of one object. The
-other four are simulated: see ``simulated_controls``.
+Frozen, reversed and slow change time; ghost, gain and glide change the motion of one object. The other four are
+simulated: see ``simulated_controls``.
 """
 
 from collections.abc import Callable

@@ -23,10 +23,7 @@ JPEG_QUALITY = 80
 
 
 def write_judge_page(
-    judged: JudgeVerdicts,
-    result: JudgeResult,
-    path: Path,
-    progress: Progress = lambda fraction, words: None,
+    judged: JudgeVerdicts, result: JudgeResult, path: Path, progress: Progress = lambda fraction, words: None
 ) -> None:
     """Write the page; ``PICTURES_PER_VIDEO`` pictures of every video's first look are rendered for it.
 
@@ -84,9 +81,7 @@ def _summary(judged: JudgeVerdicts) -> str:
 
 def _table(table: ResultTable) -> str:
     heads = "".join(f"<th>{escape_html(h)}</th>" for h in table.heads)
-    rows = "".join(
-        f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows
-    )
+    rows = "".join(f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows)
     return f"<h2>{escape_html(table.title)}</h2><table><tr>{heads}</tr>{rows}</table>"
 
 

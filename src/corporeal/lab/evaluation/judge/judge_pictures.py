@@ -44,9 +44,7 @@ class SequentialPictures(Sequence[np.ndarray]):
         return self._taken[number]
 
 
-def judge_pictures(
-    video: VideoMotion, staging: Staging, look: int
-) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
+def judge_pictures(video: VideoMotion, staging: Staging, look: int) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
     """Show a video: dated pictures, close-ups, and the diagram of its paths.
 
     Args:
@@ -63,22 +61,18 @@ def judge_pictures(
 
     def picture(time: float, camera: CameraAim, words: str) -> np.ndarray:
         posed = stage.posed(*video.cast.skin.pose(video.at(time)))
-        return video_overlay.draw_caption(
-            render_image(posed, camera, "draft", usable_cores()), words
-        )
+        return video_overlay.draw_caption(render_image(posed, camera, "draft", usable_cores()), words)
 
     dated = [
         partial(picture, time, wide, f"{number}   t = {time:.3f} s")
         for number, time in enumerate(staging.times.tolist(), 1)
     ]
-    close = [
-        partial(picture, c.time, staging.near(c, look), f"close   t = {c.time:.3f} s")
-        for c in staging.closes
-    ]
+    close = [partial(picture, c.time, staging.near(c, look), f"close   t = {c.time:.3f} s") for c in staging.closes]
     return SequentialPictures([*dated, *close, partial(path_diagram, video, staging, wide)])
 
 
 def pictures_description(look: int) -> str:
     """Describe in words how the pictures of a look are taken; recordings compare this."""
     size = f"{PICTURE_SIZE_PX[0]} x {PICTURE_SIZE_PX[1]}"
-    return f"{DATED_PICTURES} dated pictures, {CLOSE_UP_PICTURES} close-ups, paths; {size}; turned {LOOK_TURNS_DEG[look]:+g}°"
+    turned = f"turned {LOOK_TURNS_DEG[look]:+g}°"
+    return f"{DATED_PICTURES} dated pictures, {CLOSE_UP_PICTURES} close-ups, paths; {size}; {turned}"

@@ -126,6 +126,5 @@ def _agreed(reckoned: JudgingCost, config: JudgeConfig) -> None:
         return
     if reckoned.dollars is None or reckoned.dollars > CONFIRM_ABOVE_USD:
         raise UserError(
-            f"{price_words(reckoned, config)} Add --yes to confirm, or judge fewer: "
-            "--looks 1 --control-scenes 3."
+            f"{price_words(reckoned, config)} Add --yes to confirm, or judge fewer: --looks 1 --control-scenes 3."
         )

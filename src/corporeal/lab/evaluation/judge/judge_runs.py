@@ -5,12 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.dynamics.compared_methods import (
-    METHOD_NAMES,
-    OURS_NAME,
-    reference_folder,
-    run_folder,
-)
+from corporeal.lab.evaluation.dynamics.compared_methods import METHOD_NAMES, OURS_NAME, reference_folder, run_folder
 from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts, check_judging, query_judge
 from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig, SceneRuns, gather_videos
 from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, weigh_judge
@@ -27,9 +22,7 @@ class JudgedRuns:
     result: JudgeResult
 
 
-def judge_runs(
-    out: Path, config: JudgeConfig, say: Callable[[str], None], progress: Progress
-) -> JudgedRuns:
+def judge_runs(out: Path, config: JudgeConfig, say: Callable[[str], None], progress: Progress) -> JudgedRuns:
     """Judge all scenes of an evaluation; controls that are absent are simulated.
 
     Args:
@@ -57,15 +50,10 @@ def judged_scenes_in(out: Path) -> list[SceneRuns]:
 
     """
     folders = sorted(p for p in out.iterdir() if p.is_dir()) if out.is_dir() else []
-    scenes = [
-        _scene(out, p.name)
-        for p in folders
-        if (run_folder(out, p.name, OURS_NAME) / RUN_FILE).exists()
-    ]
+    scenes = [_scene(out, p.name) for p in folders if (run_folder(out, p.name, OURS_NAME) / RUN_FILE).exists()]
     if not scenes:
         raise UserError(
-            f"{out} holds no runs to judge: it has no SCENE/{OURS_NAME}. Make them with: corporeal "
-            "evaluate dynamics."
+            f"{out} holds no runs to judge: it has no SCENE/{OURS_NAME}. Make them with: corporeal evaluate dynamics."
         )
     return scenes
 

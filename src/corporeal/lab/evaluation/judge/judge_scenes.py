@@ -45,8 +45,7 @@ class JudgeConfig:
     record: Path | None = None
     """Folder where its answers are recorded, for replay:FOLDER."""
     looks: int = 1
-    """Times that each video is judged, each from another side and with questions in another order:
-    1 to 3.
+    """Times that each video is judged, each from another side and with questions in another order: 1 to 3.
     """
     control_scenes: int = DEFAULT_CONTROL_SCENES
     """Scenes of which controls are judged."""
@@ -118,10 +117,7 @@ def check_judging(config: JudgeConfig) -> None:
 
 
 def gather_videos(
-    scenes: Sequence[SceneRuns],
-    out: Path,
-    config: JudgeConfig,
-    progress: Progress = lambda fraction, words: None,
+    scenes: Sequence[SceneRuns], out: Path, config: JudgeConfig, progress: Progress = lambda fraction, words: None
 ) -> JudgedVideos:
     """Make all videos: read runs back, simulate and edit controls.
 
@@ -233,9 +229,7 @@ def _control(
     if control in scene.runs:  # also a method, so it was run
         return _read(scene, control, videos)
     try:
-        played = simulate_control(
-            control, scene.runs[REFERENCE_METHOD], folder / f"control-{control}"
-        )
+        played = simulate_control(control, scene.runs[REFERENCE_METHOD], folder / f"control-{control}")
     except UserError as error:
         videos.failed.append(FailedVideo(scene.name, control_name(control), str(error)))
         return None

@@ -16,11 +16,7 @@ from corporeal.lab.evaluation.judge.detectability import (
     trusted_questions,
 )
 from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts
-from corporeal.lab.evaluation.judge.judge_scenes import (
-    CONTROL_NAMES,
-    REFERENCE_METHOD,
-    control_name,
-)
+from corporeal.lab.evaluation.judge.judge_scenes import CONTROL_NAMES, REFERENCE_METHOD, control_name
 from corporeal.lab.evaluation.judge.subquestions import question_catalogue
 from corporeal.lab.evaluation.result_table import ResultTable
 
@@ -48,28 +44,18 @@ def weigh_judge(judged: JudgeVerdicts) -> JudgeResult:
     """Find what the judge can tell, and mark methods by that alone."""
     effective = {(e.scene, control_name(e.control)) for e in judged.videos.effects if e.effective}
     names = [control_name(c) for c in CONTROL_NAMES]
-    usable = [
-        v
-        for v in judged.verdicts
-        if v.condition not in names or (v.scene, v.condition) in effective
-    ]
-    rows = measure_detectability(
-        usable, REFERENCE_METHOD, dict(zip(CONTROL_NAMES, names, strict=True))
-    )
+    usable = [v for v in judged.verdicts if v.condition not in names or (v.scene, v.condition) in effective]
+    rows = measure_detectability(usable, REFERENCE_METHOD, dict(zip(CONTROL_NAMES, names, strict=True)))
     trusted = trusted_questions(rows)
     methods, all_questions = judged.videos.methods, [q for qs in trusted.values() for q in qs]
-    by_physics = [
-        method_mark(usable, m, law, qs) for law, qs in trusted.items() if qs for m in methods
-    ]
+    by_physics = [method_mark(usable, m, law, qs) for law, qs in trusted.items() if qs for m in methods]
     groups = judged.videos.groups
     return JudgeResult(
         rows=tuple(rows),
         believed=trusted,
         false_alarms={law: _false_alarms(usable, law) for law in trusted},
         by_law_of_physics=tuple(m for m in by_physics if m),
-        by_class=_grouped(
-            usable, methods, all_questions, {s: g.classes for s, g in groups.items()}
-        ),
+        by_class=_grouped(usable, methods, all_questions, {s: g.classes for s, g in groups.items()}),
         by_law=_grouped(usable, methods, all_questions, {s: g.laws for s, g in groups.items()}),
         wholes={m: w for m in methods if (w := _whole(usable, m)) is not None},
     )
@@ -91,9 +77,7 @@ def _grouped(
 
 def _false_alarms(videos: Sequence[VideoVerdict], law: str) -> float:
     asked = [q.id for q in question_catalogue().question if q.law == law]
-    given = [
-        f.alarm[q] for f in videos if f.condition == REFERENCE_METHOD for q in asked if q in f.alarm
-    ]
+    given = [f.alarm[q] for f in videos if f.condition == REFERENCE_METHOD for q in asked if q in f.alarm]
     return fmean(given) if given else 0.0
 
 
@@ -114,9 +98,7 @@ def judge_tables(judged: JudgeVerdicts, result: JudgeResult) -> list[ResultTable
         _marks("Methods by class of material", result.by_class),
         _marks("Methods by constitutive law", result.by_law),
         ResultTable(
-            "Not judged",
-            ("scene", "video", "why"),
-            [(f.scene, f.condition, f.reason) for f in judged.videos.failed],
+            "Not judged", ("scene", "video", "why"), [(f.scene, f.condition, f.reason) for f in judged.videos.failed]
         ),
     ]
 
@@ -127,9 +109,7 @@ def _laws(result: JudgeResult) -> ResultTable:
         for law, told in result.believed.items()
         for alarms in [result.false_alarms[law]]
     ]
-    return ResultTable(
-        "What this judge can tell", ("law of physics", "", "alarms on references"), rows
-    )
+    return ResultTable("What this judge can tell", ("law of physics", "", "alarms on references"), rows)
 
 
 def _controls(judged: JudgeVerdicts, result: JudgeResult) -> ResultTable:
@@ -163,12 +143,8 @@ def _telling_row(row: Detectability) -> tuple[str, ...]:
     )
 
 
-def _marks(
-    title: str, marks: Sequence[MethodMark], wholes: Mapping[str, float] | None = None
-) -> ResultTable:
-    rows = [
-        (m.group, m.method, str(m.scenes), f"{m.mark:.2f} {_interval(m.interval)}") for m in marks
-    ]
+def _marks(title: str, marks: Sequence[MethodMark], wholes: Mapping[str, float] | None = None) -> ResultTable:
+    rows = [(m.group, m.method, str(m.scenes), f"{m.mark:.2f} {_interval(m.interval)}") for m in marks]
     rows += [("whole mark, 1 to 5", m, "", f"{w:.2f}") for m, w in (wholes or {}).items()]
     return ResultTable(title, ("of", "method", "scenes", "without alarm, 90 %"), rows)
 

@@ -30,9 +30,7 @@ def _object(prepared: PreparedScene, k: int) -> str:
     low = 100 * float(mine[:, 2].min())
     place = "on the floor or on what is below it" if low < 1.0 else f"{low:.3g} cm above the floor"
     what = f"{thing.name} ({thing.class_name}), {sides} cm, {_mass(mass)}: {_made_of(prepared, k)}"
-    return f"{what}. It starts with its lowest point {place}, {_moving(thing.velocity)}." + _acts(
-        scene, k
-    )
+    return f"{what}. It starts with its lowest point {place}, {_moving(thing.velocity)}." + _acts(scene, k)
 
 
 def _made_of(prepared: PreparedScene, k: int) -> str:
@@ -70,14 +68,10 @@ def _acts(scene: Scene, k: int) -> str:
     thing, said = scene.objects[k], []
     if isinstance(thing.push, Push):
         said.append(
-            f"it is pushed with {_vector(thing.push.acceleration)} m/s² "
-            f"{_span(thing.push.start, thing.push.end)}"
+            f"it is pushed with {_vector(thing.push.acceleration)} m/s² {_span(thing.push.start, thing.push.end)}"
         )
     if isinstance(thing.wind, Wind):
-        said.append(
-            f"wind of {_vector(thing.wind.velocity)} m/s blows "
-            f"{_span(thing.wind.start, thing.wind.end)}"
-        )
+        said.append(f"wind of {_vector(thing.wind.velocity)} m/s blows {_span(thing.wind.start, thing.wind.end)}")
     if isinstance(thing.path, Keyframes):
         said.append("it is led along a prescribed path")
     return "".join(f" From outside, {words}." for words in said)

@@ -1,8 +1,7 @@
 """Controls that are simulated: the reference's own scene, with one fault.
 
-``single`` and ``capped`` are settings of the simulation; ``halfgravity`` is another scene;
-``wrong`` exchanges stiff and soft materials. Each is an ordinary run in a folder of its own, so
-what is finished is not done again.
+``single`` and ``capped`` are settings of the simulation; ``halfgravity`` is another scene; ``wrong`` exchanges stiff
+and soft materials. Each is an ordinary run in a folder of its own, so what is finished is not done again.
 """
 
 from collections.abc import Callable
@@ -48,13 +47,9 @@ def order_control(control: str, reference: Path, folder: Path) -> ControlRequest
     asked = run_pipeline.read_run_request(reference)
     settings = asked.settings
     if control == "single":
-        return ControlRequest(
-            asked.inputs, replace(settings, simulate=replace(settings.simulate, contact="single"))
-        )
+        return ControlRequest(asked.inputs, replace(settings, simulate=replace(settings.simulate, contact="single")))
     if control == "capped":
-        return ControlRequest(
-            asked.inputs, replace(settings, fill=replace(settings.fill, stiffness="capped"))
-        )
+        return ControlRequest(asked.inputs, replace(settings, fill=replace(settings.fill, stiffness="capped")))
     made = run_pipeline.read_run(reference)
     if control == "halfgravity":
         return ControlRequest([_lighter(made.scene, folder)], settings)
@@ -67,10 +62,7 @@ def order_control(control: str, reference: Path, folder: Path) -> ControlRequest
 
 
 def simulate_control(
-    control: str,
-    reference: Path,
-    folder: Path,
-    tell: run_pipeline.ProgressOfStage = run_pipeline.no_progress_of_stage,
+    control: str, reference: Path, folder: Path, tell: run_pipeline.ProgressOfStage = run_pipeline.no_progress_of_stage
 ) -> SimulationResult | None:
     """Simulate a control, or read it back where it is finished; None: it does not apply.
 
@@ -104,10 +96,7 @@ def exchange_materials(scene: Scene, parts: Parts, field: MaterialField) -> dict
             continue
         part = parts.catalogue[mine]
         of_object = said.setdefault(scene.objects[part.object].name, {"parts": {}})
-        of_object["parts"][part.name] = {
-            "material": field.materials[theirs].name,
-            "structure": "solid",
-        }
+        of_object["parts"][part.name] = {"material": field.materials[theirs].name, "structure": "solid"}
     return said
 
 

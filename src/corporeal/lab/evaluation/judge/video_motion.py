@@ -48,11 +48,7 @@ class VideoMotion:
 
     def sampled(self, times: Float[np.ndarray, " T"]) -> Float[np.ndarray, "T S 3"]:
         """Positions of a few particles of every object at some instants [m]."""
-        few = [
-            m[np.linspace(0, len(m) - 1, DIGEST_PARTICLES_PER_OBJECT).astype(int)]
-            for m in self.members
-            if len(m)
-        ]
+        few = [m[np.linspace(0, len(m) - 1, DIGEST_PARTICLES_PER_OBJECT).astype(int)] for m in self.members if len(m)]
         chosen = np.concatenate(few)
         return np.array([self.at(t).position[chosen] for t in times.tolist()], dtype=float)
 

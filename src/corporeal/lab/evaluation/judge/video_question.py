@@ -1,8 +1,7 @@
 """The question about one video after one look, and what asking it costs.
 
-It is named by a digest of the motion that it shows: an answer to another motion is never found, and
-nothing in it says which condition the video is of. The version in ``video.md`` covers the questions
-of ``questions.toml``, too.
+It is named by a digest of the motion that it shows: an answer to another motion is never found, and nothing in it says
+which condition the video is of. The version in ``video.md`` covers the questions of ``questions.toml``, too.
 """
 
 import hashlib
@@ -13,11 +12,7 @@ from importlib.resources import files
 import numpy as np
 
 from corporeal.lab.evaluation.judge.camera_staging import CLOSE_UP_PICTURES, DATED_PICTURES, Staging
-from corporeal.lab.evaluation.judge.judge_pictures import (
-    PICTURES_PER_LOOK,
-    judge_pictures,
-    pictures_description,
-)
+from corporeal.lab.evaluation.judge.judge_pictures import PICTURES_PER_LOOK, judge_pictures, pictures_description
 from corporeal.lab.evaluation.judge.subquestions import question_catalogue
 from corporeal.lab.evaluation.judge.video_motion import VideoMotion
 from corporeal.vlm import OnDemandPictures, Question
@@ -70,10 +65,7 @@ def video_question(video: VideoMotion, staging: Staging, told: str, look: int) -
         views=pictures_description(look),
         pictures=OnDemandPictures(lambda: judge_pictures(video, staging, look)),
         prompt_version=_template().version,
-        facts={
-            "told": told,
-            "questions": " ".join(question_catalogue().question[k].id for k in places),
-        },
+        facts={"told": told, "questions": " ".join(question_catalogue().question[k].id for k in places)},
     )
 
 
@@ -87,11 +79,7 @@ def question_order(name: str, look: int) -> list[int]:
 def prompt_text(told: str, places: list[int]) -> str:
     """Write the prompt."""
     asked = [question_catalogue().question[k] for k in places]
-    text = (
-        _template()
-        .text.replace("{count}", str(PICTURES_PER_LOOK))
-        .replace("{dated}", str(DATED_PICTURES))
-    )
+    text = _template().text.replace("{count}", str(PICTURES_PER_LOOK)).replace("{dated}", str(DATED_PICTURES))
     text = text.replace("{close}", str(CLOSE_UP_PICTURES)).replace("{facts}", told)
     return text.replace("{questions}", "\n".join(f"- {q.id}: {q.text}" for q in asked))
 
@@ -115,8 +103,7 @@ class JudgingCost:
 def estimate_cost(asked: list[VideoQuestion], model: str) -> JudgingCost:
     """Reckon what asking about videos costs, answers that are kept already included."""
     read = sum(
-        round(TOKENS_PER_CHARACTER * len(a.question.text)) + TOKENS_PER_PICTURE * PICTURES_PER_LOOK
-        for a in asked
+        round(TOKENS_PER_CHARACTER * len(a.question.text)) + TOKENS_PER_PICTURE * PICTURES_PER_LOOK for a in asked
     )
     written = TOKENS_PER_ANSWER * len(asked)
     return JudgingCost(len(asked), read + written, price_usd(model, read, written))
