@@ -1,58 +1,18 @@
 """`corporeal assets index | list | show | props`: pools of models that scenes are composed of."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
-import numpy as np
 import tyro
 
 from corporeal.cli.parse import parse, run_subcommand
 from corporeal.core.errors import UnknownChoiceError, UserError
 from corporeal.core.terminal import progress_bars, show_table
-from corporeal.core.types import Vector
-from corporeal.geometry.scene_transforms import move_scene, surfaces_bounding_box
-from corporeal.io.gltf.gltf_reader import read_glb
 from corporeal.pool.asset_pool import AssetPool, PoolAsset
-from corporeal.render.camera_placement import fit_camera
-from corporeal.render.contact_sheet import SheetTile, write_contact_sheet
-from corporeal.render.embree import render_image
-from corporeal.render.ray_scene import RayScene
-
-VIEW_DIRECTION: Vector = (0.6, -1.0, 0.45)
-"""Front view (-Y here, +Z in the file), slightly from the right and from above."""
-PICTURE_FILL_FRACTION = 0.9
-"""Share of a picture that an asset takes up."""
-
-
-def write_pool_contact_sheet(
-    assets: Sequence[PoolAsset], path: Path, size: int, progress: Callable[[float, str], None]
-) -> None:
-    """Write a PNG of all assets, ``size`` pixels each.
-
-    Raises:
-        BadFileError: An asset's file is missing or was changed.
-
-    """
-    tiles = []
-    for k, asset in enumerate(assets):
-        progress(k / len(assets), asset.name)
-        tiles.append(_tile(asset, size))
-    write_contact_sheet(tiles, path)
-
-
-def _tile(asset: PoolAsset, size: int) -> SheetTile:
-    scene = read_glb(asset.file, "one")
-    low, high = surfaces_bounding_box(scene.surfaces)
-    foot = np.array([*(low + high)[:2] / 2, low[2]])
-    camera = fit_camera(np.stack([low, high])[None, None] - foot, (size, size), VIEW_DIRECTION, PICTURE_FILL_FRACTION)
-    picture = render_image(RayScene(move_scene(scene, -foot)), camera, "draft")
-    facts = f"{asset.size} · {asset.triangles:,} triangles"
-    return SheetTile(picture, asset.name, (asset.class_name, facts, asset.licence))
-
 
 DEFAULT_POOL = Path("pool")
 Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
@@ -156,7 +116,7 @@ def _of_class(pool: AssetPool, class_name: str) -> Sequence[PoolAsset]:
 
 def _show() -> None:
     """Draw a contact sheet of a pool: every asset with its name, class and extent."""
-    from corporeal.cli.assets_command import write_pool_contact_sheet
+    from corporeal.cli.pool_contact_sheet import write_pool_contact_sheet
     from corporeal.pool.pool_index import read_pool
 
     @dataclass(frozen=True)

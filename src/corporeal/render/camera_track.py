@@ -4,7 +4,6 @@ Boxes are those of objects over time, nan where an object is absent or went far 
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -12,12 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from corporeal.core.types import Ledger, Vector
 from corporeal.render.camera_placement import CameraAim, fit_camera
-
-CameraShot = Literal["wide", "close", "follow"]
-"""wide: everything, all the time; close: what is struck first; follow: what moves."""
-ColourQuantity = Literal["material", "law", "object", "part", "young", "poisson", "density"]
-"""What parts can be coloured by."""
-
+from corporeal.render.video_choices import CameraShot
 
 SMOOTHING_STD_S = 0.12
 """A camera that moves with something follows a mean over this time [s, standard deviation]."""

@@ -21,7 +21,6 @@ from corporeal.core.types import MaterialField, Parts, Scene, Video
 from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.render import colours, video_file
 from corporeal.render.camera_placement import CameraAim, fit_camera
-from corporeal.render.camera_track import ColourQuantity
 from corporeal.render.embree import (
     MIN_BAND_ROWS,
     RAY_SAMPLING,
@@ -46,6 +45,7 @@ from corporeal.render.figure_legends import (
 from corporeal.render.kernels_hits import HitBuffer
 from corporeal.render.png_writer import write_png
 from corporeal.render.ray_scene import RayScene, StudioLight
+from corporeal.render.video_choices import ColourQuantity
 
 
 def render_recoloured(

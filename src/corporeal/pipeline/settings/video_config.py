@@ -6,7 +6,7 @@ from typing import Literal
 
 from corporeal.core.errors import UserError, check_range
 from corporeal.core.types import Vector
-from corporeal.render.camera_track import CameraShot, ColourQuantity
+from corporeal.render.video_choices import CameraShot, ColourQuantity
 
 MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.01, 100.0
 MAX_SLOW_MOTION_RATIO = 100.0
