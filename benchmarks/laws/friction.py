@@ -13,7 +13,7 @@ RUBBER = Stuff(young=1e6, poisson=0.3, density=1000.0)
 SLOPE = np.radians(30.0)
 NEAR, LOSS = 0.9, 0.3
 """Share of the friction that would hold a block, and its loss factor: without loss it shakes, and
-parts of it stick at times (decision restitution-measured)."""
+parts of it stick at times (decision restitution-pairs)."""
 HELD = 10.0
 """Friction that holds a slab to the floor."""
 SIZE = (0.2, 0.1, 0.1)

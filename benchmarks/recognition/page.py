@@ -37,7 +37,7 @@ errors in them had been seen (chocolate, cheese, air conditioner, the margin of 
 With the vocabulary as first written the third set had 57 % right and 9 % wrong, the fourth 44 % and
 3 %. Only names and surface values of these sets were available, so their truth is what such objects
 are commonly made of. Of 77 names of BEHAVIOR-1K's vocabulary that were held back 52 are known, none
-of them wrongly ([recognition decision](../decisions/recognition-vocabulary.md)).
+of them wrongly ([recognition decision](../decisions/recognition-names.md)).
 
 ## Masses by name
 

@@ -77,7 +77,7 @@ def restitution_at_speed(restitution: float, law: Float[np.ndarray, "5"], speed:
     """Restitution at the speed of an impact [-]: twin of ``Impact::bounce`` in contact.h.
 
     e = e_r (v/v_r)^(-q) - s (v - v_r), within bounds: q = 1/4 where a metal yields, a slope s where a rubber ball was
-    rated at two speeds (decision restitution-speed).
+    rated at two speeds (decision restitution-pairs).
 
     Args:
         restitution: e_r: at the law's speed [-].
