@@ -33,7 +33,7 @@ from corporeal.core.version import __version__
 Inputs = Annotated[
     tuple[Path, ...],
     tyro.conf.Positional,
-    tyro.conf.arg(metavar="SCENE ...", help="Models, photographs with poses, a splat, or a scene.toml."),
+    tyro.conf.arg(metavar="SCENE ...", help="Models, photographs, a video, a splat, or a scene.toml."),
 ]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help="The folder of a run.")]
 MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FILE")
@@ -41,10 +41,10 @@ MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FI
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Folder of the run."""
+    """Folder of the run, and resuming."""
 
     out: Path = Path("runs")
-    """Folder of all runs."""
+    """Parent folder; results are written to OUT/NAME."""
     name: str = ""
     """Name of the run's folder; by default the scene's name."""
     resume: bool = True
@@ -128,7 +128,7 @@ def command_materials() -> None:
     class Menu:
         words: tyro.conf.Positional[tuple[str, ...]] = ()
         library: str = "default"
-        """"default", "reference" (the 22 materials as first published), or the path of a TOML file."""
+        """Material library: "default", "reference" (22 materials as first published, a baseline), or a TOML file."""
 
     asked = parse(Menu, "materials", command_materials.__doc__)
     if not asked.words:

@@ -16,34 +16,35 @@ class DescribeConfig:
     """Recognition of parts and materials."""
 
     annotations: Path | None = None
-    """YAML file with materials of parts; it takes precedence over every other answer."""
+    """YAML file that states materials of parts; overrides --vlm and the file."""
     vlm: Annotated[str, ReadsPath(prefixes=("replay",))] = "metadata"
-    """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL", "google:MODEL", "ollama:MODEL",
-    or "openai:MODEL@http://host/v1" for any compatible server. "ask:FOLDER": you answer. "replay:FOLDER": recorded
-    answers."""
+    """Source of materials. "metadata": names and materials in the file, no model. "openai:MODEL", "anthropic:MODEL",
+    "google:MODEL", "ollama:MODEL", or "openai:MODEL@http://host/v1" for any compatible server. "ask:FOLDER": questions
+    are written to FOLDER and you answer them. "replay:FOLDER": answers recorded with --record."""
     critic: Annotated[str, ReadsPath(prefixes=("replay",))] = ""
-    """Model that ranks proposed decompositions into parts, as --vlm; "": the same model, or a cheaper one of
-    OpenAI's."""
+    """Model that ranks proposed decompositions into parts, written as for --vlm; by default "openai:gpt-5-mini" if
+    --vlm is openai:MODEL without a URL, else the model of --vlm."""
     record: Annotated[Path | None, WritesPath()] = None
     """Folder to record every answer in, for --vlm replay:FOLDER."""
     sampling: Literal["fraction", "value"] = "fraction"
-    """Ask a model for fractions of the measured ranges, or for values, which are then checked."""
+    """Ask the model for positions in the measured ranges (fraction, 0 to 1), or for values in physical units, checked
+    against these ranges (value)."""
     views: int = 4
-    """Number of views of each object, of 8 around it; one more shows its parts in colours."""
+    """Number of rendered views per object, chosen from 8 around it; one more view shows its parts in colours."""
     view_size: int = 512
     """Height and width of the views [px]."""
     view_seed: int = 0
     """Seed of the choice of views."""
     direct: bool = True
-    """Also ask a model, without the library, what is printed on each object and what it weighs. This reweights
-    hypotheses, and sets no value.
+    """Also ask the model for quantities printed on each object and a direct estimate of its mass. The answer only
+    reweights hypotheses.
     """
     answers: int = 1
-    """Number of answers to each question about materials, values and mass (self-consistency). Masses are pooled over
-    them with equal weights; parts are asked for once.
+    """Number of answers per question on materials, values and mass (self-consistency); masses are pooled with equal
+    weights. The question on parts is asked once.
     """
     parallel: int = 4
-    """Number of concurrent questions, in objects."""
+    """Number of objects asked about concurrently."""
 
 
 DEFAULT_DESCRIBE_CONFIG = DescribeConfig()

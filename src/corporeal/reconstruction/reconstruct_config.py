@@ -52,43 +52,50 @@ DEFAULT_RESOLUTION = ReconstructionResolution()
 
 @dataclass(frozen=True)
 class ReconstructConfig:
-    """Reconstruction from photographs or a splat; of a model only ``up`` is used."""
+    """Reconstruction from photographs, a video or a splat. For a model file only --up has an effect."""
 
     object_names: tuple[str, ...] = ()
-    """Names of the objects, the largest first, such as "armchair" "soda can"."""
+    """Names of the objects in the pictures or the splat, in order of decreasing size, such as "armchair" "soda can"; no
+    effect for model files."""
     count: int | None = None
-    """Number of objects; by default as many as --object-names names, else it is estimated."""
+    """Number of objects; by default that of --object-names, else from --vlm, instance masks or an estimate."""
     apart: SegmentationRule = "auto"
-    """What objects are segmented by; auto: instance masks where there are any, else appearance features and concavity
-    (look)."""
+    """How the scene is segmented into objects: by instance masks (masks), by appearance features and concavity (look),
+    or by connected components (components, a baseline); auto: masks where there are instance masks, else look."""
     masks: Annotated[str, ReadsPath(prefixes=tuple(MASKERS), names=(MASKS_AUTO, MASKS_NONE))] = "auto"
-    """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER" with weights of such a
-    model; auto: those beside the photographs, else grown from what all cameras look at; none: objects are what stands
-    on the floor."""
+    """Foreground masks: a folder of mask images; or "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER", where FOLDER
+    holds the weights of that model; auto: the masks beside the photographs, else masks grown from the region that all
+    cameras look at; none: grow no masks; without any beside the photographs, whatever stands on the floor is an
+    object."""
     up: UpAxisChoice = "auto"
-    """Axis of the file that points up, also of a mesh; auto: from the file or the cameras."""
+    """Up axis of the input file (photographs, splat or mesh); auto: as the file states, else estimated from the
+    cameras, else as usual for the format."""
     floor_at: float | None = None
-    """Height of the floor along the up axis, in the file's unit; by default a plane is fitted, or, where there is none,
-    the floor is put below the lowest object."""
+    """Height of the floor along the up axis [unit of the file]; by default a plane is fitted; if none is found, the
+    floor is placed below the lowest points."""
     metres_per_unit: float | None = None
-    """Length of one unit of the file [m]; by default it follows from the sizes of the objects."""
+    """Length of one unit of the file [m]; by default from --known-distance or --extent, else as a file in metres
+    states, else from the usual size of such objects."""
     known_distance: MeasuredDistance | None = None
-    """Two points of the file, x y z x y z, and their true distance [m]."""
+    """Two points in the file's coordinates and their true distance in metres: x1 y1 z1 x2 y2 z2 d."""
     training: Literal["preview", "draft", "normal"] = "normal"
-    """Length of training on photographs: seconds, about one minute, or four, on two cores."""
+    """Duration of training on two cores: preview: seconds; draft: about one minute; normal: about four minutes."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
-    """Rasteriser for training: numba on the processor, or gsplat on a CUDA GPU."""
+    """Rasteriser for training: numba on the CPU, or gsplat on a CUDA GPU."""
     semantic: EncoderSpec = "descriptor"
-    """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which needs no weights."""
+    """Image features used to match points with names of objects and parts: "clip", "clip:FOLDER" with weights in
+    FOLDER, or "descriptor": hand-crafted, no weights, and no matching with names."""
     structural: EncoderSpec = "descriptor"
-    """Features that parts are segmented by: "dinov2", "dinov2:FOLDER", or "descriptor"."""
+    """Image features used to segment parts: "dinov2", "dinov2:FOLDER" with weights in FOLDER, or "descriptor"
+    (hand-crafted, no weights)."""
     lifting: Literal["uplift", "back-projection", "radiance"] = "uplift"
     """How image features are lifted to points: to Gaussians by their blending weights (uplift) or by back-projection,
     or to points of a radiance field, which is then trained as well."""
     force: bool = False
-    """Continue where objects are as large as the room, or photographs are reproduced badly."""
+    """Continue where reconstruction would stop because its result looks unusable (wrong poses, incomplete views,
+    objects as large as the room, held-out photographs reproduced badly)."""
     training_seed: int = 0
-    """Seed of all random numbers."""
+    """Random seed of reconstruction."""
     resolution: Annotated[ReconstructionResolution, NoOption()] = DEFAULT_RESOLUTION
     """Sizes of pictures and grids."""
 

@@ -12,25 +12,27 @@ class AssembleConfig:
     """How files become a scene."""
 
     objects: Literal["auto", "one", "nodes"] = "auto"
-    """Grouping of a file into objects: the nodes that state a class, else the pieces that touch no other or are named
-    as objects of their own (auto); the whole file (one); every branch below the root (nodes).
+    """How a model file is split into objects. auto: one object per node that states a class; without any, per connected
+    group of touching pieces, where two pieces named as objects stay apart. one: the whole file is one object.
+    nodes: each branch below the root is one object.
     """
     stack: bool = False
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
-    """Raise each object above what it stands on by this many times its own size."""
+    """Initial clearance of each object above its support, as a multiple of its own size."""
     lift: tuple[str, ...] = ()
-    """Raise an object above where it stands, such as "duck=0.5" [m]."""
+    """Raise one object by a height, such as "duck=0.5" [m]."""
     velocity: tuple[str, ...] = ()
     """An object's initial velocity, such as "duck=1,0,-2" [m/s]."""
     extent: tuple[str, ...] = ()
-    """Largest real extent of an object, such as "duck=0.1" [m]."""
+    """Longest side of the real object's bounding box, such as "duck=0.1" [m]."""
     unit: LengthUnit = "auto"
-    """Length of one unit of a mesh file; auto: as stated, else what its size makes likely."""
+    """Length of one unit of a mesh file; auto: as the file states, else the unit that gives a plausible size."""
     working_extent: float | None = None
     """Scale the whole scene so that its largest extent is this [m]."""
     duration: float | None = None
-    """Simulated time [s]; by default from the scene file, else long enough for all falls."""
+    """Simulated time [s]; by default from the scene file, else three times the longest fall plus 1 s (at most 3 s), and
+    until the last force ends."""
     fps: int | None = None
     """Frames per second of the video; by default from the scene file, else 30."""
 

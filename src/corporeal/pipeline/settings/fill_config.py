@@ -11,11 +11,12 @@ class FillConfig:
     """How objects are filled with material points."""
 
     detail: Literal["draft", "normal", "fine"] = "draft"
-    """Spatial resolution and step budget; the only setting of accuracy."""
+    """Resolution of the simulation grid and limit on the number of time steps."""
     stiffness: Literal["true", "capped"] = "true"
-    """Young's moduli as measured, or capped by the published rule (a control only)."""
+    """true: measured Young's moduli, as far as the limit on time steps allows; capped: moduli capped so that a fixed
+    time step is stable, a baseline for comparison."""
     seed: int = 0
-    """Seed of all random numbers."""
+    """Random seed of measuring and filling objects."""
 
 
 def validate(config: FillConfig) -> None:

@@ -16,14 +16,15 @@ class GroundConfig:
     """Sources of material values."""
 
     library: Annotated[str, ReadsPath(names=SHIPPED_LIBRARIES)] = "default"
-    """"default", "reference" (the 22 materials as first published), or the path of a TOML file."""
+    """Material library: "default", "reference" (22 materials as first published, a baseline), or a TOML file."""
     floor: str = "concrete"
     """Material of the floor and the walls, for friction and restitution."""
     neutral: str = "plastics-PP"
-    """Material assumed for parts of unknown material."""
+    """Material assumed for parts of unknown material; plastics-PP is polypropylene."""
     field: Annotated[str, ReadsPath(prefixes=FIELD_FILES)] = ""
-    """Material values of another method: vomp:PATH, pixie:PATH or table:PATH.csv (a file of the scene, or a folder with
-    one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs.
+    """Material parameters from another method: vomp:PATH, pixie:PATH or table:PATH.csv (one file for the scene, or a
+    folder with one file per object); one[:E=2e6,nu=.4,rho=200] for the same values everywhere; omniphysgs for the
+    constants in its code (E 2 MPa, ν 0.4, ρ 1000 kg/m³).
     """
 
 

@@ -7,7 +7,7 @@ from corporeal.core.errors import check_range
 
 @dataclass(frozen=True)
 class SegmentConfig:
-    """Part segmentation of objects from pictures; a model's parts are its nodes and materials."""
+    """Part segmentation of objects reconstructed from pictures. Parts of a model file are its nodes and materials."""
 
     position_weight: float = 0.3
     """Weight of position relative to appearance features; 0: position is not used."""

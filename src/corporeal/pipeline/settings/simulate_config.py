@@ -11,19 +11,19 @@ from corporeal.mpm.problem import BodySplittingEngine, InteractiveEngine
 
 @dataclass(frozen=True)
 class SimulateConfig:
-    """Solver settings; none of them changes material values."""
+    """Solver settings."""
 
     engine: Literal["cpu", "cuda", "reference"] = DEFAULT_ENGINE
-    """cpu: the fast engine; cuda: the same on a CUDA GPU; reference: NumPy in double precision, slow, which the others
-    are tested against.
+    """cpu: compiled, multi-threaded; cuda: the same method on an NVIDIA GPU; reference: NumPy in double precision,
+    slow, for verification.
     """
     contact: Literal["multi", "single"] = "multi"
     """multi: one velocity field per object, with friction between them; single: one shared
     field, a control in which touching objects stick together.
     """
     breaking: bool = False
-    """Break brittle objects that are struck with ten times the energy they withstand; else a warning says what would
-    break.
+    """Simulate fracture of brittle objects where the impact energy exceeds ten times E₅₀, the energy that breaks half
+    of such objects; otherwise a warning names the objects that would break.
     """
 
 

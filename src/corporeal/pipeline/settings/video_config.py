@@ -17,19 +17,19 @@ class VideoConfig:
     """Camera, size and quality of the video."""
 
     width: int = 1280
-    """[px]"""
+    """Width of the video [px]."""
     height: int = 720
-    """[px]"""
+    """Height of the video [px]."""
     quality: Literal["draft", "normal", "fine"] = "draft"
-    """Rays per pixel; draft reuses static pixels, and casts more at edges."""
+    """Rays per pixel; draft reuses the background where no object affects it, and supersamples edges."""
     speed: float = 1.0
-    """Playback speed; 1: real time, 0.25: four times slower."""
+    """Playback speed; 1: real time, 0.25: quarter speed."""
     view: Vector | None = None
-    """Direction from the scene to the camera; None: where objects occlude each other least."""
+    """Direction from the scene to the camera; by default one in which objects hide little of each other."""
     stills: bool = False
     """Also keep every frame as PNG."""
     look: Literal["surfaces", "gaussians"] | None = None
-    """What is rendered; None: Gaussians where the scene was reconstructed, else surfaces."""
+    """What is rendered; by default Gaussians where the scene was reconstructed, else surfaces."""
     colour_by: Literal["itself", "speed"] | ColourQuantity = "itself"
     """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
     shot: CameraShot = "wide"
@@ -37,9 +37,9 @@ class VideoConfig:
     camera tracks what moves.
     """
     slow: float = 1.0
-    """Slow-motion factor about the first contact."""
+    """Slow-motion factor around the first contact: 1 is none, 4 is four times slower."""
     caption: bool = True
-    """Write the time into the picture."""
+    """Overlay the simulated time."""
 
 
 def validate(config: VideoConfig) -> None:
