@@ -86,10 +86,9 @@ def test_a_finished_run_stays_fresh_whatever_lies_in_the_working_directory(tmp_p
     run([path], tmp_path / "run", Settings(), tell, until="fill")
     assert done
     done.clear()
-    values = {v for f in fields(Settings) for v in asdict(getattr(Settings(), f.name)).values()}
-    for value in values | {"cpu"}:
-        if isinstance(value, str) and value:
-            Path(value).write_text("in the way")
+    values = [v for f in fields(Settings) for v in asdict(getattr(Settings(), f.name)).values()]
+    for value in {"cpu", *(v for v in values if isinstance(v, str) and v)}:
+        Path(value).write_text("in the way")
     run([path], tmp_path / "run", Settings(), tell, until="fill")
     assert not done
     for f in fields(Settings):

@@ -131,7 +131,7 @@ def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
     ):
         with pytest.raises(UserError, match=word):
             live._do(Command("add", thing=thing, point=SPOT, to=(0.0, 0.0, 0.1)))
-    with pytest.raises(UserError, match="no room"):
+    with pytest.raises(UserError, match="no space"):
         live.hands.obey(Command(RECORDED_ADD, thing=THING, point=(0.7, 0.0, 0.03), to=(0.0, 0.0, 0.1)))
     assert len(live.hands.engine.problem.bodies) == 2 and live.hands.touches == []
     live._both(1 / 60)

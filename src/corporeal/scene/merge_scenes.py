@@ -91,7 +91,7 @@ def _merged_particles(here: FilledScene, b: Particles) -> Particles:
     a, whole = here.particles, here.whole
     objects, parts, count = len(whole.scene.objects), len(whole.parts.catalogue), a.count
     rows = ("position", "velocity", "volume", "density", "surface", "curvature", "face")
-    rows += ("wetted", "wetted_normal")
+    rows += ("wetted_point", "wetted_normal")
     both = {name: np.concatenate([getattr(a, name), getattr(b, name)]) for name in rows}
     for name in ("object", "object_of_surface", "object_of_wetted"):
         both[name] = np.append(getattr(a, name), getattr(b, name) + objects)
