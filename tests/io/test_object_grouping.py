@@ -30,7 +30,7 @@ def test_what_touches_nothing_is_an_object_whatever_it_is_called(tmp_path):
     assert [o.real_extent for o in scene.objects] == pytest.approx([2, 1])
     assert [s.object for s in scene.surfaces] == [0, 0, 1]
     (said,) = scene.hints
-    assert "scene.glb was taken for 2 objects (cube_0, sphere_0)" in said
+    assert "scene.glb was split into 2 objects (cube_0, sphere_0)" in said
     assert "--objects one" in said
 
 

@@ -39,7 +39,7 @@ def kept(engine):
 
 
 def test_a_step_of_one_body_is_four_launches_and_one_with_contact_eleven():
-    assert card.launches(flying().program._step) == ["scatter", "divide", "gather", "finish"]
+    assert card.launches(flying().program._step) == ["scatter", "momentum_to_velocity", "gather", "finish_step"]
     names = card.launches(engine_of(HEAP).program._step)
     assert len(names) == 11 and len(set(names)) == 11
 
@@ -48,7 +48,7 @@ def test_rigid_bodies_add_four_launches_and_a_round_of_impacts_is_six():
     stone = ball((0, 0, 0.1))
     run = CudaEngine(problem(body(stone, rigid=True, surface=stone)), device="cpu").program
     names = card.launches(run._step)
-    assert {"list_surface", "force_rigid", "advance", "follow"} < set(names) and len(names) == 15
+    assert {"list_surface", "force_rigid", "advance_rigid", "place_rigid_particles"} < set(names) and len(names) == 15
     assert len(card.launches(run._impact)) == 6 and len(card.launches(run._sweep)) == 3
 
 

@@ -84,5 +84,5 @@ def test_what_flows_keeps_its_own_pressure():
 def test_a_law_that_there_is_not_is_refused_with_the_menu(number):
     body = box((0, 0, 0), (0.04,) * 3, 0.01)
     body.law[:] = number
-    with pytest.raises(SimulationError, match=rf"unknown law {number}, .*0 \(corotated\)"):
+    with pytest.raises(SimulationError, match=rf"unknown law {number}\. .*0 \(corotated\)"):
         MaterialTable.of(problem(body, cell=0.02))

@@ -200,7 +200,7 @@ def test_what_holds_for_every_question_ends_the_run(step, match):
 
 def test_no_server_at_all_is_said_plainly():
     model = OpenAIClient("fake-model@http://127.0.0.1:9/v1", QUICK)
-    with pytest.raises(UserError, match=r"Nobody answers at http://127\.0\.0\.1:9/v1"):
+    with pytest.raises(UserError, match=r"There is no answer from http://127\.0\.0\.1:9/v1"):
         model.ask(ASKED, Colours, check)
 
 
@@ -208,7 +208,7 @@ def test_ollama_is_looked_for_where_it_usually_listens_or_where_the_environment_
     monkeypatch.delenv("OLLAMA_BASE_URL", raising=False)
     assert str(OllamaClient("llava").model.base_url).startswith("http://localhost:11434/v1")
     monkeypatch.setenv("OLLAMA_BASE_URL", "http://127.0.0.1:9/v1")
-    with pytest.raises(UserError, match=r"Nobody answers at http://127\.0\.0\.1:9/v1"):
+    with pytest.raises(UserError, match=r"There is no answer from http://127\.0\.0\.1:9/v1"):
         OllamaClient("llava", QUICK).ask(ASKED, Colours, check)
 
 
@@ -277,7 +277,7 @@ def test_only_one_file_needs_the_package():
     source = Path(corporeal.__file__).parent
     needing = [p.name for p in source.rglob("*.py") if "import pydantic_ai" in p.read_text()]
     needing += [p.name for p in source.rglob("*.py") if "from pydantic_ai" in p.read_text()]
-    assert needing == ["provider.py"]
+    assert needing == ["api_clients.py"]
 
 
 def test_without_the_package_the_way_to_install_it_is_said(monkeypatch):

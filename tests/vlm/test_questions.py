@@ -71,11 +71,11 @@ def open_ware_and_covers_have_a_word(w):
 
 
 def build_hangs_on_the_material(w):
-    return {"material", "built", "contents"} <= w.fields("MaterialsAnswer", "Way")
+    return {"material", "built", "contents"} <= w.fields("MaterialsAnswer", "PartHypothesis")
 
 
 def parts_and_air_have_a_word(w):
-    solidity = "solidity" in w.fields("MaterialsAnswer", "Way")
+    solidity = "solidity" in w.fields("MaterialsAnswer", "PartHypothesis")
     return solidity and '"packed": many pieces and air' in w["materials"]
 
 

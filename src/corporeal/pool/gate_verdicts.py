@@ -111,7 +111,7 @@ def judge_file(file: Path, key: str, gate: GateConfig, pool: Path) -> GateVerdic
     except Exception as mistake:  # ours; one file must not end the work on all others
         place = traceback.extract_tb(mistake.__traceback__)[-1]
         what = f"{type(mistake).__name__} at {Path(place.filename).name}:{place.lineno}: {mistake}"
-        return GateVerdict(key, f"a mistake of ours ({what})", class_name=words)
+        return GateVerdict(key, f"internal error ({what})", class_name=words)
 
 
 def _accepted_verdict(file: Path, key: str, m: GatedModel, pool: Path) -> GateVerdict:

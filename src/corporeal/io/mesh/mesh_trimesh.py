@@ -203,7 +203,7 @@ def read_obj(path: Path) -> RawMesh:
     return RawMesh(
         *_finished_meshes(scene, _object_and_material),
         up="+z" if z_up else None,
-        up_note="+z is up, as a comment in it says; --up y takes another." if z_up else "",
+        up_note="+z is up, as its comment states; override with --up." if z_up else "",
         lost=tuple(looks.lost),
     )
 

@@ -93,7 +93,7 @@ class TransformsFrame:
         turn = matrix[:3, :3]
         rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) and np.linalg.det(turn) > 0
         if not rigid or not np.allclose(matrix[3], (0, 0, 0, 1)):
-            self.fail("'transform_matrix' is not a rigid transform.", "It must neither scale.")
+            self.fail("'transform_matrix' is not a rigid transform.", "It must neither scale, shear nor mirror.")
         if not np.allclose(turn @ turn.T, np.eye(3), atol=1e-9):
             matrix[:3, :3] = nearest_rotation(turn)
         return matrix @ OPENCV_FROM_OPENGL
