@@ -247,7 +247,7 @@ def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_
     settings = SETTINGS | {"ground": {"library": str(own)}}
     run = tmp_path / "runs" / made.scenes[0].name
     store.write_json(run / "run.json", {"inputs": [], "settings": settings})
-    with pytest.raises(UserError, match=rf"{made.scenes[0].name} was run with .*own\.toml.* back"):
+    with pytest.raises(UserError, match=rf"{made.scenes[0].name} was run with .*own\.toml.*Restore the library"):
         collect_results(tmp_path)
     own.write_text(
         '[steel]\ngroup = "mineral"\nlaw = "von_mises"\n'

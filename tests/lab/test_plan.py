@@ -1,5 +1,6 @@
 """A plan is balanced in everything it draws, and follows from the pool and the seed alone."""
 
+import os
 import subprocess
 import sys
 from collections import Counter
@@ -11,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import corporeal
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.lab.corpus.corpus_plan import (
     CorpusConfig,
@@ -136,13 +138,14 @@ def test_another_process_plans_the_same_and_the_order_of_the_pool_is_no_matter()
     made = plan_corpus(pool(20), CorpusConfig(seed=5))
     assert plan_corpus(pool(20)[::-1], CorpusConfig(seed=5)) == made
     assert plan_corpus(pool(20), CorpusConfig(seed=6)).scenes != made.scenes
+    paths = [Path(__file__).parent, Path(corporeal.__file__).parents[1]]
     told = subprocess.run(
         [sys.executable, "-c", PRINT, "5"],
         capture_output=True,
         text=True,
         check=True,
         cwd=Path(__file__).parent,
-        env={"PYTHONHASHSEED": "77", "PYTHONPATH": str(Path(__file__).parent)},
+        env={"PYTHONHASHSEED": "77", "PYTHONPATH": os.pathsep.join(map(str, paths))},
     )
     assert told.stdout.strip() == repr(made.scenes)
 

@@ -102,7 +102,7 @@ def test_two_pieces_seen_from_one_side_are_believed_if_somebody_said_two(monkeyp
     solid = ClosedSurface(np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((8, 3)), np.zeros(8, int), 0.1)
     taken = GaussianScene(ONE, masks=np.ones((len(views), 6, 8), np.bool_))
     found = FoundObjects(taken, NOTHING, ObjectSurfaces((solid, solid), np.zeros(1, int), np.zeros(0, int)))
-    for other in ("not_worth", "unlike_masks"):
+    for other in ("boxes_rejection_reason", "overlap_rejection_reason"):
         monkeypatch.setattr(stage, other, lambda *_, **__: None)
     monkeypatch.setattr(
         "corporeal.reconstruction.surface.reconstruction_acceptance.widest_unseen_angle", lambda _: 200.0

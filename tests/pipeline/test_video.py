@@ -111,7 +111,7 @@ def test_a_video_has_all_frames_and_any_browser_plays_it(tmp_path):
     data = made.path.read_bytes()
     assert data.find(b"moov") < data.find(b"mdat"), "a browser wants the index first"
     assert told == sorted(told) and told[-1] == 1.0
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["video.mp4", "thumbnail.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["thumbnail.png", "video.mp4"]
     assert np.asarray(Image.open(tmp_path / "thumbnail.png")).shape == (96, 128, 3)
 
 

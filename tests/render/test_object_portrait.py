@@ -68,7 +68,7 @@ def test_the_bytes_by_which_answers_are_cached_do_not_depend_on_the_number_of_co
     thing = scene(block(0, 0, (0, 0, 0)), block(0, 1, (0.2, 0.3, 1), 0.4))
     taken = []
     for count in (1, 4):
-        for room in ("portrait", "embree"):
-            monkeypatch.setattr(f"corporeal.render.{room}.cores", lambda n=count: n)
+        for module in ("object_portrait", "embree"):
+            monkeypatch.setattr(f"corporeal.render.{module}.usable_cores", lambda n=count: n)
         taken.append(render_portraits(thing, [0, 1], PortraitOptions(2, 256)))
     assert all(np.array_equal(a, b) for a, b in zip(*taken, strict=True))

@@ -181,7 +181,7 @@ def test_grown_masks_are_learned_from_again_without_what_no_other_photograph_sho
     assert len({name for _, name in given}) == times, "neither is learned anew when run again"
     assert np.array_equal(given[-1][0], ~strange if times == 2 else np.ones_like(strange))
     assert np.array_equal(made.masks, given[-1][0])
-    said = any("1.6% of what masks hold shows in 2 of 3 photographs" in s for s in made.statements)
+    said = any("1.6% of what masks hold is in 2 of 3 photographs" in s for s in made.statements)
     assert said == (times == 2)
     made = take(grown=False)
     assert np.all(made.masks) and len(given) == 1, "masks that somebody gave are right"

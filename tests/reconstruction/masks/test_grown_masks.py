@@ -182,7 +182,7 @@ def test_the_command_says_how_to_go_on(grown, tmp_path, monkeypatch, capsys):
     shutil.copytree(made.folder, out)
     assert type_in(monkeypatch, "masks", photos, "--out", out) == 0
     told = capsys.readouterr().out.replace("\n", " ")
-    assert f"Look at {out / MASK_FOLDERS[0]}." in told, "they lie there"
+    assert f"Check {out / MASK_FOLDERS[0]}." in told, "they lie there"
     assert f"corporeal run {photos} --masks {out}" in told
 
 
