@@ -23,10 +23,13 @@ QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [
 FACES = np.array([t for a, b, c, d in QUADS for t in ([a, b, c], [a, c, d])])
 SIMULATE = """
 import sys
+from functools import partial
 from pathlib import Path
-from corporeal.simulation import checkpoint
+from corporeal.pipeline.stages import simulate
 from corporeal.pipeline.run_pipeline import Settings, run
-checkpoint.MIN_INTERVAL_S, checkpoint.MAX_WRITE_TIME_FRACTION = 0.05, 1.0
+from corporeal.simulation.checkpoint import CheckpointConfig, Checkpoints
+often = CheckpointConfig(min_interval_s=0.05, max_write_time_fraction=1.0)
+simulate.Checkpoints = partial(Checkpoints, config=often)
 silent = lambda fraction, words: None
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
 slow_to_import = {"trimesh", "networkx", "matplotlib", "scipy.cluster", "torch", "pydantic_ai"}

@@ -23,11 +23,14 @@ from corporeal.simulation.trajectory_files import frame_path
 
 RUN = """
 import sys
+from functools import partial
 from pathlib import Path
 from corporeal.lab.evaluation.dynamics.dynamics_jobs import run_and_measure
 from corporeal.pipeline.run_pipeline import Settings
-from corporeal.simulation import checkpoint
-checkpoint.MIN_INTERVAL_S, checkpoint.MAX_WRITE_TIME_FRACTION = 0.05, 1.0
+from corporeal.pipeline.stages import simulate
+from corporeal.simulation.checkpoint import CheckpointConfig, Checkpoints
+often = CheckpointConfig(min_interval_s=0.05, max_write_time_fraction=1.0)
+simulate.Checkpoints = partial(Checkpoints, config=often)
 run_and_measure(Path(sys.argv[2]), lambda f, w: None, Path(sys.argv[1]), Settings())
 """
 PATIENCE = 600.0

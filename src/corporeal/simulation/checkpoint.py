@@ -18,10 +18,6 @@ from corporeal.core.errors import BadFileError
 from corporeal.simulation.trajectory_files import frame_path, read_arrays, write_arrays
 
 CHECKPOINT_FILE, PREVIOUS_CHECKPOINT_FILE = "checkpoint.npz", "checkpoint-before.npz"
-MIN_INTERVAL_S = 10.0
-"""Minimum computing time between two checkpoints [s]."""
-MAX_WRITE_TIME_FRACTION = 0.05
-"""Maximum share of the time spent on writing them."""
 STATE_PREFIX = "engine."
 
 log = logging.getLogger(__name__)
