@@ -101,7 +101,7 @@ MIN_ARC_COMPONENT = 0.1
 MAX_ARC_ANGLE_RAD = 1.57
 """Nothing stands for a surface that looks farther aside from its own normal than this [rad]."""
 FACET_ROW = 11
-"""Numbers of a rigid body's flat face: see ``physics/facets.py``."""
+"""Numbers of a rigid body's flat face: see ``physics/flat_facets.py``."""
 FACET_MIN_NORMAL_COSINE, FACET_MAX_HEIGHT_RATIO = 0.9998, 0.02
 """Points of one flat face have normals with at least this cosine [-], and differ in height by less than this, over how
 far it goes on from each [-]."""

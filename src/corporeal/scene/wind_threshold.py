@@ -3,8 +3,8 @@
 Wind pressure on objects at rest.
 
 With u the velocity of the air and θ the angle between u and a face's inward normal, the pressure is ½ ρ_air C u² cos³θ
-where cos θ > 0, and nothing in the lee (Hoerner 1965; see ``mpm/wind.py``, which does the same for faces in motion and
-imports nothing of the project: a test holds the two equal).
+where cos θ > 0, and nothing in the lee (Hoerner 1965; see ``mpm/physics/wind_pressure.py``, which does the same for
+faces in motion and imports nothing of the project: a test holds the two equal).
 """
 
 from dataclasses import dataclass

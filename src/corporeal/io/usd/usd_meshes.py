@@ -2,13 +2,12 @@
 
 What UsdPhysics says of bodies and their material comes along (``usd_bodies.py``).
 
-Facts: OpenUSD 26.11, UsdGeom (mesh, subset, primvar, stage metrics), UsdShade (UsdPreviewSurface). A layer, and a
-picture, must lie in the file's own folder, or in the package itself.
+Shapes that USD states by numbers (cube, sphere, capsule, cone, cylinder, plane) become triangles. A layer, and an
+image, must lie in the folder of the file, or in the package itself.
 
-Shapes that USD states by numbers (a cube, a sphere …) as triangles.
-
-Facts: OpenUSD 26.11, UsdGeom: ``size``, ``radius``, ``height``, ``axis``; a capsule's height is that of its cylinder
-alone, all stand about the origin, a cone's tip points along its axis.
+Source: OpenUSD 26.11, UsdGeom (mesh, subset, primvar, stage metrics; ``size``, ``radius``, ``height``, ``axis``: the
+height of a capsule is that of its cylinder, all are centred at the origin, the tip of a cone points along its axis),
+UsdShade (UsdPreviewSurface).
 """
 
 # pyright: reportAttributeAccessIssue=false, reportOptionalMemberAccess=false

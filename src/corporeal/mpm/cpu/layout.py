@@ -156,7 +156,7 @@ BODY_LOAD_RECORD = NativeRecord(  # uniform accelerations of a body
     ("double[3]", "push"),
     ("double", "start end"),
     ("double *", "rigid"),
-    ("double *", "path"),  # prescribed motion: see physics/prescribed.py
+    ("double *", "path"),  # prescribed motion: see physics/prescribed_motion.py
     ("double[3]", "arm"),  # of the centre at the start from the path's first place
     ("int", "field first last"),  # first and last row of the field's materials
     ("int", "paths"),  # rows of the path; 0: it moves freely
@@ -221,7 +221,7 @@ TETHER_RECORD = NativeRecord(  # particles of a field on springs to a rigid body
 JOINT_RECORD = NativeRecord(  # two rigid bodies: arms in their own frames
     "Joint", ("double *", "first second"), ("double[3]", "arm_first arm_second"), ("double", "stiffness damping lost")
 )
-GRIP_RECORD = NativeRecord(  # a spring from a body to a point outside: see physics/grips.py
+GRIP_RECORD = NativeRecord(  # a spring from a body to a point outside: see physics/spring_grips.py
     "Grip",
     ("double *", "share rigid impulse"),
     ("double[3]", "arm target"),

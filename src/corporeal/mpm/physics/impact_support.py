@@ -1,4 +1,4 @@
-"""Support of a rigid body during an impact: twin of formulas/backing.h.
+"""Support of a rigid body during an impact: twin of formulas/impact_support.h.
 
 A body between what strikes it and what it rests on is squeezed at once where it is light, or where the contact behind
 is the wider one: its own vibration between the two contacts is then much quicker than the impact, so that both contacts
