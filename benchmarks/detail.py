@@ -58,7 +58,7 @@ def stuff(material: Material, treatment: Discretization) -> Stuff:
     """Join what a treatment says with what it leaves as it is."""
     return Stuff(
         law=material.law,
-        young=treatment.simulated_young_pa,
+        young_pa=treatment.simulated_young_pa,
         poisson=treatment.poisson,
         density=treatment.density,
         friction_angle=material.friction_angle or 0.0,
@@ -73,7 +73,7 @@ def drop(material: Material, detail: DetailLevel, diameter: float = 0.1) -> tupl
     place, down = (0.0, 0.0, diameter / 2), (0.0, 0.0, -speed)
     thing = ball(place, diameter / 2, cell / 2, "blue", stuff=matter, velocity=down)
     run = started(problem(thing, cell=cell, planes=[floor()], friction=0.5))
-    lasts = diameter / speed * (speed / np.sqrt(matter.young / matter.density)) ** 0.4 + 0.01
+    lasts = diameter / speed * (speed / np.sqrt(matter.young_pa / matter.density)) ** 0.4 + 0.01
     height, least, rebound = np.ptp(run.snapshot().position[:, 2]), np.inf, 0.0
     for k in range(40):
         run.advance(lasts * (k + 1) / 40)
@@ -86,7 +86,7 @@ def drop(material: Material, detail: DetailLevel, diameter: float = 0.1) -> tupl
 def collapse(detail: DetailLevel, radius: float = 0.1) -> tuple[float]:
     """Run-out of 98 % of a sand column over its radius [-]; E = 1 MPa, φ = 30°, base .6."""
     dry = grains.SAND
-    sand = Material("sand", dry.law, dry.young, dry.poisson, dry.density)
+    sand = Material("sand", dry.law, dry.young_pa, dry.poisson, dry.density)
     sand = replace(sand, friction_angle=dry.friction_angle, cohesion=0.0)
     _, cell = planned(sand, (radius, 2 * radius, 2 * radius), np.pi / 4, 1.0, detail)
     column = cylinder_sdf((0.0, 0.0, radius / 2), radius, radius)

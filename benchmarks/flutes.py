@@ -63,12 +63,12 @@ def beam(start: np.ndarray, end: np.ndarray, stretch: float, bend: float) -> np.
     return turn.T @ local @ turn
 
 
-def young_across(flute: Flute, young: float, thickness: float) -> float:
+def young_across(flute: Flute, young_pa: float, thickness: float) -> float:
     """Modulus of a layer of flutes, pressed together [Pa].
 
     Args:
         flute: Which.
-        young: Of the paper [Pa].
+        young_pa: Of the paper [Pa].
         thickness: Of the paper [m].
 
     """
@@ -78,7 +78,7 @@ def young_across(flute: Flute, young: float, thickness: float) -> float:
     whole = np.zeros((3 * len(x), 3 * len(x)))
     for k in range(BEAMS):
         own = slice(3 * k, 3 * k + 6)
-        whole[own, own] += beam(points[k], points[k + 1], young * thickness, young * thickness**3 / 12)
+        whole[own, own] += beam(points[k], points[k + 1], young_pa * thickness, young_pa * thickness**3 / 12)
     shift = np.zeros(len(whole))
     shift[-2] = -1.0  # the upper crest comes down by one
     free = slice(3, len(whole) - 3)
@@ -95,9 +95,9 @@ def crush(weight: float) -> float:
 def main() -> None:
     """Print both for the usual weights."""
     paper = materials.find_material("paper").ranges
-    young, density = paper["young"].typical, paper["density"].typical
+    young_pa, density = paper["young_pa"].typical, paper["density"].typical
     for weight in WEIGHTS:
-        across = [young_across(f, young, weight / density) / 1e6 for f in FLUTES]
+        across = [young_across(f, young_pa, weight / density) / 1e6 for f in FLUTES]
         named = ", ".join(f"{f.name} {e:.1f}" for f, e in zip(FLUTES, across, strict=True))
         print(f"{1e3 * weight:.0f} g/m2: crushed at {crush(weight) / 1e3:.0f} kPa, {named} MPa")
 

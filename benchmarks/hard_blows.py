@@ -58,17 +58,17 @@ class Blow:
     def strike(self) -> tuple[float, int]:
         """Return the speed after over that before [-], and the steps that it took."""
         cell = 2.0 * self.radius / self.cells
-        young = self.density * self.speed**2 / self.hardness
+        young_pa = self.density * self.speed**2 / self.hardness
         shift, fill = np.zeros(3), "lattice"
         if self.seed is not None:
             shift, fill = np.random.default_rng(self.seed).uniform(0.0, 1.0, 3), "blue"
         place = shift * cell + (0.0, 0.0, self.radius + LIFTED * cell)
-        stuff = Stuff(young=young, poisson=self.poisson, density=self.density, loss=self.loss)
+        stuff = Stuff(young_pa=young_pa, poisson=self.poisson, density=self.density, loss=self.loss)
         velocity = (0.0, 0.0, -self.speed)
         given = {"fill": fill, "stuff": stuff, "velocity": velocity}
         thing = ball(tuple(place), self.radius, cell / 2, **given)
         run = load_backend("engine", "cpu", ENGINES)(problem(thing, cell=cell, planes=(FLOOR,)))
-        dent = hertz_dent_of_ball(young, self.poisson, self.density, self.speed) * self.radius
+        dent = hertz_dent_of_ball(young_pa, self.poisson, self.density, self.speed) * self.radius
         lasts, now = TOUCHES * dent / self.speed, run.measure()
         while run.time < 20.0 * lasts:
             run.advance(run.time + lasts / 20.0)

@@ -149,7 +149,7 @@ def _counts() -> str:
     """Return how well founded the numbers are."""
     counts = {"read": 0, "recalled": 0, "ours": 0}
     for entry in library().values():
-        for field in ("young", "poisson", "density", "yield_stress"):
+        for field in ("young_pa", "poisson", "density", "yield_stress"):
             if field in entry.ranges:
                 keys = entry.ranges[field].source.split("+")
                 checks = [source_table()[k]["check"] for k in keys]
@@ -228,8 +228,8 @@ def _ratings() -> list[str]:
 def _layered() -> list[str]:
     lines = ["| material | E across | crushed at | source |", "|---|---:|---:|---|"]
     for name, row in layered_materials().items():
-        young, crush = f"{1e-6 * row.young_across_pa:g} MPa", f"{1e-3 * row.crush_pa:g} kPa"
-        lines.append(f"| {name} | {young} | {crush} | {row.source} |")
+        young_pa, crush = f"{1e-6 * row.young_across_pa:g} MPa", f"{1e-3 * row.crush_pa:g} kPa"
+        lines.append(f"| {name} | {young_pa} | {crush} | {row.source} |")
     return lines
 
 

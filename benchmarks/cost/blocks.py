@@ -13,7 +13,7 @@ from corporeal.mpm.problem import Body, Plane, Problem
 
 CELL = 1.0 / 64.0
 """[m]"""
-YOUNG, POISSON, DENSITY = 1e5, 0.3, 1000.0
+YOUNG_PA, POISSON, DENSITY = 1e5, 0.3, 1000.0
 """[Pa], [-], [kg/m³]"""
 SPEED = 1.0
 """Along the floor [m/s]."""
@@ -92,7 +92,7 @@ def _body(drop: Drop, name: str, place: np.ndarray) -> Body:
         volume=one * (CELL / 2) ** 3,
         density=one * DENSITY,
         law=np.full(len(points), drop.law.value),
-        young=one * YOUNG,
+        young_pa=one * YOUNG_PA,
         poisson=one * POISSON,
         yield_stress=one * 100.0,
         hardening=one * 0.0,

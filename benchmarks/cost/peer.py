@@ -7,7 +7,7 @@ import tempfile
 import venv
 from pathlib import Path
 
-from cost.blocks import CELL, DENSITY, HEIGHT, POISSON, SPEED, STEP, YOUNG, Drop
+from cost.blocks import CELL, DENSITY, HEIGHT, POISSON, SPEED, STEP, YOUNG_PA, Drop
 from cost.contest import Cost
 
 SCRIPT = Path(__file__).parent.parent / "peers" / "genesis_block.py"
@@ -41,7 +41,7 @@ class Peer:
             drop: Corotated, one object, on the CPU.
 
         """
-        words = (drop.threads, drop.across, CELL, STEP, YOUNG, POISSON, DENSITY, SPEED, HEIGHT)
+        words = (drop.threads, drop.across, CELL, STEP, YOUNG_PA, POISSON, DENSITY, SPEED, HEIGHT)
         self.complaints = tempfile.TemporaryFile("w+")
         self.process = subprocess.Popen(
             [str(python_of(folder)), str(SCRIPT), *(str(word) for word in words)],

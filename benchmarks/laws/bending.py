@@ -8,7 +8,7 @@ from laws.bodies import DOWN, G, Stuff, body, box, bricks, floor, problem
 from laws.outcome import Outcome, relative
 from laws.watching import crossing, follow, started
 
-BEAM = Stuff(young=2e7, poisson=0.3, density=1000.0)
+BEAM = Stuff(young_pa=2e7, poisson=0.3, density=1000.0)
 LENGTH, HEIGHT = 0.48, 0.06
 
 
@@ -27,11 +27,11 @@ class Cantilever:
 
         δ = 3 ρ g L⁴ / 2 E h² + ρ g L² / (2 · 5/6 · G);  f = (1.875²/2π) √(E I / ρ A L⁴)
         """
-        shear = stuff.young / (2 * (1 + stuff.poisson))
+        shear = stuff.young_pa / (2 * (1 + stuff.poisson))
         weight = stuff.density * G
-        bent = 3 * weight * length**4 / (2 * stuff.young * height**2)
+        bent = 3 * weight * length**4 / (2 * stuff.young_pa * height**2)
         sheared = weight * length**2 / (2 * 5 / 6 * shear)
-        speed = np.sqrt(stuff.young / (12 * stuff.density)) * height / length**2
+        speed = np.sqrt(stuff.young_pa / (12 * stuff.density)) * height / length**2
         return cls(bent + sheared, 1.8751**2 / (2 * np.pi) * float(speed))
 
 

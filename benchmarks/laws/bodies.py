@@ -23,7 +23,7 @@ class Stuff:
     """A material; soft rubber unless said otherwise."""
 
     law: Law = Law.NEO_HOOKEAN
-    young: float = 1e5
+    young_pa: float = 1e5
     poisson: float = 0.3
     density: float = 1000.0
     yield_stress: float = 1e3
@@ -40,7 +40,7 @@ class Stuff:
     def p_wave_modulus(self) -> float:
         """λ + 2μ [Pa]."""
         nu = self.poisson
-        return self.young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+        return self.young_pa * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
 
 
 RUBBER = Stuff()
@@ -68,9 +68,18 @@ def body(
     n = len(points)
     numbers = {
         name: np.full(n, float(getattr(stuff, name)))
-        for name in ("density", "young", "poisson", "yield_stress", "hardening", "friction_angle", "cohesion", "loss")
+        for name in (
+            "density",
+            "young_pa",
+            "poisson",
+            "yield_stress",
+            "hardening",
+            "friction_angle",
+            "cohesion",
+            "loss",
+        )
     }
-    shear = stuff.young / (2 * (1 + stuff.poisson))
+    shear = stuff.young_pa / (2 * (1 + stuff.poisson))
     extent = max(float(np.ptp(points, axis=0).max()), 1e-30)
     numbers["vibration"] = np.full(n, np.pi * np.sqrt(shear / stuff.density) / extent)
     if stuff.law is Law.FLUID:

@@ -166,7 +166,7 @@ def discs(cells: int, angle: float = 0.0, contact: str = "multi", transfer: str 
 
     """
     radius, cell = 0.2, 0.2 / cells
-    stuff = Stuff(young=1e3, poisson=0.3, density=1000.0)
+    stuff = Stuff(young_pa=1e3, poisson=0.3, density=1000.0)
     axis = np.array([np.cos(np.radians(angle)), 0.0, np.sin(np.radians(angle))])
     centre = OFF_GRID * cell * (1, 0, 1) + (0, cell, 0)
     sides = [
@@ -266,7 +266,7 @@ class Hertz:
         force at half its peak is integrated.
         """
         mass = stuff.density * 4 / 3 * np.pi * radius**3 / 2
-        modulus, curved = stuff.young / (1 - stuff.poisson**2) / 2, radius / 2
+        modulus, curved = stuff.young_pa / (1 - stuff.poisson**2) / 2, radius / 2
         depth = (15 * mass * speed**2 / (16 * modulus * np.sqrt(curved))) ** 0.4
         stiff = 4 / 3 * modulus * np.sqrt(curved)
         x = np.linspace(0.5 ** (2 / 3), 1, 200_001) * depth
@@ -276,7 +276,7 @@ class Hertz:
         return cls(float(depth), float(2.943 * depth / speed), float(stiff * depth**1.5), float(width))
 
 
-SPHERE, SPEED, RADIUS = Stuff(young=1e5, poisson=0.3, density=1000.0), 0.2, 0.2
+SPHERE, SPEED, RADIUS = Stuff(young_pa=1e5, poisson=0.3, density=1000.0), 0.2, 0.2
 
 
 def spheres(cells: int, fill: str = "blue", transfer: str = "flip") -> Collision:

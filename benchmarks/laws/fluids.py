@@ -80,10 +80,10 @@ class Tank:
         axes = [(np.arange(round(s / h)) + 0.5) * s / round(s / h) for s in size]
         points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         given = self.liquid
-        young, poisson = elastic_moduli(bulk_modulus(given.density, self.speed))
+        young_pa, poisson = elastic_moduli(bulk_modulus(given.density, self.speed))
         stuff = Stuff(
             law=Law.FLUID,
-            young=young,
+            young_pa=young_pa,
             poisson=poisson,
             density=given.density,
             yield_stress=sqrt(3.0) * given.yield_shear,

@@ -9,7 +9,7 @@ from laws.bodies import G, Stuff, ball, ball_surface, box, disc, floor, problem,
 from laws.outcome import Check, Outcome, absolute, relative
 from laws.watching import follow, started
 
-RUBBER = Stuff(young=1e6, poisson=0.3, density=1000.0)
+RUBBER = Stuff(young_pa=1e6, poisson=0.3, density=1000.0)
 SLOPE = np.radians(30.0)
 NEAR, LOSS = 0.9, 0.3
 """Share of the friction that would hold a block, and its loss factor: without loss it shakes, and

@@ -12,7 +12,9 @@ from laws.watching import started
 
 REPOSE = 30.0
 """Friction angle φ [degrees]."""
-SAND = Stuff(law=Law.DRUCKER_PRAGER, young=1e6, poisson=0.3, density=1500.0, friction_angle=float(np.radians(REPOSE)))
+SAND = Stuff(
+    law=Law.DRUCKER_PRAGER, young_pa=1e6, poisson=0.3, density=1500.0, friction_angle=float(np.radians(REPOSE))
+)
 ROUGH = 0.6
 """Friction of the floor: tan 31°, as rough as the sand."""
 LUBE = 1.24

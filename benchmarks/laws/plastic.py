@@ -9,7 +9,7 @@ from laws.bodies import Stuff, cylinder, floor, problem
 from laws.outcome import Outcome, absolute, relative
 from laws.watching import started
 
-COPPER = Stuff(law=Law.VON_MISES, young=117e9, poisson=0.35, density=8930.0, yield_stress=400e6, hardening=100e6)
+COPPER = Stuff(law=Law.VON_MISES, young_pa=117e9, poisson=0.35, density=8930.0, yield_stress=400e6, hardening=100e6)
 LENGTH, RADIUS, SPEED, TIME = 32.4e-3, 3.2e-3, 227.0, 80e-6
 
 

@@ -9,7 +9,7 @@ from laws.bodies import DOWN, G, Stuff, box, box_surface, floor, problem
 from laws.outcome import Check, Outcome, absolute, relative
 from laws.watching import History, started, watch
 
-RUBBER = Stuff(young=1e6, poisson=0.3, density=1000.0)
+RUBBER = Stuff(young_pa=1e6, poisson=0.3, density=1000.0)
 RAMP = 0.1
 """Time in which gravity grows [s]: a sudden weight would make what is soft bounce."""
 SIDE, CELL = 0.1, 0.025

@@ -52,7 +52,7 @@ def turned_at_once(law: Law, count: int = 1000) -> Turned:
 
 def turning_body(law: Law, build, time: float) -> Turned:
     """Let a small block spin freely; ρ ω² R² / E is 2e-8."""
-    stuff = Stuff(law=law, young=1e5, poisson=0.3, density=1000.0, yield_stress=1e4)
+    stuff = Stuff(law=law, young_pa=1e5, poisson=0.3, density=1000.0, yield_stress=1e4)
     block = box((0.003, 0.007, 0.005), (0.06, 0.04, 0.04), CELL / 2, stuff=stuff, spin=tuple(SPIN))
     run = build(problem(block, cell=CELL))
     run.advance(time)

@@ -9,8 +9,8 @@ from laws.bodies import DOWN, G, Stuff, box, floor, problem, walls
 from laws.outcome import Check, Outcome, relative
 from laws.watching import Path, crossing, follow, started
 
-FOAM = Stuff(young=2.5e5, poisson=0.35, density=30.0)
-STEEL = Stuff(young=3e7, poisson=0.3, density=7850.0)
+FOAM = Stuff(young_pa=2.5e5, poisson=0.35, density=30.0)
+STEEL = Stuff(young_pa=3e7, poisson=0.3, density=7850.0)
 """Stiff enough beside foam where it has to be deformable."""
 HELD = 10.0
 """Friction that holds foam to the floor."""
@@ -101,7 +101,7 @@ def heavy_in_space(quick: bool = False) -> Outcome:
 # ---------------------------------------------------------------- case 13
 
 
-COLUMN = Stuff(law=Law.COROTATED, young=1e5, poisson=0.3, loss=0.2)
+COLUMN = Stuff(law=Law.COROTATED, young_pa=1e5, poisson=0.3, loss=0.2)
 """Confined, this law is linear at any strain: P = (λ + 2μ) (F - 1)."""
 
 

@@ -12,7 +12,7 @@ from laws.watching import started
 
 STEEL = Stuff(density=7850.0)
 GLASS = Stuff(density=2500.0)
-FOAM = Stuff(young=3e4, poisson=0.2, density=50.0)
+FOAM = Stuff(young_pa=3e4, poisson=0.2, density=50.0)
 
 # ---------------------------------------------------------------- case 18
 

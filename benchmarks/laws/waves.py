@@ -8,10 +8,10 @@ from laws.bodies import Stuff, box, problem
 from laws.outcome import Check, Outcome, at_least, relative
 from laws.watching import crossing, follow, half_width, started
 
-YOUNG, DENSITY = 1e6, 1000.0
-SOUND = float(np.sqrt(YOUNG / DENSITY))
+YOUNG_PA, DENSITY = 1e6, 1000.0
+SOUND = float(np.sqrt(YOUNG_PA / DENSITY))
 """[m/s]"""
-BAR = Stuff(young=YOUNG, poisson=0.0, density=DENSITY)
+BAR = Stuff(young_pa=YOUNG_PA, poisson=0.0, density=DENSITY)
 RING_TARGETS = {20: (1.2, 0.80), 40: (0.33, 0.963), 80: (0.07, 0.994)}
 """Per cells along the bar: error of the period [%], share of the energy left after 10 periods."""
 REBOUND_TARGETS = {20: 0.8, 40: 0.9}

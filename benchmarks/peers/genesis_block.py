@@ -1,6 +1,6 @@
 """The block drop in genesis-world; runs in an environment of its own, one batch per line asked.
 
-    python genesis_block.py THREADS ACROSS CELL STEP YOUNG POISSON DENSITY SPEED HEIGHT
+    python genesis_block.py THREADS ACROSS CELL STEP YOUNG_PA POISSON DENSITY SPEED HEIGHT
 
 Prints one line once it is ready, with the number of particles; then, for each line of standard
 input that asks for so many substeps, the seconds that they took.
@@ -20,7 +20,7 @@ os.dup2(2, 1)  # what the engine prints is no answer
 
 import genesis as gs  # noqa: E402
 
-YOUNG, POISSON, DENSITY, SPEED, HEIGHT = (float(word) for word in sys.argv[5:10])
+YOUNG_PA, POISSON, DENSITY, SPEED, HEIGHT = (float(word) for word in sys.argv[5:10])
 PER_CALL = 10
 """Substeps that one call of the engine takes."""
 
@@ -43,7 +43,7 @@ scene = gs.Scene(
     show_viewer=False,
 )
 block = scene.add_entity(
-    material=gs.materials.MPM.Elastic(E=YOUNG, nu=POISSON, rho=DENSITY, sampler="regular", model="corotation"),
+    material=gs.materials.MPM.Elastic(E=YOUNG_PA, nu=POISSON, rho=DENSITY, sampler="regular", model="corotation"),
     morph=gs.morphs.Box(pos=(0.0, 0.0, margin + HEIGHT + size / 2), size=(size, size, size)),
 )
 scene.build()

@@ -15,16 +15,16 @@ PUSH = 1e-3
 """Fastest point over the speed of sound [-]: strains are small."""
 
 
-def bar(law: int, young: float, density: float) -> co.Problem:
+def bar(law: int, young_pa: float, density: float) -> co.Problem:
     """Pose a free bar that does not bulge (ν = 0), all of whose points move in its slowest mode."""
     axes = [CELL * (np.arange(0.25, n, 0.5) - n / 2) for n in (LENGTH, WIDTH, WIDTH)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     one, none = np.ones(len(points)), np.zeros(len(points))
     mode = np.sin(np.pi * points[:, 0] / (LENGTH * CELL))
-    velocity = PUSH * np.sqrt(young / density) * mode[:, None] * [1.0, 0.0, 0.0]
+    velocity = PUSH * np.sqrt(young_pa / density) * mode[:, None] * [1.0, 0.0, 0.0]
     numbers = dict.fromkeys(("poisson", "yield_stress", "hardening"), none)
     numbers |= dict.fromkeys(("friction_angle", "cohesion", "loss", "vibration"), none)
-    numbers |= {"young": young * one, "density": density * one, "volume": CELL**3 / 8 * one}
+    numbers |= {"young_pa": young_pa * one, "density": density * one, "volume": CELL**3 / 8 * one}
     laws = np.full(len(points), law)
     body = co.Body(name="bar", position=points, velocity=velocity, law=laws, **numbers)
     alone = np.zeros((1, 1))
@@ -34,9 +34,9 @@ def bar(law: int, young: float, density: float) -> co.Problem:
 def swing(material: str, build: Callable[[co.Problem], co.Engine]) -> dict[str, float]:
     """Return the quarter period over L/2c, and the energy that is stored then over the motion's."""
     entry = co.material(material)
-    young, density = entry.ranges["young"].typical, entry.ranges["density"].typical
-    problem = bar(entry.law.value, young, density)
-    run, quarter = build(problem), 0.5 * LENGTH * CELL / np.sqrt(young / density)
+    young_pa, density = entry.ranges["young_pa"].typical, entry.ranges["density"].typical
+    problem = bar(entry.law.value, young_pa, density)
+    run, quarter = build(problem), 0.5 * LENGTH * CELL / np.sqrt(young_pa / density)
     mode, start = problem.bodies[0].velocity[:, 0], run.measure().kinetic[0]
     times, speed, stored = quarter * np.linspace(0.8, 1.2, 9), [], []
     for time in times:

@@ -69,7 +69,7 @@ def test_a_report_plays_from_a_file_and_a_click_opens_the_card(report, tmp_path)
         tab.press("Escape")
         tab.until("document.querySelector('.picked').textContent === ''")
         # Colours change what is seen, and the key says what they mean.
-        for by, word in (("stress", "von Mises"), ("young", "Young"), ("speed", "speed")):
+        for by, word in (("stress", "von Mises"), ("young_pa", "Young"), ("speed", "speed")):
             tab.run(f"viewer.by.value = '{by}', viewer.paint('{by}')")
             tab.until(f"viewer.legend.textContent.includes('{word}')")
         tab.until("!viewer.dirty")

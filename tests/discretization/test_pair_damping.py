@@ -43,7 +43,7 @@ def soft_loss(parts, motions, floor=STEEL):
 def test_two_alike_share_a_blow_and_the_stiffer_takes_less():
     assert compliance_share(SOFT, LOSSY) == pytest.approx(0.5)
     assert contact_loss_factor(SOFT, LOSSY) == pytest.approx(0.3)
-    assert compliance_share(replace(SOFT, young=1.2e7), LOSSY) == pytest.approx(0.25)
+    assert compliance_share(replace(SOFT, young_pa=1.2e7), LOSSY) == pytest.approx(0.25)
     assert compliance_share(SOFT, STEEL) + compliance_share(STEEL, SOFT) == pytest.approx(1.0)
 
 
@@ -73,11 +73,11 @@ def test_all_else_keeps_the_very_loss_of_its_material(parts, motions, floor):
     assert soft_loss(parts, motions, floor) == SOFT.loss
 
 
-def mat(young=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
+def mat(young_pa=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
     return Discretization(
         kind=kind,
-        young_pa=young,
-        simulated_young_pa=young,
+        young_pa=young_pa,
+        simulated_young_pa=young_pa,
         poisson=0.5,
         density=1000.0,
         yield_stress=None,

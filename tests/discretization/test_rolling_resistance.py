@@ -23,7 +23,7 @@ def material(name):
 
 def test_a_ball_of_rubber_on_steel_by_hand():
     """a³ = 3 N R/(4 E*), α = 1 - e², c = 3/16 α a: of what is stiff nothing is left."""
-    soft = replace(material("rubber"), young=3e6, poisson=0.5, loss=0.1)
+    soft = replace(material("rubber"), young_pa=3e6, poisson=0.5, loss=0.1)
     a = (0.75 * 0.32 * 0.01 * 0.75 / 3e6) ** (1 / 3)
     e = np.exp(-1.385 * 0.1 + 0.133 * 0.01)
     found = rolling_resistance_length(BALL, soft, material("hardened_steel"))
@@ -31,7 +31,7 @@ def test_a_ball_of_rubber_on_steel_by_hand():
 
 
 def test_a_cylinder_of_rubber_by_hand():
-    soft = replace(material("rubber"), young=3e6, poisson=0.5, loss=0.1)
+    soft = replace(material("rubber"), young_pa=3e6, poisson=0.5, loss=0.1)
     a = np.sqrt(4 * 0.32 * 0.01 * 0.75 / 3e6 / (np.pi * 0.05))
     e = np.exp(-1.385 * 0.1 + 0.133 * 0.01)
     roller = RollingBody(radius=0.01, weight=0.32, length=0.05)

@@ -174,7 +174,7 @@ def test_a_thickened_wall_keeps_its_mass_its_folding_moment_and_the_stiffness_of
 
 def test_a_wall_that_cannot_yield_keeps_its_bending_stiffness():
     (duck,) = plan_discretization([DUCK], [FALL], "draft").treatments
-    assert duck.simulated_young_pa * duck.thickness**3 == pytest.approx(RUBBER.young * 0.002**3)
+    assert duck.simulated_young_pa * duck.thickness**3 == pytest.approx(RUBBER.young_pa * 0.002**3)
 
 
 def test_cloth_is_not_pulled_to_pieces_and_stays_limp():
@@ -201,12 +201,12 @@ def test_rubber_keeps_its_shear_modulus_when_its_bulk_is_capped():
     (ball,) = plan_discretization([sphere(tyre, 0.5)], [FALL], "fine").treatments
     assert ball.poisson == 0.49
     shear = ball.simulated_young_pa / (2 * (1 + ball.poisson))
-    assert shear == pytest.approx(tyre.young / (2 * (1 + tyre.poisson)))
+    assert shear == pytest.approx(tyre.young_pa / (2 * (1 + tyre.poisson)))
 
 
 def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
     copper = Material("copper", Law.VON_MISES, 110e9, 0.35, 8940.0, yield_stress=20e6)
-    plaster = replace(copper, name="plaster", young=5e9, yield_stress=2e6)
+    plaster = replace(copper, name="plaster", young_pa=5e9, yield_stress=2e6)
     parts = [sphere(m, 0.1, number=k) for k, m in enumerate((FOAM, RUBBER, plaster, copper))]
     # Long enough to bend: a ball of metal would be marked too deeply, and be rigid.
     parts[2:] = [replace(p, size=(0.1, 0.1, 0.21)) for p in parts[2:]]
@@ -233,7 +233,7 @@ def test_what_the_step_budget_would_let_sag_is_rigid_where_that_is_nearer_to_lif
     assert not judge_rigidity(pole, calm).rigid
     assert draft.kind == "rigid"
     assert "step budget" in draft.reason
-    flabby = cylinder(replace(WOOD, young=12e6), 0.15, 5.0)
+    flabby = cylinder(replace(WOOD, young_pa=12e6), 0.15, 5.0)
     assert plan_discretization([flabby], [calm], "draft").treatments[0].kind == "deformable"
     for thing in (BALL, DUCK, CAN, block(SAND, 0.33, 2, 2), block(RUBBER, 0.004, 0.01, 0.6)):
         assert plan_discretization([thing], [FALL], "draft").treatments[0].kind != "rigid"
@@ -261,13 +261,13 @@ def test_compression_keeps_the_order_never_stiffens_and_slows_all_waves(parts, l
     if max(speed for _, speed in parts) <= limit:
         return
     knee, power = fit_young_compression(parts, limit)
-    squeezed = [compress_young(young, knee, power) for young, _ in sorted(parts)]
+    squeezed = [compress_young(young_pa, knee, power) for young_pa, _ in sorted(parts)]
     assert 0 < power < 1
     assert all(a <= b for a, b in pairwise(squeezed))
-    for young, speed in parts:
-        small = compress_young(young, knee, power)
-        assert small <= young * (1 + 1e-12)
-        assert speed * sqrt(small / young) <= limit * (1 + 1e-9)
+    for young_pa, speed in parts:
+        small = compress_young(young_pa, knee, power)
+        assert small <= young_pa * (1 + 1e-12)
+        assert speed * sqrt(small / young_pa) <= limit * (1 + 1e-9)
 
 
 MATERIALS = [entry.pick(entry.typical()) for entry in library().values()]
@@ -294,7 +294,7 @@ def test_shells_are_simulated_in_their_order_of_bending_stiffness():
     parts = [sphere(m, 0.2, shell(t), number=k) for k, (m, t) in enumerate(made)]
     treatments = plan_discretization(parts, [ExpectedMotion(30.0, 9.81)] * len(parts), "draft").treatments
     rows = sorted(
-        (m.young * t**3, s.simulated_young_pa * (s.thickness or 0.0) ** 3)
+        (m.young_pa * t**3, s.simulated_young_pa * (s.thickness or 0.0) ** 3)
         for (m, t), p, s in zip(made, parts, treatments, strict=True)
         if s.kind == "shell" and not part_geometry.is_limp_wall(p, t / (s.thickness or t))
     )
@@ -303,7 +303,7 @@ def test_shells_are_simulated_in_their_order_of_bending_stiffness():
 
 
 def test_the_published_cap_loses_the_order_of_stiffness():
-    tyre = replace(RUBBER, poisson=0.4999, young=20e6)
+    tyre = replace(RUBBER, poisson=0.4999, young_pa=20e6)
     foam = Material("foam", Law.NEO_HOOKEAN, 5e6, 0.375, 30.0)
     parts = [sphere(tyre, 0.125, number=0), sphere(foam, 0.125, number=1)]
     rubber, soft = plan_discretization(parts, [FALL] * 2, "draft", "capped").treatments
@@ -356,7 +356,7 @@ def test_a_heavy_foot_of_a_few_cells_holds_what_is_around_it():
 def test_a_closed_elastic_wall_keeps_its_indentation_stiffness():
     """k ~ E t² / R of a spherical shell (Reissner 1946)."""
     (duck,) = plan_discretization([replace(DUCK, closed=True)], [FALL], "fine").treatments
-    assert duck.simulated_young_pa * duck.thickness**2 == pytest.approx(RUBBER.young * 0.002**2)
+    assert duck.simulated_young_pa * duck.thickness**2 == pytest.approx(RUBBER.young_pa * 0.002**2)
     assert duck.density * duck.thickness == pytest.approx(RUBBER.density * 0.002)
 
 
@@ -401,13 +401,13 @@ def test_the_bulk_gives_way_before_the_shape_does():
     (draft,) = plan_discretization([ball], [fast], "draft").treatments
     assert draft.kind == "deformable"
     assert draft.poisson == pytest.approx(MIN_REDUCED_POISSON_RATIO)
-    assert draft.simulated_young_pa > 0.2 * RUBBER.young
+    assert draft.simulated_young_pa > 0.2 * RUBBER.young_pa
     assert "Poisson" in draft.reason
     (fine,) = plan_discretization([ball], [fast], "fine").treatments
     assert fine.poisson > 0.48
-    assert fine.simulated_young_pa == RUBBER.young
+    assert fine.simulated_young_pa == RUBBER.young_pa
     # Only as far as is needed.
-    (between,) = plan_discretization([sphere(replace(RUBBER, young=0.6e6), 0.06)], [fast], "draft").treatments
+    (between,) = plan_discretization([sphere(replace(RUBBER, young_pa=0.6e6), 0.06)], [fast], "draft").treatments
     assert MIN_REDUCED_POISSON_RATIO < between.poisson < 0.49
     assert between.simulated_young_pa == 0.6e6
     (foam,) = plan_discretization([sphere(FOAM, 0.06)], [fast], "draft").treatments
@@ -416,7 +416,7 @@ def test_the_bulk_gives_way_before_the_shape_does():
 
 def test_what_would_be_dented_twice_as_much_as_in_life_rebounds_rigidly():
     fast = ExpectedMotion(impact_speed=4.0, acceleration=9.81)
-    hard = replace(RUBBER, young=30e6)
+    hard = replace(RUBBER, young_pa=30e6)
     (treatment,) = plan_discretization([sphere(hard, 0.06)], [fast], "draft").treatments
     assert treatment.kind == "rigid"
     assert "restitution" in treatment.reason
@@ -438,7 +438,7 @@ def test_what_would_be_marked_twice_as_deeply_as_in_life_is_rigid():
     (ball,) = plan_discretization([sphere(LEAD, 0.02)], [fast], "draft").treatments
     assert ball.kind == "rigid"
     assert "0.073 of its radius" in ball.reason
-    putty = replace(LEAD, young=3.2e6, density=1750.0, yield_stress=1e5)
+    putty = replace(LEAD, young_pa=3.2e6, density=1750.0, yield_stress=1e5)
     (soft,) = plan_discretization([sphere(putty, 0.04)], [fast], "draft").treatments
     assert soft.kind == "deformable"
     # A bar bends, whatever its end is marked by.
@@ -468,7 +468,7 @@ def test_a_dent_doubles_where_stiffness_is_five_and_a_half_times_too_small():
 
 
 def test_steps_follow_what_is_resisted_at_once():
-    limp = replace(FOAM, young=3e3)
+    limp = replace(FOAM, young_pa=3e3)
     lossy = replace(limp, loss=0.3)
     still, moving = ExpectedMotion(0.0, 9.81), ExpectedMotion(2.0, 9.81)
     bare, slow, struck = (

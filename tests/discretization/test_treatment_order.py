@@ -24,7 +24,7 @@ def pressed(stiffness):
     found = plan_discretization(parts, [ExpectedMotion(3.0, 9.81)] * 2, "draft", stiffness)
     cell, balls, plates = found.cell, [], []
     for k, t in enumerate(found.treatments):
-        stuff = Stuff(young=t.simulated_young_pa, poisson=t.poisson, density=t.density)
+        stuff = Stuff(young_pa=t.simulated_young_pa, poisson=t.poisson, density=t.density)
         place = (3.0 * k * DIAMETER, 0.0, DIAMETER / 2)
         balls.append(ball(place, DIAMETER / 2, cell / 2, stuff=stuff))
         wide = (DIAMETER, DIAMETER, 2 * cell)
@@ -51,13 +51,13 @@ def test_under_the_published_cap_rubber_is_softer_than_foam_and_in_truth_it_is_n
 RADIUS, THICK, SOFT = 0.04, 0.1, 2.5e5
 
 
-def dent_expected(mass, speed, young):
+def dent_expected(mass, speed, young_pa):
     """Deepest dent [m] of a ball in a foam layer on the floor, from the energy of its fall.
 
     F = 4/3 E* √(R δ³) (1 + .884 χ + .781 χ² + .386 χ³), χ = √(R δ)/h (Hertz; a layer that is not
     bonded: Dimitriadis et al. 2002), and ½ m v² = ∫ F dδ.
     """
-    hardness = 1.0 / ((1 - 0.35**2) / SOFT + (1 - 0.49**2) / young)
+    hardness = 1.0 / ((1 - 0.35**2) / SOFT + (1 - 0.49**2) / young_pa)
     depth = np.linspace(0.0, RADIUS, 4001)
     chi = np.sqrt(RADIUS * depth) / THICK
     layer = 1.0 + 0.884 * chi + 0.781 * chi**2 + 0.386 * chi**3
@@ -66,17 +66,17 @@ def dent_expected(mass, speed, young):
     return float(np.interp(0.5 * mass * speed**2, work, depth))
 
 
-def dented(density, young, speed=1.2):
+def dented(density, young_pa, speed=1.2):
     """Dent of a ball [m], and that over the expected one; stiffer than 1 GPa: rigid."""
-    cell, rigid = 0.01, young > 1e9
-    foam = Stuff(young=SOFT, poisson=0.35, density=30.0)
+    cell, rigid = 0.01, young_pa > 1e9
+    foam = Stuff(young_pa=SOFT, poisson=0.35, density=30.0)
     block = box((0.0, 0.0, THICK / 2), (0.2, 0.2, THICK), cell / 2, stuff=foam)
-    stuff = Stuff(young=young, poisson=0.49, density=density)
+    stuff = Stuff(young_pa=young_pa, poisson=0.49, density=density)
     place = (0.0, 0.0, THICK + RADIUS)
     thing = ball(place, RADIUS, cell / 2, stuff=stuff, velocity=(0, 0, -speed), rigid=rigid)
     run = CpuEngine(problem(block, thing, cell=cell, planes=[floor()]), threads=1)
     mass, start, deepest = run.measure().mass[1], run.measure().centre[1, 2], 0.0
-    expected = dent_expected(mass, speed, young)
+    expected = dent_expected(mass, speed, young_pa)
     while run.time < 2.5 * expected / speed:
         run.advance(run.time + 0.1 * expected / speed)
         deepest = max(deepest, start - run.measure().centre[1, 2])

@@ -38,9 +38,9 @@ def test_the_loader_of_gns_reads_positions_kinds_and_a_property(written, asked, 
     frames, particles = len(asked.motion.time), played.prepared.particles.count
     assert position.shape == (frames, particles, 3) and position.dtype == np.float32
     assert kind.shape == stiffness.shape == (particles,)
-    young = np.array([m.treatment.simulated_young_pa for m in asked.scene.matter])
-    np.testing.assert_allclose(10**stiffness, young[played.prepared.particles.part])
-    assert said[0]["values"]["young"]["source"]
+    young_pa = np.array([m.treatment.simulated_young_pa for m in asked.scene.matter])
+    np.testing.assert_allclose(10**stiffness, young_pa[played.prepared.particles.part])
+    assert said[0]["values"]["young_pa"]["source"]
 
 
 def test_metadata_are_moments_of_what_happens_from_frame_to_frame(written, asked):

@@ -160,9 +160,9 @@ def test_provenance_is_text_that_mujoco_keeps(written, asked):
         row = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, f"corporeal part_{k}")
         start, size = model.text_adr[row], model.text_size[row]
         said = json.loads(bytes(model.text_data[start : start + size]).rstrip(b"\0").decode())
-        young = matter.material.grounds["young"]
-        assert said["values"]["young"]["value"] == young.value
-        assert said["values"]["young"]["range"] == [young.range.low, young.range.high]
+        young_pa = matter.material.grounds["young_pa"]
+        assert said["values"]["young_pa"]["value"] == young_pa.value
+        assert said["values"]["young_pa"]["range"] == [young_pa.range.low, young_pa.range.high]
 
 
 @pytest.mark.parametrize(

@@ -104,8 +104,8 @@ def test_soft_matter_keeps_mass_modulus_and_parts(usd, asked):
             treatment = asked.scene.matter[part].treatment
             material = f"/World/Matter/part_{part}"
             for dialect in ("physics", "omniphysics", "newton:mpm"):
-                young = attribute(stage, material, f"{dialect}:youngsModulus")
-                assert young == pytest.approx(treatment.simulated_young_pa, rel=1e-6)
+                young_pa = attribute(stage, material, f"{dialect}:youngsModulus")
+                assert young_pa == pytest.approx(treatment.simulated_young_pa, rel=1e-6)
             subset = UsdGeom.Subset(stage.GetPrimAtPath(f"{path}/part_{part}"))
             chosen = np.array(subset.GetIndicesAttr().Get())
             np.testing.assert_array_equal(chosen, np.flatnonzero(solid.grains.part == part))

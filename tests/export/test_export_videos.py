@@ -239,7 +239,7 @@ def test_usd_has_the_gaussians_of_every_object_at_every_frame(played, asked, wri
     still = stage.GetPrimAtPath("/World/background").GetAttribute("positions")
     assert still.GetNumTimeSamples() == 0 and len(still.Get()) == 1
     said = stage.GetPrimAtPath(f"/World/{asked.scene.solids[0].name}").GetCustomDataByKey("corporeal")
-    assert said["parts"]["0"]["values"]["young"]["source"]
+    assert said["parts"]["0"]["values"]["young_pa"]["source"]
 
 
 def _surfaces(asked):

@@ -86,11 +86,11 @@ def compare_with_newton(said, asked):
     counts = {}
     for solid in soft(asked):
         for part in solid.parts:
-            young = asked.scene.matter[part].treatment.simulated_young_pa
-            counts[young] = counts.get(young, 0) + int((solid.grains.part == part).sum())
+            young_pa = asked.scene.matter[part].treatment.simulated_young_pa
+            counts[young_pa] = counts.get(young_pa, 0) + int((solid.grains.part == part).sum())
     wanted = sorted(counts.items())
-    assert [c for _, c in said["young"]] == [c for _, c in wanted]
-    np.testing.assert_allclose([e for e, _ in said["young"]], [e for e, _ in wanted], rtol=1e-6)
+    assert [c for _, c in said["simulated_young_pa"]] == [c for _, c in wanted]
+    np.testing.assert_allclose([e for e, _ in said["simulated_young_pa"]], [e for e, _ in wanted], rtol=1e-6)
 
 
 def physics(old, new):
@@ -240,8 +240,8 @@ def test_the_loader_of_gns_opens_ours(written, asked):
     said = json.loads(out)
     assert said["samples"] == len(asked.motion.time) - length
     compare_windows(said, asked, len(asked.motion.time) - 1)
-    young = sorted({m.treatment.simulated_young_pa for m in asked.scene.matter})
-    np.testing.assert_allclose(said["young"], young, rtol=1e-6)
+    young_pa = sorted({m.treatment.simulated_young_pa for m in asked.scene.matter})
+    np.testing.assert_allclose(said["simulated_young_pa"], young_pa, rtol=1e-6)
 
 
 def test_another_start_is_another_file(played, written):

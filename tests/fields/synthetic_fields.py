@@ -35,7 +35,7 @@ class Thing:
     voxel: np.ndarray
     """[m]"""
     part_of_voxel: np.ndarray
-    young: np.ndarray
+    young_pa: np.ndarray
     """Of each voxel [Pa]."""
 
 
@@ -49,9 +49,9 @@ def thing(name):
     points, own = points[mixed], parts.part_of_point[triangle[mixed]]
     cell = np.ptp(points, axis=0).max() / VOXELS
     first = np.unique(np.round(points / cell).astype(int), axis=0, return_index=True)[1]
-    young = 10.0 ** (5 + own[first]) * np.exp(rng.normal(0, np.log(SCATTER), len(first)))
+    young_pa = 10.0 ** (5 + own[first]) * np.exp(rng.normal(0, np.log(SCATTER), len(first)))
     voxel = np.round(points[first] / cell) * cell
-    return Thing(scene, inventory, parts, points, own, voxel, own[first], young)
+    return Thing(scene, inventory, parts, points, own, voxel, own[first], young_pa)
 
 
 def placed(points, frame):
@@ -59,21 +59,21 @@ def placed(points, frame):
     return points @ FRAMES[frame].T / np.ptp(points, axis=0).max() + [0.3, -2, 1]
 
 
-def write_vomp(path, position, young, poisson=0.3, density=900.0):
+def write_vomp(path, position, young_pa, poisson=0.3, density=900.0):
     names = ("x", "y", "z", "youngs_modulus", "poissons_ratio", "density")
     rows = np.zeros(len(position), [(n, "<f4") for n in names] + [("segment_id", "<U32")])
     rows["x"], rows["y"], rows["z"] = position.T
-    rows["youngs_modulus"], rows["poissons_ratio"], rows["density"] = young, poisson, density
+    rows["youngs_modulus"], rows["poissons_ratio"], rows["density"] = young_pa, poisson, density
     np.savez_compressed(path, voxel_data=rows)
 
 
-def write_pixie(path, position, young, kind=0, poisson=0.3, density=900.0):
+def write_pixie(path, position, young_pa, kind=0, poisson=0.3, density=900.0):
     colours = [(n, "u1") for n in ("red", "green", "blue", "alpha")]
     names = [*((n, "<f4") for n in "xyz"), *colours, ("part_label", "<i4"), ("density", "<f4")]
     names += [("E", "<f4"), ("nu", "<f4"), ("material_id", "<i4"), ("conf", "<f4")]
     rows = np.zeros(len(position), names)
     rows["x"], rows["y"], rows["z"] = position.T
-    rows["E"], rows["nu"], rows["density"], rows["material_id"] = young, poisson, density, kind
+    rows["E"], rows["nu"], rows["density"], rows["material_id"] = young_pa, poisson, density, kind
     words = {"<f4": "float", "u1": "uchar", "<i4": "int"}
     head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
     head += [f"property {words[kind]} {name}" for name, kind in names] + ["end_header"]

@@ -35,7 +35,7 @@ def written(folder, whose, name, frame="z-up", **more):
     write, suffix = WRITERS[whose]
     it = thing(name)
     path = folder / f"field.{suffix}"
-    write(path, synthetic_fields.placed(it.voxel, frame), it.young, **more)
+    write(path, synthetic_fields.placed(it.voxel, frame), it.young_pa, **more)
     return path
 
 
@@ -58,7 +58,7 @@ def test_a_field_finds_its_parts_in_any_frame(name, kind, frame, tmp_path):
     kept = {k: n for k, n in told.items() if not n.unfit}
     assert kept
     for k, numbers in kept.items():
-        assert abs(np.log10(numbers.value["young"]) - (5 + k)) <= 0.15
+        assert abs(np.log10(numbers.value["young_pa"]) - (5 + k)) <= 0.15
 
 
 @pytest.mark.parametrize("kind", WRITERS)
@@ -66,7 +66,7 @@ def test_numbers_of_a_field_replace_ours_and_the_rest_is_borrowed(kind, tmp_path
     it, before = thing("armchair"), ours("armchair")
     path = written(tmp_path, kind, "armchair", "y-up")
     field = impose_field(before, it.scene, it.parts, f"{kind}:{path}")
-    replaced = [m for m in field.materials if m.grounds["young"].chosen_by == "field"]
+    replaced = [m for m in field.materials if m.grounds["young_pa"].chosen_by == "field"]
     assert len(replaced) >= 3
     for now, then in zip(field.materials, before.materials, strict=True):
         if now not in replaced:
@@ -112,7 +112,7 @@ def test_pixies_kinds_choose_laws_with_what_these_need(tmp_path):
     for kind, law in laws.items():
         path = written(tmp_path, "pixie", "armchair", kind=kind)
         for material in impose_field(before, it.scene, it.parts, f"pixie:{path}").materials:
-            if material.grounds["young"].chosen_by == "field":
+            if material.grounds["young_pa"].chosen_by == "field":
                 assert material.law is law
                 assert law is not Law.VON_MISES or material.yield_stress
                 assert law is not Law.DRUCKER_PRAGER or material.friction_angle
@@ -128,9 +128,9 @@ def test_pixies_kinds_choose_laws_with_what_these_need(tmp_path):
 
 def test_a_folder_holds_a_file_per_object_named_with_or_without_its_number(tmp_path):
     it, before = thing("armchair"), ours("armchair")
-    synthetic_fields.write_vomp(tmp_path / "armchair.npz", it.voxel, it.young)
+    synthetic_fields.write_vomp(tmp_path / "armchair.npz", it.voxel, it.young_pa)
     field = impose_field(before, it.scene, it.parts, f"vomp:{tmp_path}")
-    assert any(m.grounds["young"].chosen_by == "field" for m in field.materials)
+    assert any(m.grounds["young_pa"].chosen_by == "field" for m in field.materials)
     (tmp_path / "armchair.npz").rename(tmp_path / "chair.npz")
     with pytest.raises(UserError, match="no file for any object of the scene: armchair_0"):
         impose_field(before, it.scene, it.parts, f"vomp:{tmp_path}")
@@ -143,18 +143,18 @@ def test_a_table_may_tell_density_alone(tmp_path):
     path.write_text("\n".join(["x,y,z,density", *rows]))
     field = impose_field(before, it.scene, it.parts, f"table:{path}")
     for now, then in zip(field.materials, before.materials, strict=True):
-        assert now.density == 1234 and now.young == then.young
-        assert now.grounds["young"].chosen_by == "borrowed"
+        assert now.density == 1234 and now.young_pa == then.young_pa
+        assert now.grounds["young_pa"].chosen_by == "borrowed"
 
 
 def test_one_material_makes_everything_solid_and_equal():
     it, before = thing("armchair"), ours("armchair")
     field = impose_field(before, it.scene, it.parts, "one")
-    numbers = {(m.law, m.young, m.poisson, m.density, m.loss) for m in field.materials}
+    numbers = {(m.law, m.young_pa, m.poisson, m.density, m.loss) for m in field.materials}
     assert numbers == {(Law.COROTATED, 2e6, 0.4, 200.0, 0.0)}
     assert {s.kind for s in field.structures} == {"solid"}
     said = impose_field(before, it.scene, it.parts, "one:E=1e5,rho=300").materials[0]
-    assert (said.young, said.poisson, said.density) == (1e5, 0.4, 300.0)
+    assert (said.young_pa, said.poisson, said.density) == (1e5, 0.4, 300.0)
 
 
 def test_omniphysgs_keeps_laws_and_walls():
@@ -162,7 +162,7 @@ def test_omniphysgs_keeps_laws_and_walls():
     field = impose_field(before, it.scene, it.parts, "omniphysgs")
     assert [m.law for m in field.materials] == [m.law for m in before.materials]
     assert field.structures == before.structures
-    assert {(m.young, m.poisson, m.density) for m in field.materials} == {(2e6, 0.4, 1000.0)}
+    assert {(m.young_pa, m.poisson, m.density) for m in field.materials} == {(2e6, 0.4, 1000.0)}
 
 
 def test_ground_asks_for_the_field_that_the_command_line_names(tmp_path):
@@ -217,14 +217,14 @@ def _cut_zip(folder):
 
 def _nan(folder):
     it = thing("armchair")
-    synthetic_fields.write_vomp(folder / "a.npz", it.voxel, np.where(np.arange(len(it.young)) < 3, np.nan,
-                                                            it.young))  # fmt: skip
+    synthetic_fields.write_vomp(folder / "a.npz", it.voxel, np.where(np.arange(len(it.young_pa)) < 3, np.nan,
+                                                            it.young_pa))  # fmt: skip
     return "vomp", folder / "a.npz"
 
 
 def _nowhere(folder):
     it = thing("armchair")
-    synthetic_fields.write_pixie(folder / "a.ply", np.full_like(it.voxel, np.nan), it.young)
+    synthetic_fields.write_pixie(folder / "a.ply", np.full_like(it.voxel, np.nan), it.young_pa)
     return "pixie", folder / "a.ply"
 
 
@@ -275,7 +275,7 @@ def _few(folder):
         (_pickled, "holds pickled objects, which are not read"),
         (_cut, "rows of 'vertex' are there"),
         (_cut_zip, "is no sound npz file"),
-        (_nan, r"3 of \d+ values of young do not lie between 0 and inf"),
+        (_nan, r"3 of \d+ values of young_pa do not lie between 0 and inf"),
         (_nowhere, "coordinates that are not finite"),
         (_normalised, "Name mapped_preds.ply"),
         (_array, "is no npz file"),
@@ -304,7 +304,7 @@ def test_a_field_of_another_object_does_not_fit(tmp_path):
 def test_what_cannot_be_computed_with_is_refused(tmp_path):
     it = thing("armchair")
     path = tmp_path / "a.npz"
-    synthetic_fields.write_vomp(path, it.voxel, it.young)
+    synthetic_fields.write_vomp(path, it.voxel, it.young_pa)
     field = read_vomp(path)
     with pytest.raises(BadFileError, match="values of poisson"):
-        check_field(replace(field, values={"poisson": np.full(len(it.young), 0.5)}))
+        check_field(replace(field, values={"poisson": np.full(len(it.young_pa), 0.5)}))

@@ -93,7 +93,7 @@ def test_an_evaluation_runs_all_once_and_a_failure_is_a_row(tmp_path, monkeypatc
     assert found.row("broken", "ours").error.startswith("failed: ")
     assert "Traceback" not in found.row("broken", "ours").error
     one = run_pipeline.read_run(out / "fall" / "one").field
-    assert {m.young for m in one.materials} == {2e6}
+    assert {m.young_pa for m in one.materials} == {2e6}
     before = {p: p.stat().st_mtime_ns for p in (out / "fall").rglob("frames/*.npz")}
     said.clear()
     again = evaluate_dynamics("showcase", out, config, Settings(), hands)

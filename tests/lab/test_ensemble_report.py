@@ -54,9 +54,9 @@ def made(ran):
 
 def test_members_differ_and_stay_in_their_ranges(ran, made):
     assert [member.number for member in made.members] == [0, 1, 2]
-    young = [member.drawn[0]["young"] for member in made.members]
-    assert len(set(young)) == 3
-    assert all(1.5e6 <= y <= 2.5e6 for y in young)
+    young_pa = [member.drawn[0]["young_pa"] for member in made.members]
+    assert len(set(young_pa)) == 3
+    assert all(1.5e6 <= y <= 2.5e6 for y in young_pa)
     masses = [member.objects["ball"]["mass_kg"] for member in made.members]
     density = [member.drawn[0]["density"] for member in made.members]
     assert masses == pytest.approx([d * trimesh.creation.icosphere(2, 0.05).volume for d in density])

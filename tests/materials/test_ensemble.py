@@ -92,17 +92,17 @@ def test_what_moves_together_in_life_moves_together_here():
         rank = [np.argsort(np.argsort(x)) for x in (a, b)]
         return np.corrcoef(*rank)[0, 1]
 
-    assert together(column(0, "young"), column(0, "yield_stress")) > 0.7
-    assert together(column(1, "young"), column(1, "density")) > 0.7
-    assert abs(together(column(0, "young"), column(0, "density"))) < 0.25
-    assert abs(together(column(0, "young"), column(2, "young"))) < 0.25
+    assert together(column(0, "young_pa"), column(0, "yield_stress")) > 0.7
+    assert together(column(1, "young_pa"), column(1, "density")) > 0.7
+    assert abs(together(column(0, "young_pa"), column(0, "density"))) < 0.25
+    assert abs(together(column(0, "young_pa"), column(2, "young_pa"))) < 0.25
 
 
 def test_one_object_has_one_grade_of_a_material():
     drawn = sample_material_field(field_of("hardwood", "hardwood", "hardwood"), [0, 0, 1], np.random.default_rng(3))
     legs, other = drawn.materials[:2], drawn.materials[2]
     assert legs[0] == legs[1]
-    assert legs[0].young != other.young
+    assert legs[0].young_pa != other.young_pa
 
 
 def test_what_was_chosen_narrows_the_draw_and_what_was_stated_ends_it():
@@ -110,10 +110,10 @@ def test_what_was_chosen_narrows_the_draw_and_what_was_stated_ends_it():
     steel = field.materials[0]
 
     def spread(chosen_by):
-        said = replace(steel.grounds["young"], chosen_by=chosen_by)
-        told = replace(steel, grounds=steel.grounds | {"young": said})
+        said = replace(steel.grounds["young_pa"], chosen_by=chosen_by)
+        told = replace(steel, grounds=steel.grounds | {"young_pa": said})
         found = draws(replace(field, materials=(told,)), [0])
-        return float(np.ptp([f.materials[0].young for f in found]))
+        return float(np.ptp([f.materials[0].young_pa for f in found]))
 
     assert spread("annotation") == 0.0
     assert 0 < spread("model") < 0.6 * spread("typical")

@@ -37,11 +37,11 @@ def test_a_rigid_ball_loses_the_pressure_times_what_it_crushes():
     """Hard and slow: e² is what both store, 8 p² a³/3E*, over p π a⁴/4R, for a thick sheet."""
     thick = replace(BOARD, thickness=1.0)
     steel, speed = ball("steel"), 0.5
-    p, young = thick.layers.crush_pa, thick.layers.young_across_pa
+    p, young_pa = thick.layers.crush_pa, thick.layers.young_across_pa
     blow = 0.5 * steel.mass * speed**2
     a = (4 * RADIUS * blow / (pi * p)) ** 0.25
     e = crush_restitution(steel, thick, speed, 0.3)
-    plain = sqrt(8 / 3 * p**2 * a**3 / young / blow) * restitution_of_loss(thick.material.loss)
+    plain = sqrt(8 / 3 * p**2 * a**3 / young_pa / blow) * restitution_of_loss(thick.material.loss)
     assert e == pytest.approx(plain, rel=0.08)
 
 
@@ -87,5 +87,5 @@ def test_two_lossy_bodies_lose_in_series():
     assert e == pytest.approx(restitution_of_loss(contact_loss_factor(one.material, other.material)), abs=0.01)
     own = pair_restitution(one, one).value
     assert own == pytest.approx(one.material.restitution)
-    stiff = replace(other, material=replace(other.material, young=1e13))
+    stiff = replace(other, material=replace(other.material, young_pa=1e13))
     assert pair_restitution(one, stiff).value == pytest.approx(own)

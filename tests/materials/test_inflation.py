@@ -37,7 +37,7 @@ def contact_time(force, mass, speed):
 
 
 def hertz(material, radius):
-    plane = material.young / (1 - material.poisson**2)
+    plane = material.young_pa / (1 - material.poisson**2)
     return lambda x: 4 / 3 * plane * sqrt(radius) * max(x, 0.0) ** 1.5
 
 
@@ -106,7 +106,7 @@ def test_a_blow_is_stored_in_wall_and_air_where_a_ball_turns():
         x += dt * v
     energy = 0.5 * mass * speed**2
     assert ball.squeeze(energy) == pytest.approx(x / ball.radius, rel=0.01)
-    solid = replace(inflated_ball_material(ball), young=equivalent_solid(ball, energy).young_pa)
+    solid = replace(inflated_ball_material(ball), young_pa=equivalent_solid(ball, energy).young_pa)
     assert hertz(solid, ball.radius)(x) == pytest.approx(force(x), rel=0.02)
 
 

@@ -31,7 +31,7 @@ def test_every_source_can_be_looked_up_and_none_is_idle():
 def test_estimates_are_few_and_never_the_stiffness_of_a_metal():
     entries = materials.library().values()
     numbers = [(e, f, r) for e in entries for f, r in e.ranges.items()]
-    core = [(e, f, r) for e, f, r in numbers if f in {"young", "poisson", "density"}]
+    core = [(e, f, r) for e, f, r in numbers if f in {"young_pa", "poisson", "density"}]
     guessed = [(e.name, f) for e, f, r in core if r.source == "engineering-estimate"]
     assert len(guessed) / len(core) < 0.25
     assert not [g for g in guessed if materials.find_material(g[0]).group == "metal"]
@@ -80,10 +80,10 @@ def test_an_unknown_material_shows_the_menu():
 def test_a_value_outside_the_measured_range_is_refused():
     steel = materials.find_material("steel")
     grounds = steel.typical()
-    soft = Provenance(200.0, steel.ranges["young"], "annotation", "")
+    soft = Provenance(200.0, steel.ranges["young_pa"], "annotation", "")
     with pytest.raises(OutOfRangeError, match="Young's modulus of steel is 200 Pa"):
-        steel.pick(grounds | {"young": soft})
-    angle = Provenance(0.5, steel.ranges["young"], "annotation", "")
+        steel.pick(grounds | {"young_pa": soft})
+    angle = Provenance(0.5, steel.ranges["young_pa"], "annotation", "")
     with pytest.raises(UserError, match="steel has no friction angle"):
         steel.pick(grounds | {"friction_angle": angle})
 
@@ -99,7 +99,7 @@ def test_typical_values_make_a_material(name):
 
 def test_stiffness_comes_in_the_order_everybody_knows():
     order = "seat_foam mud rubber packaging_foam cork HDPE ABS wood concrete glass steel"
-    stiffness = [materials.find_material(n).ranges["young"].typical for n in order.split()]
+    stiffness = [materials.find_material(n).ranges["young_pa"].typical for n in order.split()]
     assert stiffness == sorted(stiffness)
 
 
@@ -117,7 +117,7 @@ def test_what_breaks_before_it_yields_has_a_strength_and_nothing_else_has():
     for name in brittle:
         entry = materials.find_material(name)
         assert entry.law is Law.HENCKY
-        strain = entry.ranges["strength"].typical / entry.ranges["young"].typical
+        strain = entry.ranges["strength"].typical / entry.ranges["young_pa"].typical
         assert 5e-5 < strain < 0.02, name
     assert materials.find_material("glass").pick(materials.find_material("glass").typical()).strength == 60e6
     assert materials.find_material("steel").pick(materials.find_material("steel").typical()).strength is None
@@ -126,10 +126,10 @@ def test_what_breaks_before_it_yields_has_a_strength_and_nothing_else_has():
 def test_a_kind_of_plastic_that_nobody_can_tell_spans_the_kinds_that_it_may_be():
     hard, soft = (materials.find_material("plastic"), materials.find_material("soft plastic, kind unknown"))
     for name in "PP HDPE polystyrene ABS PVC PET polycarbonate nylon".split():
-        for field in ("density", "young"):
+        for field in ("density", "young_pa"):
             assert materials.find_material(name).ranges[field].typical in hard.ranges[field], (name, field)
     for name in "LDPE soft_PVC TPU".split():
-        for field in ("density", "young"):
+        for field in ("density", "young_pa"):
             assert materials.find_material(name).ranges[field].typical in soft.ranges[field], (name, field)
 
 

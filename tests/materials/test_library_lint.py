@@ -217,7 +217,7 @@ def test_a_library_replaces_ours_unless_it_extends_it(tmp_path):
     assert list(materials.library(str(alone))) == ["lamp_steel"]
     both = materials.library(str(merged))
     assert list(both) == list(materials.library())
-    assert both["steel"].ranges["young"].low == pytest.approx(195e9)
+    assert both["steel"].ranges["young_pa"].low == pytest.approx(195e9)
     assert "friction" not in both["steel"].ranges, "a table replaces its namesake whole"
     assert both["glass"] is materials.library()["glass"]
 
@@ -234,7 +234,7 @@ def test_a_changed_file_is_read_again(tmp_path):
 def test_a_source_of_ones_own_is_written_out(tmp_path):
     (tmp_path / "mine.toml").write_text(SOUND)
     ranges = materials.library(str(tmp_path / "mine.toml"))["lamp_steel"].ranges
-    assert materials.citation(ranges["young"].source).startswith("Our tensile test")
+    assert materials.citation(ranges["young_pa"].source).startswith("Our tensile test")
     both = materials.citation(ranges["density"].source)
     assert both.startswith("Our tensile test")
     assert both.endswith(materials.citation("elastic-tables"))

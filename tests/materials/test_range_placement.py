@@ -59,8 +59,8 @@ def test_every_treatment_lies_inside_what_was_measured():
 
 
 def test_a_range_is_offered_with_its_unit_its_usual_place_and_what_narrows_it():
-    measured = materials.library()["seat_foam"].ranges["young"]
-    offered = quantity_choice("seat_foam", "young", measured)
+    measured = materials.library()["seat_foam"].ranges["young_pa"]
+    offered = quantity_choice("seat_foam", "young_pa", measured)
     assert offered.bounds == pytest.approx((10.0, 150.0))
     first, *uses = offered.words.splitlines()
     assert first.startswith("Young's modulus: 10 to 150 kPa, logarithmic scale; usually 60 (place")
@@ -80,10 +80,10 @@ def test_lists_hold_every_name_once_and_what_flows_is_only_inside():
 def test_only_what_is_open_is_offered():
     assert quantity_choices(PartDescription("x", None)) == {}
     solid = quantity_choices(PartDescription("x", "steel", "solid"))
-    assert set(solid) == {"young", "poisson", "density", "yield_stress"}
+    assert set(solid) == {"young_pa", "poisson", "density", "yield_stress"}
     shell = quantity_choices(PartDescription("x", "steel", "shell"))
     assert set(shell) - set(solid) == {"shell_thickness"}
-    stated = PartDescription("x", "steel", "shell", thickness=1e-3, values={"young": 2.05e11})
+    stated = PartDescription("x", "steel", "shell", thickness=1e-3, values={"young_pa": 2.05e11})
     assert set(quantity_choices(stated)) == {"poisson", "density", "yield_stress"}
     filled = quantity_choices(PartDescription("x", "aluminium_can_sheet", "filled", contents="water"))
     assert filled[CONTENTS_DENSITY_FIELD].range == materials.library()["water"].ranges["density"]
@@ -97,12 +97,12 @@ def test_a_name_is_spelt_as_the_library_does_or_is_none():
 
 def test_a_value_on_a_printed_bound_is_inside():
     offered = quantity_choices(PartDescription("x", "soft_PVC", "solid"))
-    low, _ = offered["young"].bounds
-    placed = placements_from_values({"young": QuantityJudgement(low * (1 - 1e-9), "why")}, "model", offered)
-    assert placed["young"] == RangePlacement(0.0, "model", "why")
-    fallback = usual_placements(offered, "nobody")["young"]
-    typical = offered["young"].range.typical
-    assert value_at_fraction(offered["young"].range, fallback.fraction) == pytest.approx(typical)
+    low, _ = offered["young_pa"].bounds
+    placed = placements_from_values({"young_pa": QuantityJudgement(low * (1 - 1e-9), "why")}, "model", offered)
+    assert placed["young_pa"] == RangePlacement(0.0, "model", "why")
+    fallback = usual_placements(offered, "nobody")["young_pa"]
+    typical = offered["young_pa"].range.typical
+    assert value_at_fraction(offered["young_pa"].range, fallback.fraction) == pytest.approx(typical)
     assert fallback.chosen_by == "fallback"
 
 
@@ -112,12 +112,13 @@ def at(**fractions):
 
 def test_stiff_but_weak_and_light_but_stiff_do_not_fit():
     clay, foam = PartDescription("x", "plasticine"), PartDescription("x", "seat_foam")
-    assert placement_contradictions(clay, at(young=1.0, yield_stress=0.0)).keys() == {"yield_stress"}
-    assert placement_contradictions(clay, at(young=0.0, yield_stress=1.0))["yield_stress"].startswith("soft but strong")
-    assert placement_contradictions(foam, at(young=1.0, density=0.0))["young"].startswith("light but stiff")
+    assert placement_contradictions(clay, at(young_pa=1.0, yield_stress=0.0)).keys() == {"yield_stress"}
+    soft = placement_contradictions(clay, at(young_pa=0.0, yield_stress=1.0))["yield_stress"]
+    assert soft.startswith("soft but strong")
+    assert placement_contradictions(foam, at(young_pa=1.0, density=0.0))["young_pa"].startswith("light but stiff")
     for fraction in (0.0, 0.3, 0.5, 1.0):
-        assert placement_contradictions(clay, at(young=fraction, yield_stress=fraction)) == {}
-        assert placement_contradictions(foam, at(young=fraction, density=fraction)) == {}
+        assert placement_contradictions(clay, at(young_pa=fraction, yield_stress=fraction)) == {}
+        assert placement_contradictions(foam, at(young_pa=fraction, density=fraction)) == {}
 
 
 def test_nobody_is_told_to_mend_a_value_that_was_not_asked_for():
@@ -126,8 +127,8 @@ def test_nobody_is_told_to_mend_a_value_that_was_not_asked_for():
     assert set(quantity_choices(foam, weighing=True)) == {"density"}
     for fraction in (0.0, 0.5, 1.0):
         assert placement_contradictions(foam, at(density=fraction)) == {}
-    stiff = PartDescription("x", "packaging_foam", "solid", values={"young": 1e7})
-    assert placement_contradictions(stiff, at(density=0.0))["young"].startswith("light but stiff")
+    stiff = PartDescription("x", "packaging_foam", "solid", values={"young_pa": 1e7})
+    assert placement_contradictions(stiff, at(density=0.0))["young_pa"].startswith("light but stiff")
 
 
 @pytest.mark.parametrize("entry", materials.library().values(), ids=lambda e: e.name)

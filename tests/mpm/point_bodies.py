@@ -11,7 +11,7 @@ SIZE = np.array([0.4, 0.12, 0.06])
 """Of a board [m]."""
 NUMBERS = {
     "density": 1000.0,
-    "young": 1e5,
+    "young_pa": 1e5,
     "poisson": 0.3,
     "yield_stress": 2e3,
     "hardening": 1e4,

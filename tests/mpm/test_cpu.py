@@ -46,8 +46,8 @@ def test_every_law_holds_far_beyond_where_its_series_do(law, stretch):
     """Small strains are taken by series, others by eigenvalues; a body here sees both."""
     points = ball((0, 0, 0), 0.05)
     given = problem(
-        body(points, law, young=1e4, yield_stress=5e2, loss=0.0),
-        body(points + np.array([0.5, 0, 0]), law, young=1e4, yield_stress=5e2, loss=0.0),
+        body(points, law, young_pa=1e4, yield_stress=5e2, loss=0.0),
+        body(points + np.array([0.5, 0, 0]), law, young_pa=1e4, yield_stress=5e2, loss=0.0),
         planes=(),
         gravity=(0.0, 0.0, 0.0),
     )
@@ -161,7 +161,7 @@ def test_steps_are_those_of_each_matter_and_not_of_the_fastest_with_the_greatest
     points = ball((0, 0, 0.05), 0.05)
     limp = points[:, 0] > 0.0
     mixed = body(points, velocity=(0, 0, -1.0), poisson=poisson)
-    mixed.young[:] = np.where(limp, 5e3, 6e4)
+    mixed.young_pa[:] = np.where(limp, 5e3, 6e4)
     mixed.loss[:] = np.where(limp, 1.1, 0.2)
     fast, sure = CpuEngine(problem(mixed), threads=1), ReferenceEngine(problem(mixed))
     assert fast.stable_step() == pytest.approx(sure.stable_step(), rel=1e-3)

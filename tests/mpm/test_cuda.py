@@ -75,7 +75,7 @@ def test_every_law_moves_as_in_the_reference_through_impact_and_friction(law):
 
 @pytest.mark.parametrize("law", [Law.COROTATED, Law.NEO_HOOKEAN, Law.HENCKY])
 def test_what_is_stiff_in_bulk_takes_its_pressure_from_around_as_in_the_reference(law):
-    soft = body(ball((0, 0, 0.055)), law, (0.3, 0, -1.0), poisson=0.47, young=5e4)
+    soft = body(ball((0, 0, 0.055)), law, (0.3, 0, -1.0), poisson=0.47, young_pa=5e4)
     ours, sure = side_by_side(problem(soft), 20)
     assert sure.matter.uses_mean_dilatation.all()
     assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
@@ -109,7 +109,7 @@ def test_what_is_rounded_rolls_as_in_the_reference():
 
 def test_one_shared_field_moves_as_in_the_reference():
     low = body(ball((0, 0, 0.055)), velocity=(0, 0, -0.5))
-    high = body(ball((0.02, 0.01, 0.155)), velocity=(0, 0, -1.5), young=2e5)
+    high = body(ball((0.02, 0.01, 0.155)), velocity=(0, 0, -1.5), young_pa=2e5)
     ours, sure = side_by_side(problem(low, high, contact="single"), 24)
     assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
     assert np.isfinite(ours.measure().first_contact[0, 2])

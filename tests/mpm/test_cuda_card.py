@@ -154,7 +154,7 @@ def test_a_group_of_threads_sums_and_moves_what_one_thread_does(monkeypatch):
 
 
 def pressed():
-    return problem(body(ball((0, 0, 0.055)), velocity=(0.3, 0, -1.0), poisson=0.47, young=5e4))
+    return problem(body(ball((0, 0, 0.055)), velocity=(0.3, 0, -1.0), poisson=0.47, young_pa=5e4))
 
 
 def struck():

@@ -55,7 +55,7 @@ def test_wind_blows_soft_and_rigid_things_as_in_the_reference():
 
 
 def test_tethers_pull_as_in_the_reference():
-    crown = body(ball((0, 0, 0.3)), young=0.0, density=50.0, loss=0.0, velocity=(0.3, 0, 0))
+    crown = body(ball((0, 0, 0.3)), young_pa=0.0, density=50.0, loss=0.0, velocity=(0.3, 0, 0))
     tied = replace(crown, tether=Tether(0, np.full(len(crown.position), 30.0), 0.2))
     post = body(bricks((-0.02, -0.02, 0.0), (0.02, 0.02, 0.2)), rigid=True)
     mine, theirs = compared(problem(post, tied, planes=(), excluded_pairs=((0, 1),)), 20)
@@ -76,7 +76,7 @@ def test_joints_hold_and_spring_as_in_the_reference():
 
 def test_a_rigid_frame_holds_its_cushion_as_in_the_reference():
     frame = body(bricks((-0.1, -0.1, 0.0), (0.1, 0.1, 0.06)), rigid=True, density=700.0)
-    cushion = body(bricks((-0.1, -0.1, 0.06), (0.1, 0.1, 0.12)), young=5e4)
+    cushion = body(bricks((-0.1, -0.1, 0.06), (0.1, 0.1, 0.12)), young_pa=5e4)
     stone = body(ball((0.03, 0.0, 0.165), 0.04), rigid=True, density=3000.0, velocity=(0, 0, -1.0))
     given = problem(frame, cushion, stone, bonds=((0, 1),), planes=())
     mine, theirs = compared(given, 20)
@@ -86,7 +86,7 @@ def test_a_rigid_frame_holds_its_cushion_as_in_the_reference():
 
 @pytest.mark.parametrize("rigid", [False, True])
 def test_blows_and_drags_reach_a_body_as_in_the_reference(rigid):
-    given = problem(body(ball((0, 0, 0.3)), rigid=rigid, young=3e4))
+    given = problem(body(ball((0, 0, 0.3)), rigid=rigid, young_pa=3e4))
     ours, sure = on_device(given), ReferenceEngine(given)
     assert isinstance(ours, InteractiveEngine)
     start = ours.measure().potential.sum()

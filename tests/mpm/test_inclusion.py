@@ -14,7 +14,7 @@ from corporeal.mpm.reference.inclusions import join_bodies
 from corporeal.simulation.ledger_row import ledger_row
 
 CELL = 0.05
-FOAM = Stuff(young=2.5e5, poisson=0.35, density=30.0)
+FOAM = Stuff(young_pa=2.5e5, poisson=0.35, density=30.0)
 WOOD = Stuff(density=700.0)
 STEEL = Stuff(density=7850.0)
 SIDE, HEIGHT = 0.2, 0.1

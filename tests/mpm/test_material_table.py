@@ -15,8 +15,8 @@ from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.material_table import MaterialTable
 from corporeal.mpm.state import ParticleConstants
 
-SAND = Stuff(law=Law.DRUCKER_PRAGER, young=1e6, friction_angle=0.6, cohesion=300.0)
-METAL = Stuff(law=Law.VON_MISES, young=2e6, yield_stress=1e4, hardening=5e4)
+SAND = Stuff(law=Law.DRUCKER_PRAGER, young_pa=1e6, friction_angle=0.6, cohesion=300.0)
+METAL = Stuff(law=Law.VON_MISES, young_pa=2e6, yield_stress=1e4, hardening=5e4)
 SHARED = ("LAW MU LAMBDA YIELD HARD CONE APEX DRAG INDEX FORGET DENSITY RIGID").split()
 """Columns that both fast engines have, at the same places."""
 
@@ -26,7 +26,7 @@ def mixed(**given):
     size = (0.04, 0.04, 0.04)
     soft = box((0, 0, 0.05), size, 0.01, stuff=SAND)
     half, metal = soft.position[:, 0] > 0, box((0, 0, 0.05), size, 0.01, stuff=METAL)
-    names = "law young poisson yield_stress hardening friction_angle cohesion loss".split()
+    names = "law young_pa poisson yield_stress hardening friction_angle cohesion loss".split()
     soft = replace(soft, **{n: np.where(half, getattr(metal, n), getattr(soft, n)) for n in names})
     return problem(soft, box((0, 0, 0.15), size, 0.01, rigid=True), cell=0.02, **given)
 
@@ -48,7 +48,7 @@ def test_the_numbers_are_those_of_the_field():
     given = mixed()
     table, row = MaterialTable.of(given)
     sand = table.law == Law.DRUCKER_PRAGER.value
-    bulk = SAND.young / (3 * (1 - 2 * SAND.poisson))
+    bulk = SAND.young_pa / (3 * (1 - 2 * SAND.poisson))
     assert table.apex[sand] == pytest.approx(300.0 / np.tan(0.6) / bulk)
     assert table.cone[sand] == pytest.approx(np.sqrt(2) / 3 * np.sin(0.6))
     soft = ~table.rigid
@@ -68,8 +68,8 @@ def test_all_that_share_a_field_forget_alike():
 @pytest.mark.parametrize(("poisson", "mean"), [(0.3, False), (0.4, False), (0.41, True)])
 def test_pressure_is_a_mean_above_a_poissons_ratio_of_two_fifths(poisson, mean):
     """At 0.4 itself engines of different precision decided differently."""
-    for young in (1e5, 2.3e6, 1e9):
-        stuff = Stuff(young=young, poisson=poisson)
+    for young_pa in (1e5, 2.3e6, 1e9):
+        stuff = Stuff(young_pa=young_pa, poisson=poisson)
         table, _ = MaterialTable.of(problem(box((0, 0, 0), (0.04,) * 3, 0.01, stuff=stuff), cell=0.02))
         assert table.uses_mean_dilatation.all() == table.uses_mean_dilatation.any() == mean
 

@@ -19,7 +19,7 @@ ELASTIC = [Law.NEO_HOOKEAN, Law.COROTATED, Law.HENCKY]
 @pytest.mark.parametrize("law", ELASTIC)
 def test_both_engines_squeeze_rubber_alike(law):
     radius, cell = 0.05, 0.025
-    stuff = Stuff(law=law, young=2e5, poisson=0.49)
+    stuff = Stuff(law=law, young_pa=2e5, poisson=0.49)
     bouncy = ball((0.0, 0.0, radius), radius, cell / 2, "blue", stuff=stuff, velocity=(0, 0, -2))
     given = problem(bouncy, cell=cell, planes=[floor()], friction=0.3)
     sure, fast = ReferenceEngine(given), CpuEngine(given, threads=1)
@@ -36,7 +36,7 @@ def test_both_engines_squeeze_rubber_alike(law):
 
 @pytest.mark.parametrize("law", ELASTIC)
 def test_the_force_of_the_mean_pressure_is_the_slope_of_the_stored_energy(law):
-    stuff = Stuff(law=law, young=2e5, poisson=0.49)
+    stuff = Stuff(law=law, young_pa=2e5, poisson=0.49)
     given = problem(box((0, 0, 0), (0.08, 0.08, 0.08), 0.01, stuff=stuff), cell=0.02)
     matter, rng = ParticleConstants.of(given), np.random.default_rng(2)
     start = State.start(given, matter)
@@ -66,7 +66,7 @@ def test_the_force_of_the_mean_pressure_is_the_slope_of_the_stored_energy(law):
 def test_a_struck_rubber_ball_gains_no_energy(poisson):
     """With each particle's own J in the books it seemed to gain 14, 22 and 58 %."""
     radius, cell = 0.1, 0.1 / 3.8
-    stuff = Stuff(young=2e5, poisson=poisson)
+    stuff = Stuff(young_pa=2e5, poisson=poisson)
     place = (0.13 * cell, 0.31 * cell, radius + 0.5 * cell)
     struck = ball(place, radius, cell / 2, stuff=stuff, velocity=(0, 0, -0.25))
     run = CpuEngine(problem(struck, cell=cell, planes=[floor()], friction=0.3), threads=1)
@@ -90,18 +90,18 @@ def test_rubber_between_plates_does_not_lock():
     assert squeezed(cells=4) == pytest.approx(1.559, rel=0.02)
 
 
-def squeezed(cells, height=0.05, width=0.1, young=1e6, mass=4.0):
+def squeezed(cells, height=0.05, width=0.1, young_pa=1e6, mass=4.0):
     """k h/E A from half a swing of a mass on the block."""
     cell = height / cells
     plate = (width + 2 * cell, width + 2 * cell, 4 * cell)
     far = height / 2 + 2 * cell
-    stuff = Stuff(young=young, poisson=0.49, density=200.0)
+    stuff = Stuff(young_pa=young_pa, poisson=0.49, density=200.0)
     block = box((0.0, 0.0, 0.0), (width, width, height), cell / 2, stuff=stuff)
     load = Stuff(density=mass / np.prod(plate))
     above = box((0, 0, far), plate, cell / 2, stuff=load, rigid=True, velocity=(0, 0, -0.02))
     below = box((0, 0, -far), plate, cell / 2, stuff=Stuff(density=1e8), rigid=True)
     run = CpuEngine(problem(block, above, below, cell=cell, bonds=((1, 0), (2, 0))), threads=1)
-    bar = young * width**2 / height
+    bar = young_pa * width**2 / height
     times = np.linspace(0.0, 0.25 * np.pi * np.sqrt(mass / bar), 41)[1:] * 2
     sunk = []
     for t in times:

@@ -180,7 +180,7 @@ def test_a_rebound_books_what_it_took(patient_engine):
     energy = before.kinetic.sum()
     assert after.impact_loss == pytest.approx((1 - 0.6**2) * energy, rel=1e-3)
     assert after.kinetic.sum() == pytest.approx(0.6**2 * energy, rel=1e-3)
-    stuff = Stuff(young=60e3, poisson=0.1, density=60.0)
+    stuff = Stuff(young_pa=60e3, poisson=0.1, density=60.0)
     soft = ball((0.0, 0.0, 0.06), 0.05, 0.00625, stuff=stuff, velocity=tuple(fall))
     run = patient_engine(problem(soft, cell=0.0125, planes=(FLOOR,)))
     before = run.measure()

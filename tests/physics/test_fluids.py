@@ -64,10 +64,10 @@ def test_the_step_does_not_see_the_viscosity(engine, viscosity):
 @pytest.mark.parametrize(("yield_shear", "index"), [(0.0, 1.0), (20.0, 1.0), (10.0, 0.5)])
 def test_engines_agree_on_how_a_liquid_flows(engine, yield_shear, index):
     """A lump that spins apart: what it loses is the reference's, momentum stays."""
-    young, poisson = elastic_moduli(bulk_modulus(1000.0, 1.0))
+    young_pa, poisson = elastic_moduli(bulk_modulus(1000.0, 1.0))
     stuff = Stuff(
         law=Law.FLUID,
-        young=young,
+        young_pa=young_pa,
         poisson=poisson,
         yield_stress=np.sqrt(3.0) * yield_shear,
         consistency=2.0,
@@ -105,8 +105,8 @@ def test_water_is_not_a_solid(fast_engine):
 
 def falling_sheet(place, *, cell=0.008):
     """Water one particle thick that slides at .8 m/s and falls onto a floor; place in cells."""
-    young, poisson = elastic_moduli(bulk_modulus(1000.0, 0.8))
-    stuff = Stuff(law=Law.FLUID, young=young, poisson=poisson, yield_stress=0.0, consistency=1e-3, flow_index=1.0)
+    young_pa, poisson = elastic_moduli(bulk_modulus(1000.0, 0.8))
+    stuff = Stuff(law=Law.FLUID, young_pa=young_pa, poisson=poisson, yield_stress=0.0, consistency=1e-3, flow_index=1.0)
     size = (8 * cell, 8 * cell, 0.5 * cell)
     middle = (0.0, 0.0, (place + 1.75) * cell)
     sheet = box(middle, size, 0.5 * cell, stuff=stuff, velocity=(0.8, 0.0, 0.0))

@@ -112,7 +112,7 @@ def flight(law, poisson, cells, duration):
     """Largest elastic energy of a ball that flies and turns, over its kinetic energy."""
     radius = 0.1
     cell = radius / cells
-    stuff = Stuff(law=law, young=1e5, poisson=poisson, yield_stress=1e9, cohesion=1e4)
+    stuff = Stuff(law=law, young_pa=1e5, poisson=poisson, yield_stress=1e9, cohesion=1e4)
     place = (0.13 * cell, 0.31 * cell, 0.2 * cell)
     flying = ball(place, radius, cell / 2, stuff=stuff, velocity=(4.0, 0.0, 0.0), spin=(0, 0, 2.0))
     run = CpuEngine(problem(flying, cell=cell), threads=1)

@@ -40,7 +40,7 @@ def test_what_yields_pays_for_it_and_no_more(engine, law):
 
 def test_metal_hit_softly_springs_back_and_hit_hard_keeps_a_dent(engine):
     """It yields first where the speed passes σ_y / (ρ c)."""
-    metal = Stuff(law=Law.VON_MISES, young=1e6, density=1000.0, yield_stress=1.5e4)
+    metal = Stuff(law=Law.VON_MISES, young_pa=1e6, density=1000.0, yield_stress=1.5e4)
     soft, _, _, _ = thrown_down(engine, metal, 0.1, 0.03)
     hard, _, _, _ = thrown_down(engine, metal, 3.0, 0.03)
     assert soft.snapshot().plastic_strain.max() == 0.0
@@ -77,7 +77,7 @@ def test_cohesion_keeps_a_column_standing_that_sand_would_let_slump(fast_engine)
     heights = []
     for cohesion in (0.0, 2000.0):
         soil = Stuff(
-            law=Law.DRUCKER_PRAGER, young=2e5, density=1500.0, friction_angle=np.radians(25.0), cohesion=cohesion
+            law=Law.DRUCKER_PRAGER, young_pa=2e5, density=1500.0, friction_angle=np.radians(25.0), cohesion=cohesion
         )
         column = cylinder((0.003, 0.002, 0.06), radius, 0.12, cell / 2, stuff=soil)
         run = fast_engine(problem(column, cell=cell, friction=0.6, planes=[floor()], gravity=DOWN))
@@ -89,7 +89,7 @@ def test_cohesion_keeps_a_column_standing_that_sand_would_let_slump(fast_engine)
 
 def test_a_ball_dents_mud_and_the_dent_stays(fast_engine):
     cell = 0.02
-    mud = Stuff(law=Law.VON_MISES, young=2e5, poisson=0.4, density=1600.0, yield_stress=2e3)
+    mud = Stuff(law=Law.VON_MISES, young_pa=2e5, poisson=0.4, density=1600.0, yield_stress=2e3)
     bed = box((0.003, 0.002, 0.04), (0.24, 0.24, 0.08), cell / 2, stuff=mud)
     stone = ball(
         (0.003, 0.002, 0.145), 0.04, cell / 2, stuff=Stuff(density=2500.0), rigid=True, velocity=(0.0, 0.0, -2.0)
@@ -111,9 +111,9 @@ def test_how_far_sand_runs_out_does_not_depend_on_how_stiff_its_grains_are():
     """Heaps of stiff grains once came out shorter: they took more steps, each with its loss."""
     cell, far = grains.RADIUS / 5, []
     whole = cylinder_sdf((0.0, 0.0, grains.RADIUS / 2), grains.RADIUS, grains.RADIUS)
-    for young in (1e6, 2e7):
+    for young_pa in (1e6, 2e7):
         sand = grains.quarter(whole, 1.5 * grains.RADIUS, cell / 2, np.pi * grains.RADIUS**3)
-        sand = replace(sand, young=np.full(len(sand.volume), young))
+        sand = replace(sand, young_pa=np.full(len(sand.volume), young_pa))
         given = grains.on_rough_floor(sand, cell)
         far.append(grains.settled(given, grains.RADIUS, 0.6).farthest)
     assert far[1] == pytest.approx(far[0], rel=0.03)

@@ -18,7 +18,7 @@ from corporeal.simulation.static_equilibrium import (
 G = 9.81
 DOWN = (0.0, 0.0, -G)
 CELL = 0.02
-FOAM = Stuff(young=2e4, poisson=0.3, density=1000.0)
+FOAM = Stuff(young_pa=2e4, poisson=0.3, density=1000.0)
 LENGTH, WIDTH = 0.2, 0.04
 
 

@@ -80,7 +80,7 @@ def test_what_moves_as_told_goes_exactly_there_and_is_booked_to_the_last_digit(e
     told = path(np.linspace(0.0, 0.3, 7), shift=0.05 * np.sin(np.linspace(0.0, 6.0, 7)), turn=turn)
     size = (0.1, 0.06, 0.06)
     rod = box((0.0, 0.0, 0.2), size, CELL / 2, rigid=True, path=told, pivot=(0.03, 0.0, 0.2))
-    soft = box((0.09, 0.0, 0.2), (0.075,) * 3, CELL / 2, stuff=Stuff(young=2e4))
+    soft = box((0.09, 0.0, 0.2), (0.075,) * 3, CELL / 2, stuff=Stuff(young_pa=2e4))
     run = engine(problem(rod, soft, cell=CELL, friction=0.3, gravity=DOWN))
     before = run.measure()
     run.advance(0.2)
@@ -110,7 +110,7 @@ WEIGHT = 1000.0 * SIDE**3 * G
 
 def lifted(friction, engine):
     """Squeeze a soft cube, lift the fingers by 6 mm, and give the cube's rise and their force."""
-    soft = Stuff(young=2e5, poisson=0.0, density=1000.0)
+    soft = Stuff(young_pa=2e5, poisson=0.0, density=1000.0)
     bodies = [box((0.0, 0.0, SIDE / 2), (SIDE,) * 3, FINE / 2, stuff=soft)]
     for side in (-1.0, 1.0):
         close = -side * 0.0015

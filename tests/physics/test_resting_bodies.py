@@ -16,7 +16,7 @@ CENTRE, SIZE = (0.103, 0.052, 0.05), (0.1, 0.1, 0.1)
 
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
-    stuff = Stuff(young=2e5, loss=1.0)
+    stuff = Stuff(young_pa=2e5, loss=1.0)
     surface = box_surface(CENTRE, SIZE) if rigid else None
     block = box(CENTRE, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
     run = patient_engine(problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05))
@@ -32,8 +32,8 @@ def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
 
 
 def test_a_stack_of_two_stands(patient_engine):
-    low = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
-    high = box(np.add(CENTRE, (0, 0, 0.1)), SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
+    low = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young_pa=2e5, loss=1.0))
+    high = box(np.add(CENTRE, (0, 0, 0.1)), SIZE, CELL / 2, stuff=Stuff(young_pa=2e5, loss=1.0))
     run = patient_engine(problem(low, high, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05))
     run.advance(0.15)
     m = run.measure()
@@ -59,7 +59,7 @@ def test_a_rigid_stack_stands(patient_engine):
 def test_every_elastic_law_is_hookes_where_strains_are_small(patient_engine, law):
     """The top sinks by ρ g L² / 2 (λ + 2μ); smooth walls keep the sides."""
     length, width, cell = 0.2, 0.04, 0.02
-    stuff = Stuff(law=law, young=2e5, poisson=0.3, loss=0.5)
+    stuff = Stuff(law=law, young_pa=2e5, poisson=0.3, loss=0.5)
     column = box((width / 2, width / 2, length / 2), (width, width, length), cell / 2, stuff=stuff)
     walls = [
         floor(),
@@ -85,7 +85,7 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
     """The same rest on a wall that faces sideways, with gravity turned along."""
     wall = Plane((1.0, 0.0, 0.0), 0.0)
     centre = (0.05, 0.103, 0.052)
-    block = box(centre, SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
+    block = box(centre, SIZE, CELL / 2, stuff=Stuff(young_pa=2e5, loss=1.0))
     run = patient_engine(
         problem(block, cell=CELL, friction=0.5, planes=[wall], gravity=(-G, 0.0, 0.0), gravity_ramp=0.05)
     )
@@ -114,8 +114,8 @@ def test_water_stands_as_high_wherever_planes_lie_on_the_grid(fast_engine, walls
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_block_lies_as_high_wherever_the_floor_is_on_the_grid(fast_engine, rigid):
     """Ten places between nodes; a soft block's foot sinks by no more than its strain over ¾ dx."""
-    stuff = Stuff(young=2e5, loss=1.0)
-    strain = 1000.0 * G * SIZE[2] / stuff.young
+    stuff = Stuff(young_pa=2e5, loss=1.0)
+    strain = 1000.0 * G * SIZE[2] / stuff.young_pa
     for off in np.arange(10) / 10 * CELL:
         centre = np.add(CENTRE, (0.0, 0.0, off))
         surface = box_surface(tuple(centre), SIZE) if rigid else None

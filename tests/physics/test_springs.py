@@ -14,7 +14,7 @@ from corporeal.mpm.reference.engine import ReferenceEngine
 
 CELL = 0.02
 FALL = (0.0, 0.0, -9.81)
-LOOSE = Stuff(young=0.0, density=50.0)
+LOOSE = Stuff(young_pa=0.0, density=50.0)
 
 
 def crown(rate, holder=0, damping=0.0, **more):
@@ -170,7 +170,7 @@ def test_an_applied_impulse_moves_what_is_near_and_nothing_beyond_two_cells(engi
 
 @pytest.mark.parametrize("rigid", [False, True])
 def test_what_is_pulled_hangs_below_the_hand_by_its_weight_over_the_spring(fast_engine, rigid):
-    body = ball((0, 0, 0), 0.06, CELL / 2, stuff=Stuff(young=2e5), rigid=rigid)
+    body = ball((0, 0, 0), 0.06, CELL / 2, stuff=Stuff(young_pa=2e5), rigid=rigid)
     weight = float(body.volume @ body.density) * 9.81
     run = fast_engine(problem(body, cell=CELL, gravity=FALL))
     run.attach_spring(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 500.0)

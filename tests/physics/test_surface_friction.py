@@ -11,7 +11,7 @@ CENTRE = (0.1, 0.05, 0.05)
 
 
 def block_on_slope(friction, gravity=SLOPE, rigid=False, **more):
-    stuff = Stuff(young=1e5)
+    stuff = Stuff(young_pa=1e5)
     surface = box_surface(CENTRE, SIZE) if rigid else None
     block = box(CENTRE, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
     return problem(block, cell=CELL, friction=friction, planes=[floor()], gravity=gravity, **more)
@@ -59,7 +59,7 @@ def test_what_sticks_loses_nothing_to_friction(patient_engine, rigid):
 
 def test_a_soft_ball_that_settles_loses_little_to_friction(fast_engine):
     """It widens a little on the floor: a few per cent of what it fell, not a third."""
-    soft = Stuff(young=2e4, density=900.0, loss=0.3)
+    soft = Stuff(young_pa=2e4, density=900.0, loss=0.3)
     falling = ball((0.003, 0.002, 0.07), 0.05, 0.00625, stuff=soft)
     run = fast_engine(problem(falling, cell=0.0125, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G)))
     before = run.measure()
@@ -80,7 +80,7 @@ def test_a_block_sticks_when_friction_exceeds_the_slope(patient_engine, rigid):
     assert abs(moved[1]) < 0.01 * CELL
 
 
-LOSSY, LOSSLESS = Stuff(young=1e6, loss=0.3), Stuff(young=1e6)
+LOSSY, LOSSLESS = Stuff(young_pa=1e6, loss=0.3), Stuff(young_pa=1e6)
 LIMIT = float(np.tan(ANGLE))
 """Friction that just holds a block on the slope [-]."""
 
@@ -134,7 +134,7 @@ def test_a_block_without_friction_slides_freely(patient_engine):
 
 def test_a_thrown_block_stops_after_its_braking_distance(fast_engine):
     """v₀² / 2 μ g."""
-    block = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=1e5), velocity=(1.0, 0.0, 0.0))
+    block = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young_pa=1e5), velocity=(1.0, 0.0, 0.0))
     run = fast_engine(problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G)))
     run.advance(1.0 / (0.5 * G) + 0.1)
     m = run.measure()

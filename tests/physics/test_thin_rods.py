@@ -19,7 +19,7 @@ def a_rod(tilt):
     along = np.array([np.cos(tilt), 0.0, np.sin(tilt)])
     line = np.outer(np.linspace(-LENGTH / 2, LENGTH / 2, 42), along) + np.array([0, 0.005, 0.005])
     r = DIAMETER / (2 * CELL)
-    stuff = Stuff(Law.COROTATED, young=1e8 * r**4, density=1000.0 * r**2)
+    stuff = Stuff(Law.COROTATED, young_pa=1e8 * r**4, density=1000.0 * r**2)
     points = rod_section_points(Rod(line, DIAMETER), 2 * CELL, CELL / 2)
     return body(points, np.pi * CELL**2 * LENGTH, stuff), along
 

@@ -6,18 +6,18 @@ from laws.bodies import Stuff, ball, box, problem
 
 from corporeal.mpm.problem import FLOOR
 
-RADIUS, SPEED, DENSITY, YOUNG = 0.05, 2.0, 60.0, 60e3
+RADIUS, SPEED, DENSITY, YOUNG_PA = 0.05, 2.0, 60.0, 60e3
 
 
 def half_period(poisson):
     """Half of the slowest vibration's period [s]."""
-    return 2 * RADIUS / np.sqrt(YOUNG / (2 * (1 + poisson)) / DENSITY)
+    return 2 * RADIUS / np.sqrt(YOUNG_PA / (2 * (1 + poisson)) / DENSITY)
 
 
 def rebound(engine, loss, poisson, cells):
     """Speed after the floor's push over that before it, for a foam ball without weight."""
     cell = 2 * RADIUS / cells
-    stuff = Stuff(young=YOUNG, poisson=poisson, density=DENSITY, loss=loss)
+    stuff = Stuff(young_pa=YOUNG_PA, poisson=poisson, density=DENSITY, loss=loss)
     start, down = (0.0, 0.0, RADIUS + 0.6 * cell), (0.0, 0.0, -SPEED)
     thing = ball(start, RADIUS, cell / 2, stuff=stuff, velocity=down)
     run = engine(problem(thing, cell=cell, planes=(FLOOR,)))
@@ -50,7 +50,7 @@ def test_a_finer_grid_hardly_changes_a_damped_rebound(fast_engine):
 def turns_after(engine, loss):
     """Time from the floor's first touch to where a foam ball turns [s]."""
     cell, step = RADIUS / 4, half_period(0.1) / 50
-    stuff = Stuff(young=YOUNG, poisson=0.1, density=DENSITY, loss=loss)
+    stuff = Stuff(young_pa=YOUNG_PA, poisson=0.1, density=DENSITY, loss=loss)
     start, down = (0.0, 0.0, RADIUS + 0.6 * cell), (0.0, 0.0, -SPEED)
     thing = ball(start, RADIUS, cell / 2, stuff=stuff, velocity=down)
     run = engine(problem(thing, cell=cell, planes=(FLOOR,)))
@@ -61,7 +61,7 @@ def turns_after(engine, loss):
 
 def sag(engine, loss, side=0.1):
     """How far the middle of a foam cube sinks under twenty times its weight, at rest [m]."""
-    stuff = Stuff(young=YOUNG, poisson=0.1, density=DENSITY, loss=loss)
+    stuff = Stuff(young_pa=YOUNG_PA, poisson=0.1, density=DENSITY, loss=loss)
     cube = box((0.0, 0.0, side / 2), (side,) * 3, side / 16, stuff=stuff)
     load = {"gravity": (0.0, 0.0, -200.0), "gravity_ramp": 0.1}
     run = engine(problem(cube, cell=side / 8, planes=(FLOOR,), **load))
@@ -77,4 +77,4 @@ def test_loss_stiffens_a_blow_and_no_load_that_rests(fast_engine):
     stiffer = (turns_after(fast_engine, 0.0) / turns_after(fast_engine, 0.3)) ** 2.5
     assert stiffer == pytest.approx(1.5, abs=0.1)
     assert sag(fast_engine, 0.3) == pytest.approx(sag(fast_engine, 0.6), rel=2e-3)
-    assert sag(fast_engine, 0.3) == pytest.approx(DENSITY * 200.0 * 0.1**2 / 3 / YOUNG, rel=0.1)
+    assert sag(fast_engine, 0.3) == pytest.approx(DENSITY * 200.0 * 0.1**2 / 3 / YOUNG_PA, rel=0.1)

@@ -17,10 +17,10 @@ PASTE = Liquid(1100.0, 12.0, 25.0, 0.5)
 
 def layer(liquid, *, speed=0.0, place=0.0, gravity=DOWN, cell=0.01, cells=3):
     """A layer on a floor that it sticks to, ``place`` cells above a node; it slides along x."""
-    young, poisson = elastic_moduli(bulk_modulus(liquid.density, 1.0))
+    young_pa, poisson = elastic_moduli(bulk_modulus(liquid.density, 1.0))
     stuff = Stuff(
         law=Law.FLUID,
-        young=young,
+        young_pa=young_pa,
         poisson=poisson,
         density=liquid.density,
         yield_stress=np.sqrt(3.0) * liquid.yield_shear,

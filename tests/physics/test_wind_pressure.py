@@ -15,7 +15,7 @@ from corporeal.mpm.problem import WindFaces
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 CELL, R = 0.02, 0.05
-LIGHT = Stuff(density=30.0, young=1e4)
+LIGHT = Stuff(density=30.0, young_pa=1e4)
 STILL_AIR = Wind((0.0, 0.0, 0.0))
 FALL = (0.0, 0.0, -9.81)
 
@@ -77,7 +77,7 @@ def test_a_plate_falls_slower_than_a_sphere_as_its_drag_coefficient_says(fast_en
 
 
 def test_wind_blows_a_body_along_with_it_and_no_faster(fast_engine):
-    thin = Stuff(density=2.0, young=1e3)
+    thin = Stuff(density=2.0, young_pa=1e3)
     run = fast_engine(problem(a_sphere(Wind((5.0, 0.0, 0.0)), rigid=True, stuff=thin), cell=CELL))
     run.advance(3.0)
     velocity = run.measure().momentum[0] / run.measure().mass[0]
@@ -92,7 +92,7 @@ def test_the_work_of_the_wind_is_in_the_books(engine, rigid, shift):
     Particles half way between nodes have no share in the outermost ones, which bear no mass.
     """
     air = Wind((3.0, 0.0, 12.0), gust=0.5, start=0.01, end=0.05)
-    body = a_plate(air, size=(0.06, 0.06, 0.04), rigid=rigid, stuff=Stuff(density=100.0, young=1e4))
+    body = a_plate(air, size=(0.06, 0.06, 0.04), rigid=rigid, stuff=Stuff(density=100.0, young_pa=1e4))
     body = replace(body, position=body.position + shift * CELL)
     run = engine(problem(body, cell=CELL))
     run.advance(0.01)

@@ -140,7 +140,7 @@ def test_a_person_is_believed_before_the_file(tmp_path):
     body = said[("duck_0", "body")]
     assert (body.material, body.answered_by) == ("natural_rubber", "annotation")
     assert (body.structure, body.thickness) == ("shell", pytest.approx(0.0015))
-    assert body.values == {"young": pytest.approx(2.2e6)}
+    assert body.values == {"young_pa": pytest.approx(2.2e6)}
     assert said[("vase_0", "vase")].answered_by == "metadata"
 
 
@@ -340,7 +340,7 @@ def test_what_a_person_has_stated_is_not_asked_for_again(ask, tmp_path):
         ("mass", "hand-made/vase_0"),
     ]
     vase = words(inventory)[("vase_0", "vase")]
-    assert (vase.answered_by, vase.placements["young"].fraction) == ("annotation", 0.25)
+    assert (vase.answered_by, vase.placements["young_pa"].fraction) == ("annotation", 0.25)
 
 
 def test_a_model_that_contradicts_what_the_file_states_is_believed_and_told_once(ask):
@@ -396,7 +396,7 @@ def test_each_way_has_places_of_its_own_and_the_mass_is_kept_beside_them(ask):
     oracle = Oracle(materials=said, mass=weighs(printed=printed))
     (thing,) = ask(oracle, VASE).objects
     first, second = thing.parts[0].hypotheses
-    assert set(first.placements) > {"young", "density", "shell_thickness"}
+    assert set(first.placements) > {"young_pa", "density", "shell_thickness"}
     assert set(second.placements) == {"density", "shell_thickness"}
     assert (thing.evidence.low, thing.evidence.likely, thing.evidence.high) == (0.5, 1.0, 2.0)
     assert thing.evidence.printed[0].value == 0.5
@@ -441,7 +441,7 @@ def test_values_may_be_asked_for_and_become_the_same_places(ask):
 
     oracle = Oracle(materials=made_of(part("vase", "glass", "sheet")), placement=values)
     (vase,) = ask(oracle, VASE, sampling="value").objects[0].parts
-    assert set(vase.placements) >= {"young", "density", "shell_thickness"}
+    assert set(vase.placements) >= {"young_pa", "density", "shell_thickness"}
     assert {p.fraction for p in vase.placements.values()} == {0.0}
 
 
@@ -458,10 +458,10 @@ def test_values_that_do_not_fit_each_other_are_asked_for_once_more(ask):
     assert stubborn.tasks().count("placement") == 2
     again = [q for q in stubborn.asked if q.task == "placement"][1]
     assert "stiff but weak: yield_stress/young is 0.005" in again.text
-    assert (said.placements["young"].fraction, said.placements["yield_stress"].fraction) == (1, 0)
+    assert (said.placements["young_pa"].fraction, said.placements["yield_stress"].fraction) == (1, 0)
     mute = Oracle(materials=clay, placement=[hard_but_weak, None])
     (said,) = ask(mute, THING).objects[0].parts
-    assert (said.placements["young"].fraction, said.placements["young"].chosen_by) == (1, "model")
+    assert (said.placements["young_pa"].fraction, said.placements["young_pa"].chosen_by) == (1, "model")
     persuaded = Oracle(materials=clay, placement=[hard_but_weak, everywhere(0.5)])
     (said,) = ask(persuaded, THING).objects[0].parts
     assert {p.fraction for p in said.placements.values()} == {0.5}
@@ -510,7 +510,7 @@ def test_recorded_answers_replay_without_the_model_and_without_pictures(ask, tmp
     again = describe(scene(VASE), replay(tmp_path))
     (vase,), (old,) = again.objects[0].parts, told.objects[0].parts
     assert (vase.material, vase.answered_by) == ("glass", "recording")
-    assert vase.placements["young"].fraction == old.placements["young"].fraction
+    assert vase.placements["young_pa"].fraction == old.placements["young_pa"].fraction
     assert {p.chosen_by for p in vase.placements.values()} == {"recording"}
     assert again.usage.calls == 0
     with pytest.raises(UserError, match="differs in 'scene'"):

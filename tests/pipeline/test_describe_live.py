@@ -101,13 +101,13 @@ def test_real_objects_of_many_parts_are_described_placed_and_grounded(described)
             assert why.value in why.range
             assert materials.citation(why.range.source) != why.range.source
             assert why.margin == 0.7
-            chosen = name in ("young", "density", "poisson")
+            chosen = name in ("young_pa", "density", "poisson")
             assert why.chosen_by == ("model" if chosen else "typical")
             assert why.reason == ("Worn leather." if chosen else why.reason)
         density = material.grounds["density"]
         low, high = density.range.low, density.range.high
         assert density.value == pytest.approx(low + 0.8 * (high - low))
-    said = materials.materials_json(field, parts)["parts"][0]["values"]["young"]
+    said = materials.materials_json(field, parts)["parts"][0]["values"]["young_pa"]
     assert (said["place"], said["chosen_by"], said["margin"]) == (0.8, "model", 0.7)
     assert any("--extent" in w for w in inventory.warnings)
 

@@ -225,7 +225,7 @@ def test_a_narrow_sheet_is_as_light_as_its_thick_wall_and_no_hollow_body():
     bent = trimesh.creation.cylinder(0.03, 0.4, sections=24)
     bent.update_faces((bent.triangles_center[:, 1] < 0) & (np.abs(bent.face_normals[:, 2]) < 0.5))
     bent.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
-    scene, parts, field = inputs(thing((put(bent, 0.0), replace(RUBBER, young=1e8), foil)), thing((ball(), RUBBER)))
+    scene, parts, field = inputs(thing((put(bent, 0.0), replace(RUBBER, young_pa=1e8), foil)), thing((ball(), RUBBER)))
     particles = fill(scene, parts, field, FillConfig(detail="draft"))
     treatment, own = particles.treatments[0], particles.part == 0
     assert treatment.kind == "shell"
@@ -396,7 +396,7 @@ def test_a_plant_becomes_bodies_that_hold_together_and_never_touch():
 
 
 def test_a_plant_whose_stem_bends_is_no_rigid_one():
-    rubbery = replace(WOOD, young=1e7)
+    rubbery = replace(WOOD, young_pa=1e7)
     scene, parts, field = a_potted_plant(rubbery, push=Push((3.0, 0.0, 0.0), 0.0, 0.2))
     particles = fill(scene, parts, field)
     assert particles.treatments[2].kind == "deformable"
@@ -405,7 +405,7 @@ def test_a_plant_whose_stem_bends_is_no_rigid_one():
 
 
 def test_a_rod_thinner_than_the_grid_stands_on_rings_with_its_bending_stiffness():
-    soft = replace(RUBBER, young=2e7)
+    soft = replace(RUBBER, young_pa=2e7)
     rod = trimesh.creation.cylinder(0.004, 0.8, sections=16)
     rod.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
     scene, parts, field = inputs(thing((put(rod, 0.3), soft)))
@@ -519,7 +519,7 @@ def test_a_pillow_is_as_soft_as_its_stuffing_and_as_heavy_as_all_of_it():
     assert particles.density.max() > 1.3 * particles.density[core].max()  # the cover
     body = build_model(scene, particles, field).problem.bodies[0]
     assert set(body.law) == {Law.NEO_HOOKEAN.value}
-    assert body.young == pytest.approx(treatment.simulated_young_pa)
+    assert body.young_pa == pytest.approx(treatment.simulated_young_pa)
 
 
 def test_a_cup_holds_what_goes_in_up_to_its_rim():

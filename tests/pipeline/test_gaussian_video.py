@@ -237,7 +237,7 @@ def test_colours_can_tell_what_things_are(tmp_path):
 
 
 def test_surfaces_can_be_coloured_too(tmp_path):
-    render_video(play(), replace(SMALL, colour_by="young"), tmp_path)
+    render_video(play(), replace(SMALL, colour_by="young_pa"), tmp_path)
     picture = still(tmp_path, 0)
     soft = picture[..., 2] > 1.3 * picture[..., 0]
     stiff = picture[..., 0] > 1.3 * picture[..., 2]

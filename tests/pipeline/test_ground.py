@@ -34,7 +34,7 @@ def grounded(*objects, config=None, annotations=None):
 def test_every_value_carries_its_range_its_source_and_a_reason():
     field, _, _ = grounded(DUCK, BLOCK, PLANK)
     for material in field.materials:
-        assert set(material.grounds) >= {"young", "poisson", "density", "friction", "loss"}
+        assert set(material.grounds) >= {"young_pa", "poisson", "density", "friction", "loss"}
         for name, why in material.grounds.items():
             assert getattr(material, name) == why.value
             assert why.value in why.range
@@ -63,7 +63,7 @@ def test_an_unknown_part_gets_a_stated_stand_in_and_a_warning():
     assert field.materials[0].name == "plastics-PP"
     assert field.words[0].material is None
     assert {g.chosen_by for g in field.materials[0].grounds.values()} == {"fallback"}
-    assert "of this part is unknown" in field.materials[0].grounds["young"].reason
+    assert "of this part is unknown" in field.materials[0].grounds["young_pa"].reason
     (warning,) = grounding_warnings(field, parts, made)
     assert warning.startswith("riddle_0: riddle is of unknown material")
     named = replace(made, objects=tuple(replace(o, name="riddle") for o in made.objects))
@@ -79,7 +79,7 @@ def test_a_person_may_choose_a_value_inside_the_range_and_never_outside(tmp_path
     assert steel.yield_stress == pytest.approx(500e6)
     assert steel.density == pytest.approx(7900)
     assert steel.grounds["yield_stress"].chosen_by == "annotation"
-    assert steel.grounds["young"].chosen_by == "typical"
+    assert steel.grounds["young_pa"].chosen_by == "typical"
     path.write_text("block_0: { values: { young_GPa: 20 } }")
     with pytest.raises(OutOfRangeError, match="Young's modulus of steel is 2e\\+10 Pa"):
         grounded(BLOCK, annotations=path)
@@ -131,13 +131,13 @@ def test_a_library_of_ones_own_replaces_ours_or_extends_it(tmp_path):
     (tmp_path / "merged.toml").write_text('extends = "default"\n' + OWN)
     config = GroundConfig(library=str(tmp_path / "merged.toml"))
     field, parts, _ = grounded(BLOCK, PLANK, config=config)
-    assert field.materials[0].young == pytest.approx(201e9)
+    assert field.materials[0].young_pa == pytest.approx(201e9)
     assert field.materials[1].name == "hardwood"
     said = materials.materials_json(field, parts)
-    assert said["parts"][0]["values"]["young"]["source"] == "Our own bench"
+    assert said["parts"][0]["values"]["young_pa"]["source"] == "Our own bench"
     (tmp_path / "alone.toml").write_text(OWN)
     alone = GroundConfig(library=str(tmp_path / "alone.toml"), floor="steel", neutral="steel")
-    assert grounded(BLOCK, config=alone)[0].materials[0].young == pytest.approx(201e9)
+    assert grounded(BLOCK, config=alone)[0].materials[0].young_pa == pytest.approx(201e9)
     with pytest.raises(UserError, match=r"has nothing for 'hardwood'.*extends = \"default\""):
         grounded(BLOCK, PLANK, config=alone)
 
@@ -147,8 +147,8 @@ def test_the_record_is_plain_data_with_resolved_citations():
     said = json.loads(json.dumps(materials.materials_json(field, parts), allow_nan=False))
     duck = said["parts"][0]
     assert duck["structure"]["thickness"] == 0.002
-    assert duck["values"]["young"]["range"] == [3.6e6, 21e6]
-    assert "Gent" in duck["values"]["young"]["source"]
+    assert duck["values"]["young_pa"]["range"] == [3.6e6, 21e6]
+    assert "Gent" in duck["values"]["young_pa"]["source"]
     assert said["parts"][1]["answered_by"] == "unknown"
 
 
@@ -169,21 +169,21 @@ def spoken(thing, words, library="default"):
 
 
 def test_values_are_where_a_model_placed_them_and_say_so():
-    words = PartDescription("", "soft_PVC", "shell", margin=0.6, placements=placed(young=0.25, shell_thickness=0.5))
+    words = PartDescription("", "soft_PVC", "shell", margin=0.6, placements=placed(young_pa=0.25, shell_thickness=0.5))
     field, said = spoken(RIDDLE, words)
     (material,), (structure,) = field.materials, field.structures
-    assert material.young == pytest.approx(3.6e6 + 0.25 * (21e6 - 3.6e6))
+    assert material.young_pa == pytest.approx(3.6e6 + 0.25 * (21e6 - 3.6e6))
     assert material.shell_thickness == pytest.approx(0.4e-3 + 0.5 * 3.6e-3)
     assert structure.thickness == material.shell_thickness
-    young, density = material.grounds["young"], material.grounds["density"]
-    assert (young.chosen_by, young.reason, young.margin) == ("model", "young so.", 0.6)
+    young_pa, density = material.grounds["young_pa"], material.grounds["density"]
+    assert (young_pa.chosen_by, young_pa.reason, young_pa.margin) == ("model", "young_pa so.", 0.6)
     assert (density.chosen_by, density.margin) == ("typical", 0.6)
     assert said == ()
 
 
 def test_a_wide_range_is_placed_in_factors():
-    (foam,) = spoken(RIDDLE, PartDescription("", "seat_foam", placements=placed(young=0.5)))[0].materials
-    assert foam.young == pytest.approx((10e3 * 150e3) ** 0.5)
+    (foam,) = spoken(RIDDLE, PartDescription("", "seat_foam", placements=placed(young_pa=0.5)))[0].materials
+    assert foam.young_pa == pytest.approx((10e3 * 150e3) ** 0.5)
 
 
 def test_what_is_inside_is_as_dense_as_it_was_placed():
@@ -196,7 +196,7 @@ def test_what_is_inside_is_as_dense_as_it_was_placed():
 
 
 def test_values_that_do_not_fit_each_other_are_flagged_where_they_stand_and_in_a_warning():
-    words = PartDescription("", "plasticine", placements=placed(young=1.0, yield_stress=0.0))
+    words = PartDescription("", "plasticine", placements=placed(young_pa=1.0, yield_stress=0.0))
     field, said = spoken(RIDDLE, words)
     reason = field.materials[0].grounds["yield_stress"].reason
     assert reason.startswith("yield_stress so. It does not fit the others: stiff but weak")
@@ -204,16 +204,16 @@ def test_values_that_do_not_fit_each_other_are_flagged_where_they_stand_and_in_a
 
 
 def test_what_a_person_stated_outranks_what_a_model_placed():
-    words = PartDescription("", "steel", placements=placed(young=0.0), values={"young": 2.1e11})
+    words = PartDescription("", "steel", placements=placed(young_pa=0.0), values={"young_pa": 2.1e11})
     (steel,) = spoken(RIDDLE, words)[0].materials
-    assert (steel.young, steel.grounds["young"].chosen_by) == (2.1e11, "annotation")
-    assert steel.grounds["young"].margin == 1.0
+    assert (steel.young_pa, steel.grounds["young_pa"].chosen_by) == (2.1e11, "annotation")
+    assert steel.grounds["young_pa"].margin == 1.0
 
 
 def test_a_place_that_nobody_could_choose_is_marked():
-    words = PartDescription("", "steel", placements={"young": RangePlacement(0.4, "fallback", "No answer.")})
+    words = PartDescription("", "steel", placements={"young_pa": RangePlacement(0.4, "fallback", "No answer.")})
     (steel,) = spoken(RIDDLE, words)[0].materials
-    assert steel.grounds["young"].chosen_by == "fallback"
+    assert steel.grounds["young_pa"].chosen_by == "fallback"
 
 
 def test_a_description_without_the_part_is_refused():

@@ -36,7 +36,7 @@ def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
     skin = 1100 * 4 * np.pi * RADIUS**2 * 0.003
     assert particles.mass.sum() == pytest.approx(skin + 2.15 * volume, rel=0.05)
     np.testing.assert_allclose(particles.density, particles.mass.sum() / volume, rtol=0.02)
-    assert particles.treatments[0].simulated_young_pa == structure.contents.young
+    assert particles.treatments[0].simulated_young_pa == structure.contents.young_pa
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_an_annotation_inflates_a_ball_and_lets_the_air_out_of_one(tmp_path):
     assert blown.contents.name == "air at 60 kPa"
     assert "nine times as stiff" in blown.reason
     flat = annotated(tmp_path, "football: {inflation_kPa: 0}\n", "football")
-    assert flat.contents is None or flat.contents.young < 50e3
+    assert flat.contents is None or flat.contents.young_pa < 50e3
 
 
 @pytest.mark.parametrize(

@@ -53,10 +53,10 @@ def test_a_number_is_written_as_a_person_would(value, unit, said):
     assert si_text(value, unit) == said
 
 
-def treated(kind, young):
+def treated(kind, young_pa):
     numbers = {"poisson": 0.3, "density": 1.0, "yield_stress": None, "thickness": None}
     numbers |= {"strain": 0.0, "impact_speed": 0.0, "wave_speed": 1.0, "step": 1.0, "reason": ""}
-    return Discretization(kind=kind, young_pa=1e9, simulated_young_pa=young, **numbers)
+    return Discretization(kind=kind, young_pa=1e9, simulated_young_pa=young_pa, **numbers)
 
 
 def test_the_real_stiffness_stands_beside_the_simulated_one():

@@ -189,7 +189,7 @@ def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
     assert treated.kind == "deformable"
     assert "At its real size, 0.2 times this one, it would be judged otherwise" in treated.reason
     assert "otherwise" not in plan_discretization([replace(stick, scale=1.0)], [gentle], "fine").treatments[0].reason
-    stiff = replace(stick, material=replace(gel, young=1e11))
+    stiff = replace(stick, material=replace(gel, young_pa=1e11))
     assert "otherwise" not in plan_discretization([stiff], [gentle], "fine").treatments[0].reason
 
 

@@ -44,7 +44,7 @@ def cube(height):
 def treated(material):
     stiff = material is STONE
     return Discretization(
-        "rigid" if stiff else "deformable", material.young, material.young, material.poisson,
+        "rigid" if stiff else "deformable", material.young_pa, material.young_pa, material.poisson,
         material.density, None, None, 0.1, 1.0, 0.0 if stiff else 5.0, 1e-3, "As it is.",
         material.loss,
     )  # fmt: skip

@@ -137,7 +137,7 @@ def lattice(low, high):
 
 def treated(material=RUBBER, kind="deformable"):
     return Discretization(
-        kind, material.young, material.young, material.poisson, material.density,
+        kind, material.young_pa, material.young_pa, material.poisson, material.density,
         material.yield_stress, None, 0.1, 1.0, 38.0, 2e-4, "Deformable.", material.loss,
     )  # fmt: skip
 

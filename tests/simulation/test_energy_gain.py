@@ -74,7 +74,7 @@ def test_what_a_touch_or_a_push_gives_is_no_gain():
 
 def test_a_ball_that_falls_bounces_and_rings_passes():
     cell = 0.02
-    soft = ball((0.0, 0.0, 0.12), 0.05, cell / 2, stuff=Stuff(young=1e5), velocity=(0, 0, -2))
+    soft = ball((0.0, 0.0, 0.12), 0.05, cell / 2, stuff=Stuff(young_pa=1e5), velocity=(0, 0, -2))
     given = problem(soft, cell=cell, planes=[floor()], gravity=(0.0, 0.0, -9.81))
     run, watch = CpuEngine(given, threads=1), EnergyWatch.of(given)
     assert watch is not None

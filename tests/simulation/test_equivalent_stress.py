@@ -34,12 +34,12 @@ def test_a_small_stretch_follows_hooke(problem):
     across = -body.poisson[0] * strain
     F = np.eye(3) + np.diag([strain, across, across])
     found = VonMises(problem).at(snapshot(problem, F))
-    np.testing.assert_allclose(found, body.young * strain, rtol=5e-3)
+    np.testing.assert_allclose(found, body.young_pa * strain, rtol=5e-3)
 
 
 def test_turning_costs_no_stress_and_swelling_has_no_equivalent_stress(problem):
     turn = np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])
-    scale = problem.bodies[0].young.max()
+    scale = problem.bodies[0].young_pa.max()
     for F in (turn, 1.2 * np.eye(3)):
         assert VonMises(problem).at(snapshot(problem, F)).max() < 1e-5 * scale
 

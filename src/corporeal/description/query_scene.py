@@ -32,6 +32,7 @@ from corporeal.description.pool_answers import pool_answers
 from corporeal.discretization.drawn_thickness import measure_drawn_shape
 from corporeal.discretization.mesh_measures import oriented_box_size
 from corporeal.materials.material_candidates import QuantityChoice, content_materials_text, part_materials_text
+from corporeal.materials.quantities import question_name
 from corporeal.materials.range_placement import (
     QuantityJudgement,
     library_entry,
@@ -159,8 +160,8 @@ def make_placement_offer(
     seen = f" (it looks: {look})" if look else ""
     return PlacementOffer(
         f"{name}: {', '.join(made)}{seen}",
-        {field: c.words for field, c in offered.items()},
-        {field: c.bounds for field, c in offered.items()},
+        {question_name(field): c.words for field, c in offered.items()},
+        {question_name(field): c.bounds for field, c in offered.items()},
     )
 
 
@@ -169,10 +170,12 @@ def placements_from_answer(
 ) -> dict[str, dict[str, RangePlacement]]:
     """Read an answer: part → quantity → where in its range the value lies."""
     read = placements_from_values if isinstance(answer, ValueAnswer) else placements_from_fractions
-    return {
-        p.part: read({v.quantity: QuantityJudgement(v.number, v.reason) for v in p.values}, by, offered[p.part])
-        for p in answer.parts
-    }
+    found = {}
+    for p in answer.parts:
+        fields = {question_name(field): field for field in offered[p.part]}
+        judged = {fields[v.quantity]: QuantityJudgement(v.number, v.reason) for v in p.values}
+        found[p.part] = read(judged, by, offered[p.part])
+    return found
 
 
 INTERVIEW_TASKS = ("parts", "ranking", "materials", "thickness", "placement", "mass", "extents")

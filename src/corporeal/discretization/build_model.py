@@ -276,7 +276,7 @@ def constitutive_numbers(material: Material, treatment: Discretization, extent: 
     softer, leafy = treatment.simulated_young_pa / treatment.young_pa, treatment.kind == "foliage"
     return {
         "law": float(Law.COROTATED.value if leafy else material.law.value),
-        "young": treatment.simulated_young_pa,
+        "young_pa": treatment.simulated_young_pa,
         "poisson": treatment.poisson,
         "yield_stress": treatment.yield_stress or 0.0,
         "hardening": material.hardening * softer,

@@ -104,9 +104,9 @@ def mean_stiffness(part: PartGeometry) -> float:
     """E of a part as a whole [Pa]: of what fills it, or of a wall by its share of the volume."""
     inside = part_as_contents(part)
     if inside.structure.kind != "shell" or part.volume <= 0.0:
-        return max(inside.material.young, 1.0)
+        return max(inside.material.young_pa, 1.0)
     share = part.narrowing * part.area * (part.structure.thickness or 0.0) / part.volume
-    return max(part.material.young * min(1.0, share), 1.0)
+    return max(part.material.young_pa * min(1.0, share), 1.0)
 
 
 def _part_geometry(member: MeasuredPart, bodies: MeasuredScene, number: int) -> PartGeometry:

@@ -138,19 +138,20 @@ def effective_parameters(
     thicker = choose_thickening(part, role, 2 * cell, motion.impact_speed)
     density = mean_density(part) * thicker.density
     # True elastic numbers; those of a liquid follow from its speed.
-    young, poisson = bounded_poisson(material.young, material.poisson)
-    strong, real = material.yield_stress, material.young
+    simulated_young_pa, poisson = bounded_poisson(material.young_pa, material.poisson)
+    strong, young_pa = material.yield_stress, material.young_pa
     if CONSTITUTIVE_LAWS[material.law].liquid:
-        young, poisson = liquid_stiffness_numbers(part, motion)
-        real, strong = young, sqrt(3.0) * material.yield_shear
+        simulated_young_pa, poisson = liquid_stiffness_numbers(part, motion)
+        young_pa, strong = simulated_young_pa, sqrt(3.0) * material.yield_shear
     # What the grid does not dissipate by itself, and the waves that limit the step.
     shell = structure.kind == "shell" and structure.thickness is not None
     loss = remaining_loss_factor(part, motion, resolved.across) if soft else 0.0
-    wave = wave_speed(young * thicker.young_factor, poisson, density, loss) if soft else 0.0
+    simulated_young_pa *= thicker.young_factor
+    wave = wave_speed(simulated_young_pa, poisson, density, loss) if soft else 0.0
     return Discretization(
         kind=("shell" if shell else "deformable") if soft else "rigid",
-        young_pa=real,
-        simulated_young_pa=young * thicker.young_factor if soft else material.young,
+        young_pa=young_pa,
+        simulated_young_pa=simulated_young_pa if soft else material.young_pa,
         poisson=poisson,
         density=density,
         yield_stress=strong * thicker.strength if soft and strong is not None else strong,
@@ -192,15 +193,15 @@ class ThickeningFactors:
 def choose_thickening(part: PartGeometry, role: PartRole, thick: float, speed: float) -> ThickeningFactors:
     """Choose the factors that keep bending and mass where a part is simulated ``thick`` [m]."""
     wall = wall_thickening_ratio(part, thick)
-    young, strength, density = wall_factors(part, wall, speed)
+    young_factor, strength, density = wall_factors(part, wall, speed)
     thickness = part.structure.thickness
     round_dent = part.closed and not is_folding_wall(part, speed)
     if CONSTITUTIVE_LAWS[part.material.law].ductile and thickness and wall < 1 and not round_dent:
-        young *= fold_stiffness_factor(thickness, thick, part.size[1] / 2)
+        young_factor *= fold_stiffness_factor(thickness, thick, part.size[1] / 2)
     rod = rod_thickening_ratio(part, thick) if role == "soft" else 1.0
     if rod < 1:
-        young, strength, density = rod**4, rod**3, rod**2
-    return ThickeningFactors(wall, rod, young, strength, density)
+        young_factor, strength, density = rod**4, rod**3, rod**2
+    return ThickeningFactors(wall, rod, young_factor, strength, density)
 
 
 def liquid_stiffness_numbers(part: PartGeometry, motion: ExpectedMotion) -> tuple[float, float]:
@@ -214,7 +215,7 @@ def foliage_parameters(part: PartGeometry, verdict: RigidityVerdict, motion: Exp
     """Give foliage no stress of its own."""
     return Discretization(
         kind="foliage",
-        young_pa=part.material.young,
+        young_pa=part.material.young_pa,
         simulated_young_pa=0.0,
         poisson=0.0,
         density=part.material.density,

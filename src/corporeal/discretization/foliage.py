@@ -141,7 +141,7 @@ def leaf_frequencies(
     length = np.minimum(np.concatenate(lengths)[nearest], MAX_LEAF_LENGTH_M * scale)
     if is_bulk_foliage(member, scale):
         length[:] = USUAL_LEAF_LENGTH_M * scale
-    stiffness = tissue.young * (tissue.shell_thickness * scale) ** 2
+    stiffness = tissue.young_pa * (tissue.shell_thickness * scale) ** 2
     rate = np.sqrt(stiffness / (1.5 * LEAF_CENTRE_SHIFT_RATIO * tissue.density)) / length**2
     return np.minimum(rate, MAX_LEAF_FREQUENCY_RAD_S)
 
@@ -256,7 +256,7 @@ def root_joint(
     x, y = corner[low, :2].mean(axis=0)
     point = (float(x), float(y), found.foot + ROCKING_PIVOT_DEPTH_RATIO * depth)
     soil = materials[found.soil]
-    stiffness = ROOT_STIFFNESS_COEFFICIENT * soil.young * depth**3
+    stiffness = ROOT_STIFFNESS_COEFFICIENT * soil.young_pa * depth**3
     damping = soil.loss * float(np.sqrt(stiffness * inertia_about(found.wood, point)))
     return PlantRoot(number, found.wood, point, stiffness, damping)
 

@@ -3,13 +3,13 @@
 from math import pi, sqrt
 
 
-def hertz_dent_of_ball(young: float, poisson: float, density: float, speed: float) -> float:
+def hertz_dent_of_ball(young_pa: float, poisson: float, density: float, speed: float) -> float:
     """Greatest dent of a ball that strikes a rigid plane, over its radius [-], at most 1.
 
     δ/R = (5π ρ v²/4 E*)^(2/5), E* = E/(1 - ν²): all of ½ m v² is stored by Hertz's force
     (Johnson, Contact Mechanics, 1985, §11.4). So E/5.7 doubles it.
     """
-    plane = young / (1.0 - poisson**2)
+    plane = young_pa / (1.0 - poisson**2)
     return min(1.0, (1.25 * pi * density * speed**2 / plane) ** 0.4)
 
 
@@ -59,7 +59,7 @@ def yield_mark_of_ball(strength: float, density: float, speed: float) -> float:
 
 
 def dent_of_hollow_ball(
-    young: float, poisson: float, density: float, thickness: float, radius: float, speed: float
+    young_pa: float, poisson: float, density: float, thickness: float, radius: float, speed: float
 ) -> float:
     """Greatest dent of a hollow ball that strikes a rigid plane, over its radius [-], at most 1.
 
@@ -67,4 +67,4 @@ def dent_of_hollow_ball(
     δ/R = v √(π ρ R √(3(1 - ν²))/(E t)).
     """
     bend = sqrt(3.0 * (1.0 - poisson**2))
-    return min(1.0, speed * sqrt(pi * density * radius * bend / (young * thickness)))
+    return min(1.0, speed * sqrt(pi * density * radius * bend / (young_pa * thickness)))

@@ -31,16 +31,16 @@ MIN_NOTABLE_LOSS_FACTOR = 0.005
 """A smaller loss factor changes no rebound that can be measured [-]."""
 
 
-def vibration_loss(density: float, speed: float, young: float) -> float:
+def vibration_loss(density: float, speed: float, young_pa: float) -> float:
     """Loss factor [-] that a ball's vibrations take of an impact on a rigid plane.
 
     Args:
         density: [kg/m³]
         speed: [m/s]
-        young: E, resisted slowly [Pa].
+        young_pa: E, resisted slowly [Pa].
 
     """
-    return VIBRATION_LOSS_COEFFICIENT * min(density * speed**2 / young, MAX_IMPACT_NUMBER)
+    return VIBRATION_LOSS_COEFFICIENT * min(density * speed**2 / young_pa, MAX_IMPACT_NUMBER)
 
 
 def compensate_vibration_loss(

@@ -50,7 +50,7 @@ class MissingWall:
 def _is_limp_over_span(material: Material, span: float, depth: float) -> bool:
     """Return whether a bar of some material would visibly bend by its own weight, held at one end."""
     load = material.density * GRAVITY_M_S2
-    return cantilever_tip_deflection_ratio(load, material.young, span, depth) >= MAX_INVISIBLE_STRAIN
+    return cantilever_tip_deflection_ratio(load, material.young_pa, span, depth) >= MAX_INVISIBLE_STRAIN
 
 
 def close_all_missing_walls(anatomies: Sequence[MeasuredObject], field: MaterialField) -> list[MeasuredObject]:

@@ -218,7 +218,7 @@ def is_folding_wall(part: PartGeometry, speed: float) -> bool:
     if not CONSTITUTIVE_LAWS[material.law].flows or not thickness or part.size[0] <= 0.0:
         return CONSTITUTIVE_LAWS[material.law].flows
     radius = 0.5 * part.size[0]
-    made = (material.young, min(material.poisson, 0.49), material.density)
+    made = (material.young_pa, min(material.poisson, 0.49), material.density)
     depth = dent_of_hollow_ball(*made, thickness, radius, speed) * radius / thickness
     return not 0.0 < depth < MIN_FOLDED_DENT_RATIO
 
@@ -233,4 +233,4 @@ def is_limp_wall(part: PartGeometry, ratio: float) -> bool:
     if part.structure.kind != "shell" or not thickness:
         return False
     load = 1.5 * material.density * GRAVITY_M_S2 * part.size[2] ** 3
-    return load * ratio**2 > material.young * thickness**2
+    return load * ratio**2 > material.young_pa * thickness**2

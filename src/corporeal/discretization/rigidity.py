@@ -20,19 +20,19 @@ MAX_INVISIBLE_STRAIN = 5e-3
 """Half a percent, of strain or of a shift over a length, is not seen."""
 
 
-def cantilever_tip_deflection_ratio(load: float, young: float, length: float, depth: float) -> float:
+def cantilever_tip_deflection_ratio(load: float, young_pa: float, length: float, depth: float) -> float:
     """Shift of the tip of a bar that is held at one end, over its length [-].
 
     δ/L = 3 ρ a L³ / (2 E h²) (Euler–Bernoulli, a solid bar).
 
     Args:
         load: ρ a [N/m³].
-        young: E [Pa].
+        young_pa: E [Pa].
         length: L [m].
         depth: h [m].
 
     """
-    return 1.5 * load * length**3 / (young * depth**2)
+    return 1.5 * load * length**3 / (young_pa * depth**2)
 
 
 def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdict:
@@ -54,14 +54,14 @@ def judge_rigidity(part: PartGeometry, motion: ExpectedMotion) -> RigidityVerdic
     if part.structure.contents is not None:
         return judge_filled_shell(part, motion, judge_rigidity)
     material, speed = part.material, motion.impact_speed
-    young, poisson = bounded_poisson(material.young, material.poisson)
+    young_pa, poisson = bounded_poisson(material.young_pa, material.poisson)
     density = material.density
     ratio = 1.0 if tube_diameter(part) else wall_thickening_ratio(part, part_width(part) / 10)
     stiffer, _, denser = wall_factors(part, ratio, speed)
-    real = p_wave_speed(young, poisson, density)
+    real = p_wave_speed(young_pa, poisson, density)
     mapped = stiffer / denser
     weight = max(
-        density * motion.acceleration * part.size[2] / (young * mapped),
+        density * motion.acceleration * part.size[2] / (young_pa * mapped),
         # The shape of a plant has its own weight and its leaves' in it already.
         cantilever_sag(part, motion.driven if part.burden else motion.acceleration),
     )
@@ -100,7 +100,7 @@ def cantilever_sag(part: PartGeometry, acceleration: float) -> float:
     length, depth = part.size[2], sqrt(1.5) * tube_diameter(part) or 2 / 3 * part_width(part)
     if depth <= 0 or length < 4 * depth:
         return 0.0
-    density, young = part.material.density, part.material.young
+    density, young_pa = part.material.density, part.material.young_pa
     # A load at the tip bends 8/3 as much as one spread along.
     loaded = 1.0 + 8 / 3 * part.burden
-    return cantilever_tip_deflection_ratio(loaded * density * acceleration, young, length, depth)
+    return cantilever_tip_deflection_ratio(loaded * density * acceleration, young_pa, length, depth)

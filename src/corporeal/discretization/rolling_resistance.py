@@ -88,7 +88,7 @@ def rolling_resistance_length(roller: RollingBody, own: Material, other: Materia
     of it keeps in an impact (``materials.rebound``). Hertz: a³ = 3 N R/(4 E*) of a ball, a² = 4 N R/(π L E*) of a
     cylinder.
     """
-    soft = [plane_strain_compliance(m) if m.young > 0 else 0.0 for m in (own, other)]
+    soft = [plane_strain_compliance(m) if m.young_pa > 0 else 0.0 for m in (own, other)]
     taken = [1.0 - restitution_of_loss(min(m.loss, 2.0)) ** 2 for m in (own, other)]
     both = sum(soft)
     if both == 0.0:

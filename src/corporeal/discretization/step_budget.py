@@ -152,17 +152,17 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
     )
 
 
-def wave_speed(young: float, poisson: float, density: float, loss: float) -> float:
+def wave_speed(young_pa: float, poisson: float, density: float, loss: float) -> float:
     """Speed of the fastest wave [m/s]: c_p of the modulus that is resisted at once.
 
     Args:
-        young: E, resisted slowly [Pa].
+        young_pa: E, resisted slowly [Pa].
         poisson: ν [-].
         density: ρ [kg/m³].
         loss: tan δ as simulated [-]: loss stiffens (``mpm.physics.branches``).
 
     """
-    return p_wave_speed(young, poisson, density) * sqrt(stiffening(loss, poisson))
+    return p_wave_speed(young_pa, poisson, density) * sqrt(stiffening(loss, poisson))
 
 
 # ------------------------------------------------------------------ better rigid
@@ -244,14 +244,14 @@ def _ball_dents(part: PartGeometry, true: Discretization, soft: Discretization) 
     if soft.kind == "deformable":
         return _BallDents(
             *(
-                hertz_dent_of_ball(young, true.poisson, true.density, true.impact_speed)
-                for young in (true.simulated_young_pa, soft.simulated_young_pa)
+                hertz_dent_of_ball(modulus_pa, true.poisson, true.density, true.impact_speed)
+                for modulus_pa in (true.simulated_young_pa, soft.simulated_young_pa)
             )
         )
     if soft.kind != "shell" or not part.structure.sealed or not soft.thickness:
         return None
     speed, radius, made = true.impact_speed, 0.5 * part.size[0], part.material
-    real = (made.young, made.poisson, made.density, part.structure.thickness or soft.thickness)
+    real = (made.young_pa, made.poisson, made.density, part.structure.thickness or soft.thickness)
     slow = (soft.simulated_young_pa, soft.poisson, soft.density, soft.thickness)
     return _BallDents(*(dent_of_hollow_ball(*wall, radius, speed) for wall in (real, slow)))
 
@@ -336,14 +336,14 @@ def cap_stiffness(part: PartGeometry, treatment: Discretization, cell: float) ->
     """Apply the published cap instead: σ_y falls with E, which keeps the yield strain."""
     material, density = part.material, treatment.density
     poisson = min(material.poisson, 0.4999)
-    young = capped_young(material.young, poisson, density, cell)
-    wave = p_wave_speed(young, poisson, density)
+    simulated_young_pa = capped_young(material.young_pa, poisson, density, cell)
+    wave = p_wave_speed(simulated_young_pa, poisson, density)
     strong = material.yield_stress
     return replace(
         treatment,
-        simulated_young_pa=young,
+        simulated_young_pa=simulated_young_pa,
         poisson=poisson,
-        yield_stress=None if strong is None else strong * young / material.young,
+        yield_stress=None if strong is None else strong * simulated_young_pa / material.young_pa,
         wave_speed=wave,
         step=stable_step(wave, treatment.impact_speed, cell),
         reason="Deformable with the published cap on Young's modulus.",

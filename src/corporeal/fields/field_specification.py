@@ -29,7 +29,7 @@ from corporeal.core.errors import BadFileError, UserError
 from corporeal.fields.sampled_field import FIELD_VALUE_BOUNDS, SampledField, check_field
 from corporeal.io.ply_container import read_ply_elements
 
-VOMP_COLUMNS = {"young": "youngs_modulus", "poisson": "poissons_ratio", "density": "density"}
+VOMP_COLUMNS = {"young_pa": "youngs_modulus", "poisson": "poissons_ratio", "density": "density"}
 VOMP_WRITE_AGAIN = "Write it again with VoMP's save_materials."
 
 
@@ -65,7 +65,7 @@ def read_vomp(path: Path) -> SampledField:
 
 PIXIE_KINDS = ("jelly", "metal", "sand", "visplas", "fluid", "snow", "stationary", "background")
 """By material_id."""
-PIXIE_COLUMNS = {"young": "E", "poisson": "nu", "density": "density"}
+PIXIE_COLUMNS = {"young_pa": "E", "poisson": "nu", "density": "density"}
 PIXIE_FILE_NAMES = "mapped_preds.ply or world_mapped_preds.ply"
 
 
@@ -99,7 +99,7 @@ def read_pixie(path: Path) -> SampledField:
     )
 
 
-TABLE_COLUMNS = {"young": "E", "poisson": "nu", "density": "density"}
+TABLE_COLUMNS = {"young_pa": "E", "poisson": "nu", "density": "density"}
 TABLE_HEADER_HELP = "Its first line names the columns: x,y,z and any of E,nu,density (SI)."
 
 
@@ -146,10 +146,10 @@ FIELD_READERS: Mapping[str, tuple[Callable[[Path], SampledField], str]] = {
     "table": (read_field_table, ".csv"),
 }
 """Kind of a field → its reader, and what the name of its files ends in."""
-FIELD_LETTERS = {"E": "young", "nu": "poisson", "rho": "density"}
-PHYSGAUSSIAN_UNIFORM = {"young": 2e6, "poisson": 0.4, "density": 200.0}
+FIELD_LETTERS = {"E": "young_pa", "nu": "poisson", "rho": "density"}
+PHYSGAUSSIAN_UNIFORM = {"young_pa": 2e6, "poisson": 0.4, "density": 200.0}
 """PhysGaussian's config/ficus_config.json [SI]."""
-OMNIPHYSGS_UNIFORM = {"young": 2e6, "poisson": 0.4, "density": 1000.0}
+OMNIPHYSGS_UNIFORM = {"young_pa": 2e6, "poisson": 0.4, "density": 1000.0}
 """OmniPhysGS: buffers of elasticity.py, which its training does not change [SI]."""
 FIELD_SPECIFICATION_HELP = "Use one, one:E=2e6,nu=.4,rho=200, omniphysgs, vomp:PATH, pixie:PATH or table:PATH.csv."
 

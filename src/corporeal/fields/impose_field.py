@@ -82,7 +82,7 @@ def _sum_up_part(field: SampledField, sample: np.ndarray, covered: float) -> Par
         unfit = f"only {covered:.0%} of it lies near a point of the field"
         return PartFieldNumbers({}, {}, None, covered, 0.0, unfit)
     bands = {name: np.percentile(v[sample], BAND_PERCENTILES) for name, v in field.values.items()}
-    decades = float(np.log10(bands["young"][2] / bands["young"][0])) if "young" in bands else 0.0
+    decades = float(np.log10(bands["young_pa"][2] / bands["young_pa"][0])) if "young_pa" in bands else 0.0
     unfit = f"E spans {decades:.1f} decades within it" if decades > MAX_YOUNG_SPAN_DECADES else ""
     kind = None
     if field.kind is not None:

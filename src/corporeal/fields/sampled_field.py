@@ -10,7 +10,7 @@ from jaxtyping import Float
 from corporeal.core.errors import BadFileError
 
 FIELD_VALUE_BOUNDS: Mapping[str, tuple[float, float]] = {
-    "young": (0.0, np.inf),
+    "young_pa": (0.0, np.inf),
     "density": (0.0, np.inf),
     "poisson": (-1.0, 0.5),
 }

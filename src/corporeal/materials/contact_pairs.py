@@ -190,7 +190,7 @@ def compliance_share(a: Material, b: Material) -> float:
     One force presses both and their dents add up, so that 1/E* = (1 - ν_a²)/E_a + (1 - ν_b²)/E_b (Hertz; Johnson,
     Contact Mechanics, 1985, §4.2), and each stores its part of the sum.
     """
-    stiff_a, stiff_b = (m.young / (1.0 - m.poisson**2) for m in (a, b))
+    stiff_a, stiff_b = (m.young_pa / (1.0 - m.poisson**2) for m in (a, b))
     return stiff_b / (stiff_a + stiff_b)
 
 

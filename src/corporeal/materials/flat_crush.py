@@ -122,8 +122,8 @@ class _CrushContact:
 
 def material_across_layers(sheet: Material) -> Material:
     """Return a sheet's material as it is across its layers, as long as they do not fold."""
-    young = layered_materials()[sheet.name].young_across_pa
-    return replace(sheet, young=young, restitution=restitution_of_loss(sheet.loss), poisson=0.0)
+    young_pa = layered_materials()[sheet.name].young_across_pa
+    return replace(sheet, young_pa=young_pa, restitution=restitution_of_loss(sheet.loss), poisson=0.0)
 
 
 def crush_restitution(ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float) -> float:

@@ -19,7 +19,7 @@ from corporeal.materials.quantities import QUANTITIES, SI_OF_KEY_UNIT, example_k
 from corporeal.materials.value_plausibility import default_namesake, range_doubt, yield_strain_doubt
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
-REQUIRED_FIELDS = ("young", "poisson", "density")
+REQUIRED_FIELDS = ("young_pa", "poisson", "density")
 LAWS_OF_FIELD = {
     field: {law for law in Law if field in CONSTITUTIVE_LAWS[law].fields}
     for asked in CONSTITUTIVE_LAWS.values()
@@ -302,7 +302,7 @@ def _check_sizes(found: _ProblemFinder, row: _MaterialRow, fields: dict[str, _Ra
     _check_rebound(found, row, fields)
     doubted = yield_strain_doubt({f: c.entries["typical"] * parse_quantity_key(c.key)[1] for f, c in fields.items()})
     if doubted and not any(p.table == row.name for p in found.problems):
-        strength, stiffness = fields["yield_stress"], fields["young"]
+        strength, stiffness = fields["yield_stress"], fields["young_pa"]
         if not (strength.unusual or stiffness.unusual):
             found.tell(row.name, strength.key, doubted.what, doubted.advice)
 

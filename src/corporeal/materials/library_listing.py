@@ -25,7 +25,7 @@ from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.range_modifiers import is_within_range, range_modifiers
 
 PREFIXES_OF_UNIT = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
-LISTING_FIELDS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion")
+LISTING_FIELDS = ("young_pa", "poisson", "density", "yield_stress", "friction_angle", "cohesion")
 LISTING_HEADS = ("material", "law", "E", "ν", "ρ", "σ_y", "φ", "c")
 
 

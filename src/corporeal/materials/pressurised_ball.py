@@ -73,8 +73,8 @@ def wall_stiffness(skin: Material, thickness: float, radius: float) -> float:
     Reissner, Stresses and small displacements of shallow spherical shells, J. Math. Phys. 25 (1946). A thick wall is
     dented where it is touched, too: never more than ``SOLID_BALL_STIFFNESS_RATIO`` E R.
     """
-    thin = 4.0 * skin.young * thickness**2 / (radius * sqrt(3.0 * (1.0 - skin.poisson**2)))
-    return thin / (1.0 + thin / (SOLID_BALL_STIFFNESS_RATIO * skin.young * radius))
+    thin = 4.0 * skin.young_pa * thickness**2 / (radius * sqrt(3.0 * (1.0 - skin.poisson**2)))
+    return thin / (1.0 + thin / (SOLID_BALL_STIFFNESS_RATIO * skin.young_pa * radius))
 
 
 def is_carried_by_air(gauge: float, skin: Material, thickness: float, radius: float) -> bool:
@@ -167,7 +167,7 @@ def inflated_ball_material(ball: InflatedBall) -> Material:
     bounces = restitution_of_loss(light.loss)
     why = f"wall of {skin.name} and air at {ball.gauge_pressure / 1e3:.3g} kPa act in parallel"
     values = {
-        "young": _ground(0.5 * light.young_pa, light.young_pa, 1.5 * light.young_pa, why),
+        "young_pa": _ground(0.5 * light.young_pa, light.young_pa, 1.5 * light.young_pa, why),
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "as of a ball full of air"),
         "density": _ground(density, density, density, "air at this pressure"),
         "restitution": _ground(0.0, bounces, 1.0, "the wall's share of the loss"),
@@ -183,11 +183,11 @@ def sealed_air_material(gauge: float) -> Material:
         gauge: Pressure above that of the air around it [Pa].
 
     """
-    young = MODULUS_PRESSURE_RATIO * pressed_gauge_pressure(gauge)
+    young_pa = MODULUS_PRESSURE_RATIO * pressed_gauge_pressure(gauge)
     density = AIR_DENSITY * (1.0 + gauge / ATMOSPHERIC_PRESSURE_PA)
     why = f"a limp ball at {gauge / 1e3:.3g} kPa presses as a solid of nine times the pressure does"
     values = {
-        "young": _ground(0.85 * young, young, 1.15 * young, why),
+        "young_pa": _ground(0.85 * young_pa, young_pa, 1.15 * young_pa, why),
         "poisson": _ground(0.1, SEALED_AIR_POISSON_RATIO, 0.3, "air lets itself be pressed together"),
         "density": _ground(density, density, density, "air at this pressure"),
         "restitution": _ground(0.73, INFLATED_BALL_RESTITUTION, 0.88, "what rules of sports ask of inflated balls"),

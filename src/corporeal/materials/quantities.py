@@ -24,7 +24,7 @@ class Quantity:
 QUANTITIES = {
     q.field: q
     for q in (
-        Quantity("young", "Young's modulus", "Pa", 1e2, 1.2e12),
+        Quantity("young_pa", "Young's modulus", "Pa", 1e2, 1.2e12),
         Quantity("poisson", "Poisson's ratio", "-", -0.99, 0.5),
         Quantity("density", "Density", "kg/m³", 1.0, 2.3e4),
         Quantity("yield_stress", "Yield stress", "Pa", 1e2, 5e9),
@@ -44,7 +44,9 @@ QUANTITIES = {
     )
 }
 
-FIELD_OF_KEY_STEM = {"yield": "yield_stress"}
+KEY_STEM_OF_FIELD = {"yield_stress": "yield", "young_pa": "young"}
+"""Field → the first part of its data key, where that is another word: a key ends in the unit of its file."""
+FIELD_OF_KEY_STEM = {KEY_STEM_OF_FIELD.get(field, field): field for field in QUANTITIES}
 SI_OF_KEY_UNIT = {
     "GPa": ("Pa", 1e9),
     "MPa": ("Pa", 1e6),
@@ -60,6 +62,11 @@ SI_OF_KEY_UNIT = {
 }
 
 
+def question_name(field: str) -> str:
+    """Name a field in questions to a language model, and so in recorded answers: the unit is with the range there."""
+    return "young" if field == "young_pa" else field
+
+
 def parse_quantity_key(key: str) -> tuple[str, float]:
     """Read a data key such as ``"young_GPa"``: the field it means and the factor to SI.
 
@@ -71,8 +78,8 @@ def parse_quantity_key(key: str) -> tuple[str, float]:
         return key, 1.0
     for suffix, (unit, factor) in SI_OF_KEY_UNIT.items():
         stem = key.removesuffix(f"_{suffix}")
-        field = FIELD_OF_KEY_STEM.get(stem, stem)
-        if stem != key and field in QUANTITIES and QUANTITIES[field].unit == unit:
+        field = FIELD_OF_KEY_STEM.get(stem)
+        if stem != key and field is not None and QUANTITIES[field].unit == unit:
             return field, factor
     raise UserError(f"Unknown quantity {key!r}. The unit is in the key: {', '.join(example_keys())}.")
 

@@ -16,6 +16,7 @@ from corporeal.core.types import WALLED_KINDS, MeasuredRange, PartDescription, R
 from corporeal.materials.library import find_material, library, library_counterpart
 from corporeal.materials.library_entry import MaterialEntry
 from corporeal.materials.material_candidates import QuantityChoice, fraction_of, quantity_choice, value_at_fraction
+from corporeal.materials.quantities import question_name
 
 CONSISTENCY_RATIO = 1.5
 """By what factor a set may leave what the grades have."""
@@ -38,8 +39,8 @@ class QuantityBond:
 
 
 QUANTITY_BONDS = (
-    QuantityBond("yield_stress", "young", 1, (), "stiff but weak", "soft but strong"),
-    QuantityBond("young", "density", 2, ("foam",), "dense but soft", "light but stiff"),
+    QuantityBond("yield_stress", "young_pa", 1, (), "stiff but weak", "soft but strong"),
+    QuantityBond("young_pa", "density", 2, ("foam",), "dense but soft", "light but stiff"),
 )
 
 
@@ -76,12 +77,12 @@ def _clause(bond: QuantityBond, ranges: Mapping[str, MeasuredRange], values: Map
     kind = bond.odd if ratio < low else bond.odder
     power = f"^{bond.power:g}" if bond.power != 1 else ""
     return (
-        f"{kind}: {bond.strong}/{bond.by}{power} is {ratio:.2g}, and its grades have "
+        f"{kind}: {question_name(bond.strong)}/{question_name(bond.by)}{power} is {ratio:.2g}, and its grades have "
         f"{min(grades):.2g} to {max(grades):.2g} (SI)"
     )
 
 
-PLACED_FIELDS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion", "shell_thickness")
+PLACED_FIELDS = ("young_pa", "poisson", "density", "yield_stress", "friction_angle", "cohesion", "shell_thickness")
 """Fields of ``Material`` that use and treatment decide; the others keep their usual value."""
 MASS_FIELDS = ("density", "shell_thickness")
 """Those of them that a mass hangs on."""

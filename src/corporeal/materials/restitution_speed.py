@@ -70,7 +70,7 @@ def material_at_speed(material: Material, speed: float) -> Material:
 
 def plane_strain_compliance(material: Material) -> float:
     """(1 - ν²)/E, what a material adds to 1/E* of a contact [1/Pa] (Johnson, 1985, §4.2)."""
-    return (1.0 - material.poisson**2) / material.young
+    return (1.0 - material.poisson**2) / material.young_pa
 
 
 def yield_restitution(a: Material, b: Material, speed: float) -> float:

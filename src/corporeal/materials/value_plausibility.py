@@ -9,7 +9,7 @@ from corporeal.materials.quantities import QUANTITIES, SI_OF_KEY_UNIT, parse_qua
 
 PLAUSIBLE_RANGE_FACTOR = 3.0
 """How far a new material may lie beyond all that are like it, as a factor."""
-COMPARED_FIELDS = ("young", "density", "yield_stress", "hardening", "shell_thickness")
+COMPARED_FIELDS = ("young_pa", "density", "yield_stress", "hardening", "shell_thickness")
 """What spans decades and carries a unit, so that a slip of the unit shows."""
 YIELD_STRAIN_RANGE = (5e-5, 0.3)
 """Yield stress over Young's modulus: from annealed pure metals to modelling clay."""
@@ -51,10 +51,10 @@ def range_doubt(key: str, span: tuple[float, float], name: str, group: str, law:
 
 
 def yield_strain_doubt(values: Mapping[str, float]) -> ValueDoubt | None:
-    """State that ``yield_stress`` and ``young`` [Pa] do not go together, or None."""
-    if "yield_stress" not in values or not values.get("young"):
+    """State that ``yield_stress`` and ``young_pa`` [Pa] do not go together, or None."""
+    if "yield_stress" not in values or not values.get("young_pa"):
         return None
-    strain = values["yield_stress"] / values["young"]
+    strain = values["yield_stress"] / values["young_pa"]
     if YIELD_STRAIN_RANGE[0] <= strain <= YIELD_STRAIN_RANGE[1]:
         return None
     what = f"yields at a strain of {strain:.2g}; solids yield between 5e-05 and 0.3."

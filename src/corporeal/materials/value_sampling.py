@@ -38,7 +38,7 @@ RANGE_SPAN_OF_SOURCE |= {"field": 0.0}
 """How far towards the ends of its range a value is drawn, by who chose it."""
 GRADE_CORRELATION = 0.9
 """Correlation of what moves together."""
-GRADE_FIELDS = ("young", "yield_stress", "hardening", "cohesion", "friction_angle")
+GRADE_FIELDS = ("young_pa", "yield_stress", "hardening", "cohesion", "friction_angle")
 """Grow together within one material."""
 POROUS_GROUPS = ("foam", "fibrous", "granular", "bulk", "food")
 """Groups in which the denser is also the stiffer (Gibson and Ashby 1997: E ∝ ρ²)."""

@@ -164,7 +164,7 @@ def _body_rows(problem: Problem, number: int) -> Float[np.ndarray, "P C"]:
     if body.rigid:
         row = {"flip_damping_rate": none + VAST, "rigid": none + 1.0}
     else:
-        mu, lam = (np.asarray(value) for value in lame_parameters(body.young, body.poisson))
+        mu, lam = (np.asarray(value) for value in lame_parameters(body.young_pa, body.poisson))
         sand = np.isin(body.law, laws.GRANULAR_LAWS)
         wave, pull = np.sqrt((lam + 2.0 * mu) / body.density), np.linalg.norm(problem.gravity)
         pours = np.isin(body.law, laws.LIQUID_LAWS)

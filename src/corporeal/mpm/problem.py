@@ -79,8 +79,8 @@ class Body:
     """[kg/m³]"""
     law: Int[np.ndarray, " P"]
     """``types.Law`` values."""
-    young: Float[np.ndarray, " P"]
-    """[Pa]"""
+    young_pa: Float[np.ndarray, " P"]
+    """Young's modulus E as simulated [Pa]; the solver knows no other."""
     poisson: Float[np.ndarray, " P"]
     yield_stress: Float[np.ndarray, " P"]
     """Von Mises yield stress [Pa]; unused by laws without it."""

@@ -79,7 +79,7 @@ def split_problem(problem: Problem, split: BodySplit) -> Problem:
 
 def _piece_body(body: Body, split: BodySplit, k: int) -> Body:
     mine = split.piece == k
-    columns = "volume density law young poisson yield_stress hardening friction_angle cohesion"
+    columns = "volume density law young_pa poisson yield_stress hardening friction_angle cohesion"
     columns += " loss vibration consistency flow_index"
     held = {name: getattr(body, name) for name in columns.split()}
     return replace(

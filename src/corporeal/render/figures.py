@@ -118,7 +118,7 @@ SHEET_SIZE_PX, SHEET_PANEL_SIZE_PX = (1485, 1045), (472, 354)
 FIRST_PANEL_CORNER_PX, PANEL_STEP_PX = (18, 41), (489, 522)
 """Left and top of the first picture, and from one to the next [px]."""
 
-PANEL_ORDER: tuple[ColourQuantity, ...] = ("material", "law", "young", "poisson", "density", "object")
+PANEL_ORDER: tuple[ColourQuantity, ...] = ("material", "law", "young_pa", "poisson", "density", "object")
 """Panels of the figure, row by row."""
 
 
@@ -263,7 +263,7 @@ def colour_panels(
             [part.name.replace("_", " ") for part in parts.catalogue],
             [palette[k % len(palette)] for k in numbers],
         ),
-        "young": NumericPanel("Young's modulus E", "Pa", [m.young for m in made], log=True),
+        "young_pa": NumericPanel("Young's modulus E", "Pa", [m.young_pa for m in made], log=True),
         "poisson": NumericPanel("Poisson's ratio ν", "", [m.poisson for m in made]),
         "density": NumericPanel("Density ρ", "kg/m³", [m.density for m in made], log=True),
     }

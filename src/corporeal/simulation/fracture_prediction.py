@@ -139,7 +139,7 @@ class _FirstImpacts:
         self.trajectory, self.ledger = trajectory, trajectory.ledger
         self.brittle = _brittle(particles, field)
         hard = find_material(FLOOR_MATERIAL).ranges
-        self.floor = ElasticSolid(hard["young"].typical, hard["poisson"].typical)
+        self.floor = ElasticSolid(hard["young_pa"].typical, hard["poisson"].typical)
 
     def all(self) -> Iterator[BrittleImpact]:
         """Every first impact on a brittle part."""
@@ -165,7 +165,7 @@ class _FirstImpacts:
         if c < objects:
             other = self._mover(frame, k, c, time, point)
             material = self.field.materials[self._struck(frame, c, point)]
-            partner = ElasticSolid(material.young, material.poisson)
+            partner = ElasticSolid(material.young_pa, material.poisson)
         mine, normal = self._mover(frame, k, a, time, point), self._normal(a, c, k)
         closing = float((mine.velocity - other.velocity) @ normal)
         speed = abs(closing)
@@ -261,7 +261,7 @@ class _FirstImpacts:
         wall = max(self.particles.walls[k]) if self.particles.walls else 0.0
         if wall == 0.0 and structure.kind != "solid":
             wall = (structure.thickness or 0.0) * scale
-        solid = ElasticSolid(material.young, material.poisson)
+        solid = ElasticSolid(material.young_pa, material.poisson)
         assert material.strength_local is not None
         form: BrittleForm = "lump"
         thickness, length, radius = 0.0, short, short / 2.0

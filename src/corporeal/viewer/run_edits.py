@@ -12,7 +12,7 @@ import yaml
 
 from corporeal.core.errors import UserError
 from corporeal.materials.library import find_material
-from corporeal.materials.quantities import QUANTITIES
+from corporeal.materials.quantities import KEY_STEM_OF_FIELD, QUANTITIES
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import Settings, read_run_request
 from corporeal.pipeline.settings.assemble_config import validate as validate_assemble
@@ -154,7 +154,8 @@ def _values(material: str, values: Any) -> dict[str, float]:
         low, high = ranges[name].low, ranges[name].high
         if not low * (1 - 1e-6) <= value <= high * (1 + 1e-6):
             raise UserError(f"{name} of {material} lies outside its range, {low:g} to {high:g}.")
-        out[name + UNIT_KEY_SUFFIXES[QUANTITIES[name].unit]] = min(max(float(value), low), high)
+        key = f"{KEY_STEM_OF_FIELD.get(name, name)}{UNIT_KEY_SUFFIXES[QUANTITIES[name].unit]}"
+        out[key] = min(max(float(value), low), high)
     return out
 
 

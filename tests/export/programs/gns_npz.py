@@ -17,7 +17,7 @@ print(
             "shape": list(position.shape),
             "count": count,
             "kinds": np.unique(kind).tolist(),
-            "young": sorted(set(np.round(10.0**stiffness, 3).tolist())),
+            "simulated_young_pa": sorted(set(np.round(10.0**stiffness, 3).tolist())),
             "last": np.asarray(label, dtype=float).mean(axis=0).tolist(),
         }
     )

@@ -67,9 +67,9 @@ def told(path, seconds):
     said["friction"] = dict(zip(builder.shape_label, frictions, strict=True))
     if model.particle_count:
         said["particle_mass"] = float(model.particle_mass.numpy().astype(float).sum())
-        young = model.mpm.young_modulus.numpy()
-        values, counts = np.unique(young, return_counts=True)
-        said["young"] = [[float(v), int(c)] for v, c in zip(values, counts, strict=True)]
+        young_pa = model.mpm.young_modulus.numpy()
+        values, counts = np.unique(young_pa, return_counts=True)
+        said["simulated_young_pa"] = [[float(v), int(c)] for v, c in zip(values, counts, strict=True)]
     if seconds:
         moved = drift(model, seconds)
         said["drift"] = {n: float(m) for n, m in zip(builder.body_label, moved, strict=True)}

@@ -25,7 +25,7 @@ from corporeal.mpm.quiet_warp import wp
 wp.set_module_options(formulas.formula_options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
 
 COUNT = 8000
-YOUNG, POISSON, YIELD, HARDENING, ANGLE = 1e5, 0.3, 2e3, 1e4, np.radians(30.0)
+YOUNG_PA, POISSON, YIELD, HARDENING, ANGLE = 1e5, 0.3, 2e3, 1e4, np.radians(30.0)
 DRAG = 5e4
 """K_c/dtⁿ of a liquid [Pa]."""
 PLACES = 20
@@ -169,7 +169,7 @@ def responses(law, H, width, past=None, apex=0.0, index=0.4):
 
     ``past`` is the plastic strain and the volume correction so far, (COUNT, 2).
     """
-    mu, lam = lame_parameters(YOUNG, POISSON)
+    mu, lam = lame_parameters(YOUNG_PA, POISSON)
     cone = float(cone_slope(ANGLE)) if law == Law.DRUCKER_PRAGER else 0.0
     numbers = [law.value, mu, lam, YIELD, HARDENING, cone, apex, DRAG, index]
     table = np.array(numbers, np.float32)
@@ -186,7 +186,7 @@ def responses(law, H, width, past=None, apex=0.0, index=0.4):
 
 def moduli():
     """μ and λ of every particle [Pa]."""
-    mu, lam = lame_parameters(np.full(COUNT, YOUNG), np.full(COUNT, POISSON))
+    mu, lam = lame_parameters(np.full(COUNT, YOUNG_PA), np.full(COUNT, POISSON))
     return np.asarray(mu), np.asarray(lam)
 
 
@@ -194,7 +194,7 @@ def flowed(law, F, past=None, cohesion=0.0, index=0.4):
     """What NumPy makes of the return map: the strain that is left, and what flowed."""
     full = lambda value: np.full(COUNT, float(value))  # noqa: E731
     past = np.zeros((COUNT, 2)) if past is None else past.astype(np.float64)
-    cone, apex = cone_slope(ANGLE), apex_strain(ANGLE, cohesion, *lame_parameters(YOUNG, POISSON))
+    cone, apex = cone_slope(ANGLE), apex_strain(ANGLE, cohesion, *lame_parameters(YOUNG_PA, POISSON))
     numbers = YieldParameters(*moduli(), *map(full, (YIELD, HARDENING, cone, apex, DRAG, index)))
     return laws.flow(np.full(COUNT, law.value), F, numbers, past[:, 0], past[:, 1])
 
@@ -202,7 +202,7 @@ def flowed(law, F, past=None, cohesion=0.0, index=0.4):
 def astray(law, F, H, found):
     """By how much a stress is not that of float64, as a share of E ‖F - 1‖ or of itself."""
     exact = laws.tau(np.full(COUNT, law.value), F, *moduli())[:, *UPPER]
-    size = YOUNG * np.linalg.norm(H.astype(np.float64), axis=(1, 2))
+    size = YOUNG_PA * np.linalg.norm(H.astype(np.float64), axis=(1, 2))
     wrong = np.linalg.norm(found[:, :6] - exact, axis=1)
     return wrong / size, wrong / np.maximum(size, np.linalg.norm(exact, axis=1))
 
@@ -249,9 +249,9 @@ def test_matter_with_a_past_flows_as_in_float64(law, width, H):
     strain = found[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9].reshape(-1, 3, 3)
     assert np.abs(strain - (exact.F - np.eye(3))).max() < TOLERANCE
     tau = hencky.tau(exact.F, mu, lam)[:, *UPPER]
-    assert (np.linalg.norm(found[:, :6] - tau, axis=1) / (YOUNG * size)).max() < TOLERANCE
+    assert (np.linalg.norm(found[:, :6] - tau, axis=1) / (YOUNG_PA * size)).max() < TOLERANCE
     assert np.abs(found[:, int(RESPONSE_PLASTIC_STRAIN)] - exact.plastic_strain).max() < TOLERANCE
-    assert (np.abs(found[:, int(RESPONSE_PLASTIC_WORK)] - exact.loss) / (YOUNG * size**2)).max() < 2 * TOLERANCE
+    assert (np.abs(found[:, int(RESPONSE_PLASTIC_WORK)] - exact.loss) / (YOUNG_PA * size**2)).max() < 2 * TOLERANCE
     if law == Law.FLUID:
         plain, newton = responses(law, H, width, past, apex, 1.0), flowed(law, F, past, cohesion, 1)
         strain = plain[:, int(RESPONSE_STRAIN) : int(RESPONSE_STRAIN) + 9].reshape(-1, 3, 3)
@@ -286,7 +286,7 @@ def test_no_wave_along_a_principal_axis_is_faster_than_its_bound(law, width, wil
 @pytest.mark.parametrize("law", BULKY)
 def test_the_mean_pressure_is_that_of_numpy(law, width, H):
     log_volume_ratio = (0.1 * np.random.default_rng(4).normal(size=COUNT)).astype(np.float32)
-    F, bulk = np.eye(3) + H.astype(np.float64), YOUNG
+    F, bulk = np.eye(3) + H.astype(np.float64), YOUNG_PA
     out = on_processor(np.zeros(2 * COUNT, np.float32))
     if width == 1:
         given = [on_processor(H, wp.mat33), on_processor(log_volume_ratio), out]
@@ -306,7 +306,7 @@ def test_the_mean_pressure_is_that_of_numpy(law, width, H):
         return laws.psi_mean(numbers, J * np.exp(r + more), full)
 
     exact = pressure(0.0)
-    size = YOUNG * (np.linalg.norm(H.astype(np.float64), axis=(1, 2)) + np.abs(log_volume_ratio))
+    size = YOUNG_PA * (np.linalg.norm(H.astype(np.float64), axis=(1, 2)) + np.abs(log_volume_ratio))
     assert (np.abs(found[:, 0] - exact) / size).max() < TOLERANCE
     # Its slope in ln J is what it adds to ρ c², or less where matter is squeezed.
     assert ((pressure(1e-6) - exact) / 1e-6 < found[:, 1] * (1.0 + 1e-5) + 1.0).all()
@@ -337,14 +337,14 @@ def test_plastic_work_is_never_negative_and_flow_happens(width, H):
 
 @pytest.mark.parametrize("law", list(Law))
 def test_the_stored_energy_is_that_of_numpy(law, H):
-    mu, lam = (float(value) for value in lame_parameters(YOUNG, POISSON))
+    mu, lam = (float(value) for value in lame_parameters(YOUNG_PA, POISSON))
     out = on_processor(np.zeros(COUNT), wp.float64)
     strain = on_processor(H.astype(np.float64).ravel(), wp.float64)
     wp.launch(energies, COUNT, [law.value, mu, lam, strain, out], device="cpu")
     F = np.eye(3) + H.astype(np.float64)
     full = np.full(COUNT, law.value)
     exact = laws.psi(full, F, np.full(COUNT, mu), np.full(COUNT, lam))
-    scale = YOUNG * np.sum(H.astype(np.float64) ** 2, axis=(1, 2))
+    scale = YOUNG_PA * np.sum(H.astype(np.float64) ** 2, axis=(1, 2))
     assert (np.abs(out.numpy() - exact) / scale).max() < 1e-7
 
 

@@ -10,7 +10,7 @@ from corporeal.mpm.laws import von_mises as cylinder
 from corporeal.mpm.laws.constitutive_law import YieldParameters, lame_parameters
 
 MU, LAM = lame_parameters(1e3, 0.3)
-YOUNG = 1e3
+YOUNG_PA = 1e3
 ONE = np.ones(1)
 SHEARED = np.array([[-0.06, -0.01, 0.04]])
 """Squeezed, and sheared in a plane without volume: the middle stress is the mean of the others."""
@@ -59,7 +59,7 @@ def test_a_bar_in_uniaxial_tension_yields_exactly_at_the_yield_stress():
     stress, plastic = pull(0.03, 60, yield_stress=10.0).T
     elastic = plastic == 0.0
     assert elastic.sum() >= 18
-    assert np.allclose(np.diff(stress[elastic]), YOUNG * 0.03 / 60, rtol=1e-9)
+    assert np.allclose(np.diff(stress[elastic]), YOUNG_PA * 0.03 / 60, rtol=1e-9)
     assert stress[-1] == pytest.approx(10.0, rel=1e-9)
     assert stress.max() <= 10.0 * (1 + 1e-9)
 

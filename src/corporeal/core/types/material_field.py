@@ -30,8 +30,8 @@ class Material:
 
     name: str
     law: Law
-    young: float
-    """Young's modulus [Pa]."""
+    young_pa: float
+    """Young's modulus as measured [Pa]; what is simulated is ``Discretization.simulated_young_pa``."""
     poisson: float
     """Poisson's ratio [-]."""
     density: float

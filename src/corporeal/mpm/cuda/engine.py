@@ -27,7 +27,7 @@ from corporeal.mpm.problem import Body, Problem, Snapshot, StepStatistics
 from corporeal.mpm.state import ParticleConstants, Velocities, branch_energy, strain_energy
 
 KNOWN_FIELDS = {
-    Body: "name position velocity volume density law young poisson yield_stress hardening "
+    Body: "name position velocity volume density law young_pa poisson yield_stress hardening "
     "friction_angle cohesion loss vibration consistency flow_index "
     "rigid surface curvature wetted_surface push wind faces tether path pivot",
     Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "

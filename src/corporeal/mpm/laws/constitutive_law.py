@@ -48,12 +48,12 @@ LOGARITHMIC_VOLUMETRIC = VolumetricEnergy(psi=lambda J: 0.5 * _log(J) ** 2, pres
 Number = Float[np.ndarray, " P"] | float
 
 
-def lame_parameters(young: Number, poisson: Number) -> tuple[Number, Number]:
+def lame_parameters(young_pa: Number, poisson: Number) -> tuple[Number, Number]:
     """Lamé's constants (μ, λ) [Pa].
 
     μ = E / 2(1 + ν),  λ = E ν / ((1 + ν)(1 - 2ν))
     """
-    return (young / (2.0 * (1.0 + poisson)), young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)))
+    return (young_pa / (2.0 * (1.0 + poisson)), young_pa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)))
 
 
 @dataclass(frozen=True)

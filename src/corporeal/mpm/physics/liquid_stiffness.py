@@ -33,5 +33,5 @@ def elastic_moduli(bulk: float) -> tuple[float, float]:
     E = 9 K G/(3 K + G),  ν = (3 K - 2 G)/2 (3 K + G)
     """
     shear = LIQUID_SHEAR_TO_BULK_RATIO * bulk
-    young = 9.0 * bulk * shear / (3.0 * bulk + shear)
-    return young, (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))
+    young_pa = 9.0 * bulk * shear / (3.0 * bulk + shear)
+    return young_pa, (3.0 * bulk - 2.0 * shear) / (2.0 * (3.0 * bulk + shear))

@@ -16,7 +16,7 @@ from corporeal.mpm.constants import (
 )
 
 
-def p_wave_speed(young: float, poisson: float, density: float) -> float:
+def p_wave_speed(young_pa: float, poisson: float, density: float) -> float:
     """Longitudinal wave speed c_p [m/s] of an isotropic solid.
 
     c_p = sqrt( E (1 - ν) / (ρ (1 + ν) (1 - 2ν)) )
@@ -24,12 +24,12 @@ def p_wave_speed(young: float, poisson: float, density: float) -> float:
     It grows without bound as ν → 1/2. Source: Landau & Lifshitz, Theory of Elasticity, §22.
 
     Args:
-        young: Young's modulus E [Pa].
+        young_pa: Young's modulus E [Pa].
         poisson: Poisson's ratio ν [-], below 1/2.
         density: Mass density ρ [kg/m³].
 
     """
-    return sqrt(young * (1 - poisson) / (density * (1 + poisson) * (1 - 2 * poisson)))
+    return sqrt(young_pa * (1 - poisson) / (density * (1 + poisson) * (1 - 2 * poisson)))
 
 
 def young_from_speed(speed: float, poisson: float, density: float) -> float:
@@ -37,14 +37,14 @@ def young_from_speed(speed: float, poisson: float, density: float) -> float:
     return density * speed**2 * (1 + poisson) * (1 - 2 * poisson) / (1 - poisson)
 
 
-def bounded_poisson(young: float, poisson: float) -> tuple[float, float]:
+def bounded_poisson(young_pa: float, poisson: float) -> tuple[float, float]:
     """Cap the bulk modulus and keep the shear modulus: (E, ν) with ν ≤ 0.49 and the same μ.
 
     μ = E / 2(1 + ν). Above ν = 0.49 steps shrink and quadratic splines lock, while μ, which
     carries the shape, no longer changes.
     """
     bounded = min(poisson, MAX_POISSON_RATIO)
-    return young * (1 + bounded) / (1 + poisson), bounded
+    return young_pa * (1 + bounded) / (1 + poisson), bounded
 
 
 def stable_step(wave: float, motion: float, cell: float, courant: float = COURANT) -> float:
@@ -142,24 +142,24 @@ def fit_young_compression(parts: Sequence[tuple[float, float]], limit: float) ->
         limit: Largest wave speed.
 
     """
-    fast = [(young, speed / limit) for young, speed in parts if speed > limit]
-    knee = min(young / over**2 for young, over in fast) / 4
-    return knee, 1 - max(2 * log(over) / log(young / knee) for young, over in fast)
+    fast = [(young_pa, speed / limit) for young_pa, speed in parts if speed > limit]
+    knee = min(young_pa / over**2 for young_pa, over in fast) / 4
+    return knee, 1 - max(2 * log(over) / log(young_pa / knee) for young_pa, over in fast)
 
 
-def compress_young(young: float, knee: float, power: float) -> float:
+def compress_young(young_pa: float, knee: float, power: float) -> float:
     """Compress Young's modulus [Pa]: K (E/K)^q above the knee.
 
     Monotone in E, so the order of stiffness is kept, whatever the densities; a compression of wave speeds would make
     heavy soft material stiffer than light stiff material. Never above E.
     """
-    return young if young <= knee else knee * (young / knee) ** power
+    return young_pa if young_pa <= knee else knee * (young_pa / knee) ** power
 
 
-def capped_young(young: float, poisson: float, density: float, cell: float) -> float:
+def capped_young(young_pa: float, poisson: float, density: float, cell: float) -> float:
     """Apply the published cap on Young's modulus [Pa], kept as a baseline and control only.
 
     E_sim = min(E, ρ (s dx/dt₀)² (1+ν)(1-2ν)/(1-ν)) with dt₀ = 1e-4 s and s = 0.5. The capped
     value depends on ρ and ν alone, so the order of stiffness is lost.
     """
-    return min(young, young_from_speed(BASELINE_COURANT * cell / BASELINE_STEP_S, poisson, density))
+    return min(young_pa, young_from_speed(BASELINE_COURANT * cell / BASELINE_STEP_S, poisson, density))

@@ -37,7 +37,7 @@ from corporeal.simulation.audit_messages import breakage_message, equilibrium_me
 from corporeal.simulation.summary_text import SummarySection, split_advice, summary_sections
 
 VALUE_UNITS = {
-    "young": ("Young's modulus E", "Pa"),
+    "young_pa": ("Young's modulus E", "Pa"),
     "poisson": ("Poisson's ratio ν", ""),
     "density": ("density ρ", "kg/m³"),
     "yield_stress": ("yield stress σ_y", "Pa"),
@@ -261,7 +261,7 @@ def _part_row(story: ReportContent, k: int) -> str:
     names = (story.scene.objects[part.object].name, part.name)
     liquid = CONSTITUTIVE_LAWS[material.law].liquid
     numbers = (
-        "–" if liquid else si_text(material.young, "Pa"),
+        "–" if liquid else si_text(material.young_pa, "Pa"),
         "–" if liquid else f"{material.poisson:.3g}",
         f"{material.density:.4g}",
         yields,

@@ -2,7 +2,7 @@
 
 const PREFIXES = [[1e9, 'G'], [1e6, 'M'], [1e3, 'k'], [1, ''], [1e-3, 'm'], [1e-6, 'µ']]
 export const NAMES = {
-  young: 'Young’s modulus E', poisson: 'Poisson’s ratio ν', density: 'density ρ', yield_stress: 'yield stress σ_y',
+  young_pa: 'Young’s modulus E', poisson: 'Poisson’s ratio ν', density: 'density ρ', yield_stress: 'yield stress σ_y',
   friction_angle: 'friction angle φ', cohesion: 'cohesion c', hardening: 'hardening modulus H', friction: 'surface friction μ',
   restitution: 'restitution e', loss: 'loss factor η', shell_thickness: 'wall thickness',
 }

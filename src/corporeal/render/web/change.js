@@ -2,7 +2,7 @@
 
 import { el, si, spoken, NAMES } from './cards.js'
 
-const VALUES = ['young', 'density', 'poisson', 'friction', 'restitution', 'loss'] // what can be changed here
+const VALUES = ['young_pa', 'density', 'poisson', 'friction', 'restitution', 'loss'] // what can be changed here
 const STEPS = 200 // of a slider
 const LOOK_AGAIN = 1000 // [ms]
 const FEW = 3 // parts that are shown open

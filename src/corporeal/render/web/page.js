@@ -88,9 +88,9 @@ export class Viewer {
 
   lookTab() {
     const header = this.takes[0].header, video = header.video
-    const choices = ['itself', 'object', 'material', 'law', 'young', 'density', 'poisson', ...(video ? ['speed'] : []),
+    const choices = ['itself', 'object', 'material', 'law', 'young_pa', 'density', 'poisson', ...(video ? ['speed'] : []),
       ...(video?.stress > 0 || this.options.tabs ? ['stress'] : [])]
-    const words = {young: 'stiffness E', density: 'density ρ', poisson: 'Poisson’s ratio ν', stress: 'stress (von Mises)'}
+    const words = {young_pa: 'stiffness E', density: 'density ρ', poisson: 'Poisson’s ratio ν', stress: 'stress (von Mises)'}
     this.by = el('select', {'aria-label': 'colour by', onchange: () => this.paint(this.by.value)},
       choices.map(c => el('option', {value: c}, words[c] ?? c)))
     this.card = el('div', {class: 'picked', 'aria-live': 'polite'})

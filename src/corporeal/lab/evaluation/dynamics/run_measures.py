@@ -107,13 +107,13 @@ def _body(made: StageResults, number: int, rows: tuple[PartAudit, ...], library:
     mass = np.array([particles.mass_real[k] for k in own])
     start = particles.position[particles.object == number]
     path = made.trajectory.ledger.centre[:, number]
-    young = np.array([rows[k].young_pa for k in own])
+    young_pa = np.array([rows[k].young_pa for k in own])
     heaviest = made.field.materials[own[int(mass.argmax())]]
     return ObjectMeasures(
         name=thing.name,
         diagonal=float(np.linalg.norm(np.ptp(start, axis=0))),
         path=tuple((x, y, z) for x, y, z in path.tolist()),
-        young_pa=float(np.exp(np.average(np.log(young), weights=np.maximum(mass, 1e-30)))),
+        young_pa=float(np.exp(np.average(np.log(young_pa), weights=np.maximum(mass, 1e-30)))),
         restitution=heaviest.restitution,
         groups=tuple(dict.fromkeys(_group(rows[k].material, library) for k in own)),
         laws=tuple(

@@ -89,7 +89,7 @@ def exchange_materials(scene: Scene, parts: Parts, field: MaterialField) -> dict
     Parts of liquids and grains keep theirs. Nothing is said where all others are alike.
     """
     solid = [k for k, m in enumerate(field.materials) if not CONSTITUTIVE_LAWS[m.law].loose]
-    order = sorted(solid, key=lambda k: (field.materials[k].young, k))
+    order = sorted(solid, key=lambda k: (field.materials[k].young_pa, k))
     said: dict[str, dict] = {}
     for mine, theirs in zip(order, reversed(order), strict=True):
         if field.materials[mine].name == field.materials[theirs].name:
