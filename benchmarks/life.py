@@ -44,7 +44,7 @@ INSIDE = 0.85
 AT_FIRST = 20
 """So many of the blind rows were in their range ± ``LEEWAY`` when they were tried first, at draft."""
 UNBOOKED = 0.08
-"""Most that may be lost unbooked at draft, over the energy of the blow [-]."""
+"""Most that may be lost unbooked at draft, over the energy of the impact [-]."""
 
 
 def tried(row: MeasuredRebound, detail: str, seed: int) -> DropResult | str:

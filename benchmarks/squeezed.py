@@ -1,4 +1,4 @@
-"""Compare rules for a blow on what rests on a floor with fine springs in one dimension.
+"""Compare rules for an impact on what rests on a floor with fine springs in one dimension.
 
 python benchmarks/squeezed.py
 """

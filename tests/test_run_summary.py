@@ -12,17 +12,17 @@ from corporeal.simulation.audit_file import AUDIT_FILE
 from sample_findings import run_audit
 
 
-def blow(word, ratio, pieces=0):
+def breakage(word, ratio, pieces=0):
     return PredictedBreakage("glass_0", "glass", "tile_0", 0.3, 3.1, 0.75, ratio, word, pieces)
 
 
 @pytest.mark.parametrize(
     ("found", "told"),
     [
-        (blow("would break", 11.0), ("glass would break", "with --breaking")),
-        (blow("may break", 3.0), ("glass may break",)),
-        (blow("holds", 0.4), ()),
-        (blow("would break", 11.0, pieces=7), ()),
+        (breakage("would break", 11.0), ("glass would break", "with --breaking")),
+        (breakage("may break", 3.0), ("glass may break",)),
+        (breakage("holds", 0.4), ()),
+        (breakage("would break", 11.0, pieces=7), ()),
     ],
 )
 def test_what_would_break_is_said_where_the_video_shows_it_whole(tmp_path, capsys, found, told):

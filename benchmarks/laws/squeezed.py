@@ -2,7 +2,7 @@
 
 A striker of mass 1 at speed 1 meets a body of mass m that lies on a floor. Both contacts are
 unilateral springs F = k δ^p, of which a part e² comes back while they open (a loss that knows no
-frequency). k: stiffness of the contact with the floor over that of the blow, at equal forces.
+frequency). k: stiffness of the contact with the floor over that of the impact, at equal forces.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from corporeal.mpm.physics.impact_support import responds_within_impact
 STEPS = 20
 """Steps in one radian of the quickest vibration."""
 SLOWEST = 0.01
-"""Slower approaches, over the speed of the blow, are none [-]."""
+"""Slower approaches, over the speed of the impact, are none [-]."""
 ROUNDS = 50
 
 
 @dataclass(frozen=True)
 class Case:
-    """One blow."""
+    """One impact."""
 
     mass: float
     """Of the body between, over the striker's [-]."""
@@ -36,7 +36,7 @@ class Case:
 
 
 def in_springs(case: Case) -> tuple[float, float]:
-    """Speeds after the blow of striker and body, back from the floor [-], of fine steps."""
+    """Speeds after the impact of striker and body, back from the floor [-], of fine steps."""
     stiffness = case.stiffness**case.power
     return _springs(case.mass, stiffness, case.power, case.bounce**2, case.floor**2)
 
@@ -98,7 +98,7 @@ def by_rule(case: Case) -> tuple[float, float]:
 
 RULES = {
     "in rounds": in_rounds,
-    "always held, e of the blow": held_alone,
+    "always held, e of the impact": held_alone,
     "always held, in series": held,
     "held where it swings quickly": by_rule,
 }

@@ -1,4 +1,4 @@
-"""Restitution is carried to the speed of each pair's first blow when a problem is posed."""
+"""Restitution is carried to the speed of each pair's first impact when a problem is posed."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def test_what_was_drawn_stays_drawn_and_what_is_unknown_stays():
 
 @pytest.mark.parametrize("material", ["softball_core", "brass", "lead", "glass", "wood"])
 @pytest.mark.parametrize("speed", [0.3, 4.0])
-def test_slower_blows_follow_the_law_of_their_materials(material, speed):
+def test_slower_impacts_follow_the_law_of_their_materials(material, speed):
     entries = [materials.find_material(name) for name in (material, "concrete")]
     one, other = (ImpactBody(entry, entry.pick(entry.typical())) for entry in entries)
     law = materials.pair_restitution_law(one, other, speed)

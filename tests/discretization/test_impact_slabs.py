@@ -101,7 +101,7 @@ def test_a_ball_on_cardboard_is_not_a_ball_on_a_box():
     )
     assert sheet.restitution[0, 1] == pytest.approx(0.46, abs=0.03)
     assert cube.restitution[0, 1] == pytest.approx(0.794, abs=0.01)
-    # Slower blows lose less, and what never strikes its face is as before.
+    # Slower impacts lose less, and what never strikes its face is as before.
     slope, power, most = sheet.restitution_law[0, 1][[1, 2, 4]]
     assert power > 0.15 and slope == 0.0 and most > 0.8
     assert sheet.restitution[1, -1] == pytest.approx(cube.restitution[1, -1])

@@ -48,7 +48,7 @@ def test_what_yields_falls_on_something_soft_or_is_as_stiff_as_in_life_keeps_its
     assert "vibrations" not in prepared(name).particles.treatments[0].reason
 
 
-def test_harder_blows_than_were_measured_count_as_the_hardest():
+def test_harder_impacts_than_were_measured_count_as_the_hardest():
     assert vibration_loss(1000.0, 100.0, 1e6) == VIBRATION_LOSS_COEFFICIENT * MAX_IMPACT_NUMBER
 
 

@@ -1,4 +1,4 @@
-"""What is soft loses for what is rigid and meets it, by the first blows and real moduli."""
+"""What is soft loses for what is rigid and meets it, by the first impacts and real moduli."""
 
 from dataclasses import replace
 from math import pi
@@ -40,7 +40,7 @@ def soft_loss(parts, motions, floor=STEEL):
     return pair_loss_factor_of_parts(SOFT, met)
 
 
-def test_two_alike_share_a_blow_and_the_stiffer_takes_less():
+def test_two_alike_share_an_impact_and_the_stiffer_takes_less():
     assert compliance_share(SOFT, LOSSY) == pytest.approx(0.5)
     assert contact_loss_factor(SOFT, LOSSY) == pytest.approx(0.3)
     assert compliance_share(replace(SOFT, young_pa=1.2e7), LOSSY) == pytest.approx(0.25)
@@ -94,7 +94,7 @@ def mat(young_pa=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
 RIGID = mat(kind="rigid")
 
 
-def test_a_mat_loses_at_the_frequency_of_the_blow():
+def test_a_mat_loses_at_the_frequency_of_the_impact():
     parts, moving = [SLAB, ball(LOSSY, 1)], [LYING, fallen(0)]
     (found, struck) = tune_loss_to_impacts(parts, moving, [mat(), RIGID])
     lasts = hertz_contact_time(0.01, 0.015, 2.0, 4e6 / 0.75, 0.01)

@@ -477,5 +477,5 @@ def test_steps_follow_what_is_resisted_at_once():
     )
     assert slow.loss == 0.3
     assert slow.wave_speed / bare.wave_speed == pytest.approx(sqrt(stiffening(0.3, FOAM.poisson)), rel=1e-6)
-    # What contact and transfers take of a blow counts on the material's loss.
+    # What contact and transfers take of an impact counts on the material's loss.
     assert struck.loss == pytest.approx(0.3 - GRID_LOSS_FACTOR / 8**2)

@@ -1,4 +1,4 @@
-"""A blow across layers is work against the pressure at which they fold."""
+"""An impact across layers is work against the pressure at which they fold."""
 
 from dataclasses import replace
 from math import pi, sqrt
@@ -38,10 +38,10 @@ def test_a_rigid_ball_loses_the_pressure_times_what_it_crushes():
     thick = replace(BOARD, thickness=1.0)
     steel, speed = ball("steel"), 0.5
     p, young_pa = thick.layers.crush_pa, thick.layers.young_across_pa
-    blow = 0.5 * steel.mass * speed**2
-    a = (4 * RADIUS * blow / (pi * p)) ** 0.25
+    energy = 0.5 * steel.mass * speed**2
+    a = (4 * RADIUS * energy / (pi * p)) ** 0.25
     e = crush_restitution(steel, thick, speed, 0.3)
-    plain = sqrt(8 / 3 * p**2 * a**3 / young_pa / blow) * restitution_of_loss(thick.material.loss)
+    plain = sqrt(8 / 3 * p**2 * a**3 / young_pa / energy) * restitution_of_loss(thick.material.loss)
     assert e == pytest.approx(plain, rel=0.08)
 
 
@@ -61,15 +61,15 @@ def test_a_sheet_takes_no_more_than_its_thickness():
     """A heavy ball packs it, and rebounds from what is packed."""
     heavy = ball("steel", 0.05)
     takes = pi * heavy.radius * BOARD.depth**2 * BOARD.layers.crush_pa
-    blow = 0.5 * heavy.mass * 6.0**2
-    assert takes < 0.1 * blow
+    energy = 0.5 * heavy.mass * 6.0**2
+    assert takes < 0.1 * energy
     assert crush_restitution(heavy, BOARD, 6.0, 0.6) == pytest.approx(0.6, abs=0.03)
     assert crush_restitution(heavy, replace(BOARD, thickness=1.0), 6.0, 0.6) < 0.25
     assert BOARD.depth == pytest.approx(THICK * (1 - 1.4 * 150 / 690))
 
 
 @pytest.mark.parametrize("speed", [1.0, 3.0])
-def test_slower_blows_follow_a_power(speed):
+def test_slower_impacts_follow_a_power(speed):
     rubber = ball("rubber")
     law = crush_restitution_law(rubber, BOARD, speed, 0.79)
     assert law.value == crush_restitution(rubber, BOARD, speed, 0.79)

@@ -93,7 +93,7 @@ def racquetball(gauge=0.0):
     return InflatedBall(gauge, rubber, 0.0036, 0.0286)
 
 
-def test_a_blow_is_stored_in_wall_and_air_where_a_ball_turns():
+def test_an_impact_is_stored_in_wall_and_air_where_a_ball_turns():
     """By stepping m x'' = -(k x + p A), with the air compressed adiabatically."""
     ball, mass, speed = racquetball(), 0.04, 6.9
 

@@ -1,4 +1,4 @@
-"""Restitution at the speed of a blow: rated balls, and metals that yield."""
+"""Restitution at the speed of an impact: rated balls, and metals that yield."""
 
 from dataclasses import replace
 from math import inf
@@ -80,7 +80,7 @@ def metals():
 
 @pytest.mark.parametrize("name", metals())
 @pytest.mark.parametrize("below", ["itself", "hardened_steel"])
-def test_every_metal_yields_in_a_fast_blow_whatever_was_measured_in_slow_ones(name, below):
+def test_every_metal_yields_in_a_fast_impact_whatever_was_measured_in_slow_ones(name, below):
     """Balls of bearings, .94 below 3 m/s, and lead, .16, kept that at all speeds."""
     pair = striker(name), striker(name if below == "itself" else below)
     values = [materials.pair_restitution(*pair, v).value for v in (1.0, 25.0, 50.0)]

@@ -306,7 +306,7 @@ def balls_that_touch(count):
 
 
 @pytest.mark.parametrize("e", [1.0, 0.8])
-def test_a_blow_runs_through_a_row_of_touching_balls_to_the_last(e):
+def test_an_impact_runs_through_a_row_of_touching_balls_to_the_last(e):
     """Each hits the next by itself: u_k = ((1 + e)/2)^(k-1) (1 - e)/2, the last ((1 + e)/2)^(n-1).
 
     Where e < 1 those behind are a little faster than those in front and hit them again; so only
@@ -326,7 +326,7 @@ def test_a_blow_runs_through_a_row_of_touching_balls_to_the_last(e):
         assert np.abs(u[:-1]).max() < 1e-12
 
 
-def test_solved_at_once_a_row_of_touching_balls_would_share_the_blow():
+def test_solved_at_once_a_row_of_touching_balls_would_share_the_impact():
     """The control: all five balls rebound in one solve."""
     movers, contacts = balls_that_touch(5)
     movers.velocity[0, 0] = 1.0

@@ -85,7 +85,7 @@ def test_a_rigid_frame_holds_its_cushion_as_in_the_reference():
 
 
 @pytest.mark.parametrize("rigid", [False, True])
-def test_blows_and_drags_reach_a_body_as_in_the_reference(rigid):
+def test_wind_and_grips_reach_a_body_as_in_the_reference(rigid):
     given = problem(body(ball((0, 0, 0.3)), rigid=rigid, young_pa=3e4))
     ours, sure = on_device(given), ReferenceEngine(given)
     assert isinstance(ours, InteractiveEngine)

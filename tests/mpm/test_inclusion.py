@@ -67,7 +67,7 @@ def test_a_frame_joined_to_points_keeps_momentum_and_inertia_to_round_off():
     assert np.linalg.solve(whole.inertia, total) == pytest.approx(spin, rel=1e-12)
 
 
-def test_a_blow_on_a_cushion_reaches_its_frame_with_all_momentum_and_no_change_of_shape(engine):
+def test_an_impact_on_a_cushion_reaches_its_frame_with_all_momentum_and_no_change_of_shape(engine):
     frame, cushion = chair(spin=3.0)
     run = engine(problem(frame, cushion, block(), cell=CELL, bonds=((0, 1),), transfer="apic"))
     start, before = run.measure(), run.snapshot().position

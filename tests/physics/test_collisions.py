@@ -108,7 +108,7 @@ def test_two_cubes_separate_in_the_reference_and_stick_in_its_single_grid(engine
     assert abs(glued[1, 0] - glued[0, 0]) < 0.1
 
 
-def test_a_blow_runs_through_a_row_and_only_the_last_flies_off(fast_engine):
+def test_an_impact_runs_through_a_row_and_only_the_last_flies_off(fast_engine):
     """Like Newton's cradle: three balls, gaps wide enough that they meet one after the other."""
     shift, step = np.array([0.11, 0.3, 0.2]) * CELL, 2 * RADIUS + 0.4 * CELL
     balls = [

@@ -1,4 +1,4 @@
-"""How different kinds of matter take a blow."""
+"""How different kinds of matter take an impact."""
 
 from dataclasses import replace
 

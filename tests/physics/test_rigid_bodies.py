@@ -43,7 +43,7 @@ def test_a_rigid_ball_bounces_to_the_height_its_restitution_says(patient_engine,
 
 
 @pytest.mark.parametrize("law", [(1.2, 0.0, 0.25, 0.0, 0.9), (1.2, 0.2, 0.0, 0.1, 0.9)])
-def test_each_rise_has_the_restitution_of_its_own_blow(patient_engine, law):
+def test_each_rise_has_the_restitution_of_its_own_impact(patient_engine, law):
     """A power of the speed where a metal yields, a line where a ball is rated."""
     speed, e = 1.2, 0.5
     stone = steel_ball((0.003, 0.002, RADIUS + 0.001), velocity=(0, 0, -speed))
@@ -109,14 +109,14 @@ CARDS = [pytest.param("cuda", gap, marks=pytest.mark.slow) for gap in GAPS]
 @pytest.mark.parametrize(
     ("patient_engine", "gap"), [*(("cpu", gap) for gap in GAPS), *SURE, *CARDS], indirect=["patient_engine"]
 )
-def test_newtons_cradle_passes_a_blow_on_to_the_last_ball(patient_engine, gap):
+def test_newtons_cradle_passes_an_impact_on_to_the_last_ball(patient_engine, gap):
     u = last_of_a_row(patient_engine, gap, restitution=1.0)
     assert u[-1] == pytest.approx(1.0, abs=0.05)
     assert np.abs(u[:-1]).max() < 0.05
 
 
 def test_in_a_cradle_that_loses_energy_the_last_ball_is_slower(patient_engine):
-    """Each blow hands on (1 + e)/2 of the speed."""
+    """Each impact hands on (1 + e)/2 of the speed."""
     u = last_of_a_row(patient_engine, 0.0, restitution=0.8)
     assert u[-1] == pytest.approx(0.9**4, rel=0.03)
 

@@ -83,7 +83,7 @@ def test_a_ball_rolls_down_a_gutter_slower_than_on_a_plane():
 def test_a_board_pulled_away_drags_a_cube_by_friction_alone(thick):
     """At 3 m/s: v = μ g t until the board's end is under the cube's edge, and no throw.
 
-    Normals of nodes lean near edges; a lean of 5° at that speed was a blow of .26 m/s.
+    Normals of nodes lean near edges; a lean of 5° at that speed was an impact of .26 m/s.
     """
     speed, time, side = 3.0, 0.045, 0.06
     board = box((0.4, 0.2, thick), (0.0, 0.0, thick / 2))

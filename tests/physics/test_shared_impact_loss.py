@@ -18,7 +18,7 @@ from corporeal.mpm.problem import FLOOR
 YOUNG_PA, DENSITY, POISSON, CELL = 60e3, 60.0, 0.2, 0.0125
 SIDE, HEIGHT, RADIUS = 0.2, 0.1, 0.04
 SPEED, BALL = 0.5, 2000.0
-"""Slow and heavy, so that the inertia of the block takes little of the blow [m/s, kg/m³]."""
+"""Slow and heavy, so that the inertia of the block takes little of the impact [m/s, kg/m³]."""
 SOFT = Material("foam", Law.NEO_HOOKEAN, YOUNG_PA, POISSON, DENSITY, loss=0.3)
 
 

@@ -15,7 +15,7 @@ SHEET = (0.3, 0.3, 1.5 * CELL)
 LOW = np.array([0.13, 0.31, 0.0]) * CELL
 
 
-def test_a_rule_for_blows_is_as_good_as_fine_springs():
+def test_a_rule_for_impacts_is_as_good_as_fine_springs():
     given = squeezed.cases()
     off = np.abs(squeezed.errors("held where it swings quickly", given))
     assert off.mean() < 0.015
@@ -40,7 +40,7 @@ def sheet(mass, below=0.0):
 
 
 def struck(engine, masses, restitution):
-    """Drop a ball of 1 kg on sheets of these masses on a floor; the engine after the blow."""
+    """Drop a ball of 1 kg on sheets of these masses on a floor; the engine after the impact."""
     top = SHEET[2] * len(masses)
     at = (LOW[0] + 0.2 * CELL, LOW[1] + 0.1 * CELL, top + RADIUS + 0.5 * CELL)
     stuff = Stuff(density=1.0 / (4 / 3 * np.pi * RADIUS**3))

@@ -69,8 +69,8 @@ def sag(engine, loss, side=0.1):
     return side / 2 - float(run.measure().centre[0, 2])
 
 
-def test_loss_stiffens_a_blow_and_no_load_that_rests(fast_engine):
-    """Loss over a band is stiffening (causality): at .3 a blow meets 1/G∞ = 1.54 times E.
+def test_loss_stiffens_an_impact_and_no_load_that_rests(fast_engine):
+    """Loss over a band is stiffening (causality): at .3 an impact meets 1/G∞ = 1.54 times E.
 
     Hertz: a ball turns after a time that goes as E to the power of -2/5.
     """

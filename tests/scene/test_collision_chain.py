@@ -1,4 +1,4 @@
-"""A blow reaches the last of a row: sent from the heavy end, as fast as masses and friction ask."""
+"""An impact reaches the last of a row: sent from the heavy end, as fast as masses and friction ask."""
 
 from dataclasses import replace
 from math import sqrt
@@ -60,14 +60,16 @@ def test_the_speed_asked_for_is_that_of_impacts_without_a_bounce():
 @pytest.mark.parametrize("masses", [(8.0, 2.0, 0.5), (0.5, 2.0, 8.0), (3.0, 3.0, 3.0, 3.0)])
 def test_a_chain_begins_at_the_heavy_end_and_reaches_the_other(masses):
     still, rng = row(*masses), np.random.default_rng(0)
-    blow = find_collision_chain(still, 0.5, rng)
-    assert blow is not None
+    chain = find_collision_chain(still, 0.5, rng)
+    assert chain is not None
     heaviest = int(np.argmax(masses))
-    assert masses[blow.mover] == masses[heaviest] and blow.mover in (0, len(masses) - 1)
-    assert np.linalg.norm(blow.velocity) <= MAX_START_SPEED_RATIO * sqrt(G * SIDE)
-    met = preview_contacts(still, {blow.mover: blow.velocity}, 2.0)
-    assert impact_hops([(m.a, m.b) for m in met], [blow.mover]) == {abs(blow.mover - k): k for k in range(len(masses))}
-    assert blow.arrives == pytest.approx(met[-1].instant)
+    assert masses[chain.mover] == masses[heaviest] and chain.mover in (0, len(masses) - 1)
+    assert np.linalg.norm(chain.velocity) <= MAX_START_SPEED_RATIO * sqrt(G * SIDE)
+    met = preview_contacts(still, {chain.mover: chain.velocity}, 2.0)
+    assert impact_hops([(m.a, m.b) for m in met], [chain.mover]) == {
+        abs(chain.mover - k): k for k in range(len(masses))
+    }
+    assert chain.arrives == pytest.approx(met[-1].instant)
 
 
 def test_where_no_speed_allowed_reaches_the_last_there_is_no_chain():
@@ -96,7 +98,7 @@ def test_the_video_lasts_until_the_last_was_struck():
     assert met[-1].instant + 0.5 < action.duration
 
 
-def test_a_blow_is_counted_from_what_was_sent():
+def test_an_impact_is_counted_from_what_was_sent():
     met = [PreviewContact(2, 3, 0.1), PreviewContact(0, 1, 0.2), PreviewContact(1, 2, 0.3)]
     assert impact_hops([(m.a, m.b) for m in met], [0]) == {0: 0, 1: 1, 2: 2}
 

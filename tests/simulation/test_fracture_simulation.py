@@ -67,7 +67,7 @@ def test_pieces_have_the_mass_and_move_with_the_momentum_of_the_whole(broken, au
 
 
 @pytest.mark.slow
-def test_before_the_blow_the_pieces_move_as_one(broken):
+def test_before_the_impact_the_pieces_move_as_one(broken):
     (one,) = broken.trajectory.breaks
     before = [f for f in broken.trajectory.frames if f.time < one.time]
     first, last = before[0], before[-1]

@@ -77,7 +77,7 @@ def test_a_bottle_is_struck_for_about_a_millisecond():
     assert pi * sqrt(0.35 / bottle.stiffness) == pytest.approx(1e-3, rel=0.15)
 
 
-def test_the_energy_of_a_blow_and_its_force_belong_together():
+def test_the_energy_of_an_impact_and_its_force_belong_together():
     for struck in (egg(0.02), plate(5e-3), BrittlePart("lump", GLASS, 170e6, 0.008, 0.0, 0.016)):
         for energy in (1e-4, 1e-2, 1.0):
             assert struck.energy(struck.force(energy, STEEL), STEEL) == pytest.approx(energy)

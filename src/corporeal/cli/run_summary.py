@@ -42,8 +42,8 @@ def show_summary(folder: Path) -> None:
 def _breakage_sentences(found: Sequence[PredictedBreakage]) -> None:
     """Describe what the video shows whole although it would break, and how to simulate breaking."""
     doubted = [b for b in found if b.word != "holds" and not b.pieces]
-    for blow in doubted[:MAX_LISTED_IMPACTS]:
-        _say("hint", breakage_message(blow))
+    for impact in doubted[:MAX_LISTED_IMPACTS]:
+        _say("hint", breakage_message(impact))
     if len(doubted) > MAX_LISTED_IMPACTS:
         print_line(f"and {len(doubted) - MAX_LISTED_IMPACTS} more that may break: see the report.")
     if any(b.word == "would break" for b in doubted):

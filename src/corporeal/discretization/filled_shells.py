@@ -40,9 +40,9 @@ def part_as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
     density = mean_density(part) if inflated else inner.density * part.structure.fill
     spread = replace(inner, density=density)
     if part.structure.gauge_pressure is not None:
-        blow = equivalent_solid(part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2)
-        loss = inner.loss if part.structure.rebound is not None else blow.loss
-        spread = replace(spread, young_pa=blow.young_pa, loss=loss)
+        solid = equivalent_solid(part_as_sealed_ball(part, speed), 0.5 * density * part.volume * speed**2)
+        loss = inner.loss if part.structure.rebound is not None else solid.loss
+        spread = replace(spread, young_pa=solid.young_pa, loss=loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
 
 

@@ -58,10 +58,10 @@ def tune_loss_to_impacts(
         treatments: One per part, as they are simulated.
 
     """
-    blows = impacts_on_objects(parts, motions, treatments)
+    impacts = impacts_on_objects(parts, motions, treatments)
     found = []
     for part, treatment in zip(parts, treatments, strict=True):
-        taken = blows.get(part.object, [])
+        taken = impacts.get(part.object, [])
         energy = sum(b.landing.energy for b in taken)
         own = motions[part.object].landing
         falls = own is not None and own.energy >= energy
@@ -88,8 +88,8 @@ def impacts_on_objects(
         if lands is None or lands.energy <= 0.0 or not own:
             continue
         largest = max(own, key=lambda n: bulk_mass(parts[n]))
-        blow = _ImpactOnMat(lands, 0.5 * parts[largest].size[1], impact_compliance(treatments[largest]))
-        found.setdefault(lands.onto, []).append(blow)
+        impact = _ImpactOnMat(lands, 0.5 * parts[largest].size[1], impact_compliance(treatments[largest]))
+        found.setdefault(lands.onto, []).append(impact)
     return found
 
 

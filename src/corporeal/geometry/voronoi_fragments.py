@@ -21,7 +21,7 @@ FRAGMENT_CREASE_ANGLE_DEG = 30.0
 FragmentPoints = Float[np.ndarray, "N 3"]
 
 
-def fragment_seeds(points: FragmentPoints, blow: Float[np.ndarray, "3"], rng: np.random.Generator) -> FragmentPoints:
+def fragment_seeds(points: FragmentPoints, struck: Float[np.ndarray, "3"], rng: np.random.Generator) -> FragmentPoints:
     """Choose points of an object whose cells are its pieces, densely near the impact.
 
     The chance of a point falls with its squared distance from the impact. Cells of fewer than
@@ -29,11 +29,11 @@ def fragment_seeds(points: FragmentPoints, blow: Float[np.ndarray, "3"], rng: np
 
     Args:
         points: Of all of the object [m].
-        blow: Where it is struck [m].
+        struck: Where it is struck [m].
         rng: Makes the choice.
 
     """
-    away = np.linalg.norm(points - blow, axis=1)
+    away = np.linalg.norm(points - struck, axis=1)
     chance = 1.0 / (away**2 + (NEAR_IMPACT_DISTANCE_FRACTION * np.ptp(points, axis=0).max()) ** 2)
     count = min(MAX_FRAGMENTS, len(points) // MIN_PARTICLES_PER_FRAGMENT)
     chosen = points[rng.choice(len(points), max(count, 1), False, chance / chance.sum())]

@@ -125,7 +125,7 @@ class RestitutionLaw:
 
 
 YIELD_SPEED_EXPONENT = 0.25
-"""Exponent of a metal that yields: e ∝ v^(-1/4) (``blow.yielding``)."""
+"""Exponent of a metal that yields: e ∝ v^(-1/4) (``yield_restitution``)."""
 FULL_YIELD_SPEED_M_S = 1e4
 """At which every metal yields [m/s]."""
 

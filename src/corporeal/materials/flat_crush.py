@@ -141,20 +141,20 @@ def crush_restitution(ball: ImpactingBall, sheet: LayeredSheet, speed: float, pa
     made, struck = material_across_layers(sheet.material), material_at_speed(ball.material, speed)
     of_sheet = compliance_share(made, struck)
     back = of_sheet * made.restitution**2 + (1.0 - of_sheet) * struck.restitution**2
-    blow = 0.5 * ball.mass * speed**2
-    if blow <= 0.0:
+    energy = 0.5 * ball.mass * speed**2
+    if energy <= 0.0:
         return sqrt(back)
     of_ball = plane_strain_compliance(struck)
     both = of_ball / (1.0 - of_sheet)
     contact = _CrushContact(sheet.layers.crush_pa, both, of_ball, ball.radius)
     widest = _solve_increasing(contact.depth, sheet.depth)
-    x = min(_solve_increasing(contact.taken, blow), widest)
+    x = min(_solve_increasing(contact.taken, energy), widest)
     # A ball that sinks in deeper than to its middle crushes no wider hole.
     deeper = max(0.0, sheet.depth - contact.depth(x)) if x == MAX_CONTACT_RADIUS_RATIO else 0.0
     taken = contact.taken(x) + contact.pressure * pi * ball.radius**2 * deeper
-    rest = max(blow - taken, 0.0)
-    returned = back * min(contact.stored(x), blow) + packed**2 * rest
-    return sqrt(min(back, returned / blow))
+    rest = max(energy - taken, 0.0)
+    returned = back * min(contact.stored(x), energy) + packed**2 * rest
+    return sqrt(min(back, returned / energy))
 
 
 def crush_restitution_law(ball: ImpactingBall, sheet: LayeredSheet, speed: float, packed: float) -> RestitutionLaw:

@@ -90,8 +90,8 @@ def yield_restitution(a: Material, b: Material, speed: float) -> float:
         return 1.0
     strength = min(weak)
     plane = 1.0 / sum(plane_strain_compliance(m) for m in (a, b))
-    blow = 2.0 / 3.0 * pi * max(a.density, b.density) * speed**2 / strength
-    return min(1.0, 3.8 * sqrt(strength / plane) * blow**-0.125)
+    impact_number = 2.0 / 3.0 * pi * max(a.density, b.density) * speed**2 / strength
+    return min(1.0, 3.8 * sqrt(strength / plane) * impact_number**-0.125)
 
 
 def is_stated_by_person(material: Material, field: str) -> bool:

@@ -94,7 +94,7 @@ LAST_IMPACT_SPEED_RATIO_RANGE = (0.15, 0.3)
 MAX_START_SPEED_RATIO = 3.0
 """Nothing is sent off faster, over √(g L): 6.6 m/s where the largest object is half a metre."""
 SLOW_SPEED_FRACTION = 0.8
-"""The row must pass the blow on even from this share of the speed."""
+"""The row must pass the impact on even from this share of the speed."""
 SPEED_RAISE_FACTOR = 1.25
 """By how much a speed that did not do is raised."""
 MAX_CHAIN_S = 2.0
@@ -130,9 +130,9 @@ def find_collision_chain(still: SettledBodies, arrival: float, rng: np.random.Ge
     starts = [(chain_start_speed(still, row, arrival, last), row) for row in _possible_rows(still)]
     for speed, row in sorted(starts):
         while speed <= MAX_START_SPEED_RATIO * scale:
-            blow = _preview_chain(still, row, speed)
-            if blow:
-                return blow
+            chain = _preview_chain(still, row, speed)
+            if chain:
+                return chain
             speed *= SPEED_RAISE_FACTOR
     return None
 

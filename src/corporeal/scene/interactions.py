@@ -155,14 +155,14 @@ def _begin_collision(still: SettledBodies, rng: np.random.Generator) -> SceneInt
 
 def _begin_chain(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction | None:
     """Send the object at one end of a row into its neighbour, and that one into the next."""
-    blow = find_collision_chain(still, _arrival_speed(still, rng), rng)
-    if blow is None:
+    chain = find_collision_chain(still, _arrival_speed(still, rng), rng)
+    if chain is None:
         return None
-    speed = float(np.linalg.norm(blow.velocity))
-    mover, target = still.names[blow.mover], still.names[blow.target]
+    speed = float(np.linalg.norm(chain.velocity))
+    mover, target = still.names[chain.mover], still.names[chain.target]
     words = f"{mover} is sent into {target} at {speed:.2g} m/s, and on along the row"
     return SceneInteraction(
-        "chain", (_entry_with_velocity(mover, blow.velocity),), _watch_duration(blow.arrives), words
+        "chain", (_entry_with_velocity(mover, chain.velocity),), _watch_duration(chain.arrives), words
     )
 
 

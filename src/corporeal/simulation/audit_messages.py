@@ -85,13 +85,13 @@ def surface_warnings(pairs: Iterable[SurfacePairCheck]) -> list[str]:
 
 def breakage_message(found: PredictedBreakage) -> str:
     """Return in a sentence what an impact does to a brittle part."""
-    blow = (
+    impact = (
         f"{found.by} strikes it at {found.speed:.2g} m/s, with {found.ratio:.2g} times the energy "
         "that breaks half of such parts"
     )
     if found.pieces:
-        return f"{found.object}: {found.part} breaks into {found.pieces} pieces: {blow}."
-    return f"{found.object}: {found.part} {found.word}: {blow}; the simulation keeps it whole."
+        return f"{found.object}: {found.part} breaks into {found.pieces} pieces: {impact}."
+    return f"{found.object}: {found.part} {found.word}: {impact}; the simulation keeps it whole."
 
 
 SAG_WARNING_DX, SAG_MENTION_DX = 1.0, 0.1

@@ -84,10 +84,10 @@ def predict_breakage(
     """
     found = {one.part: fracture_event_of(one, scene, field) for one in trajectory.breaks}
     pieces = piece_objects(trajectory.breaks, len(scene.objects))
-    for blow in first_impacts(scene, particles, field, trajectory):
-        known = found.get(blow.part)
-        if blow.object not in pieces and (known is None or blow.found.ratio > known.ratio):
-            found[blow.part] = blow.found
+    for impact in first_impacts(scene, particles, field, trajectory):
+        known = found.get(impact.part)
+        if impact.object not in pieces and (known is None or impact.found.ratio > known.ratio):
+            found[impact.part] = impact.found
     return tuple(found[k] for k in sorted(found))
 
 
@@ -148,11 +148,11 @@ class _FirstImpacts:
         for a in range(objects):
             for c in range(len(first)):
                 if c != a and np.isfinite(first[a, c]):
-                    found = self._blow(a, c, float(first[a, c]))
+                    found = self._judge_first_touch(a, c, float(first[a, c]))
                     if found is not None:
                         yield found
 
-    def _blow(self, a: int, c: int, time: float) -> BrittleImpact | None:
+    def _judge_first_touch(self, a: int, c: int, time: float) -> BrittleImpact | None:
         """Judge the first touch of an object with another or a plane; None: it is not brittle."""
         objects = len(self.scene.objects)
         k = max(0, int(np.searchsorted(self.ledger.time, time, side="right")) - 1)

@@ -58,22 +58,22 @@ def next_breaking_impact(
     trajectory = gather_ledgers(folder, number + 1)
     spared = piece_objects(breaks, len(stage.scene.objects)) | whole
     found = [
-        blow
-        for blow in first_impacts(stage.scene, stage.particles, stage.field, trajectory)
-        if blow.found.time > since and blow.found.ratio > CERTAIN_BREAK_ENERGY_RATIO and blow.object not in spared
+        impact
+        for impact in first_impacts(stage.scene, stage.particles, stage.field, trajectory)
+        if impact.found.time > since and impact.found.ratio > CERTAIN_BREAK_ENERGY_RATIO and impact.object not in spared
     ]
-    return min(found, key=lambda blow: blow.found.time, default=None)
+    return min(found, key=lambda impact: impact.found.time, default=None)
 
 
 def fracture_body(
-    stage: FractureState, engine: Engine, blow: BrittleImpact, breaks: tuple[FractureEvent, ...]
+    stage: FractureState, engine: Engine, impact: BrittleImpact, breaks: tuple[FractureEvent, ...]
 ) -> FracturedRun | None:
     """Replace the struck object by fragments just before the impact; None: it cannot be cut.
 
     Args:
         stage: What is simulated.
         engine: At an instant before the impact; goes on to just before it.
-        blow: The impact.
+        impact: The impact.
         breaks: Earlier fractures.
 
     Raises:
@@ -81,20 +81,20 @@ def fracture_body(
 
     """
     owner = stage.posed.object_of_body
-    (bodies,) = np.nonzero(owner == blow.object)
-    parts = np.unique(stage.particles.part[stage.particles.object == blow.object])
+    (bodies,) = np.nonzero(owner == impact.object)
+    parts = np.unique(stage.particles.part[stage.particles.object == impact.object])
     if len(bodies) != 1 or len(parts) != 1 or not can_split(engine.problem, int(bodies[0])):
         return None
     body = int(bodies[0])
-    before = blow.found.time - STEPS_BEFORE_IMPACT * engine.steps.largest
+    before = impact.found.time - STEPS_BEFORE_IMPACT * engine.steps.largest
     if before > engine.time:
         engine.advance(before)
     now = engine.snapshot()
-    pieces = _pieces(stage, blow, body, now)
+    pieces = _pieces(stage, impact, body, now)
     if pieces is None:
         return None
-    _take_energy(engine, stage, blow)
-    one = _break(blow, pieces)
+    _take_energy(engine, stage, impact)
+    one = _break(impact, pieces)
     split = _split(stage, engine, body, one)
     after = require(engine, BodySplittingEngine).with_split_body(split)
     return FracturedRun(stage.with_pieces(one, split, after.problem, now), after, (*breaks, one))
@@ -111,21 +111,21 @@ class _CutPieces:
     surfaces: tuple[Surface, ...]
 
 
-def _pieces(stage: FractureState, blow: BrittleImpact, body: int, now: Snapshot) -> _CutPieces | None:
+def _pieces(stage: FractureState, impact: BrittleImpact, body: int, now: Snapshot) -> _CutPieces | None:
     """Cut an object into Voronoi cells around the impact; None: its surface is not closed."""
     scene, particles = stage.scene, stage.particles
-    own = [s for s in scene.surfaces if s.object == blow.object]
+    own = [s for s in scene.surfaces if s.object == impact.object]
     if len({s.finish for s in own}) != 1:
         return None
-    start = particles.position[particles.object == blow.object].astype(float)
+    start = particles.position[particles.object == impact.object].astype(float)
     mine = stage.rows(body)
     place = now.position[mine].mean(axis=0)
-    struck = (blow.point - place) @ now.motion[mine][0] + start.mean(axis=0)
-    rng = np.random.default_rng([blow.object, 11])
+    struck = (impact.point - place) @ now.motion[mine][0] + start.mean(axis=0)
+    rng = np.random.default_rng([impact.object, 11])
     seed = fragment_seeds(start, struck, rng)
     outside = own[0] if len(own) == 1 else _as_one_surface(own)
-    wall = max(particles.walls[blow.part]) if particles.walls else 0.0
-    wall = wall if encloses_cavity(scene, blow.object) else 0.0
+    wall = max(particles.walls[impact.part]) if particles.walls else 0.0
+    wall = wall if encloses_cavity(scene, impact.object) else 0.0
     found = cut_fragments(outside, wall, seed) if len(seed) > 1 else None
     return None if found is None else _CutPieces(fragment_cells(start, seed), found)
 
@@ -136,11 +136,11 @@ def _as_one_surface(surfaces: Sequence[Surface]) -> Surface:
     return replace(plain, vertices=mesh.vertices, triangles=mesh.triangles)
 
 
-def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
-    said = blow.found
+def _break(impact: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
+    said = impact.found
     return FractureEvent(
-        object=blow.object,
-        part=blow.part,
+        object=impact.object,
+        part=impact.part,
         time=said.time,
         energy=said.energy / said.ratio,
         ratio=said.ratio,
@@ -152,16 +152,16 @@ def _break(blow: BrittleImpact, pieces: _CutPieces) -> FractureEvent:
     )
 
 
-def _take_energy(engine: Engine, stage: FractureState, blow: BrittleImpact) -> None:
+def _take_energy(engine: Engine, stage: FractureState, impact: BrittleImpact) -> None:
     """Subtract the fracture energy from the impact; the struck body recoils.
 
     J = m v (1 - √(1 - E₅₀/E)) with E = ½ m v².
     """
-    said = blow.found
+    said = impact.found
     mass = 2.0 * said.energy / said.speed**2
-    impulse = mass * said.speed * (1.0 - np.sqrt(1.0 - 1.0 / said.ratio)) * blow.away
-    x, y, z = blow.point.tolist()
-    for number, sign in ((blow.object, 1.0), (blow.other, -1.0)):
+    impulse = mass * said.speed * (1.0 - np.sqrt(1.0 - 1.0 / said.ratio)) * impact.away
+    x, y, z = impact.point.tolist()
+    for number, sign in ((impact.object, 1.0), (impact.other, -1.0)):
         if number is not None and stage.scene.objects[number].path is None:
             body = int(np.flatnonzero(stage.posed.object_of_body == number)[0])
             a, b, c = (sign * impulse).tolist()

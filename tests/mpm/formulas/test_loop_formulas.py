@@ -305,7 +305,7 @@ def bounces(e: Doubles, laws: wp.array2d(dtype=D), v: Doubles, out: Doubles):
     out[i] = one_lane_contact.restitution_at_speed(e[i], laws, i, v[i])
 
 
-def test_restitution_at_the_speed_of_a_blow_is_as_in_numpy(rng):
+def test_restitution_at_the_speed_of_an_impact_is_as_in_numpy(rng):
     e, v = rng.uniform(0.1, 1.0, COUNT), rng.uniform(0.0, 9.0, COUNT)
     power = np.where(rng.uniform(size=COUNT) < 0.5, 0.25, 0.0)
     law = np.column_stack([rng.uniform(0.1, 9.0, COUNT), rng.uniform(0, 0.05, COUNT), power])

@@ -65,9 +65,9 @@ def rigid_grid(
     surface, curvature = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
     facets = facets_of(surface, curvature)
     points, clumps = _sort_into_cubes(points, 4.0 * cell)
-    wetted, patches = _wetted_points(body, state[CENTRE : CENTRE + 3], cell)
-    places = np.full((3, len(wetted) + LANES), VAST, np.float32)
-    places[:, : len(wetted)] = wetted[:, :3].T
+    wetted_points, patches = _wetted_points(body, state[CENTRE : CENTRE + 3], cell)
+    places = np.full((3, len(wetted_points) + LANES), VAST, np.float32)
+    places[:, : len(wetted_points)] = wetted_points[:, :3].T
     normals = curvature[:, :3]
     thin = rigid.thinness(body.surface, normals, cell)
     spacing = rigid.surface_point_spacing(body.surface)
@@ -90,7 +90,7 @@ def rigid_grid(
         "curvature": np.ascontiguousarray(curvature),
         "facet": facets.row,
         "facet_point": np.ascontiguousarray(facets.point),
-        "wetted": wetted,
+        "wetted_points": wetted_points,
         "patch": patches,
         "places": places,
         "shown": shown,
@@ -169,13 +169,13 @@ class ContactMemory:
             plane=self.plane,
             friction=self.friction,
             restitution=self.restitution,
-            bounces=self.restitution_law,
+            restitution_law=self.restitution_law,
             contact_memory=self.stage,
             face=self.face,
         )
         if problem.has_rolling_resistance:
-            self.rolling = np.array(problem.rolling_resistance, float)
-            write_pointers(world, rolling=self.rolling)
+            self.rolling_resistance = np.array(problem.rolling_resistance, float)
+            write_pointers(world, rolling_resistance=self.rolling_resistance)
         write_pointers(world, **{name: getattr(ledger, name) for name in LEDGER_ARRAYS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
         moves = problem.contact == "multi" and any(body.rigid for body in problem.bodies)

@@ -210,13 +210,13 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
             chore=self.task.chore,
             list=self.node_task,
             report=self.report,
-            blow=self.winds.record,
+            wind_load=self.winds.record,
             bond=self.bond,
         )
         self._connect_bonds()
         self.springs.connect(world)
-        world["blows"] = len(self.winds.record)
-        world["blown"] = len(self.field) if len(self.winds.record) else 0
+        world["wind_loads"] = len(self.winds.record)
+        world["wind_tasks"] = len(self.field) if len(self.winds.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
         world["tasks"], world["nodes"] = len(self.task.row), len(self.node_task)
         world["colour"], world["chores"] = self.task.colours, len(self.task.chore)

@@ -185,7 +185,7 @@ FIELD_RECORD = NativeRecord(
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
     ("double *", "facet facet_point"),  # rigid: [facets][FACET_ROW] flat faces; places on them
     ("double *", "curvature"),  # rigid: [surfaces][CURVATURE_COLUMNS], see types.CURVATURE_COLUMNS
-    ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
+    ("double *", "wetted_points"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
@@ -208,7 +208,7 @@ FIELD_RECORD = NativeRecord(
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
 WIND_RECORD = NativeRecord(  # a body in the wind: see wind_records.py
-    "Blow",
+    "WindLoad",
     ("double *", "area point rigid impulse signal"),
     ("int *", "face"),
     ("double[3]", "wind"),
@@ -236,11 +236,11 @@ WORLD_RECORD = NativeRecord(
     ("int *", "task list contact_memory"),
     ("int *", "chore"),  # [chores][2]: first and last of the tasks that are done one by one
     ("double *", "report plane friction restitution"),
-    ("double *", "bounces"),  # how restitution changes with speed: 5 numbers a pair
-    ("double *", "rolling"),  # c of every pair [m]; null: nothing brakes what rolls
+    ("double *", "restitution_law"),  # how restitution changes with speed: 5 numbers a pair
+    ("double *", "rolling_resistance"),  # c of every pair [m]; null: there is none
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
     ("double *", "contact_point face impact_loss impact_of_pair"),
-    ("Blow *", "blow"),
+    ("WindLoad *", "wind_load"),
     ("Bond *", "bond"),
     ("Tether *", "tether"),
     ("Joint *", "joint"),
@@ -249,7 +249,7 @@ WORLD_RECORD = NativeRecord(
     ("double[3]", "kick"),
     ("int", "fields planes tasks full"),
     ("int", "names again"),  # bodies and planes in the books; a repeated call after more memory
-    ("int", "blows blown bonds"),  # bodies in the wind; tasks on them
+    ("int", "wind_loads wind_tasks bonds"),  # bodies in the wind; tasks on them
     ("int", "tethers joints grips sprung"),  # sprung: whether there is any of them
     ("int", "stop"),  # why the steps end after this phase; 0: they go on
     ("int", "nodes"),  # tasks on nodes …

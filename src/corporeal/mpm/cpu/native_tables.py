@@ -70,12 +70,12 @@ class WindRecords:
             points: Particles of the rigid bodies in their own frames.
 
         """
-        blown = [b for b, body in enumerate(problem.bodies) if body.wind and len(body.faces.area)]
-        self.body = blown
-        self.record = np.zeros(len(blown), WIND_RECORD.dtype)
+        windy = [b for b, body in enumerate(problem.bodies) if body.wind and len(body.faces.area)]
+        self.body = windy
+        self.record = np.zeros(len(windy), WIND_RECORD.dtype)
         self.kept: list[np.ndarray] = [np.ascontiguousarray(GUST_SIGNAL)]
         single = problem.contact == "single"
-        for row, b in zip(range(len(blown)), blown, strict=True):
+        for row, b in zip(range(len(windy)), windy, strict=True):
             record = self.record[row : row + 1]
             self._face(record, problem.bodies[b])
             write_pointers(record, impulse=impulse[b], signal=self.kept[0])

@@ -52,7 +52,7 @@ MIN_PARTICLES_PER_READING_THREAD = 4096
 ) = range(PIECE_CONTACT, PIECE_CONTACT + 11)
 CONTACT_PIECES = "start mark find stand list look face reach choose solve resolve"
 """Pieces of contact: ``loops/contact_NAME.cpp``."""
-PIECE_NAMES = [*"lay move pace clear blow spring forces".split(), *CONTACT_PIECES.split()]
+PIECE_NAMES = [*"lay move timestep clear wind spring forces".split(), *CONTACT_PIECES.split()]
 """Of all pieces, by number."""
 
 
@@ -72,7 +72,7 @@ SCHEDULE = (
     Phase(PIECE_TIMESTEP),
     Phase(PIECE_CLEAR, "bare_nodes"),
     *(Phase(PIECE_LAY, "bare", colour) for colour in range(COLOURS)),
-    Phase(PIECE_WIND, "blown"),
+    Phase(PIECE_WIND, "wind_tasks"),
     Phase(PIECE_SPRING, "sprung"),
     Phase(PIECE_FORCES, "nodes"),
     Phase(PIECE_START, "rigids"),

@@ -330,7 +330,7 @@ def face_of(r: DeviceRigidBodies, s: StepGlobals, b: int, x: wp.vec3d, mean: wp.
     R = wp.transpose(r.turn[b])
     y = R * (x - r.centre[b])
     place = y + R * wp.vec3d(mean)
-    face = wetted_face(r.wetted, r.wetted_first[b], r.wetted_count[b], y, place, s.dx, number)
+    face = wetted_face(r.wetted_points, r.wetted_first[b], r.wetted_count[b], y, place, s.dx, number)
     n = r.turn[b] * wp.vec3d(face[0], face[1], face[2])
     height = VAST
     if face[3] < wp.float64(VAST):

@@ -28,7 +28,7 @@ def max_rolling_moment(c: DeviceContacts, t: int):
     if c.active[t] > 0 and c.meet[t] < 0:
         if c.rolls[t] == 1:
             push = wp.dot(c.impulse[t] + c.struck[t], wp.vec3d(c.normal[t]))
-            most = c.rolling[c.fa[t], c.fc[t]] * wp.max(push, D(0.0))
+            most = c.rolling_resistance[c.fa[t], c.fc[t]] * wp.max(push, D(0.0))
     return most
 
 

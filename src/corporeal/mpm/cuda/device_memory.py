@@ -100,7 +100,7 @@ class DeviceMemory:
         self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
         self._surfaces(r, matter, np.flatnonzero(stiff), problem.cell)
         self._facets(r, matter, np.flatnonzero(stiff))
-        self._wetted(r, problem, matter, stiff)
+        self._wetted_points(r, problem, matter, stiff)
         self._paths(r, problem, matter)
         return r
 
@@ -173,7 +173,7 @@ class DeviceMemory:
         r.facet_first = self.put(np.cumsum(faces) - faces, wp.int32)
         r.facet_count = self.put(faces, wp.int32)
 
-    def _wetted(self, r: WarpStruct, problem: Problem, matter: ParticleConstants, stiff: np.ndarray) -> None:
+    def _wetted_points(self, r: WarpStruct, problem: Problem, matter: ParticleConstants, stiff: np.ndarray) -> None:
         rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)
         for b in np.flatnonzero(stiff):
             wetted = problem.bodies[b].wetted_surface
@@ -181,7 +181,7 @@ class DeviceMemory:
                 both = np.stack([wetted.point - matter.centre[b], wetted.normal], axis=1)
                 rows.append(both.reshape(-1, 3))
                 count[b] = len(both)
-        r.wetted = self.put(np.concatenate(rows), wp.vec3d)
+        r.wetted_points = self.put(np.concatenate(rows), wp.vec3d)
         r.wetted_first = self.put(np.cumsum(count) - count, wp.int32)
         r.wetted_count = self.put(count, wp.int32)
         liquid = matter.body[np.isin(matter.law, laws.LIQUID_LAWS)] * (problem.contact == "multi")
@@ -229,7 +229,7 @@ class DeviceMemory:
         c.friction, c.restitution = (self.put(friction, wp.float64), self.put(restitution, wp.float64))
         c.restitution_law = self.put(problem.restitution_law_of_pair.reshape(-1, 5), wp.float64)
         lengths = 0.0 * friction if problem.rolling_resistance is None else problem.rolling_resistance
-        c.rolling = self.put(lengths, wp.float64)
+        c.rolling_resistance = self.put(lengths, wp.float64)
         rows = np.zeros((friction.size, SUPPORT_ROW))
         rows[:, SUPPORT_LEAST_GAP] = VAST_DOUBLE
         c.rounds = self.put(rows, wp.float64)

@@ -156,7 +156,7 @@ def gather_one(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlobals,
     keep = 1.0 - wp.min(1.0, p.table[row, FORGET] * dt)
     given = wp.vec3(0.0)
     if l.acts == 1:
-        given = vector_at(l.blown, i)
+        given = vector_at(l.load_impulse, i)
     blown = wp.length_sq(given) > 0.0
     uses_mean_dilatation = p.table[row, USES_MEAN_DILATATION] > 0.0
     lam = p.table[row, LAMBDA]

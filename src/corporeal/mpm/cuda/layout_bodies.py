@@ -86,7 +86,7 @@ class DeviceRigidBodies:
     """… of each body the first …"""
     slim_count: wp.array(dtype=wp.int32)
     """… and how many."""
-    wetted: wp.array(dtype=wp.vec3d)
+    wetted_points: wp.array(dtype=wp.vec3d)
     """Points that liquids touch, each followed by its normal."""
     wetted_first: wp.array(dtype=wp.int32)
     """Of each body: its first such point …"""
@@ -106,9 +106,9 @@ class DeviceLoads:
 
     acts: int
     """1: something acts on particles."""
-    blown: wp.array2d(dtype=wp.float32)
+    load_impulse: wp.array2d(dtype=wp.float32)
     """What wind and grips give each particle in this step [N s], in the order of ``Particles`` …"""
-    pulled: wp.array2d(dtype=wp.float32)
+    tether_impulse: wp.array2d(dtype=wp.float32)
     """… and what its tether does."""
     wind_force: wp.array(dtype=wp.vec3d)
     """What the wind gives each rigid body [N s] …"""

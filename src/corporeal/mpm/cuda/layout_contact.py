@@ -80,7 +80,7 @@ class DeviceContacts:
     restitution: wp.array2d(dtype=wp.float64)
     restitution_law: wp.array2d(dtype=wp.float64)
     """How it changes with the speed of an impact: 5 numbers a pair."""
-    rolling: wp.array2d(dtype=wp.float64)
+    rolling_resistance: wp.array2d(dtype=wp.float64)
     """c [m]; unused without rolling friction."""
     face: wp.array(dtype=wp.float32)
     """Where the face of a half space lies whose mean offset is i/4096 · 1½ - 1½ [dx]."""

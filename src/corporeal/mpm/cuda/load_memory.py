@@ -18,8 +18,8 @@ NO_TIME_WINDOW = (0.0, -1.0)
 def lay_out_loads(memory: DeviceMemory, problem: Problem, matter: ParticleConstants) -> Any:
     """Lay out wind, tethers and joints."""
     bodies, count, out = len(problem.bodies), len(matter.mass), DeviceLoads()
-    out.blown = memory.zeros((3, count), wp.float32)
-    out.pulled = memory.zeros((3, count), wp.float32)
+    out.load_impulse = memory.zeros((3, count), wp.float32)
+    out.tether_impulse = memory.zeros((3, count), wp.float32)
     out.at = memory.zeros(count, wp.int32)
     for name in ("wind_force", "wind_moment", "force", "moment", "external"):
         setattr(out, name, memory.zeros(bodies, wp.vec3d))
@@ -115,7 +115,7 @@ def write_grips(out: Any, problem: Problem, matter: ParticleConstants, grips: di
     columns |= {"gripped": gripped, "target": target, "grip_arm": arm, "share": share}
     for name, values in columns.items():
         getattr(out, name).assign(values)
-    out.blown.zero_()
+    out.load_impulse.zero_()
     out.external.zero_()
 
 

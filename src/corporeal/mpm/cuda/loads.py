@@ -30,8 +30,8 @@ FULL_TURN_RAD = wp.constant(D(2.0 * math.pi))
 def clear_loads(p: DeviceParticles, l: DeviceLoads, s: StepGlobals, stride: int):
     """Take all loads away, and say where particles are."""
     for i in range(wp.tid(), p.count, stride):
-        put_vector(l.blown, i, wp.vec3(0.0))
-        put_vector(l.pulled, i, wp.vec3(0.0))
+        put_vector(l.load_impulse, i, wp.vec3(0.0))
+        put_vector(l.tether_impulse, i, wp.vec3(0.0))
         l.at[p.number[i]] = i
     for b in range(wp.tid(), s.bodies, stride):
         l.wind_force[b] = wp.vec3d(D(0.0))
@@ -84,7 +84,7 @@ def apply_wind(p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: Step
             seen_here = wp.vec3(air) - vector_at(p.velocity, i)
             given = wind_impulse(HALF_RHO_C, turned_area(F, l.area[k]), seen_here, l.weight[k], dt)
             for d in range(3):
-                wp.atomic_add(l.blown, d, i, given[d])
+                wp.atomic_add(l.load_impulse, d, i, given[d])
             wp.atomic_add(l.external, b, wp.vec3d(given))
 
 
@@ -114,7 +114,7 @@ def pull_tethered(p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: S
         wp.atomic_add(l.loss, 0, mass * dt * l.damping[k] * wp.dot(v, v + D(0.5) * pull))
         # Springs bear the weight from the start, so that nothing sags.
         J = mass * (pull - (s.kick[h] - s.pushed[h]))
-        put_vector(l.pulled, i, wp.vec3(J))
+        put_vector(l.tether_impulse, i, wp.vec3(J))
         wp.atomic_sub(l.force, h, J)
         wp.atomic_sub(l.moment, h, wp.cross(place, J))
 
@@ -218,7 +218,7 @@ def apply_grips(p: DeviceParticles, l: DeviceLoads, s: StepGlobals, stride: int)
         if share > D(0.0):
             b = int(p.table[p.kind[i], MATERIAL_BODY])
             J = share * grip_impulse(l, b, l.hand[b], l.hand_speed[b], s.clock[CLOCK_DT])
-            put_vector(l.blown, i, vector_at(l.blown, i) + wp.vec3(J))
+            put_vector(l.load_impulse, i, vector_at(l.load_impulse, i) + wp.vec3(J))
             wp.atomic_add(l.external, b, J)
 
 

@@ -50,7 +50,7 @@ def particle_share(p: DeviceParticles, g: BlockGrid, l: DeviceLoads, s: StepGlob
     impulse = m * wp.vec3(s.kick[int(p.table[row, MATERIAL_BODY])])
     S = dt * symmetric_at(p.stress, i)
     if l.acts == 1:
-        impulse += vector_at(l.blown, i) + vector_at(l.pulled, i)
+        impulse += vector_at(l.load_impulse, i) + vector_at(l.tether_impulse, i)
     if p.table[row, USES_MEAN_DILATATION] > 0.0:
         at = p.cluster[i]
         push = -4.0 / s.cell * p.volume[i] * dt * g.pool[1, at] / g.pool[0, at]

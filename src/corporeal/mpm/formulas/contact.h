@@ -160,7 +160,7 @@ struct Impact {
     const bool rebounds = approach > MIN_REBOUND_SPEED && (speed * dt > gap || gap < IMPACT_PATCH_DX * dx);
     return rebounds ? -e * approach : closing(gap, dt);
   }
-  // Restitution at the speed of a blow. law: the speed at which it is e, slope, exponent, least and most.
+  // Restitution at the approach speed of an impact. law: the speed at which it is e, slope, exponent, least and most.
   CUDA_CALLABLE static inline double bounce(double e, const double *law, double speed) {
     double now = e;
     if (law[2] != 0) now *= pow((speed > TINY_DOUBLE ? speed : TINY_DOUBLE) / law[0], -law[2]);

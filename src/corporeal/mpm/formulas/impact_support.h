@@ -5,10 +5,10 @@
 namespace mpm {
 namespace {
 // Of every pair of bodies, or body and plane, one row: its part in this round of impacts, its restitution in
-// it, the least gap of its contacts, the speed of the blow, and of those that are near how many there are, the sums of place, squared place and normal.
+// it, the least gap of its contacts, the approach speed of the impact, and of those that are near how many there are, the sums of place, squared place and normal.
 struct Backing {
   enum { ROLE, BOUNCE, LEAST, SPEED, COUNT, PLACE, SQUARE = 8, NORMAL = 14, ROW = 17 };
-  enum { PER_BLOW = 5 };   // numbers of Impact::bounce
+  enum { RESTITUTION_LAW_NUMBERS = 5 };   // numbers of Impact::bounce
   enum { WAITS, STRUCK, HELD };
   // Whether a contact is near and does not open; least: gap of the nearest one of its pair, if that is struck.
   CUDA_CALLABLE static inline bool near(double gap, double least, double speed, double dx) {
@@ -47,8 +47,8 @@ struct Backing {
     const double layer = LAYER_STIFFNESS_FACTOR * (a * a - dx * dx) / (thick > TINY_DOUBLE ? thick : TINY_DOUBLE);
     return layer > a ? layer : a;
   }
-  // Whether what lies between, of this mass, swings much faster than the blow lasts: k is the stiffness of the
-  // contact behind over that of the blow; from, to: inverse masses of what strikes and of what is behind.
+  // Whether what lies between, of this mass, swings much faster than the impact lasts: k is the stiffness of the
+  // contact behind over that of the impact; from, to: inverse masses of what strikes and of what is behind.
   CUDA_CALLABLE static inline bool quick(double k, double mass, double from, double to) {
     return k * (1 / mass + to) + 1 / mass > SUPPORT_FREQUENCY_RATIO2 * (from + to / (1 + mass * to));
   }
@@ -61,11 +61,11 @@ struct Backing {
     return forward ? cosine : -cosine;
   }
   // Hold what body b, struck along u, rests on, and what that rests on in turn. soft, kept: compliance of what
-  // is pressed, over that of the blow, and the part of the energy in it that comes back.
+  // is pressed, over that of the impact, and the part of the energy in it that comes back.
   CUDA_CALLABLE static inline void follow(double *rows, const double *e, const double *light, int all, int from,
                                           int b, const double *u, const double *struck, double dx, double &soft, double &kept) {
     double mass = 0;
-    const double blow = radius(struck, dx), *front = struck;
+    const double front_radius = radius(struck, dx), *front = struck;
     for (int before = from, turn = 0; turn < all && light[b] > 0; turn++) {
       int next = -1;
       double stiffest = 0;
@@ -74,7 +74,7 @@ struct Backing {
         double *row = rows + ROW * at(b, d, all);
         if (d == b || d == before || light[d] < 0 || row[COUNT] == 0 || row[ROLE] == STRUCK) continue;
         if (SUPPORT_MASS_RATIO * light[d] > light[b] || along(row, b < d, u) < SUPPORT_NORMAL_COSINE) continue;
-        const double k = reach(row, front, u, dx) / blow;
+        const double k = reach(row, front, u, dx) / front_radius;
         if (!quick(k, mass, light[from], light[d])) continue;
         row[ROLE] = HELD;
         if (k > stiffest) stiffest = k, next = d;
@@ -97,7 +97,7 @@ struct Backing {
         double *row = rows + ROW * (a * all + c), u[3], back[3];
         if (row[ROLE] != STRUCK) continue;
         const double *n = row + NORMAL;
-        const double own = Impact::bounce(e[a * all + c], law + PER_BLOW * (a * all + c), row[SPEED]);
+        const double own = Impact::bounce(e[a * all + c], law + RESTITUTION_LAW_NUMBERS * (a * all + c), row[SPEED]);
         const double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         double soft = 1, kept = own * own;
         for (int i = 0; i < 3; i++) u[i] = n[i] / (size > TINY_DOUBLE ? size : TINY_DOUBLE), back[i] = -u[i];

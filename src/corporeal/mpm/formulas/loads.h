@@ -1,4 +1,4 @@
-// Loads: wind on faces, grips, gravity that fades in. Twins of physics/wind.py and grips.py.
+// Loads: wind on faces, grips, gravity that fades in. Twins of physics/wind_pressure.py and spring_grips.py.
 #pragma once
 #include "lanes.h"
 namespace mpm {
@@ -13,7 +13,7 @@ template <class R> struct Air {
              (p[0] * q[1] - p[1] * q[0]) * N[2];
     }
   }
-  // Adds the air's impulse on a face [N s]; no face is blown faster than the air.
+  // Adds the air's impulse on a face [N s]; no face becomes faster than the air.
   CUDA_CALLABLE static inline void press(R half_rho_c, const R *a, const R *seen, R mass, R dt, R *J) {
     R size = sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
     R along = a[0] * seen[0] + a[1] * seen[1] + a[2] * seen[2];

@@ -269,7 +269,7 @@ def supported_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float
 
 
 @wp.func_native("""
-  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::PER_BLOW * pair, speed);
+  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::RESTITUTION_LAW_NUMBERS * pair, speed);
 """)
 def restitution_at_speed(
     e: wp.float64, laws: wp.array2d(dtype=wp.float64), pair: int, speed: wp.float64

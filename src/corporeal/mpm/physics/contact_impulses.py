@@ -143,7 +143,7 @@ def solve_impacts(contacts: ContactList, movers: Movers, rebound: ReboundRules, 
     and all others wait (generalized reflections: Smith, Kaufman, Vouga, Tamstorf and Grinspun 2012, "Reflections on
     simultaneous impact"). Solved at once, all pairs of a row of touching balls would share the impact; in rounds it
     runs through to the last. What is light between what strikes it and what it rests on is held in the same round
-    (``backing``).
+    (``impact_support``).
 
     Returns:
         Impulses J [N s], as of ``solve``.
@@ -158,8 +158,8 @@ def solve_impacts(contacts: ContactList, movers: Movers, rebound: ReboundRules, 
         sweeps = IMPACT_SWEEPS
         if rebound.bodies is not None:
             c = contacts
-            blow = np.where(closing_fast(c, speed, rebound, dt), approach_of(speed, rebound), 0.0)
-            seen = impact_support.ImpactContacts(rebound.pair, c.point, c.normal, c.gap, speed, hit, blow)
+            approach = np.where(closing_fast(c, speed, rebound, dt), approach_of(speed, rebound), 0.0)
+            seen = impact_support.ImpactContacts(rebound.pair, c.point, c.normal, c.gap, speed, hit, approach)
             now = impact_support.ImpactRound.of(rebound.bodies, seen, cell)
             bounces = rebound._replace(restitution=now.bounce(rebound.restitution))
             target, _ = target_speeds(contacts, speed, bounces, cell, dt)

@@ -54,7 +54,7 @@ class ImpactContacts(NamedTuple):
     """At which it closes [m/s]."""
     struck: Bool[np.ndarray, " E"]
     """Whether its pair is."""
-    blow: Scalars
+    approach: Scalars
     """Speed of approach of those that begin an impact, without this step's forces [m/s]; else 0."""
 
 
@@ -158,32 +158,32 @@ class ImpactRound:
             normal = seen.normal[near].sum(axis=0)
             normal = normal / max(float(np.linalg.norm(normal)), TINY_DOUBLE)
             both = np.divmod(pair, len(bodies.light))
-            blow = float(seen.blow[mine].max())
-            e = restitution_at_speed(float(bodies.restitution[both]), bodies.restitution_law[both], blow)
+            approach = float(seen.approach[mine].max())
+            e = restitution_at_speed(float(bodies.restitution[both]), bodies.restitution_law[both], approach)
             width = contact_disc_radius(seen.point[near], normal, cell)
             place = seen.point[near].mean(axis=0)
             found[int(pair)] = ImpactPair(ROLE_REBOUNDS if struck else ROLE_WAITS, e, width, normal, place)
         now = cls(bodies, number, found, cell)
-        for pair, blow in found.items():
-            if blow.role == ROLE_REBOUNDS:
-                now._hold(pair, blow)
+        for pair, struck in found.items():
+            if struck.role == ROLE_REBOUNDS:
+                now._hold(pair, struck)
         return now
 
-    def _hold(self, pair: int, blow: ImpactPair) -> None:
+    def _hold(self, pair: int, struck: ImpactPair) -> None:
         a, c = divmod(pair, len(self.bodies.light))
-        soft, kept = 1.0, blow.bounce**2
-        for strikes, first, along in ((a, c, blow.normal), (c, a, -blow.normal)):
-            for stiffness, e in self._behind(strikes, first, along, blow):
+        soft, kept = 1.0, struck.bounce**2
+        for strikes, first, along in ((a, c, struck.normal), (c, a, -struck.normal)):
+            for stiffness, e in self._behind(strikes, first, along, struck):
                 soft, kept = soft + 1.0 / stiffness, kept + e**2 / stiffness
-        blow.bounce = sqrt(kept / soft) if soft > 1.0 else blow.bounce
+        struck.bounce = sqrt(kept / soft) if soft > 1.0 else struck.bounce
 
     def _behind(
-        self, strikes: int, first: int, along: Float[np.ndarray, "3"], blow: ImpactPair
+        self, strikes: int, first: int, along: Float[np.ndarray, "3"], struck: ImpactPair
     ) -> list[tuple[float, float]]:
         """Hold what a struck body rests on, and what that rests on; stiffness and e of each."""
         found: list[tuple[float, float]] = []
         light, before, body, mass = self.bodies.light, strikes, first, 0.0
-        front = blow
+        front = struck
         while light[body] > 0.0 and len(found) < len(light):
             mass += 1.0 / light[body]
             stiffest, following, rests = 0.0, -1, front
@@ -192,7 +192,7 @@ class ImpactRound:
                 if other == before or pair is None or not self._backs(pair, body, other, along):
                     continue
                 thickness = abs(float((pair.place - front.place) @ along))
-                stiffness = equivalent_punch_radius(pair.radius, thickness, self.cell) / blow.radius
+                stiffness = equivalent_punch_radius(pair.radius, thickness, self.cell) / struck.radius
                 if not responds_within_impact(stiffness, mass, light[strikes], light[other]):
                     continue
                 pair.role = ROLE_HELD

@@ -234,14 +234,14 @@ class SimulationRun:
 
         """
         while True:
-            blow = next_breaking_impact(self.stage, self.breaks, self.whole, self.folder, number, since)
-            if blow is None:
+            impact = next_breaking_impact(self.stage, self.breaks, self.whole, self.folder, number, since)
+            if impact is None:
                 return
             self.engine.restore(saved)
-            broken = fracture_body(self.stage, self.engine, blow, self.breaks)
+            broken = fracture_body(self.stage, self.engine, impact, self.breaks)
             if broken is None:
                 # objects that cannot be cut stay whole
-                self.whole.add(blow.object)
+                self.whole.add(impact.object)
             else:
                 self.checkpoints.forget()
                 rewrite_history(self.folder, number, self.stage, broken.stage, broken.breaks[-1])

@@ -49,7 +49,7 @@ struct Rounds {
     }
     for (int f = 0; f < all; f++)
       stage->light[f] = f >= w->fields ? 0.0 : w->field[f].rigids ? w->field[f].rigid[INVERSE_MASS] : -1.0;
-    Backing::hold(pair, w->restitution, w->bounces, stage->light, all, dx);
+    Backing::hold(pair, w->restitution, w->restitution_law, stage->light, all, dx);
     return true;
   }
 };
@@ -118,7 +118,7 @@ if (n) {
   for (int i = 0; i < groups; i++) place[i + 1] += place[i];
   for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;   // place: where each group ends, from now on
   List::sort(lines, order, n);
-  // Impacts of rigid bodies, one after the other: what is hit passes the blow on to what it touches.
+  // Impacts of rigid bodies, one after the other: what is hit passes the impact on to what it touches.
   // In every round the pairs that approach now rebound together, those behind hold what is light, and
   // all others wait.
   int impacts = 0;
@@ -208,7 +208,7 @@ struct Rolls {
   }
   static inline void brake(World *w, const Line &R, Touch &T, int all) {
     const Field *F = Points::rolls(w, T);
-    const double most = w->rolling[T.fa * all + T.fc] * Vec::dot(T.J, T.normal);
+    const double most = w->rolling_resistance[T.fa * all + T.fc] * Vec::dot(T.J, T.normal);
     if (!F || most <= 0 || !F->rolls) return;
     const double *round = F->curvature + mpm::CURVATURE_ROW * (T.a % F->surfaces);
     if (round[6] + round[7] <= 0) return;
@@ -223,7 +223,7 @@ struct Rolls {
     for (int i = 0; i < 3; i++) T.J[i] += f[i];
   }
 };
-for (int i = 0; i < n && world->rolling; i++) Rolls::brake(world, lines[i], touches[lines[i].touch], all);
+for (int i = 0; i < n && world->rolling_resistance; i++) Rolls::brake(world, lines[i], touches[lines[i].touch], all);
 struct Books {
   // What a contact's impulse J on a body that moves as told takes of its mover.
   static inline void react(World *w, const double *s, int body, const double *x, const double *J,

@@ -131,7 +131,7 @@ struct Solver {
         int left = close(F, start, X, mpm::WETTED_SEARCH_FACTOR * reach);
         if (end - start < 8) left &= (1 << (end - start)) - 1;
         for (; left && rows.count < mpm::MAX_WETTED_POINTS; left &= left - 1) {
-          const double *row = F.wetted + 6 * (start + __builtin_ctz(left));
+          const double *row = F.wetted_points + 6 * (start + __builtin_ctz(left));
           const double d = mpm::Wetted::square(row, X);
           if (d <= reach * reach) rows.add(row, d);
         }

@@ -1,6 +1,6 @@
-"""Measure what a ball loses beyond its loss factor, over cells and the hardness of the blow.
+"""Measure what a ball loses beyond its loss factor, over cells and the hardness of the impact.
 
-    python benchmarks/hard_blows.py [--check]
+    python benchmarks/hard_impacts.py [--check]
 
 Weightless balls strike a plane. What they lose, as a loss factor by the inverse of hereditary Hertz
 contact, less their own: the constant of ``discretization/impact_vibration.py``. ``--check``
@@ -36,7 +36,7 @@ TOUCHES = 2.94
 
 
 @dataclass(frozen=True)
-class Blow:
+class Impact:
     """One ball that strikes a plane."""
 
     cells: int
@@ -88,7 +88,7 @@ def beyond(console: Console) -> None:
         for hardness in HARDNESS:
             more = []
             for cells in CELLS:
-                e, _ = Blow(cells, loss, hardness, poisson).strike()
+                e, _ = Impact(cells, loss, hardness, poisson).strike()
                 more.append(loss_of_restitution(e) - loss)
                 rows.append((cells**-2.0, hardness))
             found += more
@@ -107,7 +107,7 @@ def check(console: Console) -> None:
     ):
         taken = GRID_LOSS_FACTOR / cells**2 + (vibration_loss(1.0, 1.0, 1.0 / hardness) if rule else 0.0)
         other = {"radius": 0.12, "density": 300.0, "speed": 7.0, "seed": cells}
-        e, count = Blow(cells, max(0.0, loss - taken), hardness, poisson, **other).strike()
+        e, count = Impact(cells, max(0.0, loss - taken), hardness, poisson, **other).strike()
         off[rule].append(abs(e - restitution_of_loss(loss)))
         steps[rule] += count
     table = Table("", "mean error of e", "greatest", "steps")
