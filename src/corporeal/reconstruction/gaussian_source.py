@@ -100,10 +100,11 @@ def gaussians_from_source(
             raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), GIVE_MASKS_HINT)
         later = subprogress(progress, begun + MASKED_PROGRESS, 1.0)
         (folder / MASKS_FIGURE_FILE).unlink(missing_ok=True)
-        masks_figure(posed.folder, found.folder, folder / MASKS_FIGURE_FILE)
+        if config.masks != MASKS_NONE:
+            masks_figure(posed.folder, found.folder, folder / MASKS_FIGURE_FILE)
         # corrected masks are reliable
         grown = found.grown and found.folder is not None and not edited_masks(found.folder)
-        masked = MaskSource(found.folder, grown)
+        masked = MaskSource(found.folder, grown, bare=config.masks == MASKS_NONE)
         taken = load_or_train_gaussians(posed.folder, training, kept, later, instances, masked)
     made = replace(
         taken,
@@ -130,7 +131,7 @@ class _MasksFound:
 
 
 def find_or_grow_masks(config: ReconstructConfig, source: Path, folder: Path, progress: Progress) -> _MasksFound:
-    """Take masks from a folder, find them with a model, or grow them where there are none."""
+    """Take masks from a folder, find them with a model, or grow them where there are none, unless none are wanted."""
     if config.masks not in (MASKS_AUTO, MASKS_NONE) and split_model_spec(config.masks) is None:
         return _MasksFound(Path(config.masks))
     shots = list_posed_photos(source).shots

@@ -65,8 +65,8 @@ class ReconstructConfig:
     masks: Annotated[str, ReadsPath(prefixes=tuple(MASKERS), names=(MASKS_AUTO, MASKS_NONE))] = "auto"
     """Foreground masks: a folder of mask images; or "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER", where FOLDER
     holds the weights of that model; auto: the masks beside the photographs, else masks grown from the region that all
-    cameras look at; none: grow no masks; without any beside the photographs, whatever stands on the floor is an
-    object."""
+    cameras look at; none: no masks, and those beside the photographs serve the estimation of poses alone; whatever
+    stands on the floor is then an object. An alpha channel always counts."""
     up: UpAxisChoice = "auto"
     """Up axis of the input file (photographs, splat or mesh); auto: as the file states, else estimated from the
     cameras, else as usual for the format."""
@@ -137,6 +137,8 @@ def validate_reconstruct(
 
 
 def _check_masks(config: ReconstructConfig) -> None:
+    if config.apart == "masks" and config.masks == MASKS_NONE:
+        raise UserError("--apart masks needs masks, and --masks none ignores them. Omit one of the two.")
     if config.masks in (MASKS_AUTO, MASKS_NONE):
         return
     if split_model_spec(config.masks) is None:

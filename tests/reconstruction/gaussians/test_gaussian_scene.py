@@ -92,7 +92,7 @@ def test_poses_are_checked_in_pictures_of_the_size_that_the_check_was_measured_o
     monkeypatch.setattr(gaussian_scene, "check_pose_consistency", said)
     shown = pictured(Path("photos"), longest).only([0, 2])
     with pytest.raises(UserError, match=DOUBT):
-        gaussian_scene.pose_warnings(Path("photos"), None, shown)
+        gaussian_scene.pose_warnings(Path("photos"), shown=shown)
     size = max(longest, 320)
     assert looked == [(2, size // 2, size)] and asked == ([128, 320] if longest == 128 else [512])
 

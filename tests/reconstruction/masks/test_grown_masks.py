@@ -16,13 +16,16 @@ from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.mask_files import edited_masks
 from corporeal.io.photos.posed_photos import MASK_FOLDERS, read_posed_photos
 from corporeal.io.photos.transforms_json import write_views
+from corporeal.multiview.pose_consistency import PoseConsistency
 from corporeal.pipeline.run_pipeline import Settings, _Run, no_progress_of_stage
 from corporeal.reconstruction import gaussian_source
 from corporeal.reconstruction.gaussian_source import find_or_grow_masks, gaussians_from_source
+from corporeal.reconstruction.gaussians import gaussian_scene
 from corporeal.reconstruction.gaussians.gaussian_scene import GaussianScene
 from corporeal.reconstruction.masks import grown_masks as module
 from corporeal.reconstruction.masks.grown_masks import GrownMasks, grown_masks
 from corporeal.reconstruction.masks.mask_prompts import MaskPrompt
+from corporeal.reconstruction.masks_figure import MASKS_FIGURE_FILE
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate_reconstruct
 
 
@@ -237,6 +240,32 @@ def test_a_run_grows_masks_where_there_are_none(grown, tmp_path):
     owners = np.where(masks, 0, -1).astype(np.int32)
     write_views(tmp_path / "masked", Views(views.rgb, views.cameras, object_of_pixel=owners))
     assert asked("auto", tmp_path / "masked").folder is None
+
+
+@pytest.mark.parametrize(("masks", "used"), [("auto", True), ("none", False)])
+def test_masks_beside_the_photographs_are_used_unless_none_are_wanted(masks, used, tmp_path, monkeypatch):
+    views, true, _ = scene()
+    owners = np.where(true, 0, -1).astype(np.int32)
+    write_views(tmp_path / "photos", Views(views.rgb, views.cameras, object_of_pixel=owners))
+    given = []
+
+    def train(views, masks, *rest):
+        given.append((masks, views.object_of_pixel))
+        raise UserError("This is enough.")
+
+    agree = PoseConsistency("matches", 500, 0.7, 0.5, None)
+    monkeypatch.setattr(gaussian_scene, "check_pose_consistency", lambda *_: agree)
+    monkeypatch.setattr(gaussian_scene, "train_gaussians", train)
+    with pytest.raises(UserError, match="This is enough"):
+        gaussians_from_source(tmp_path / "photos", ReconstructConfig(masks=masks), tmp_path / "run", unheard)
+    ((seen, numbers),) = given
+    assert (seen is not None) == (numbers is not None) == used
+    assert (tmp_path / "run" / MASKS_FIGURE_FILE).exists() == used
+
+
+def test_segmentation_by_masks_is_refused_without_masks():
+    with pytest.raises(UserError, match="--apart masks needs masks"):
+        validate_reconstruct(ReconstructConfig(apart="masks", masks="none"))
 
 
 def test_masks_that_cannot_be_are_refused_before_anything_is_learned(tmp_path):

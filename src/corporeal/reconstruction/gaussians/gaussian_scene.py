@@ -138,7 +138,9 @@ class MaskSource:
     by: Path | None = None
     """A folder of masks; None: the photographs' own, if there are any."""
     grown: bool = False
-    """Whether nobody, and no model, made these: what is in them that no other photograph shows is left out."""
+    """Whether these were grown, not given or made by a model: what no other photograph shows in them is left out."""
+    bare: bool = False
+    """Whether masks beside the photographs are ignored."""
 
 
 MASKS_BESIDE_PICTURES = MaskSource()
@@ -172,7 +174,7 @@ def load_or_train_gaussians(
             raise UserError(f"{source} is a splat, which has no instance masks. Leave --apart out.")
         return _load_splat(source)
     shown, masks = _load_photographs(source, TRAINING_PRESETS[training.preset].longest, instances, masked)
-    doubt = pose_warnings(source, masked.by, shown)
+    doubt = pose_warnings(source, masked, shown)
     points = _sparse_points(shown)
     wrong = [said for said in shown.warnings if said not in shown.done]
     # With masks, where sparse points are says less than what masks carve; what they are seen through is empty.
@@ -217,7 +219,7 @@ def _load_photographs(
         UserError: They cannot be used, lack masks that segment objects, or these are inverted.
 
     """
-    shown = _drop_inconsistent(read_posed_photos(source, longest, masked.by, close=True))
+    shown = _drop_inconsistent(read_posed_photos(source, longest, masked.by, masked.bare, close=True))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES_MESSAGE}")
     masks = None if shown.masks is None else shown.masks >= MASK_MIN_U8
@@ -339,7 +341,9 @@ def _drop_inconsistent(shown: PosedPhotos) -> PosedPhotos:
     return replace(shown.only(kept.tolist()), warnings=(*shown.warnings, said))
 
 
-def pose_warnings(source: Path, masked_by: Path | None = None, shown: PosedPhotos | None = None) -> tuple[str, ...]:
+def pose_warnings(
+    source: Path, masked: MaskSource = MASKS_BESIDE_PICTURES, shown: PosedPhotos | None = None
+) -> tuple[str, ...]:
     """Return what seems wrong with the poses, as warnings.
 
     Points are matched in pictures as large as that was measured on: where little ones are learned from, a third of the
@@ -347,7 +351,7 @@ def pose_warnings(source: Path, masked_by: Path | None = None, shown: PosedPhoto
 
     Args:
         source: A folder of photographs with poses.
-        masked_by: A folder of masks instead of the photographs' own.
+        masked: Which masks are read.
         shown: What was read of them and is used: no other counts, and it serves if it is large enough.
 
     Raises:
@@ -356,7 +360,7 @@ def pose_warnings(source: Path, masked_by: Path | None = None, shown: PosedPhoto
     """
     looked = shown
     if looked is None or max(looked.views.rgb.shape[1:3]) < FEATURE_IMAGE_SIDE_PX:
-        looked = read_posed_photos(source, FEATURE_IMAGE_SIDE_PX, masked_by, close=True)
+        looked = read_posed_photos(source, FEATURE_IMAGE_SIDE_PX, masked.by, masked.bare, close=True)
         if shown is not None:
             kept = [k for k, name in enumerate(looked.names) if name in shown.names]
             looked = looked.only(kept)
