@@ -67,7 +67,7 @@ class ComposeConfig:
     repeat: bool = False
     """Allow several objects of one class."""
     seed: int = 0
-    """Seed of all random numbers."""
+    """Random seed of the choice of objects, their sizes, arrangement and interaction."""
     arrangement: BodyArrangement | Literal["auto"] = "auto"
     """Arrangement at rest: side by side, stacked, dropped onto one, or in a row."""
     settle_with: SettlingEngine = "mujoco"
