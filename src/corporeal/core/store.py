@@ -354,7 +354,7 @@ def cache_folder(kind: str) -> Path:
 
 @dataclass(frozen=True)
 class ResultMeta:
-    """What stands beside a finished result."""
+    """Metadata beside a finished result."""
 
     key: str = ""
     """Names the result by all it depends on."""
@@ -369,7 +369,7 @@ class ResultMeta:
 
 
 def read_meta(folder: Path) -> ResultMeta:
-    """Read what stands beside the finished result in ``folder``.
+    """Read the metadata of the finished result in ``folder``.
 
     Raises:
         BadFileError: The folder holds no finished result, or the file is damaged.

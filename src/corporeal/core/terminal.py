@@ -136,7 +136,7 @@ def log_lines(
         where: Gets the lines.
         every: Seconds between two lines on one stage [s].
         now: The clock [s].
-        soon: Seconds that it takes for a stage to be said to begin [s].
+        soon: Time after which the beginning of a stage is printed [s].
 
     """
     watched: list[_LoggedStage] = []  # the one that goes on
@@ -164,7 +164,7 @@ def log_lines(
 
 
 class _LoggedStage:
-    """A stage of which something is said every so often, whether or not it tells anything."""
+    """A stage whose state is printed at intervals, whether or not it reports anything."""
 
     def __init__(
         self, doing: StageProgress, say: Callable[[str], None], now: Callable[[], float], soon: float, every: float

@@ -8,9 +8,9 @@ sag far more than in reality, as soft as thick walls and the step budget make it
 Limits on the stiffness of parts that prescribed motion compresses, with warnings.
 
 What a displacement is forced on has its shape at any stiffness, and only the force is as wrong as its stiffness. So a
-part that the step budget softens stays deformable, and the factor is said. What would be softened out of all proportion
-is hard: in reality it would stop, or break, what presses it, which prescribed motion cannot do. It is rigid, at the
-cost of a rigid one, and that is said.
+part that the step budget softens stays deformable, and a warning states the factor. What would be softened out of all
+proportion is hard: in reality it would stop, or break, what presses it, which prescribed motion cannot do. It is rigid,
+at the cost of a rigid one, with a warning.
 """
 
 from collections.abc import Sequence

@@ -25,7 +25,7 @@ they are, and a filled saucer, the flattest ware, is 2.9 times as thick."""
 MIN_DRAWN_HOLLOW_FRACTION = 0.5
 """Of what a vessel encloses: as much room below its rim shows that its hollow is drawn [-]."""
 THICKNESS_PERCENTILES = (10, 25, 50)
-"""Of the surface [%], behind which it is said how far the opposite face lies."""
+"""Of the surface [%], behind which the distance of the opposite face is known."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ MAX_STEP_TIME_FRACTION = 0.4
 much (2.1 to 2.4 times in the first two showcase scenes)."""
 LIVE_WAVE_SPEED_RATIO = 4.0
 """Waves run at least so many times faster than anything moves [-]; a run asks for 10, at which the duck on mud takes
-2.3 times the steps. What is softer for it is said in the page."""
+2.3 times the steps. The page states what is softer for it."""
 SUFFICIENT_STEPS_PER_SECOND = 3e3
 """Steps per simulated second below which coarser cells are better, where cells can be coarser."""
 MIN_STEPS_PER_SECOND = 1e3

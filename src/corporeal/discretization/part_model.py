@@ -387,7 +387,7 @@ def is_unseen_open_vessel(member: MeasuredPart, words: PartDescription) -> bool:
 
 
 def _is_open_sheet(words: PartDescription) -> bool:
-    """Return whether a part is said to be an open sheet that covers nothing."""
+    """Return whether a part is described as an open sheet that covers nothing."""
     return words.structure == "sheet" and not (words.inner_share > 0 or words.missing)
 
 

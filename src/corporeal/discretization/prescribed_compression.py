@@ -125,7 +125,7 @@ def place_along_path(thing: SampledObject, path: Keyframes, pivot: Vector, times
 
 @dataclass(frozen=True)
 class Clearance:
-    """How far two things are from each other along a direction."""
+    """Distance of two objects along a direction."""
 
     gap: float
     """Least distance [m]; below zero where they overlap a little, inf: they pass each other."""

@@ -40,11 +40,11 @@ class PartFieldNumbers:
     band: Mapping[str, tuple[float, float]]
     """The same → 10th and 90th percentile."""
     kind: str | None
-    """What most of its points are taken for; None: not said."""
+    """What most of its points are taken for; None: not stated."""
     covered: float
     """Share of its points with a sample within reach, in [0, 1]."""
     decades: float
-    """p10 to p90 of E [decades]; 0 where E is not told."""
+    """p10 to p90 of E [decades]; 0 where E is not stated."""
     unfit: str = ""
     """Why it does not tell the part, in a clause; empty: it does."""
 

@@ -46,7 +46,7 @@ class FreeDistances:
     """Way that each may go [m]; 0 or less: it must be asked."""
 
     def note(self, points: np.ndarray, which: np.ndarray, free: np.ndarray) -> None:
-        """Keep what some points were told where they are."""
+        """Fix the points that were given where they are."""
         self.start[which], self.free[which] = points[which], free
 
     def still(self, points: np.ndarray, which: np.ndarray) -> Bool[np.ndarray, " M"]:

@@ -12,7 +12,7 @@ IMAGE_FORMATS = ("PNG", "JPEG", "WEBP")
 MAX_IMAGE_PIXELS = 2**27
 """A picture that claims more is refused before it is unpacked."""
 MAX_IMAGE_SIDE_PX = 4096
-"""Larger pictures are halved until they fit; nobody renders more of one object [px]."""
+"""Larger pictures are halved until they fit: no rendering shows more of one object [px]."""
 
 
 def decode_image(data: bytes, side: int = MAX_IMAGE_SIDE_PX) -> UInt8[np.ndarray, "H W C"]:

@@ -1,8 +1,8 @@
 """The formats that are read, one row each, and the types of the rows of readers and writers.
 
-A row is all that the package has to know of a format: which files are told from it by name, which suffixes errors list,
-how a file is recognised by its content, and which function reads it. Nothing is imported before a file asks for it.
-Writers are listed in ``export.export_target``.
+A row is all that the package has to know of a format: which files are distinguished from it by name, which suffixes
+errors list, how a file is recognised by its content, and which function reads it. Nothing is imported before a file
+asks for it. Writers are listed in ``export.export_target``.
 """
 
 from collections.abc import Iterator

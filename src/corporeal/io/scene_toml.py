@@ -291,7 +291,7 @@ def _parsed(path: Path, data: bytes) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _TomlTable:
-    """One table of the file and where it stands."""
+    """One table of the file and its place."""
 
     path: Path
     where: str

@@ -93,7 +93,7 @@ def find_material_or_default(name: str, library_name: str) -> MaterialEntry:
 
 
 def library_counterpart(entry: MaterialEntry, library_name: str) -> MaterialEntry:
-    """Return what stands for ``entry`` in another library: its own name, or the published one.
+    """Return the counterpart of ``entry`` in another library: its own name, or the published one.
 
     Raises:
         UserError: The library has neither.

@@ -84,7 +84,7 @@ def lint_library(text: str, sources: Mapping[str, Any], bases: tuple[str, ...]) 
 
 @dataclass(frozen=True)
 class _NumberPlace:
-    """Where a number stands in the file."""
+    """Place of a number in the file."""
 
     table: str
     key: str
@@ -113,7 +113,7 @@ class _MaterialRow:
 
 
 class _ProblemFinder:
-    """Collects problems and knows in which line each key stands."""
+    """Collects problems and knows in which line each key is."""
 
     def __init__(self, lines: dict[tuple[str, str], int]) -> None:
         self.lines = lines

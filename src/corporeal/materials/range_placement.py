@@ -92,7 +92,7 @@ CONTENTS_DENSITY_FIELD = "contents_density"
 
 
 def library_entry(name: str, library_name: str = "default") -> MaterialEntry:
-    """Look a material up; a smaller library gives what stands for it there."""
+    """Look a material up; a smaller library gives its counterpart."""
     entries = library(library_name)
     return entries[name] if name in entries else library_counterpart(find_material(name), library_name)
 

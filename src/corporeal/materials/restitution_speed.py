@@ -16,7 +16,7 @@ from corporeal.core.types import Law, Material
 from corporeal.materials.loss_restitution import loss_of_restitution, restitution_of_loss
 
 NOMINAL_IMPACT_SPEED_M_S = 1.0
-"""Speed at which restitution of pairs is stated where no other is said [m/s]."""
+"""Speed at which restitution of pairs is stated where no other is given [m/s]."""
 MIN_CARRIED_RESTITUTION, MAX_CARRIED_RESTITUTION = 0.12, 0.99
 """What a restitution that was carried to another speed may be [-]."""
 

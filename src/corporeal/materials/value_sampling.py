@@ -279,7 +279,7 @@ def _draw_piece(
 def _draw_wall(words: PartDescription, owner: int, grades: GradeDraws) -> PartDescription:
     """Draw a wall that is only usual of such objects; rules fix what inflated balls weigh.
 
-    Nobody rules what is blown up by mouth: an air bed, a beach ball.
+    No rule states the pressure of what is inflated by mouth: an air bed, a beach ball.
     """
     by_mouth = 0 < (words.inflation or 0.0) <= MAX_MOUTH_INFLATION_PA
     ruled = words.inflation is not None and not by_mouth

@@ -192,7 +192,7 @@ DENSE_CONTACT_REACH_DX, LOOSE_CONTACT_REACH_DX = 1.25, 1.5
 """Particles of two bodies farther apart than this along an axis [cells] are not in contact. Those of a solid are less
 than a cell from one another and touch from 1.14 on, lone grains from 1.5 on."""
 REACH_BOUND_FACTOR = 1.00001
-"""How much a bound on what a particle reaches exceeds it [-]: rounding leaves nobody out."""
+"""How much a bound on what a particle reaches exceeds it [-]: rounding leaves no particle out."""
 
 # ---------------------------------------------------------------- contact: what it transmits
 

@@ -109,7 +109,7 @@ class Body:
     push: Push | None = None
     wind: Wind | None = None
     faces: WindFaces = NO_WIND_FACES
-    """What the wind blows on."""
+    """Faces that the wind acts on."""
     tether: Tether | None = None
     path: Keyframes | None = None
     """Prescribed motion, of a rigid body: nothing that it meets can move it."""
@@ -296,7 +296,7 @@ class Engine(Protocol):
     """What every solver of one problem does.
 
     Its class is called with the problem and with ``threads``, how many threads it may use on the CPU (None: as it
-    likes), and stands in ``ENGINES``. What only some engines can do follows as protocols of methods alone;
+    likes), and is listed in ``ENGINES``. What only some engines can do follows as protocols of methods alone;
     ``engines.require`` asks for them.
     """
 

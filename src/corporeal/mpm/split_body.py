@@ -94,7 +94,7 @@ def _piece_body(body: Body, split: BodySplit, k: int) -> Body:
 
 
 def can_split(problem: Problem, body: int) -> bool:
-    """Whether a body is rigid and by itself: nothing holds it, hangs on it or blows at it."""
+    """Whether a body is rigid and by itself: no tether, joint or wind acts on it."""
     one = problem.bodies[body]
     tied = {b for pair in (*problem.bonds, *problem.excluded_pairs) for b in pair}
     tied |= {b for joint in problem.joints for b in (joint.first, joint.second)}

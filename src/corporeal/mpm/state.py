@@ -19,7 +19,7 @@ from corporeal.mpm.problem import Body, Problem
 
 
 def surface_curvature(body: Body) -> Float[np.ndarray, "S 12"]:
-    """How a body's surface curves at its points; zeros where it was not told."""
+    """How a body's surface curves at its points; zeros where it is unknown."""
     rows = np.zeros((len(body.surface), CURVATURE_COLUMNS))
     if len(body.curvature) == len(body.surface):
         rows[:, : body.curvature.shape[1]] = body.curvature

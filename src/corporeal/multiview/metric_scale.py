@@ -50,7 +50,7 @@ class ObjectExtent:
     metres: float
     """The same in reality [m]."""
     who: str
-    """Who said so, in words for the report ("the command line", "a model")."""
+    """Source of the statement, in words for the report ("the command line", "a model")."""
 
 
 def choose_metric_scale(
@@ -67,7 +67,7 @@ def choose_metric_scale(
 
     Args:
         distance: Of two points, or of cameras.
-        stated: What a person said of single objects.
+        stated: Statements of a person about single objects.
         file: Where the file's kind is in metres.
         usual: What a model or a table says of objects of these classes.
         size: Of the whole in the file, for the stand-in [its unit].
@@ -160,10 +160,10 @@ def stated_metric_scale(per_unit: float | None, points: MeasuredDistance | None,
     Args:
         per_unit: What one unit is [m].
         points: Whose distance is known.
-        who: Who said so, for the report.
+        who: Source of the statement, for the report.
 
     Raises:
-        UserError: Both were said, or what was said makes no sense.
+        UserError: Both were stated, or a statement makes no sense.
 
     """
     if per_unit is not None and points is not None:

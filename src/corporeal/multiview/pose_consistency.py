@@ -2,7 +2,7 @@
 
 Points that pictures share, found without the poses, must meet under them (epipolar geometry). Where pictures share too
 few, because they were taken far apart or of smooth objects, silhouettes must belong to one object. Where there are none
-either, nothing can be said.
+either, the result is unknown.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ SEED_PICTURES_COUNT = 5
 MATCH_TOLERANCE_PX = 2.0
 """Error of a match that agrees, in pixels of a picture of 320 × 320 or less."""
 MIN_MATCHES_PER_PAIR, MIN_MATCHES_OF_ALL_PAIRS = 20, 40
-"""Matches of a pair, and of all pairs, from which on something can be said."""
+"""Matches of a pair, and of all pairs, from which on there is a result."""
 MIN_AGREEING_FRACTION = 0.2
 """Share of matches: right poses give 0.3 to 0.9, wrong ones 0 to 0.1."""
 HOPELESS_AGREEING_FRACTION = 0.1
@@ -43,7 +43,7 @@ FOCAL_LENGTH_FACTORS = (0.5, 2 / 3, 0.8, 1.25, 1.5, 2.0)
 PRINCIPAL_POINT_SHIFTS_FRACTION = (-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2)
 """Of the principal point, in widths and heights of a picture: what comes of cropped pictures."""
 MIN_MATCHES_FOR_LENS = 100
-"""Good matches from which on single numbers of a lens can be told."""
+"""Good matches from which on single parameters of a lens can be determined."""
 MIN_FOCAL_GAIN_FACTOR, MIN_PRINCIPAL_POINT_GAIN_FACTOR = 1.15, 1.25
 """Factors by which matches must meet more closely under another lens; 1.3 and 2 for focal lengths off by a half and
 principal points off by a tenth, at most 0.93 and 1.0 for right ones."""

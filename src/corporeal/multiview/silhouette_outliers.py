@@ -49,7 +49,7 @@ def are_masks_inverted(masks: Bool[np.ndarray, "V H W"], cameras: tuple[Camera, 
     """Return whether most masks hold most of the borders, and not what all cameras look at.
 
     Args:
-        masks: Which pixels are said to be on objects.
+        masks: Pixels on objects, according to the masks.
         cameras: Of the pictures.
 
     """

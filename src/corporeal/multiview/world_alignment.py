@@ -51,7 +51,7 @@ class WorldAlignment:
     world_from_file: Float[np.ndarray, "4 4"]
     """Rotation and shift; lengths stay."""
     found_by: str
-    """Who said what is up: "person", "file", "cameras", "floor", "rest" or "custom"."""
+    """Source of the up direction: "person", "file", "cameras", "floor", "rest" or "custom"."""
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str

@@ -87,7 +87,7 @@ def _in_words_of_one_line(verdict: GateVerdict) -> GateVerdict:
 
 
 def content_key(file: Path, gate: GateConfig) -> str:
-    """Name the content of a file and its companions, and the gate it stands before."""
+    """Name the content of a file and its companions, and the settings of the gate."""
     total = hashlib.sha256(json.dumps([GATE_RULES_VERSION, asdict(gate)]).encode())
     for path in list_input_files([file]):
         total.update(path.name.encode() if path != file else file.suffix.lower().encode())

@@ -156,7 +156,7 @@ def _write_pool(pool: Path, admission: PoolAdmission) -> None:
 
 
 def _path_in_index(pool: Path, file: Path) -> str:
-    """Return a path as it stands in the index: what is the pool's own moves with it."""
+    """Return a path as the index has it: what is the pool's own moves with it."""
     return str(file.relative_to(pool)) if file.is_relative_to(pool) else str(file)
 
 

@@ -14,7 +14,7 @@ from corporeal.recognition.translation import translate_words
 PERCENT_FULL_PATTERN = re.compile(r"(\d{1,3})\s*(?:%|percent|per cent|prozent)[\s_-]*(?:full|filled|voll)")
 FRACTION_FULL_PATTERN = re.compile(r"\b([1-4])\s*/\s*([2-5])[\s_-]*(?:full|filled|voll)")
 GOODS_FILL_FRACTION, OPEN_WARE_FILL_FRACTION = 0.9, 0.8
-"""How full is what is said to hold something, and not how much: bottles as they are sold, and open ware that is carried
+"""Fill of what is stated to hold something, without an amount: bottles as they are sold, and open ware that is carried
 [-]."""
 MAX_FILL_FRACTION = 0.95
 """A rim stays free [-]."""
@@ -35,7 +35,7 @@ class NamedContents:
     vessel: WordPhrase
     """The vessel's name; (): none is known."""
     drinks: bool
-    """It holds water or a drink where nothing else is said."""
+    """It holds water or a drink where nothing else is stated."""
 
 
 def contents_from_name(thing: SceneObject) -> NamedContents | None:
@@ -67,7 +67,7 @@ def _find_vessel(said: Sequence[str]) -> tuple[WordPhrase, int]:
 
 
 def _fill_fraction(name: str, said: Sequence[str]) -> float | None:
-    """Return how full it is said to be [-]."""
+    """Return the stated fill [-]."""
     if level := PERCENT_FULL_PATTERN.search(name):
         return min(int(level[1]) / 100, MAX_FILL_FRACTION)
     if fraction := FRACTION_FULL_PATTERN.search(name):

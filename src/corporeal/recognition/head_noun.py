@@ -52,7 +52,7 @@ def names_several_objects(words: Sequence[str]) -> bool:
 
 
 def _move_complement_first(words: list[str], known: KnownWords, phrases: PhraseSet) -> list[str]:
-    """Put what stands behind a preposition before the object, or leave it out.
+    """Put what follows a preposition before the object, or leave it out.
 
     What only describes stays in front: a full bottle of wine is a full wine bottle.
     """
@@ -93,7 +93,7 @@ def _swap_reversed_phrases(words: list[str], phrases: PhraseSet) -> list[str]:
 
 
 def _is_in_phrase(words: Sequence[str], k: int, phrases: PhraseSet) -> bool:
-    """Return whether a word is one of a phrase where it stands."""
+    """Return whether a word is part of a phrase."""
     pairs = [tuple(words[j : j + n]) for n in (2, 3) for j in range(max(0, k - n + 1), k + 1)]
     return any(len(pair) > 1 and pair in phrases for pair in pairs)
 

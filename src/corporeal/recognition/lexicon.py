@@ -114,7 +114,7 @@ class ColourRule:
 
 @dataclass(frozen=True)
 class TokenisedName:
-    """A name as it stands in the file, and the words of it that count."""
+    """A name as the file has it, and the words of it that count."""
 
     text: str
     words: tuple[str, ...]
@@ -126,7 +126,7 @@ class TokenisedName:
 
 
 def head_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
-    """Find what stands in a name; of compound nouns the last one is the object.
+    """Find the terms in a name; of compound nouns the last one is the object.
 
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
@@ -149,7 +149,7 @@ def head_terms(tokens: tuple[str, ...]) -> list[LexiconTerm]:
 
 
 def _head_noun_index(tokens: tuple[str, ...]) -> int | None:
-    """Return where the last noun of a name stands, which is the object; None: no noun is known."""
+    """Return the place of the last noun of a name, which is the object; None: no noun is known."""
     nouns = _noun_words() - _describing_words()
     return next((k for k in range(len(tokens) - 1, -1, -1) if tokens[k] in nouns), None)
 
@@ -248,7 +248,7 @@ def _vocabulary() -> KnownWords:
 
 @cache
 def _lexicon_words() -> frozenset[str]:
-    """Return every word that stands in the lexicon by itself or in a phrase."""
+    """Return every word of the lexicon by itself or in a phrase."""
     return frozenset(w for term in lexicon_terms() for w in term.phrase) | _container_nouns()
 
 
@@ -302,7 +302,7 @@ def names_hollow_casting(tokens: tuple[str, ...]) -> bool:
 
 
 def _head_noun_in_table(tokens: tuple[str, ...], table: str) -> bool:
-    """Return whether a name's last noun stands in a table: "bin" in "bin old green"."""
+    """Return whether a table has a name's last noun: "bin" in "bin old green"."""
     return _head_noun_among(tokens, _table_phrases(table))
 
 
@@ -320,7 +320,7 @@ def _head_noun_among(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]])
 
 @cache
 def _noun_words() -> frozenset[str]:
-    """Return words that name an object: what stands behind the last of them only describes it."""
+    """Return words that name an object: what follows the last of them only describes it."""
     tables = {phrase[-1] for table in ("hollow", "open", "cast") for phrase in _table_phrases(table)}
     things = {term.phrase[-1] for term in lexicon_terms() if term.kind != "substance"}
     return frozenset(tables | things | {name[-1] for name in multiword_names()}) | _container_nouns() | part_nouns()

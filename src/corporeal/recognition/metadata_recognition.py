@@ -387,7 +387,7 @@ def _strongest_terms(
 
 
 def _terms_in_context(name: TokenisedName) -> list[LexiconTerm]:
-    """Find what stands in a name; a substance right beside an object is that of such an object.
+    """Find the terms in a name; a substance right beside an object is that of such an object.
 
     "Wooden chair", and as files are named "chair_wooden"; what lies loose is no object's material: a snow shoe, a snow
     globe. A general word means what such objects are of: a plastic duck is of PVC.

@@ -62,7 +62,7 @@ def _is_meaningful_word(word: str) -> bool:
 
 
 def _cut_camel_case(run: str) -> list[str]:
-    """Cut a run of letters where a capital stands behind a small letter."""
+    """Cut a run of letters where a capital follows a small letter."""
     if run.isascii():
         return CAMEL_CASE_PATTERN.findall(run)
     inner = range(1, len(run))

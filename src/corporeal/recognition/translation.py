@@ -9,11 +9,11 @@ from pathlib import Path
 from corporeal.recognition.parts_by_name import strip_accents
 
 OF_PREPOSITIONS = frozenset("de del di du des da do della dello en au aux".split())
-"""What stands between an object and what belongs to it: "caja de carton" is a box of cardboard, "pot au lait" a milk
+"""Words between an object and what belongs to it: "caja de carton" is a box of cardboard, "pot au lait" a milk
 pot.
 """
 TRAILING_ADJECTIVES = frozenset("empty full old small large red blue green white black".split())
-"""What stands behind an object and what belongs to it, and is of the thing: "botella de vino vacía" is an empty bottle.
+"""Words after an object and what belongs to it that describe the object: "botella de vino vacía" is an empty bottle.
 """
 UMLAUT_TRANSCRIPTION = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 UNSPACED_SCRIPTS = ("CJK ", "HIRAGANA ", "KATAKANA ")
@@ -106,7 +106,7 @@ def substance_words() -> frozenset[str]:
 
 @cache
 def _word_translations() -> dict[str, tuple[str, ...]]:
-    """Return every word that stands by itself → its English words."""
+    """Return every single word → its English words."""
     return {s: english for word, english in _dictionary_rows() if word[0] != "-" for s in _unaccented_spellings(word)}
 
 

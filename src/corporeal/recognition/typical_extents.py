@@ -85,7 +85,7 @@ PLURAL_ONLY_NOUNS = frozenset(
     "scissors pliers tongs tweezers handcuffs binoculars goggles sunglasses spectacles eyeglasses "
     "jeans pants trousers tights".split()
 )
-"""Words that stand for one thing in the plural."""
+"""Plural words that name one object."""
 
 
 def with_article(words: str, has: str, have: str) -> str:

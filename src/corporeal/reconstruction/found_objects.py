@@ -21,7 +21,7 @@ from corporeal.render.object_portrait import PART_COLOURS, part_colour_names
 from corporeal.vlm.photographed_objects import UNKNOWN_CLASS, PhotoInterview, SeenObject, object_of_usual_size
 
 NOBODYS_GREY = (0.2, 0.2, 0.2)
-"""Linear RGB of what is nobody's, in painted pictures."""
+"""Linear RGB of what belongs to no object, in painted pictures."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ def recognise_objects(
 ) -> list[SeenObject]:
     """Return what each segmented object is; these are in order of size.
 
-    Who named objects on the command line named the largest first. Others are told by CLIP where there is one, else by
-    whoever sees the objects painted.
+    Objects named on the command line are named the largest first. Others are distinguished by CLIP where there is one,
+    else by whoever sees the objects painted.
     """
     count = found.count
     if config.object_names or not wanted:

@@ -37,7 +37,7 @@ from corporeal.reconstruction.sfm.find_poses import (
 )
 
 POSED_PROGRESS = 0.5
-"""Share of learning from pictures that is done when poses that nobody gave are found."""
+"""Share of learning from pictures that is done when unknown poses are estimated."""
 MASKED_PROGRESS = 0.1
 """The same, of finding masks."""
 WHOLE_PICTURES_PROGRESS, MASKS_TESTED_PROGRESS, RETESTED_PROGRESS = 0.7, 0.8, 0.9
@@ -69,13 +69,13 @@ GIVE_MASKS_HINT = (
 def gaussians_from_source(
     source: Path, config: ReconstructConfig, folder: Path | None, progress: Progress
 ) -> tuple[GaussianScene, bool]:
-    """Read a splat, or learn Gaussians from pictures, whose poses are found if nobody gave any.
+    """Read a splat, or learn Gaussians from pictures, whose poses are estimated if there are none.
 
     Returns:
-        What there is, and whether somebody said which pixels are objects.
+        The scene, and whether masks were given or made by a model.
 
     Raises:
-        BadFileError: Where pictures were taken from, or what they are of, cannot be told.
+        BadFileError: Where pictures were taken from, or what they are of, cannot be determined.
 
     """
     if folder is None:
@@ -95,7 +95,7 @@ def gaussians_from_source(
         found = find_or_grow_masks(config, posed.folder, folder, subprogress(progress, begun, begun + MASKED_PROGRESS))
     with notes_on_error((*posed.warnings, *found.warnings)):
         if found.incomplete and not config.force:
-            # Under wrong poses nothing is found whole: then that is what is to be said.
+            # Under wrong poses no object is found whole: then the poses are the error to report.
             doubt = pose_warnings(posed.folder)
             raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), GIVE_MASKS_HINT)
         later = subprogress(progress, begun + MASKED_PROGRESS, 1.0)
@@ -123,7 +123,7 @@ class _MasksFound:
     statements: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     grown: bool = False
-    """Whether nobody, and no model, said what an object is."""
+    """Whether they were grown, not given or made by a model."""
     doubted: Path | None = None
     """Where masks are that are unreliable."""
     incomplete: str = ""
@@ -158,10 +158,10 @@ def _read_masks_at_size(taken: GaussianScene, source: Path, folder: Path) -> Boo
 
 
 def _find_source_poses(source: Path, config: ReconstructConfig, folder: Path, progress: Progress) -> FoundPoses | None:
-    """Find where pictures were taken from; None: that is known, or there are none.
+    """Estimate camera poses; None: they are known, or there are no photographs.
 
     Raises:
-        BadFileError: It cannot be found, or is right about what is around the object alone.
+        BadFileError: They cannot be estimated, or are right for the surroundings of the object alone.
 
     """
     if not lacks_poses(source):
@@ -253,7 +253,7 @@ def _refuse_doubted_poses(source: Path, posed: FoundPoses, force: bool, step: st
     Args:
         source: The photographs.
         posed: Where they were taken from.
-        force: Whether masks agree with that, or somebody wants to go on.
+        force: Whether masks agree with that, or the run is forced.
         step: What to do beside showing more of a pattern.
 
     Raises:

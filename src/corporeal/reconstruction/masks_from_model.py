@@ -2,7 +2,7 @@
 
 A model sees one picture at a time and may take something else for the object in each. What it
 found is asked what grown masks are asked: whether pictures hold it, and whether its outlines are
-those of one object. Nobody asks that of what a person drew.
+those of one object. Masks that a person drew are not tested.
 """
 
 from pathlib import Path

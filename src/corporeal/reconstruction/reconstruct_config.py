@@ -111,7 +111,7 @@ def validate_reconstruct(
     Args:
         config: What was asked for.
         extents: Real largest extents, such as "duck=0.1" [m].
-        asked: Whether somebody will be asked what there is.
+        asked: Whether a person or a model will be asked for the objects.
         source: What the pictures are called.
 
     """

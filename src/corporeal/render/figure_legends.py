@@ -57,7 +57,7 @@ class LegendEntry:
 
     name: str
     colour: Colour | None
-    """sRGB in [0, 1]; None: no colour stands beside it."""
+    """sRGB in [0, 1]; None: it has no colour."""
 
 
 @dataclass(frozen=True)

@@ -164,7 +164,7 @@ class RecordedGaussians:
     colour: UInt8[np.ndarray, "N 4"]
     """sRGB and opacity."""
     object: Int[np.ndarray, " N"]
-    """-1: of none, it stands still."""
+    """-1: of none, it does not move."""
     vertex: Int[np.ndarray, " N"]
     """Of its object: the one that it follows."""
     all: int

@@ -79,7 +79,7 @@ LIGHT_FILTER_REACH_PX = 7
 HALO_TILES = NEAR_OBJECT_TILES + 1 + -(-LIGHT_DEPENDENCE_REACH_PX // TILE_PX)
 """Tiles above and below a band that what is seen in it hangs on."""
 EMPTY_HALO_TILES = -(-SHARED_LIGHT_REACH_PX // TILE_PX)
-"""The same of the empty studio: what hides nothing lets nobody ask again."""
+"""The same of the empty studio; where nothing is hidden it is not computed again."""
 EMPTY_BAND_TILES = 24
 """Tiles of the empty studio that are cast at once: its memory is that of a part of the picture."""
 TEXTURE_FILTER_PX = 0.65

@@ -44,7 +44,7 @@ def arrange_bodies(
         arrangement: ``scatter``: side by side; ``stack``: one above the other, below what carries most; ``onto``: all
             above that one; ``row``: in a line along +x, heavy ones first
         and flat ones last, broadside on.
-        rng: Source of what is left to chance.
+        rng: Source of random numbers.
 
     """
     ways = {"scatter": _scatter_poses, "stack": _stack_poses, "onto": _onto_poses, "row": _row_poses}

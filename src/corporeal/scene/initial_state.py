@@ -49,7 +49,7 @@ def parse_initial_velocity(text: str) -> tuple[str, Vector]:
 
 
 def with_initial_state(scene: Scene, lifts: Sequence[str], velocities: Sequence[str]) -> Scene:
-    """Return a scene whose objects begin as was said of them.
+    """Return a scene with the stated initial state of its objects.
 
     Args:
         scene: As it stands.

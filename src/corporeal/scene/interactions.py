@@ -52,7 +52,7 @@ MAX_WIND_SPEED_M_S = 32.0
 """No wind is stronger: a violent storm (Beaufort 11) [m/s]."""
 WIND_GUST_FRACTION = 0.3
 WIND_DURATION_S = 0.6
-"""How long the wind blows [s]: what is light should not leave the picture."""
+"""Duration of the wind [s]: what is light should not leave the picture."""
 WATCH_AFTER_IMPACT_S = 0.8
 """How long to go on watching after the first impact [s]."""
 
@@ -174,7 +174,7 @@ def _arrival_speed(still: SettledBodies, rng: np.random.Generator) -> float:
 
 
 def _begin_wind(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction | None:
-    """Let air blow on everything from one side, somewhat faster than what moves the easiest object.
+    """Apply wind to everything from one side, somewhat faster than what moves the easiest object.
 
     Of the objects that carry others nothing is expected.
     """

@@ -50,7 +50,7 @@ def settle_for_interaction(
         bodies: What there is.
         arrangement: How it begins to fall.
         kinds: What may happen, best first; none: nothing is to.
-        rng: Of everything that is left to chance.
+        rng: Source of random numbers.
         deepest: Penetration allowed [m].
         config: How hard to try.
 

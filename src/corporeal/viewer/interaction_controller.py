@@ -100,7 +100,7 @@ class InteractionController:
         """Do what an order says to bodies; ``InteractionController`` knows nothing of playing and pausing.
 
         Returns:
-            What another engine is told to do the same; None: nothing was done.
+            Order for another engine to do the same; None: nothing was done.
 
         Raises:
             UserError: It cannot be done.
@@ -125,7 +125,7 @@ class InteractionController:
             self.again(touch)
 
     def again(self, touch: InteractionEvent) -> None:
-        """Do one thing again."""
+        """Repeat one order."""
         if touch.order is not None:
             self.obey(touch.order)
         else:

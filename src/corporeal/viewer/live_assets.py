@@ -17,7 +17,7 @@ from corporeal.showcase.showcase_scenes import prop_scene
 from corporeal.viewer.run_store import RunStore
 
 SHOWCASE_PREFIX = "corporeal"
-"""Before the names of models; before an object's stands its run's."""
+"""Prefix of the names of models; that of an object is the name of its run."""
 DEFAULT_SETTINGS = Settings()
 
 

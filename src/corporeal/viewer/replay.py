@@ -1,6 +1,6 @@
 """Records of live simulations, and their replay at higher resolution.
 
-The record holds every order and the instant of every advance. What was taken hold of is told by where its material was
+The record holds every order and the instant of every advance. What was grabbed is identified by where its material was
 at the start, so that a scene filled more finely obeys it as well.
 """
 

@@ -1,6 +1,6 @@
 """Queue of runs started from the page, each in its own process.
 
-What was asked stands in ``.queue.json``. A job that is stopped, or whose server is killed, goes on in the same folder
+Requests are kept in ``.queue.json``. A job that is stopped, or whose server is killed, goes on in the same folder
 from where it was.
 """
 
@@ -90,7 +90,7 @@ class RunQueue:
             busy = [e for e in self.entries if e.state in ("waiting", "running")]
             if any(e.name == asked.name for e in busy):
                 raise UserError(f"{asked.name} is in the queue already.")
-            # What became of the run before is told by what becomes of it now.
+            # The state of the new run replaces that of the previous one.
             self.entries = [e for e in self.entries if e.name != asked.name]
             self.settings[asked.id] = settings
             self.entries.append(asked)
@@ -227,6 +227,6 @@ class RunQueue:
 
 
 def _stage_fractions(every: Sequence[str], told: Mapping[str, float]) -> dict[str, float]:
-    """Return how far every stage is; before one that is told of, all are done, maybe long ago."""
+    """Return how far every stage is; before one that is reported, all are done."""
     last = max((every.index(verb) for verb in told if verb in every), default=0)
     return {v: 1.0 if k < last else told.get(v, 0.0) for k, v in enumerate(every)}

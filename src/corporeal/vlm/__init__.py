@@ -32,7 +32,7 @@ VLM_CLIENTS = {
     "google": "corporeal.vlm.api_clients:GoogleClient",
     "ollama": "corporeal.vlm.api_clients:OllamaClient",
 }
-"""How to reach a model: name before the colon → class that takes what stands after it."""
+"""How to reach a model: name before the colon → class that takes what follows it."""
 VLM_WRAPPERS = {
     "cache": "corporeal.vlm.answer_cache:CachingClient",
     "record": "corporeal.vlm.recordings:RecordingClient",

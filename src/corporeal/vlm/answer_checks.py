@@ -199,7 +199,7 @@ def thickness_complaints(answer: ThicknessAnswer, parts: Sequence[str]) -> list[
 
 
 def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
-    """Check the order, and that masses, judged and printed, are in the units they are said in.
+    """Check the order, and that masses, judged and printed, are in the units they are stated in.
 
     Args:
         answer: What was answered.

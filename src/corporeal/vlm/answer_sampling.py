@@ -17,7 +17,7 @@ from corporeal.vlm import Answer, AnswerCheck, AnswerSchema, Question
 SAMPLING_TEMPERATURE = 0.7
 """Temperature of several answers: Wang et al. (2022, arXiv:2203.11171) took .5 to .7."""
 OTHER_CHOICES: ContextVar[list[list[str]] | None] = ContextVar("heard", default=None)
-"""What was said beside the first choice, by response, of the question that this task asks."""
+"""Answers beside the first choice, by response, of the question that this task asks."""
 
 
 class ToolArguments(BaseModel):
@@ -78,7 +78,7 @@ class SpareAnswers:
         self._one = Lock()
 
     def keep(self, question: Question, answer: type[AnswerSchema], texts: list[str]) -> None:
-        """Keep what was said for those who ask the same."""
+        """Keep the answers for equal questions."""
         with self._one:
             self._kept[_key(question, answer)] = list(texts)
 
@@ -103,7 +103,7 @@ def _key(question: Question, answer: type[AnswerSchema]) -> str:
 
 
 def _parse_fitting_answer(text: str, answer: type[Answer], check: AnswerCheck[Answer]) -> Answer | None:
-    """Read an answer, whatever stands around its braces; None where it does not fit."""
+    """Read an answer, whatever surrounds its braces; None where it does not fit."""
     try:
         found = answer.model_validate_json(text[text.find("{") : text.rfind("}") + 1])
     except ValidationError:

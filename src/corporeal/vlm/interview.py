@@ -79,7 +79,7 @@ SENTENCES: Mapping[str, Mapping[str, str]] = {
     "holes": {"hollowed": MODELLED_HOLES_CLAUSE, "whole": ""},
     "how": {"fraction": FRACTION_INSTRUCTION, "value": VALUE_INSTRUCTION},
 }
-"""Fact → its value → what stands in the prompt for it; other facts stand there themselves."""
+"""Fact → its value → what the prompt has for it; other facts are used as they are."""
 
 TASKS_WITH_FIXED_TEXT = ("materials", "mass")
 """Questions whose text hangs on question 1 only, so that each of several answers is to the same."""
@@ -289,7 +289,7 @@ class Interview:
 
         Args:
             colours: Names of the regions' colours.
-            things: What there is, in words.
+            things: Objects of the scene, in words.
 
         """
         lines = "\n".join(f"{k}. {words}" for k, words in enumerate(things, 1))

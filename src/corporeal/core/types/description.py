@@ -224,7 +224,7 @@ class ObjectDescription:
     evidence: MassEvidence | None = None
     """An estimate of its mass made without the library; None: not asked."""
     answers: tuple[ObjectAnswer, ...] = ()
-    """Each of several answers, as a whole; what stands above pools them. Empty: one was given."""
+    """Each of several answers, as a whole; the fields above pool them. Empty: one was given."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from corporeal.core.types.description import MassEvidence, PartDescription, Prov
 
 
 class Law(Enum):
-    """How a material answers to strain: each stands in the file of its name in ``mpm/laws``."""
+    """How a material answers to strain: each is defined in the file of its name in ``mpm/laws``."""
 
     COROTATED = 0
     NEO_HOOKEAN = 1

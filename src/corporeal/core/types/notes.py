@@ -55,6 +55,6 @@ def note_kinds(sentences: Iterable[str]) -> tuple[NoteKind, ...]:
 
 
 def notes_with_kinds(sentences: Sequence[str], kinds: Sequence[NoteKind]) -> tuple[Note, ...]:
-    """Return what ``note_kinds`` was told; sentences of files without kinds are doubts."""
+    """Return the notes whose kinds ``note_kinds`` listed; sentences of files without kinds are doubts."""
     pairs = zip_longest(sentences, kinds[: len(sentences)], fillvalue=NoteKind.DOUBT)
     return tuple(Note(str(text), NoteKind(kind)) for text, kind in pairs)

@@ -29,7 +29,7 @@ DROPPED_GLTF_LISTS = ("animations", "cameras")
 
 @dataclass(frozen=True)
 class MergeMember:
-    """One object of the scene to be made: a file and where its content stands."""
+    """One object of the scene to be made: a file and the place of its content."""
 
     file: Path
     """.glb, or .gltf with its companions beside it."""

@@ -98,7 +98,7 @@ def _implied_nodes(document: GltfDocument) -> list[GltfEntry]:
 
 
 def _roots(document: GltfDocument, count: int) -> list[int]:
-    """Return the root nodes of the default scene; without scenes, all nodes nobody contains."""
+    """Return the root nodes of the default scene; without scenes, all nodes without a parent."""
     if not document.entries("nodes"):
         return list(range(count))
     scene = document.root.refer("scene", "scenes")

@@ -60,7 +60,7 @@ class LoadedModel:
     ours: bool
     """Our writer made the file: gravity, duration, velocities and pushes are stated in it."""
     metric: bool = True
-    """Whether the scene is in metres; else it is in the file's unit, which nobody states."""
+    """Whether the scene is in metres; else it is in the file's unit, which is unknown."""
     stated: bool = False
     """Whether the file itself says what its objects are."""
 

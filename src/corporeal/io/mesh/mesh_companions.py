@@ -28,7 +28,7 @@ def dae_companions(path: Path) -> list[Path]:
 
 
 def _named_after(keywords: str, path: Path) -> list[Path]:
-    """Return what stands after keywords at the beginnings of lines."""
+    """Return what follows keywords at the beginnings of lines."""
     pattern = rf"(?mi)^[ \t]*(?:{keywords})[ \t]+(?:-\w+[ \t]+\S+[ \t]+)*(.+?)[ \t\r]*$"
     return _files_beside(path, re.findall(pattern, _text(path)))
 

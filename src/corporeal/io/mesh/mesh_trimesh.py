@@ -34,7 +34,7 @@ from corporeal.io.mesh.raw_mesh import MAX_PIECES, MESH_EXPORT_ADVICE, NODE_NAME
 from corporeal.io.referenced_files import read_beside
 
 GENERIC_NODE_PATTERN = re.compile(r"(?i)(?:instance|group|component)(?:[_ #]?\d+)?")
-"""What programs call a node that places a component, when nobody named it (SketchUp)."""
+"""Default name of a node that places a component (SketchUp)."""
 
 PieceNames = tuple[tuple[str, ...], str]
 """Names from the file's root to a piece, and that of its material; "": it states none."""

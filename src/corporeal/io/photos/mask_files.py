@@ -41,7 +41,7 @@ class MaskRecord:
     incomplete: str = ""
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
     beside: str = ""
-    """What stands beside what they show, in sentences; empty: nothing is known of it."""
+    """Objects beside what they show, in sentences; empty: nothing is known of it."""
     contradict: bool = False
     """Whether they are rejected because their outlines contradict each other."""
 

@@ -1,7 +1,7 @@
 """Plan of a corpus: classes, arrangements and interactions of its scenes.
 
 Everything is balanced and drawn by deficit: classes, models of a class, object counts, interaction kinds and
-arrangements each come out even to within one, as far as their needs allow. Wind blows where it moves something. A plan
+arrangements each come out even to within one, as far as their needs allow. Wind acts where it moves something. A plan
 follows from the pool and the seed alone; it is written to ``corpus.json``.
 """
 
@@ -55,7 +55,7 @@ class CorpusConfig:
     repeat: bool = False
     """A class may come twice in a scene."""
     seed: int = 0
-    """Of everything that is drawn."""
+    """Random seed of the plan."""
 
     @property
     def words(self) -> str:
@@ -240,7 +240,7 @@ def _kinds_by_object_count(kinds: Sequence[InteractionKind]) -> list[list[Intera
 def with_wind(
     kinds: Sequence[InteractionKind], sets: Sequence[Sequence[str]], windy: WindTest
 ) -> tuple[list[InteractionKind], list[str]]:
-    """Let wind blow where it moves something.
+    """Apply wind where it moves something.
 
     A scene in which it would move nothing changes its interaction with another one, of as many objects where there is
     one; where none can, its objects fall instead.

@@ -2,7 +2,7 @@
 
 The ladder of what is known, each step in the same run: the scan's volume as water; everything
 solid and usual; how objects are built and filled, with usual values; values placed in their
-ranges; all ways they may be; and these reweighted by what was said of the mass outright. Beside it
+ranges; all ways they may be; and these reweighted by direct estimates of the mass. Beside it
 stand a constant, a fit on the size, and that number itself.
 
 Baselines of mass prediction without materials.
@@ -134,7 +134,7 @@ MASS_METHODS = {
     "mass": "all ways, with outside evidence",
     "direct": "asked directly",
 }
-"""From knowing least to knowing most; ``mass`` is the prediction, ``direct`` stands beside it."""
+"""From knowing least to knowing most; ``mass`` is the prediction, ``direct`` is for comparison."""
 
 
 @dataclass(frozen=True)

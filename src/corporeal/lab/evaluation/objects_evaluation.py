@@ -55,7 +55,7 @@ Progress = Callable[[float, str], None]
 TOUCHING_EXTENT_RATIO = 0.002
 """Objects touch that are nearer than this, as a share of the scene's extent."""
 MAX_SURFACE_POINTS = 60_000
-"""Points on the surface by which distances are measured, and Gaussians told whose they are."""
+"""Points on the surface by which distances are measured, and Gaussians assigned to objects."""
 APPROACH_STEPS = 100
 """Of bringing one object to another."""
 NORMAL_NEIGHBOURS = 16

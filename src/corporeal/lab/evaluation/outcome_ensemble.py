@@ -251,7 +251,7 @@ INK_COLOUR, MEMBER_COLOUR, CHOSEN_COLOUR = "#222222", "#9fb8c4", "#c8553d"
 
 
 def spread_rows(result: Ensemble) -> list[tuple[str, ...]]:
-    """Return one row per object and quantity that anything can be said of."""
+    """Return one row per object and quantity that has a value."""
     return [
         (name, SPREAD_QUANTITIES[quantity], *map(_number, (s.chosen, s.low, s.median, s.high)), str(s.count))
         for name, own in result.spread.items()

@@ -51,7 +51,7 @@ class MeasuredRebound:
     blind: bool = False
     """Whether it was written down before it was tried for the first time."""
     scene: str = ""
-    """What several rows measured alike, the same thing on the same; "": none."""
+    """Name of a measurement that several rows repeat, the same objects; "": none."""
 
     def off(self, restitution: float) -> float:
         """Return how far a restitution is from the range [-]; 0 in it."""
@@ -108,7 +108,7 @@ def contradictory_rebounds(rows: Sequence[MeasuredRebound], leeway: float) -> It
     """Yield the rows of each scene that no value can meet, each within a leeway [-].
 
     Raises:
-        BadFileError: Rows of one scene are not the same thing on the same.
+        BadFileError: Rows of one scene are not of the same objects.
 
     """
     for scene in dict.fromkeys(row.scene for row in rows if row.scene):

@@ -55,7 +55,7 @@ class EngineCheckpoint:
     def place_as(self, saved: SavedArrays, fields: Collection[int], bodies: Collection[int]) -> None:
         """Take over some fields and rigid bodies, and how fast waves were there."""
         self._restore_bodies(saved, fields, self.rigid.keys() & set(bodies))
-        self.contact.kept = np.zeros(0, np.uint8)  # who is here stands elsewhere there
+        self.contact.kept = np.zeros(0, np.uint8)  # the order of particles differs there
         wave = float(saved["clock"][1 + CLOCK_FIELDS.index("wave")])
         self.clock["wave"] = max(float(self.clock["wave"][0]), wave)
 

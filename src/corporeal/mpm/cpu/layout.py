@@ -132,7 +132,7 @@ POST_RECORD = NativeRecord(  # one thread's, on a cache line of its own
 THREAD_POOL_RECORD = NativeRecord(
     "ThreadPool",
     ("void *", "yield_core read_clock"),  # the system's sched_yield and clock_gettime, or null
-    ("int *", "phase"),  # [phases][4]: piece, first task, how many, or where in World that stands
+    ("int *", "phase"),  # [phases][4]: piece, first task, how many, or the field of World that holds it
     ("double *", "spent"),  # [phases + 1], or null
     ("int", "phases threads now piece first count started clock_id"),
     ("int", "epoch stopped"),  # a line of their own
@@ -361,13 +361,13 @@ CONTACT_STAGE_RECORD = NativeRecord(
     ("Entry *", "entry stand"),
     ("Line *", "line"),
     ("Past *", "past"),
-    ("int *", "slot"),  # where each past contact stands, by its key; slots: a power of two
+    ("int *", "slot"),  # place of each past contact, by its key; slots: a power of two
     ("double *", "pair"),  # [fields and planes][fields and planes][PAIR]
     ("double *", "light"),  # inverse masses of fields and planes, as in ``Backing``
     ("int *", "order"),
     ("Lean *", "lean"),
     ("Choice *", "choice kept"),  # of this step, and of the last one
-    ("int *", "kept_slot"),  # where each of those stands, by block and pair
+    ("int *", "kept_slot"),  # place of each of those, by block and pair
     ("int", "most_junctions most_meets most_sides most_touches"),
     ("int", "slots pasts sweeps"),
     ("int", "junctions meets sides touches points"),

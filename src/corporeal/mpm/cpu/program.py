@@ -1,10 +1,10 @@
 """Native code of the engine, compiled by Warp.
 
 Warp compiles C++ for the machine it runs on and keeps it in a cache; the pieces use vector extensions, so they build on
-any processor. What they share with Python stands in ``layout``.
+any processor. What they share with Python is in ``layout``.
 
 A step is a list of phases, ``SCHEDULE``; a phase is a number of tasks of one piece, which any thread may take in any
-order. A new one needs four things: ``loops/NAME.cpp``, which does task ``index`` and returns; a stub ``NAME_native``; a
+order. A new one needs four parts: ``loops/NAME.cpp``, which does task ``index`` and returns; a stub ``NAME_native``; a
 number and a branch in ``run_tasks``; a ``Phase``. How many tasks it has may be known only at run time: then it is an
 int in ``WORLD_RECORD``, which an earlier phase wrote. Tasks of one phase must not write to the same place, or what is
 written must not depend on their order. A piece ends the steps through ``World.full`` (a list was too short: Python
@@ -61,7 +61,7 @@ class Phase(NamedTuple):
 
     piece: int
     count: str | int = 1
-    """How many tasks; or where in ``WORLD_RECORD`` that stands when the phase begins; 0 skips it."""
+    """How many tasks; or the field of ``WORLD_RECORD`` that holds it when the phase begins; 0 skips it."""
     which: int = 0
     """Place in it, where it is an array."""
     resume: bool = False

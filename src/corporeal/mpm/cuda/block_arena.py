@@ -48,7 +48,7 @@ def node_of(near: wp.array(dtype=wp.int32), home: int, cell: wp.vec3i, i: int, j
 
 @wp.func_native("return mpm::Arena::sum(node, kind);")
 def sum_at(node: int, kind: int) -> int:
-    """Where a node's sum of one kind stands."""
+    """Index of a node's sum of one kind."""
     ...
 
 

@@ -47,7 +47,7 @@ def start_of(key: wp.int64, mask: int):
 
 @wp.func
 def block_of(cell: wp.vec3i):
-    """Return the block that a node stands in."""
+    """Return the block of a node."""
     return wp.vec3i(cell[0] >> 2, cell[1] >> 2, cell[2] >> 2)
 
 

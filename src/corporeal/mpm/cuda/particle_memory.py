@@ -36,7 +36,7 @@ PARTICLE_STATE: dict[str, tuple[tuple[int, ...], Any]] = {
     "field": ((), wp.int32),
     "number": ((), wp.int32),
 }
-"""What is kept of each particle: shape of a row, and type; behind it stands their block."""
+"""What is kept of each particle: shape of a row, and type; their block follows."""
 CHANNELS_SORTED_AT_ONCE = 16
 """Channels that are moved together when particles are sorted: so many are there twice."""
 PARTICLE_CHANNELS = 1 + sum(int(np.prod(shape)) for shape, _ in PARTICLE_STATE.values())

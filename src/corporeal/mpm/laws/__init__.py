@@ -1,7 +1,7 @@
 """Constitutive laws, one per file, and their dispatch.
 
-A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``. The functions below
-answer for particles of different laws at once.
+A law is defined in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``. The functions
+below answer for particles of different laws at once.
 """
 
 from importlib import import_module

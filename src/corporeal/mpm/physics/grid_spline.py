@@ -1,6 +1,6 @@
 """Quadratic B-splines between particles and the nodes of a sparse grid of fields.
 
-Node i stands at i·dx. A *slot* is one field's value at one node; only slots that a particle
+Node i is at i·dx. A *slot* is one field's value at one node; only slots that a particle
 reaches exist, sorted by field, then by node.
 """
 
@@ -31,7 +31,7 @@ class Stencil:
     field: Int[np.ndarray, " A"]
     """Which field each slot belongs to."""
     index: Int[np.ndarray, "A 3"]
-    """Which node each slot stands at."""
+    """Node of each slot."""
     key: Int[np.ndarray, " A"]
     """The node as one number."""
 

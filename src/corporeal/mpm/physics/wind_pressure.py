@@ -1,6 +1,6 @@
 """Wind pressure on the surface of a body.
 
-Air presses on the faces that it blows against, along their normals. With u the velocity of the
+Air presses on the faces turned towards it, along their normals. With u the velocity of the
 air seen from the face and θ the angle between u and the face's inward normal,
 
     p = ½ ρ_air C |u|² cos³θ   where cos θ > 0, nothing in the lee.
@@ -52,7 +52,7 @@ def wind_impulses(
     Args:
         area: Outward area vectors now [m²].
         seen: Velocity of the air relative to each face [m/s].
-        mass: What each face moves [kg]: a face is never blown faster than the air.
+        mass: What each face moves [kg]: a face never becomes faster than the air.
         dt: [s]
 
     """

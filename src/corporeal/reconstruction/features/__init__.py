@@ -15,7 +15,7 @@ ENCODER_REGISTRY = {
     "clip": "corporeal.reconstruction.features.clip:Clip",
     "dinov2": "corporeal.reconstruction.features.dinov2:Dinov2",
 }
-"""Models that look at pictures: name before the colon → class that takes what stands after it."""
+"""Models that look at pictures: name before the colon → class that takes what follows it."""
 NO_ENCODER = "descriptor"
 """No model: colour and shape decide, see ``features.descriptor``."""
 ENCODER_PACKAGES = ("torch", "transformers")

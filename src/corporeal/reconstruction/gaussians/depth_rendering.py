@@ -64,7 +64,7 @@ def restrict_depth_to_objects(
     Args:
         rendering: Of N Gaussians.
         of_object: Which of them are objects'; the others hide these.
-        masks: Pixels that show objects; None: nobody says it.
+        masks: Pixels that show objects; None: unknown.
 
     """
     met = np.where(of_object[rendering.met], rendering.met, -1)

@@ -164,8 +164,8 @@ def assign_hidden_gaussians(gaussians: Gaussians, owner: Int[np.ndarray, " N"], 
 def gaussians_below_floor(gaussians: Gaussians, owner: Int[np.ndarray, " N"], longest: float) -> Bool[np.ndarray, " N"]:
     """Return which Gaussians of objects are below the floor.
 
-    Where nobody looks from below, the visual hull goes on under it, as a cone that nothing denies. The floor ends the
-    surface there; in a video of an object that is lifted the cone would show.
+    Where no camera looks from below, the visual hull goes on under it, as a cone that nothing denies. The floor ends
+    the surface there; in a video of an object that is lifted the cone would show.
 
     Args:
         gaussians: In the world's frame: +z up, the floor at z = 0.

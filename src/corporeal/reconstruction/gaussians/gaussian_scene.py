@@ -56,7 +56,7 @@ INVERTED_MASKS_MESSAGE = (
     "the pictures: they are inverted, or of the background. White is what counts: invert them."
 )
 MIN_CONTAMINATION_FRACTION = 0.01
-"""Share of masks that nobody gave from which on it is worth learning again without: of pieces that are not thin."""
+"""Share of grown masks from which on training again without it is worth while: of pieces that are not thin."""
 RETRAINING_CHECKPOINT = "training-again"
 """Name of the file in which that is kept."""
 FIRST_TRAINING_PROGRESS = 0.8
@@ -133,7 +133,7 @@ def render_on_black(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "
 
 @dataclass(frozen=True)
 class MaskSource:
-    """By what it is said which pixels of photographs are on objects."""
+    """Source of the masks of objects in photographs."""
 
     by: Path | None = None
     """A folder of masks; None: the photographs' own, if there are any."""
@@ -245,7 +245,7 @@ class _TrainingInput:
     def of_grown(
         self, masks: Bool[np.ndarray, "V H W"]
     ) -> tuple[TrainedGaussians, Bool[np.ndarray, "V H W"], tuple[str, ...]]:
-        """Learn from masks that nobody made, without what no other photograph shows in them.
+        """Train from grown masks, without what no other photograph shows in them.
 
         Returns:
             What was learned, from which masks, and what was left out of these, in a sentence.

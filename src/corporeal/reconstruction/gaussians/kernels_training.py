@@ -152,7 +152,7 @@ def count_mask_votes(points, first, last, cameras, pictures, masks, patience, ou
 
     cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; pictures (V, H, W, 3); masks
     (V, H, W), true on objects; patience: after more views that see it beside objects
-    nobody else is asked. out (N, 5): views that see it, views that see it beside objects, sums of
+    no other view is read. out (N, 5): views that see it, views that see it beside objects, sums of
     red, green and blue [0–1].
     """
     views, height, width, _ = pictures.shape

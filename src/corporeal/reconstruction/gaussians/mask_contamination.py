@@ -1,6 +1,6 @@
 """Detection of background in masks by inconsistency with other photographs.
 
-Masks that are grown from colours take in pieces of what stands behind an object, where these have
+Masks that are grown from colours take in pieces of the background of an object, where these have
 its colours. If every view that could see past such a place has a piece of something there, the
 hull of all masks holds it, though each view shows something else in it. Gaussians learned from
 all photographs know: what is at one place has about one colour, so that they mostly show nothing

@@ -75,7 +75,7 @@ class RadianceFieldConfig:
     held_out: int = 8
     """Every so-many-th view is not learned from but compared with; 0: none is."""
     seed: int = 0
-    """Of everything that is left to chance."""
+    """Random seed of the training."""
     threads: int | None = None
     """None: one per processor. Changes no result."""
     rays_per_step: int | None = None

@@ -52,7 +52,7 @@ def masks_above_floor(
 ) -> Bool[np.ndarray, "V H W"]:
     """Return which pixels of the cameras' pictures are on objects.
 
-    What is less than a thin layer above the floor cannot be told from it. There objects are
+    What is less than a thin layer above the floor cannot be distinguished from it. There objects are
     taken to go down to it as they begin above that layer: mirrored at its top.
 
     Args:

@@ -56,7 +56,7 @@ LEARNING_RATES = {
 FINAL_RATE_FRACTIONS = {PARAM_MEAN: 0.02, PARAM_SCALE: 0.15, PARAM_COLOUR: 0.15}
 """What is left of them at the end."""
 OPACITY_SCALE_PENALTY = 0.01
-"""On opacities and scales, so that what nobody needs fades (Kheradmand et al. 2024)."""
+"""On opacities and scales, so that unneeded ones fade (Kheradmand et al. 2024)."""
 DEAD_OPACITY_LOGIT = -7.0
 """Logit of the opacity that haze is left with: it is dead."""
 STIR_SIGMAS_PER_RATE = 1e3

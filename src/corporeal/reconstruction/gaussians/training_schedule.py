@@ -83,7 +83,7 @@ class TrainConfig:
     held_out: int = 8
     """Every so-many-th view is not learned from but compared with; 0: none is."""
     seed: int = 0
-    """Of everything that is left to chance."""
+    """Random seed of the training."""
     threads: int | None = None
     """None: one per processor. Changes no result."""
     rasteriser: Literal["numba", "gsplat"] = "numba"

@@ -183,7 +183,7 @@ def mask_votes_at_points(
 ) -> Float[np.ndarray, "N 5"]:
     """Return what views say of points, as ``kernels_learn.witness`` has it.
 
-    patience: after more views that see a point beside objects nobody else is asked; None: as many as ASTRAY forgives.
+    patience: after more views that see a point beside objects no other view is read; None: as many as ASTRAY forgives.
     """
     out = np.empty((len(points), 5))
     patience = ASTRAY_VIEWS_FRACTION * len(views.cameras) if patience is None else float(patience)

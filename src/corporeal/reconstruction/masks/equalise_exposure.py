@@ -1,7 +1,7 @@
 """Equalisation of exposure and white balance.
 
 A phone chooses both anew for every picture, so that a brown floor has as many browns as there
-are pictures, and what is told by colours borders on all of them. What the floor's places look like
+are pictures, and what colours distinguish borders on all of them. What the floor's places look like
 in each picture says by how much they differ.
 """
 
@@ -23,7 +23,7 @@ from corporeal.reconstruction.masks.reduce_views import reduce_views
 
 
 def equalise_exposure(views: Views, floor: GroundPlane | None, around: ViewedRegion, longest: int) -> Views:
-    """Return the pictures, each channel of each times one number; as they are: nobody knows these.
+    """Return the pictures, each channel of each times one number; as they are: these are unknown.
 
     Args:
         views: The pictures.

@@ -4,7 +4,7 @@ A shadow lies beside the object in every picture, has colours that the rest of t
 part of the object where colours alone decide. But a shadow only takes light away: it leaves the ratios of the channels
 as they are on the lit floor (Finlayson, Hordley, Lu and Drew 2006 build on the same). And it lies on one plane: taken
 to it by its homography, views from different sides see one colour there, which they do not of what stands above it. A
-floor that is grey has the ratios of everything grey and of every shade of it, and nothing is said.
+floor that is grey has the ratios of everything grey and of every shade of it, and gives no information.
 """
 
 import numpy as np

@@ -66,7 +66,7 @@ class StandingRegions:
 def find_standing_regions(
     views: Views, masks: Bool[np.ndarray, "V H W"], floor: GroundPlane | None, around: ViewedRegion
 ) -> StandingRegions | None:
-    """Find what stands on the floor; None: nobody knows where that is, or views are too few.
+    """Find what stands on the floor; None: its place is unknown, or views are too few.
 
     Args:
         views: The pictures.

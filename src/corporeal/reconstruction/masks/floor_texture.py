@@ -89,7 +89,7 @@ def _fit_light(
 
 
 FIT_UNKNOWN, FIT_AGREES, FIT_PARTLY, FIT_CONTRADICTS = range(4)
-"""Levels: nobody knows what the floor has there, it is that, or nearly or darker, or it is not."""
+"""Levels: what the floor has there is unknown, it is that, or nearly or darker, or it is not."""
 FLOOR_EXTENT_RADII = 1.6
 """How much of the floor is looked at, in radii of the ball that all cameras look at: before what lies beyond the ball,
 the upper half of an object is seen.

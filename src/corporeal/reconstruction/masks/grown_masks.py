@@ -69,9 +69,9 @@ class GrownMasks:
     doubted: Path | None = None
     """Holds masks that are unreliable, if there are any."""
     incomplete: str = ""
-    """Why nobody can tell all of what the photographs are of, in a clause; empty: masks do."""
+    """Why masks do not show all of the photographed object, in a clause; empty: they do."""
     beside: str = ""
-    """What stands on the floor beside what they show, in sentences; empty: nothing is known of it, or somebody
+    """What stands on the floor beside what they show, in sentences; empty: nothing is known of it, or a person
     corrected them."""
     contradict: bool = False
     """Whether they are unreliable because their outlines contradict each other."""
@@ -136,7 +136,7 @@ def grown_masks(
 
 
 def _load_kept_masks(folder: Path, made_by: str) -> GrownMasks | None:
-    """Return masks that lie there and were made so, with what somebody corrected; None: others."""
+    """Return masks that lie there and were made so, with what was corrected; None: others."""
     record = read_mask_record(folder)
     if record is None or record.made_by != made_by:
         return None

@@ -22,7 +22,7 @@ MASK_THRESHOLD = 0.5
 def close_mask_holes(
     inside: Float32[np.ndarray, "V h w"], cameras: tuple[Camera, ...], room: VoxelVolume
 ) -> Float32[np.ndarray, "V h w"]:
-    """Return masks without the holes that nobody can see through.
+    """Return masks without the holes that no view sees through.
 
     Args:
         inside: How far each pixel is inside, 0 to 1, at any size.

@@ -107,7 +107,7 @@ def seeds_from_prompt(views: Views, points: Float[np.ndarray, "N 3"] | None, spo
         spot: What is pointed at.
 
     Raises:
-        UserError: Nothing there can be told from what is around it.
+        UserError: Nothing there can be distinguished from its surroundings.
 
     """
     k, width = spot.view, views.rgb.shape[2]

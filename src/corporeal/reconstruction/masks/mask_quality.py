@@ -69,7 +69,7 @@ def _doubt_before_outlines(grown: RegionGrowingResult) -> str | None:
 
 
 def incompleteness_reason(grown: RegionGrowingResult | None) -> str | None:
-    """Return in a clause why nobody can tell all of what the photographs are of; None: masks do."""
+    """Return in a clause why masks do not show all of the photographed object; None: they do."""
     if grown is None or grown.left_over <= MAX_RESIDUAL_FRACTION:
         return None
     more = "with its colours is seen on the floor in the middle"

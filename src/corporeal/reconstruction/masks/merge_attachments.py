@@ -75,7 +75,7 @@ def _is_merge_better(wider: RegionGrowingResult, grown: RegionGrowingResult, mor
 
 
 def _seeds_from_masks(seeds: MaskSeeds, masks: Bool[np.ndarray, "V H W"], more: MaskAttachments) -> MaskSeeds:
-    """Begin at what is known to be inside, told from what is near it, and do not go far beyond.
+    """Begin at what is known to be inside, distinguished from what is near it, and do not go far beyond.
 
     What is farther off has its colours by chance: the grey of a head is a wall's, too.
     """

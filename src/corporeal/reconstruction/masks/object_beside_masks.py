@@ -39,7 +39,7 @@ def find_object_beside_masks(
     Args:
         stands: All that stands on the floor.
         masks: What was taken for objects.
-        near: The same and what borders on it, where nothing is said.
+        near: The same and what borders on it, which is left out.
 
     """
     piece, count = stands.room.pieces(stands.beside(near))

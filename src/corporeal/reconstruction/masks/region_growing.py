@@ -55,8 +55,8 @@ MAX_MASK_OVERHANG_WIDTHS = 0.06
 """How far beyond silhouettes masks are drawn, in the same widths: what the hull lacks may be a thin leg that some
 pictures lost, but no wall of the same colour that touches outlines."""
 COLOUR_BAND_WIDTHS = 0.2
-"""How far around silhouettes colours are learned that objects are told from, in the same widths: what pictures show
-farther away, such as a wall of their colour, does not border on them."""
+"""How far around silhouettes colours are learned that objects are distinguished from, in the same widths: what pictures
+show farther away, such as a wall of their colour, does not border on them."""
 MASK_THRESHOLD = 0.5
 """Of a pixel: from here on it is inside."""
 MIN_PIECE_FILL_RATIO = 0.02

@@ -44,7 +44,7 @@ def assign_instances(
         rule: auto: by instance masks where there are any, else by appearance and concavity.
         count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points.
-        masks: What each view takes each point for; -1: unknown. None: nobody drew any.
+        masks: What each view takes each point for; -1: unknown. None: there are none.
         space: What space tells; where that alone does, appearance and concavity segment nothing that touches, unless
             the rule asks for it or ``count`` is given. None: nothing.
 

@@ -141,7 +141,7 @@ class ObjectSegmentationConfig:
 
 DEFAULT_OBJECT_SEGMENTATION = ObjectSegmentationConfig()
 TOUCHING_IS_ONE_CONFIG = ObjectSegmentationConfig(apart=0.0)
-"""Only space, or a number that is told, makes several objects."""
+"""Only space, or a stated number, makes several objects."""
 
 
 @dataclass(frozen=True)
@@ -178,10 +178,10 @@ def segment_objects(
         cloud: Points with features; ``semantic`` decides, or ``structural`` where that is empty.
         count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points, which is less sure.
-        masks: What each view takes each point for, where somebody drew instance masks (see ``masks.lifted``); -1:
+        masks: What each view takes each point for, where there are instance masks (see ``masks.lifted``); -1:
             unknown.
         config: How objects are segmented.
-        piece_of_point: Which connected piece each is of, from 0, where somebody saw empty space between these; None:
+        piece_of_point: Which connected piece each is of, from 0, where a view saw empty space between these; None:
             all may be one.
 
     Raises:

@@ -21,7 +21,7 @@ from skimage.color import rgb2lab
 from corporeal.core.types import FeatureCloud, PartDescription
 
 UP_VECTOR = np.array([0.0, 0.0, 1.0])
-"""Where the top is of what stands."""
+"""Height of the top of what is upright."""
 COLOUR_SIGMA_LAB = 15.0
 """Standard deviation of what is seen of a named colour in full light [CIELAB]."""
 BLACK_LAB_OFFSET = np.array([16.0, 0.0, 0.0])

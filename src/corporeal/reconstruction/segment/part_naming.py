@@ -124,7 +124,7 @@ def _missing_part_warnings(part_of_point: np.ndarray, parsed: Sequence[PartDescr
 def _claim_clusters(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
     """Give each name the cluster that is most surely its own, and each other cluster its best name.
 
-    A name that something else beats everywhere is still somebody's: who described the object saw it.
+    A name that another one beats everywhere still belongs to a part: the description names it.
     """
     part = score.argmax(axis=1)
     own = optimal_assignment(log_softmax(score, axis=1).T)

@@ -2,7 +2,7 @@
 
 Two sides of an object that look alike, such as those of a block, are taken for one: the pictures of
 one side are put among those of the other, by points on the object alone, with a low reprojection
-error. But who stands in one place sees one floor. So where two pictures from nearly one direction
+error. But from one place one floor is seen. So where two pictures from nearly one direction
 share points in a part only of what both show, they are not from there: what is missing tells
 (Zach, Irschara and Bischof, "What can missing correspondences tell us about 3D structure and
 motion?", CVPR 2008).
@@ -10,7 +10,7 @@ motion?", CVPR 2008).
 Detection of mirrored photographs of front cameras.
 
 A printed sheet that is seen in a mirror is a sheet that is seen from below: both fit one model, with a low reprojection
-error, half of its cameras under the floor and what stands on it there twice. But nobody sees one point of a surface
+error, half of its cameras under the floor and what stands on it there twice. But no camera sees one point of a surface
 from both of its sides.
 """
 

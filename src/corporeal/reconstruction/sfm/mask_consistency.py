@@ -34,7 +34,7 @@ def remove_by_masks(told: SfmRun, folder: Path, place: Path) -> SfmRun:
 
     Args:
         told: What came of the attempt.
-        folder: Holds ``masks`` where somebody gave some; else nothing is done.
+        folder: Holds ``masks`` where some were given; else nothing is done.
         place: Holds the model, which is changed.
 
     """

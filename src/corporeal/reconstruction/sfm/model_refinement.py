@@ -68,7 +68,7 @@ def whitening_matrices(grey: Float[np.ndarray, "H W"], points: Float[np.ndarray,
 ROBUST_SCALE_PX = 0.5
 """Reprojection error [px] from which on a point counts for less (Cauchy's loss)."""
 MIN_PICTURES_PER_SIZE = 3
-"""Pictures of one size, either way up, below which somebody cut them to it: a camera writes few sizes, and has its lens
+"""Pictures of one size, either way up, below which they were cropped to it: a camera writes few sizes, and has its lens
 before the middle of each."""
 REFINEMENT_ROUNDS = 3
 """Of finding the middles of cropped pictures, and the lens that all were taken through."""
@@ -90,7 +90,7 @@ def refine_model(pycolmap: Any, model: Any, taken: Mapping[str, LensPrior], imag
     COLMAP's last adjustment is one of least squares, which points that are 4 px off pull with 64 times the weight of
     those that are half a pixel off.
 
-    Where the lens was in pictures that somebody cropped nobody knows: taken for their middles, it turns and moves
+    The principal points of cropped pictures are unknown: taken for their middles, it turns and moves
     cameras, and gives each another lens. One lens before middles of their own takes as many numbers, and is accepted
     where it fits better.
 

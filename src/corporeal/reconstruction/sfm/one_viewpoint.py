@@ -21,7 +21,7 @@ MIN_EXPLAINED_PAIRS_FRACTION = 0.8
 bursts on a way around an object few pairs are of one burst.
 """
 MIN_PAIRS = 10
-"""Pairs without which nothing is said."""
+"""Pairs without which there is no result."""
 MIN_PICTURES_FRACTION = 0.5
 """Of all pictures that must be of that place."""
 REFIT_ROUNDS = 3

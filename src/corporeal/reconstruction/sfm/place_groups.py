@@ -2,8 +2,8 @@
 
 A folder of which a part shows something else would cost many minutes before COLMAP says that the pictures fall apart.
 Small pictures share enough points with their neighbours to see two separate circles of pictures, each well joined
-within; where they share few, nothing is said. Real sets of 48, 49 and 97 photographs are one group each, with 5 to 27
-partners in the median; 16 of a banana, far apart, fall into groups of 7, 4 and 3 whose median is 2.
+within; where they share few, there is no result. Real sets of 48, 49 and 97 photographs are one group each, with 5 to
+27 partners in the median; 16 of a banana, far apart, fall into groups of 7, 4 and 3 whose median is 2.
 """
 
 import shutil
@@ -188,7 +188,7 @@ class SmallCopyMatches:
     stamps: Mapping[PictureSize, Bool[np.ndarray, "R C"]] = field(default_factory=dict)
     """Cells of pictures of a size about what stands at the same place of all of them."""
     said: str = ""
-    """What is to be said of that, and that nothing was looked for there; empty: nothing stands."""
+    """A message about that, and that no points were looked for there; empty: there is no such place."""
 
     @property
     def stood_still(self) -> str | None:

@@ -51,7 +51,7 @@ ALPHA_THRESHOLD_U8 = 127
 """Alpha above which it is rather seen than not."""
 MAX_ASPECT_RATIO = 2.4
 """Longer side over the shorter, above which a picture is no camera's: videos have 21 : 9. For one of 1600 × 120 a lens
-was found that nobody has, and 24 good photographs were refused with it.
+was found that does not exist, and 24 good photographs were refused with it.
 """
 JPEG_QUALITY = 95
 """Of JPEG copies."""
@@ -133,7 +133,7 @@ def prepare_images(source: Path, folder: Path, progress: Progress) -> PreparedIm
 def spread_selection(found: Sequence[Path], step: int) -> list[Path]:
     """Return one of each so many that follow one another, at no fixed place among them.
 
-    Two cameras, or two things by turns, would lie at equal steps, and one of them at all places.
+    Two cameras, or two objects by turns, would lie at equal steps, and one of them at all places.
     """
     firsts = range(0, len(found), step)
     offsets = (int(step * (k * GOLDEN_RATIO_FRACTION % 1)) for k in range(len(firsts)))
@@ -272,7 +272,7 @@ def _read_upright(file: Path, strip: bool = False) -> tuple[Image.Image, Image.I
 def _lens_exif(exif: Image.Exif) -> bytes:
     """Return what EXIF says of camera and lens, as EXIF; b"" where it says nothing.
 
-    The rest is left out: it may be longer than a JPEG can hold, broken, or say where somebody lives.
+    The rest is left out: it may be longer than a JPEG can hold, broken, or say where a person lives.
     """
     kept = Image.Exif()
     own, of_lens = exif.get_ifd(EXIF_IFD_TAG), kept.get_ifd(EXIF_IFD_TAG)
@@ -324,7 +324,7 @@ def _write_mask(mask: Image.Image, path: Path) -> None:
 def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> list[str]:
     """Write masks of photographs that were cut out, if most were; say so where few are.
 
-    Of an alpha that hides all, or nothing, nobody can tell what is meant.
+    Of an alpha that hides all, or nothing, the meaning is unknown.
 
     Args:
         alphas: By the names of the photographs.

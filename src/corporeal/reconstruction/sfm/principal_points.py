@@ -23,7 +23,7 @@ MAX_ERROR_RATIO = 0.9
 that were not; .73 in one of a phone, whose lens moves by 1.3 %.
 """
 SLIGHT_SPREAD_FRACTION = 0.02
-"""Spread of the middles, in the longer side, from which on it is said: it turns a view by 1.3°."""
+"""Spread of the middles, in the longer side, from which on it is reported: it turns a view by 1.3°."""
 CROPPED_SPREAD_FRACTION = 0.05
 """The same, from which on poses are rejected: 3.3°."""
 UNCROPPED_HINT = "Use the original photographs; crop none, or all in the same way."

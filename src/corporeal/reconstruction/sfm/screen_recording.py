@@ -25,7 +25,7 @@ BLOCK_SIDE_PX = 16
 MIN_BLOCK_CONTRAST_U8 = 6.0
 """Standard deviation of a block's greys, of 255, below which it says nothing."""
 MIN_BLOCKS = 12
-"""Blocks without which nothing is said of two pictures."""
+"""Blocks without which two pictures are not compared."""
 MIN_BLOCK_CORRELATION, MIN_SHIFTED_BLOCKS_FRACTION = 0.85, 0.6
 """Correlation of a block with where it was pushed from, and share of the blocks that have it: a page has a header that
 stays."""

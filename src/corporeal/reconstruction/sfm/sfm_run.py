@@ -6,7 +6,7 @@ no vocabulary tree (loop detection).
 
 Choice of picture pairs for matching.
 
-All pairs grow with the square of the pictures. Small copies have told which two share points (``groups.py``): of many
+All pairs grow with the square of the pictures. Small copies have shown which two share points (``groups.py``): of many
 partners a picture needs the best, whose points join it with the others.
 """
 
@@ -41,7 +41,7 @@ NAME_DISTANCES = (*range(1, 11), 16, 32, 64)
 MAX_PARTNERS = 16
 """Of pictures that share points with it when small, so many are matched, which share most."""
 FEW_PARTNERS = 4
-"""Partners when small below which a picture is matched as if small copies said nothing: pairs of a banana that share
+"""Partners when small below which a picture is matched as if small copies gave no result: pairs of a banana that share
 nothing when small carry its model."""
 ALWAYS_MATCHED_DISTANCE = 3
 """Distance by name up to which pictures are matched whatever small copies say."""
@@ -88,7 +88,7 @@ STRATEGY_PREFIXES: dict[SfmStrategy, str] = {
 MAX_FEATURES_PER_IMAGE = 4096
 """Points of a picture that are matched, the largest ones. Twice as many take four times as long."""
 PICTURES_PER_BATCH, PAIRS_PER_BATCH = 4, 100
-"""Pictures and pairs that are worked on before progress is told."""
+"""Pictures and pairs that are worked on before progress is reported."""
 MIN_REGISTERED_FRACTION = 0.7
 """Of the pictures that must be registered."""
 MAX_GROUP_ROTATION_DEG = 5.0
@@ -123,7 +123,7 @@ class SfmRun:
     """Registered pictures beside others that they share too little with, as another side that looks alike does. They
     were taken out of the model, as were the next."""
     parted: tuple[int, ...] = ()
-    """The same of so many pictures that nobody can say who is right: sizes of their groups."""
+    """The same of so many pictures that it is unknown which are right: sizes of their groups."""
     astray: tuple[str, ...] = ()
     """Registered pictures in which masks say that the object is elsewhere."""
     filled: float = 1.0
@@ -221,7 +221,7 @@ def pairs_to_match(gathered: PreparedImages, way: SfmStrategy) -> PicturePairs:
 class _SfmSteps:
     """The steps of one attempt; each takes whom to tell the share that is done, and a token.
 
-    Nobody else opens the database meanwhile: a second library of SQLite in one process breaks the locks of the first
+    Nothing else opens the database meanwhile: a second library of SQLite in one process breaks the locks of the first
     (sqlite.org/howtocorrupt.html, 2.2.1).
     """
 

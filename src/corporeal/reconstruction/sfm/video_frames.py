@@ -30,7 +30,7 @@ MIN_PIXEL_CONTRAST_U8 = 12.0
 STATIC_RANGE_U8 = 10
 """Range of a pixel's greys over the video, of 255, that compression makes of what stands still."""
 MIN_CONTRAST_PIXELS = 50
-"""Pixels of contrast without which nothing is said."""
+"""Pixels of contrast without which there is no result."""
 
 
 class StaticPixels:
@@ -103,7 +103,7 @@ class VideoInfo:
 
 
 def write_video_frames(path: Path, folder: Path, progress: Progress, max_seconds: float = MAX_VIDEO_S) -> list[str]:
-    """Write the chosen frames of a video as PNG; return what is to be said of them.
+    """Write the chosen frames of a video as PNG; return messages about them.
 
     Args:
         path: The video.

@@ -2,7 +2,7 @@
 
 Its points are the same in every two of them, also in two that show nothing else in common. From them all pictures would
 be of one place, taken from one viewpoint. What a camera that stands shows is at the same place, too, but all over the
-pictures; and where somebody walks around an object, no place of the picture holds still from all sides.
+pictures; and where the camera moves around an object, no place of the picture holds still from all sides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ MIN_STILL_PAIRS_FRACTION = 0.5
 """Share of all pairs of pictures in which a cell holds points that did not move: of these, most
 are from different sides."""
 MIN_PICTURES_OF_SIZE = 6
-"""Pictures of one size, without which nothing is said."""
+"""Pictures of one size, without which there is no result."""
 MAX_STILL_CELLS_FRACTION = 0.25
 """Share of the cells that hold points, from which on the camera stood still."""
 PictureSize = tuple[int, int]
@@ -74,7 +74,7 @@ def write_watermark_masks(
     sizes: Sequence[PictureSize],
     folder: Path,
 ) -> str:
-    """Write where no points are to be looked for, as COLMAP reads it; return what is to be said.
+    """Write where no points are to be looked for, as COLMAP reads it; return messages about it.
 
     Args:
         found: Cells that are stamped.

@@ -2,7 +2,7 @@
 
 Gaussians are learned to look right from where photographs were taken. From the side of a video they are thin where only
 those behind them, or those below the floor, which are taken away, made them full: a foot is ragged, and an underside
-that nobody photographed is a hole into a hollow shell. The closed surface is whole, with the colours that photographs
+that no photograph shows is a hole into a hollow shell. The closed surface is whole, with the colours that photographs
 show. A layer of opaque discs along it, below what was learned, leaves full pixels as they are.
 """
 

@@ -26,7 +26,7 @@ TOP_BISECTION_STEPS = 6
 MIN_KNOWN_BELIEF = 0.5
 """Confidence from which on photographs know a vertex, and mean confidence from which on the top."""
 MIN_SAID_HEIGHT_FRACTION = 0.1
-"""Share of the height from which on it is said: mass changes by as much."""
+"""Share of the height from which on it is reported: mass changes by as much."""
 PIXEL_NEIGHBOURHOOD = np.ones((1, 3, 3), bool)
 """Outlines are known to a pixel."""
 

@@ -48,8 +48,8 @@ def boxes_rejection_reason(
 
     Args:
         boxes: Low and high corner of each object, in the cameras' frame and unit.
-        cameras: That took the photographs; (): nobody knows, and nothing is said.
-        masked: Whether somebody said which pixels are objects.
+        cameras: That took the photographs; (): unknown, and no result.
+        masked: Whether masks were given or made by a model.
         quality: How well pictures agree with photographs held back; None: none was.
 
     """
@@ -78,14 +78,14 @@ def boxes_rejection_reason(
 
 
 def pieces_rejection_reason(pieces: int, cameras: Sequence[Camera]) -> str | None:
-    """Return in a sentence or two why surfaces that nobody masked are unreliable; None.
+    """Return in a sentence or two why surfaces without given masks are unreliable; None.
 
-    One object is in one piece. Where half of the circle around it was not seen, nothing but colours told it from what
-    stands behind it.
+    One object is in one piece. Where half of the circle around it was not seen, nothing but colours distinguished it
+    from what stands behind it.
 
     Args:
-        pieces: That all came out in where nobody said of how many objects, else the most of one.
-        cameras: That took the photographs; (): nobody knows, and nothing is said.
+        pieces: Of all objects where their number was not stated, else the most of one.
+        cameras: That took the photographs; (): unknown, and no result.
 
     """
     if pieces < 2 or not cameras or (unseen := widest_unseen_angle(cameras)) < UNSEEN_HALF_GAP_DEG:
@@ -102,7 +102,7 @@ def cropping_rejection_reason(masks: Bool[np.ndarray, "V H W"]) -> str | None:
     """Return in a sentence or two why what was cut out is no object; None: it may be.
 
     Args:
-        masks: Which pixels show what was taken for objects, as nobody said.
+        masks: Pixels that were taken for objects, as no masks were given.
 
     """
     count = int(find_cropped_masks(masks).sum())
@@ -140,8 +140,8 @@ def overlap_rejection_reason(
     Args:
         meshes: Closed, of all objects, in the cameras' frame and unit.
         cameras: That took the photographs.
-        masks: Which pixels show objects, as somebody said or was found.
-        given: Whether somebody, or a model that knows objects, said it.
+        masks: Pixels of objects, given or found.
+        given: Whether a person or a model of objects gave them.
 
     """
     shown = [k for k in range(len(cameras)) if masks[k].any()]

@@ -26,7 +26,7 @@ BOOTSTRAP_DRAWS = 2000
 
 @dataclass(frozen=True)
 class VideoVerdict:
-    """What is said of one video: means over looks."""
+    """Answers about one video: means over looks."""
 
     scene: str
     condition: str
@@ -93,7 +93,7 @@ def measure_detectability(
     """Compare every control with the reference by every question and by the whole mark.
 
     Args:
-        videos: Of controls only those that differ from the reference enough to be told.
+        videos: Of controls only those that differ from the reference enough to be distinguished.
         reference: Name of the reference among the conditions.
         controls: Control → its name among the conditions.
 

@@ -28,7 +28,7 @@ def write_judge_page(
     """Write the page; ``PICTURES_PER_VIDEO`` pictures of every video's first look are rendered for it.
 
     Args:
-        judged: What was said of which videos.
+        judged: Answers about each video.
         result: What follows.
         path: Of the page.
         progress: Called with the fraction done and which video is rendered.

@@ -21,7 +21,7 @@ MAX_PARALLEL_QUESTIONS = 4
 
 @dataclass(frozen=True)
 class JudgeVerdicts:
-    """What a judge said."""
+    """Answers of a judge."""
 
     videos: JudgedVideos
     verdicts: list[VideoVerdict]

@@ -16,7 +16,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class JudgedRuns:
-    """What a judge said, and what follows."""
+    """Answers of a judge, and what follows."""
 
     judged: JudgeVerdicts
     result: JudgeResult

@@ -85,7 +85,7 @@ class SceneGroups:
 
 @dataclass(frozen=True)
 class ControlEffect:
-    """How far a control is from its reference, and whether that is enough to be told."""
+    """How far a control is from its reference, and whether that is enough to be distinguished."""
 
     scene: str
     control: str

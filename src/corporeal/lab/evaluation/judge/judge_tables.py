@@ -1,4 +1,4 @@
-"""What a judge said, as tables and as data: first what it cannot tell."""
+"""Answers of a judge as tables and as data: first what it cannot distinguish."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

@@ -1,4 +1,4 @@
-"""What a judge is told of a scene: what is there and how it starts, never what happens."""
+"""Facts of a scene in the question to a judge: its objects and their initial state, never what happens."""
 
 import numpy as np
 
@@ -64,7 +64,7 @@ def _moving(velocity: Vector) -> str:
 
 
 def _acts(scene: Scene, k: int) -> str:
-    """Describe what pushes an object, blows on it or leads it."""
+    """Describe the push, the wind and the prescribed motion of an object."""
     thing, said = scene.objects[k], []
     if isinstance(thing.push, Push):
         said.append(

@@ -86,7 +86,7 @@ def simulate_control(
 def exchange_materials(scene: Scene, parts: Parts, field: MaterialField) -> dict[str, dict]:
     """Give the stiffest part the softest part's material, and so on; annotations of all parts.
 
-    Parts of liquids and grains keep theirs. Nothing is said where all others are alike.
+    Parts of liquids and grains keep theirs. Nothing is returned where all others are alike.
     """
     solid = [k for k, m in enumerate(field.materials) if not CONSTITUTIVE_LAWS[m.law].loose]
     order = sorted(solid, key=lambda k: (field.materials[k].young_pa, k))

@@ -75,7 +75,7 @@ def _answers() -> type[VideoAnswers]:
 
 
 class Verdict(AnswerSchema):
-    """What is said of one video after one look."""
+    """Answers about one video after one look."""
 
     SCHEMA: ClassVar[str] = "verdict/1"
     happens: str = Field(min_length=1, max_length=MAX_DESCRIPTION_CHARACTERS)

@@ -52,7 +52,7 @@ def video_question(video: VideoMotion, staging: Staging, told: str, look: int) -
     Args:
         video: What is shown.
         staging: When and from where.
-        told: What the judge is told of the scene: ``told_facts.facts``.
+        told: Facts of the scene: ``prompt_context.scene_facts``.
         look: From which side; also decides the order of the questions.
 
     """
