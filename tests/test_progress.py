@@ -35,7 +35,7 @@ def test_a_part_is_told_as_of_the_whole():
 def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, said):
     verb = StageProgress("video", 0.0)
     for fraction, when in told:
-        verb.told(fraction, "drawing", when)
+        verb.report(fraction, "drawing", when)
     assert verb.line(now) == said
 
 

@@ -322,8 +322,8 @@ class Audit:
 
     def noting(self, notes: Iterable[str]) -> Self:
         """Return the same with these for warnings."""
-        told = tuple(notes)
-        return replace(self, warnings=tuple(map(str, told)), kind_of_warning=note_kinds(told))
+        every = tuple(notes)
+        return replace(self, warnings=tuple(map(str, every)), kind_of_warning=note_kinds(every))
 
 
 @dataclass(frozen=True)

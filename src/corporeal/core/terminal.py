@@ -93,7 +93,7 @@ class StageProgress:
     speed.
     """
 
-    def told(self, fraction: float, words: str, now: float) -> None:
+    def report(self, fraction: float, words: str, now: float) -> None:
         """Update by a report."""
         self.fraction, self.words = fraction, words
         self.first = self.first or (now, fraction)
@@ -153,7 +153,7 @@ def log_lines(
         ended()
         doing = StageProgress(verb, now())
         watched.append(_LoggedStage(doing, lambda line: print_line(line, where), now, soon, every))
-        return lambda fraction, words: doing.told(fraction, words, now())
+        return lambda fraction, words: doing.report(fraction, words, now())
 
     try:
         yield tell

@@ -91,7 +91,7 @@ def repeat_interview(
     """
     if count == 1:
         return [ObjectAnswer(tuple(described()), _judge_mass(interview, direct))]
-    told, whole, waiting = [], [], []
+    interpreted, whole, waiting = [], [], []
     for number in range(1, count + 1):
         interview.turn = AnswerNumber(number, count)
         before = len(interview.transcript)
@@ -99,13 +99,13 @@ def repeat_interview(
         fits = _is_complete(interview.transcript[before:])
         evidence = _ask_unless_pending(partial(_judge_mass, interview, direct), waiting)
         if parts is not None:
-            told.append(ObjectAnswer(tuple(parts), evidence))
-            whole += [told[-1]] if fits else []
+            interpreted.append(ObjectAnswer(tuple(parts), evidence))
+            whole += [interpreted[-1]] if fits else []
     interview.turn = SINGLE_ANSWER
     if waiting:
         raise PendingQuestionsError(str(waiting[0]), sum(error.count for error in waiting))
     _warn_of_left_out_answers(interview, whole, count)
-    return whole or told[:1]
+    return whole or interpreted[:1]
 
 
 def _ask_unless_pending(ask: Callable, waiting: list[PendingQuestionsError]):

@@ -36,7 +36,7 @@ class Cavity:
 def is_vessel(member: MeasuredPart) -> bool:
     """Whether the cavity lies between the faces of the mesh instead of behind all of them.
 
-    A bowl too wide to be told from a body by what is blocked around its hollow is told by how much goes into that.
+    A bowl too wide to be distinguished from a body by what is blocked around its hollow is recognised by its volume.
     """
     apart = member.build is not MeshKind.BODY or member.volume == 0
     return apart or member.hollow > MIN_OPEN_HOLLOW_RATIO * member.volume

@@ -97,25 +97,25 @@ def warn_of_wrong_compression(
         made: As they are simulated.
 
     """
-    told = []
+    messages = []
     for part, true, treatment in zip(parts, unslowed, made, strict=True):
         if part.pressed < MAX_INVISIBLE_STRAIN:
             continue
         name = f"Object {part.object + 1} of the scene"
         share = treatment.simulated_young_pa / true.simulated_young_pa if true.simulated_young_pa > 0.0 else 1.0
         if treatment.kind == "rigid":
-            told.append(
+            messages.append(
                 f"{name} is pressed by about {part.pressed:.2g} of its thickness by prescribed "
                 "motion, and is rigid, so the contact force cannot be right. End the path at the "
                 "contact, or choose a softer material."
             )
         elif share < MIN_RIGHT_FORCE_STIFFNESS_RATIO:
-            told.append(
+            messages.append(
                 f"{name} is compressed by prescribed motion and simulated {1 / share:.2g} times "
                 "softer than it is: its reaction force is too small by about that factor. A finer "
                 "detail has a larger step budget."
             )
-    return list(dict.fromkeys(told))
+    return list(dict.fromkeys(messages))
 
 
 DetailLevel = Literal["draft", "normal", "fine"]
@@ -204,9 +204,9 @@ def plan_discretization(
             why = slabs_nearer_to_rigid(parts, motions, treatments)
         if stiffness == "capped" or not why:
             laid = mark_thin_floor_sheets(parts, motions, treatments)
-            told = (*draft.plan.warnings, *warn_of_wrong_compression(parts, draft.unslowed, laid))
+            messages = (*draft.plan.warnings, *warn_of_wrong_compression(parts, draft.unslowed, laid))
             tuned = tune_loss_to_impacts(parts, motions, laid)
-            return replace(draft.plan, treatments=tuned, warnings=told)
+            return replace(draft.plan, treatments=tuned, warnings=messages)
         verdicts = [replace(v, rigid=True, reason=why[k]) if k in why else v for k, v in enumerate(judged.verdicts)]
         judged = replace(judged, verdicts=verdicts)
 

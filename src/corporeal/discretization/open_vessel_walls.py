@@ -55,12 +55,12 @@ def hollow_if_too_thick(words: PartDescription, seen: FileEvidence, library: str
     thickness = mean_drawn_thickness(seen.surfaces, seen.thing.scale)
     if not 0 < thickest < thickness:
         return words
-    told = (
+    because = (
         f"A block {1e3 * thickness:.0f} mm thick would be more than {MAX_SOLID_THICKNESS_RATIO:g} "
         "times as thick as "
         f"any wall of {words.material} was measured: it is assumed hollow."
     )
-    return replace(words, structure="shell", reason=f"{words.reason} {told}")
+    return replace(words, structure="shell", reason=f"{words.reason} {because}")
 
 
 def usual_wall_thickness(material: str | None, library: str) -> float:
@@ -167,8 +167,8 @@ def sheet_if_drawn_full(words: PartDescription, seen: FileEvidence, library: str
         wall = usual_wall_thickness(words.material, library)
     if not wall or not is_drawn_as_lump(seen.surfaces, wall, seen.thing.scale):
         return words
-    told = "Its mesh fills its hollow: it is assumed to be a wall along its outside."
-    return replace(words, structure="sheet", wall_unseen=True, reason=f"{words.reason} {told}")
+    because = "Its mesh fills its hollow: it is assumed to be a wall along its outside."
+    return replace(words, structure="sheet", wall_unseen=True, reason=f"{words.reason} {because}")
 
 
 def _is_no_single_vessel(name: TokenisedName) -> bool:

@@ -206,15 +206,15 @@ def compression_pressures(
 
     """
     found = [0.0] * len(scene.objects)
-    told = [k for k, obj in enumerate(scene.objects) if obj.path is not None]
-    free = [k for k in range(len(found)) if k not in told]
-    if not told or not free:
+    prescribed = [k for k, obj in enumerate(scene.objects) if obj.path is not None]
+    free = [k for k in range(len(found)) if k not in prescribed]
+    if not prescribed or not free:
         return found
     rng = np.random.default_rng([seed, 11])
     things = [SampledObject.of(a.everything, rng) for a in anatomies]
     times = look_times(scene)
     pressers: list[PresserPath] = []
-    for k in told:
+    for k in prescribed:
         path = scene.objects[k].path
         assert path is not None
         pressers.append(place_along_path(things[k], path, underside_centre(scene, k), times))

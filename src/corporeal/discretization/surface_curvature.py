@@ -159,8 +159,8 @@ class MeshCurvature:
         x, y = edge[..., 0], edge[..., 1]
         zero = np.zeros_like(x)
         rows = np.concatenate([np.stack([x, y, zero], axis=2), np.stack([zero, x, y], axis=2)], axis=1)
-        told = np.concatenate([turn[..., 0], turn[..., 1]], axis=1)
-        a, b, c = np.einsum("tij,tj->ti", np.linalg.pinv(rows), told).T
+        turns = np.concatenate([turn[..., 0], turn[..., 1]], axis=1)
+        a, b, c = np.einsum("tij,tj->ti", np.linalg.pinv(rows), turns).T
         value, vector = np.linalg.eigh(np.stack([np.stack([a, b], 1), np.stack([b, c], 1)], 1))
         return value[:, 1], value[:, 0], np.einsum("ti,tij->tj", vector[:, :, 1], frame)
 

@@ -116,8 +116,8 @@ def read_field_table(path: Path) -> SampledField:
     except (UnicodeDecodeError, csv.Error) as error:
         raise BadFileError(path, "is no CSV file in UTF-8.", TABLE_HEADER_HELP) from error
     names, body = (lines[0], lines[1:]) if lines else ([], [])
-    told = {ours: theirs for ours, theirs in TABLE_COLUMNS.items() if theirs in names}
-    if not told or not {"x", "y", "z"} <= set(names):
+    columns = {ours: theirs for ours, theirs in TABLE_COLUMNS.items() if theirs in names}
+    if not columns or not {"x", "y", "z"} <= set(names):
         raise BadFileError(path, "lacks columns.", TABLE_HEADER_HELP)
     rows = np.array([_line_numbers(path, k, line, len(names)) for k, line in enumerate(body, start=2)])
     rows = rows.reshape(-1, len(names))
@@ -126,7 +126,7 @@ def read_field_table(path: Path) -> SampledField:
         method="the table",
         path=path,
         position=np.stack([column[axis] for axis in "xyz"], axis=1),
-        values={ours: column[theirs] for ours, theirs in told.items()},
+        values={ours: column[theirs] for ours, theirs in columns.items()},
     )
 
 

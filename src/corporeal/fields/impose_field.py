@@ -136,7 +136,7 @@ def impose_field(found: MaterialField, scene: Scene, parts: Parts, spec: str) ->
         return found
     if isinstance(field, UniformField):
         return _with_uniform_field(found, field)
-    told: dict[int, PartFieldNumbers] = {}
+    numbers_of_part: dict[int, PartFieldNumbers] = {}
     methods: set[str] = set()
     for number in (None, *range(len(scene.objects))):
         path = field.of(None if number is None else scene.objects[number].name)
@@ -145,11 +145,11 @@ def impose_field(found: MaterialField, scene: Scene, parts: Parts, spec: str) ->
             methods.add(sampled.method)
             chosen = _SurfaceSamples(scene, parts, number)
             placed = register_points(sampled.position, chosen.surface, path)
-            told |= sum_up_per_part(sampled, placed, chosen.points, chosen.part_of_point)
-    if not told:
+            numbers_of_part |= sum_up_per_part(sampled, placed, chosen.points, chosen.part_of_point)
+    if not numbers_of_part:
         names = ", ".join(thing.name for thing in scene.objects)
         raise UserError(f"{field.path} has no file for any object of the scene: {names}.")
-    return _with_part_numbers(found, parts, told, methods.pop())
+    return _with_part_numbers(found, parts, numbers_of_part, methods.pop())
 
 
 class _SurfaceSamples:
@@ -213,12 +213,12 @@ class _FieldUse:
 
 
 def _with_part_numbers(
-    found: MaterialField, parts: Parts, told: Mapping[int, PartFieldNumbers], method: str
+    found: MaterialField, parts: Parts, numbers_of_part: Mapping[int, PartFieldNumbers], method: str
 ) -> MaterialField:
     materials, pieces = list(found.materials), list(found.pieces)
     outside, kept = 0, []
     for k, part in enumerate(parts.catalogue):
-        numbers = told.get(k)
+        numbers = numbers_of_part.get(k)
         if numbers is None or numbers.unfit:
             clause = numbers.unfit if numbers else "the field has no file for it"
             kept.append(f"{part.name} ({clause})")

@@ -90,14 +90,14 @@ def pair_restitution(a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT
 
     """
     solid = a.solid and b.solid
-    told = any(is_stated_by_person(s.material, "restitution") for s in (a, b))
-    row = _closest_row(a.entry.kin, b.entry.kin, measured_restitution_pairs) if solid and not told else None
+    by_person = any(is_stated_by_person(s.material, "restitution") for s in (a, b))
+    row = _closest_row(a.entry.kin, b.entry.kin, measured_restitution_pairs) if solid and not by_person else None
     if row is not None:
         low, typical, high = row["restitution"]
         most = yield_restitution(*_yielding_materials(a, b), speed)
         return Restitution(min(typical, most), MeasuredRange(low, typical, high, row["source"]))
     one, other = (material_at_speed(s.material, speed) for s in (a, b))
-    if told or not solid:
+    if by_person or not solid:
         return Restitution(series_restitution(one, other), None)
     value = _choose_rule(a, b)(one, other)
     return Restitution(min(value, yield_restitution(*_yielding_materials(a, b), speed)), None)

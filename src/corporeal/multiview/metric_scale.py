@@ -96,7 +96,7 @@ def scale_from_extents(extents: Sequence[ObjectExtent]) -> MetricScale | None:
         return None
     ratios = [_scale_ratio(e.metres, e.units, f"The extent of {e.name}") for e in extents]
     scale = float(np.exp(np.median(np.log(ratios))))
-    told = "; ".join(f"{e.name} {e.units:.4g} units, {e.metres:.3g} m ({e.who})" for e in extents)
+    extents_text = "; ".join(f"{e.name} {e.units:.4g} units, {e.metres:.3g} m ({e.who})" for e in extents)
     odd = [e.name for e, r in zip(extents, ratios, strict=True) if _scales_differ(r, scale)]
     warnings = ()
     if odd:
@@ -107,7 +107,7 @@ def scale_from_extents(extents: Sequence[ObjectExtent]) -> MetricScale | None:
                 NoteKind.ASSUMED,
             ),
         )
-    return MetricScale(scale, "extent", f"One unit is {scale:.4g} m: {told}.", warnings)
+    return MetricScale(scale, "extent", f"One unit is {scale:.4g} m: {extents_text}.", warnings)
 
 
 def _stand_in_scale(size: float) -> MetricScale:

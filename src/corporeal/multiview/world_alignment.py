@@ -110,11 +110,11 @@ def align_world(
     around = _scene_ball(cameras, points if of_objects is None else of_objects)
     near = points[np.linalg.norm(points - around.centre, axis=1) < MAX_POINT_DISTANCE_RADII * around.radius]
     if stated.up is not None:
-        told = _UpEvidence(_unit_vector(stated.up), "person", 1.0, 0.0, "Up is what was stated.", ())
+        evidence = _UpEvidence(_unit_vector(stated.up), "person", 1.0, 0.0, "Up is what was stated.", ())
     elif z_up or cameras:
-        told = _up_from_file_or_cameras(cameras, z_up)
+        evidence = _up_from_file_or_cameras(cameras, z_up)
     else:
-        told = _UpEvidence(
+        evidence = _UpEvidence(
             _unit_vector(usual or UNIT_Z),
             "custom",
             0.4,
@@ -122,13 +122,13 @@ def align_world(
             f"Up is {USUAL_UP_AXIS_WORDS}.",
             (_unknown_up_note(""),),
         )
-    plane = _find_floor(told, cameras, near, around)
-    if plane is None and told.found_by == "custom":
-        told = _up_from_resting(told, near)
+    plane = _find_floor(evidence, cameras, near, around)
+    if plane is None and evidence.found_by == "custom":
+        evidence = _up_from_resting(evidence, near)
     if plane is not None:
-        told = _corrected_up(told, plane)
+        evidence = _corrected_up(evidence, plane)
     floor = plane if stated.floor is None else stated.floor
-    return _world_alignment(told, floor, around, near if of_objects is None else of_objects)
+    return _world_alignment(evidence, floor, around, near if of_objects is None else of_objects)
 
 
 def _fewer_points(points: np.ndarray) -> np.ndarray:
@@ -159,19 +159,19 @@ def _up_from_file_or_cameras(cameras: tuple[Camera, ...], z_up: bool) -> _UpEvid
     return _UpEvidence(seen.up, "cameras", seen.sure, seen.error, reason, seen.warnings)
 
 
-def _up_from_resting(told: _UpEvidence, points: np.ndarray) -> _UpEvidence:
+def _up_from_resting(evidence: _UpEvidence, points: np.ndarray) -> _UpEvidence:
     """Return what is up as objects would rest, for want of cameras and of a floor.
 
     Near the usual axis, unless they would fall over, and there is another along which they stand.
     """
-    usual, body = told.up, remove_outliers(points)
+    usual, body = evidence.up, remove_outliers(points)
     rests = [(axis, find_resting_pose(body, axis)) for axis in (usual, -usual, *_other_axes(usual))]
     found = [(axis, stood) for axis, stood in rests if stood is not None]
     if not found:
-        return told
+        return evidence
     axis, stood = min(found, key=lambda f: f[1].tilt + (f[0] is not usual) * UNUSUAL_AXIS_EXTRA_ROLL_RAD)
     if stood.tilt > MAX_STANDING_ROLL_RAD:
-        return told
+        return evidence
     fell = "" if axis is usual else f" Up is not {USUAL_UP_AXIS_WORDS}: the objects would fall over."
     reason = f"Up is by the resting pose of the objects, {_degrees_text(stood.tilt)} from an axis."
     return _UpEvidence(stood.up, "rest", 0.5, np.inf, reason + fell, (_unknown_up_note(fell),))
@@ -205,24 +205,28 @@ def _up_by_file(seen: UpDirection | None) -> _UpEvidence:
 
 
 def _find_floor(
-    told: _UpEvidence, cameras: tuple[Camera, ...], points: np.ndarray, around: ViewedRegion
+    evidence: _UpEvidence, cameras: tuple[Camera, ...], points: np.ndarray, around: ViewedRegion
 ) -> GroundPlane | None:
     eyes = np.array([c.world_from_camera[:3, 3] for c in cameras]).reshape(-1, 3)
-    lost = told.sure < MIN_UP_CONFIDENCE and len(eyes) > 0
-    tilt = np.pi if lost else MAX_FLOOR_TILTS_RAD[told.sure >= MIN_STRONG_CONFIDENCE]
-    search = GroundSearch(told.up, tilt, around.radius, eyes)
+    lost = evidence.sure < MIN_UP_CONFIDENCE and len(eyes) > 0
+    tilt = np.pi if lost else MAX_FLOOR_TILTS_RAD[evidence.sure >= MIN_STRONG_CONFIDENCE]
+    search = GroundSearch(evidence.up, tilt, around.radius, eyes)
     return find_ground_plane(points, search, np.random.default_rng(0))
 
 
-def _corrected_up(told: _UpEvidence, plane: GroundPlane) -> _UpEvidence:
+def _corrected_up(evidence: _UpEvidence, plane: GroundPlane) -> _UpEvidence:
     """Let a plane that objects stand on correct what is up."""
-    angle = _angle_between(told.up, plane.normal)
-    if told.sure >= MIN_STRONG_CONFIDENCE and told.error < MAX_SURE_UP_ERROR_RAD and angle < NEAR_PLANE_ANGLE_RAD:
-        return told
-    reason = f"{told.reason} The floor, {np.degrees(angle):.1f}° from it, corrected that."
-    by = told.found_by if told.sure >= MIN_STRONG_CONFIDENCE else "floor"
-    sure = max(told.sure, min(0.9, 0.5 + plane.share))
-    return replace(told, up=plane.normal, found_by=by, sure=sure, reason=reason)
+    angle = _angle_between(evidence.up, plane.normal)
+    if (
+        evidence.sure >= MIN_STRONG_CONFIDENCE
+        and evidence.error < MAX_SURE_UP_ERROR_RAD
+        and angle < NEAR_PLANE_ANGLE_RAD
+    ):
+        return evidence
+    reason = f"{evidence.reason} The floor, {np.degrees(angle):.1f}° from it, corrected that."
+    by = evidence.found_by if evidence.sure >= MIN_STRONG_CONFIDENCE else "floor"
+    sure = max(evidence.sure, min(0.9, 0.5 + plane.share))
+    return replace(evidence, up=plane.normal, found_by=by, sure=sure, reason=reason)
 
 
 def _unit_vector(vector: Vector | np.ndarray) -> np.ndarray:
@@ -250,14 +254,14 @@ def _scene_ball(cameras: tuple[Camera, ...], points: np.ndarray) -> ViewedRegion
 
 
 def _world_alignment(
-    told: _UpEvidence, floor: GroundPlane | float | None, around: ViewedRegion, lowest: np.ndarray
+    evidence: _UpEvidence, floor: GroundPlane | float | None, around: ViewedRegion, lowest: np.ndarray
 ) -> WorldAlignment:
-    rotation = rotation_to_z(told.up)
+    rotation = rotation_to_z(evidence.up)
     centre = rotation @ np.array(around.centre)
-    warnings = list(told.warnings)
+    warnings = list(evidence.warnings)
     if isinstance(floor, GroundPlane):
         # Where the plane is below the middle: it may be tilted against up by a little.
-        below = (floor.offset - floor.normal @ np.array(around.centre)) / (floor.normal @ told.up)
+        below = (floor.offset - floor.normal @ np.array(around.centre)) / (floor.normal @ evidence.up)
         height, by = float(centre[2] + below), "plane"
         reason = f"The floor is a plane with {floor.share:.0%} of the points."
     elif floor is not None:
@@ -272,10 +276,10 @@ def _world_alignment(
     shift = -np.array([centre[0], centre[1], height])
     return WorldAlignment(
         world_from_file=similarity_matrix(rotation, 1.0, shift),
-        found_by=told.found_by,
-        confidence=float(told.sure),
+        found_by=evidence.found_by,
+        confidence=float(evidence.sure),
         floor_by=by,
         radius=around.radius,
-        reason=f"{told.reason} {reason}",
+        reason=f"{evidence.reason} {reason}",
         warnings=tuple(warnings),
     )

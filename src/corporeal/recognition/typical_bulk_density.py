@@ -83,8 +83,8 @@ def mass_warning(name: str, class_name: str, mass: float, sides: tuple[float, fl
             across >= THICK_OBJECT_SIDE_M and bulk > MAX_THICK_OBJECT_KG_M3
         )
         found = _mass_text(name, mass, bulk, "box")
-        told = Note(f"{found}, more than nearly all objects. {MASS_ADVICE}", NoteKind.ASSUMED)
-        return told if heavy else None
+        note = Note(f"{found}, more than nearly all objects. {MASS_ADVICE}", NoteKind.ASSUMED)
+        return note if heavy else None
     found = mass / face if known.measure == "face" else bulk
     if known.low / BULK_DENSITY_MARGIN_RATIO <= found <= known.high * BULK_DENSITY_MARGIN_RATIO:
         return None

@@ -34,8 +34,8 @@ SECTIONS = (WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SECTION)
 
 def summary_sections(audit: RunAudit) -> dict[SummarySection, tuple[str, ...]]:
     """Return the sections of the summary, each sentence once, by severity."""
-    told = (*audit.notes, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
-    return {s: tuple(dict.fromkeys(_of(s, told))) for s in SECTIONS}
+    every = (*audit.notes, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
+    return {s: tuple(dict.fromkeys(_of(s, every))) for s in SECTIONS}
 
 
 def split_advice(sentences: str) -> tuple[str, str]:
@@ -44,6 +44,6 @@ def split_advice(sentences: str) -> tuple[str, str]:
     return first, " ".join(rest)
 
 
-def _of(section: SummarySection, told: tuple[Note, ...]) -> Iterator[str]:
+def _of(section: SummarySection, every: tuple[Note, ...]) -> Iterator[str]:
     for kind in section.kinds:
-        yield from (str(note) for note in told if note.kind is kind)
+        yield from (str(note) for note in every if note.kind is kind)

@@ -226,7 +226,7 @@ class RunQueue:
         store.write_json(self.runs / QUEUE_FILE, rows)
 
 
-def _stage_fractions(every: Sequence[str], told: Mapping[str, float]) -> dict[str, float]:
+def _stage_fractions(every: Sequence[str], fractions: Mapping[str, float]) -> dict[str, float]:
     """Return how far every stage is; before one that is reported, all are done."""
-    last = max((every.index(verb) for verb in told if verb in every), default=0)
-    return {v: 1.0 if k < last else told.get(v, 0.0) for k, v in enumerate(every)}
+    last = max((every.index(verb) for verb in fractions if verb in every), default=0)
+    return {v: 1.0 if k < last else fractions.get(v, 0.0) for k, v in enumerate(every)}

@@ -75,8 +75,8 @@ def evaluate_materials(
     rows = []
     for number, path in enumerate(known):
         progress(number / len(known), path.stem)
-        told = describe(assemble([path]), config, library)
-        words = {w.name: w for obj in told.objects for w in obj.parts}
+        described = describe(assemble([path]), config, library)
+        words = {w.name: w for obj in described.objects for w in obj.parts}
         for part, accepted in truth[path.stem].items():
             if part not in words:
                 raise UserError(f"{path.stem} has no part {part!r}. Its parts: {', '.join(sorted(words))}.")

@@ -105,9 +105,9 @@ def _touches_prescribed_body(scene: ContactScene, pair: Int[np.ndarray, "E 2"]) 
     """Return which contacts are of a rigid body with one that follows a prescribed path."""
     bodies, walls = scene.problem.bodies, len(scene.problem.planes)
     rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
-    told = np.array([body.path is not None for body in bodies] + [False] * walls)
+    prescribed = np.array([body.path is not None for body in bodies] + [False] * walls)
     one, other = pair.T
-    return rigid[one] & rigid[other] & (told[one] | told[other])
+    return rigid[one] & rigid[other] & (prescribed[one] | prescribed[other])
 
 
 def _contact_groups(touches: list[PossibleContacts]) -> Int[np.ndarray, " E"]:

@@ -212,8 +212,8 @@ def _in_metres(blocks: list[_FileObjects], wanted: Mapping[str, float]) -> list[
         found.append(guess)
         blocks[i] = replace(block, scene=convert_scene_unit(block.scene, guess.metres), metric=True)
     first = blocks[0].scene
-    told = (*first.warnings, *unit_notes(found))
-    return [replace(blocks[0], scene=replace(first, warnings=told)), *blocks[1:]]
+    notes = (*first.warnings, *unit_notes(found))
+    return [replace(blocks[0], scene=replace(first, warnings=notes)), *blocks[1:]]
 
 
 def _scaled_to_extent(block: _FileObjects, wanted: Mapping[str, float]) -> _FileObjects:

@@ -43,8 +43,8 @@ def describe(
 
     """
     made = _describe_scene(scene, config, library, progress, from_pictures)
-    told = (_with_unseen_walls(o) if k in from_pictures else o for k, o in enumerate(made.objects))
-    return replace(made, objects=tuple(told))
+    with_walls = (_with_unseen_walls(o) if k in from_pictures else o for k, o in enumerate(made.objects))
+    return replace(made, objects=tuple(with_walls))
 
 
 def _with_unseen_walls(thing: ObjectDescription) -> ObjectDescription:

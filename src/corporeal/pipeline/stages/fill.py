@@ -101,9 +101,9 @@ def fill(
     doubted = warn_of_implausible_masses(scene, anatomies, particles.mass_real)
     unlike = warn_of_masses_not_as_named(scene, anatomies, particles.mass_real)
     thick = warn_of_thick_walls(scene, anatomies, makes, field)
-    told = (*name_objects(particles.warnings, scene), *drawn, *heavy, *thick, *doubted, *unlike)
-    told += warn_of_loose_sheets(scene, parts, anatomies, field)
-    particles = replace(particles, warnings=told, contents=contents)
+    notes = (*name_objects(particles.warnings, scene), *drawn, *heavy, *thick, *doubted, *unlike)
+    notes += warn_of_loose_sheets(scene, parts, anatomies, field)
+    particles = replace(particles, warnings=notes, contents=contents)
     return with_plant_springs(scene, particles, anatomies, field, tissue)
 
 

@@ -214,13 +214,13 @@ def _name_objects(
     names = object_names(objects)
     sizes = dict(zip(names, found.extents, strict=True))
     scale = decide_metric_scale(sizes, objects, extents, measured, z_up)
-    told = [] if by_name is None else [named_object_note(title, by_name, names[0])]
+    notes = [] if by_name is None else [named_object_note(title, by_name, names[0])]
     if scale.source == "extent" and not extents and by_name is None:
-        told = [class_extent_note(objects, names)]
+        notes = [class_extent_note(objects, names)]
     pairs = zip(names, found.solids, strict=True)
     unsound = [with_text(w, f"{name}: {w}") for name, solid in pairs for w in solid.warnings]
     doubts = [*found.taken.doubts, *unsound]
-    return _NamedObjects(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
+    return _NamedObjects(objects, names, scale, [*scale.warnings, *notes, *doubts], tuple(doubts))
 
 
 def _align_upright(source: Path, taken: GaussianScene, config: ReconstructConfig, folder: Path | None) -> GaussianScene:
@@ -246,8 +246,8 @@ def _align_upright(source: Path, taken: GaussianScene, config: ReconstructConfig
         numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
         draw_masks_over(list(made.views.rgb), cut_out, numbers, folder / MASKS_FIGURE_FILE)
     if cut_out is not None and made.coloured is not None:
-        told = Note(f"{SPLIT_BY_PLACE_WARNING} {describe_masks_in(folder)}".rstrip(), NoteKind.GRAVE)
-        made = replace(made, doubts=(*made.doubts, told))
+        note = Note(f"{SPLIT_BY_PLACE_WARNING} {describe_masks_in(folder)}".rstrip(), NoteKind.GRAVE)
+        made = replace(made, doubts=(*made.doubts, note))
     return made
 
 

@@ -170,13 +170,13 @@ def _origin_list(story: ReportContent) -> str:
     scene = story.scene
     forced = [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
     settled = equilibrium_message(story.audit.settling)
-    told = [
+    statements = [
         *map(escape_html, story.origin),
         *forced,
         *map(escape_html, filter(None, [describe_scales(scene.objects), settled])),
     ]
-    rows = "".join(f"<li>{sentence}</li>" for sentence in told)
-    return f"<details><summary>How it came about</summary><ul>{rows}</ul></details>" * bool(told)
+    rows = "".join(f"<li>{sentence}</li>" for sentence in statements)
+    return f"<details><summary>How it came about</summary><ul>{rows}</ul></details>" * bool(statements)
 
 
 def _answer_source_words(questions: ModelUsage, answers: int) -> str:

@@ -162,8 +162,8 @@ def _replace_with_pieces(
     of_point[own] = place + np.searchsorted(kept, best)
     confidence = parts.confidence.copy()
     confidence[own] = share[np.arange(len(own)), best]
-    told = _doubts(named, obj, kept.tolist())
-    doubts = [with_text(words, f"{obj.name}: {words}") for words in told]
+    found_doubts = _doubts(named, obj, kept.tolist())
+    doubts = [with_text(words, f"{obj.name}: {words}") for words in found_doubts]
     return replace(
         parts,
         part_of_point=of_point,

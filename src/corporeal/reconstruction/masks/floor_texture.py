@@ -138,20 +138,20 @@ def floor_fit(
     for k, (rgb, camera) in enumerate(zip(views.rgb, views.cameras, strict=True)):
         places = floor_intersections(camera, floor)
         cell = ground.cells(places).reshape(rgb.shape[:2])
-        told = (cell >= 0) & (looking[cell] >= 2 * MIN_AGREEING_PARTNERS)
-        at = ground.at(places.reshape(*rgb.shape)[told]).T - 0.5
-        own = np.log(np.maximum(rgb[told].astype(float), DARK_FLOOR_U8) / 255) - _interpolate_cells(light[k], at)
+        compared = (cell >= 0) & (looking[cell] >= 2 * MIN_AGREEING_PARTNERS)
+        at = ground.at(places.reshape(*rgb.shape)[compared]).T - 0.5
+        own = np.log(np.maximum(rgb[compared].astype(float), DARK_FLOOR_U8) / 255) - _interpolate_cells(light[k], at)
         expected, reach = _interpolate_cells(print_, at), _interpolate_cells(between, at)
         off = _lab_of_logarithms(own) - expected
         off = np.sign(off) * np.maximum(np.abs(off) - reach, 0)
         fit = _floor_likelihood(off, _interpolate_cells(spread[k], at), expected[:, 0])
-        fit = np.where(agreed.ravel()[cell[told]], fit, 0.0)
+        fit = np.where(agreed.ravel()[cell[compared]], fit, 0.0)
         other = np.where(
-            sure[k][told],
+            sure[k][compared],
             0.0,
             PRIOR_OTHER_PROBABILITY / (PRIOR_OTHER_PROBABILITY + (1 - PRIOR_OTHER_PROBABILITY) * fit),
         )
-        made[k][told] = FIT_AGREES + np.searchsorted(OTHER_PROBABILITY_LEVELS, other)
+        made[k][compared] = FIT_AGREES + np.searchsorted(OTHER_PROBABILITY_LEVELS, other)
     return made
 
 

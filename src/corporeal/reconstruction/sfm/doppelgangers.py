@@ -99,30 +99,30 @@ MIN_MOVE_GAIN = 1e-9
 """Below it nothing is gained by moving a picture to another group."""
 
 
-def remove_doppelgangers(told: SfmRun, place: Path, gathered: PreparedImages) -> SfmRun:
+def remove_doppelgangers(attempt: SfmRun, place: Path, gathered: PreparedImages) -> SfmRun:
     """Take pictures that stand where they cannot out of a model; return what is left of it.
 
     Where these are too many, it is left as it is: an object that was turned over between two rounds on one card parts
     them as well, and masks can tell.
 
     Args:
-        told: What came of the attempt.
+        attempt: An attempt at the poses.
         place: Holds the model, which is changed.
         gathered: All pictures.
 
     """
-    if model_doubts(told):
-        return told
+    if model_doubts(attempt):
+        return attempt
     order = gathered.names
-    compared = [(order[a], order[b]) for a, b in pairs_to_match(gathered, told.way)]
+    compared = [(order[a], order[b]) for a, b in pairs_to_match(gathered, attempt.way)]
     groups = doppelganger_groups(read_colmap(place), compared)
     misplaced = tuple(sorted(name for group in groups[1:] for name in group))
     if not misplaced:
-        return told
-    if len(groups[0]) < MIN_REGISTERED_FRACTION * told.registered:
-        return replace(told, parted=tuple(len(group) for group in groups))
+        return attempt
+    if len(groups[0]) < MIN_REGISTERED_FRACTION * attempt.registered:
+        return replace(attempt, parted=tuple(len(group) for group in groups))
     registered, points = remove_pictures(place, misplaced)
-    return replace(told, registered=registered, points=points, misplaced=misplaced)
+    return replace(attempt, registered=registered, points=points, misplaced=misplaced)
 
 
 def doppelganger_groups(model: ColmapModel, compared: Collection[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
@@ -140,28 +140,28 @@ def doppelganger_groups(model: ColmapModel, compared: Collection[tuple[str, str]
     return tuple(tuple(sorted(names[k] for k in group)) for group in groups)
 
 
-def neighbours_support_model(told: SfmRun, place: Path, gathered: PreparedImages) -> bool:
+def neighbours_support_model(attempt: SfmRun, place: Path, gathered: PreparedImages) -> bool:
     """Return whether neighbours speak for a model against which only is that its points are few.
 
     Many pictures of little that has a pattern share few points, of which each sees enough: what places it are those.
     That nothing contradicts is not enough: neighbours must agree, and join all that must be placed.
 
     Args:
-        told: What came of the attempt.
+        attempt: An attempt at the poses.
         place: Holds its model.
         gathered: All pictures.
 
     """
-    if not only_sparse(told):
+    if not only_sparse(attempt):
         return False
     model, order = read_colmap(place), gathered.names
     if len(model.sightings) < MIN_POINTS_PER_PICTURE * len(model.images):
         return False
-    compared = [(order[a], order[b]) for a, b in pairs_to_match(gathered, told.way)]
+    compared = [(order[a], order[b]) for a, b in pairs_to_match(gathered, attempt.way)]
     agreed = _pair_agreement(model, compared)
     _, label = connected_components(csr_array(agreed > 0), directed=False)
     joined = int(np.bincount(label).max())
-    return len(agreeing_groups(np.nan_to_num(agreed))) == 1 and joined >= MIN_REGISTERED_FRACTION * told.pictures
+    return len(agreeing_groups(np.nan_to_num(agreed))) == 1 and joined >= MIN_REGISTERED_FRACTION * attempt.pictures
 
 
 def _pair_agreement(model: ColmapModel, compared: Collection[tuple[str, str]]) -> Float[np.ndarray, "N N"]:

@@ -240,13 +240,13 @@ def find_object_poses(posed: FoundPoses, masks: Path, folder: Path, progress: Pr
         for name, place in ((IMAGES_FOLDER, posed.folder / IMAGES_FOLDER), (MASK_FOLDERS[0], masks)):
             shutil.copytree(place, folder / name, dirs_exist_ok=True)
         gathered = load_prepared_images(folder)
-        told = _check_model(run_sfm(folder, folder / "masked", gathered, "masked", progress), folder, gathered)
-        why = [*model_doubts(told), *filter(None, [mask_contradiction_doubt(told)])]
+        attempt = _check_model(run_sfm(folder, folder / "masked", gathered, "masked", progress), folder, gathered)
+        why = [*model_doubts(attempt), *filter(None, [mask_contradiction_doubt(attempt)])]
         shutil.rmtree(folder / MASK_FOLDERS[0])  # they were grown under other poses
         if why:
-            kept = _PosesRecord((), (), "; ".join(why), (told,))
+            kept = _PosesRecord((), (), "; ".join(why), (attempt,))
         else:
-            kept = _record_of_runs(folder, gathered, (), (told,), told)
+            kept = _record_of_runs(folder, gathered, (), (attempt,), attempt)
         _save_record(folder, kept)
     return None if kept.refused else FoundPoses(folder, kept.statements, kept.warnings)
 
@@ -274,7 +274,7 @@ def _find_or_load_poses(source: Path, folder: Path, progress: Progress) -> _Pose
         if spread >= SLIGHT_SPREAD_FRACTION:
             gathered = replace(gathered, said=(*gathered.said, spread_sentence(spread)))
         return _record_of_runs(folder, gathered, tuple(said), tuple(tried), best)
-    best = max(tried, key=lambda told: told.registered)
+    best = max(tried, key=lambda attempt: attempt.registered)
     return _refusal(model_doubts(best), gathered, smeared, others, tuple(tried))
 
 
@@ -299,8 +299,8 @@ def _try_strategies(folder: Path, gathered: PreparedImages, progress: Progress) 
         share, before = (before, until), until
         if not _is_worth_trying(way, folder, tried, len(smeared)):
             continue
-        told = run_sfm(folder, folder / way, gathered, way, subprogress(progress, *share))
-        tried.append(_check_model(told, folder, gathered))
+        attempt = run_sfm(folder, folder / way, gathered, way, subprogress(progress, *share))
+        tried.append(_check_model(attempt, folder, gathered))
         if not model_doubts(tried[-1]) and mask_contradiction_doubt(tried[-1]) is None:
             break
         smeared = smeared or blurred_pictures(folder / IMAGES_FOLDER, gathered.names)
@@ -336,10 +336,10 @@ def _find_places(
     return replace(gathered, doubled=fine, pairs=pairs), len(groups.beside)
 
 
-def _check_model(told: SfmRun, folder: Path, gathered: PreparedImages) -> SfmRun:
+def _check_model(attempt: SfmRun, folder: Path, gathered: PreparedImages) -> SfmRun:
     """Take out of a model which pictures cannot be where it has them, by neighbours and masks."""
-    place = folder / told.way / "sparse" / "0"
-    return remove_by_masks(remove_doppelgangers(told, place, gathered), folder, place)
+    place = folder / attempt.way / "sparse" / "0"
+    return remove_by_masks(remove_doppelgangers(attempt, place, gathered), folder, place)
 
 
 def _best_by_masks(tried: list[SfmRun], folder: Path, gathered: PreparedImages) -> SfmRun | None:
@@ -348,14 +348,14 @@ def _best_by_masks(tried: list[SfmRun], folder: Path, gathered: PreparedImages) 
     Where its neighbours contradict, one that was doubted for few points alone, and with which neighbours and masks
     agree, is taken.
     """
-    believed = [told for told in tried if not model_doubts(told)]
-    best = max(believed, key=lambda told: told.filled, default=None)
+    believed = [attempt for attempt in tried if not model_doubts(attempt)]
+    best = max(believed, key=lambda attempt: attempt.filled, default=None)
     if best is None or not best.parted:
         return best
-    for told in tried:
-        place = folder / told.way / "sparse" / "0"
-        if mask_contradiction_doubt(told) is None and neighbours_support_model(told, place, gathered):
-            return told
+    for attempt in tried:
+        place = folder / attempt.way / "sparse" / "0"
+        if mask_contradiction_doubt(attempt) is None and neighbours_support_model(attempt, place, gathered):
+            return attempt
     return best
 
 
@@ -365,7 +365,7 @@ def _is_worth_trying(way: SfmStrategy, folder: Path, tried: list[SfmRun], smeare
         return (folder / MASK_FOLDERS[0]).is_dir()
     if way == "plain":
         return True
-    return all(model_doubts(told) for told in tried) and not thorough_in_vain(tried[0], smeared)
+    return all(model_doubts(attempt) for attempt in tried) and not thorough_in_vain(tried[0], smeared)
 
 
 def _prepare_source(source: Path, folder: Path, progress: Progress) -> tuple[list[str], PreparedImages]:

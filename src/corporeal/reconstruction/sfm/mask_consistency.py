@@ -27,30 +27,30 @@ MAX_COMPARED_MASK_PX = 320
 """Side of the masks that are compared [px]."""
 
 
-def remove_by_masks(told: SfmRun, folder: Path, place: Path) -> SfmRun:
+def remove_by_masks(attempt: SfmRun, folder: Path, place: Path) -> SfmRun:
     """Take pictures whose masks contradict the others out of a model; return what is left of it.
 
     Lenses are taken for straight: what they bend is less than a pixel of these masks.
 
     Args:
-        told: What came of the attempt.
+        attempt: An attempt at the poses.
         folder: Holds ``masks`` where some were given; else nothing is done.
         place: Holds the model, which is changed.
 
     """
     masks = folder / MASK_FOLDERS[0]
-    if not told.registered or not masks.is_dir():
-        return told
+    if not attempt.registered or not masks.is_dir():
+        return attempt
     compared = _masked_cameras(place, masks)
     if compared is None:
-        return told
+        return attempt
     shown, cameras, drawn = compared.shown, compared.cameras, compared.drawn
     wrong = outlier_views(drawn, cameras)
     right = [k for k in range(len(shown)) if k not in wrong]
     filled = silhouette_coherence(drawn[right], tuple(cameras[k] for k in right))
     astray = tuple(sorted(shown[k].name for k in wrong))
-    left = remove_pictures(place, astray) if astray else (told.registered, told.points)
-    return replace(told, registered=left[0], points=left[1], astray=astray, filled=round(filled, 3))
+    left = remove_pictures(place, astray) if astray else (attempt.registered, attempt.points)
+    return replace(attempt, registered=left[0], points=left[1], astray=astray, filled=round(filled, 3))
 
 
 def pictures_of_something_else(place: Path, masks: Path) -> tuple[str, ...]:

@@ -199,7 +199,7 @@ class SmallCopyMatches:
         )
 
 
-def match_small_copies(folder: Path, gathered: PreparedImages, told: Callable[[float], None]) -> SmallCopyMatches:
+def match_small_copies(folder: Path, gathered: PreparedImages, progress: Callable[[float], None]) -> SmallCopyMatches:
     """Look for points that each two of the pictures share, in small copies.
 
     Where something stands at the same place of all of them, they are looked at again without it.
@@ -207,17 +207,17 @@ def match_small_copies(folder: Path, gathered: PreparedImages, told: Callable[[f
     Args:
         folder: Holds ``images``; gets ``stamps`` where there are some.
         gathered: What lies there.
-        told: Called with the fraction done.
+        progress: Called with the fraction done.
 
     """
     pycolmap = require_pycolmap()
     shutil.rmtree(folder / STAMPS, ignore_errors=True)
     first = _match_copies(pycolmap, folder, gathered)
-    told(0.5)
+    progress(0.5)
     if first.stamps:
         said = write_watermark_masks(first.stamps, gathered.names, gathered.sizes, folder / STAMPS)
         first = replace(_match_copies(pycolmap, folder, gathered), said=said)
-    told(1.0)
+    progress(1.0)
     return first
 
 

@@ -37,67 +37,68 @@ MORE_OVERLAP_HINT = (
 )
 
 
-def model_doubts(told: SfmRun) -> list[str]:
+def model_doubts(attempt: SfmRun) -> list[str]:
     """Return what speaks against a model, in clauses; nothing: it can be accepted."""
-    if not told.registered and 0 < (told.joined or 0) < MIN_REGISTERED_FRACTION * told.pictures:
-        return [f"only {told.joined} of {told.pictures} pictures share points with one another"]
-    if not told.registered:
+    if not attempt.registered and 0 < (attempt.joined or 0) < MIN_REGISTERED_FRACTION * attempt.pictures:
+        return [f"only {attempt.joined} of {attempt.pictures} pictures share points with one another"]
+    if not attempt.registered:
         return ["no two pictures share enough points"]
     found = []
-    if told.registered < MIN_REGISTERED_FRACTION * told.pictures:
+    if attempt.registered < MIN_REGISTERED_FRACTION * attempt.pictures:
         beside = ""
-        if told.misplaced:
-            beside = f" ({len(told.misplaced)} more only where another side looks alike)"
-        found.append(f"only {told.registered} of {told.pictures} pictures fit together{beside}")
-    if told.points < MIN_POINTS_PER_PICTURE * told.registered:
-        each = told.points / told.registered
+        if attempt.misplaced:
+            beside = f" ({len(attempt.misplaced)} more only where another side looks alike)"
+        found.append(f"only {attempt.registered} of {attempt.pictures} pictures fit together{beside}")
+    if attempt.points < MIN_POINTS_PER_PICTURE * attempt.registered:
+        each = attempt.points / attempt.registered
         found.append(f"there are {each:.0f} points per picture, too few to trust")
-    if not FOCAL_RANGE_RATIO[0] < told.focal < FOCAL_RANGE_RATIO[1] or told.bent > MAX_RADIAL_DISTORTION:
-        found.append(f"it needs an implausible lens (focal length {told.focal:g} × the longer side, k1 {told.bent:g})")
-    if told.others and told.others[0] > RIVAL_GROUP_FRACTION * told.registered:
-        groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
+    if not FOCAL_RANGE_RATIO[0] < attempt.focal < FOCAL_RANGE_RATIO[1] or attempt.bent > MAX_RADIAL_DISTORTION:
+        lens = f"focal length {attempt.focal:g} × the longer side, k1 {attempt.bent:g}"
+        found.append(f"it needs an implausible lens ({lens})")
+    if attempt.others and attempt.others[0] > RIVAL_GROUP_FRACTION * attempt.registered:
+        groups = " and ".join(str(n) for n in (attempt.registered, *attempt.others)[:3])
         found.append(f"the pictures fall into groups of {groups} that share nothing")
     return found
 
 
-def only_sparse(told: SfmRun) -> bool:
+def only_sparse(attempt: SfmRun) -> bool:
     """Return whether nothing speaks against a model but that its points are few."""
-    enough = replace(told, points=MIN_POINTS_PER_PICTURE * told.registered)
-    return bool(model_doubts(told)) and not model_doubts(enough)
+    enough = replace(attempt, points=MIN_POINTS_PER_PICTURE * attempt.registered)
+    return bool(model_doubts(attempt)) and not model_doubts(enough)
 
 
-def too_few_placed(told: SfmRun, others: int) -> str | None:
+def too_few_placed(attempt: SfmRun, others: int) -> str | None:
     """Return in a clause that most of a folder was not placed, if so.
 
     Args:
-        told: An attempt that is accepted.
+        attempt: An attempt that is accepted.
         others: Photographs that were left out before it.
 
     """
-    total = told.pictures + others
-    if told.registered >= MIN_PLACED_FRACTION * total:
+    total = attempt.pictures + others
+    if attempt.registered >= MIN_PLACED_FRACTION * total:
         return None
-    return f"only {told.registered} of {total} pictures fit together"
+    return f"only {attempt.registered} of {total} pictures fit together"
 
 
-def thorough_in_vain(told: SfmRun, blurred: int) -> bool:
+def thorough_in_vain(attempt: SfmRun, blurred: int) -> bool:
     """Return whether a thorough attempt cannot mend what was doubted.
 
     Args:
-        told: What came of the plain attempt.
+        attempt: The plain attempt at the poses.
         blurred: Pictures that are heavily blurred.
 
     """
-    if blurred >= MAX_BLURRED_FRACTION * told.pictures:
+    if blurred >= MAX_BLURRED_FRACTION * attempt.pictures:
         return True
-    return told.joined is not None and told.joined < MIN_JOINED_BY_PLAIN_FRACTION * told.pictures
+    return attempt.joined is not None and attempt.joined < MIN_JOINED_BY_PLAIN_FRACTION * attempt.pictures
 
 
-def neighbour_doubt(told: SfmRun) -> str:
+def neighbour_doubt(attempt: SfmRun) -> str:
     """Return in a clause that pictures stand side by side that share too little; "": they do not."""
-    if not told.parted:
+    if not attempt.parted:
         return ""
-    sizes = " and ".join(str(n) for n in told.parted[:3])
+    sizes = " and ".join(str(n) for n in attempt.parted[:3])
     return (
         f"pictures that would have been taken side by side, in groups of {sizes}, share too little "
         "of what both show: they were put in wrong places, as where a pattern repeats or two sides "
@@ -105,18 +106,18 @@ def neighbour_doubt(told: SfmRun) -> str:
     )
 
 
-def mask_contradiction_doubt(told: SfmRun) -> str | None:
+def mask_contradiction_doubt(attempt: SfmRun) -> str | None:
     """State that masks contradict one another, if they do: right poses and poor masks do that, too.
 
     Args:
-        told: What came of an attempt, after its outliers were left out.
+        attempt: An attempt at the poses, after its outliers were left out.
 
     """
-    if told.filled >= MIN_MASK_FILLED_FRACTION:
+    if attempt.filled >= MIN_MASK_FILLED_FRACTION:
         return None
-    placed = "some pictures were put in wrong places, " if told.parted else ""
+    placed = "some pictures were put in wrong places, " if attempt.parted else ""
     return Note(
-        f"All masks together leave {told.filled:.0%} of what each shows: {placed}the object was "
+        f"All masks together leave {attempt.filled:.0%} of what each shows: {placed}the object was "
         "moved or turned over between the pictures, or masks miss parts of it. Check the masks.",
         NoteKind.GRAVE,
     )

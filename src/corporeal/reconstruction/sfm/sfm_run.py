@@ -178,10 +178,10 @@ def run_sfm(folder: Path, out: Path, gathered: PreparedImages, way: SfmStrategy,
     )
     for step, begin, end, what in steps:
 
-        def told(share: float, begin: float = begin, end: float = end, what: str = what) -> None:
+        def report(share: float, begin: float = begin, end: float = end, what: str = what) -> None:
             progress(begin + (end - begin) * share, STRATEGY_PREFIXES[way] + what)
 
-        _run_interruptibly(pycolmap, partial(step, told))
+        _run_interruptibly(pycolmap, partial(step, report))
     return replace(_summarise_models(work.models, folder / IMAGES_FOLDER, out, gathered, way), joined=work.joined)
 
 
@@ -236,7 +236,7 @@ class _SfmSteps:
         self.models: Any = {}
         self.joined = 0
 
-    def extract(self, told: Callable[[float], None], token: Any) -> None:
+    def extract(self, report: Callable[[float], None], token: Any) -> None:
         """Find points; pictures of one size share a camera, if their lenses are stated alike."""
         reading = self.pycolmap.ImageReaderOptions()
         reading.camera_model = "SIMPLE_RADIAL"
@@ -268,9 +268,9 @@ class _SfmSteps:
                     cancellation_token=token,
                 )
                 done += len(names[first : first + PICTURES_PER_BATCH])
-                told(done / len(self.gathered.names))
+                report(done / len(self.gathered.names))
 
-    def match(self, told: Callable[[float], None], token: Any) -> None:
+    def match(self, report: Callable[[float], None], token: Any) -> None:
         """Find which points of two pictures are one, and check that by epipolar geometry."""
         matching = self.pycolmap.FeatureMatchingOptions()
         matching.num_threads, matching.use_gpu = usable_cores(), False
@@ -293,10 +293,10 @@ class _SfmSteps:
                 device=self.pycolmap.Device.cpu,
                 cancellation_token=token,
             )
-            told(min((first + PAIRS_PER_BATCH) / len(pairs), 1.0))
+            report(min((first + PAIRS_PER_BATCH) / len(pairs), 1.0))
         self.joined = _joined_pictures(self.pycolmap, self.database, self.least)
 
-    def place(self, told: Callable[[float], None], token: Any) -> None:
+    def place(self, report: Callable[[float], None], token: Any) -> None:
         """Place cameras one after the other, in groups that share points."""
         options = self.pycolmap.IncrementalPipelineOptions()
         options.num_threads, options.random_seed, options.min_model_size = usable_cores(), 0, 3
@@ -318,7 +318,7 @@ class _SfmSteps:
             self.images,
             self.out / "models",
             options,
-            next_image_callback=lambda: told(min(next(placed) / total, 1.0)),
+            next_image_callback=lambda: report(min(next(placed) / total, 1.0)),
             cancellation_token=token,
         )
 

@@ -112,16 +112,16 @@ def move_to_agreement(
     asked = np.flatnonzero(movable)[:: max(1, int(VERTICES_PER_SAMPLE * fine))]
     for farthest in MAX_OFFSETS_PX:
         normals = smoothed_normals(mesh, mean, fine)
-        told = _ask_offsets(mesh, normals, asked, pictures, farthest, pool)
+        found = _ask_offsets(mesh, normals, asked, pictures, farthest, pool)
         # Where places that vertices tell lie above the smoothed surface [px].
         above = ((mesh.vertices - _neighbour_means(mesh.vertices, mean, along)) * normals).sum(axis=1)
         above /= pictures.pixel
-        face, belief = _face_height(above, asked, told, mean, along)
+        face, belief = _face_height(above, asked, found, mean, along)
         move = np.where(movable, belief * np.clip(face - above, -MAX_ROUND_MOVE_PX, MAX_ROUND_MOVE_PX), 0)
         vertices = mesh.vertices + pictures.pixel * move[:, None] * normals
         vertices[lies, 2] = floor
         _fill_unknown_vertices(
-            vertices, movable & (belief > MIN_FILL_BELIEF) & ~_knowing_vertices(asked, told, movable), mean
+            vertices, movable & (belief > MIN_FILL_BELIEF) & ~_knowing_vertices(asked, found, movable), mean
         )
         mesh = smooth_taubin(Mesh(vertices, mesh.triangles), floor, 2, mean)
     return AgreedSurface(mesh, np.where(movable, belief, 0))
@@ -197,13 +197,13 @@ def _curve_peaks(curves: Float32[np.ndarray, "A K"], offsets: Float[np.ndarray, 
 
 
 def _face_height(
-    above: Float[np.ndarray, " N"], asked: Int[np.ndarray, " A"], told: _VertexOffsets, mean: csr_array, along: int
+    above: Float[np.ndarray, " N"], asked: Int[np.ndarray, " A"], found: _VertexOffsets, mean: csr_array, along: int
 ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """Return how high over the smoothed surface vertices about each see a face [px], and confidence."""
-    place, count = above[asked] + told.offset, len(above)
+    place, count = above[asked] + found.offset, len(above)
     sums = np.zeros((count, 5))
-    columns = np.ones(len(asked)), told.weight > 0, told.weight
-    sums[asked] = np.stack([*columns, told.weight * place, told.weight * place**2], axis=1)
+    columns = np.ones(len(asked)), found.weight > 0, found.weight
+    sums[asked] = np.stack([*columns, found.weight * place, found.weight * place**2], axis=1)
     every, knows, weight, first, second = _neighbour_means(sums, mean, along).T
     weight = np.maximum(weight, TINY_LENGTH)
     face = first / weight
@@ -214,11 +214,11 @@ def _face_height(
 
 
 def _knowing_vertices(
-    asked: Int[np.ndarray, " A"], told: _VertexOffsets, movable: Bool[np.ndarray, " N"]
+    asked: Int[np.ndarray, " A"], found: _VertexOffsets, movable: Bool[np.ndarray, " N"]
 ) -> Bool[np.ndarray, " N"]:
     """Return which vertices know where the face is, or were not asked."""
     out = np.ones(len(movable), bool)
-    out[asked] = told.weight > 0
+    out[asked] = found.weight > 0
     return out
 
 

@@ -98,11 +98,11 @@ def measure_detectability(
         controls: Control → its name among the conditions.
 
     """
-    told = {(f.scene, f.condition): f for f in videos}
+    by_condition = {(f.scene, f.condition): f for f in videos}
     scenes = sorted({f.scene for f in videos if f.condition == reference})
     rows = []
     for control, name in controls.items():
-        pairs = [(told[s, name], told[s, reference]) for s in scenes if (s, name) in told]
+        pairs = [(by_condition[s, name], by_condition[s, reference]) for s in scenes if (s, name) in by_condition]
         for question in (*(q.id for q in question_catalogue().question), WHOLE_MARK):
             both = [
                 (question_alarm(a, question), question_alarm(b, question))

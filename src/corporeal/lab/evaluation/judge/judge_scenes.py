@@ -151,7 +151,7 @@ def _gather_scene(
         return
     library = run_pipeline.read_run_request(scene.runs[REFERENCE_METHOD]).settings.ground.library
     videos.groups[scene.name] = scene_groups(reference, library)
-    staging, told = stage_scene(reference), scene_facts(reference.prepared)
+    staging, facts = stage_scene(reference), scene_facts(reference.prepared)
     shown = {REFERENCE_METHOD: motion_of_run(reference), **_methods(scene, videos)}
     if with_controls:
         limit = _yardstick(scene, reference, staging).limit
@@ -164,7 +164,7 @@ def _gather_scene(
                 bound = shown[REFERENCE_METHOD] if same else None
                 shown[control_name(control)] = replace(video, bound_as=bound)
     videos.asked.extend(
-        VideoQuestion(scene.name, condition, look, video_question(video, staging, told, look))
+        VideoQuestion(scene.name, condition, look, video_question(video, staging, facts, look))
         for condition, video in shown.items()
         for look in range(config.looks)
     )

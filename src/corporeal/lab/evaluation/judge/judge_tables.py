@@ -105,8 +105,8 @@ def judge_tables(judged: JudgeVerdicts, result: JudgeResult) -> list[ResultTable
 
 def _laws(result: JudgeResult) -> ResultTable:
     rows = [
-        (law, CANNOT_TELL_TEXT if not told else f"trusted by: {', '.join(told)}", f"{alarms:.0%}")
-        for law, told in result.believed.items()
+        (law, CANNOT_TELL_TEXT if not judges else f"trusted by: {', '.join(judges)}", f"{alarms:.0%}")
+        for law, judges in result.believed.items()
         for alarms in [result.false_alarms[law]]
     ]
     return ResultTable("What this judge can tell", ("law of physics", "", "alarms on references"), rows)
@@ -123,7 +123,7 @@ def _controls(judged: JudgeVerdicts, result: JudgeResult) -> ResultTable:
             continue
         rows += [_telling_row(r) for r in result.rows if r.control == control.id and _worth(r)]
     heads = ("control", "question", "scenes", "hits", "false alarms", "accuracy, 90 %", "")
-    return ResultTable("Controls (* meant to be told by this question)", heads, rows)
+    return ResultTable("Controls (* meant to be found by this question)", heads, rows)
 
 
 def _worth(row: Detectability) -> bool:

@@ -46,13 +46,13 @@ def motion_digest(video: VideoMotion, staging: Staging) -> str:
     return hashlib.sha256(np.clip(whole, -1e9, 1e9).astype(np.int64).tobytes()).hexdigest()[:12]
 
 
-def video_question(video: VideoMotion, staging: Staging, told: str, look: int) -> Question:
+def video_question(video: VideoMotion, staging: Staging, scene_text: str, look: int) -> Question:
     """Ask about one video.
 
     Args:
         video: What is shown.
         staging: When and from where.
-        told: Facts of the scene: ``prompt_context.scene_facts``.
+        scene_text: Facts of the scene: ``prompt_context.scene_facts``.
         look: From which side; also decides the order of the questions.
 
     """
@@ -60,12 +60,12 @@ def video_question(video: VideoMotion, staging: Staging, told: str, look: int) -
     places = question_order(name, look)
     return Question(
         task=DYNAMICS_TASK,
-        prompt=prompt_text(told, places),
+        prompt=prompt_text(scene_text, places),
         scene=name,
         views=pictures_description(look),
         pictures=OnDemandPictures(lambda: judge_pictures(video, staging, look)),
         prompt_version=_template().version,
-        facts={"told": told, "questions": " ".join(question_catalogue().question[k].id for k in places)},
+        facts={"told": scene_text, "questions": " ".join(question_catalogue().question[k].id for k in places)},
     )
 
 
@@ -76,11 +76,11 @@ def question_order(name: str, look: int) -> list[int]:
     return dice.permutation(len(question_catalogue().question)).tolist()
 
 
-def prompt_text(told: str, places: list[int]) -> str:
+def prompt_text(scene_text: str, places: list[int]) -> str:
     """Write the prompt."""
     asked = [question_catalogue().question[k] for k in places]
     text = _template().text.replace("{count}", str(PICTURES_PER_LOOK)).replace("{dated}", str(DATED_PICTURES))
-    text = text.replace("{close}", str(CLOSE_UP_PICTURES)).replace("{facts}", told)
+    text = text.replace("{close}", str(CLOSE_UP_PICTURES)).replace("{facts}", scene_text)
     return text.replace("{questions}", "\n".join(f"- {q.id}: {q.text}" for q in asked))
 
 
