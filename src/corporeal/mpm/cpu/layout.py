@@ -112,7 +112,7 @@ FIELDS_IN_BLOCK = 12
 """Fields that may meet in one block of nodes."""
 PAIR_COLUMNS = 17
 """Columns of a pair of fields in a step: its part in a round of impacts, normal sum, weighted place (3), spare; in such
-a round those of ``Backing`` in backing.h."""
+a round those of ``ImpactSupport`` in impact_support.h."""
 
 
 def cpp_layout_numbers() -> str:
@@ -363,7 +363,7 @@ CONTACT_STAGE_RECORD = NativeRecord(
     ("Past *", "past"),
     ("int *", "slot"),  # place of each past contact, by its key; slots: a power of two
     ("double *", "pair"),  # [fields and planes][fields and planes][PAIR]
-    ("double *", "light"),  # inverse masses of fields and planes, as in ``Backing``
+    ("double *", "light"),  # inverse masses of fields and planes, as in ``ImpactSupport``
     ("int *", "order"),
     ("Lean *", "lean"),
     ("Choice *", "choice kept"),  # of this step, and of the last one

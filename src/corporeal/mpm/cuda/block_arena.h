@@ -26,7 +26,7 @@ struct Arena {
     return (int *)(given + ARENA_SUMS * ARENA_NODES);
 #endif
   }
-  // Put a number in a place, and give what was there.
+  // Exchange the number at a place.
   CUDA_CALLABLE static MPM_INLINE int exchange(int *place, int number) {
 #if defined(__CUDA_ARCH__)
     return atomicExch(place, number);
@@ -54,7 +54,7 @@ struct Arena {
   CUDA_CALLABLE static MPM_INLINE int node(const int *near, int home, int k) {
     return node(near, home, k / (ARENA_SIDE * ARENA_SIDE), k / ARENA_SIDE % ARENA_SIDE, k % ARENA_SIDE);
   }
-  // Where a node's sums stand: those of one kind side by side for a whole block.
+  // Index of a node's sums: those of one kind side by side for a whole block.
   CUDA_CALLABLE static MPM_INLINE int sum(int node, int kind) {
     return NODES_OF_BLOCK * (ARENA_SUMS * (node / NODES_OF_BLOCK) + kind) + node % NODES_OF_BLOCK;
   }
@@ -69,7 +69,7 @@ struct Reach {
   }
 };
 
-// What a particle gives: mass, and momentum and impulse at its first node and more a node along each axis.
+// Contribution of a particle: mass, and momentum and impulse at its first node and more a node along each axis.
 struct Gift {
   float mass, first[6], more[3][6];
   // B, S: gradients of momentum and impulse, a cell.
@@ -85,7 +85,7 @@ struct Gift {
       }
     }
   }
-  // Give all nodes their parts. Place: which number of the arena, or of all nodes, is whose sum.
+  // Add to all nodes. Place: index of a node's sums in the arena, or among all nodes.
   template <class Place> CUDA_CALLABLE MPM_INLINE void scatter(const Reach &to, float *sums, const Place &place) const {
 #pragma unroll
     for (int i = 0; i < 3; i++)
@@ -103,7 +103,7 @@ struct Gift {
   }
 };
 
-// What the particles of one cell give to a layer of nine nodes, summed in registers; layer: which along x.
+// Contribution of the particles of one cell to a layer of nine nodes, summed in registers; layer: which along x.
 struct Layer {
   static constexpr int BODY_SUMS = 9 * ARENA_SUMS;
   CUDA_CALLABLE static MPM_INLINE void add(float *sums, const Gift &gift, int layer, const float *f) {
@@ -142,7 +142,7 @@ struct Here {
   CUDA_CALLABLE MPM_INLINE int sum(int node, int kind) const { return ARENA_NODES * kind + node; }
 };
 
-// Places among all nodes, of what has strayed from its group's block.
+// Places among all nodes, for particles that strayed from their group's block.
 struct There {
   const int *near;
   int home;
@@ -150,7 +150,7 @@ struct There {
   CUDA_CALLABLE MPM_INLINE int sum(int node, int kind) const { return Arena::sum(node, kind); }
 };
 
-// What a particle receives: velocity and its gradient, now and without forces; first: of which node's motion.
+// Result for a particle: velocity and its gradient, now and without forces; first: of which node's motion.
 struct Seen {
   float v[3], L[9], u[3], K[9];
   CUDA_CALLABLE MPM_INLINE void clear() {

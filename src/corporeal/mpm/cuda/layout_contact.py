@@ -73,7 +73,7 @@ class DeviceContacts:
     apart: wp.array2d(dtype=wp.int32)
     """1: two bodies that are never in contact."""
     rounds: wp.array2d(dtype=wp.float64)
-    """Of every pair of bodies and planes in a round of impacts: ``Backing``, backing.h …"""
+    """Of every pair of bodies and planes in a round of impacts: ``ImpactSupport``, impact_support.h …"""
     lightness: wp.array(dtype=wp.float64)
     """… and inverse masses as it takes them."""
     friction: wp.array2d(dtype=wp.float64)

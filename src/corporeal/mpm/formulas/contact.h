@@ -1,4 +1,4 @@
-// Contact: where faces lie around a node, and what contacts transmit. Twins of physics/contact.py.
+// Contact: places of faces around a node, and impulses of contacts. Twins of physics/contact.py.
 // Lengths are in cells. Numbers in capitals are those of mpm/constants.py, in every header.
 #pragma once
 #include "lanes.h"
@@ -75,14 +75,14 @@ template <class R> struct Face {
     const bool like = full >= R(MIN_FILLED_FRACTION) && off < R(HALF_SPACE_TOLERANCE_DX) && off > R(-HALF_SPACE_TOLERANCE_DX);
     return h > R(WALL_REACH) && (h > R(LIQUID_WALL_REACH_DX) || !like) ? R(VAST) : gap_to_plane(a, h);
   }
-  // The same to a surface; what is deep inside of a field does not feel it.
+  // The same to a surface; none for nodes deep inside of a field.
   CUDA_CALLABLE static inline R gap_to_surface(R a, R h) {
     return h > R(WALL_REACH) ? R(VAST) : gap_to_plane(a, h);
   }
-  // The same to what is thin: its surface is exact, and the field a lattice.
+  // The same to a thin body: its surface is exact, and the field a lattice.
   CUDA_CALLABLE static inline R gap_to_thin(R a, R h) { return h > R(WALL_REACH) ? R(VAST) : lattice(h) - a; }
 };
-// Where two rigid bodies touch that meet at a node: in both of them. Twin of contact.touched. R: of the table.
+// Where two rigid bodies touch that meet at a node: in both of them. Twin of contact.touching_offset. R: of the table.
 template <class R> struct Touched {
   // How far it is along the plane of contact, and which way, to the edge of a body that does not reach the
   // node; 0 where it does. mean: its mean offset.
@@ -102,7 +102,7 @@ template <class R> struct Touched {
     for (int i = 0; i < 3; i++) cosine += p[i] * q[i];
     const double apart = 1.0 - cosine * cosine;
     double first = far >= other ? far : 0.0, second = far >= other ? 0.0 : other;
-    if (far * cosine < other && other * cosine < far) {   // neither edge is all that counts
+    if (far * cosine < other && other * cosine < far) {   // neither edge alone decides
       first = apart > PARALLEL_EDGE_SINE2 ? (far - other * cosine) / apart : 0.5 * far;
       second = apart > PARALLEL_EDGE_SINE2 ? (other - far * cosine) / apart : 0.5 * other;
     }
@@ -125,7 +125,7 @@ struct Keep {
     return n;
   }
 };
-// In which order contacts are swept: number k is k times the stride, modulo their number.
+// Order in which contacts are swept: number k is k times the stride, modulo their number.
 struct Scatter {
   CUDA_CALLABLE static inline int stride(int count) {
     int step = (int)(SWEEP_STRIDE_FRACTION * count);
@@ -144,7 +144,7 @@ struct Scatter {
 };
 // Newton's law of restitution where a rigid body meets another or a plane. Speeds along n [m/s], the
 // one that may rebound leaves out what forces added in this step and is never more than there is. A body
-// that rolls on its surface points meets the next one at up to its spin times their distance: feigned.
+// that rolls on its surface points meets the next one at up to its spin times their distance: not counted.
 struct Impact {
   CUDA_CALLABLE static inline double approach(double speed, double kick, double feigned) {
     const double all = kick > 0 ? speed - kick : speed;
@@ -176,7 +176,7 @@ struct Impact {
 struct FlowCurve {
   double yield, drag, index;
 };
-// What a liquid that sticks bears on a wall: twin of physics/wall_stress.py. Herschel and Bulkley's flow curve
+// Shear stress of a sticking liquid on a wall: twin of physics/wall_stress.py. Herschel and Bulkley's flow curve
 // tau = yield + K (u/d)^n of a layer d = WALL_LAYER_DX dx thick whose other side slips by u.
 struct WallStress {
   // Area of the wall times time [m^2 s] that acts on a node of mass m, h cells over the wall: its spline's

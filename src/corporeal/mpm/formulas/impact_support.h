@@ -1,12 +1,13 @@
-// What holds a rigid body from behind while it is struck: twin of physics/backing.py. A light body between
+// Support of a rigid body during an impact: twin of physics/impact_support.py. A light body between
 // what strikes it and what it lies on is squeezed at once, both contacts being springs in series.
 #pragma once
 #include "contact.h"
 namespace mpm {
 namespace {
 // Of every pair of bodies, or body and plane, one row: its part in this round of impacts, its restitution in
-// it, the least gap of its contacts, the approach speed of the impact, and of those that are near how many there are, the sums of place, squared place and normal.
-struct Backing {
+// it, the least gap of its contacts, the approach speed of the impact, and of the near ones their number and
+// the sums of place, squared place and normal.
+struct ImpactSupport {
   enum { ROLE, BOUNCE, LEAST, SPEED, COUNT, PLACE, SQUARE = 8, NORMAL = 14, ROW = 17 };
   enum { RESTITUTION_LAW_NUMBERS = 5 };   // numbers of Impact::bounce
   enum { WAITS, STRUCK, HELD };
@@ -37,7 +38,7 @@ struct Backing {
     }
     return sqrt(2 * (all > along ? all - along : 0.0) + dx * dx);
   }
-  // How stiff a contact behind is, as the radius of a punch that is as stiff: what is thin and lies on its face
+  // Stiffness of a contact behind, as the radius of an equally stiff punch: what is thin and lies on its face
   // is pressed as a layer, E pi a^2/h, h being its thickness from the contact before it along u.
   CUDA_CALLABLE static inline double reach(const double *row, const double *front, const double *u, double dx) {
     const double a = radius(row, dx);
@@ -47,7 +48,7 @@ struct Backing {
     const double layer = LAYER_STIFFNESS_FACTOR * (a * a - dx * dx) / (thick > TINY_DOUBLE ? thick : TINY_DOUBLE);
     return layer > a ? layer : a;
   }
-  // Whether what lies between, of this mass, swings much faster than the impact lasts: k is the stiffness of the
+  // Whether the vibration of the body between, of this mass, is much shorter than the impact: k is the stiffness of the
   // contact behind over that of the impact; from, to: inverse masses of what strikes and of what is behind.
   CUDA_CALLABLE static inline bool quick(double k, double mass, double from, double to) {
     return k * (1 / mass + to) + 1 / mass > SUPPORT_FREQUENCY_RATIO2 * (from + to / (1 + mass * to));
@@ -60,7 +61,7 @@ struct Backing {
     const double cosine = (n[0] * u[0] + n[1] * u[1] + n[2] * u[2]) / (size > TINY_DOUBLE ? size : TINY_DOUBLE);
     return forward ? cosine : -cosine;
   }
-  // Hold what body b, struck along u, rests on, and what that rests on in turn. soft, kept: compliance of what
+  // Mark the supports of body b, struck along u, and their supports in turn. soft, kept: compliance of what
   // is pressed, over that of the impact, and the part of the energy in it that comes back.
   CUDA_CALLABLE static inline void follow(double *rows, const double *e, const double *light, int all, int from,
                                           int b, const double *u, const double *struck, double dx, double &soft, double &kept) {
@@ -88,8 +89,9 @@ struct Backing {
       b = next;
     }
   }
-  // Say of all pairs that are struck what they rebound with, and which others hold them. light: inverse masses,
-  // of planes and what moves as told 0, of what is no rigid body -1; e: restitution of all pairs; law: how it changes with speed.
+  // Find for all struck pairs their restitution, and which other pairs support them. light: inverse masses,
+  // 0 of planes and of prescribed motion, -1 of what is no rigid body; e: restitution of all pairs; law: its
+  // change with speed.
   CUDA_CALLABLE static inline void hold(double *rows, const double *e, const double *law, const double *light,
                                         int all, double dx) {
     for (int a = 0; a < all; a++)

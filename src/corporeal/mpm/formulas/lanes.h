@@ -9,8 +9,8 @@
 #define MPM_INLINE __attribute__((always_inline)) inline
 #endif
 namespace mpm {
-// Unnamed in every header: what only one module sees is inlined as if it stood there, and which
-// products are fused with sums, so the last bit of results, hangs on that.
+// Unnamed in every header: functions of internal linkage are inlined in each module, and which
+// products are fused with sums, so the last bit of results, depends on that.
 namespace {
 template <class R> struct Lanes;
 

@@ -1,5 +1,5 @@
 // Constitutive laws of both fast engines: the twins of mpm/laws, in float32, as templates on the
-// width. A law is a struct Rule<NUMBER, R>; who chooses among them is written from the menu of
+// width. A law is a struct Rule<NUMBER, R>; the dispatch is generated from the menu of
 // mpm/laws, which the preamble gives as the enum Law and as lists:
 //   MPM_ELASTIC(X)  laws whose stress follows from b - 1: Rule has stress and energy;
 //   MPM_PLASTIC(X)  laws with a return map on the logarithmic strain of HENCKY: Rule has flow;
@@ -264,13 +264,13 @@ template <class R> struct Strain {
     for (int k = 0; k < 9; k++) H[k] = G[k];
   }
 };
-// Whether a law has a return map: its particles remember more than F - 1.
+// Whether a law has a return map: its particles store more than F - 1.
 CUDA_CALLABLE inline bool remembers(int law) {
 #define MPM_REMEMBERS(NUMBER) || law == NUMBER
   return false MPM_PLASTIC(MPM_REMEMBERS);
 #undef MPM_REMEMBERS
 }
-// Whether a law takes any shape: its particles' whole motion is of no use.
+// Whether a law takes any shape: its particles' deformation is not stored.
 CUDA_CALLABLE inline bool liquid(int law) {
 #define MPM_POURS(NUMBER) || law == NUMBER
   return false MPM_LIQUID(MPM_POURS);
@@ -280,7 +280,7 @@ CUDA_CALLABLE inline bool liquid(int law) {
 template <class R> struct Material {
   R law, mu, lambda, yield, hard, cone, apex, drag, index;
 };
-// What a law makes of a trial strain.
+// Result of a law at a trial strain.
 template <class R> struct Response {
   R tau[6];            // Kirchhoff stress after the return map [Pa]: 00 01 02 11 12 22
   R wave;              // bound on rho c^2 at this strain [Pa]
@@ -289,7 +289,7 @@ template <class R> struct Response {
   R opened;            // volume correction of granular matter after the return map
   R work;              // plastic work per rest volume [J/m^3]
 };
-// A law: what stands below under its number.
+// A law: specialised below by its number.
 template <int NUMBER, class R> struct Rule;
 template <class R> struct Rule<COROTATED, R> {
   typedef Lanes<R> S;
@@ -406,7 +406,7 @@ template <class R> struct Rule<HENCKY, R> : Logarithmic<R> {
 template <class R> struct Rule<DRUCKER_PRAGER, R> {
   typedef Lanes<R> S;
   typedef typename S::Mask M;
-  // Strain to the cone; gives what it changed by, the slip, the volume correction, and the plastic
+  // Return strain to the cone; gives the change, the slip, the volume correction, and the plastic
   // work per rest volume with the stress after the return.
   CUDA_CALLABLE static inline R flow(const Material<R> &t, R, R *e, R *moved, R &change, R &vc) {
     R zero = S::all(0.0f), h[6], tr = e[0] + e[3] + e[5] + vc, start = tr * (1.0f / 3.0f);
@@ -418,7 +418,7 @@ template <class R> struct Rule<DRUCKER_PRAGER, R> {
     scale = S::pick(apex, zero, scale);
     mean = S::pick(apex, t.apex * (1.0f / 3.0f), mean);
     R after = 3.0f * mean;
-    // Beyond the apex what was open before is no new slip: only the change is.
+    // Beyond the apex only the change of volume is new slip.
     R opened = S::pick(apex, vc, zero), gone = start - mean - opened * (1.0f / 3.0f);
     R work = 2.0f * t.mu * (scale * (1.0f - scale) * n * n + after * gone) +
               3.0f * t.lambda * after * gone;
@@ -435,7 +435,7 @@ template <class R> struct Rule<DRUCKER_PRAGER, R> {
 };
 template <class R> struct Rule<VON_MISES, R> {
   typedef Lanes<R> S;
-  // Strain to the cylinder: the same.
+  // Return strain to the cylinder: the same.
   CUDA_CALLABLE static inline R flow(const Material<R> &t, R ep, R *e, R *moved, R &change, R &) {
     R h[6], n = Sym<R>::deviator(e, (e[0] + e[3] + e[5]) * (1.0f / 3.0f), h);
     R dg = (2.0f * t.mu * n - ROOT_2_3 * (t.yield + t.hard * ep)) /
@@ -469,7 +469,7 @@ template <class R> struct Rule<FLUID, R> {
     }
     return S::pick(bent, D, plain);
   }
-  // Strain to what the law bears at its rate: the same.
+  // Return strain to the flow curve at its rate: the same.
   CUDA_CALLABLE static inline R flow(const Material<R> &t, R, R *e, R *moved, R &change, R &) {
     R h[6], n = Sym<R>::deviator(e, (e[0] + e[3] + e[5]) * (1.0f / 3.0f), h);
     R gone = 0.70710678f * slip(t, 1.41421356f * t.mu * n - 0.57735027f * t.yield);
@@ -482,13 +482,13 @@ template <class R> struct Rule<FLUID, R> {
     return 2.0f * t.mu * n * (1.0f - less) * gone;
   }
 };
-// Who chooses among them: nothing below knows a law but Hencky's.
+// Dispatch: nothing below depends on a law but Hencky's.
 // The law of each lane, on E = b - 1, exact for small strains.
 template <class R> struct Laws {
   typedef Lanes<R> S;
   typedef typename S::Mask M;
   CUDA_CALLABLE static inline M is(const Material<R> &t, Law law) { return t.law == (float)law; }
-  // Lanes whose law has a return map: what they remember besides is EP, VC and TM.
+  // Lanes whose law has a return map: they also store EP, VC and TM.
   CUDA_CALLABLE static inline M flows(const Material<R> &t) {
 #define MPM_FLOWS(NUMBER) | is(t, NUMBER)
     return S::bits(S::all(0.0f)) MPM_PLASTIC(MPM_FLOWS);

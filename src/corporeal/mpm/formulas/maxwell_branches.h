@@ -1,4 +1,4 @@
-// Maxwell branches: strain that is forgotten. Twin of physics/branches.py.
+// Maxwell branches: strain that relaxes. Twin of physics/maxwell_branches.py.
 #pragma once
 #include "lanes.h"
 namespace mpm {

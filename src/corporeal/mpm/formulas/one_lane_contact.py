@@ -231,28 +231,28 @@ def impact_target(
     3,
     4,
 )
-"""Columns of ``Backing`` in backing.h: how many, and some of them; from BACKING_SUMS on sums."""
+"""Columns of ``ImpactSupport`` in impact_support.h: how many, and some of them; from BACKING_SUMS on sums."""
 STRUCK_PAIR, HELD_PAIR = 1, 2
 """What its role may be, where it is not 0: waiting."""
 SupportSums = wp.types.vector(length=SUPPORT_ROW - SUPPORT_SUMS, dtype=wp.float64)
 
 
-@wp.func_native("return mpm::Backing::near(gap, least, speed, dx);")
+@wp.func_native("return mpm::ImpactSupport::near(gap, least, speed, dx);")
 def support_near(gap: wp.float64, least: wp.float64, speed: wp.float64, dx: wp.float64) -> bool: ...
 
 
 @wp.func_native(f"""
-  static_assert(mpm::Backing::ROW == {SUPPORT_ROW} && mpm::Backing::COUNT == {SUPPORT_SUMS} &&
-                mpm::Backing::STRUCK == {STRUCK_PAIR} && mpm::Backing::HELD == {HELD_PAIR}, "");
+  static_assert(mpm::ImpactSupport::ROW == {SUPPORT_ROW} && mpm::ImpactSupport::COUNT == {SUPPORT_SUMS} &&
+                mpm::ImpactSupport::STRUCK == {STRUCK_PAIR} && mpm::ImpactSupport::HELD == {HELD_PAIR}, "");
   wp::vec_t<{SUPPORT_ROW - SUPPORT_SUMS}, wp::float64> sums;
-  mpm::Backing::adds(&x.c[0], &n.c[0], &sums.c[0]);
+  mpm::ImpactSupport::adds(&x.c[0], &n.c[0], &sums.c[0]);
   return sums;
 """)
 def support_adds(x: wp.vec3d, n: wp.vec3d) -> SupportSums: ...
 
 
 @wp.func_native("""
-  mpm::Backing::hold((double *)rows.data, (const double *)restitution.data,
+  mpm::ImpactSupport::hold((double *)rows.data, (const double *)restitution.data,
                      (const double *)laws.data, (const double *)light.data, light.shape[0], dx);
 """)
 def support_hold(
@@ -264,12 +264,12 @@ def support_hold(
 ): ...
 
 
-@wp.func_native("return mpm::Backing::held(gap, dt, dx);")
+@wp.func_native("return mpm::ImpactSupport::held(gap, dt, dx);")
 def supported_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float64: ...
 
 
 @wp.func_native("""
-  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::RESTITUTION_LAW_NUMBERS * pair, speed);
+  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::ImpactSupport::RESTITUTION_LAW_NUMBERS * pair, speed);
 """)
 def restitution_at_speed(
     e: wp.float64, laws: wp.array2d(dtype=wp.float64), pair: int, speed: wp.float64

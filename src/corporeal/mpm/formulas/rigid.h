@@ -21,7 +21,7 @@ struct Vec {
     c[1] = y;
     c[2] = z;
   }
-  // a/|a|; nothing stays nothing. Returns |a|.
+  // a/|a|; zero stays zero. Returns |a|.
   CUDA_CALLABLE static inline double unit(double *a) {
     double l = sqrt(dot(a, a));
     for (int i = 0; i < 3; i++) a[i] = l > TINY ? a[i] / l : 0.0;
@@ -89,7 +89,7 @@ struct Body {
     return sine > MIN_ROTATION_SINE ? atan2(sine, 0.5 * (Q[0] + Q[4] + Q[8] - 1.0)) / sine : 1.0;
   }
 };
-// Prescribed motion: twin of physics/prescribed.py. A path has KEY_ROW columns a row.
+// Prescribed motion: twin of physics/prescribed_motion.py. A path has KEY_ROW columns a row.
 struct Path {
   CUDA_CALLABLE static inline void cubics(const double *c, double t, double *x) {
     for (int i = 0; i < 3; i++, c += 4) x[i] = c[0] + t * (c[1] + t * (c[2] + t * c[3]));
@@ -112,7 +112,7 @@ struct Path {
     Body::turn(row + KEY_FRAME, turn, 1.0, R);
   }
   // Velocity V, spin w and rotation Q that put a body, its centre now at x and turned by R, at the end
-  // of a step where the path says; arm: of its centre at the start from the path's first place.
+  // of a step on the path; arm: of its centre at the start from the path's first place.
   CUDA_CALLABLE static inline void follow(const double *path, int rows, const double *arm, double end,
                                           double dt, const double *x, const double *R, double *V,
                                           double *w, double *Q) {

@@ -1,9 +1,9 @@
-// Rolling friction of one contact, in double precision at either width. Twin of physics/rolling.py.
+// Rolling friction of one contact, in double precision at either width. Twin of reference/rolling_contacts.py.
 #pragma once
 #include "rigid.h"
 namespace mpm {
 namespace {
-// One side of a contact of rigid bodies; a plane has neither mass nor inertia to give way with.
+// One side of a contact of rigid bodies; a plane has neither inverse mass nor inverse inertia.
 struct RollingSide {
   double light, inertia[9], arm[3];   // 1/M [1/kg], I^-1 [1/(kg m^2)], contact less centre [m]
 };

@@ -1,9 +1,9 @@
-// Surfaces of rigid bodies as contact sees them: points, what is round or curved, flat faces, what is wet.
+// Surfaces of rigid bodies for contact: points, round and curved surfaces, flat faces, wetted points.
 #pragma once
 #include "contact.h"
 namespace mpm {
 namespace {
-// Where the surface of a thin rigid body begins along n, seen from x: the least (p - x) . n of its points
+// Support of a thin rigid body along n at x: the least (p - x) . n of its points
 // around that line; of none, that of the point nearest to the line. What is farther behind x than a node
 // sees does not count; without any others it is VAST. Points three by three, in its frame.
 struct Surface {
@@ -63,7 +63,7 @@ struct Surface {
     return false;
   }
 };
-// A search that looks at all points.
+// A search over all points.
 struct AllShown {
   const double *points;
   int count;
@@ -77,7 +77,7 @@ struct AllShown {
   }
 };
 // How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of
-// physics/rounded_surface.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.CURVATURE_ROW.
+// physics/curved_surface.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.CURVATURE_ROW.
 struct Round {
   // Angle from the normal, no larger than that up to which a point stands for its surroundings.
   CUDA_CALLABLE static inline double bounded(double angle, double reach, double radius, bool &beyond) {
@@ -103,8 +103,8 @@ struct Round {
     return !beyond || row[9] == 0;
   }
 };
-// A surface around a point that curves along an arc and across it, outwards or inwards, and what is round
-// that meets it: twin of physics/curved.py. row: types.CURVATURE_ROW.
+// A surface around a point that curves along an arc and across it, outwards or inwards, and a round body
+// that meets it: twin of physics/curved_surface.py. row: types.CURVATURE_ROW.
 struct Curved {
   // Radius of the ball that lies under a round point, and that of the arc along which it moves.
   CUDA_CALLABLE static inline double ball(const double *row) { return row[6] > 0 ? row[6] : row[7] > 0 ? row[7] : 0.0; }
@@ -213,7 +213,7 @@ struct Curved {
     return least < 0 ? -0.5 * least / (1.0 + least * ball(round)) * square * dt : 0.0;
   }
 };
-// A flat face of a rigid body, on which what is round rolls: twin of physics/facets.py. row: normal, offset;
+// A flat face of a rigid body, on which round bodies roll: twin of physics/flat_facets.py. row: normal, offset;
 // middle and radius of its points; how far the face goes on from one; the first and last of them.
 struct Facet {
   enum { OFFSET = 3, MIDDLE = 4, AROUND = 7, REACH = 8, BEGIN = 9, END = 10 };
@@ -260,7 +260,7 @@ struct SeenFaces {
   CUDA_CALLABLE inline void outward(int k, double *out) const { Curved::turn(turn, row(k), out); }
   static CUDA_CALLABLE inline double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
   CUDA_CALLABLE inline double height(int k) const { return dot(row(k), x) - row(k)[Facet::OFFSET]; }
-  // Which face looks most along sign times n, and how much it does.
+  // Face whose normal is nearest to sign times n, and its cosine.
   CUDA_CALLABLE inline int most(const double *n, double sign, double &cosine) const {
     double d[3];
     Curved::turn_back(turn, n, d);
@@ -277,7 +277,7 @@ struct SeenFaces {
     const double along = dot(mean, n);
     return dot(mean, mean) - along * along + FACE_SCATTER_DX * FACE_SCATTER_DX;
   }
-  // Two faces that look at one another, from which n leans less than OPPOSED_FACES_COSINE, and which are farthest apart
+  // Two faces that face each other, from which n leans less than OPPOSED_FACES_COSINE, and which are farthest apart
   // by value; whether there are any.
   CUDA_CALLABLE static inline bool facing(const SeenFaces &A, const SeenFaces &C, const double *n, double dx, int &a, int &c) {
     double best = -VAST, p[3], d[3];
@@ -294,8 +294,8 @@ struct SeenFaces {
     }
     return best > -VAST;
   }
-  // Normal from a to c of the faces along which they meet, in place of a node's whose lean feigns more approach
-  // than there is: twin of facets.along_faces. u: speed of a over c.
+  // Normal from a to c of the faces along which they meet, in place of a node's whose tilt causes more approach
+  // than there is: twin of flat_facets.facet_normals. u: speed of a over c.
   CUDA_CALLABLE static inline void along(const SeenFaces &A, const SeenFaces &C, const double *u, double dx, double *n) {
     double cosine, other, p[3], q[3], found[3], square = 0;
     int a = A.most(n, 1.0, cosine), c = C.most(n, -1.0, other);
@@ -312,7 +312,7 @@ struct SeenFaces {
     for (int i = 0; i < 3; i++) n[i] = found[i] / size;
   }
 };
-// Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of
+// Where the surface of a rigid body lies for a liquid: twin of wetted_faces in physics/contact.py. Rows of
 // six: point and outward normal; X is the liquid's place, x the node.
 struct Wetted {
   double normal[3], height;
@@ -323,7 +323,7 @@ struct Wetted {
     const double a = p[0] - X[0], b = p[1] - X[1], c = p[2] - X[2];
     return a * a + b * b + c * c;
   }
-  // Whether a row may belong to another face than a known one: it looks another way, at the liquid.
+  // Whether a row may belong to another face than a known one: its normal differs and points to the liquid.
   static CUDA_CALLABLE inline bool other(const double *p, const double *X, const Wetted &known) {
     return dot(p + 3, known.normal) <= WETTED_NORMAL_COSINE && dot(X, p + 3) > dot(p, p + 3);
   }

@@ -1,7 +1,7 @@
-// Where a rigid body begins, seen from a node: a search among its surface points for mpm::Surface::begins that
-// looks at no run of points, which are near one another, where none may be the one. All in the body's frame.
+// Support of a rigid body along a normal at a node: a search among its surface points for mpm::Surface::begins that
+// skips runs of neighbouring points of which none can be the result. All in the body's frame.
 struct Runs {
-  enum { RUNS_HELD = 128 };   // more than that are looked at in the order of their place
+  enum { RUNS_HELD = 128 };   // more than that are searched in the order of their place
   const Field &F;
   const double *x, *n, around, behind;
   double along, aside;   // of a run's middle
@@ -15,7 +15,7 @@ struct Runs {
     const double at = mpm::Surface::around_line(points, (int)(run[1] - run[0]), x, n, around, behind);
     if (at < least) least = at;
   }
-  // Those around the line, first the runs that may begin first.
+  // Runs around the line, those that may begin first before the others.
   inline double first() {
     double low[RUNS_HELD], least = mpm::VAST;
     int held[RUNS_HELD], count = 0;

@@ -1,4 +1,4 @@
-// Of three candidates, the one along which two fields are farthest apart, unless one is kept.
+// Choose, of three candidate normals, that of the largest gap between two fields, unless one is cached.
 const int begun = (int)((long long)stage->junctions * index / LIST_PARTS),
           ended = (int)((long long)stage->junctions * (index + 1) / LIST_PARTS);
 for (int j = begun; j < ended; j++) {

@@ -1,5 +1,5 @@
-// Candidate normals where two fields meet: g_a - g_c, g_a and -g_c; only the one that is kept, where
-// one is.
+// Candidate normals where two fields meet: g_a - g_c, g_a and -g_c; only the cached one, where
+// there is one.
 struct Candidate {
   static inline void unit(const Side &A, const Side &C, int which, float *n) {
     double v[3];
@@ -27,7 +27,7 @@ for (int t = from; t < to; t++) {
   if (T.c < 0) continue;
   const Side &A = sides[T.a], &C = sides[T.c];
   aim.weight = A.m < C.m ? A.m : C.m;
-  // What is small against the cell has no face of its own.
+  // A body that is small against the cell has no face of its own.
   const bool point = world->field[T.fa].thin == 2, other = world->field[T.fc].thin == 2;
   for (int q = 0; q < 4; q++) {
     const bool none = q == 3 || (point != other && (q == 0 || q == (point ? 1 : 2)));

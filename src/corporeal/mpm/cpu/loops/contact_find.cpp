@@ -1,5 +1,5 @@
 // List the blocks where fields meet each other or a plane, and number what is in them. One task:
-// it looks at blocks, not at nodes, unless something is there.
+// it reads blocks, and their nodes only where fields meet.
 struct Find {
   static inline bool apart(const Field &A, const Field &B) {
     for (int i = 0; i < 3; i++)
@@ -75,7 +75,7 @@ for (int f = 0; f < fields; f++) {
   Field &F = world->field[f];
   int near[64], nears = 0, wall_of[WALLS], walls = 0;
   Around mine, other;
-  bool lone = true;         // though others are near
+  bool lone = true;         // although others are near
   if (!F.rigids) mine.all(F);
   for (int g = f + 1; g < fields && nears < 64; g++) {
     const Field &G = world->field[g];
@@ -184,8 +184,8 @@ world->parts = stage->junctions ? LIST_PARTS : 0;
 world->turns = stage->junctions ? world->rigids : 0;
 for (int k = 0; k < COLOURS; k++) {
   world->looks[k] = stage->junctions ? world->colour[k] : 0;
-  world->reaches[k] = 0;   // until somebody asks: contact_list
+  world->reaches[k] = 0;   // until contact_list counts them
 }
-// Whether all normals are chosen anew: see physics/contact.py.
+// Whether all normals are chosen anew: see normal_cache_steps in physics/contact.py.
 stage->anew = world->clock->count % mpm::Keep::steps(world->clock->speed * dt * inv) == 0;
 Kept::enter(stage);

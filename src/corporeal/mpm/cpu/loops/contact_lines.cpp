@@ -74,7 +74,7 @@ struct List {
     hit(R.c, R.mc, R.rc, d, 1.0);
     return sqrt(Vec::dot(d, d)) * R.inverse;
   }
-  // Begin with the force of the last step, as far as it still pushes.
+  // Start from the force of the last step where it is still compressive (warm start).
   static inline void remember(Line &R, const double *force, double dt) {
     double jn = Vec::dot(force, R.n) * dt, t[3];
     if (jn <= 0) return;
@@ -120,12 +120,12 @@ struct List {
     at_once(lines, n);
     return most_sweeps;
   }
-  // Whether a rigid body meets one there that moves as told.
+  // Whether a rigid body meets one of prescribed motion there.
   static inline bool guided(const Line &R) {
     return !R.waits && R.ma < 0 && R.c && R.mc < 0 && (R.a[INVERSE_MASS] == 0 || R.c[INVERSE_MASS] == 0);
   }
-  // What moves as told may leave no room between: then sweeps do not come to rest, and end as the last
-  // contacts have it. All contacts at once give what is in between the same from all sides.
+  // Bodies of prescribed motion may leave no room between: then sweeps do not converge, and end as the last
+  // contacts have it. Solved all at once, contacts press what is in between equally from all sides.
   MPM_RARE static void at_once(Line *lines, int n) {
     bool any = false;
     for (int i = 0; i < n && !any; i++) any = guided(lines[i]);
@@ -138,7 +138,7 @@ struct List {
           for (int d = 0; d < 3; d++) R.change[d] = -R.J[d];
           relax(R, u);
           for (int d = 0; d < 3; d++) R.change[d] += R.J[d];
-          hit(R.a, R.ma, R.ra, R.change, 1.0);   // and back: the others start from the same motion
+          hit(R.a, R.ma, R.ra, R.change, 1.0);   // and back: the other contacts start from the same motion
           hit(R.c, R.mc, R.rc, R.change, -1.0);
           count += Vec::dot(R.change, R.change) > 0;
         }

@@ -1,4 +1,4 @@
-// Write down the nodes of some blocks, the fields there and their possible contacts.
+// List the nodes of some blocks, the fields there and their possible contacts.
 int from = (int)((long long)stage->junctions * index / LIST_PARTS),
     to = (int)((long long)stage->junctions * (index + 1) / LIST_PARTS);
 bool asked = false;

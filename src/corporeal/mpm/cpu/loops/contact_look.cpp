@@ -1,4 +1,4 @@
-// Second look at the particles around listed nodes, and only them: where a field's mass lies there,
+// Second pass over the particles around listed nodes: the mean offset of a field's mass there,
 // and its outward gradient of volume. One chore: tasks of one field, each a run of blocks.
 struct Asked {              // nodes of a block's arena that are listed
   u64 layers[8];            // layer by layer, a bit for each
@@ -76,7 +76,7 @@ struct Shares {
       }
     }
   }
-  // Those of neighbours in one cell, to the rows of nodes of which one is asked for.
+  // Sum of neighbours in one cell, into the rows of nodes of which one is listed.
   inline void add(f8 *arena, const u64 *layers, int cell, int first, int end) const {
     for (int i = 0; i < 3; i++) {
       const u64 rows = layers[(cell >> 6) + i] >> (cell & 63) & 0x070707ull;

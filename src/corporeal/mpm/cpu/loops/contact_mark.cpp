@@ -1,6 +1,6 @@
-// One rigid body puts itself on the nodes of blocks that somebody else reaches: mass, mass times
+// Scatter one rigid body to the nodes of blocks that another field or a plane reaches: mass, mass times
 // offset and outward gradient of volume. Its velocity there follows from its motion.
-const int MATES = 32;     // rigid bodies near that are looked at one by one
+const int MATES = 32;     // near rigid bodies that are tested one by one
 Field &F = world->field[index];
 if (!F.rigids) return;
 const double *s = F.rigid;
@@ -158,7 +158,7 @@ for (int c = 0; c < F.clumps; c++) {
     for (int i = 0; i < 3; i++) {
       double x = (s[CENTRE + i] + Vec::dot(s + TURN + 3 * i, q)) * inv;
       base[i] = Grid::floor_int(x - 0.5);
-      double f = x - base[i];   // doubles: what is nearly nothing must not become nothing
+      double f = x - base[i];   // doubles: nearly zero must not become zero
       fr[i] = (float)f;
       double n[3], slope[3];
       mpm::Spline<double>::weights(f, n);

@@ -1,5 +1,5 @@
-// Contacts of rigid bodies on their surface points: with planes, and of what is round with flat faces of
-// others. Twin of reference/surface_points.py. Not in line: where nothing is rigid it costs 5 % of a heap.
+// Contacts of rigid bodies at their surface points: with planes, and of round bodies with flat faces of
+// others. Twin of reference/surface_point_contacts.py. Not inlined: that costs 5 % where nothing is rigid.
 struct Points {
   // Where the rounded surface around point p ends in a direction, both in the body's frame, and the gap
   // there, from that of the point itself; whether it is below reach.
@@ -106,7 +106,7 @@ struct Points {
       for (int p = 0; p < F.surfaces && count < room; p++) {
         const double *curvature = F.curvature + mpm::CURVATURE_ROW * p;
         double gap = height + Vec::dot(up, F.surface + 3 * p);
-        const double radius = curvature[6] + curvature[7];   // its middle is on this side of the face
+        const double radius = curvature[6] + curvature[7];   // its centre is on this side of the face
         if (radius <= 0 || !touching(F, p, towards, reach, gap, at) || gap <= -reach || gap <= -radius) continue;
         turn(s, at, x);
         for (int i = 0; i < 3; i++) at[i] = x[i] + apart[i];
@@ -193,7 +193,7 @@ struct Points {
       turn(s, x, y);
       T.instead = mpm::Curved::misjudged(round, row(q), w->dx);
       for (int i = 0; i < 3; i++) T.x[i] = y[i] + s[CENTRE + i], T.normal[i] = f < g ? -m[i] : m[i];
-      for (int i = 0; i < 3; i++) y[i] = T.x[i] + radius * m[i];   // the middle of what is round
+      for (int i = 0; i < 3; i++) y[i] = T.x[i] + radius * m[i];   // centre of the round body
       T.target -= mpm::Curved::inward(round, row(q), along(y, m), w->dt);
       return true;
     }
@@ -225,11 +225,11 @@ struct Points {
     }
     return count;
   }
-  // How far around a contact with a face nodes are not asked [m].
+  // Radius around a contact with a face in which contacts at nodes are ignored [m].
   static inline double instead(const World *w, const Touch &P) {
     return P.instead > 0 ? P.instead : mpm::Facet::misjudged(rolls(w, P)->rigid[RADIUS], w->dx);
   }
-  // Contacts on nodes that are those on flat and curved faces, less well known, transmit nothing.
+  // Contacts at nodes that repeat those on flat and curved faces, less accurately, transmit nothing.
   MPM_RARE static void instead_of_nodes(const World *w, Touch *touches, int nodes, int first, int all) {
     for (int q = first; q < all; q++) {
       const Touch &P = touches[q];

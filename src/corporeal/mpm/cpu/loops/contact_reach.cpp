@@ -15,7 +15,7 @@ struct Support {
     far = __builtin_elementwise_max(far, (A.fa == f ? h : -h) + reach);
   }
   static inline f4 all(float a) { return f4{a, a, a, a}; }
-  // Eight particles at one node, seen from either side. What cannot reach farther is most of them.
+  // Eight particles at one node, seen from either side. Most of them cannot reach farther.
   inline void see(Own &A, f8 x, f8 y, f8 z, i8 in) const {
     f8 h[3];
     for (int k = 0; k < 3; k++) h[k] = x * A.n[0][k] + y * A.n[1][k] + z * A.n[2][k];

@@ -1,20 +1,20 @@
-// What moves rigid bodies, in one list: contacts on nodes and, against planes, on their surface
-// points. Then the books, and rigid bodies move.
+// Contacts that move rigid bodies, in one list: at nodes and, against planes, at their surface
+// points. Then the ledger is updated and rigid bodies move.
 
 struct Rounds {
-  static_assert(PAIR_COLUMNS == Backing::ROW, "one row of a pair");
+  static_assert(PAIR_COLUMNS == ImpactSupport::ROW, "one row of a pair");
   static inline bool both_rigid(const Line &R) { return R.ma < 0 && (R.mc < 0 || !R.c); }
   // Where two rigid bodies touch that meet at a node: not beyond the edge of one of them.
   static inline void place(const World *w, const Side *sides, Touch &T, double dx) {
     double a[3], c[3], shift[3];
-    for (int i = 0; i < 3; i++) {   // what is round all over has no edges
+    for (int i = 0; i < 3; i++) {   // a body that is round all over has no edges
       a[i] = w->field[T.fa].edged ? sides[T.a].mean[i] : 0.0;
       c[i] = w->field[T.fc].edged ? sides[T.c].mean[i] : 0.0;
     }
     mpm::Touched<double>::shift(w->face, a, c, T.normal, shift);
     for (int i = 0; i < 3; i++) T.x[i] += shift[i] * dx;
   }
-  // Note the pairs that approach as things move now, and what holds them from behind; whether there are any.
+  // Find the pairs that approach now, and the bodies that support them; whether there are any.
   static inline bool find(const World *w, Stage *stage, int n, int all, double dt, double dx) {
     double *pair = stage->pair, approach;
     bool any = false;
@@ -26,30 +26,30 @@ struct Rounds {
       if (!Impact::begins(approach, speed, T.gap, dt)) continue;
       for (int k = 0; k < PAIR_COLUMNS * all * all && !any; k++) pair[k] = 0;
       double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc);
-      row[Backing::ROLE] = Backing::STRUCK;
-      row[Backing::LEAST] = mpm::VAST_DOUBLE;
-      if (approach > row[Backing::SPEED]) row[Backing::SPEED] = approach;
+      row[ImpactSupport::ROLE] = ImpactSupport::STRUCK;
+      row[ImpactSupport::LEAST] = mpm::VAST_DOUBLE;
+      if (approach > row[ImpactSupport::SPEED]) row[ImpactSupport::SPEED] = approach;
       any = true;
     }
     if (!any) return false;
     for (int i = 0; i < n; i++) {
       const Touch &T = stage->touch[stage->line[i].touch];
       double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc);
-      if (row[Backing::ROLE] == Backing::STRUCK && T.gap < row[Backing::LEAST]) row[Backing::LEAST] = T.gap;
+      if (row[ImpactSupport::ROLE] == ImpactSupport::STRUCK && T.gap < row[ImpactSupport::LEAST]) row[ImpactSupport::LEAST] = T.gap;
     }
     for (int i = 0; i < n; i++) {
       const Line &R = stage->line[i];
       const Touch &T = stage->touch[R.touch];
-      double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc), sums[Backing::ROW - Backing::COUNT];
+      double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc), sums[ImpactSupport::ROW - ImpactSupport::COUNT];
       if (!both_rigid(R)) continue;
       const double speed = List::closing(R, 0, approach);
-      if (!Backing::near(T.gap, row[Backing::LEAST], speed, dx)) continue;
-      Backing::adds(T.x, R.n, sums);
-      for (int k = Backing::COUNT; k < Backing::ROW; k++) row[k] += sums[k - Backing::COUNT];
+      if (!ImpactSupport::near(T.gap, row[ImpactSupport::LEAST], speed, dx)) continue;
+      ImpactSupport::adds(T.x, R.n, sums);
+      for (int k = ImpactSupport::COUNT; k < ImpactSupport::ROW; k++) row[k] += sums[k - ImpactSupport::COUNT];
     }
     for (int f = 0; f < all; f++)
       stage->light[f] = f >= w->fields ? 0.0 : w->field[f].rigids ? w->field[f].rigid[INVERSE_MASS] : -1.0;
-    Backing::hold(pair, w->restitution, w->restitution_law, stage->light, all, dx);
+    ImpactSupport::hold(pair, w->restitution, w->restitution_law, stage->light, all, dx);
     return true;
   }
 };
@@ -57,7 +57,7 @@ Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR_COLUMNS]
 nt += Points::on_planes(world, touches + nt);
-const int faces = nt;   // contacts of what is round with faces of others begin here
+const int faces = nt;   // contacts of round bodies with faces of others begin here
 nt += Points::on_facets(world, touches + nt, stage->most_touches - nt);
 nt += Points::on_curves(world, touches + nt, stage->most_touches - nt);
 stage->points = nt - stage->touches;
@@ -118,8 +118,8 @@ if (n) {
   for (int i = 0; i < groups; i++) place[i + 1] += place[i];
   for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;   // place: where each group ends, from now on
   List::sort(lines, order, n);
-  // Impacts of rigid bodies, one after the other: what is hit passes the impact on to what it touches.
-  // In every round the pairs that approach now rebound together, those behind hold what is light, and
+  // Impacts of rigid bodies, one after the other: a struck body passes the impact on to what it touches.
+  // In every round the pairs that approach now rebound together, those behind support light bodies, and
   // all others wait.
   int impacts = 0;
   for (; impacts < mpm::MAX_IMPACTS_PER_STEP && Rounds::find(world, stage, n, all, dt, dx); impacts++) {
@@ -129,14 +129,14 @@ if (n) {
       Line &R = lines[i];
       const Touch &T = touches[R.touch];
       const double *row = pair + PAIR_COLUMNS * (T.fa * all + T.fc);
-      R.waits = row[Backing::ROLE] == Backing::WAITS;
+      R.waits = row[ImpactSupport::ROLE] == ImpactSupport::WAITS;
       if (R.waits) continue;
       for (int d = 0; d < 3; d++) R.J[d] = 0;
-      R.target = Backing::held(T.gap, dt, dx);
-      holds |= row[Backing::ROLE] == Backing::HELD;
-      if (row[Backing::ROLE] == Backing::HELD) continue;
+      R.target = ImpactSupport::held(T.gap, dt, dx);
+      holds |= row[ImpactSupport::ROLE] == ImpactSupport::HELD;
+      if (row[ImpactSupport::ROLE] == ImpactSupport::HELD) continue;
       const double speed = List::closing(R, Points::rolls(world, T), approach);
-      R.target = Impact::target(row[Backing::BOUNCE], approach, speed, T.gap, dt, dx);
+      R.target = Impact::target(row[ImpactSupport::BOUNCE], approach, speed, T.gap, dt, dx);
     }
     const int most = holds ? mpm::SUPPORTED_IMPACT_SWEEPS : mpm::IMPACT_SWEEPS;
     List::sweep(lines, order, place, n, most, mpm::SWEEPS, mpm::IMPACT_SWEEP_TOLERANCE_DX * dx, stacked);
@@ -148,7 +148,7 @@ if (n) {
     lines[i].target = touches[lines[i].touch].target;
     for (int d = 0; d < 3; d++) lines[i].J[d] = 0;
   }
-  // Then all contacts together. Rigid bodies on one another have only each other to yield: with few
+  // Then all contacts together. Rigid bodies on one another only yield to each other: with few
   // sweeps stacks creep. So contacts begin with the forces of the last step, and sweeps end when what
   // they change would creep by less than a few thousandths of a cell per second.
   const int sweeps = impacts || stacked ? mpm::IMPACT_SWEEPS : mpm::SWEEPS;
@@ -225,7 +225,7 @@ struct Rolls {
 };
 for (int i = 0; i < n && world->rolling_resistance; i++) Rolls::brake(world, lines[i], touches[lines[i].touch], all);
 struct Books {
-  // What a contact's impulse J on a body that moves as told takes of its mover.
+  // Work that a contact's impulse J on a body of prescribed motion takes from its drive.
   static inline void react(World *w, const double *s, int body, const double *x, const double *J,
                            double sign) {
     if (s[INVERSE_MASS] != 0) return;
@@ -279,7 +279,7 @@ for (int a = 0; a < fields; a++)
       world->pair_impulse[a * bodies + c] += row[1];
       world->pair_impulse[c * bodies + a] = world->pair_impulse[a * bodies + c];
     }
-    // In the books planes come after the bodies, which share one field in the control.
+    // In the ledger planes follow the bodies, which share one field with a single velocity field.
     int name = c < fields ? c : bodies + c - fields;
     for (int side = 0; side < 2; side++) {
       int i = side ? name * world->names + a : a * world->names + name;
@@ -290,7 +290,7 @@ for (int a = 0; a < fields; a++)
       world->last_contact[i] = world->time;
     }
   }
-// Wipe the marks for the next step.
+// Clear the marks for the next step.
 for (int j = 0; j < stage->junctions; j++)
   for (int q = 0; q < junctions[j].fields; q++)
     world->field[junctions[j].field[q]].where[4 * junctions[j].block[q] + 3] = 0;

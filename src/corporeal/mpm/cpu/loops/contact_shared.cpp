@@ -1,19 +1,19 @@
-// What the contact pieces share. Their order: start, mark, find, stand, list, look, face, reach, choose,
-// solve, resolve. Same formulas as contact.py and reference/contact.py; design: physics, section 2 C to G.
+// Shared by the contact pieces. Their order: start, mark, find, stand, list, look, face, reach, choose,
+// solve, resolve. Same formulas as physics/contact.py and reference/contact.py; docs/explanation/contact.md.
 // Offsets, gaps and normals' supports are in cells; velocities, masses and impulses SI.
 const int WALLS = 32;     // planes that a block of nodes may reach
-const int ENTRIES = 8;    // entries looked back at
+const int ENTRIES = 8;    // last entries that are searched
 
 typedef float f4 __attribute__((vector_size(16), aligned(4)));
 
 typedef mpm::Face<double> Face;
-using mpm::Backing;
+using mpm::ImpactSupport;
 using mpm::Coulomb;
 using mpm::Impact;
 using mpm::Scatter;
 using mpm::WallStress;
 struct Body6 {            // a rigid body's state
-  // What moves as told keeps the spin that it was given.
+  // A body of prescribed motion keeps its given spin.
   static inline void spin_up(double *s) {
     if (s[INVERSE_MASS] == 0) return;
     mpm::Body::inverse_inertia(s + TURN, s + REST_INVERSE_INERTIA, s + INERTIA);
@@ -207,7 +207,7 @@ struct Kept {
     stage->choice = free;
     stage->kepts = stage->choices;
   }
-  // Let them be found, or none if all are made anew.
+  // Build their lookup table, empty if all are chosen anew.
   static inline void enter(Stage *stage) {
     if (stage->anew) stage->kepts = 0;
     if (!stage->kepts) return;

@@ -58,7 +58,7 @@ struct Solver {
     inside(F, x, x, seen.x, d);
     return seen;
   }
-  // Where two bodies of flat faces meet and a node leans and so feigns an approach, its normal is that of faces.
+  // Where bodies of flat faces meet and the tilt of a node's normal causes a false approach, take that of the faces.
   static inline void along_faces(const World *w, const Side *sides, Touch &T) {
     double u[3], v[3];
     Body6::velocity(w->field[T.fa].rigid, T.x, u);
@@ -89,11 +89,11 @@ struct Solver {
     if (h > mpm::LIQUID_WALL_REACH_DX || Face::gap_to_plane(mean, h) >= mpm::LIQUID_TOUCH_DX) return 0.0;
     return WallStress::span(S.m, w->field[S.field].full, h, w->dx, w->dt);
   }
-  // Whether a liquid meets a rigid body that says where liquids touch it.
+  // Whether a liquid meets a rigid body with wetted points.
   static inline bool liquid(const Field &F, const Field &G) {
     return (F.patches && G.pours) || (G.patches && F.pours);
   }
-  // Which of eight points that liquids touch are as near to X as that: bits.
+  // Which of eight wetted points are as near to X as that: bits.
   static inline int close(const Field &F, int start, const double *X, double reach) {
     const float limit = (float)(reach * reach);
     f8 d = mpm::Lanes<f8>::all(0.0f);
@@ -154,7 +154,7 @@ struct Solver {
     Runs runs = {F, q, d, mpm::SURFACE_SEARCH_RADIUS_DX * w->dx, mpm::NODE_SIGHT_DX * w->dx, 0, 0};
     return mpm::Surface::begins(runs) * (scale < 0 ? -scale : scale);
   }
-  // Relative velocity as the step began, before its forces: what friction's work is booked with.
+  // Relative velocity at the begin of the step, before its forces: friction's work in the ledger is computed with it.
   static inline void before(const World *w, const Side *sides, const Touch &T, double *u) {
     for (int i = 0; i < 3; i++) u[i] = 0;
     for (int side = 0; side < (T.c < 0 ? 1 : 2); side++) {
@@ -221,7 +221,7 @@ struct Smooth {
     for (int p = 0; p < many; p++)
       for (int i = 0; i < 216; i++) grid[p][i] = f4{0, 0, 0, 0};
   }
-  // What another block's contacts add to some pairs of this one, from low on.
+  // Add another block's contacts to some pairs of this one, from low on.
   inline void add(const Junction &J, const Pairs &mine, const Junction &O, int n, int low, int many,
                   const Lean *leans) {
     const Pairs others(O);
@@ -276,7 +276,7 @@ struct Together {
     }
     count++;
   }
-  // Call what will be read soon.
+  // Prefetch what is read soon.
   static inline void ahead(const void *from, const void *to) {
     for (const char *line = (const char *)from; line < (const char *)to; line += 64) __builtin_prefetch(line, 1);
   }
@@ -304,7 +304,7 @@ struct Together {
       }
     }
   }
-  // Write it down; target: the speed, until the contact is known to be active.
+  // Store it; target: the speed, until the contact is known to be active.
   inline void give(Touch *touches, const double *table, double dx) {
     find(table);
     for (int i = 0; i < count; i++) {
@@ -377,7 +377,7 @@ if (from < to) {
         for (int d = 0; d < 3; d++) T.J[d] = 0;
         for (int d = 0; d < 3 && (T.choice < 0 || M.stiff); d++) T.x[d] = M.at[d] * dx;
         if (T.choice >= 0) {
-          nears |= T.active & (int)(T.target > 0);   // without a branch to guess
+          nears |= T.active & (int)(T.target > 0);   // without a branch
           continue;
         }
         T.active = 0;
@@ -398,7 +398,7 @@ if (from < to) {
         T.active = 1;
         nears |= Vec::dot(u, T.normal) > 0 || Solver::sticks(world, T);
       }
-      // Where nobody comes nearer nobody pushes, and then nobody is pushed.
+      // Where no contact closes none transmits anything, and no node changes.
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         Touch &T = touches[t];
         if (!nears) T.active = 0;
@@ -413,7 +413,7 @@ if (from < to) {
         T.mu = world->friction[T.fa * all + T.fc];
         if (T.choice < 0) T.gap = Solver::gap(world, sides, T, inv) * dx;
         T.span = sticks ? Solver::span(world, sides, T, sticks, high * inv) : 0.0;
-        T.active = T.gap < mpm::VAST * dx || T.span > 0;   // else no contact at all
+        T.active = T.gap < mpm::VAST * dx || T.span > 0;   // else there is no contact
         if (!T.active) continue;
         T.target = Impact::closing(T.gap, dt);
         if (sticks || high > mpm::WALL_REACH * dx) T.mu = 0.0;

@@ -1,5 +1,5 @@
-// Nodes of a field that meet nobody but the one plane it can reach: nothing to look for, one contact
-// each. The node's last lane says how high over it the field's mass lies. Tasks as in forces.cpp.
+// Nodes of a field that meet only the one plane it can reach: no search, one contact
+// each. The node's last lane has the mean height of the field's mass over it. Tasks as in forces.cpp.
 const int *task = world->list + 4 * index;
 const Field &F = world->field[task[0]];
 Entry &book = stage->stand[index];

@@ -1,4 +1,4 @@
-// Rigid bodies take this step's gravity and push, and forget where they were on the grid.
+// Apply this step's gravity and push to rigid bodies, and clear their marks on the grid.
 Field &F = world->field[index];
 if (F.rigids) {
   double *s = F.rigid;

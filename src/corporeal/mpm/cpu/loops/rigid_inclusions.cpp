@@ -1,5 +1,5 @@
 // Rigid inclusions: a frame and the soft nodes inside it are one rigid body while contact acts on it.
-// Same formulas as inclusions.py; design: physics, section 5.1.
+// Same formulas as physics/inclusions.py.
 struct Bonds {
   static inline void invert(const double *A, double *B) {
     double r[3][3];
@@ -61,7 +61,7 @@ struct Bonds {
         base[i] = (int)floor(c[i] - 0.5);
       }
       Blocks near;
-      if (!near.find(S, base)) continue;   // most points of a frame have nothing soft around
+      if (!near.find(S, base)) continue;   // most points of a frame are far from soft nodes
       float w[3][3];
       for (int i = 0; i < 3; i++) mpm::Spline<float>::weights((float)(c[i] - base[i]), w[i]);
       for (int i = 0; i < 9; i++) {

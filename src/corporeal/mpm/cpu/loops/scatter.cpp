@@ -1,6 +1,6 @@
 // One block's particles to nodes.
 struct Scatter {
-  // What a uniform acceleration of some bodies of a shared field adds to the force; its work.
+  // Force of a uniform acceleration of some bodies of a shared field; its work.
   static inline double push(const World *world, const Field &field, const float *q, f8 m, f8 *r) {
     alignas(32) float push[3][8];
     double work = 0;

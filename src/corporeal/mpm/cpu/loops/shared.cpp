@@ -1,4 +1,4 @@
-// What every native piece shares. Warp pastes each piece into a function body, so helpers are
+// Shared by every native piece. Warp pastes each piece into a function body, so helpers are
 // static members of local structs. Formulas are not written here: mpm/formulas has them; nor are numbers
 // and structs that Python knows: cpu/layout.py writes them in front.
 using mpm::f8;
@@ -57,7 +57,7 @@ struct Simd : mpm::Lanes<f8> {
       high[d] = (high[d] < 0 ? 0 : high[d] > 5 ? 5 : high[d]) + 2;
     }
   }
-  // Whether so many lanes from l on stand in one cell.
+  // Whether so many lanes from l on are in one cell.
   static inline bool together(const int *base, int l, int live) {
     if (l + TOGETHER > live) return false;
     bool same = true;
@@ -65,7 +65,7 @@ struct Simd : mpm::Lanes<f8> {
     return same;
   }
   // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
-  // place in the block's arena of 8 x 8 x 8. Who strayed is kept inside: its step counts no more.
+  // place in the block's arena of 8 x 8 x 8. A particle that strayed is kept inside: its step is discarded.
   static inline void weights(const float *q, const int *block, f8 *D, Row *W, int *base) {
     f8 w[3][3];
     const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
@@ -93,7 +93,7 @@ struct ClusterMean {
   ClusterMean() {
     for (int k = 0; k < 64; k++) sum[k] = volume[k] = 0.0f;
   }
-  // Cluster of each particle of a batch; who strayed from the block has clusters of its own.
+  // Cluster of each particle of a batch; a particle that strayed from the block has a cluster of its own.
   static inline i8 of(const float *q, const int *block) {
     i8 at = i8{0, 0, 0, 0, 0, 0, 0, 0};
     for (int d = 0; d < 3; d++) {
@@ -116,8 +116,8 @@ struct ClusterMean {
     return a;
   }
 };
-// Numbers too small for float32's full precision cost a hundred times as much as zero, and come in
-// crowds where motion dies out: they count as zero inside a piece.
+// Denormal float32 numbers cost a hundred times as much as zero, and come in
+// large numbers where motion decays: they are flushed to zero inside a piece.
 struct Flush {
 #if defined(__SSE__)
   unsigned before = __builtin_ia32_stmxcsr();

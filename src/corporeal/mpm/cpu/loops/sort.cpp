@@ -4,7 +4,7 @@ struct Stage {
   static inline i8 block(const float *q, int d) {
     return (*(const i8u *)(q + 8 * (XI + d)) - HALF_CELL_UNITS) >> (PLACE + 2);
   }
-  // Where blocks are, and whether somebody is lost.
+  // Range of blocks, and whether a particle is lost.
   static void survey(Sorting &S) {
     i8 low[3], high[3];
     for (int d = 0; d < 3; d++) low[d] = i8{} + (1 << 30), high[d] = -low[d];
@@ -110,7 +110,7 @@ struct Stage {
           w[3] = 0;
           S.table[line] = S.pool++;
         }
-    // The last is none: it stands for neighbours out of reach.
+    // The last is empty: it represents neighbours out of reach.
     const int none = S.pool++;
     for (int d = 0; d < 4; d++) S.where[4 * none + d] = 0;
     for (b = 0; b < S.blocks; b++) {
@@ -136,7 +136,7 @@ struct Stage {
   static inline int reached(const Sorting &S, int line, int k) {
     return line + ((k / 9 - 1) * S.dim[1] + k / 3 % 3 - 1) * S.dim[2] + k % 3 - 1;
   }
-  // Copy some blocks' particles; what pads a batch stands where its block's first one does.
+  // Copy some blocks' particles; padding of a batch is placed at its block's first particle.
   static void copy(const Sorting &S, int low, int high) {
     for (int b = low; b < high; b++) {
       const int *record = S.block + BLOCK_INTEGERS * b;

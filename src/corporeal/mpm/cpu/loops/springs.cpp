@@ -1,5 +1,5 @@
 // Springs, one after the other: tethers of particles to rigid bodies, joints of rigid bodies, and
-// grips from outside. Same formulas as springs.py and grips.py.
+// grips from outside. Same formulas as physics/springs.py and spring_grips.py.
 struct Spring {
   static inline void turned(const double *s, const double *r, double *out) {
     Vec::apply(s + TURN, r, out);
@@ -133,7 +133,7 @@ for (int n = 0; n < world->grips; n++) {
   Grip &G = world->grip[n];
   Field &field = world->field[G.field];
   double x[3] = {0, 0, 0}, v[3] = {0, 0, 0}, J[3], arm[3], about[3];
-  for (int turn = 0; turn < (G.rigid ? 1 : 2); turn++) {   // look at what is held, then pull
+  for (int turn = 0; turn < (G.rigid ? 1 : 2); turn++) {   // measure what is held, then pull
     if (turn == 0 && G.rigid) {
       Spring::turned(G.rigid, G.arm, arm);
       Spring::velocity(G.rigid, arm, v);

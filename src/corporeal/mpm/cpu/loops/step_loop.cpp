@@ -1,8 +1,8 @@
 // Hands one thread its next task, as piece << 24 | task, or -1 when the steps end. A phase is over when
-// its last task is done, so a thread that the system put to sleep between tasks holds nobody up.
+// its last task is done, so a thread that the system suspends between tasks delays no other.
 typedef int ReadClock(int, long long *);
 struct Conduct {
-  // The phase that ends took what passed on this thread's clock since it began.
+  // Time of the phase that ends, by this thread's clock.
   static inline void note(ThreadPool *pool) {
     long long now[2];   // seconds and nanoseconds
     ((ReadClock *)pool->read_clock)(pool->clock_id, now);

@@ -1,10 +1,10 @@
-// The end of one step and the beginning of the next: what the tasks report, how long the next step may
-// be, what gravity and pushes give in it, and whether the steps go on.
+// End of one step and beginning of the next: reports of the tasks, length of the next step,
+// velocity change by gravity and pushes in it, and whether the steps go on.
 struct Pace {
   static inline double size(const double *a) {
     return sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]);
   }
-  // Largest stable step: dt = s dx/(c + |v|), and the falls of what is rigid.
+  // Largest stable step: dt = s dx/(c + |v|), and the limit for falling rigid bodies.
   static inline double stable(const World *w, const Clock *c) {
     double limit = mpm::MAX_STEP_S, fastest = c->wave + c->speed;
     if (w->tasks) {
@@ -67,17 +67,17 @@ struct Pace {
     w->again = 0;
     kick(w, c);
     if (c->pushed) c->laid = 0;
-    // Pushes need to know the step: while there is one, particles lie down when the step begins.
+    // Pushes depend on the step: while there is one, particles are scattered when the step begins.
     c->fused = c->fuse && !c->pushed;
     w->bare_nodes = c->laid ? 0 : w->nodes;
     for (int k = 0; k < COLOURS; k++) w->bare[k] = c->laid ? 0 : w->colour[k];
   }
-  // What a step leaves of strain in a material's branches.
+  // Fractions of strain that a step leaves in a material's branches.
   static inline void relax(float *row, double dt) {
     for (int k = 0; k < mpm::BRANCHES; k++)
       mpm::Branch<float>::kept(dt, row[BRANCH_TIME + k], row[BRANCH_KEPT + k], row[BRANCH_FRESH + k]);
   }
-  // Let a body go where its path says in this step; enters what that takes, but for contacts.
+  // Move a body along its path in this step; adds the work of that, without contacts, to the ledger.
   static inline void guide(World *w, Clock *c, BodyLoad &T, int b) {
     double *s = T.rigid, V[3], spin[3], inertia[9], moment[3], work = 0;
     mpm::Path::follow(T.path, T.paths, T.arm, w->time + w->dt, w->dt, s + CENTRE, s + TURN, V, spin,
@@ -98,7 +98,7 @@ struct Pace {
       s[KICK + i] = 0;
     }
   }
-  // Velocity that gravity and pushes give in this step; enters it in the books.
+  // Velocity change by gravity and pushes in this step; adds it to the ledger.
   static inline void kick(World *w, Clock *c) {
     double start = w->time, end = start + w->dt;
     double share = mpm::Clocks::ramped(end, c->ramp) - mpm::Clocks::ramped(start, c->ramp);

@@ -1,5 +1,5 @@
 // One chore on particles: tasks of one field one after the other, each some blocks of one column. Nodes
-// give particles their motion, or particles lay the nodes of a step, or both, the second for the step
+// give particles their motion, or particles are scattered to the nodes, or both, the second for the step
 // after. Chores of one colour never overlap.
 const int *chore = world->chore + 2 * (index >> 1);
 const bool fused = world->clock->fused, bare = index & 1;
