@@ -69,7 +69,7 @@ def test_what_decides_about_rule_b_holds_one_by_one():
     assert not verdict(plain, fewer)["share inside no farther from 90 %"]
 
 
-def test_each_interval_is_told_over_the_scales():
+def test_each_interval_is_reported_over_the_scales():
     said = each(drawn(0.5, 0.5, 0.5))
     assert said.split("; ")[3] == "without, B 0.50 < 0.50 < 0.50"
     assert said.startswith("with evidence 0.50 < 0.50 < 0.50; with evidence, B ")

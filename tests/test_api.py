@@ -86,7 +86,7 @@ def test_a_scene_holds_what_was_built_where_it_was_put():
     assert made.warnings == ()
 
 
-def test_bodies_that_stand_in_each_other_are_told():
+def test_bodies_that_stand_in_each_other_are_reported():
     made = co.build_scene(co.ball("rubber", 0.1), co.ball("steel", 0.1, at=(0.1, 0, 0.1)))
     assert made.warnings == ("ball and ball_1 overlap at the start.",)
 

@@ -45,7 +45,7 @@ def test_the_pool_that_was_made_serves_again_and_another_seed_is_another_scene(t
     assert not (tmp_path / "scenes" / "scene-4" / "views").exists()
 
 
-def test_what_cannot_be_assembled_is_said_in_one_line(typed, tmp_path):
+def test_what_cannot_be_assembled_is_reported_in_one_line(typed, tmp_path):
     refused(typed("assemble", "--from", "nowhere"), "nowhere")
     refused(typed("assemble", "--from", "models", "--classes", "duck"), "box, plank")
     assert not list((tmp_path / "scenes").glob("scene-*"))

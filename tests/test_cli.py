@@ -103,7 +103,7 @@ def test_a_run_needs_a_scene(typed):
     refused(typed("run"), "scene")
 
 
-def test_a_folder_that_is_not_there_is_said_to_be_missing(typed):
+def test_a_folder_that_is_not_there_is_reported_to_be_missing(typed):
     refused(typed("status", "runs/nowhere"), "runs/nowhere is not a run", "no such folder")
 
 
@@ -162,7 +162,7 @@ def test_settings_that_cannot_be_right_are_refused_before_anything_is_done(typed
     assert not (tmp_path / "runs").exists()
 
 
-def test_a_full_disk_is_said_and_the_run_is_not_taken_for_finished(typed, tmp_path):
+def test_a_full_disk_is_reported_and_the_run_is_not_taken_for_finished(typed, tmp_path):
     write_glb(tmp_path / "box.glb", a_box())
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
@@ -194,7 +194,7 @@ def test_help_is_there_for_every_verb(typed):
         assert verb in text.out
 
 
-def test_who_is_asked_is_said_in_one_word_and_what_is_missing_in_one_line(typed, tmp_path, monkeypatch):
+def test_the_model_is_named_in_one_word_and_what_is_missing_in_one_line(typed, tmp_path, monkeypatch):
     monkeypatch.delenv("OPENAI_API_KEY", raising=False)
     write_glb(tmp_path / "box.glb", a_box())
     ask = ("run", "box.glb", "--view-size", 32, "--vlm")

@@ -146,7 +146,7 @@ def test_a_judge_asks_for_a_folder_of_runs_and_not_of_models(command):
     assert "Models, one object each" not in said.out
 
 
-def test_a_judge_without_runs_is_told_where_they_come_from(command, tmp_path):
+def test_a_judge_without_runs_is_reported_where_they_come_from(command, tmp_path):
     code, said = command("evaluate", "judge", str(tmp_path), "--judge", "ask:answers")
     assert code == 2
     assert "holds no runs to judge" in said.err and "evaluate dynamics" in said.err

@@ -14,7 +14,7 @@ from corporeal.cli import doctor
         (4, 64, "4 cores of the 64 that the machine has"),
     ],
 )
-def test_one_core_is_no_cores_and_fewer_than_there_are_are_said(monkeypatch, used, there, said):
+def test_one_core_is_no_cores_and_fewer_than_there_are_are_reported(monkeypatch, used, there, said):
     monkeypatch.setattr(doctor, "usable_cores", lambda: used)
     monkeypatch.setattr(doctor.os, "cpu_count", lambda: there)
     (processor,) = (f for f in doctor.check_installation() if f.what == "processor")

@@ -28,12 +28,12 @@ def walked():
     return render_views(patterned(), way_around(low, high, asked, np.random.default_rng(0)))
 
 
-def test_what_is_seen_is_as_large_as_the_thing(walked):
+def test_what_is_seen_is_as_large_as_the_object(walked):
     off = sides_of(walked) - SIDES
     assert (off < 1e-3).all() and (off > [-0.02, -0.02, -0.03]).all(), off
 
 
-def test_somebody_walks_around_at_two_heights(walked):
+def test_the_camera_moves_around_at_two_heights(walked):
     eyes = np.stack([c.world_from_camera[:3, 3] for c in walked.cameras])
     slant = np.degrees(np.arctan2(eyes[:, 2], np.linalg.norm(eyes[:, :2], axis=1)))
     assert slant[:4].max() < slant[4:].min()
@@ -67,7 +67,7 @@ def test_a_set_is_read_as_it_was_written(walked, look, tmp_path):
     assert errors.right == 8
 
 
-def test_what_nobody_described_is_not_known():
+def test_an_undescribed_object_is_not_known():
     assert measure.known(Path("nobody-knows-this")) == measure.Known()
 
 

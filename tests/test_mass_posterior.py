@@ -274,7 +274,7 @@ def test_doubt_about_a_share_adds_to_the_meshs_own_in_quadrature():
     assert spread == pytest.approx(np.hypot(own, 0.2), rel=0.1)
 
 
-def test_a_share_moves_no_wall_whose_thickness_somebody_stated():
+def test_a_share_moves_no_wall_of_stated_thickness():
     scale, sheet = a_blade(structure="sheet", thickness=0.001)
     _, said = a_blade(structure="sheet", thickness=0.001, swelling=HALF)
     assert scale.mass(said) == scale.mass(sheet)
@@ -337,7 +337,7 @@ def test_no_evidence_contradicts_nothing():
     assert mass_contradiction(inventory.objects[0], np.array([1.0, 2.0])) == ""
 
 
-def test_objects_of_one_file_weigh_their_sum_and_keep_what_was_said_of_all():
+def test_objects_of_one_file_weigh_their_sum_and_keep_statements_of_all():
     said = MassEvidence(1.0, 2.0, 3.0, "A guess.")
     one = MassPosterior("a", 2.0, 1.0, 4.0, 2.5, 1.5, 5.0, evidence=said, warning="Far.")
     assert total_mass_posterior([one]) is one

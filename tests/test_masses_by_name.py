@@ -99,7 +99,7 @@ def weighed_by(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("name", "life", "unit"), [(n, m, u) for n, _, m, u in THINGS], ids=[t[0] for t in THINGS])
-def test_a_thing_by_its_name_weighs_what_such_things_do_or_is_doubted(weighed_by, name, life, unit):
+def test_an_object_by_its_name_weighs_what_such_objects_do_or_is_doubted(weighed_by, name, life, unit):
     found = weighed_by(name)
     low, high = life
     unknown = any(w.material is None for w in found.field.words)

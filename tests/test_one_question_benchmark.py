@@ -50,7 +50,7 @@ def test_the_materials_come_without_the_values(asked):
     assert one.said["one/cup"] == ValuedAnswer.model_validate(SAID)
 
 
-def test_values_go_to_the_way_they_were_said_of_and_stay_inside_its_range(asked):
+def test_values_go_to_the_way_they_were_given_for_and_stay_inside_its_range(asked):
     one, question = asked
     one.ask(question, MaterialsAnswer)
     outside = OneQuestion.characters["outside"]

@@ -62,7 +62,7 @@ def colmap(folder, views, matrix):
     return folder
 
 
-def test_photographs_become_a_video_of_things_that_fall(typed, views, tmp_path):
+def test_photographs_become_a_video_of_objects_that_fall(typed, views, tmp_path):
     write_views(tmp_path / "photos", views)
     code, said = typed("run", "photos", "--object-names", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL)
     assert code == 0, said.err

@@ -13,7 +13,7 @@ from corporeal.core.terminal import StageProgress, duration_words, log_lines
 from corporeal.reconstruction.masks import grown_masks as module
 
 
-def test_a_part_is_told_as_of_the_whole():
+def test_progress_of_a_part_is_of_the_whole():
     told = []
     part = subprogress(lambda *what: told.append(what), 0.5, 0.75, ", once more")
     part(0.0, "growing")
@@ -32,7 +32,7 @@ def test_a_part_is_told_as_of_the_whole():
         ([(0.6, 0.0)], 40.0, "video 60% after 40 s: drawing"),
     ],
 )
-def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, said):
+def test_the_time_left_follows_from_what_was_done_since_the_first_report(told, now, said):
     verb = StageProgress("video", 0.0)
     for fraction, when in told:
         verb.report(fraction, "drawing", when)
@@ -40,7 +40,7 @@ def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, 
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(1.4, "1 s"), (89.0, "89 s"), (90.0, "2 min"), (9000.0, "2.5 h")])
-def test_times_are_said_as_people_say_them(seconds, said):
+def test_times_are_written_as_people_say_them(seconds, said):
     assert duration_words(seconds) == said
 
 
@@ -80,7 +80,7 @@ def test_what_is_over_at_once_is_not_worth_a_line():
     assert where.getvalue() == ""
 
 
-def test_what_failed_is_not_said_to_be_done():
+def test_what_failed_is_not_reported_to_be_done():
     where = Heard()
     with pytest.raises(ValueError), log_lines(Console(file=where), soon=0.01) as tell:
         tell("fill")
@@ -89,7 +89,7 @@ def test_what_failed_is_not_said_to_be_done():
     assert where.getvalue() == "fill begins\n"
 
 
-def test_a_log_says_so_while_nothing_is_told_either():
+def test_a_log_says_so_while_nothing_is_reported_either():
     """Of a call into another library nobody hears anything for minutes."""
     where = Heard()
     with log_lines(Console(file=where), every=0.01, soon=0.01) as tell:
@@ -97,14 +97,14 @@ def test_a_log_says_so_while_nothing_is_told_either():
         assert where.waits_for("reconstruct 40% after 0 s: matching [3/4]")
 
 
-def test_nobody_watches_a_pipe(capsys, monkeypatch):
+def test_a_pipe_gets_no_progress_bar(capsys, monkeypatch):
     monkeypatch.setattr(terminal, "console", Console(stderr=True))
     with terminal.progress_bars() as tell:
         tell("masks")(0.5, "growing masks")
     assert "growing" not in capsys.readouterr().err, "no bar"
 
 
-def test_masks_that_are_grown_again_are_told_apart_and_never_go_back(monkeypatch):
+def test_masks_that_are_grown_again_are_distinguished_and_never_go_back(monkeypatch):
     """The bar began again, with the same words."""
     told = []
 

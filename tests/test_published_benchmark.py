@@ -64,7 +64,7 @@ def test_what_is_far_off_known_and_not_doubted_is_silent():
     assert found(0.9 * NEAR, 1, 4, warned=True).false_alarm
 
 
-def test_figures_are_of_all_things():
+def test_figures_are_of_all_objects():
     said = summary([found(1.0, 0.9, 1.1), found(4.0, 2.0, 8.0)])
     assert f"ALDE {log(4) / 2:.3f}" in said
     assert "within a factor of 1.5 50%" in said

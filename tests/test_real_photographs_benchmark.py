@@ -101,7 +101,7 @@ def test_a_size_is_compared_with_both_yardsticks():
     assert "+5.3%, -1.0%" in benchmark.cells(row, 0)
 
 
-def test_sides_are_of_all_things_together_and_volume_is_of_the_largest():
+def test_sides_are_of_all_objects_together_and_volume_is_of_the_largest():
     box = trimesh.creation.box((1, 1, 1))
     things = tuple(
         Mesh(np.array(box.vertices) * size + [x, 0, size / 2], np.array(box.faces)) for size, x in ((1.0, 0), (0.5, 2))
@@ -155,5 +155,5 @@ def test_writing_a_page_again_gives_the_page(kind, tmp_path, monkeypatch):
     [("A pot.", "It is new.", "A pot. It is new."), ("--wall", "Half.", "--wall. Half."),
      ("", "Half.", "Half."), ("A pot.", "", "A pot."), ("", "", "")],
 )  # fmt: skip
-def test_what_is_said_beside_follows_what_is_known(note, more, both):
+def test_what_is_reported_beside_follows_what_is_known(note, more, both):
     assert benchmark.with_more(note, more) == both

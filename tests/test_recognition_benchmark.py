@@ -53,7 +53,7 @@ def test_the_margin_knows_right_from_wrong(rows):
     assert min(shares) == min(shares[:2]), "small margins are the doubtful ones"
 
 
-def test_the_order_is_measured_as_it_is_said():
+def test_the_order_is_measured_as_stated():
     def row(answer, margin):
         return RecognitionRow("a", "b", answer, margin, ("steel",))
 

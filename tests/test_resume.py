@@ -100,7 +100,7 @@ def assert_same(one: Path, other: Path) -> None:
     assert not left
 
 
-def test_a_killed_run_ends_exactly_like_one_that_was_not_and_nobody_else_gets_in(tmp_path):
+def test_a_killed_run_ends_exactly_like_one_that_was_not_and_no_other_run_starts_in_it(tmp_path):
     scene = a_scene(tmp_path / "two.glb", duration=0.15)
     words = []
 

@@ -17,7 +17,7 @@ def piece(name, pixels, colour, material, area, **said):
     return Piece(name, pixels, colour, {"material": material, "structure": "solid"} | said, area)
 
 
-def test_pieces_built_alike_are_told_as_one_and_what_nobody_notices_is_not_told():
+def test_pieces_built_alike_are_reported_as_one_and_invisible_differences_are_not_reported():
     shell = {"structure": "shell"}
     told = _merged(
         [
@@ -31,7 +31,7 @@ def test_pieces_built_alike_are_told_as_one_and_what_nobody_notices_is_not_told(
     assert told["white shade"] == {"material": "steel", **shell, "thickness_mm": 1.75}
 
 
-def test_large_pieces_that_are_told_as_one_are_all_named():
+def test_large_pieces_that_are_reported_as_one_are_all_named():
     foam = [
         piece("cushion", 400, "grey", "foam", 0.1),
         piece("body", 900, "grey", "foam", 0.1),
@@ -57,7 +57,7 @@ def drum(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_wall_that_is_modelled_with_both_faces_is_told_as_a_wall(drum, tmp_path):
+def test_a_wall_that_is_modelled_with_both_faces_is_reported_as_a_wall(drum, tmp_path):
     with open_run([drum], tmp_path / "run", Settings(), lambda verb: _deaf, "ground") as done:
         views = capture(done.made.scene, CaptureConfig(4, (48, 48), threads=1))
         told = yaml.safe_load(as_told(done.made, views, tmp_path / "told.yaml").read_text())
@@ -70,7 +70,7 @@ def _deaf(fraction, words):
     pass
 
 
-def test_things_are_put_aside_by_a_hundredth_of_their_size(drum, tmp_path):
+def test_objects_are_put_aside_by_a_hundredth_of_their_size(drum, tmp_path):
     scene = assemble([drum])
     aside = assemble([put_aside(StageResults(assemble=scene), drum, tmp_path, seed=1)])
     shift = object_boxes(aside)[0] - object_boxes(scene)[0]

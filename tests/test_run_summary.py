@@ -25,7 +25,7 @@ def breakage(word, ratio, pieces=0):
         (breakage("would break", 11.0, pieces=7), ()),
     ],
 )
-def test_what_would_break_is_said_where_the_video_shows_it_whole(tmp_path, capsys, found, told):
+def test_what_would_break_is_reported_where_the_video_shows_it_whole(tmp_path, capsys, found, told):
     """A glass that fell on a tile bounced, and only the report said that it would break."""
     store.write_json(tmp_path / AUDIT_FILE, store.to_plain(run_audit(breakage=(found,))))
     show_summary(tmp_path)

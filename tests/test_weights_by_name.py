@@ -35,7 +35,7 @@ def test_a_weight_is_made_so_that_it_weighs_what_its_name_says(tmp_path, name, s
     assert found.weight == []
 
 
-def test_a_mass_that_no_way_has_is_told_and_sets_nothing(tmp_path):
+def test_a_mass_that_no_way_has_is_reported_and_sets_nothing(tmp_path):
     named = weigh(bell(), tmp_path / "kettlebell 160 kg.glb")
     plain = weigh(bell(), tmp_path / "kettlebell.glb")
     assert named.masses == pytest.approx(plain.masses)

@@ -151,7 +151,7 @@ def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small
 
 
 @pytest.mark.slow
-def test_a_thing_from_the_pool_is_dropped_where_one_clicks(small_run, tmp_path):
+def test_an_object_from_the_pool_is_dropped_where_one_clicks(small_run, tmp_path):
     from corporeal.viewer.asset_routes import asset_routes
     from corporeal.viewer.live_assets import LiveAssets
     from corporeal.viewer.live_simulation import LiveSession

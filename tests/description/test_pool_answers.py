@@ -173,7 +173,7 @@ def pieces(core, shell, inside="shell", **said):
     return ObjectAnswer((replace(own[0], name="ball", pieces=tuple(own)),))
 
 
-def test_pieces_are_matched_by_name_and_take_up_what_those_say_who_nest_them_alike():
+def test_pieces_are_matched_by_name_and_take_up_answers_of_equal_nesting():
     answers = [pieces(0.4, True), pieces(0.6, False), pieces(0.9, True, inside="")]
     (words,) = pool_answers(THING, answers).parts
     assert [p.name for p in words.pieces] == ["core", "shell"]

@@ -69,7 +69,7 @@ def test_a_bowl_that_a_person_says_is_of_wood_has_the_wall_of_its_size(tmp_path)
     assert thing.parts[0].thickness == expected.thickness
 
 
-def test_it_is_said_how_thick_a_wall_is_taken_to_be_and_why(tmp_path):
+def test_it_is_reported_how_thick_a_wall_is_taken_to_be_and_why(tmp_path):
     mug = scene(("stoneware mug", [("mesh", plain(), {})]))
     (warning,) = describe(mug, from_pictures=[0]).warnings
     assert "4.6 mm (the median of two weighed ones)" in warning

@@ -9,14 +9,14 @@ ROD = shape("drum .006 .3")
 
 
 @pytest.mark.parametrize("name", ["brass samovar", "bouillotte en laiton", "titanium pot"])
-def test_a_thing_of_unknown_kind_is_no_block_of_metal(tmp_path, name):
+def test_an_object_of_unknown_kind_is_no_block_of_metal(tmp_path, name):
     """They weighed ten to eighteen kilograms; the hot-water bottle of brass has .976 kg."""
     seen = weigh(DRUM, tmp_path / f"{name}.glb")
     assert seen.field.words[0].structure == "shell"
     assert 0.3 < sum(seen.masses) < 2
 
 
-def test_it_is_said_why(tmp_path):
+def test_it_is_reported_why(tmp_path):
     (words,) = weigh(DRUM, tmp_path / "brass samovar.glb").field.words
     assert "A block 40 mm thick would be more than 5 times as thick as any wall" in words.reason
 

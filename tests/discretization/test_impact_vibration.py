@@ -23,7 +23,7 @@ def prepared(name):
 
 
 @pytest.mark.parametrize("name", ["red tennis ball", "racquetball"])
-def test_a_ball_full_of_air_rebounds_as_is_told_however_deep_it_is_dented(name):
+def test_a_ball_full_of_air_rebounds_as_stated_however_deep_it_is_dented(name):
     """Both are dented by half of their radius: the loss of their matter alone was 0.04 too much."""
     inner = prepared(name).field.structures[0].contents
     assert inner is not None

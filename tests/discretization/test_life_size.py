@@ -69,7 +69,7 @@ def made(mesh, field, scale):
 
 
 @pytest.mark.parametrize("build", BUILDS)
-def test_a_thing_of_the_same_make_weighs_with_the_cube_of_its_scale(build):
+def test_an_object_of_the_same_make_weighs_with_the_cube_of_its_scale(build):
     scale = 0.37
     mesh, structure, words = BUILDS[build]
     life, _ = made(mesh, field_of(structure, words), 1.0)
@@ -130,14 +130,14 @@ def a_scene():
     return Scene("s", "s.glb", things, tuple(surfaces), (Finish("plain"),), walls=wall)
 
 
-def test_a_scaled_scene_has_its_walls_where_its_things_are():
+def test_a_scaled_scene_has_its_walls_where_its_objects_are():
     scene = scale_scene(a_scene(), 2.0)
     assert scene.walls == (Wall((-1.0, 0.0, 0.0), (6.0, 1.0, 0.0)),)
     assert [o.scale for o in scene.objects] == [2.0, 8.0]
     assert [o.real_extent for o in scene.objects] == [0.2, 0.05]
 
 
-def test_each_thing_is_brought_back_to_its_real_size_where_it_stands():
+def test_each_object_is_brought_back_to_its_real_size_where_it_stands():
     scene = scale_to_life_size(scale_scene(a_scene(), 2.0))
     boxes = object_boxes(scene)
     np.testing.assert_allclose(np.ptp(boxes, axis=1).max(axis=1), [0.2, 0.05], rtol=1e-12)

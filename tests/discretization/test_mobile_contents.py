@@ -70,7 +70,7 @@ def test_a_push_acts_on_all_that_it_was_to_move():
     assert whole.scene.objects[1].push is None
 
 
-def test_a_pushed_vessel_and_what_is_in_it_are_expected_to_move_as_they_were_told_to():
+def test_a_pushed_vessel_and_what_is_in_it_are_expected_to_move_as_prescribed():
     scene = showcase_scenes.build_single_prop_scene("tumbler")
     pushed = replace(scene.objects[0], push=Push((2.0, 0.0, 0.0), 0.0, 0.5), mass=0.5)
     whole = in_memory.prepare_scene(replace(scene, objects=(pushed,)))

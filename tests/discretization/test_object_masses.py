@@ -32,7 +32,7 @@ def thick():
     return said_of(a_bin(0.009), "draws a wall")
 
 
-def test_a_wall_drawn_thicker_than_any_of_its_material_is_told(thick):
+def test_a_wall_drawn_thicker_than_any_of_its_material_is_reported(thick):
     (sentence,) = thick
     assert sentence.startswith("trash_can_0: the mesh of trash can draws a wall ")
     assert "0.64 to 3.8 mm, usually 1.5" in sentence
@@ -63,7 +63,7 @@ def test_a_face_is_judged_as_large_as_it_is_in_life():
     assert "cubic metre" in said_of(replace(ball, objects=(golf,)), "ball_0 weighs")[0]
 
 
-def test_a_block_of_what_comes_in_sheets_is_told():
+def test_a_block_of_what_comes_in_sheets_is_reported():
     """A pouf of leather weighed 70 kg without a word; a strap is as thick as it is drawn."""
     for side, told in ((0.4, 1), (0.01, 0)):
         mesh = trimesh.creation.box((0.4, side, side)).apply_translation((0, 0, side / 2))

@@ -110,7 +110,7 @@ FREE = {
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_what_can_go_away_or_is_only_touched_stays_rigid_and_nothing_is_said(name):
+def test_what_can_go_away_or_is_only_touched_stays_rigid_and_nothing_is_reported(name):
     ready = treated(*FREE[name])
     assert {t.kind for t in ready.treatments} == {"rigid"}
     assert not [w for w in ready.warnings if "pressed" in w]

@@ -93,12 +93,12 @@ def test_a_mistake_is_one_sentence(command, run_folder, tmp_path, words, told):
     assert not list(tmp_path.glob("out/*/*"))
 
 
-def test_what_is_no_scene_is_told(command, tmp_path):
+def test_what_is_no_scene_is_reported(command, tmp_path):
     code, said = command("export", tmp_path / "absent", "--to", "glb")
     assert code == 2 and "No such file" in said.err
 
 
-def test_a_run_without_matter_is_told_how_to_go_on(command, run_folder, tmp_path):
+def test_a_run_without_matter_is_reported_with_how_to_go_on(command, run_folder, tmp_path):
     run = tmp_path / "a run"
     shutil.copytree(run_folder, run)
     (run / "7-fill" / "meta.json").unlink()
@@ -162,7 +162,7 @@ def test_a_disk_that_refuses_leaves_what_was_there(command, run_folder, tmp_path
     assert left(out) == []
 
 
-def test_a_file_that_may_not_grow_is_told(command, run_folder, tmp_path):
+def test_a_file_that_may_not_grow_is_reported(command, run_folder, tmp_path):
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
     try:
@@ -173,7 +173,7 @@ def test_a_file_that_may_not_grow_is_told(command, run_folder, tmp_path):
     assert not (tmp_path / "usd").exists() and left(tmp_path) == []
 
 
-def test_a_file_in_the_way_is_told(command, run_folder, tmp_path):
+def test_a_file_in_the_way_is_reported(command, run_folder, tmp_path):
     (tmp_path / "out").write_text("mine")
     code, said = command("export", run_folder, "--to", "glb", "--out", tmp_path / "out")
     assert code == 2 and "a file is in its way" in said.err
@@ -247,7 +247,7 @@ def test_a_corpus_becomes_one_data_set(run_folder, tmp_path):
     assert "scene_0, scene_1" in json.dumps(record.targets["npz"].unsaid)
 
 
-def test_a_corpus_without_a_finished_run_is_told(command, tmp_path):
+def test_a_corpus_without_a_finished_run_is_reported(command, tmp_path):
     (tmp_path / "corpus.json").write_text("{}")
     code, said = command("export", tmp_path, "--to", "npz")
     assert code == 2 and "has no finished run" in said.err

@@ -129,7 +129,7 @@ def test_velocities_are_a_keyframe(written, asked):
     np.testing.assert_allclose(speed[:3], block.velocity, rtol=1e-9)
 
 
-def test_soft_things_fall_and_stay_whole(written):
+def test_soft_objects_fall_and_stay_whole(written):
     """A rubber cube comes down at 2 m/s, and is held by the floor at its height."""
     cube = co.box("rubber", (0.05, 0.05, 0.05), (0, 0, 0.03), (0, 0, -2), name="cube")
     scene = co.build_scene(cube)
@@ -147,7 +147,7 @@ def test_soft_things_fall_and_stay_whole(written):
     assert np.ptp(heights) == pytest.approx(0.05, rel=0.2)
 
 
-def test_soft_things_are_left_out_where_asked(played, written):
+def test_soft_objects_are_left_out_where_asked(played, written):
     asked = asked_of(played, soft="none")
     assert compiled(written(write_mjcf, asked)).nflex == 0
 

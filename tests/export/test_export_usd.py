@@ -64,7 +64,7 @@ def test_openusd_finds_nothing_to_complain_of(usd, asked):
     assert found.measured["mass_and_inertia_off"] < 1e-6
 
 
-def test_a_finding_is_told(usd, asked):
+def test_a_finding_is_reported(usd, asked):
     replaced(usd / "physics.usda", "physics:mass = ", "physics:mass = -")
     replaced(usd / "sim.usda", "metersPerUnit = 1", "")
     found = check_target("usd", usd, asked)

@@ -74,7 +74,7 @@ def test_colliders_hold_the_surface(asked):
     np.testing.assert_allclose(high, block.surfaces[0].vertices.max(axis=0), atol=1e-6)
 
 
-def test_pushes_and_winds_are_said_to_be_left_out(settled):
+def test_pushes_and_winds_are_reported_to_be_left_out(settled):
     scene = settled.motion.scene
     pushed = replace(scene.objects[0], push=co.Push((1.0, 0.0, 0.0)))
     blown = replace(scene.objects[1], wind=co.Wind((1.0, 0.0, 0.0)))
@@ -96,7 +96,7 @@ def test_an_instant_that_is_not_there_is_refused(at):
         frame_at(at, np.arange(5) / 40)
 
 
-def test_names_become_identifiers_that_are_told_apart():
+def test_names_become_identifiers_that_are_distinguished():
     names = identifiers(["мяч", "Büste 1", "Büste_1", "7up", "World", "a/b"], ["World"])
     assert names == ["thing", "Buste_1", "Buste_2", "thing_7up", "World_1", "a_b"]
 

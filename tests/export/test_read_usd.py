@@ -81,14 +81,14 @@ def test_masses_densities_and_frictions_of_others_come_in_their_units(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "not USD", "#usda 1.0\ndef"])
-def test_what_is_no_usd_is_told(tmp_path, text):
+def test_what_is_no_usd_is_reported(tmp_path, text):
     path = tmp_path / "x.usda"
     path.write_text(text)
     with pytest.raises(UserError, match="cannot be read as USD"):
         read_usd_physics(path)
 
 
-def test_what_is_not_there_is_told(tmp_path):
+def test_what_is_not_there_is_reported(tmp_path):
     with pytest.raises(UserError, match="no such file"):
         read_usd_physics(tmp_path / "x.usda")
 

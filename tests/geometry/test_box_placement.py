@@ -35,7 +35,7 @@ def test_a_stack_has_the_first_at_the_bottom():
     assert (b[1:, 0, 2] > b[:-1, 1, 2]).all()
 
 
-def test_a_thing_is_lifted_by_its_own_size():
+def test_an_object_is_lifted_by_its_own_size():
     assert box_placement.lift_heights(boxes((1, 2, 3)), 0.2) == pytest.approx([0.6])
 
 

@@ -68,7 +68,7 @@ def test_bodies_within_each_other_count_once_and_cavities_not_at_all(columns):
         assert not found[(radius < low - 0.3) | (radius > 15)].any()
 
 
-def test_a_surface_that_is_wound_both_ways_is_told(columns):
+def test_a_surface_that_is_wound_both_ways_is_reported(columns):
     ball = shown(trimesh.creation.icosphere(3, 15.0))
     lid = ball.corners[:, :, 2].min(axis=1) > 0
     turned = np.where(lid[:, None], ball.triangles[:, ::-1], ball.triangles)

@@ -98,7 +98,7 @@ def test_points_whose_centroid_is_in_the_open_stay():
     assert volumes.sum() == pytest.approx(wall.volume, rel=0.03)
 
 
-def test_nothing_is_divided_among_nobody():
+def test_nothing_is_divided_among_no_points():
     ball = shaped(trimesh.creation.icosphere(1))
     points, volumes = centroidal_points(np.zeros((0, 3)), ball, 0.1, np.zeros(0, bool))
     assert points.shape == (0, 3) and volumes.shape == (0,)

@@ -77,7 +77,7 @@ def test_a_tree_answers_where_many_edges_are_open(rng):
     assert np.abs(leaky.winding(points) - exact(leaky.mesh, points)).max() < 0.01
 
 
-def test_nothing_winds_around_nobody():
+def test_nothing_winds_around_an_empty_mesh():
     nothing = QueryMesh(Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)))
     assert not nothing.winding(np.zeros((4, 3))).any()
 

@@ -146,7 +146,7 @@ def test_a_file_cut_off_anywhere_is_refused(tmp_path):
         refused(tmp_path / "cut.glb", "cut off|empty|header")
 
 
-def test_things_that_are_no_files_are_refused(tmp_path):
+def test_objects_that_are_no_files_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe.glb")
     (tmp_path / "folder.glb").mkdir()
     (tmp_path / "dangling.glb").symlink_to(tmp_path / "none")

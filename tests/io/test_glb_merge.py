@@ -295,7 +295,7 @@ def test_a_model_that_occurs_twice_is_stored_once(tmp_path):
     np.testing.assert_allclose(b.vertices - a.vertices, [[2, 0, 0]] * 24, atol=1e-12)
 
 
-def test_what_nobody_uses_is_left_out(tmp_path):
+def test_unused_nodes_are_left_out(tmp_path):
     made = cube()
     made.view(b"\7" * 5000)
     made.mesh(CUBE * 2)
@@ -446,7 +446,7 @@ def test_a_broken_member_is_named(tmp_path, spoil, said):
     assert "a.glb" in str(problem.value)
 
 
-def test_a_missing_picture_is_told_and_left_out(tmp_path):
+def test_a_missing_picture_is_reported_and_left_out(tmp_path):
     made = dressed()
     made.json["images"] = [{"uri": "gone.png"}]
     path = tmp_path / "scene.glb"

@@ -185,7 +185,7 @@ def test_strips_fans_and_bare_lists_say_the_same_as_triangles(tmp_path):
         assert len(area) == 2
 
 
-def test_points_and_lines_are_left_out_and_told(tmp_path):
+def test_points_and_lines_are_left_out_and_reported(tmp_path):
     made = cube()
     made.node(mesh=made.mesh(indices=np.arange(8, dtype=np.uint16), mode=0))
     scene = read_glb(made.save(tmp_path / "a.glb"))
@@ -193,7 +193,7 @@ def test_points_and_lines_are_left_out_and_told(tmp_path):
     assert any("points" in w for w in scene.warnings)
 
 
-def test_a_mesh_that_the_scene_does_not_place_is_left_out_and_told(tmp_path):
+def test_a_mesh_that_the_scene_does_not_place_is_left_out_and_reported(tmp_path):
     made = cube()
     made.node(root=False, mesh=0, name="plank")
     scene = read_glb(made.save(tmp_path / "a.glb"))
@@ -274,7 +274,7 @@ def test_a_file_without_normals_gets_some_with_sharp_edges(tmp_path):
 
 
 @pytest.mark.parametrize("image", [b"", b"\x89PNG\r\n\x1a\nrubbish", b"hello"])
-def test_a_broken_texture_is_left_out_and_told(tmp_path, image):
+def test_a_broken_texture_is_left_out_and_reported(tmp_path, image):
     made, _ = textured({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}, image)
     scene = read_glb(made.save(tmp_path / "a.glb"))
     assert scene.finishes[0].texture is None

@@ -60,7 +60,7 @@ def test_names_tell_what_an_input_is(tmp_path):
 
 
 @pytest.mark.parametrize("how", ["beside", "as an object"])
-def test_photographs_among_models_are_told_how_they_come_together(tmp_path, how):
+def test_photographs_among_models_are_reported_with_how_to_combine_them(tmp_path, how):
     """A scene file said of a folder of photographs: is no model, convert it to .glb."""
     (tmp_path / "bananas").mkdir()
     (tmp_path / "bananas" / "transforms.json").touch()

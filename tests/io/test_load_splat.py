@@ -268,7 +268,7 @@ def test_spz_says_the_same_to_its_steps(kept, version, degree):
     assert same_rotation(read.rotation, given.rotation) < (0.2 if version == 2 else STEP)
 
 
-def test_harmonics_of_degree_4_lose_their_last_band_and_it_is_said(kept):
+def test_harmonics_of_degree_4_lose_their_last_band_and_it_is_reported(kept):
     given = some_gaussians(count=5, degree=4)
     read = load_splat(kept(spz(given, 3, 4), "a.spz"))
     assert read.sh.shape == (5, 16, 3)

@@ -209,7 +209,7 @@ def test_plain_colours_come_along(kind, tmp_path):
     np.testing.assert_allclose(finish.colour, (0.2, 0.4, 0.6, 1), atol=2 / 255)
 
 
-def test_axes_can_be_told_otherwise(tmp_path):
+def test_axes_can_be_overridden(tmp_path):
     path = written(".stl", tmp_path)
     corners = np.concatenate([s.vertices for s in load_mesh(path, up="-y").scene.surfaces])
     # The file's -y points up: its z becomes y, and its y points down.
@@ -226,7 +226,7 @@ def test_colours_of_vertices_are_kept_as_linear_light(tmp_path):
     np.testing.assert_allclose(surface.colours, np.tile(wanted, (24, 1)), atol=1e-6)
 
 
-def test_named_things_are_objects_where_asked(tmp_path):
+def test_named_objects_are_objects_where_asked(tmp_path):
     text = f"o chair_1\n{CORNERS}f 1 2 3 4\no cup\nf 1 2 5\n"
     (tmp_path / "room.obj").write_text(text)
     assert len(load_mesh(tmp_path / "room.obj").scene.objects) == 1
@@ -237,7 +237,7 @@ def test_named_things_are_objects_where_asked(tmp_path):
 
 
 @pytest.mark.parametrize("order", ["usemtl wax\ng {}", "g {}\nusemtl wax"])
-def test_groups_are_things_where_an_obj_has_no_objects(tmp_path, order):
+def test_groups_are_objects_where_an_obj_has_no_objects(tmp_path, order):
     faces = zip(("chair_1", "cup"), ("f 1 2 3 4", "f 1 2 5"), strict=True)
     text = CORNERS + "".join(f"{order.format(name)}\n{face}\n" for name, face in faces)
     (tmp_path / "room.obj").write_text(text)
@@ -247,13 +247,13 @@ def test_groups_are_things_where_an_obj_has_no_objects(tmp_path, order):
     assert len(load_mesh(tmp_path / "one.obj", "nodes").scene.objects) == 1
 
 
-def test_patches_of_a_surface_are_no_things(tmp_path):
+def test_patches_of_a_surface_are_no_objects(tmp_path):
     groups = "".join(f"g patch{k}\nf 1 2 3\n" for k in range(MAX_PIECES + 1))
     (tmp_path / "scan.obj").write_text(CORNERS + groups)
     assert len(load_mesh(tmp_path / "scan.obj").scene.surfaces) == 1
 
 
-def test_a_splat_a_mesh_and_points_are_told_by_the_header(tmp_path):
+def test_a_splat_a_mesh_and_points_are_recognised_by_the_header(tmp_path):
     def kind(text):
         return kind_of_ply(f"ply\nformat ascii 1.0\n{text}end_header\n".encode())
 

@@ -49,7 +49,7 @@ def test_what_touches_nothing_is_an_object_whatever_it_is_called(tmp_path):
         ("scene.glb", "Cube", "Cube.001", False),
     ],
 )
-def test_what_touches_is_one_unless_names_say_that_each_is_a_thing(tmp_path, file, lower, upper, apart):
+def test_what_touches_is_one_unless_names_say_that_each_is_an_object(tmp_path, file, lower, upper, apart):
     scene = read(tmp_path, file, (lower, UNDER), (upper, ON))
     assert len(scene.objects) == 1 + apart
 

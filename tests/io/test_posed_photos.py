@@ -262,7 +262,7 @@ def test_masks_that_lie_across_their_pictures_are_refused_and_squares_stretched(
         read_posed_photos(tmp_path)
 
 
-def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path):
+def test_masks_under_names_of_no_photograph_are_reported_to_be_none(tmp_path):
     said(tmp_path)
     (tmp_path / "masks").mkdir()
     Image.fromarray(np.eye(12, 16, dtype=np.uint8) * 255).save(tmp_path / "masks" / "m1.png")
@@ -458,7 +458,7 @@ def test_blurred_dark_and_grey_pictures_are_fine(tmp_path):
     assert (read_posed_photos(tmp_path).views.rgb[0] == 3).all()
 
 
-def test_grey_pictures_among_coloured_ones_are_told(tmp_path):
+def test_grey_pictures_among_coloured_ones_are_reported(tmp_path):
     _, pictures = forty(tmp_path)
     assert not read_posed_photos(tmp_path).warnings, "all are grey"
     for path in pictures[3:]:

@@ -160,7 +160,7 @@ def test_every_row_names_functions_that_are_there(reader):
     assert all(suffix == suffix.lower() and suffix[0] == "." for suffix in reader.suffixes)
 
 
-def test_what_shares_a_suffix_is_told_by_its_content(tmp_path):
+def test_what_shares_a_suffix_is_recognised_by_its_content(tmp_path):
     assert sorted(s for s in set(suffixes_of()) if suffixes_of().count(s) > 1) == [".ply"]
     path = tmp_path / "a.ply"
     mesh = "element face 1\nproperty list uchar int vertex_indices\n"

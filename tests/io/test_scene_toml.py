@@ -54,7 +54,7 @@ def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("true", True), ("false", False)])
-def test_a_scene_file_says_that_things_had_come_to_rest(tmp_path, said, meant):
+def test_a_scene_file_says_that_objects_had_come_to_rest(tmp_path, said, meant):
     scene = read(tmp_path, f'file = "a.glb"\nsettled = {said}\n')
     assert scene.settled is meant
     write_scene_file(tmp_path / "again.toml", scene)

@@ -36,7 +36,7 @@ def said(mesh, path, head=""):
 
 
 @pytest.mark.parametrize(("made", "why"), [(chair, "plane z = 0"), (mushroom, "tip over")])
-def test_an_obj_that_lies_on_its_side_is_said_to_and_an_upright_one_is_not(tmp_path, made, why):
+def test_an_obj_that_lies_on_its_side_is_reported_to_and_an_upright_one_is_not(tmp_path, made, why):
     (lying,) = said(made(), tmp_path / "thing.obj").warnings
     assert why in lying and "use --up z" in lying
     upright = made().apply_transform(np.linalg.inv(QUARTER))
@@ -44,7 +44,7 @@ def test_an_obj_that_lies_on_its_side_is_said_to_and_an_upright_one_is_not(tmp_p
     assert load_mesh(tmp_path / "thing.obj", up="+z").scene.warnings == (), "somebody says it"
 
 
-def test_a_ply_that_was_made_with_y_up_is_said_to_lie(tmp_path):
+def test_a_ply_that_was_made_with_y_up_is_reported_to_lie(tmp_path):
     lying = chair().apply_transform(np.linalg.inv(QUARTER))
     (why,) = said(lying, tmp_path / "chair.ply").warnings
     assert "plane y = 0" in why and "use --up y" in why
@@ -52,7 +52,7 @@ def test_a_ply_that_was_made_with_y_up_is_said_to_lie(tmp_path):
 
 
 @pytest.mark.parametrize("comment", ["# Z-up, metres", "# up axis: z", "# up_axis = +Z"])
-def test_a_comment_that_says_z_up_is_believed_and_said(tmp_path, comment):
+def test_a_comment_that_says_z_up_is_believed_and_reported(tmp_path, comment):
     scene = said(chair(), tmp_path / "chair.obj", f"{comment}\n")
     (why,) = scene.warnings
     assert "as its comment states" in why
@@ -65,7 +65,7 @@ def test_what_stands_either_way_is_not_doubted(tmp_path):
     assert said(cube, tmp_path / "cube.obj", "# a set up, z\n# zup.com\n").warnings == ()
 
 
-def test_places_of_a_geometry_that_no_node_names_are_things_apart():
+def test_places_of_a_geometry_that_no_node_names_are_objects_apart():
     pytest.importorskip("collada")
     assert [own for own, _ in read_dae_names(THREE.encode()).values()] == [
         ("brick",), ("brick_1",), ("brick_2",),

@@ -260,6 +260,6 @@ def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_
     assert [p.group for p in scene.parts] == ["mineral", "elastomer"]
 
 
-def test_what_is_no_corpus_is_said_to_be_none(tmp_path):
+def test_what_is_no_corpus_is_reported_to_be_none(tmp_path):
     with pytest.raises(UserError, match="not a corpus"):
         report_corpus(Path(tmp_path), silent)

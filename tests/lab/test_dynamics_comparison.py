@@ -131,7 +131,7 @@ def test_a_path_nearer_to_the_reference_than_ours_is_no_better():
     assert found.first and not found.lost
 
 
-def test_nobody_is_first_who_is_alone():
+def test_a_single_method_has_no_rank():
     assert rank_scene("scene", rows_of(ours=run())) is None
 
 

@@ -100,7 +100,7 @@ def test_a_member_that_was_cut_off_goes_on(ran, made, monkeypatch):
     assert again.members != made.members
 
 
-def test_a_member_that_breaks_is_told_and_the_others_count(ran, monkeypatch, tmp_path):
+def test_a_member_that_breaks_is_reported_and_the_others_count(ran, monkeypatch, tmp_path):
     real = ensembles.simulate
 
     def breaks(scene, particles, field, config, folder, progress):

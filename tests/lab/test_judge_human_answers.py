@@ -147,7 +147,7 @@ def test_five_of_seven_laws_are_believed(rows):
     ("control", "question", "hits", "scenes"),
     [("gain", "gain", 3, 4), ("wrong", "react", 3, 4), ("single", "stick", 2, 4), ("halfgravity", "pace", 3, 5)],
 )
-def test_what_is_not_told_everywhere_by_the_question_meant_for_it(rows, control, question, hits, scenes):
+def test_what_is_not_found_everywhere_by_the_question_meant_for_it(rows, control, question, hits, scenes):
     (row,) = [r for r in rows if (r.control, r.question) == (control, question)]
     assert (row.hits, row.scenes, row.tells) == (hits, scenes, False)
 

@@ -70,7 +70,7 @@ def test_the_page_renders_no_picture_that_it_does_not_show_and_none_twice(judged
     assert taken == sorted(set(taken)) and len(taken) == PICTURES_PER_VIDEO < len(pictures)
 
 
-def test_without_controls_nothing_can_be_told(judged):
+def test_without_controls_there_is_no_result(judged):
     result = weigh_judge(judged)
     assert not any(result.believed.values())
     assert all(law in blind_spots_sentence(result) for law in result.believed)

@@ -61,7 +61,7 @@ def told(rows):
     return {(r.control, r.question) for r in rows if r.tells and r.question != "whole"}
 
 
-def test_there_are_thirteen_questions_and_ten_controls_each_told_by_questions_that_exist():
+def test_there_are_thirteen_questions_and_ten_controls_each_found_by_questions_that_exist():
     known = {q.id for q in question_catalogue().question}
     assert len(known) == 13 and len(FAULT) == 10
     assert all(known.issuperset(c.questions) and c.questions for c in question_catalogue().control)

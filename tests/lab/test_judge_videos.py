@@ -357,7 +357,7 @@ def test_looks_are_one_to_three(looks):
         check_judging(JudgeConfig(looks=looks))
 
 
-def test_nobody_to_judge_is_an_error():
+def test_no_videos_to_judge_is_an_error():
     videos = judge_scenes.JudgedVideos([], [], [], {}, [REFERENCE_METHOD])
     with pytest.raises(UserError, match="No judge"):
         query_judge(videos, JudgeConfig(), lambda words: None)
@@ -366,7 +366,7 @@ def test_nobody_to_judge_is_an_error():
 # ---------------------------------------------------------------- what it costs
 
 
-def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_a_yes(played, staging, told):
+def test_the_price_is_reported_before_anybody_is_asked_and_more_than_5_dollars_want_a_yes(played, staging, told):
     one = VideoQuestion("balls", REFERENCE_METHOD, 0, video_question(motion_of_run(played), staging, told, 0))
     said = []
 

@@ -172,7 +172,7 @@ def test_what_is_known_is_weighed_and_a_hollow_ball_is_a_shell(weighed):
     assert hollow.hull_m3 == pytest.approx(large.volume, rel=1e-6)
 
 
-def test_what_nobody_recognised_may_weigh_anything(weighed):
+def test_unrecognised_objects_may_weigh_anything(weighed):
     _, found = weighed
     known, unknown = found[0], found[3]
     assert unknown.high / unknown.low > 10 > 1.2 > known.high / known.low

@@ -25,7 +25,7 @@ def scene():
     return Scene("two", "", things, surfaces, finishes)
 
 
-def test_things_that_stand_apart_are_pushed_until_they_touch(scene):
+def test_objects_that_stand_apart_are_pushed_until_they_touch(scene):
     near = objects_evaluation.bring_together(scene)
     low, tall = near.surfaces[1].vertices, near.surfaces[0].vertices
     gap = low[:, 0].min() - tall[:, 0].max()

@@ -146,7 +146,7 @@ def test_only_what_pictures_show_is_asked_for(judged_boxes):
     assert set(np.unique(judged.truth)) == set(range(len(judged.row.parts)))
 
 
-def test_a_folder_without_models_or_without_parts_is_told(tmp_path, folder):
+def test_a_folder_without_models_or_without_parts_is_reported(tmp_path, folder):
     with pytest.raises(UserError, match="no models"):
         evaluate_parts(tmp_path, {}, CHEAP)
     one = tmp_path / "one"
@@ -162,7 +162,7 @@ def test_who_does_not_know_words_cannot_name():
 
 
 @pytest.mark.parametrize("text", ["[duck", "duck = 3", "[duck]\nbody = 7", "[duck]\nbody = ''"])
-def test_names_that_are_no_names_are_told(tmp_path, text):
+def test_names_that_are_no_names_are_reported(tmp_path, text):
     path = tmp_path / "names.toml"
     path.write_text(text)
     with pytest.raises(BadFileError):

@@ -104,7 +104,7 @@ def test_wind_blows_where_it_moves_something_and_nothing_else_changes():
     assert all(s.count >= MIN_OBJECTS_OF_KIND[s.interaction] for s in blown.scenes) and not blown.messages
 
 
-def test_where_no_wind_moves_anything_things_fall_and_it_is_said():
+def test_where_no_wind_moves_anything_objects_fall_and_it_is_reported():
     kinds, said = with_wind(["wind", "fall"], [["anvil"], ["safe"]], lambda names: False)
     assert kinds == ["fall", "fall"] and "No wind moves anvil" in said[0]
 
@@ -161,7 +161,7 @@ def test_a_small_pool_gives_what_it_can_and_says_so():
     assert plan_corpus(pool(3), CorpusConfig()).messages[1].startswith("Scenes have at most 3 objects")
 
 
-def test_an_empty_pool_and_senseless_numbers_are_said_to_be():
+def test_an_empty_pool_and_senseless_numbers_are_reported_to_be():
     with pytest.raises(UserError, match="no usable asset"):
         plan_corpus([], CorpusConfig())
     for wrong in ({"scenes": 0}, {"classes": 0}, {"seed": -1}):

@@ -63,7 +63,7 @@ def test_a_killed_worker_is_replaced_and_the_manifest_is_the_same_as_here(tmp_pa
 
 
 @pytest.mark.slow
-def test_an_address_without_a_cluster_is_said_to_be_one(tmp_path):
+def test_an_address_without_a_cluster_is_reported_to_be_one(tmp_path):
     pytest.importorskip("ray")
     with pytest.raises(UserError, match=r"Cannot use Ray at 127\.0\.0\.1:1"):
         with ray_worker_pool(1, 1, 0.0, "127.0.0.1:1"):

@@ -64,7 +64,7 @@ SETS = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize("measured", SETS, ids=[one.recordings for one in SETS])
-def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets, measured):
+def test_the_ladder_of_what_is_known_on_scanned_objects(shared_assets, measured):
     things = read_measured_masses(shared_assets / "ycb", shared_assets / "mass_truth.csv")
     answered = DescribeConfig(vlm=f"replay:{RECORDINGS / measured.recordings}")
     config = MassConfig(anonymous=True)

@@ -123,7 +123,7 @@ def test_what_breaks_before_it_yields_has_a_strength_and_nothing_else_has():
     assert materials.find_material("steel").pick(materials.find_material("steel").typical()).strength is None
 
 
-def test_a_kind_of_plastic_that_nobody_can_tell_spans_the_kinds_that_it_may_be():
+def test_an_unknown_kind_of_plastic_spans_the_kinds_that_it_may_be():
     hard, soft = (materials.find_material("plastic"), materials.find_material("soft plastic, kind unknown"))
     for name in "PP HDPE polystyrene ABS PVC PET polycarbonate nylon".split():
         for field in ("density", "young_pa"):
@@ -146,7 +146,7 @@ def test_a_note_on_a_number_is_shown_under_it():
     assert "cells buckle" in shown.split("Restitution")[1].split("Loss")[0]
 
 
-def test_a_light_thing_dropped_on_mud_leaves_an_imprint():
+def test_a_light_object_dropped_on_mud_leaves_an_imprint():
     """Energy of a 70 g toy falling .13 m against the bearing capacity of a flat 6 cm footprint."""
     mud = materials.find_material("mud").pick(materials.find_material("mud").typical())
     assert mud.cohesion is not None
@@ -264,7 +264,7 @@ def test_what_is_inside_is_in_materials_json_with_its_grounds():
     assert said["contents_values"]["density"]["range"] == [1000, 1250]
 
 
-def test_coffee_is_a_drink_or_a_powder_and_nobody_guesses_which():
+def test_coffee_is_a_drink_or_a_powder_and_neither_is_guessed():
     with pytest.raises(UnknownChoiceError) as refused:
         materials.find_material("coffee")
     assert str(refused.value).endswith("Did you mean ground_coffee or 'coffee drink' (water)?")

@@ -105,7 +105,7 @@ def test_one_mistake_makes_one_complaint():
         assert len(found(SOUND.replace(before, after, 1))) == 1, name
 
 
-def test_all_mistakes_are_told_at_once_in_the_order_of_the_file():
+def test_all_mistakes_are_reported_at_once_in_the_order_of_the_file():
     said = SOUND
     for name in ("no group", "swapped", "incompressible"):
         said = said.replace(*PLANTED[name][0], 1)
@@ -119,7 +119,7 @@ def test_a_known_name_is_held_to_what_we_know_of_it():
     assert "outside of what our steel has" in found(said)[0]
 
 
-def test_what_is_true_but_unusual_can_be_said_to_be():
+def test_what_is_true_but_unusual_can_be_marked_as_such():
     said = SOUND.replace("high = 210,", "high = 1050, unusual = true,")
     assert found(said) == []
     assert "any metal" in found(said.replace("unusual = true,", ""))[0]
@@ -140,7 +140,7 @@ loss = { low = 0.1, typical = 0.2, high = 0.3, source = "bench" }
 """
 
 
-def test_a_restitution_that_contradicts_the_loss_factor_is_told_with_what_would_fit():
+def test_a_restitution_that_contradicts_the_loss_factor_is_reported_with_what_would_fit():
     assert found(SOFT) == [
         "line 11, [squashy] restitution: 0.1 to 0.5 contradicts the loss factor: with 0.1 to 0.3 a "
         "ball keeps 0.67 to 0.87 of its speed. Correct one of the two, or explain with note = '...' "
@@ -163,7 +163,7 @@ def test_ranges_that_meet_a_note_or_another_group_part_loss_and_restitution(befo
     assert not [said for said in found(SOFT.replace(before, after, 1)) if "contradicts" in said]
 
 
-def test_a_wrong_range_is_told_before_it_is_compared():
+def test_a_wrong_range_is_reported_before_it_is_compared():
     swapped = SOFT.replace("typical = 0.3, high = 0.5", "typical = 0.5, high = 0.3")
     assert len(found(swapped)) == 1
 

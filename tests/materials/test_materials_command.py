@@ -52,7 +52,7 @@ def test_a_loss_factor_that_contradicts_the_restitution_ends_with_code_2(typed, 
     assert typed("check", "mine.toml")[0] == 0
 
 
-def test_what_cannot_be_read_is_said(typed, tmp_path):
+def test_what_cannot_be_read_is_reported(typed, tmp_path):
     assert "cannot be read" in typed("check", "absent.toml")[2]
     (tmp_path / "a.toml").write_bytes(b"\xff\xfe")
     assert typed("check", "a.toml")[0] == 2

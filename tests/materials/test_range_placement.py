@@ -121,7 +121,7 @@ def test_stiff_but_weak_and_light_but_stiff_do_not_fit():
         assert placement_contradictions(foam, at(young_pa=fraction, density=fraction)) == {}
 
 
-def test_nobody_is_told_to_mend_a_value_that_was_not_asked_for():
+def test_no_correction_is_asked_for_a_value_that_was_not_asked_for():
     """Of the ways beside the likeliest only what a mass hangs on is asked."""
     foam = PartDescription("x", "packaging_foam", "solid")
     assert set(quantity_choices(foam, weighing=True)) == {"density"}

@@ -30,7 +30,7 @@ def test_a_baseball_bounces_better_from_a_hand_than_from_a_bat():
     assert material_at_speed(ball, 1e3).restitution == pytest.approx(0.12)
 
 
-def test_what_a_person_stated_or_nobody_rated_stays():
+def test_stated_and_unrated_values_stay():
     ball, steel = made("softball_core"), made("steel")
     said = {"loss": replace(ball.grounds["loss"], chosen_by="annotation")}
     stated = replace(ball, grounds=ball.grounds | said)

@@ -66,7 +66,7 @@ def test_momentum_is_that_of_the_impulses_and_energy_that_of_the_work(problems, 
     np.testing.assert_allclose(end.momentum, end.external_impulse, atol=2e-5)
 
 
-def test_who_joins_meets_who_was_there(problems):
+def test_added_bodies_meet_the_others(problems):
     few, more = problems
     bodies = list(more.bodies)
     over = bodies[MORE].position - np.array([1.0, 0.0, 1.0]) + np.array([0.5, 0.0, 2.12])

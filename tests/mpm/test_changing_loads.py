@@ -45,7 +45,7 @@ def test_another_gravity_pulls_from_then_on(problem, kind):
 
 
 @pytest.mark.parametrize("kind", ENGINES)
-def test_a_wind_blows_from_then_on_and_only_at_whom_it_is_told(problem, kind):
+def test_a_wind_acts_from_then_on_and_only_at_the_given_body(problem, kind):
     engine = kind(problem)
     engine.set_gravity((0.0, 0.0, 0.0))
     before = engine.measure().push_work

@@ -270,7 +270,7 @@ def test_every_kernel_compiles_for_cards_without_one(module, tmp_path):
 @pytest.mark.gpu
 @pytest.mark.skipif(not program.wp.get_cuda_devices(), reason="needs a CUDA device")
 @pytest.mark.parametrize("law", list(Law))
-def test_a_card_moves_things_as_the_processor_does(law):
+def test_a_card_moves_objects_as_the_processor_does(law):
     card, here = CudaEngine(fall(law)), on_processor(fall(law))
     for engine in (card, here):
         engine.advance(0.05)

@@ -42,7 +42,7 @@ def compared(given, steps, position=2e-6):
     return mine, theirs
 
 
-def test_wind_blows_soft_and_rigid_things_as_in_the_reference():
+def test_wind_moves_soft_and_rigid_bodies_as_in_the_reference():
     given = problem(
         sailing(ball((0, 0, 0.3)), law=Law.VON_MISES, velocity=(1.0, 0, 0)),
         sailing(ball((0.2, 0, 0.3)) * [1, 0.7, 1], rigid=True, velocity=(0, 2.0, 0)),

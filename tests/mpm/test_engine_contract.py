@@ -48,7 +48,7 @@ def test_these_engines_have_every_capability(name):
     assert DEFAULT_ENGINE in WHOLE
 
 
-def test_what_an_engine_cannot_do_is_said_in_a_sentence():
+def test_what_an_engine_cannot_do_is_reported_in_a_sentence():
     require_of_class(engine_class("cuda"), InteractiveEngine)
     for capability, words in CAPABILITIES.items():
         if capability is not InteractiveEngine:

@@ -49,14 +49,14 @@ def test_a_path_passes_through_its_rows_and_rests_before_and_after():
             np.testing.assert_allclose(a, b, atol=1e-12)
 
 
-def test_what_is_told_to_rest_rests():
+def test_a_path_at_rest_rests():
     """A monotone cubic overshoots nowhere; an ordinary spline would."""
     rows = prescribed_motion.path_rows(WAVY, PIVOT)
     for time in np.linspace(0.3, 0.4, 11):
         assert prescribed_motion.path_pose(rows, time).place[0] == pytest.approx(PIVOT[0] + 0.1, abs=1e-12)
 
 
-def test_speeds_of_a_path_are_smooth_and_no_larger_than_said():
+def test_speeds_of_a_path_are_smooth_and_no_larger_than_stated():
     guide = prescribed_motion.PathFollower.of(mover())
     centre = np.array([0.25, -0.1, 0.45])
     h = 1e-5

@@ -66,7 +66,7 @@ def test_members_lie_where_numpy_puts_them(record, compiled):
     assert np.array_equal(compiled[record], described(record.dtype))
 
 
-def test_a_layout_without_holes_would_be_told_from_it(compiled):
+def test_a_layout_without_holes_would_be_distinguished_from_it(compiled):
     packed = np.dtype([(n, MIXED.dtype.fields[n][0]) for n in MIXED.dtype.names])
     assert not np.array_equal(compiled[MIXED], described(packed))
 

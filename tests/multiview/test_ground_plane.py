@@ -35,7 +35,7 @@ def test_a_wall_beside_the_floor_does_not_hide_it(rng):
     assert anywhere is None, "nobody knows what objects are about"
 
 
-def test_a_patch_beside_the_thing_is_no_ground(rng):
+def test_a_patch_beside_the_object_is_no_ground(rng):
     points, search = room(rng), looked_at(rng)
     beside = replace(search, middle=np.array([0, 0.9, 0.9]), radius=0.5)
     assert find_ground_plane(points, beside, np.random.default_rng(0)) is None

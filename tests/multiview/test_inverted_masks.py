@@ -29,7 +29,7 @@ def test_what_leaves_out_the_middle_and_fills_the_border_is_inverted(radius):
 
 
 @pytest.mark.parametrize("masks", [cups(), discs(8, left=20), discs(29), discs(60), discs(30) & ~discs(8)])
-def test_rings_things_aside_and_things_that_pictures_cut_off_are_not(masks):
+def test_rings_objects_aside_and_objects_that_pictures_cut_off_are_not(masks):
     assert not are_masks_inverted(masks, CAMERAS)
 
 

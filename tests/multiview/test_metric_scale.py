@@ -43,7 +43,7 @@ def test_a_person_measures_the_unit_or_a_distance():
             stated_metric_scale(per_unit, points, "he")
 
 
-def test_scenes_as_large_as_towns_or_as_small_as_dust_are_told():
+def test_scenes_as_large_as_towns_or_as_small_as_dust_are_reported():
     assert implausible_scene_extent(0.01) is None is implausible_scene_extent(20.0)
     assert "would be 1.5e+05 m large" in implausible_scene_extent(1.5e5)
     assert "--extent" in implausible_scene_extent(1e-4)
@@ -78,7 +78,7 @@ def test_the_best_witness_is_believed_and_the_others_are_heard():
     assert choose_metric_scale(None, (), None, USUAL).metres_per_unit == pytest.approx(0.11)
 
 
-def test_a_thing_that_disagrees_with_the_others_is_named():
+def test_an_object_that_disagrees_with_the_others_is_named():
     odd = (*USUAL, ObjectExtent("ant", 1.0, 0.003, "the table"))
     found = scale_from_extents(odd)
     assert found.metres_per_unit == pytest.approx(np.sqrt(0.1 * 0.11))
@@ -88,13 +88,13 @@ def test_a_thing_that_disagrees_with_the_others_is_named():
     assert scale_from_extents(()) is None
 
 
-def test_where_nobody_knows_a_stand_in_is_named():
+def test_an_unknown_size_gets_a_named_substitute():
     found = choose_metric_scale(size=10.0)
     assert (found.metres_per_unit, found.source) == (pytest.approx(0.05), "nobody")
     assert "Its scale is unknown" in found.warnings[0]
 
 
 @pytest.mark.parametrize("metres", [0.0, -1.0, math.nan, math.inf])
-def test_nonsense_is_refused_by_the_name_of_the_thing(metres):
+def test_nonsense_is_refused_by_the_name_of_the_object(metres):
     with pytest.raises(UserError, match="The extent of duck"):
         choose_metric_scale(stated=[ObjectExtent("duck", 1.0, metres, "the command line")])

@@ -32,7 +32,7 @@ def test_a_plate_is_as_thick_as_it_is(size):
     assert (np.abs(found / size - 1) < 0.15).mean() > 0.97
 
 
-def test_noise_does_not_make_things_thin():
+def test_noise_does_not_make_objects_thin():
     rng = np.random.default_rng(1)
     position, normal = plate(20000, 0.2, rng)
     position[:, 2] += rng.normal(0, 0.001, 20000)

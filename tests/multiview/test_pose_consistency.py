@@ -95,7 +95,7 @@ def test_blurred_and_noisy_pictures_are_let_pass(near):
     assert check_pose_consistency(replace(near, rgb=rgb.clip(0, 255).astype(np.uint8))).doubt is None
 
 
-def test_matrices_for_larger_pictures_are_told_at_which_scale_they_would_agree(near):
+def test_matrices_for_larger_pictures_are_reported_at_which_scale_they_would_agree(near):
     larger = [replace(c, K=np.diag([4.0, 4.0, 1.0]) @ c.K) for c in near.cameras]
     found = check_pose_consistency(replace(near, cameras=tuple(larger)))
     assert found.hopeless
@@ -195,7 +195,7 @@ MIDDLE = np.array([[0, 0, 2.0], [0, 0, -1], [0, 0, 0]])
         (lambda K: K, None),
     ],
 )
-def test_a_lens_under_which_matches_meet_less_closely_is_told(centred, change, said, monkeypatch):
+def test_a_lens_under_which_matches_meet_less_closely_is_reported(centred, change, said, monkeypatch):
     views, pairs = centred
     monkeypatch.setattr("corporeal.multiview.pose_consistency._pairs", lambda _: pairs)
     cameras = tuple(replace(c, K=change(c.K)) for c in views.cameras)
@@ -204,7 +204,7 @@ def test_a_lens_under_which_matches_meet_less_closely_is_told(centred, change, s
     assert found.doubt is None if said is None else said in found.doubt
 
 
-def test_masks_that_belong_to_other_pictures_are_told(near):
+def test_masks_that_belong_to_other_pictures_are_reported(near):
     _, masks = pictures()
     assert check_pose_consistency(near, masks).doubt is None
     elsewhere = np.stack([np.roll(m, 40 * (-1) ** k, axis=1) for k, m in enumerate(masks)])
@@ -239,13 +239,13 @@ def test_a_handful_of_matches_does_not_doubt_the_poses(shared_points, monkeypatc
     assert check_pose_consistency(shared_points).doubt is None
 
 
-def test_of_smooth_things_nothing_can_be_said():
+def test_smooth_objects_have_no_result():
     views, _ = pictures(textured=False, floor=False)
     found = check_pose_consistency(posed(views, lambda W: W @ OPENGL_FROM_OPENCV_AXES))
     assert (found.by, found.doubt) == ("nothing", None)
 
 
-def test_silhouettes_tell_where_smooth_things_are_seen_from_afar():
+def test_silhouettes_tell_where_smooth_objects_are_seen_from_afar():
     views, masks = pictures(step=1.25, textured=False, floor=False)
     right = check_pose_consistency(views, masks)
     assert (right.by, right.doubt) == ("silhouettes", None)
@@ -303,7 +303,7 @@ def test_pictures_of_one_point_agree_to_rounding_and_shifted_ones_err_by_their_s
     assert (error < 0.1).all() and (error > 0.02).all()
 
 
-def test_points_behind_the_cameras_are_told():
+def test_points_behind_the_cameras_are_reported():
     a, b, x, y, _ = two_views(np.random.default_rng(1))
     turn = np.diag([1.0, 1, 1, 1])
     turn[:3, :3] = -np.eye(3)  # all places on the other side: the same epipolar lines
@@ -320,7 +320,7 @@ def test_points_behind_the_cameras_are_told():
     assert (depths_of_match(*mirrored, x, y) < 0).all()
 
 
-def test_good_matches_are_told_from_random_ones_without_poses():
+def test_good_matches_are_distinguished_from_random_ones_without_poses():
     rng = np.random.default_rng(2)
     a, _, x, y, _ = two_views(rng, 80)
     assert consensus_fraction(x, y, 2.0, rng) > 0.5

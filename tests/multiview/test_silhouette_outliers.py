@@ -53,7 +53,7 @@ def test_an_empty_mask_says_nothing(seen):
     assert outlier_views(masks, cameras) == ()
 
 
-def test_nobody_is_blamed_where_half_contradict_the_others_or_few_look(seen):
+def test_none_is_left_out_where_half_contradict_the_others_or_few_look(seen):
     masks, cameras = seen
     turned = np.concatenate([masks[: COUNT // 2], masks[COUNT // 2 :][::-1, ::-1]])
     assert outlier_views(turned, cameras) == ()

@@ -33,7 +33,7 @@ def test_the_right_surface_fills_its_masks_and_a_small_one_does_not(seen):
     assert 0.5 < small.min() and small.max() < 0.75, "0.64 of the area, a little off by perspective"
 
 
-def test_what_is_no_thing_at_all_overlaps_nothing(seen):
+def test_what_is_no_object_at_all_overlaps_nothing(seen):
     mesh = block()
     away = Mesh(mesh.vertices + np.array([0.3, 0, 0]), mesh.triangles)
     assert overlaps(away, seen).max() < 0.1

@@ -45,7 +45,7 @@ def shaken(camera, rng):
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_thin_thing_is_filled_unless_it_was_turned(turned):
+def test_a_thin_object_is_filled_unless_it_was_turned(turned):
     rng = np.random.default_rng(0)
     points = rod(rng)
     other = points @ np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]) * [1, 1, -1] + [0, 0, 1]

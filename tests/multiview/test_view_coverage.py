@@ -15,7 +15,7 @@ def along(degrees):
     return tuple(camera_from_aim(a) for a in ring(np.linspace(0, degrees, 25)))
 
 
-def test_a_side_that_nobody_photographed_is_named_by_its_neighbours():
+def test_an_unphotographed_side_is_named_by_its_neighbours():
     most = along(240)
     said = unseen_side_text(most, NAMES)
     assert said is not None and "Between 24.jpg and 00.jpg lie 120°" in said
@@ -26,7 +26,7 @@ def test_a_side_that_nobody_photographed_is_named_by_its_neighbours():
 
 
 @pytest.mark.parametrize(("seen", "gap"), [(90, 269), (170, 190)])
-def test_what_is_known_from_one_side_only_is_said_to_be(seen, gap):
+def test_what_is_known_from_one_side_only_is_reported_to_be(seen, gap):
     """A helmet before a wall ended in a video of its front, and the fifth warning said so."""
     said = unseen_half_text(along(seen), NAMES)
     assert said is not None and "from one side only" in said

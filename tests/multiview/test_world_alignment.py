@@ -83,7 +83,7 @@ def test_up_and_floor_are_found_in_any_frame(rng, anywhere):
         assert found.confidence > 0.8
 
 
-def test_things_without_a_floor_stand_on_their_lowest_points(rng):
+def test_objects_without_a_floor_stand_on_their_lowest_points(rng):
     _, box = room(rng)
     made = somewhere(rng)
     cameras = apply_similarity_to_cameras(cameras_at(ring()), made)
@@ -166,7 +166,7 @@ def stool(rng):
 
 
 @pytest.mark.parametrize("usual", [(0, 0, 1), (0, 0, -1), (0, 1, 0), (1, 0, 0)])
-def test_without_cameras_and_floor_things_are_put_as_they_would_rest(rng, usual):
+def test_without_cameras_and_floor_objects_are_put_as_they_would_rest(rng, usual):
     tilted = similarity_matrix(matrix_from_quaternion(np.array([1, 0.03, -0.05, 0.02])))
     found = align_world((), apply_similarity_to_points(stool(rng), tilted), usual=usual)
     angle, floor = off(found, tilted)
@@ -187,13 +187,13 @@ def test_the_top_of_a_table_is_no_floor(rng):
     assert found.floor_by == "objects"
 
 
-def test_astray_points_do_not_change_how_things_rest(rng):
+def test_astray_points_do_not_change_how_objects_rest(rng):
     points = np.concatenate([stool(rng), rng.uniform(-3, 3, (60, 3))])
     found = align_world((), points, usual=(0, 0, 1))
     assert off(found, np.eye(4))[0] < 0.5
 
 
-def test_what_somebody_states_goes_before_cameras_and_file(rng):
+def test_a_stated_axis_goes_before_cameras_and_file(rng):
     points, box = room(rng)
     cameras = cameras_at(ring())
     found = align_world(cameras, box, z_up=True, of_objects=box, stated=StatedFrame((0.0, -2.0, 0.0)))

@@ -124,7 +124,7 @@ def test_what_falls_over_is_not_held_up(fast_engine):
     assert stays.moved[1, 2] > -0.01
 
 
-def test_what_never_rests_is_said_to(fast_engine):
+def test_what_never_rests_is_reported(fast_engine):
     """A block without friction slides down a slope for ever."""
     slope = Plane((np.sin(0.3), 0.0, np.cos(0.3)), 0.0)
     block = box((0.0, 0.0, 0.06), (0.1, 0.1, 0.1), CELL / 2, stuff=FOAM)

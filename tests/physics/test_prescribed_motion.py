@@ -74,7 +74,7 @@ def test_what_is_pushed_slides_on_for_its_braking_distance(fast_engine):
     assert m.centre[1, 0] == pytest.approx(-0.05 + 0.2, abs=1e-9)
 
 
-def test_what_moves_as_told_goes_exactly_there_and_is_booked_to_the_last_digit(engine):
+def test_prescribed_motion_is_exact_and_in_the_ledger_to_the_last_digit(engine):
     """Momentum and energy change by what contacts, gravity and the mover give, and no more."""
     turn = np.linspace(0.0, 3.0, 7)
     told = path(np.linspace(0.0, 0.3, 7), shift=0.05 * np.sin(np.linspace(0.0, 6.0, 7)), turn=turn)

@@ -203,7 +203,7 @@ def test_hands_act_as_in_the_reference(rigid):
     assert ours.push_work == pytest.approx(theirs.push_work, rel=1e-3)
 
 
-def test_a_hand_that_grasps_nothing_is_told(fast_engine):
+def test_a_hand_that_grasps_nothing_is_reported(fast_engine):
     run = fast_engine(problem(ball((0, 0, 0), 0.06, CELL / 2), cell=CELL))
     with pytest.raises(UserError, match="no body 3"):
         run.apply_impulse(3, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))

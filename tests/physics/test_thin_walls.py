@@ -67,7 +67,7 @@ def test_what_lies_in_a_crate_is_not_held_by_its_lid():
     [(mug(low=0.0), 1), (block(0.01), 1), (block(), 0), (mug(base=0.06, wall=0.035, low=0.0), 0)],
     ids=["mug", "crate", "block", "thick mug"],
 )
-def test_what_has_thin_walls_is_told_by_its_surface(solid, thin):
+def test_what_has_thin_walls_is_recognised_by_its_surface(solid, thin):
     (body,) = posed(solid).bodies
     normal = surface_curvature(body)[:, :3]
     assert rigid.thinness(body.surface, normal, 0.015) == thin

@@ -87,7 +87,7 @@ def test_an_extent_that_makes_no_sense_is_refused(models, text):
         assemble(models, AssembleConfig(extent=(text,)))
 
 
-def test_an_extent_for_nobody_lists_the_objects(models):
+def test_an_extent_for_an_unknown_object_lists_the_objects(models):
     with pytest.raises(UserError, match=r"no object 'cat'\. Choose one of: duck_0, soda_can_0"):
         assemble(models, AssembleConfig(extent=("cat=1",)))
 
@@ -99,7 +99,7 @@ def test_artist_units_are_doubted_and_a_size_proposed(tmp_path):
     assert assemble([path], AssembleConfig(extent=("duck=0.1",))).warnings == ()
 
 
-def test_a_working_extent_scales_the_scene_but_not_the_real_things(models):
+def test_a_working_extent_scales_the_scene_but_not_the_real_objects(models):
     scene = assemble(models, AssembleConfig(working_extent=1.0))
     boxes = object_boxes(scene)
     assert (boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max() == pytest.approx(1)
@@ -165,7 +165,7 @@ def test_several_objects_of_one_file_keep_their_places(tmp_path):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("", True), ("settled = false", False)])
-def test_whether_things_had_come_to_rest_is_said_by_our_file_or_the_scene_file(models, tmp_path, said, meant):
+def test_whether_objects_had_come_to_rest_is_stated_by_our_file_or_the_scene_file(models, tmp_path, said, meant):
     assert not assemble(models).settled
     assert not assemble([toml(tmp_path, 'file = "duck.glb"')]).settled
     (tmp_path / "ours").mkdir()
@@ -190,7 +190,7 @@ def test_the_time_watched_follows_from_the_fall(models, drop, seconds):
     assert assemble(models[:1], AssembleConfig(drop=drop)).duration == pytest.approx(seconds)
 
 
-def test_objects_that_stand_in_each_other_are_told(models):
+def test_objects_that_stand_in_each_other_are_reported(models):
     text = """
     [[object]]
     file = "duck.glb"
@@ -276,7 +276,7 @@ def test_real_objects_collide_with_nothing_at_the_start(shared_assets):
         assert [o.class_name for o in scene.objects] == ["vase", "ball", "soda can coke"]
 
 
-def test_a_size_is_doubted_as_the_real_thing_has_it_not_the_scene(tmp_path):
+def test_a_size_is_doubted_as_the_real_object_has_it_not_the_scene(tmp_path):
     """A file that states how large the real thing is may hold it at any scale."""
     stated = {"class": "duck", "real_extent_m": 0.1}
     scene = assemble([cube(scale=[1.6] * 3, extras=stated).save(tmp_path / "a.glb")])
@@ -287,7 +287,7 @@ def test_a_size_is_doubted_as_the_real_thing_has_it_not_the_scene(tmp_path):
     assert "is 1.6 m large, but a duck is usually about 10 cm" in said
 
 
-def test_a_working_extent_moves_the_walls_with_the_things(models):
+def test_a_working_extent_moves_the_walls_with_the_objects(models):
     room = '[[object]]\nfile = "ball.glb"\n[[wall]]\npoint = [0.3, 0, 0.1]\nnormal = [-1, 0, 0]\n'
     path = toml(models[0].parent, room)
     scene = assemble([path], AssembleConfig(working_extent=1.0))
@@ -318,7 +318,7 @@ def stl(path, extent):
         ("chair.obj", 3e6, 0.9, "the size that a chair usually is"),
     ],
 )
-def test_a_mesh_without_a_unit_is_as_large_as_such_things_are(tmp_path, name, size, metres, said):
+def test_a_mesh_without_a_unit_is_as_large_as_such_objects_are(tmp_path, name, size, metres, said):
     scene = assemble([stl(tmp_path / name, size)])
     assert scene.objects[0].real_extent == pytest.approx(metres)
     assert np.ptp(object_boxes(scene)[0], axis=0).max() == pytest.approx(metres)
@@ -385,7 +385,7 @@ def test_a_mesh_of_no_likely_size_asks_for_its_unit(tmp_path):
         assemble([stl(tmp_path / "bracket.obj", 3e6)])
 
 
-def test_a_mesh_may_be_told_which_axis_is_up(tmp_path):
+def test_a_mesh_may_state_which_axis_is_up(tmp_path):
     path = stl(tmp_path / "bracket.stl", 60.0)
     heights = [np.ptp(object_boxes(assemble([path], up=up))[0], axis=0)[2] for up in (None, "+x", "-y")]
     assert heights == pytest.approx([0.02, 0.06, 0.03])

@@ -105,7 +105,7 @@ def test_metric_scenes_keep_true_metres(pool, tmp_path):
     assert diagonal == pytest.approx(np.sqrt(11), rel=1e-5)
 
 
-def test_a_thing_of_unknown_size_is_told_of(pool, tmp_path):
+def test_an_object_of_unknown_size_is_reported_of(pool, tmp_path):
     made = composed(pool, tmp_path, assets=("plank_a",))
     assert any("plank" in w for w in made.warnings)
     said = json.loads((tmp_path / "composition.json").read_text())
@@ -130,7 +130,7 @@ def test_what_a_scene_is_made_of_is_written_down(pool, tmp_path):
         ({"count": "4-2"}, UserError, "smaller first"),
     ],
 )
-def test_what_the_pool_lacks_is_said_in_one_sentence(pool, tmp_path, said, error, words):
+def test_what_the_pool_lacks_is_reported_in_one_sentence(pool, tmp_path, said, error, words):
     with pytest.raises(error, match=words):
         composed(pool, tmp_path, **said)
     assert not (tmp_path / "scene.glb").exists()

@@ -42,7 +42,7 @@ def test_a_stated_thickness_of_zero_means_solid():
     assert (said.structure, said.thickness) == ("solid", None)
 
 
-def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
+def test_open_ware_from_pictures_is_no_solid_and_that_is_reported():
     """What is plain inside looks solid; a model of the same shows its wall itself."""
     bowl = scene(("bowl_0", [("mesh", plain(), {})]))
     made = describe(bowl, from_pictures=[0])
@@ -69,7 +69,7 @@ def test_open_ware_from_pictures_stays_so_whatever_a_person_says_it_is_made_of(t
     assert words(describe(bowl, config))[("bowl_0", "bowl")].structure is None
 
 
-def test_no_wall_from_pictures_is_believed_whoever_says_that_there_is_one(tmp_path):
+def test_no_wall_from_pictures_is_believed_of_any_source(tmp_path):
     (tmp_path / "said.yaml").write_text("thing_0: { material: steel, structure: sheet }\n")
     config = DescribeConfig(annotations=tmp_path / "said.yaml")
     said = words(describe(scene(THING), config, from_pictures=[0]))[("thing_0", "thing")]
@@ -343,7 +343,7 @@ def test_what_a_person_has_stated_is_not_asked_for_again(ask, tmp_path):
     assert (vase.answered_by, vase.placements["young_pa"].fraction) == ("annotation", 0.25)
 
 
-def test_a_model_that_contradicts_what_the_file_states_is_believed_and_told_once(ask):
+def test_a_model_that_contradicts_what_the_file_states_is_believed_and_reported_once(ask):
     thin = everywhere(0.0)  # soft_PVC's walls: 0.4 mm; the file states 2 mm
     oracle = Oracle(materials=made_of(part("body", "soft_PVC", "hollow"), part("beak", "ABS", "solid")), placement=thin)
     inventory = ask(oracle, DUCK)
@@ -378,7 +378,7 @@ def test_what_is_filled_has_contents_whose_density_is_placed_too(ask):
     assert set(said.placements) >= {"contents_density", "shell_thickness", "yield_stress"}
 
 
-def test_a_weak_model_is_survived_and_said(ask):
+def test_a_weak_model_is_survived_and_reported(ask):
     both = part("vase", "glass", "sheet", probability=1.0)
     both["ways"].append(both["ways"][0] | {"material": "ceramic"})
     inventory = ask(Oracle(materials=made_of(both), extents=None), VASE)
@@ -413,7 +413,7 @@ def test_a_mass_in_grams_is_not_taken_for_kilograms(ask):
     assert any("Answer in kilograms" in w for w in inventory.warnings)
 
 
-def test_a_silent_model_leaves_usual_values_that_are_marked_and_told(ask):
+def test_a_silent_model_leaves_usual_values_that_are_marked_and_reported(ask):
     oracle = Oracle(materials=made_of(part("vase", "glass", "sheet")), placement=None, extents=None)
     inventory = ask(oracle, VASE)
     (vase,) = inventory.objects[0].parts
@@ -467,7 +467,7 @@ def test_values_that_do_not_fit_each_other_are_asked_for_once_more(ask):
     assert {p.fraction for p in said.placements.values()} == {0.5}
 
 
-def test_a_size_far_from_what_the_model_knows_is_told(ask):
+def test_a_size_far_from_what_the_model_knows_is_reported(ask):
     inventory = ask(Oracle(materials=made_of(part("vase", "glass")), extents=sizes(0.3)), VASE)
     assert inventory.objects[0].usual_extent == 0.3
     assert inventory.warnings == (
@@ -480,7 +480,7 @@ def test_a_size_far_from_what_the_model_knows_is_told(ask):
     assert close.warnings == ()
 
 
-def test_nobody_is_asked_how_large_an_object_is_of_which_no_name_tells_anything(ask):
+def test_no_size_is_asked_of_an_object_of_which_no_name_tells_anything(ask):
     nameless = ("object_0", [("mesh", plain(), {})])
     oracle = Oracle(materials=made_of(part("object", "glass")))
     assert ask(oracle, nameless).objects[0].usual_extent is None

@@ -91,7 +91,7 @@ def words_of(inventory):
         {"materials": GLASS} | by_turn(placement=[everywhere(0.5), None, everywhere(0.5)]),
     ],
 )
-def test_one_broken_answer_of_three_is_left_out_and_that_is_said(monkeypatch, broken):
+def test_one_broken_answer_of_three_is_left_out_and_that_is_reported(monkeypatch, broken):
     def called(own):
         return lambda q: said(q) if callable(said := own(q) if callable(own) else own) else said
 

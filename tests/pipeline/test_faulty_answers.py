@@ -131,7 +131,7 @@ ASKED_AGAIN = {
 
 
 @pytest.mark.parametrize(("task", "fault", "told"), ASKED_AGAIN.values(), ids=ASKED_AGAIN)
-def test_a_fault_is_told_and_asked_for_again(interview, task, fault, told):
+def test_a_fault_is_reported_and_asked_for_again(interview, task, fault, told):
     model = Faulty(task, fault)
     made, requests = interview(model, sampling="value")
     assert model.erred == 1
@@ -183,7 +183,7 @@ SAID = {
 
 
 @pytest.mark.parametrize(("task", "fault", "told"), SAID.values(), ids=SAID)
-def test_a_fault_that_stays_is_said(interview, task, fault, told):
+def test_a_fault_that_stays_is_reported(interview, task, fault, told):
     made, _ = interview(Faulty(task, fault, always=True), sampling="value")
     assert any(told in warning for warning in made.warnings)
 

@@ -78,7 +78,7 @@ def test_a_fault_in_one_of_three_is_asked_for_again_and_all_three_count(intervie
 
 
 @pytest.mark.parametrize("name", STAYING)
-def test_a_fault_of_one_of_three_that_stays_is_said_once_and_costs_that_one_alone(interview, name):
+def test_a_fault_of_one_of_three_that_stays_is_reported_once_and_costs_that_one_alone(interview, name):
     task, fault = FAULTS[name]
     made, _ = interview(OneOfThree(task, fault, always=True, at_once=task != "placement"))
     (jar,) = made.objects

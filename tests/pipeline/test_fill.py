@@ -186,7 +186,7 @@ def test_a_thick_wall_weighs_what_is_between_its_faces(whole, hollow):
     assert particles.mass_real[0] == pytest.approx(true, rel=0.02)
 
 
-def test_a_shell_is_never_heavier_than_the_same_thing_solid():
+def test_a_shell_is_never_heavier_than_the_same_object_solid():
     particles = fill(*inputs(thing((ball(0.1), RUBBER, Structure("shell", 0.5)))))
     assert particles.mass_real[0] == pytest.approx(1100 * ball(0.1).volume, rel=1e-6)
 
@@ -253,7 +253,7 @@ def test_particles_of_touching_objects_keep_apart():
     assert particles.mass.sum() == pytest.approx(2 * 1100 * 0.008, rel=1e-6)
 
 
-def test_a_fall_gives_its_speed_and_a_standing_thing_expects_what_falls_on_it():
+def test_a_fall_gives_its_speed_and_a_standing_object_expects_what_falls_on_it():
     scene, parts, _ = inputs(
         thing((put(trimesh.creation.box((1, 1, 0.2)), 0.0), RUBBER)),
         thing((ball(0.1, bottom=1.2), RUBBER)),

@@ -130,7 +130,7 @@ def puppet(gaussians, owner, played):
     return stage._gaussian_deformer(SMALL, made_of(played, gaussians, owner))
 
 
-def test_things_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
+def test_objects_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
     played = play()
     gaussians, owner = together(clad(0), clad(1))
     only = replace(gaussians, opacity=np.where(owner == 1, gaussians.opacity, 0.0))
@@ -198,7 +198,7 @@ def test_a_scene_made_of_gaussians_is_drawn_from_them(videos):
     assert both.sum() > 0.8 * max(reddish(one).sum(), greenish(other).sum())
 
 
-def test_things_of_gaussians_cast_shadows_on_the_usual_floor(videos):
+def test_objects_of_gaussians_cast_shadows_on_the_usual_floor(videos):
     one, other = still(videos / "gaussians", 2), still(videos / "surfaces", 2)
     floor = ~binary_dilation(reddish(one) | greenish(other), iterations=5)
     assert floor.mean() > 0.3
@@ -224,7 +224,7 @@ def test_what_stands_still_is_carried_and_lit_once(tmp_path, monkeypatch):
     assert len(carried) == 3, "once before it moves, and once after"
 
 
-def test_colours_can_tell_what_things_are(tmp_path):
+def test_colours_can_tell_what_objects_are(tmp_path):
     played = made_of(play(), *together(clad(0), clad(1)))
     render_video(played, replace(SMALL, colour_by="object"), tmp_path)
     picture = still(tmp_path, 0)

@@ -109,7 +109,7 @@ def test_a_heap_on_a_plate_stays_as_it_is_drawn():
     assert "fills" not in particles.fills[1]
 
 
-def test_a_sheet_of_sand_on_a_table_stays_one_and_is_told_of():
+def test_a_sheet_of_sand_on_a_table_stays_one_and_is_reported_of():
     table = trimesh.creation.box((1.0, 1.0, 0.03))
     table.apply_translation((0, 0, 0.7))
     sand = turned([(0.3, 0.72), (0, 0.72)])

@@ -42,14 +42,14 @@ def test_every_value_carries_its_range_its_source_and_a_reason():
             assert (why.chosen_by, bool(why.reason)) == ("typical", True)
 
 
-def test_the_structure_follows_what_is_said():
+def test_the_structure_follows_the_description():
     field, _, _ = grounded(DUCK, BLOCK)
     assert (field.structures[0].kind, field.structures[0].thickness) == ("shell", 0.002)
     assert field.structures[1].kind == "solid"
     assert "the shape decides" in field.structures[1].reason
 
 
-def test_a_shell_of_unsaid_thickness_is_as_thin_as_such_things_are(tmp_path):
+def test_a_shell_of_unstated_thickness_is_as_thin_as_such_objects_are(tmp_path):
     (tmp_path / "a.yaml").write_text("block_0: { structure: shell }")
     field, _, _ = grounded(BLOCK, annotations=tmp_path / "a.yaml")
     assert field.structures[0].thickness == pytest.approx(0.0007)
@@ -210,7 +210,7 @@ def test_what_a_person_stated_outranks_what_a_model_placed():
     assert steel.grounds["young_pa"].margin == 1.0
 
 
-def test_a_place_that_nobody_could_choose_is_marked():
+def test_an_unanswered_placement_is_marked():
     words = PartDescription("", "steel", placements={"young_pa": RangePlacement(0.4, "fallback", "No answer.")})
     (steel,) = spoken(RIDDLE, words)[0].materials
     assert steel.grounds["young_pa"].chosen_by == "fallback"
@@ -325,7 +325,7 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
         ("metadata", "The file's metadata says"),
     ],
 )
-def test_who_said_how_a_part_is_built_is_named(built_by, who):
+def test_the_source_of_a_structure_is_named(built_by, who):
     (solid,) = spoken(RIDDLE, PartDescription("", "steel", "solid", built_by=built_by))[0].structures
     assert solid.reason == f"{who} that it is solid."
     shell = PartDescription("", "terracotta", "shell", built_by=built_by)

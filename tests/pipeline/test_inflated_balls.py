@@ -107,7 +107,7 @@ def test_an_annotation_inflates_a_ball_and_lets_the_air_out_of_one(tmp_path):
         ("thing: {structure: solid, inflation_kPa: 80}", "Say structure: shell"),
     ],
 )
-def test_what_cannot_be_inflated_so_is_said(tmp_path, text, message):
+def test_what_cannot_be_inflated_so_is_reported(tmp_path, text, message):
     with pytest.raises(UserError, match=message):
         annotated(tmp_path, text)
 

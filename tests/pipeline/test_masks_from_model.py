@@ -46,7 +46,7 @@ def drawn(of):
     return np.stack([255 * of(k).astype(np.uint8) for k in range(VIEWS)])
 
 
-def test_a_ball_is_one_thing(cameras):
+def test_a_ball_is_one_object(cameras):
     why, share = several_objects_reason(drawn(ball), cameras)
     assert why is None and share > 0.95
 
@@ -54,7 +54,7 @@ def test_a_ball_is_one_thing(cameras):
 @pytest.mark.parametrize(
     ("of", "said"), [(anything, "they contradict one another"), (half, "in 12 of 12 photographs they end at")]
 )
-def test_what_is_of_no_thing_is_told(cameras, of, said):
+def test_what_is_of_no_object_is_reported(cameras, of, said):
     why, _ = several_objects_reason(drawn(of), cameras)
     assert why is not None and said in why
 
@@ -89,7 +89,7 @@ def asked(cameras, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("of", [anything, half])
-def test_nonsense_is_refused_with_where_it_lies_unless_somebody_wants_to_go_on(asked, of):
+def test_nonsense_is_refused_with_where_it_lies_unless_forced(asked, of):
     """Half of each picture ended as "the poses do not agree", after a training."""
     with pytest.raises(BadFileError, match=r"found@.* are not of one object.*masks.*--force") as told:
         asked(of)
@@ -98,6 +98,6 @@ def test_nonsense_is_refused_with_where_it_lies_unless_somebody_wants_to_go_on(a
     assert (folder / "masks").is_dir() and "not of one object" in doubts[0]
 
 
-def test_masks_of_a_thing_are_taken_without_a_doubt(asked):
+def test_masks_of_an_object_are_taken_without_a_doubt(asked):
     _, said, doubts = asked(ball)
     assert not doubts and "12 of 12 photographs" in said[0] and "corrected there" in said[1]

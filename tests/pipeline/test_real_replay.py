@@ -61,6 +61,6 @@ def test_one_mesh_of_several_materials_keeps_its_pieces_and_their_shares(describ
     ]
 
 
-def test_a_size_in_the_wrong_unit_is_told(described):
+def test_a_size_in_the_wrong_unit_is_reported(described):
     (said,) = described["armchair_kaolin"][1].warnings
     assert "--extent armchair_0=0.9" in said

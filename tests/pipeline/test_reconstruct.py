@@ -48,7 +48,7 @@ def made(splat):
     return reconstruct(splat, config, ("crate=0.4",))
 
 
-def test_things_come_out_in_metres_on_the_floor(made):
+def test_objects_come_out_in_metres_on_the_floor(made):
     found, scene = made.found, made.scene
     assert [(o.name, o.class_name) for o in scene.objects] == [("crate", "crate"), ("blue pillar", "blue pillar")]
     assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
@@ -117,7 +117,7 @@ def test_gaussians_follow_their_objects_beside_others(made):
     assert StageResults(reconstruct=found, assemble=scene).rendered_reconstruction is not None
 
 
-def test_the_report_is_told_how_it_came_about(made):
+def test_the_report_says_how_it_came_about(made):
     found = made.found
     told = " ".join(found.statements)
     assert "Gaussians were read from boxes.ply" in told
@@ -142,7 +142,7 @@ class Seer(PhotoInterview):
         return [1, 0]
 
 
-def test_somebody_who_sees_the_pictures_names_things_and_their_sizes(splat):
+def test_a_model_that_sees_the_pictures_names_objects_and_their_sizes(splat):
     result = reconstruct(splat, COARSE, viewer=Seer())
     found, scene = result.found, result.scene
     assert [o.class_name for o in scene.objects] == ["crate", "pillar"]

@@ -56,7 +56,7 @@ def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
     assert describe_masks_in(tmp_path).endswith(f"--masks {tmp_path}.")
 
 
-def test_where_shapes_are_made_up_is_read_first_and_said_before_a_refusal(tmp_path, monkeypatch):
+def test_where_shapes_are_made_up_is_read_first_and_reported_before_a_refusal(tmp_path, monkeypatch):
     """It was the ninth warning of a helmet before a wall; the terminal shows five."""
     half = "Its shape is known from one side only: there is no other."
     doubted = Reconstruction(
@@ -95,7 +95,7 @@ def test_who_goes_on_without_masks_hears_where_doubted_ones_lie(tmp_path, monkey
 
 
 @pytest.mark.parametrize(("count", "refused"), [(None, True), (2, False)])
-def test_two_pieces_seen_from_one_side_are_believed_if_somebody_said_two(monkeypatch, count, refused):
+def test_two_pieces_seen_from_one_side_are_believed_if_two_were_stated(monkeypatch, count, refused):
     """Apart from each other, either may be a piece of the wall behind."""
     views = cameras_around(np.eye(3), 20, (8, 6))[:10]
     mesh = trimesh.creation.box()

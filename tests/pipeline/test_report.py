@@ -71,13 +71,13 @@ def test_a_liquid_has_no_modulus_to_compare():
     assert said == "liquid, its sound slowed to 47 m/s"
 
 
-def test_what_is_inside_is_told_with_how_it_is_built():
+def test_what_is_inside_is_reported_with_how_it_is_built():
     soup = Material("soup", Law.NEO_HOOKEAN, 300.0, 0.49, 1050.0)
     assert structure_words(Structure("filled", 2e-4, contents=soup, fill=0.9)) == "filled with soup"
     assert structure_words(Structure("shell", 2e-4)) == "shell"
 
 
-def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
+def test_what_a_part_may_be_instead_and_what_was_distinguished_in_it_is_reported():
     head = PartDescription("head", "steel", volume_share=0.25)
     words = PartDescription("hammer", "hardwood", hypotheses=(Hypothesis("ABS", "solid", 0.3),), pieces=(head,))
     assert alternative_words(words) == (" Alternatives: ABS (30%). Components: head: steel (25% of the volume).")
@@ -87,7 +87,7 @@ def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
 TOOK = ModelUsage(("openai:x",), 9, 11, 20500, 1200, 43.2, 0.0693, "2026-11-21")
 
 
-def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unknown():
+def test_what_the_questions_took_is_reported_and_an_unknown_price_is_reported_to_be_unknown():
     assert usage_words(TOOK) == (
         "<br>9 questions to openai:x: 11 calls, 20,500 tokens in, 1,200 out, 43 s waited, "
         "about $0.069 at the list prices of 2026-11-21."
@@ -163,7 +163,7 @@ def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
     assert "the usual value in the measured range" in density
 
 
-def test_a_long_reason_that_all_values_share_is_said_once(page):
+def test_a_long_reason_that_all_values_share_is_reported_once(page):
     told = page(PartDescription("", None))
     reason = "The material of this part is unknown"
     assert told.count(f"Reason where none is stated: {reason}") == 1
@@ -191,6 +191,6 @@ def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
     assert 'href="#said"' in told and 'id="said"' in above
 
 
-def test_a_page_of_which_nothing_is_to_be_said_has_no_lists(page):
+def test_a_page_of_which_nothing_is_to_be_reported_has_no_lists(page):
     told = page(PartDescription("", "steel", "solid"))
     assert "<h3>What" not in told and "The audit found no violations." in told

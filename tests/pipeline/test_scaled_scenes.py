@@ -62,7 +62,7 @@ def large():
     return through(scale_scene(a_can("a recorded answer"), 5.0))
 
 
-def test_words_and_materials_are_those_of_the_real_thing(life, large):
+def test_words_and_materials_are_those_of_the_real_object(life, large):
     assert life[0] == large[0]
     assert life[2].materials == large[2].materials
     assert life[2].structures == large[2].structures
@@ -115,7 +115,7 @@ def page(scene, made, folder):
     return (folder / "report.html").read_text(encoding="utf-8")
 
 
-def test_a_merged_and_tilted_thing_keeps_its_scale_wherever_it_lies(life, tmp_path):
+def test_a_merged_and_tilted_object_keeps_its_scale_wherever_it_lies(life, tmp_path):
     """Its box in the scene says nothing of its size: what its node states does."""
     write_glb(tmp_path / "can.glb", a_can())
     said = {"class": "can", "real_extent_m": 0.1, "scale": 5.0, "sized_by": "the table"}
@@ -165,7 +165,7 @@ def test_masses_are_compared_with_the_scales_at_real_size(tmp_path):
     assert found[1] == pytest.approx(found[0], rel=1e-5)
 
 
-def test_the_real_thing_is_the_same_with_all_its_lengths_over_the_scale():
+def test_the_real_object_is_the_same_with_all_its_lengths_over_the_scale():
     steel = Material("steel", Law.VON_MISES, 2e11, 0.3, 7850.0)
     wall = Structure("shell", 4e-4)
     real = PartGeometry(0, steel, wall, (0.06, 0.06, 0.1), 2.8e-4, 0.024, diameter=0.01)
@@ -179,7 +179,7 @@ def test_the_real_thing_is_the_same_with_all_its_lengths_over_the_scale():
     assert (back.scale, back.material, back.structure.kind) == (1.0, steel, "shell")
 
 
-def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
+def test_where_the_real_object_would_be_judged_otherwise_it_is_reported():
     """A long stick bends under itself; the short one that it stands for does not."""
     gel = Material("stiff gel", Law.HENCKY, 1e8, 0.38, 700.0)
     size, volume, area = (0.15, 0.15, 1.0), 0.15**2, 4 * 0.15

@@ -103,7 +103,7 @@ def test_without_a_reconstruction_pieces_share_a_surface():
     assert [p.name for p in segment(made, words).catalogue] == ["plant", "vase"]
 
 
-def test_a_piece_that_shows_nowhere_is_left_out_and_told():
+def test_a_piece_that_shows_nowhere_is_left_out_and_reported():
     made, green = potted()
     named = NamedParts(np.zeros(len(green), int), np.ones(len(green)), "attributes", ("None.",))
     with pytest.MonkeyPatch.context() as patch:
@@ -114,7 +114,7 @@ def test_a_piece_that_shows_nowhere_is_left_out_and_told():
     assert parts.warnings == ("plant: None.",)
 
 
-def test_what_nobody_looked_at_is_said_to_be_one_material():
+def test_what_was_not_looked_at_is_reported_to_be_one_material():
     made, green = potted()
     words = told(("red pot", "ceramic"), ("green leaves", "leaves-flowers"), vase_by="metadata")
     (warning,) = segment(made, words, found=seen(made, green)).warnings

@@ -152,7 +152,7 @@ def test_what_hangs_is_held_and_falls_from_time_0(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["velocity", "push", "wind"])
-def test_what_moves_things_begins_at_time_0(tmp_path, kind):
+def test_what_moves_objects_begins_at_time_0(tmp_path, kind):
     given = {
         "velocity": {"velocity": (0.5, 0.0, 0.0)},
         "push": {"push": Push((20.0, 0.0, 0.0))},
@@ -200,7 +200,7 @@ def test_a_settling_that_was_cut_off_goes_on_to_the_last_bit(tmp_path, monkeypat
     assert not list((tmp_path / "broken").rglob("checkpoint*"))
 
 
-def test_ctrl_c_while_things_settle_keeps_what_was_done(tmp_path):
+def test_ctrl_c_while_objects_settle_keeps_what_was_done(tmp_path):
     asked = scene_of((0.0, SIZE), (FOAM, STONE))
 
     def stop(fraction, words):

@@ -72,7 +72,7 @@ def test_a_crown_weighs_what_its_leaves_weigh_and_each_swings_as_a_usual_one_doe
     assert shown in particles.fills[1]
 
 
-def test_leaves_as_thick_as_somebody_said_have_the_density_of_their_material():
+def test_leaves_as_thick_as_stated_have_the_density_of_their_material():
     made = crown(anatomy(), a_sapling(Structure("shell", 1e-3))[2])
     assert made.mass == pytest.approx(0.75 * carved().area * 1e-3 * 150, rel=1e-3)
     assert made.density == pytest.approx(made.mass / anatomy().members[-1].volume)
@@ -103,7 +103,7 @@ def above(stem, height):
     return replace(stem, body=Mesh(shown, stem.body.triangles), closed=False)
 
 
-def test_a_potted_stem_whose_foot_nobody_saw_reaches_halfway_down():
+def test_a_potted_stem_whose_foot_is_unseen_reaches_halfway_down():
     scene, parts, field = a_potted_plant()
     whole = measure_objects(scene, parts, 0)[0]
     pot, soil, stem, leaves = whole.members

@@ -223,7 +223,7 @@ def test_slowness_that_makes_no_sense_is_refused(tmp_path):
         validate(replace(SMALL, slow=0.5))
 
 
-def test_a_camera_goes_by_where_most_of_a_thing_is_and_sees_all_of_what_keeps_its_shape():
+def test_a_camera_goes_by_where_most_of_an_object_is_and_sees_all_of_what_keeps_its_shape():
     rng = np.random.default_rng(4)
     ball = rng.normal(size=(2000, 3))
     ball *= (0.05 * rng.uniform(size=(2000, 1)) ** (1 / 3)) / np.linalg.norm(ball, axis=1)[:, None]
@@ -238,7 +238,7 @@ def test_a_camera_goes_by_where_most_of_a_thing_is_and_sees_all_of_what_keeps_it
     assert (high - low).max() < 0.13
 
 
-def test_what_is_no_video_is_said_in_one_line(tmp_path):
+def test_what_is_no_video_is_reported_in_one_line(tmp_path):
     path = tmp_path / "video.mp4"
     with pytest.raises(UserError, match=r"video\.mp4: there is no such video\. Make it again\.$"):
         video_file.read_frames(path, [0])

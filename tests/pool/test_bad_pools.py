@@ -124,7 +124,7 @@ def test_when_nothing_is_good_the_pool_is_empty_and_says_why(tmp_path):
     assert pool.assets == () and set(reasons(pool)) == {"a", "b"}
 
 
-def test_what_is_said_to_be_in_metres_and_is_a_kilometre_large_stays_outside(tmp_path):
+def test_what_is_stated_to_be_in_metres_and_is_a_kilometre_large_stays_outside(tmp_path):
     put(tmp_path / "in", chair=plain_ball(500), thing=plain_ball(501), sofa=plain_ball(502))
     table = tmp_path / "said.csv"
     rows = "in/chair.glb,chair,yes\nin/thing.glb,gizmo,yes\nin/sofa.glb,sofa,no\n"
@@ -171,7 +171,7 @@ def test_a_non_manifold_tangle_is_measured_like_any_other(tmp_path):
 
 
 @pytest.mark.parametrize(("gap", "things"), [(0.1, 2), (0.01, 1), (0.0, 1)])
-def test_what_stands_apart_is_several_things(tmp_path, gap, things):
+def test_what_stands_apart_is_several_objects(tmp_path, gap, things):
     """Two balls with a gap between them, over their common extent; touching, they are one toy."""
     vertices, triangles, _ = ball(12)
     shift = 2 * 0.1 * (1 + gap / (1 - gap))
@@ -192,7 +192,7 @@ def test_open_edges_are_counted(tmp_path):
     assert asset.open_edges == pytest.approx(20 / edges, abs=1e-6)
 
 
-def test_a_placeholder_is_told_from_a_simple_thing_by_its_picture(tmp_path):
+def test_a_placeholder_is_distinguished_from_a_simple_object_by_its_picture(tmp_path):
     spread = np.stack([CUBE[:, 0], CUBE[:, 1]], 1)
     put(
         tmp_path / "in",

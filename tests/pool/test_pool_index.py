@@ -82,7 +82,7 @@ def test_folders_that_say_nothing_are_passed_over_and_models_called_model_take_t
     assert classes == {"Garden_Chair_model": "garden chair", "Duck": "duck"}
 
 
-def test_what_a_table_names_and_is_not_there_is_told(tmp_path):
+def test_what_a_table_names_and_is_not_there_is_reported(tmp_path):
     save(tmp_path / "in" / "x.glb", plain_ball())
     table = tmp_path / "said.csv"
     table.write_text("file,class\nin/x.glb,ball\nin/y.glb,mug\n")
@@ -294,7 +294,7 @@ def test_the_progress_names_every_file(tmp_path):
     assert told == [(k / 4, f"ball{k}.glb") for k in range(4)] + [(1.0, "")]
 
 
-def test_a_damaged_index_is_said_in_one_line(tmp_path):
+def test_a_damaged_index_is_reported_in_one_line(tmp_path):
     save(tmp_path / "in" / "ball.glb", plain_ball())
     index_pool([tmp_path / "in"], tmp_path / "pool")
     path = tmp_path / "pool" / "pool.json"

@@ -27,7 +27,7 @@ def test_a_compound_is_found_by_its_words(said, words):
     assert (found and found.words) == words
 
 
-def test_a_file_in_artists_units_is_said_to_be_implausible():
+def test_a_file_in_artists_units_is_reported_to_be_implausible():
     """The two that went through without a word."""
     golf = extent_warning("golfball_0", "golfball", 1.8)
     assert golf is not None
@@ -163,7 +163,7 @@ def test_what_lacks_most_of_its_mass_is_doubted(what, mass, sides):
 
 
 @pytest.mark.parametrize(("what", "mass", "sides"), SOLID)
-def test_what_is_solid_where_such_things_are_hollow_is_doubted(what, mass, sides):
+def test_what_is_solid_where_such_objects_are_hollow_is_doubted(what, mass, sides):
     said = mass_warning("it_0", what, mass, sides)
     assert said is not None
     assert said.startswith("it_0 weighs")
@@ -179,13 +179,13 @@ def test_a_sheet_has_no_box_to_weigh_it_by():
     assert mass_warning("it_0", "book", 1.0, (0.0, 0.2, 0.3)) is None
 
 
-def test_a_thing_that_is_too_light_is_doubted_too():
+def test_an_object_that_is_too_light_is_doubted_too():
     said = mass_warning("it_0", "bowling ball", 0.1, (0.216, 0.216, 0.216))
     assert said is not None
     assert "a bowling ball has 250 to 800" in said
 
 
-def test_the_doubt_does_not_depend_on_the_size_that_a_scene_shows_things_in():
+def test_the_doubt_does_not_depend_on_the_size_that_a_scene_shows_objects_in():
     """Masses follow the cube of the size, and so does the box."""
     for factor in (0.01, 1.0, 100.0):
         sides = (0.3 * factor, 0.3 * factor, 0.6 * factor)
@@ -233,7 +233,7 @@ def test_slips_compounds_and_matter_behind_the_noun(said, words):
     assert (found and found.words) == words
 
 
-def test_what_stands_for_one_thing_in_the_plural_is_said_so():
+def test_what_stands_for_one_object_in_the_plural_is_reported_so():
     said = extent_warning("jeans_0", "jeans", 90.0)
     assert said is not None
     assert "but jeans are usually" in said

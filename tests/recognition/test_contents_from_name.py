@@ -61,7 +61,7 @@ def test_a_vessel_is_as_full_as_its_name_says(name, contents, fill):
         ("plasticine mug half full", "no wall thickness of plasticine is known"),
     ],
 )
-def test_what_a_name_says_of_contents_and_is_not_used_is_told(name, why):
+def test_what_a_name_says_of_contents_and_is_not_used_is_reported(name, why):
     words, warned = told(name)
     assert words.contents is None
     assert len(warned) == 1
@@ -69,7 +69,7 @@ def test_what_a_name_says_of_contents_and_is_not_used_is_told(name, why):
     assert "--annotations" in warned[0]
 
 
-def test_of_several_parts_nobody_knows_which_holds_it():
+def test_it_is_unknown_which_of_several_parts_holds_it():
     words, (warned,) = told("bottle half full of water", "cap", "body")
     assert words.contents is None
     assert "the part that holds it" in warned

@@ -30,7 +30,7 @@ from corporeal.recognition.typical_extents import typical_extent
         ("office chair desk", "office chair desk"),
     ],
 )
-def test_the_thing_stands_last(said, words):
+def test_the_object_stands_last(said, words):
     assert " ".join(name_tokens(said)) == words
 
 
@@ -45,18 +45,18 @@ def test_the_thing_stands_last(said, words):
         ("glass jar", "glass jar"),
     ],
 )
-def test_a_part_is_not_the_thing_that_it_is_of(said, words):
+def test_a_part_is_not_the_object_that_it_is_of(said, words):
     assert " ".join(strip_whole_from_part_name(said.split(), multiword_names())) == words
 
 
 @pytest.mark.parametrize("said", ["jar_lid", "lid_jar", "tire_car"])
-def test_a_part_is_not_as_large_as_the_thing(said):
+def test_a_part_is_not_as_large_as_the_object(said):
     whole = {"jar", "car"}
     known = typical_extent(said)
     assert known is None or known.words not in whole
 
 
-def test_a_pile_of_things_is_not_as_large_as_one():
+def test_a_pile_of_objects_is_not_as_large_as_one():
     assert names_several_objects("pile of bricks".split())
     assert typical_extent("pile of bricks") is None
     assert typical_extent("brick") is not None
@@ -72,11 +72,11 @@ def test_a_pile_of_things_is_not_as_large_as_one():
         ("bucket hat", False),
     ],
 )
-def test_what_describes_a_thing_behind_it_leaves_it_hollow(said, is_hollow):
+def test_what_describes_an_object_behind_it_leaves_it_hollow(said, is_hollow):
     assert names_hollow_object(name_tokens(said)) is is_hollow
 
 
-def test_goods_before_the_vessel_are_not_the_thing():
+def test_goods_before_the_vessel_are_not_the_object():
     assert [t.material for t in head_terms(name_tokens("olive oil extra virgin bottle"))] == []
 
 
@@ -93,7 +93,7 @@ def test_furniture_is_moulded_of_plastic_and_of_tubes_where_it_is_of_metal(said,
     assert hollow_wall_thickness(name_tokens(said), material) == (None if wall is None else pytest.approx(wall))
 
 
-def test_what_only_describes_stays_in_front_of_what_a_thing_is_of():
+def test_what_only_describes_stays_in_front_of_what_an_object_is_of():
     """A full bottle of wine was a wine full bottle, and no wine bottle."""
     assert name_tokens("full bottle of red wine") == ("full", "red", "wine", "bottle")
     assert name_tokens("wooden bowl of cherries") == ("cherry", "wooden", "bowl")

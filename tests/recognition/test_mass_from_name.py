@@ -36,12 +36,12 @@ def test_what_a_name_says_of_mass(name, mass):
     assert mass_from_name(name) == (None if mass is None else pytest.approx(mass, rel=1e-3))
 
 
-def test_two_names_of_one_thing_agree_or_say_nothing():
+def test_two_names_of_one_object_agree_or_say_nothing():
     assert mass_from_name("dumbbell", "dumbbell_5kg") == 5
     assert mass_from_name("dumbbell 4kg", "dumbbell_5kg") is None
 
 
-def test_a_mass_that_is_far_from_the_name_is_told():
+def test_a_mass_that_is_far_from_the_name_is_reported():
     assert mass_from_name_warning("kettlebell_16kg", 20.0, "kettlebell_16kg") is None
     told = mass_from_name_warning("kettlebell_16kg", 33.0, "kettlebell_16kg")
     assert told is not None

@@ -119,7 +119,7 @@ def test_a_part_by_itself_is_of_what_such_parts_are():
     assert seen("mesh", "tire_car").structure == "shell", "what is a thing, too, stays one"
 
 
-def test_no_phrase_means_two_things():
+def test_no_phrase_means_two_objects():
     told = {}
     for s in lexicon_terms():
         key = (s.phrase, s.kind, s.alpha, s.extents)
@@ -149,7 +149,7 @@ def test_longer_phrases_say_more_and_ambiguous_words_say_nothing(surface, thing,
     assert seen(surface, thing).material == material
 
 
-def test_a_thing_of_another_material_is_built_as_such_things_are():
+def test_an_object_of_another_material_is_built_as_such_objects_are():
     plain, other = (seen("mesh", f"{word} gelatin box") for word in ("cardboard", "steel"))
     usual = seen("mesh", "gelatin box")
     assert replace(plain, reason="", margin=0.0) == replace(usual, reason="", margin=0.0)
@@ -204,7 +204,7 @@ def test_light_through_a_nameless_surface_is_glass():
     assert seen("mesh", "thing", Finish("x", transmission=1.0)).material == "glass"
 
 
-def test_a_plants_parts_are_told_by_their_colour():
+def test_a_plants_parts_are_recognised_by_their_colour():
     colours = {
         "leaves-flowers": (0.2, 0.5, 0.1, 1.0),
         "terracotta": (0.4, 0.1, 0.03, 1.0),
@@ -228,7 +228,7 @@ def test_a_metallic_statue_is_cast():
     assert seen("mesh", "statue", gilt, metallic=False).material == "granite"
 
 
-def test_a_thing_of_several_parts_does_not_say_what_each_is():
+def test_an_object_of_several_parts_does_not_say_what_each_is():
     assert seen("mesh", "chair", alone=True).material == "wood"
     assert seen("mesh", "chair", alone=False).material is None
     assert seen("mesh", "soda can", alone=False).material == "aluminium_can_sheet"
@@ -279,7 +279,7 @@ def told(thing, *parts):
         ("oak shelf", "hardwood"),
     ],
 )
-def test_of_compound_nouns_the_last_one_is_the_thing(name, material):
+def test_of_compound_nouns_the_last_one_is_the_object(name, material):
     assert seen("mesh", name).material == material
 
 
@@ -293,7 +293,7 @@ def test_of_compound_nouns_the_last_one_is_the_thing(name, material):
         ("Lamp_On", "lamp on"),
     ],
 )
-def test_what_a_thing_lies_on_is_not_what_it_is_made_of(name, counts):
+def test_what_an_object_lies_on_is_not_what_it_is_made_of(name, counts):
     assert " ".join(name_tokens(name)) == counts
 
 
@@ -322,7 +322,7 @@ def plural(word):
     return f"{word[:-2]}ves" if word.endswith(("life", "nife")) else f"{word}s"
 
 
-def test_many_of_a_thing_are_of_what_one_is_of():
+def test_many_of_an_object_are_of_what_one_is_of():
     known = {term.phrase[0] for term in lexicon_terms() if len(term.phrase) == 1 and term.kind == "thing"}
     apart = {word for word in known if name_tokens(plural(word)) != name_tokens(word)}
     assert apart <= {"battery", "branch"}, "batteries and branches have rows of their own"
@@ -398,7 +398,7 @@ def test_what_is_no_compound_of_known_words_stays_whole(name):
     assert len(name_tokens(name)) == 1
 
 
-def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
+def test_a_substance_in_a_name_counts_where_the_object_is_unknown():
     painted = Finish("texture", texture=np.zeros((2, 2, 3), dtype=np.uint8))
     cast = seen("mesh", "bronze talisman", painted)
     assert cast.material == "bronze"
@@ -510,13 +510,13 @@ def test_a_large_statue_of_metal_is_cast_around_a_core():
     assert built("bust", 0.5) == ("granite", None)
 
 
-def test_a_hollow_thing_of_what_has_no_walls_is_left_alone():
+def test_a_hollow_object_of_what_has_no_walls_is_left_alone():
     known = about("mesh", "plasticine box")
     assert recognise_part(known).material == "plasticine"
     assert infer_hollow_structure(recognise_part(known), known, lambda name: name != "plasticine").structure is None
 
 
-def test_what_is_said_of_how_it_is_built_outranks_what_it_is():
+def test_a_stated_structure_outranks_what_it_is():
     known = about("mesh", "box")
     solid = replace(recognise_part(known), structure="solid")
     assert infer_hollow_structure(solid, known, lambda _: True) == solid
@@ -561,7 +561,7 @@ def test_slips_and_words_written_apart_or_together_are_known(thing, material):
     assert seen("mesh", thing).material == material
 
 
-def test_a_substance_behind_the_thing_is_what_it_is_made_of():
+def test_a_substance_behind_the_object_is_what_it_is_made_of():
     found = seen("mesh", "watering can zinc")
     assert (found.material, found.structure) == ("zinc", "shell")
     assert seen("mesh", "bucket sand").structure is None
@@ -570,5 +570,5 @@ def test_a_substance_behind_the_thing_is_what_it_is_made_of():
 @pytest.mark.parametrize(
     ("thing", "material"), [("Stone and Beam stoneware vase", "ceramic"), ("stone stoneware", None)]
 )
-def test_of_two_substances_the_one_beside_the_thing_is_meant(thing, material):
+def test_of_two_substances_the_one_beside_the_object_is_meant(thing, material):
     assert seen("mesh", thing).material == material

@@ -44,7 +44,7 @@ TABLES = tomllib.loads(Path(translation.__file__).with_suffix(".toml").read_text
         ("红木箱", "wood box"),
     ],
 )
-def test_a_thing_is_known_by_its_name_in_another_language(said, english):
+def test_an_object_is_known_by_its_name_in_another_language(said, english):
     assert " ".join(name_tokens(said)) == english
     assert " ".join(translate_words(everyday_words(said).split())) == english
 
@@ -62,13 +62,13 @@ def test_no_word_of_ours_is_taken_for_a_foreign_one():
     assert {w: translate_words([w]) for w in known if translate_words([w]) != [w]} == {}
 
 
-def test_no_foreign_word_means_two_things():
+def test_no_foreign_word_means_two_objects():
     said = [w for table in TABLES.values() for words in table.values() for w in words]
     twice = {w for w in said if said.count(w) > 1}
     assert twice == set()
 
 
-def test_most_things_have_a_usual_size_or_weight():
+def test_most_objects_have_a_usual_size_or_weight():
     """A translation is there to be judged by: only a few say no more than what a thing is like."""
     unknown = {t for t in TABLES["things"] if not (typical_extent(t) or typical_bulk_density(t, 1.0))}
     assert unknown <= {"toy"}

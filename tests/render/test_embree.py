@@ -63,7 +63,7 @@ def test_a_scene_looks_the_same_at_any_size_and_place():
         assert np.percentile(np.abs(there - here), 99) <= 4
 
 
-def test_a_floating_thing_without_normals_is_smooth_and_an_edge_stays_sharp():
+def test_a_floating_object_without_normals_is_smooth_and_an_edge_stays_sharp():
     stage = RayScene(scene([ball(normals=False)]))
     smooth = render_image(stage, front(), "draft").astype(int)
     assert np.abs(smooth - look(scene([ball()]))).mean() < 0.5
@@ -157,7 +157,7 @@ def test_the_camera_stands_where_it_is_asked_to_but_never_under_the_floor():
     assert camera.eye[2] > 0 and camera.eye[1] < -1
 
 
-def test_things_in_a_row_are_not_seen_one_behind_the_other():
+def test_objects_in_a_row_are_not_seen_one_behind_the_other():
     low = np.array([[0.0, 0, 0], [0.8, -0.62, 0], [1.6, -1.24, 0]])
     boxes = np.stack([low, low + 0.5], axis=1)[None]
     camera = fit_camera(boxes, (640, 480))

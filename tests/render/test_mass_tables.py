@@ -15,7 +15,7 @@ ANSWERS = (
 )
 
 
-def test_the_leading_two_ways_and_what_was_said_of_a_mass_stand_beside_it():
+def test_the_leading_two_ways_and_the_estimate_of_a_mass_stand_beside_it():
     told = mass_table([BOX])
     for words in (
         "0.5 (0.4 to 0.6)", "0.7 (0.3 to 1.2)", "0.49 (0.4 to 0.6)", "Net Wt 1 lb", "<b>Far.</b>",
@@ -27,7 +27,7 @@ def test_the_leading_two_ways_and_what_was_said_of_a_mass_stand_beside_it():
     assert mass_table([]) == ""
 
 
-def test_without_an_estimate_nothing_is_said_of_what_it_changed():
+def test_without_an_estimate_nothing_is_reported_of_what_it_changed():
     told = mass_table([replace(BOX, evidence=None)])
     assert "way 0: 1 kg, 50%<br>" in told
 

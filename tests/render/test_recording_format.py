@@ -144,7 +144,7 @@ def test_stress_is_kept_and_the_scale_ends_at_its_largest(played):
     np.testing.assert_array_equal(stress_bytes(np.array([0.0, 0.25, 1.0, 2.0]), 1.0), [0, 128, 255, 255])
 
 
-def test_a_thing_that_only_turns_leaves_nothing_but_its_pose(played):
+def test_an_object_that_only_turns_leaves_nothing_but_its_pose(played):
     """The control: a pose without the rotation leaves residuals of centimetres."""
     p = played.prepared.particles
     R = Rotation.from_rotvec([0.3, -1.2, 0.4]).as_matrix()

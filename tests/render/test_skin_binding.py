@@ -60,7 +60,7 @@ def block():
     return s, points, bind_vertices(s, parts_of(s, [0]), cloud(points), np.array([False]))
 
 
-def test_a_rigid_thing_moves_exactly(block):
+def test_a_rigid_object_moves_exactly(block):
     s, points, skin = block
     R = rotation()
     place, normals = skin.pose(moved(points, R, (1, 2, 3)))

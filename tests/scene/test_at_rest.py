@@ -84,18 +84,18 @@ def test_a_row_stands_in_a_line_with_gaps():
         assert 0.005 < ahead.min() - behind.max() < 0.1
 
 
-def test_nothing_to_settle_is_said():
+def test_nothing_to_settle_is_reported():
     with pytest.raises(UserError, match="nothing to settle"):
         settle_bodies([], "scatter", 1, 1e-3)
 
 
-def test_the_last_reason_is_said():
+def test_the_last_reason_is_reported():
     things = [box(0.3, 0.3, 0.3, name="crate"), box(0.2, 0.2, 0.2, name="dice")]
     with pytest.raises(UserError, match=r"crate, dice: no rest found .* in 2 attempts.*overlap"):
         settle_bodies(things, "scatter", 0, 0.0, SettleConfig(attempts=2))
 
 
-def test_flat_and_tiny_things_settle_too():
+def test_flat_and_tiny_objects_settle_too():
     sheet = trimesh.Trimesh([[0, 0, 0], [0.4, 0, 0], [0.4, 0.3, 0], [0, 0.3, 0]], [[0, 1, 2], [0, 2, 3]])
     things = [body(sheet, "sheet"), box(0.004, 0.004, 0.004)]
     poses, certificate = settle_bodies(things, "scatter", 0, 1e-4)

@@ -41,7 +41,7 @@ def test_what_chatters_when_time_is_up_is_left_to_the_certificate():
     assert not drop_in_mujoco([thing], start, replace(never, chatter=0.0)).quiet
 
 
-def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
+def test_an_object_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
     """By itself the engine leaves all of them out and things fall through each other."""
     side, plate = 0.05, box(0.6, 0.6, 0.1)
     middle = (np.arange(9) - 4) * 0.06

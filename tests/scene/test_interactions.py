@@ -69,7 +69,7 @@ def test_what_falls_hangs_above_its_own_place_and_what_lay_on_it_stays_above():
     assert high[2] >= low[2] + 0.4 + FALL_HEIGHT_SIZES_RANGE[0] * 0.2
 
 
-def test_a_thing_falls_onto_another_from_above_its_top():
+def test_an_object_falls_onto_another_from_above_its_top():
     (entry,) = begun((ROW[0][:2], ROW[1][:2]), "fall-onto", 0).entries
     assert entry.name == "a" and entry.position[:2] == (0, 0)
     assert 0.3 + FALL_HEIGHT_SIZES_RANGE[0] * 0.2 <= entry.position[2] <= 0.3 + FALL_HEIGHT_SIZES_RANGE[1] * 0.2
@@ -83,7 +83,7 @@ def test_what_something_rests_on_is_not_taken_away():
             assert action is None or action.entries[0].name != "a"
 
 
-def test_a_thing_that_slides_arrives_at_the_speed_that_was_drawn():
+def test_an_object_that_slides_arrives_at_the_speed_that_was_drawn():
     pair = stood((cube("a", 0.2, 2000.0), -0.4, 0), (cube("b", 0.3), 0, 0))
     (entry,) = begun(pair, "collision", 4).entries
     gap = 0.4 - 0.1 - 0.15
@@ -157,7 +157,7 @@ def test_the_air_presses_as_in_the_simulation():
     assert np.allclose(impulse, expected, rtol=1e-6)
 
 
-def test_wind_is_as_strong_as_the_easiest_thing_needs_and_no_storm_is_too_strong():
+def test_wind_is_as_strong_as_the_easiest_object_needs_and_no_storm_is_too_strong():
     foam, stone = cube("foam", 0.2, 20.0), cube("stone", 0.2, 2500.0)
     action = begun(stood((stone, 0, 0), (foam, 1, 0)), "wind", 0)
     velocity = np.array(action.entries[0].wind.velocity)

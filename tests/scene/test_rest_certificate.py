@@ -35,7 +35,7 @@ def test_overlapping_meshes_are_seen_to_their_depth():
     assert "overlap" in evidence.objections[0]
 
 
-def test_a_small_thing_wholly_inside_a_large_one_is_seen():
+def test_a_small_object_wholly_inside_a_large_one_is_seen():
     things = [box(0.4, 0.4, 0.2), ball(0.02)]
     evidence = measure_rest(things, [FLAT, BodyPose((0.0, 0.0, 0.1))], 1e-3)
     assert evidence.penetration > 0.07

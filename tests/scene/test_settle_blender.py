@@ -96,7 +96,7 @@ def refusal(config=BlenderConfig()):  # noqa: B008
     return str(caught.value)
 
 
-def test_a_program_that_is_not_there_is_said_with_how_to_install_it(monkeypatch, tmp_path):
+def test_a_program_that_is_not_there_is_reported_with_how_to_install_it(monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     words = refusal()
     assert words.startswith("blenderproc: cannot be started (No such file")
@@ -104,7 +104,7 @@ def test_a_program_that_is_not_there_is_said_with_how_to_install_it(monkeypatch,
     assert refusal(BlenderConfig(program="/else/bproc")).startswith("/else/bproc: cannot")
 
 
-def test_a_failure_is_told_in_its_own_last_words(fake):
+def test_a_failure_is_reported_in_its_own_last_words(fake):
     fake("fail")
     words = refusal()
     assert "failed with code 2" in words

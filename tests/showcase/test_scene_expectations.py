@@ -46,7 +46,7 @@ def test_every_expectation_names_a_run_that_must_not_meet_it():
     assert all((d.low, d.high) != (-inf, inf) for d in demands if isinstance(d, MeasureExpectation))
 
 
-def test_sentences_are_told_apart():
+def test_sentences_are_distinguished():
     for row in SCENE_EXPECTATIONS.values():
         assert len({d.sentence for d in row}) == len(row)
 
@@ -64,7 +64,7 @@ def test_a_chain_in_another_order_is_not():
     assert met("vase-ball-armchair", chain([VASE_BALL]))[0] is False
 
 
-def test_things_that_stick_together_have_not_parted():
+def test_objects_that_stick_together_have_not_parted():
     stuck = chain([VASE_BALL, BALL_CHAIR], **{"vase_0|ball_0": pair(False, 0.0)})
     assert met("vase-ball-armchair", stuck)[:3] == [True, False, True]
     close = chain([VASE_BALL, BALL_CHAIR], **{"ball_0|armchair_0": pair(True, 0.5)})
@@ -158,7 +158,7 @@ def test_an_expectation_reads_as_words():
 
 
 @pytest.mark.parametrize(("depth", "cell", "seen"), [(0.03, 0.011, True), (0.01, 0.011, False), (0.07, 0.011, False)])
-def test_an_imprint_is_deeper_than_a_cell_and_swallows_nobody(depth, cell, seen):
+def test_an_imprint_is_deeper_than_a_cell_and_swallows_no_object(depth, cell, seen):
     objects = {
         "mud_pile_0": object_outcome(dent_depth_m=depth, dent_depth_dx=depth / cell),
         "rubber_duck_0": object_outcome(fall_m=1.2),

@@ -241,7 +241,7 @@ def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(sto
         ("mass_error", 0.3, "30%"),
     ],
 )
-def test_every_breach_is_said_in_plain_words(story, key, value, word):
+def test_every_breach_is_reported_in_plain_words(story, key, value, word):
     found = replace(audit(*story), **{key: value})
     (sentence,) = breach_messages(found)
     assert word in sentence
@@ -271,7 +271,7 @@ def test_what_is_one_particle_has_no_shape_that_could_change(story):
     assert seen.objects["stone_0"].shape_error_max == 0.0
 
 
-def test_what_is_lost_and_not_booked_is_told(story):
+def test_what_is_lost_and_not_booked_is_reported(story):
     known = story[3].ledger
     fall = np.linspace(0, 1.0, STEPS)[:, None] * [0, 2.0]
     ledger = replace(known, potential=-fall, kinetic=0.5 * fall, impact_loss=0.3 * fall[:, 1])

@@ -129,7 +129,7 @@ class Thing:
     second: object = None
 
 
-def test_things_have_the_same_name_only_when_they_are_the_same():
+def test_objects_have_the_same_name_only_when_they_are_the_same():
     long = np.arange(5000.0)
     changed = long.copy()
     changed[2500] += 1e-12

@@ -87,7 +87,7 @@ def test_what_is_struck_softly_stays_whole():
     assert not co.simulate_scene(tile(1.0, height=0.03), BREAKING).trajectory.breaks
 
 
-def test_a_tilted_tile_is_struck_as_the_sheet_that_it_is_and_stays_whole_unless_told():
+def test_a_tilted_tile_is_struck_as_the_sheet_that_it_is_and_stays_whole_by_default():
     """Its box along the axes would be that of a lump, which bears a thousand times as much."""
     played = co.simulate_scene(tile(14.0))
     assert len(played.prepared.scene.objects) == 1

@@ -27,11 +27,11 @@ def seen(**what):
 FALLS = {"moved_m": (0.0, 0.0, -0.5)}
 
 
-def test_nothing_is_said_of_one_piece_that_moves():
+def test_nothing_is_reported_of_one_piece_that_moves():
     assert run_hints(shelf("boards"), seen(**FALLS), divided=False) == ()
 
 
-def test_several_named_pieces_of_a_file_are_said_to_stay_together():
+def test_several_named_pieces_of_a_file_are_reported_to_stay_together():
     many = shelf("boards", "book 0", "book 1", "vase")
     (said,) = run_hints(many, seen(**FALLS), divided=False)
     assert "4 named pieces (boards, book 0, book 1, …)" in said and "--objects nodes" in said
@@ -51,7 +51,7 @@ def test_several_named_pieces_of_a_file_are_said_to_stay_together():
         ({"shape_error_max": 0.1}, False),
     ],
 )
-def test_that_nothing_moves_is_said_only_where_nothing_does(moves, told):
+def test_that_nothing_moves_is_reported_only_where_nothing_does(moves, told):
     said = run_hints(shelf("boards"), seen(**moves), divided=False)
     assert any("Nothing moves" in s for s in said) == told
 
@@ -70,7 +70,7 @@ def part(law, treatment="deformable", thing="shelf_0"):
 
 
 @pytest.mark.parametrize(("lost", "told"), [(None, False), (0.02, False), (0.31, True)])
-def test_energy_that_the_grid_took_is_told_where_it_is_much(lost, told):
+def test_energy_that_the_grid_took_is_reported_where_it_is_much(lost, told):
     """A rubber ring of 2.4 cells fell flat and stayed: nothing said that it should have bounced."""
     ring = [part("neo_hookean")]
     said = run_hints(shelf("boards"), seen(**FALLS), divided=False, lost=lost, parts=ring)
@@ -85,7 +85,7 @@ def test_energy_that_the_grid_took_is_told_where_it_is_much(lost, told):
         ([part("fluid"), part("hencky", "shell", "bottle_0")], "(bottle_0)"),
     ],
 )
-def test_only_what_springs_back_is_said_to_rebound_too_little(parts, told):
+def test_only_what_springs_back_is_reported_to_rebound_too_little(parts, told):
     """Water that was poured into a glass was said to rebound too little."""
     said = run_hints(shelf("boards"), seen(**FALLS), divided=False, lost=0.31, parts=parts)
     assert [told in s for s in said] == ([True] if told else [])

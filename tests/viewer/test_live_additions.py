@@ -38,7 +38,7 @@ def live(shelf):
     return live
 
 
-def test_a_thing_falls_from_above_what_is_pointed_at_and_strikes_it(live):
+def test_an_object_falls_from_above_what_is_pointed_at_and_strikes_it(live):
     engine, before = live.hands.engine, live.growth.at(()).prepared
     scene = live.growth.at(live.hands.added).prepared.scene
     assert [o.name for o in scene.objects] == ["ball", "stone", "ball_1"]

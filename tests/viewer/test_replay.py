@@ -100,7 +100,7 @@ def test_both_takes_of_a_replay_are_written(small_run, touched, tmp_path):
         assert header["video"]["time"][-1] == pytest.approx(done.seconds)
 
 
-def test_what_is_taken_is_told_by_where_it_was_at_the_start(touched):
+def test_what_is_taken_is_identified_by_where_it_was_at_the_start(touched):
     """A rigid body that has moved is held at the same point of it in a fresh engine."""
     live = touched
     stone = int(np.flatnonzero(live.posed.object_of_body == 1)[0])
@@ -122,7 +122,7 @@ def test_what_is_taken_is_told_by_where_it_was_at_the_start(touched):
     np.testing.assert_allclose(at, hands.start[row] + away, atol=1e-6)
 
 
-def test_a_replay_that_nobody_asked_for_is_not_found(small_run):
+def test_a_replay_that_was_not_asked_for_is_not_found(small_run):
     from corporeal.viewer.live_simulation import LiveSession
     from corporeal.viewer.replay_jobs import ReplayJobs
     from corporeal.viewer.run_store import RunStore

@@ -141,7 +141,7 @@ def test_a_file_is_counted_while_it_comes_whatever_it_says_of_itself(server):
 
 
 @pytest.mark.parametrize("said", ["10", "abc", "-5"])
-def test_a_lying_length_harms_nobody(server, said):
+def test_a_wrong_length_does_no_harm(server, said):
     link = http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)
     link.putrequest("PUT", "/files")
     for name, value in (("X-Corporeal", "1"), ("Content-Length", said)):

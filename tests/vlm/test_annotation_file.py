@@ -11,18 +11,18 @@ def told(tmp_path, text):
     return read_annotations(tmp_path / "said.yaml", SCENE)
 
 
-def test_what_is_said_of_an_object_holds_for_all_its_parts(tmp_path):
+def test_what_is_stated_of_an_object_holds_for_all_its_parts(tmp_path):
     said = told(tmp_path, "duck_0: soft_PVC\n")
     assert said == {("duck_0", p): PartAnnotation("soft_PVC") for p in ("body", "beak")}
 
 
-def test_what_is_said_of_a_part_comes_before_what_is_said_of_its_object(tmp_path):
+def test_what_is_stated_of_a_part_comes_before_what_is_stated_of_its_object(tmp_path):
     said = told(tmp_path, "duck_0:\n  material: soft_PVC\n  thickness_mm: 2\n  parts:\n    beak: ABS\n")
     assert said[("duck_0", "body")].thickness == pytest.approx(0.002)
     assert said[("duck_0", "beak")] == PartAnnotation("ABS")
 
 
-def test_pieces_of_what_nobody_told_apart_may_be_named(tmp_path):
+def test_pieces_of_undivided_parts_may_be_named(tmp_path):
     (tmp_path / "said.yaml").write_text("vase_0: {parts: {foot: wood, bowl: glass}}\n")
     said = read_annotations(tmp_path / "said.yaml", SCENE, free=["vase_0"])
     assert said == {("vase_0", "foot"): PartAnnotation("wood"), ("vase_0", "bowl"): PartAnnotation("glass")}

@@ -153,7 +153,7 @@ def ways(*probabilities):
 
 
 @pytest.mark.parametrize(("probabilities", "shares"), [((1, 1, 1), (1 / 3,) * 3), ((0.6, 0.4), (0.6, 0.4))])
-def test_probabilities_that_add_up_to_3_are_divided_by_it_and_that_is_said(probabilities, shares):
+def test_probabilities_that_add_up_to_3_are_divided_by_it_and_that_is_reported(probabilities, shares):
     answer = MaterialsAnswer.model_validate({"parts": [ways(*probabilities)]})
     assert materials_complaints(answer, ["a"], NAMES, False) == []
     found = [way.probability for way in part_hypotheses(answer.parts[0], NAMES)]
@@ -162,7 +162,7 @@ def test_probabilities_that_add_up_to_3_are_divided_by_it_and_that_is_said(proba
     assert [clause[: len(told)] for clause, told in zip(weakness_notes(answer), said, strict=True)] == said
 
 
-def test_one_way_only_given_as_certain_is_said():
+def test_one_way_only_given_as_certain_is_reported():
     (said,) = weakness_notes(MaterialsAnswer.model_validate({"parts": [ways(1.0)]}))
     assert "one way only was given" in said
     assert weakness_notes(MaterialsAnswer.model_validate({"parts": [ways(0.8)]})) == []

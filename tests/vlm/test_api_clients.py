@@ -198,7 +198,7 @@ def test_what_holds_for_every_question_ends_the_run(step, match):
     assert len(server.requests) == 1
 
 
-def test_no_server_at_all_is_said_plainly():
+def test_no_server_at_all_is_reported_plainly():
     model = OpenAIClient("fake-model@http://127.0.0.1:9/v1", QUICK)
     with pytest.raises(UserError, match=r"There is no answer from http://127\.0\.0\.1:9/v1"):
         model.ask(ASKED, Colours, check)
@@ -280,7 +280,7 @@ def test_only_one_file_needs_the_package():
     assert needing == ["api_clients.py"]
 
 
-def test_without_the_package_the_way_to_install_it_is_said(monkeypatch):
+def test_without_the_package_the_way_to_install_it_is_reported(monkeypatch):
     monkeypatch.setattr("corporeal.vlm.find_spec", lambda name: None)
     with pytest.raises(UserError, match=r"pip install 'corporeal\[models\]'"):
         connect_vlm("openai:gpt-5.4")

@@ -54,7 +54,7 @@ def test_a_name_says_what_is_shown_unless_it_is_of_the_photographs(name, class_n
     assert found is None or found.extent == object_of_usual_size(class_name).extent
 
 
-def test_a_lone_thing_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
+def test_a_lone_object_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
     came = made(tmp_path, "banana")
     (thing,), found = came.scene.objects, came.found
     assert thing.name == thing.class_name == "banana"
@@ -66,7 +66,7 @@ def test_a_lone_thing_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
     assert not any("0.5 m" in w for w in found.warnings)
 
 
-def test_a_size_that_somebody_states_is_the_size_whatever_the_name_says(tmp_path):
+def test_a_stated_size_is_the_size_whatever_the_name_says(tmp_path):
     came = made(tmp_path, "axe", ("axe=0.103",))
     assert np.ptp(came.found.boxes[0], axis=0).max() == pytest.approx(0.103, rel=0.05)
     (said,) = [w for w in came.found.warnings if "axe" in w]
@@ -75,7 +75,7 @@ def test_a_size_that_somebody_states_is_the_size_whatever_the_name_says(tmp_path
     assert made(tmp_path, "axe", ("object=0.103",)).scene.objects[0].name == "axe"
 
 
-def test_what_somebody_names_is_not_called_as_the_folder(tmp_path):
+def test_a_named_object_is_not_called_as_the_folder(tmp_path):
     came = made(tmp_path, "banana", object_names=("crate",))
     assert [o.name for o in came.scene.objects] == ["crate"]
     assert not any("banana" in w for w in came.found.warnings)
@@ -92,7 +92,7 @@ def test_a_folder_of_photographs_makes_nothing_one_of_paper(tmp_path):
     assert not any("0.5 m" in s for s in came.found.statements), "said once"
 
 
-def test_sizes_of_what_nobody_named_can_be_stated():
+def test_sizes_of_unnamed_objects_can_be_stated():
     check_stated_extents(["banana=0.2"], [], "banana")
     check_stated_extents(["object=0.2"], [], "banana")
     with pytest.raises(UserError, match="no object 'duck'"):
@@ -100,7 +100,7 @@ def test_sizes_of_what_nobody_named_can_be_stated():
     assert decide_metric_scale({"axe": 2.0}, [object_of_usual_size("axe")], ["object=0.5"]).metres_per_unit == 0.25
 
 
-def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):
+def test_an_estimated_size_names_its_source(tmp_path):
     (said,) = [w for w in made(tmp_path, "one", object_names=("banana",)).found.warnings if "large" in w]
     assert said == (
         "How large it is was not stated: assumed as large as a banana usually is, 19 cm. "

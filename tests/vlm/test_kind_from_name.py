@@ -42,7 +42,7 @@ def test_a_bean_bag_to_sit_on_is_full_of_beads_of_foam(name):
     assert (found.material, found.structure, found.contents) == ("cotton", "filled", "foam_beads")
 
 
-def test_how_large_a_thing_is_tells_nothing_of_what_is_always_the_same():
+def test_how_large_an_object_is_tells_nothing_of_what_is_always_the_same():
     assert built("sponge", 0.05) == built("sponge", 0.9)
 
 

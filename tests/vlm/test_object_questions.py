@@ -24,14 +24,14 @@ def answer(**said):
     return {"content": json.dumps(said)}
 
 
-def test_without_a_model_nobody_says_anything():
+def test_without_a_model_there_is_no_answer():
     nobody = PhotoInterview("desk", "metadata")
     assert nobody.objects(PICTURES) == []
     assert nobody.regions(PICTURES, ["red"], [SeenObject("duck")]) is None
     assert nobody.asked().transcript == ()
 
 
-def test_a_model_names_things_and_then_the_painted_regions(tmp_path):
+def test_a_model_names_objects_and_then_the_painted_regions(tmp_path):
     regions = [{"colour": "red", "thing": 2}, {"colour": "blue", "thing": None}]
     with FakeServer(answer(things=[DUCK, CAN]), answer(regions=regions)) as server:
         viewer = PhotoInterview("desk", f"openai:fake-model@{server.url}", tmp_path / "kept")
@@ -61,7 +61,7 @@ def region(colour, thing):
         ([region("red", 1), region("blue", 1)], "A thing can be one region only."),
     ],
 )
-def test_what_is_wrong_with_an_answer_is_told(regions, told):
+def test_what_is_wrong_with_an_answer_is_reported(regions, told):
     assert regions_complaints(RegionsAnswer(regions=regions), ["red", "blue"], 2) == [told]
 
 

@@ -137,7 +137,7 @@ def test_a_recorder_keeps_what_it_passes_on(tmp_path):
     assert (again.answer.name, again.by, again.model) == ("red", "recording", "some-model")
 
 
-def test_nobody_is_a_choice_and_an_unknown_name_shows_the_menu(tmp_path):
+def test_no_model_is_a_choice_and_an_unknown_name_shows_the_menu(tmp_path):
     assert connect_vlm("metadata") is None
     with pytest.raises(UnknownChoiceError, match="Choose one of: anthropic, ask, google, metadata"):
         connect_vlm("oracle")

@@ -69,7 +69,7 @@ def test_what_was_recorded_is_replayed_without_anybody(tmp_path):
     assert (replayed.low, replayed.usual, replayed.high) == (1.3, 2.1, 3.2)
 
 
-def test_a_class_that_was_not_recorded_is_told(tmp_path):
+def test_a_class_that_was_not_recorded_is_reported(tmp_path):
     with FakeServer(answer()) as server:
         ask(server, "couch", record=tmp_path / "kept")
     with pytest.raises(UserError, match=r"No recording in .* answers 'sizes' about 'vase'"):
@@ -95,7 +95,7 @@ def test_questions_can_wait_for_a_person(tmp_path):
     assert sorted(p.name[:5] for p in tmp_path.glob("*.json")) == ["sizes", "sizes"]
 
 
-def test_a_model_that_differs_from_the_table_is_believed_and_told():
+def test_a_model_that_differs_from_the_table_is_believed_and_reported():
     with FakeServer(answer(usual=0.5, smallest=0.4)) as server:
         sizes = ask(server, "couch")
     assert sizes.usual["couch"].usual == 0.5
@@ -118,7 +118,7 @@ def test_a_model_that_differs_from_the_table_is_believed_and_told():
         ({"usual": 0.02, "smallest": 0.01}, "Answer in metres"),
     ],
 )
-def test_sizes_of_no_thing_or_in_no_metres_are_sent_back(changed, words):
+def test_sizes_of_no_object_or_in_no_metres_are_sent_back(changed, words):
     assert size_complaints(SizeAnswer(**COUCH), "couch") == []
     (complaint,) = size_complaints(SizeAnswer(**COUCH | changed), "couch")
     assert words in complaint
@@ -167,7 +167,7 @@ def test_a_file_in_other_units_says_nothing_of_its_size():
         assert (real.by, real.reason) == ("a recorded answer (by hand)", "A bath toy.")
 
 
-def test_what_nobody_knows_gets_a_stand_in_and_a_warning():
+def test_an_unknown_size_gets_a_substitute_and_a_warning():
     real = estimate_real_extent("thing_7", "widget", 41.0, False, DUCKS)
     assert (real.extent, real.said_by) == (UNKNOWN_EXTENT_M, "nobody")
     assert "The size of thing_7 (widget) is unknown" in real.warnings[0]

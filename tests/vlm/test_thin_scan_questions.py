@@ -156,7 +156,7 @@ def test_an_absurd_share_is_asked_for_again(change, told):
     assert not thickness_complaints(ThicknessAnswer.model_validate({"parts": [HALF]}), ["blade"])
 
 
-def test_a_share_far_from_what_a_fine_scan_draws_is_told():
+def test_a_share_far_from_what_a_fine_scan_draws_is_reported():
     said = ThicknessAnswer.model_validate({"parts": [HALF]})
     (warning,) = strange_share_notes(said, 0.02)
     assert "50%" in warning

@@ -96,7 +96,7 @@ def test_creep_follows_the_standard_linear_solid():
             assert gamma == pytest.approx(exact, rel=1e-3)
 
 
-def test_branches_do_not_mind_who_looks():
+def test_branches_do_not_depend_on_the_frame():
     rng = np.random.default_rng(1)
     A = 0.02 * rng.normal(size=(1, 3, 3))
     memory = advance_branches(blank(), 0.1 * rng.normal(size=(1, 3, 3)), np.ones((1, 2)), 1e-12)

@@ -60,7 +60,7 @@ def test_what_is_hidden_takes_nothing_from_what_hides_it():
     np.testing.assert_allclose(lifted.mean, np.tile([0, 0, 1.0], (5, 1)), atol=1e-6)
 
 
-def test_boxes_that_touch_are_told_apart_by_where_their_points_fall(boxes):
+def test_boxes_that_touch_are_distinguished_by_where_their_points_fall(boxes):
     """On maps of 12 × 12 patches; what no view shows (the undersides) included."""
     cameras, depth, which, position, _, owner = boxes
     maps = [one_hot(w, 8, 2) for w in which]
@@ -123,7 +123,7 @@ def test_a_sliver_of_a_gaussian_has_no_say():
     np.testing.assert_array_equal(lifted.seen, [2, 1])
 
 
-def test_what_nobody_saw_looks_like_its_neighbours():
+def test_an_unseen_place_looks_like_its_neighbours():
     position = np.array([[0, 0, 0], [1, 0, 0], [0.25, 0, 0], [9, 0, 0.0]])
     before = LiftedFeatures(np.array([[1, 0], [0, 1], [0, 0], [0, 0]], np.float32), np.array([2, 1, 0, 0]))
     after = fill_unseen_points(position, before)

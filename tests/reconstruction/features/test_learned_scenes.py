@@ -58,7 +58,7 @@ class Seer(PhotoInterview):
         pytest.fail("CLIP tells which is which")
 
 
-def test_models_that_were_saved_here_see_things_and_name_parts(models, splat, tmp_path, monkeypatch):
+def test_models_that_were_saved_here_see_objects_and_name_parts(models, splat, tmp_path, monkeypatch):
     coarse = ReconstructionResolution(12, (96, 96), 60_000, 60_000)
     config = ReconstructConfig(up="z", training="draft", lifting="radiance", resolution=coarse, **models)
     result = reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")

@@ -53,7 +53,7 @@ def test_colours_that_look_alike_are_close_and_others_are_not(boxes):
     assert (distance(red, like) < 0.2 * distance(red, blue)).all()
 
 
-def test_texture_is_told_from_a_plain_surface_of_the_same_mean():
+def test_texture_is_distinguished_from_a_plain_surface_of_the_same_mean():
     rng = np.random.default_rng(2)
     position = np.column_stack([rng.uniform(0, 1, (4000, 2)), np.zeros(4000)])
     up = np.tile([0, 0, 1.0], (4000, 1))
@@ -92,7 +92,7 @@ def test_a_look_without_weight_does_not_count(boxes):
     np.testing.assert_array_equal(a, b)
 
 
-def test_boxes_of_two_colours_are_told_apart_from_their_pictures():
+def test_boxes_of_two_colours_are_distinguished_from_their_pictures():
     """From views alone: colours and outsides are lifted, the descriptor's two clusters are them."""
     cameras = around(12)
     paint = np.array([[1.0, 1.0, 1.0], [0.8, 0.2, 0.1], [0.15, 0.3, 0.8]])

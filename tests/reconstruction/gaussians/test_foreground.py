@@ -49,7 +49,7 @@ def scene():
     return joined(things, floor, wall, haze)
 
 
-def test_without_masks_things_are_above_the_floor_and_in_the_middle(scene):
+def test_without_masks_objects_are_above_the_floor_and_in_the_middle(scene):
     gaussians, kind = scene
     found = foreground_gaussians(gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, threads=1))
     assert found[kind == 0].mean() > 0.95
@@ -58,7 +58,7 @@ def test_without_masks_things_are_above_the_floor_and_in_the_middle(scene):
     assert not found[kind == 3].any()
 
 
-def test_with_masks_what_shows_outside_them_is_not_of_the_things(scene):
+def test_with_masks_what_shows_outside_them_is_not_of_the_objects(scene):
     gaussians, kind = scene
     alone = replace(gaussians, opacity=np.where(kind == 0, gaussians.opacity, 0))
     _, masks = pictured(alone, CAMERAS)
@@ -108,13 +108,13 @@ def test_undersides_face_down_though_light_comes_through_from_above(opacity):
     assert ((normal * out).sum(axis=1) > 0).mean() > 0.995
 
 
-def test_gaussians_that_are_more_than_pixels_belong_to_things_too():
+def test_gaussians_that_are_more_than_pixels_belong_to_objects_too():
     gaussians, out = ball(20_000, 0.002)
     found = foreground_gaussians(gaussians, CAMERAS, gaussian_visibility(gaussians, CAMERAS, threads=1), floor=False)
     assert found[out[:, 2] > -0.2].mean() > 0.9
 
 
-def test_what_is_faint_goes_with_the_thing_that_it_reaches_and_the_floor_stays():
+def test_what_is_faint_goes_with_the_object_that_it_reaches_and_the_floor_stays():
     rng = np.random.default_rng(0)
     thing = like(rng.normal(size=(200, 3)) * 0.02 + [0, 0, 0.4], 0.01)
     rim = like([[0.3, 0, 0.4], [0.2, 0.2, 0.4]], 0.13, 0.03)
@@ -127,7 +127,7 @@ def test_what_is_faint_goes_with_the_thing_that_it_reaches_and_the_floor_stays()
     assert (assign_hidden_gaussians(whole, np.where(kind == 0, 7, -1), floor=False) == 7).all()
 
 
-def test_what_is_below_the_floor_is_not_drawn_with_a_thing_but_for_the_floors_error():
+def test_what_is_below_the_floor_is_not_drawn_with_an_object_but_for_the_floors_error():
     heights = np.array([0.3, -0.001, -0.05, -0.05])
     gaussians = like(np.stack([0 * heights, 0 * heights, heights], axis=1), 0.02)
     assert gaussians_below_floor(gaussians, np.array([0, 0, 0, -1]), 0.4).tolist() == [False, False, True, False]

@@ -103,7 +103,7 @@ def test_nothing_is_learned_where_instance_masks_are_wanted_and_there_are_none(t
 
 
 @pytest.mark.parametrize(("ahead", "where"), [(2.3, "and inside of it"), (-0.6, "alone")])
-def test_it_is_said_where_gaussians_began(taken, ahead, where):
+def test_it_is_reported_where_gaussians_began(taken, ahead, where):
     said = " ".join(taken(FINE, replace(learned(GOOD), ahead=ahead)).statements)
     assert f"hull of the masks {where}: to begin inside, too, made {ahead:+} dB on objects" in said
     assert "visual hull" not in " ".join(taken(FINE, learned(GOOD)).statements)
@@ -124,7 +124,7 @@ def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):
         (replace(GOOD, psnr=14.0), ("differ from their rendering (14.0 dB)",)),
     ],
 )
-def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):
+def test_what_was_badly_learned_or_not_checked_is_reported(taken, quality, said):
     made = taken(FINE, learned(quality))
     told = made.warnings
     assert len(told) == len(said)

@@ -73,7 +73,7 @@ def test_what_is_thin_is_not_learned_and_is_no_reason_to_learn_again(scene):
     assert (odd & legs)[:, :10].any() and not (drop_thin_pieces(odd, masks | legs) & legs)[:, :10].any()
 
 
-def test_a_highlight_within_is_the_things(scene):
+def test_a_highlight_within_is_the_objects(scene):
     views, masks = scene
     rgb = views.rgb.copy()
     rgb[:, 29:35, 29:35] = 255
@@ -83,7 +83,7 @@ def test_a_highlight_within_is_the_things(scene):
 
 
 @pytest.mark.parametrize(("paint", "strange"), [((75, 75, 75), False), ((-75, -75, -75), False), ((85, -85, 0), True)])
-def test_what_is_but_lighter_or_darker_at_the_rim_is_the_things(paint, strange):
+def test_what_is_but_lighter_or_darker_at_the_rim_is_the_objects(paint, strange):
     dull = replace(THING, sh=0.3 * THING.sh)
     views, masks = pictured(dull, around(8, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
     row = int(masks[0].sum(axis=1).argmax())

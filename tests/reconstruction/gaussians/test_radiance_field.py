@@ -73,7 +73,7 @@ def plain(values, made, cameras, pictures, masks, rays, jitter, behind):
     return total
 
 
-def test_gradients_are_those_of_the_loss_said_plainly(haze):
+def test_gradients_are_those_of_the_loss_written_plainly(haze):
     made, cameras, pictures, masks, rays, jitter, behind = haze
     gradient, sums = np.zeros_like(made.values), np.zeros(3)
     rows = field_camera_rows(made.grid, cameras)

@@ -48,7 +48,7 @@ def scene():
     return whole, np.repeat(np.arange(3), [g.count for g in kinds])
 
 
-def test_a_shadow_is_none_of_the_thing_that_stands_on_a_floor_of_its_colour(scene):
+def test_a_shadow_is_none_of_the_object_that_stands_on_a_floor_of_its_colour(scene):
     whole, kind = scene
     _, true = pictured(gaussian_subset(whole, kind == POST), CAMERAS)
     found = masks_above_floor(whole, CAMERAS, floor=True, threads=1)
@@ -64,7 +64,7 @@ def test_what_is_lost_in_the_floors_layer_goes_on_as_above_it(scene):
     assert np.abs(np.subtract(low, least)).max() <= 1
 
 
-def test_specks_in_the_air_are_no_things_and_without_things_nothing_is_left(scene):
+def test_specks_in_the_air_are_no_objects_and_without_objects_nothing_is_left(scene):
     whole, kind = scene
     _, true = pictured(gaussian_subset(whole, kind == SPECK), CAMERAS)
     _, post = pictured(gaussian_subset(whole, kind == POST), CAMERAS)

@@ -32,7 +32,7 @@ def scene():
     return pictured(blobs(40), around(16, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
 
 
-def test_things_are_learned_from_pictures_and_masks(scene):
+def test_objects_are_learned_from_pictures_and_masks(scene):
     views, masks = scene
     told = []
     out = train_gaussians(views, masks, config=SMALL, progress=lambda f, w: told.append((f, w)))
@@ -126,7 +126,7 @@ def test_given_points_are_where_it_starts(scene):
     assert 40 <= out.gaussians.count < 60
 
 
-def test_nobody_sees_the_held_out_views(scene):
+def test_held_out_views_are_not_trained_on(scene):
     views, masks = scene
     spoilt = views.rgb.copy()
     spoilt[[4, 12]] = 0

@@ -45,7 +45,7 @@ def pieces(seed, config):
     return sorted(np.where(inside.any(axis=1), inside.argmax(axis=1), -1).tolist())
 
 
-def test_of_five_views_things_are_left_and_hardly_a_phantom():
+def test_of_five_views_objects_are_left_and_hardly_a_phantom():
     seeds = range(8)
     coarse = HullConfig(grid_cells=100_000)
     found = [pieces(seed, coarse) for seed in seeds]

@@ -73,7 +73,7 @@ def test_a_cover_leaves_no_gap():
     assert max(through) < 0.3 and np.mean(through) < 0.1
 
 
-def test_gaussians_begin_flat_on_known_surfaces_and_as_wide_as_told():
+def test_gaussians_begin_flat_on_known_surfaces_and_as_wide_as_stated():
     normal = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.6, 0, 0.8], [0, 0, 0]])
     points = StartPoints(np.eye(4, 3), np.ones((4, 3)), 0.5, normal, np.full(4, 0.2))
     theta = initial_gaussians(points, 9, 0, RNG(0))
@@ -162,7 +162,7 @@ def test_smooth_pictures_are_laid_on_the_floor():
 
 
 @pytest.mark.slow
-def test_exposures_are_learned_and_held_against_nobody():
+def test_exposures_are_learned_and_not_counted_as_errors():
     views, _ = pictured(blobs(40), around(16, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
     gains = np.exp(0.15 * RNG(0).normal(size=(16, 3)))
     rgb = np.clip(views.rgb * gains[:, None, None], 0, 255).astype(np.uint8)
@@ -178,7 +178,7 @@ def test_exposures_are_learned_and_held_against_nobody():
     assert out.quality.psnr > 24 and out.quality.psnr > plain.psnr + 2
 
 
-def test_a_gain_is_told_from_what_is_covered_alone():
+def test_a_gain_is_distinguished_from_what_is_covered_alone():
     truth, cameras = blobs(), around(1)
     views, masks = pictured(truth, cameras)
     darker = (0.5 * views.rgb[0]).astype(np.uint8)
@@ -189,7 +189,7 @@ def test_a_gain_is_told_from_what_is_covered_alone():
     assert np.isnan(exposure_gains.exposure_gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))).all()
 
 
-def test_exposure_changes_things_and_not_the_grey_behind_them():
+def test_exposure_changes_objects_and_not_the_grey_behind_them():
     grey = (0.5, 0.5, 0.5)
     views, masks = pictured(blobs(), around(6), grey)
     dark = Views((0.6 * views.rgb).astype(np.uint8), views.cameras)

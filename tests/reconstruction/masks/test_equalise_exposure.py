@@ -42,7 +42,7 @@ def test_without_a_floor_they_stay_as_they_are():
     assert equalise_exposure(views, None, find_viewed_region(views.cameras), ROUND_PICTURE_PX) is views
 
 
-def test_a_thing_is_told_from_a_floor_that_is_as_brown_in_another_picture():
+def test_an_object_is_distinguished_from_a_floor_that_is_as_brown_in_another_picture():
     views, masks, points = scene(ball=BRICK, ground=OAK)
     views = exposed(views, 0.25)
     grown = grow_masks(views, seeds_from_cameras(views, points))

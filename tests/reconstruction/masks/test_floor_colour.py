@@ -62,13 +62,13 @@ def test_masks_that_are_grown_leave_the_shadow_out():
     assert agreement(grown.inside, masks).mean() > 0.9
 
 
-def test_of_a_grey_floor_nothing_is_said():
+def test_of_a_grey_floor_nothing_is_reported():
     """Whatever is grey and darker would be a shade of it."""
     views, _, _, _ = shadowed(RED, (0.5, 0.5, 0.5))
     assert not shaded_floor(views, GROUND, find_viewed_region(views.cameras)).any()
 
 
-def test_without_a_floor_nothing_is_said():
+def test_without_a_floor_nothing_is_reported():
     views, _, _, _ = shadowed(RED, GREY)
     assert not shaded_floor(views, None, find_viewed_region(views.cameras)).any()
 

@@ -17,7 +17,7 @@ scene = partial(painted_scene.scene, finer=FINER)
 GROUND = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 0.5, 0.001)
 
 
-def test_a_pattern_of_the_floor_is_told_from_what_stands_on_it():
+def test_a_pattern_of_the_floor_is_distinguished_from_what_stands_on_it():
     """The ball and the floor have one colour: only the plane tells them apart."""
     views, masks, _ = scene(ball=(0.5, 0.5, 0.45), count=24)
     found = shows_floor_pattern(views, GROUND, find_viewed_region(views.cameras))
@@ -41,7 +41,7 @@ def test_another_plane_has_no_pattern():
     assert other[~masks].mean() < 0.2 * right[~masks].mean()
 
 
-def test_without_a_floor_or_a_pattern_nothing_is_said():
+def test_without_a_floor_or_a_pattern_nothing_is_reported():
     views, _, _ = scene()
     plain = Views(np.full_like(views.rgb, 128), views.cameras)
     around = find_viewed_region(views.cameras)

@@ -96,7 +96,7 @@ def test_what_was_corrected_is_kept_and_makes_results_stale(grown, tmp_path):
     assert np.asarray(Image.open(mask)).min() == 255
 
 
-def test_what_masks_hold_a_part_of_is_refused_until_somebody_corrects_them(tmp_path):
+def test_what_masks_hold_a_part_of_is_refused_until_they_are_corrected(tmp_path):
     views, _, points = scene(flat=0.33)
     photos, run = tmp_path / "tea set", tmp_path / "run"
     names = tuple(f"{k:04d}.png" for k in range(len(views.cameras)))
@@ -124,7 +124,7 @@ def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monke
     assert ("1.0 times as much" in found.incomplete) == (left_over > 0)
 
 
-def test_what_cannot_be_told_is_not_written(grey):
+def test_what_cannot_be_distinguished_is_not_written(grey):
     photos, _, made = grey
     assert made.folder is None and "No masks were grown" in made.said[0]
     assert not (photos.parent / "made" / "masks").exists()
@@ -201,7 +201,7 @@ def test_bad_words_get_one_sentence(photos, monkeypatch, capsys, words, said):
 @pytest.mark.parametrize(
     ("words", "said"), [((), "Point at the object with --at or --box"), (("--box", "1", "2", "9", "9"), "--on")]
 )
-def test_who_pointed_is_not_told_to_point(photos, monkeypatch, capsys, words, said):
+def test_who_pointed_is_not_advised_to_point(photos, monkeypatch, capsys, words, said):
     """A box around a thing that was found nowhere was answered with: point at it with --box."""
     monkeypatch.setattr(
         "corporeal.reconstruction.masks.grown_masks.grown_masks", lambda *_: GrownMasks(None, ("No masks were grown.",))

@@ -34,7 +34,7 @@ def test_a_head_of_another_colour_is_taken_in():
     assert agreement(after.inside, masks).mean() > 0.93
 
 
-def test_a_small_thing_close_beside_it_is_taken_in():
+def test_a_small_object_close_beside_it_is_taken_in():
     """Its hull is a piece of its own, of less than a tenth of the ball's, and no crumb."""
     masks, before, after = before_and_after("close")
     assert agreement(before.inside, masks).mean() < 0.9, "colours alone do not tell"

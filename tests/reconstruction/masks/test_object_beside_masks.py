@@ -25,7 +25,7 @@ def told(views, masks, floor):
 
 
 @pytest.mark.parametrize("floor", [GROUND, None], ids=["floor", "no floor"])
-def test_what_stands_beside_it_is_told_and_where(floor):
+def test_what_stands_beside_it_is_reported_and_where(floor):
     views, masks, _ = scene(other="ball")
     found = told(views, masks, floor)
     assert found is not None and 0.1 < found.as_large < 0.7  # (.2 / .5)², and a hull is fat
@@ -37,7 +37,7 @@ def test_what_stands_beside_it_is_told_and_where(floor):
 
 @pytest.mark.parametrize("other", [None, "disc"])
 @pytest.mark.parametrize("floor", [GROUND, None], ids=["floor", "no floor"])
-def test_a_floor_and_a_print_on_it_are_no_things(floor, other):
+def test_a_floor_and_a_print_on_it_are_no_objects(floor, other):
     views, masks, _ = scene(other=other)
     assert told(views, masks, floor) is None
 

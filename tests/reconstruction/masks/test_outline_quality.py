@@ -71,7 +71,7 @@ def test_right_masks_have_edges_and_stand_on_the_floor(grown):
     [({}, False), ({"coherence": 0.6}, True), ({"settled": 0.0}, True),
      ({"coherence": 0.6, "alike": 0.5}, False)],
 )  # fmt: skip
-def test_outlines_that_contradict_each_other_are_told_from_all_else(grown, of, told):
+def test_outlines_that_contradict_each_other_are_distinguished_from_all_else(grown, of, told):
     """By what was found: it went by how the sentence begins."""
     assert outlines_contradict(replace(grown, **of)) == told
     assert (mask_doubt(replace(grown, **of)) is None) == (not of)

@@ -41,7 +41,7 @@ def test_what_is_far_away_takes_no_part_of_its_colour_from_an_object():
     assert agreement(grown.inside, masks).mean() > 0.9
 
 
-def test_what_was_moved_between_two_rounds_is_told_from_all_around_it():
+def test_what_was_moved_between_two_rounds_is_distinguished_from_all_around_it():
     """Its outlines contradict one another, so that some of it is left in what is near."""
     views, _, points = scene()
     shown = views.rgb.copy()
@@ -49,14 +49,14 @@ def test_what_was_moved_between_two_rounds_is_told_from_all_around_it():
     assert mask_doubt(grow_masks(replace(views, rgb=shown), seeds_from_cameras(views, points))) is None
 
 
-def test_flat_things_of_its_colour_beside_it_are_told():
+def test_flat_objects_of_its_colour_beside_it_are_reported():
     """Plates beside a tea pot are a pattern on the floor, as print on paper is: nobody can tell."""
     views, _, points = scene(flat=0.33)
     why = incompleteness_reason(grow_masks(views, seeds_from_cameras(views, points)))
     assert why is not None and "times as much with its colours" in why
 
 
-def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_a_thing():
+def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_an_object():
     views, masks, points = scene(flat=0.2)
     plane = GroundPlane(np.array([0.0, 0.0, 1.0]), FLOOR, 1.0, 0.01)
     places = np.stack([floor_intersections(camera, plane).reshape(*masks.shape[1:], 3) for camera in views.cameras])

@@ -32,7 +32,7 @@ def test_the_cut_goes_where_the_graph_is_narrow():
     np.testing.assert_allclose(found.score, expected, rtol=1e-9)
 
 
-def test_a_crumb_that_hangs_by_nothing_is_not_a_thing():
+def test_a_crumb_that_hangs_by_nothing_is_not_an_object():
     graph, owner = clique([30, 30, 1], [(0, 1, 0.5), (1, 2, 1e-9)])
     assert halves(best_graph_cut(graph, 0.003).side, owner) in [{(0,), (1, 2)}]
     assert halves(best_graph_cut(graph, 0.0).side, owner) == {(0, 1), (2,)}
@@ -97,7 +97,7 @@ def blocks(*boxes, step=0.05):
     return SurfacePatches(one, one, centre, centre, centre), owner
 
 
-def test_only_thin_things_on_each_other_are_a_stack():
+def test_only_thin_objects_on_each_other_are_a_stack():
     book, lifted = ((0, 0, 0), (1, 0.6, 0.15)), ((0.1, 0, 0.15), (1, 0.6, 0.3))
     assert count_stacked_objects(*blocks(book, lifted)) == 2
     crate = ((0.1, 0, 0.15), (0.9, 0.6, 0.9))

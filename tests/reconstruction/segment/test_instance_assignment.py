@@ -55,7 +55,7 @@ def test_what_no_view_shows_goes_with_what_is_nearest(pair):
     assert same(split.object_of_point, owner) > 0.98
 
 
-def test_crumbs_of_a_third_number_are_no_thing(pair):
+def test_crumbs_of_a_third_number_are_no_object(pair):
     cloud, normal, owner = pair
     masks = views(owner, [(0, 1)] * 12)
     masks[:, :5] = 9
@@ -70,7 +70,7 @@ def test_numbers_that_differ_from_view_to_view_tell_what_belongs_together(pair):
     assert split.warnings == () and "matched from picture to picture" in split.found_by
 
 
-def test_masks_that_cut_things_elsewhere_in_every_view_count_beside_look(pair):
+def test_masks_that_cut_objects_elsewhere_in_every_view_count_beside_look(pair):
     """Each view cuts each ball into ten pieces, in another way."""
     cloud, normal, owner = pair
     masks = []
@@ -111,7 +111,7 @@ def test_masks_that_are_forgotten_or_missing(pair):
     [("auto", None, 1, 1), ("look", None, 1, 2), ("auto", 2, 1, 2), ("auto", None, 2, 2)],
     ids=["touching", "asked to look", "told", "space between"],
 )
-def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count, pieces, found):
+def test_where_one_object_was_photographed_what_touches_is_one(pair, rule, count, pieces, found):
     cloud, normal, owner = pair
     looks = np.eye(2, dtype=np.float32)[owner]
     shifted = cloud.position + np.outer(owner, [1.0 if pieces > 1 else -0.3, 0, 0])

@@ -41,14 +41,14 @@ TWINS = [((-0.3, 0, 0.3), 0.3), ((0.3, 0, 0.3), 0.3)]
 
 
 @pytest.mark.parametrize("given", [True, False])
-def test_two_like_balls_that_touch_are_told_apart_by_the_notch_between_them(given):
+def test_two_like_balls_that_touch_are_distinguished_by_the_notch_between_them(given):
     cloud, normal, owner = scene(TWINS, [[1, 0], [1, 0]])
     split = segment_objects(cloud, 2, normal if given else None)
     assert agreement(owner, split.object_of_point) > 0.97
     assert nearest_neighbour_components(cloud.position).max() == 0
 
 
-def test_four_things_in_a_heap_are_four():
+def test_four_objects_in_a_heap_are_four():
     spheres = [*TWINS, ((0, 0.5196, 0.3), 0.3), ((0, 0.1732, 0.79), 0.3)]
     cloud, normal, owner = scene(spheres, [[1, 0, 0]] * 2 + [[0, 1, 0], [0, 0, 1]])
     split = segment_objects(cloud, 4, normal)
@@ -57,19 +57,19 @@ def test_four_things_in_a_heap_are_four():
     assert split.warnings == ()
 
 
-def test_what_is_one_thing_stays_one():
+def test_what_is_one_object_stays_one():
     cloud, normal, _ = scene(TWINS, [[1, 0], [0, 1]])
     split = segment_objects(cloud, 1, normal)
     assert (split.object_of_point == 0).all() and (split.confidence == 1).all()
 
 
-def test_components_find_things_that_stand_apart():
+def test_components_find_objects_that_stand_apart():
     cloud, _, owner = scene([((-1, 0, 0.3), 0.3), ((1, 0, 0.3), 0.2)], [[1, 0], [1, 0]])
     found = nearest_neighbour_components(cloud.position)
     np.testing.assert_array_equal(found, np.where(owner == owner[0], found[0], 1 - found[0]))
 
 
-def test_a_number_that_nobody_gave_is_said_to_be_counted():
+def test_a_number_that_was_not_given_is_reported_as_counted():
     cloud, normal, owner = scene(TWINS, [[1, 0], [0, 1]])
     split = segment_objects(cloud, None, normal)
     assert split.object_of_point.max() == 1 and agreement(owner, split.object_of_point) > 0.97
@@ -79,7 +79,7 @@ def test_a_number_that_nobody_gave_is_said_to_be_counted():
 
 
 @pytest.mark.parametrize("count", [0, -1, 201])
-def test_a_number_of_things_that_cannot_be_is_refused(count):
+def test_a_number_of_objects_that_cannot_be_is_refused(count):
     cloud, _, _ = scene(TWINS, [[1, 0], [1, 0]], count=150)
     with pytest.raises(UserError, match="Ask for 1 to 200"):
         segment_objects(cloud, count)
@@ -92,7 +92,7 @@ def test_no_points_are_refused():
 
 
 @pytest.mark.parametrize("points", [1, 2, 7, 40])
-def test_few_points_are_few_things(points):
+def test_few_points_are_few_objects(points):
     rng = np.random.default_rng(3)
     appearance = np.ones((points, 2)) / np.sqrt(2)
     cloud = FeatureCloud(

@@ -79,7 +79,7 @@ def test_what_is_long_and_thin_is_a_pole_and_not_a_lid():
     assert likely(seen((0.5,) * 3, 0.7, 0.05), "pole", "shade").argmax() == 1
 
 
-def test_a_small_thing_is_the_less_likely_of_two_that_fit():
+def test_a_small_object_is_the_less_likely_of_two_that_fit():
     large, small = likely(seen((0.95,) * 3), "white wall", "white knob")
     assert large - small == pytest.approx(1.5)
 
@@ -139,7 +139,7 @@ def test_the_top_of_a_lamp_that_has_fallen_over_is_found(turn):
     assert log_likelihood(observed_attributes(cloud, bit, 3, up), TOLD).argmax(axis=1).tolist() == [0, 1, 2]
 
 
-def test_a_wide_thing_has_not_fallen_over():
+def test_a_wide_object_has_not_fallen_over():
     cloud, bit = lamp(np.eye(3), across=20.0)
     assert top_direction(cloud, bit, 3, TOLD).tolist() == [0, 0, 1]
 

@@ -76,7 +76,7 @@ def test_no_cluster_holds_two_parts_of_unlike_colour(pile):
     np.testing.assert_array_equal(np.unique(found.cluster_of_point), np.arange(found.count))
 
 
-def test_where_a_thing_stands_and_how_large_it_is_does_not_matter(pile):
+def test_where_an_object_stands_and_how_large_it_is_does_not_matter(pile):
     cloud, _ = pile
     moved = replace(cloud, position=32 * cloud.position + 64)
     a, b = cluster_parts(cloud, QUICK), cluster_parts(moved, QUICK)
@@ -114,7 +114,7 @@ def test_names_find_their_colours_without_a_model(pile):
     assert ((found.confidence > 0) & (found.confidence <= 1)).all()
 
 
-def test_names_find_their_heights_where_colours_are_not_said(pile):
+def test_names_find_their_heights_where_colours_are_not_reported(pile):
     cloud, truth = pile
     grey = replace(cloud, colour=np.full_like(cloud.colour, 0.5))
     found = name_parts(grey, thing("lid", "base"), config=QUICK)
@@ -156,7 +156,7 @@ def test_features_in_half_precision_are_not_widened_all_at_once():
     assert peak < 1.5 * rows.nbytes  # in single precision they alone are twice as large
 
 
-def test_more_names_than_clusters_are_told():
+def test_more_names_than_clusters_are_reported():
     one = PartClusters(np.zeros(10, np.int64), np.ones(10))
     x = np.zeros((10, 3))
     brown = np.tile([0.42, 0.28, 0.17], (10, 1))

@@ -59,7 +59,7 @@ def test_a_walk_around_is_one_place():
     assert doppelganger_groups(model_of(AROUND, np.zeros(COUNT)), ALL) == (NAMES,)
 
 
-def test_pictures_that_share_the_thing_alone_with_their_neighbours_are_told():
+def test_pictures_that_share_the_object_alone_with_their_neighbours_are_reported():
     found = doppelganger_groups(model_of(FOLDED, FOLDED != AROUND), ALL)
     assert len(found) == 2 and found[1] == NAMES[15:20]
 

@@ -49,7 +49,7 @@ def pairs_of(pictures):
     return [(a / LONGEST, b / LONGEST) for k, a in enumerate(pictures) for b in pictures[k + 1 :]]
 
 
-def test_a_camera_that_turns_on_the_spot_is_told_although_its_lens_is_not_known(rng):
+def test_a_camera_that_turns_on_the_spot_is_reported_although_its_lens_is_not_known(rng):
     room = rng.uniform((-6, -6, 2), (6, 6, 9), (400, 3))
     turns = Rotation.from_euler("YX", [[8 * k, 3 * (k % 3)] for k in range(6)], degrees=True)
     local = [room @ turn.as_matrix() for turn in turns]
@@ -68,7 +68,7 @@ def test_a_walk_is_no_turn_on_the_spot_even_around_a_flat_floor(floor, step):
     assert not pairs_of_rotation(pairs_of(walk)).any()
 
 
-def test_bursts_on_a_way_around_a_thing_are_no_standstill():
+def test_bursts_on_a_way_around_an_object_are_no_standstill():
     """Ten places with four pictures each, joined with those of both neighbours."""
     place = np.arange(40) // 4
     apart = np.abs(np.subtract.outer(place, place))

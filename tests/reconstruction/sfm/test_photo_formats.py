@@ -70,7 +70,7 @@ def test_an_alpha_that_hides_nothing_is_no_mask(tmp_path, greys):
 
 
 @pytest.mark.parametrize("hidden", ["few in parts", "all over"])
-def test_an_alpha_that_few_have_or_that_hides_all_is_no_mask_and_said(tmp_path, greys, hidden):
+def test_an_alpha_that_few_have_or_that_hides_all_is_no_mask_and_reported(tmp_path, greys, hidden):
     def made(k, grey):
         picture = Image.fromarray(grey).convert("RGBA")
         if hidden == "all over":
@@ -104,7 +104,7 @@ def test_a_panorama_among_photographs_is_left_out_and_named(tmp_path, greys, str
         assert len(found.names) == COUNT, "somebody cut all of them"
 
 
-def test_pictures_in_folders_below_are_said_unless_they_are_copies_or_masks(tmp_path, greys):
+def test_pictures_in_folders_below_are_reported_unless_they_are_copies_or_masks(tmp_path, greys):
     saved(tmp_path, greys, ".jpg", Image.fromarray)
     photos = tmp_path / "photos"
     for place in ("masks", "images_2", ".thumbnails", "__MACOSX"):
@@ -159,7 +159,7 @@ def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
     assert [p.name for p in photos_in_folder(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
 
 
-def test_what_is_not_read_beside_photographs_is_said_if_no_raw_picture(tmp_path, greys):
+def test_what_is_not_read_beside_photographs_is_reported_if_no_raw_picture(tmp_path, greys):
     saved(tmp_path, greys, ".jpg", Image.fromarray)
     (tmp_path / "photos" / "0.DNG").touch()
     assert gathered(tmp_path).said == ()
@@ -193,14 +193,14 @@ def test_a_sentence_is_one_line_whatever_photographs_are_called(tmp_path, greys)
     assert "two lines ?.jpg is no PNG" in said and "\n" not in said
 
 
-def test_one_picture_beside_a_folder_of_photographs_is_told_where_these_are(tmp_path, greys):
+def test_one_picture_beside_a_folder_of_photographs_is_reported_where_these_are(tmp_path, greys):
     saved(tmp_path / "mine", greys, ".jpg", Image.fromarray)
     Image.fromarray(greys[0]).save(tmp_path / "mine" / "cover.jpg")
     with pytest.raises(BadFileError, match=r"5 more lie in folders of it: name .*photos\.$"):
         prepare_images(tmp_path / "mine", tmp_path / "poses", lambda fraction, words: None)
 
 
-def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, greys):
+def test_folders_of_folders_and_single_files_are_reported_with_where_to_go_on(tmp_path, greys):
     lost = tmp_path / "DCIM" / "100" / "today"
     lost.mkdir(parents=True)
     Image.fromarray(greys[0]).save(lost / "a.jpg")
@@ -228,20 +228,20 @@ def test_what_only_its_name_calls_a_picture_is_not_called_one(tmp_path, name, sa
 
 
 @pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
-def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
+def test_good_photographs_that_are_too_few_are_not_reported_to_be_bad(tmp_path, greys, count, said):
     saved(tmp_path, greys[:count], ".jpg", Image.fromarray)
     with pytest.raises(BadFileError, match=f"photos: {said} too few to show an object"):
         gathered(tmp_path)
 
 
-def test_half_a_video_is_not_told_to_become_the_kind_it_is(tmp_path):
+def test_half_a_video_is_not_advised_to_become_the_kind_it_is(tmp_path):
     (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
     with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
         write_video_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)
 
 
 @pytest.mark.parametrize("turns", [2, 3, 5])
-def test_things_by_turns_are_all_among_the_photographs_that_are_used(turns, tmp_path):
+def test_objects_by_turns_are_all_among_the_photographs_that_are_used(turns, tmp_path):
     """Of two photographs at a time, or of five, at equal steps one thing only was looked at."""
     found = [tmp_path / f"{k:03d}" for k in range(500)]
     used = spread_selection(found, 5)
@@ -251,7 +251,7 @@ def test_things_by_turns_are_all_among_the_photographs_that_are_used(turns, tmp_
     assert all(int(file.name) // 5 == k for k, file in enumerate(used))
 
 
-def test_photographs_that_were_cropped_one_by_one_are_told_by_their_sizes(tmp_path, greys):
+def test_photographs_that_were_cropped_one_by_one_are_recognised_by_their_sizes(tmp_path, greys):
     saved(tmp_path, greys, ".jpg", Image.fromarray)
     with Image.open(tmp_path / "photos" / "0.jpg") as level:
         level.transpose(Image.Transpose.ROTATE_90).save(tmp_path / "photos" / "0.jpg")
@@ -261,7 +261,7 @@ def test_photographs_that_were_cropped_one_by_one_are_told_by_their_sizes(tmp_pa
     assert gathered(tmp_path).said[0].startswith("5 of 5 photographs have a size that no other has")
 
 
-def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
+def test_who_cropped_photographs_is_not_advised_to_put_down_a_newspaper():
     names = tuple(f"{k}.jpg" for k in range(COUNT))
     cropped = PreparedImages(names, tuple((64, 40 + k) for k in range(COUNT)), ())
     whole = PreparedImages(names, ((64, 48),) * COUNT, ())
@@ -269,7 +269,7 @@ def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
     assert "newspaper" in _refusal(["why"], whole, ()).what_to_do
 
 
-def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path, greys):
+def test_masks_under_names_of_no_photograph_are_reported_to_be_none(tmp_path, greys):
     saved(tmp_path, greys, ".png", Image.fromarray)
     place = tmp_path / "photos" / "masks"
     place.mkdir()

@@ -24,7 +24,7 @@ def test_the_spread_of_edges_is_found_whatever_the_contrast(sigma):
     assert picture_blur(0.3 * smeared + 100) == pytest.approx(picture_blur(smeared), rel=0.01)
 
 
-def test_what_is_sharp_or_dark_or_a_smooth_thing_before_a_sharp_edge_is_not_blurred():
+def test_what_is_sharp_or_dark_or_a_smooth_object_before_a_sharp_edge_is_not_blurred():
     assert picture_blur(page()) < 3
     assert picture_blur(np.full((300, 400), 90, np.float32)) == 0
     half = gaussian_filter(page(), 14)

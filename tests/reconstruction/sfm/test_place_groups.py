@@ -84,7 +84,7 @@ def test_what_joins_but_a_few_others_is_left_out_with_what_joins_none():
     assert not found.mixed and found.beside == tuple(range(59, 100))
 
 
-def test_why_pictures_are_left_out_is_said_as_far_as_it_is_known():
+def test_why_pictures_are_left_out_is_reported_as_far_as_it_is_known():
     """Ten of 25 of a ball on a white table shared nothing, and 'showed another place'."""
     names = tuple(f"{k}.jpg" for k in range(25))
     there = PreparedImages(names, ((640, 480),) * 25, ())

@@ -67,7 +67,7 @@ def test_lenses_that_look_past_the_middle_each_by_another_way_are_of_cropped_pic
 
 
 @pytest.mark.parametrize("past", [0.0, 30.0])
-def test_of_whole_pictures_and_of_those_cropped_alike_nothing_is_said(past, tmp_path):
+def test_of_whole_pictures_and_of_those_cropped_alike_nothing_is_reported(past, tmp_path):
     rng = np.random.default_rng(0)
     assert principal_point_spread(model(tmp_path / "0", np.full((COUNT, 2), past), rng)) < 0.01
 

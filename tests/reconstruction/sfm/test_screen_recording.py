@@ -32,14 +32,14 @@ def written(frames, folder):
 
 
 @pytest.mark.parametrize("header", [0, 48])
-def test_a_page_that_is_scrolled_is_told_though_its_header_stays(page, tmp_path, header):
+def test_a_page_that_is_scrolled_is_reported_though_its_header_stays(page, tmp_path, header):
     frames = windows(page)
     for frame in frames:
         frame[:header] = np.roll(page[:header], 50, axis=1)
     assert is_screen_recording(written(frames, tmp_path))
 
 
-def test_who_passes_by_near_and_far_things_does_not_scroll(page, tmp_path):
+def test_who_passes_by_near_and_far_objects_does_not_scroll(page, tmp_path):
     """What is near moves twice as far."""
     frames = windows(page)
     for k, frame in enumerate(frames):
@@ -47,7 +47,7 @@ def test_who_passes_by_near_and_far_things_does_not_scroll(page, tmp_path):
     assert not is_screen_recording(written(frames, tmp_path))
 
 
-def test_a_page_that_is_pushed_a_little_is_not_said_to_be_scrolled(page, tmp_path):
+def test_a_page_that_is_pushed_a_little_is_not_reported_to_be_scrolled(page, tmp_path):
     assert not is_screen_recording(written(windows(page)[:10], tmp_path))
 
 

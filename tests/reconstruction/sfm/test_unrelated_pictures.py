@@ -65,12 +65,12 @@ def test_what_shows_something_else_on_the_same_floor_is_left_out_and_named(tmp_p
     assert drop_pictures_of_something_else(left, masks) == left  # it is not said twice
 
 
-def test_of_one_thing_nothing_is_left_out(tmp_path):
+def test_of_one_object_nothing_is_left_out(tmp_path):
     posed, masks = placed(tmp_path, ())
     assert drop_pictures_of_something_else(posed, masks) == posed
 
 
-def test_nobody_is_blamed_where_half_show_something_else(tmp_path):
+def test_none_is_left_out_where_half_show_something_else(tmp_path):
     posed, masks = placed(tmp_path, range(0, COUNT, 2))
     assert drop_pictures_of_something_else(posed, masks) == posed
 

@@ -59,7 +59,7 @@ def middle(gaussians, camera):
     return picture.rgb[46:50, 46:50].mean(axis=(0, 1)), picture.alpha[46:50, 46:50].mean()
 
 
-def test_what_nobody_photographed_is_no_hole_into_a_shell():
+def test_an_unphotographed_place_is_no_hole_into_a_shell():
     whole = round_ones(ball(fine=4).vertices, 0.9, BLUE)
     upper = gaussian_subset(whole, whole.mean[:, 2] > 0.0)
     owner = np.zeros(upper.count, int)

@@ -58,7 +58,7 @@ def test_a_ball_on_the_floor_becomes_a_closed_ball():
     assert near.max() < 0.12
 
 
-def test_a_thing_is_as_large_as_its_outlines_though_gaussians_are_wide():
+def test_an_object_is_as_large_as_its_outlines_though_gaussians_are_wide():
     """Learned ones have their means inside by a deviation; what is met first is too far out."""
     sides, wide = np.array([0.8, 0.5, 0.6]), 1.5 * PIXEL
     ball, inner = (
@@ -132,7 +132,7 @@ def test_what_stands_on_legs_is_hollow_below():
 LEGS = [(x, y) for x in (-0.44, 0.44) for y in (-0.44, 0.44)]
 
 
-def test_every_place_in_touching_things_belongs_to_one_of_them():
+def test_every_place_in_touching_objects_belongs_to_one_of_them():
     below, above = (box([-0.5, -0.5, 0], [0.5, 0.5, 0.4]), box([-0.25, -0.25, 0.4], [0.25, 0.25, 0.9]))
     gaussians, owner = together(clad(below, 5000), clad(above, 3000))
     hidden = (np.abs(gaussians.mean[:, 2] - 0.4) < 1e-3) & (np.abs(gaussians.mean[:, :2]).max(axis=1) < 0.25)
@@ -148,7 +148,7 @@ def test_every_place_in_touching_things_belongs_to_one_of_them():
 
 
 @pytest.mark.slow
-def test_floor_and_background_are_no_things_but_hide_what_is_behind():
+def test_floor_and_background_are_no_objects_but_hide_what_is_behind():
     ball = trimesh.creation.icosphere(4, 0.4).apply_translation([0, 0, 0.4])
     ground = box([-1.5, -1.5, -0.05], [1.5, 1.5, 0.0])
     gaussians, owner = together(clad(ball), clad(ground, 6000))
@@ -166,7 +166,7 @@ def test_specks_in_the_air_are_left_out():
     assert solid.vertices[:, 2].max() < 0.82 and not solid.warnings
 
 
-def test_hollows_that_nobody_sees_and_crumbs_are_no_surface():
+def test_hollows_that_no_camera_sees_and_crumbs_are_no_surface():
     whole = trimesh.creation.box((1, 1, 1))
     hollow = trimesh.creation.box((0.1, 0.1, 0.1))
     hollow.invert()
@@ -207,7 +207,7 @@ def test_an_object_that_is_only_haze_is_named():
         build_closed_surfaces(gaussians, owner, eyes(8), config=SMALL)
 
 
-def test_what_nobody_sees_is_coloured_without_patches():
+def test_an_unseen_surface_is_coloured_without_patches():
     cube = box([-0.4, -0.4, 0], [0.4, 0.4, 0.8])
     whole, owner = together(clad(cube))
     red = whole.mean[:, :1] < 0

@@ -38,12 +38,12 @@ def found(gaussians, of_object=None, masks=None):
     return pieces_by_free_space(gaussians.mean[mine], gaussians, mine, eyes(), masks, SMALL)
 
 
-def test_things_apart_are_told_apart_and_most_points_come_first():
+def test_objects_apart_are_distinguished_and_most_points_come_first():
     whole, owner = together(ball((0.6, 0, 0.25), count=900), ball((-0.4, 0, 0.4), 0.4, 3000), ball((0.6, 0.7, 0.25)))
     np.testing.assert_array_equal(found(whole), np.array([2, 0, 1])[owner])
 
 
-def test_things_that_touch_are_one_to_space():
+def test_objects_that_touch_are_one_to_space():
     whole, _ = together(ball((-0.25, 0, 0.25)), ball((0.25, 0, 0.25)))
     assert not found(whole).any()
 
@@ -53,7 +53,7 @@ def vase():
 
 
 @pytest.mark.parametrize("draw", [None, 0, 1, 2])
-def test_a_thing_with_a_plain_neck_of_few_long_gaussians_is_one(draw):
+def test_an_object_with_a_plain_neck_of_few_long_gaussians_is_one(draw):
     whole = vase()
     if draw is not None:
         whole = gaussian_subset(whole, np.random.default_rng(draw).random(whole.count) < 0.98)
@@ -72,7 +72,7 @@ def test_a_leg_that_carving_leaves_crumbs_of_breaks_nothing():
     assert not found(whole).any()
 
 
-def test_haze_between_things_builds_no_bridge():
+def test_haze_between_objects_builds_no_bridge():
     gap = np.column_stack([np.linspace(-0.2, 0.2, 12), np.zeros(12), np.full(12, 0.25)])
     haze = Gaussians(
         gap, np.tile([1.0, 0, 0, 0], (12, 1)), np.full((12, 3), 0.03), np.full(12, 0.08), np.zeros((12, 1, 3))

@@ -52,7 +52,7 @@ def halved(mesh, known=0.0, still=False, steep=STEEP):
         return lower_hull_top(mesh, belief, stays, rows(steep), (SIDE, SIDE), pool)
 
 
-def test_a_roof_of_grazing_rays_is_lowered_to_its_middle_and_said():
+def test_a_roof_of_grazing_rays_is_lowered_to_its_middle_and_reported():
     mesh = tent(GRAZES)
     made, roof = halved(mesh)
     ridge = WIDE * np.tan(np.radians(GRAZES))
@@ -112,5 +112,5 @@ def test_a_speck_that_photographs_know_holds_no_roof():
     assert halved(mesh, known=speck)[1] == halved(mesh)[1]
 
 
-def test_little_doubt_is_not_said():
+def test_little_doubt_is_not_reported():
     assert not HullTop(MIN_SAID_HEIGHT_FRACTION, 40.0).warnings

@@ -32,12 +32,12 @@ def refused(*boxes, masked=False, **more):
 
 
 @pytest.mark.parametrize("masked", [False, True])
-def test_a_thing_that_cameras_stand_around_is_fine(masked):
+def test_an_object_that_cameras_stand_around_is_fine(masked):
     assert refused(box(0.1, 0.12), box(0.05, 0.2, (0.1, 0.1)), masked=masked) is None
 
 
 @pytest.mark.parametrize("masked", [False, True])
-def test_a_thing_that_holds_cameras_is_the_room(masked):
+def test_an_object_that_holds_cameras_is_the_room(masked):
     why = refused(box(0.1, 0.12), box(1.2, 0.5), masked=masked)
     assert why is not None and "its box holds 20 of 20 cameras" in why and "--force" in why
     # A few that bend over it are no reason, a tenth is.
@@ -45,7 +45,7 @@ def test_a_thing_that_holds_cameras_is_the_room(masked):
     assert "holds 3 of 20" in str(refused(box(0.4, 0.5, (0.5, 0.0)), masked=masked))
 
 
-def test_without_masks_a_thing_that_fills_the_pictures_is_all_there_is():
+def test_without_masks_an_object_that_fills_the_pictures_is_all_there_is():
     why = refused(box(0.6, 0.2))
     assert why is not None and "as long as the ball" in why and "--floor-at" in why
     assert refused(box(0.6, 0.2), masked=True) is None, "somebody said that it is the thing"
@@ -92,7 +92,7 @@ def test_pictures_no_better_than_grey_are_no_shape():
     assert "12.0 dB, as a plain grey picture has" in str(told(12.0))
 
 
-def test_of_a_splat_without_cameras_nothing_is_said():
+def test_of_a_splat_without_cameras_nothing_is_reported():
     assert boxes_rejection_reason(np.array([box(9.0, 9.0)]), (), masked=False) is None
 
 

@@ -93,7 +93,7 @@ def test_what_overlapped_only_touches(name):
         np.testing.assert_array_equal(made[k].vertices[clear], pair[k].vertices[clear])
 
 
-def test_equal_things_give_way_alike():
+def test_equal_objects_give_way_alike():
     one, two = PAIRS["balls"]
     overlap = common(one, two)
     for old, new in zip((one, two), made_of("balls"), strict=True):
@@ -119,7 +119,7 @@ def test_what_stands_on_the_floor_stays_flat_on_it():
         np.testing.assert_allclose(new.vertices[wall, 0], 0, atol=1e-2 * CELL)
 
 
-def test_the_order_of_things_changes_nothing():
+def test_the_order_of_objects_changes_nothing():
     one, two = PAIRS["edge"]
     for a, b in zip(made_of("edge"), parted(two, one)[::-1], strict=True):
         np.testing.assert_array_equal(a.vertices, b.vertices)
