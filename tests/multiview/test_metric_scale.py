@@ -90,7 +90,7 @@ def test_an_object_that_disagrees_with_the_others_is_named():
 
 def test_an_unknown_size_gets_a_named_substitute():
     found = choose_metric_scale(size=10.0)
-    assert (found.metres_per_unit, found.source) == (pytest.approx(0.05), "nobody")
+    assert (found.metres_per_unit, found.source) == (pytest.approx(0.05), "default")
     assert "Its scale is unknown" in found.warnings[0]
 
 

@@ -109,7 +109,7 @@ def test_an_object_of_unknown_size_is_reported_of(pool, tmp_path):
     made = composed(pool, tmp_path, assets=("plank_a",))
     assert any("plank" in w for w in made.warnings)
     said = json.loads((tmp_path / "composition.json").read_text())
-    assert said["objects"][0]["said_by"] == "nobody"
+    assert said["objects"][0]["said_by"] == "default"
 
 
 def test_what_a_scene_is_made_of_is_written_down(pool, tmp_path):

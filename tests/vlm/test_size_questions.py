@@ -169,7 +169,7 @@ def test_a_file_in_other_units_says_nothing_of_its_size():
 
 def test_an_unknown_size_gets_a_substitute_and_a_warning():
     real = estimate_real_extent("thing_7", "widget", 41.0, False, DUCKS)
-    assert (real.extent, real.said_by) == (UNKNOWN_EXTENT_M, "nobody")
+    assert (real.extent, real.said_by) == (UNKNOWN_EXTENT_M, "default")
     assert "The size of thing_7 (widget) is unknown" in real.warnings[0]
     metric = estimate_real_extent("thing_7", "widget", 0.7, True, DUCKS)
     assert (metric.extent, metric.said_by, metric.warnings) == (0.7, "file", ())

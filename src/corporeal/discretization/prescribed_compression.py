@@ -112,7 +112,7 @@ def place_along_path(thing: SampledObject, path: Keyframes, pivot: Vector, times
     """Return where an object with a path is at some times [s].
 
     Args:
-        thing: Which.
+        thing: The object.
         path: Of the point ``pivot`` of it.
         pivot: The middle of the underside of its box at the start [m].
         times: [s]

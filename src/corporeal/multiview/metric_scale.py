@@ -30,7 +30,7 @@ class MetricScale:
 
     metres_per_unit: float
     """[m]"""
-    source: Literal["file", "distance", "extent", "nobody"]
+    source: Literal["file", "distance", "extent", "default"]
     """The file's kind is in metres; two points whose distance is known; how large such an object is as a rule, stated
     or by a model; a default size.
     """
@@ -114,7 +114,7 @@ def _stand_in_scale(size: float) -> MetricScale:
     scale = _scale_ratio(NEUTRAL_SCENE_SIZE_M, size, "The whole")
     words = f"Its scale is unknown: the whole was assumed to be {NEUTRAL_SCENE_SIZE_M:g} m."
     warning = Note(f"{words} State the size of one object with --extent NAME=METRES.", NoteKind.ASSUMED)
-    return MetricScale(scale, "nobody", words, (warning,))
+    return MetricScale(scale, "default", words, (warning,))
 
 
 def _contradiction_text(believed: MetricScale, other: MetricScale) -> str:

@@ -61,7 +61,7 @@ def best_mass_fit(masses: Sequence[float], said: float) -> int:
 
     Args:
         masses: Of the object, made in each way [kg].
-        said: That its name states [kg].
+        said: Stated by its name [kg].
 
     """
     off = [max(mass / said, said / mass) if mass > 0 else inf for mass in masses]

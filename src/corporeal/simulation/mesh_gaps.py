@@ -285,8 +285,8 @@ class RelativePath:
     """Piecewise linear paths of particles of one object in the frame of another.
 
     A line ends where something has moved by ``TRACK_STRIDE_DX``; what rests costs nothing. Of what spins so fast that
-    it turns by more than ``MAX_TURN_RAD`` between frames (a shard), nothing is
-    said: a straight line in its frame would lead through it where the true arc leads past.
+    it turns by more than ``MAX_TURN_RAD`` between frames (a shard), there is no
+    result: a straight line in its frame would lead through it where the true arc leads past.
     """
 
     def __init__(self, walker: TrackedSurface, other: TrackedSurface, cell: float) -> None:

@@ -25,7 +25,7 @@ EXTENT_TABLE_SOURCE = "the table of typical extents"
 MAX_PARALLEL_SIZE_QUESTIONS = 4
 """Questions that are asked at the same time."""
 
-SizeSource = Literal["file", "model", "recording", "table", "nobody"]
+SizeSource = Literal["file", "model", "recording", "table", "default"]
 ANSWER_SOURCE_TEXT = {"model": "a model", "recording": "a recorded answer"}
 
 
@@ -133,7 +133,7 @@ def estimate_real_extent(name: str, class_name: str, extent: float, metric: bool
         "Name a model with --vlm.",
         NoteKind.ASSUMED,
     )
-    return RealExtent(UNKNOWN_EXTENT_M, "nobody", "nobody", "A default size.", (warning,))
+    return RealExtent(UNKNOWN_EXTENT_M, "default", "default", "A default size.", (warning,))
 
 
 # ---------------------------------------------------------------- a model's answers

@@ -188,7 +188,7 @@ class _NamedObjects:
     @property
     def statements(self) -> list[str]:
         """Return how large they are, where no warning does."""
-        return [self.scale.reason] * (self.scale.source != "nobody")
+        return [self.scale.reason] * (self.scale.source != "default")
 
 
 def _name_objects(

@@ -17,7 +17,7 @@ from corporeal.reconstruction.gaussians.heldout_quality import HeldOutQuality
 CAMERAS_IN_BOX_FRACTION = 0.1
 """Share of the cameras that stand in an object's box, from which on the object is the room."""
 BOX_TO_REGION_RATIO = 2.0
-"""Longest side of an object's box over the radius of the ball that cameras look at, from which on, where nobody gave
+"""Longest side of an object's box over the radius of the ball that cameras look at, from which on, without
 masks, it is all that is in the ball.
 """
 MAX_CROPPED_FRACTION = 0.5

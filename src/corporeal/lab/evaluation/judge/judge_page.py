@@ -73,7 +73,7 @@ def blind_spots_sentence(result: JudgeResult) -> str:
 
 
 def _summary(judged: JudgeVerdicts) -> str:
-    by = ", ".join(judged.answered_by) or "nobody"
+    by = ", ".join(judged.answered_by) or "no model"
     scenes = len({v.scene for v in judged.verdicts})
     missing = f" {judged.unanswered} looks have no usable answer." if judged.unanswered else ""
     return f"{len(judged.verdicts)} videos of {scenes} scenes, answered by {by}.{missing}"
