@@ -1,4 +1,4 @@
-"""A law of one's own, written into a copy of the package at the four places where a law stands."""
+"""A law of one's own, written into a copy of the package at the four places of a law."""
 
 import json
 import os
@@ -19,13 +19,15 @@ NEXT = "\n\n@dataclass(frozen=True)\nclass Material:"  # what follows the laws' 
 def write_law(package: Path) -> None:
     """Write the law's file, its twin in C++, its number and a material that follows it."""
     shutil.copy(PARTS / f"{NAME}.py", package / "mpm/laws")
-    insert(package / "mpm/formulas/laws.h", "// Who chooses", (PARTS / "laws.h").read_text())
+    insert(package / "mpm/formulas/laws.h", "// Dispatch: ", (PARTS / "laws.h").read_text())
     insert(package / "core/types/material_field.py", NEXT, f"    {NAME.upper()} = {len(Law)}\n")
     insert(package / "materials/library.toml", "[gold]", (PARTS / "library.toml").read_text())
 
 
 def insert(file: Path, before: str, text: str) -> None:
-    """Insert text in front of what stands there already."""
+    """Insert text in front of a line of the file."""
+    if before not in file.read_text():
+        raise ValueError(f"{file} has no {before!r}.")
     file.write_text(file.read_text().replace(before, text + before, 1))
 
 
