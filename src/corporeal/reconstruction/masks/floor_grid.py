@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -33,6 +34,7 @@ class FloorGrid:
     """Of a cell."""
     count: int
 
+    @cached_property
     def places(self) -> Float[np.ndarray, "M 3"]:
         """Middles of the cells, row by row."""
         steps = self.side * (np.arange(self.count) + 0.5)
@@ -42,7 +44,7 @@ class FloorGrid:
     def seen_by(self, camera: Camera) -> Float[np.ndarray, "2 M"]:
         """Row and column of a picture at which the middles of the cells are; -9: behind it."""
         P = projection_matrix(camera)
-        u, v, depth = (self.places() @ P[:, :3].T + P[:, 3]).T
+        u, v, depth = P[:, :3] @ self.places.T + P[:, 3:]
         with np.errstate(divide="ignore", invalid="ignore"):
             at = np.stack([v / depth, u / depth]) - 0.5
         at[:, depth <= 0] = -9

@@ -166,7 +166,7 @@ def lower_floor(floor: GroundPlane | None, around: ViewedRegion) -> GroundPlane 
 def pixels_of(points: Float[np.ndarray, "N 3"], camera: Camera) -> Int[np.ndarray, " N"]:
     """Return which pixel shows each point; -1: none."""
     P = projection_matrix(camera)
-    u, v, depth = (points @ P[:, :3].T + P[:, 3]).T
+    u, v, depth = P[:, :3] @ points.T + P[:, 3:]
     with np.errstate(divide="ignore", invalid="ignore"):
         column, row = np.floor(u / depth), np.floor(v / depth)
     seen = (depth > 0) & (column >= 0) & (column < camera.width)
