@@ -83,7 +83,7 @@ def hull_grid_points(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, .
 def pixels_of_points(points: Float[np.ndarray, "N 3"], camera: Camera, shape: tuple[int, ...]) -> Int[np.ndarray, " N"]:
     """Return which pixel of a small picture shows each point; -1: none."""
     P = projection_matrix(camera)
-    u, v, depth = (points @ P[:, :3].T + P[:, 3]).T
+    u, v, depth = P[:, :3] @ points.T + P[:, 3:]
     with np.errstate(divide="ignore", invalid="ignore"):
         column = np.floor(u / depth * shape[1] / camera.width)
         row = np.floor(v / depth * shape[0] / camera.height)

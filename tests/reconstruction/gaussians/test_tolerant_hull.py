@@ -33,8 +33,9 @@ def kept_and_added(masks, cameras, config=DEFAULT_HULL):
     views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)
     with ThreadPool(1) as pool:
         made = carve_hull(np.full(3, -0.9), np.full(3, 0.9), views, masks, pool, config)
-    distance = np.linalg.norm(made.cells[..., None, :] - CENTRES, axis=-1)
-    true = (distance < RADII).any(axis=-1)
+    true = np.zeros(made.inside.shape, bool)
+    for centre, radius in zip(CENTRES, RADII, strict=True):
+        true |= np.square(made.cells - centre).sum(axis=-1) < radius**2
     return (made.inside & true).sum() / true.sum(), (made.inside & ~true).sum() / true.sum()
 
 

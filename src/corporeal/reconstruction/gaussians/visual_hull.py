@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import label, maximum
+from scipy.ndimage import label
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Views
@@ -134,8 +134,10 @@ def _without_phantoms(
     piece = np.empty(hull.inside.shape, np.int32)
     label(hull.inside, np.ones((3, 3, 3)), piece)
     count = int(piece.max())
-    most = np.asarray(maximum(seen, piece, np.arange(1, count + 1)))
-    kept = np.concatenate([[True], most > config.phantom_max_views])
+    most = np.zeros(count + 1)
+    np.maximum.at(most, piece[hull.inside], seen[hull.inside])
+    kept = most > config.phantom_max_views
+    kept[0] = True
     if count < 2 or kept.all():
         return hull
     pixel, owner = _shown_pixels(hull.cells[hull.inside], piece[hull.inside], views.cameras, masks)
