@@ -105,7 +105,7 @@ def test_plain_pictures_empty_nothing():
 def test_the_number_of_threads_changes_nothing():
     config = HullConfig(grid_cells=20_000)
     views, masks = photographed(without_lid(), 0.25)
-    views, masks = Views(views.rgb[::2], views.cameras[::2]), masks[::2]
+    views, masks = Views(views.rgb[::4], views.cameras[::4]), masks[::4]
     results = []
     for count in (1, 3):
         with ThreadPool(count) as pool:
