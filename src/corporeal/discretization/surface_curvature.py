@@ -56,13 +56,10 @@ def curve_points(
     at, vertex = map(np.asarray, KDTree(mesh.vertices).query(points))
     is_corner = at < AT_CORNER_DISTANCE_FRACTION * mesh.extent
     inside = np.flatnonzero(~is_corner)
-    found = [_curvature_on_faces(curved, points[inside], reach[inside])]
-    found += [
-        _curvature_at_corner(curved, points[k], reach[k], curved.around(vertex[k])) for k in np.flatnonzero(is_corner)
-    ]
+    corners = _curvature_at_corners(curved, points[is_corner], reach[is_corner], vertex[is_corner])
+    faces = _curvature_on_faces(curved, points[inside], reach[inside])
     # Corners first, as they were given: the lowest make the object rest exactly.
-    place = np.concatenate([p for p, _ in (*found[1:], found[0])])
-    curvature = np.concatenate([r for _, r in (*found[1:], found[0])])
+    place, curvature = (np.concatenate(both) for both in zip(corners, faces, strict=True))
     curvature[:, 9] = is_surrounded(curvature, place)
     return place, curvature
 
@@ -109,10 +106,18 @@ class MeshCurvature:
         self.order = np.argsort(corner, axis=None, kind="stable")
         self.sorted = corner.reshape(-1)[self.order]
 
-    def around(self, vertex: int) -> Int[np.ndarray, " C"]:
-        """Corners of triangles at a vertex's place: three times the triangle, and which of it."""
-        low, high = np.searchsorted(self.sorted, self.place[vertex] + np.array([0, 1]))
-        return self.order[low:high]
+    def around(self, vertex: Int[np.ndarray, " N"]) -> tuple[Int[np.ndarray, " C"], Int[np.ndarray, " C"]]:
+        """Corners of triangles at the places of vertices: which of the N, and three times the triangle plus 0, 1 or 2.
+
+        In order of the N, and of their groups.
+        """
+        place = self.place[vertex]
+        low, high = np.searchsorted(self.sorted, place), np.searchsorted(self.sorted, place + 1)
+        count = high - low
+        owner = np.repeat(np.arange(len(vertex)), count)
+        corner = self.order[np.arange(len(owner)) + np.repeat(low - (np.cumsum(count) - count), count)]
+        order = np.lexsort((self.group.reshape(-1)[corner], owner))
+        return owner[order], corner[order]
 
     def _smooth(self, t: np.ndarray, u: np.ndarray) -> Bool[np.ndarray, " E"]:
         """Which edges, each of triangles t and u, stand for something round."""
@@ -200,23 +205,30 @@ def _curvature_on_faces(
     return np.where(is_curved(curvature)[:, None], lifted, points), curvature
 
 
-def _curvature_at_corner(
-    curved: MeshCurvature, point: np.ndarray, reach: float, corner: Int[np.ndarray, " C"]
+def _curvature_at_corners(
+    curved: MeshCurvature,
+    points: Float[np.ndarray, "N 3"],
+    reach: Float[np.ndarray, " N"],
+    vertex: Int[np.ndarray, " N"],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Give a corner once for each curved face that it belongs to; else as a point alone."""
-    group = curved.group.reshape(-1)[corner]
-    found = []
-    for number in np.unique(group):
-        mine = corner[group == number]
-        large, small, along = curved.principal(mine // 3)
-        weight = curved.area[mine // 3]
-        high, low = (np.array([weight @ k / weight.sum()]) for k in (large, small))
-        normal = curved.normal.reshape(-1, 3)[mine[:1]]
-        row = _curvature_row(normal, along[[np.argmax(large)]], high, low, np.array([reach]))
-        if is_curved(row)[0]:
-            found.append(row)
-    rows = np.concatenate(found) if found else np.zeros((1, CURVATURE_COLUMNS))
-    return np.tile(point, (len(rows), 1)), rows
+    """Give each corner once for each curved face that it belongs to; else as a point alone."""
+    owner, corner = curved.around(vertex)
+    group, triangle = curved.group.reshape(-1)[corner], corner // 3
+    is_first = np.diff(owner, prepend=-1) + np.abs(np.diff(group, prepend=-1)) > 0
+    first, face = np.flatnonzero(is_first), np.cumsum(is_first)
+    large, small, along = curved.principal(triangle)
+    area = curved.area[triangle]
+    high, low = (np.add.reduceat(area * k, first) / np.add.reduceat(area, first) for k in (large, small))
+    steepest = np.lexsort((-large, face))[first]
+    normal = curved.normal.reshape(-1, 3)[corner[first]]
+    rows = _curvature_row(normal, along[steepest], high, low, reach[owner[first]])
+    found = is_curved(rows)
+    of_face = owner[first][found]
+    alone = np.setdiff1d(np.arange(len(points)), of_face)
+    given = np.concatenate([of_face, alone])
+    rows = np.concatenate([rows[found], np.zeros((len(alone), CURVATURE_COLUMNS))])
+    order = np.argsort(given, kind="stable")
+    return points[given[order]], rows[order]
 
 
 def is_round(curvature: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:

@@ -218,7 +218,8 @@ def _scatter_by_columns(
     nx, ny, nz = lattice.counts
     column = np.indices((nx, ny)).transpose(1, 2, 0) + rng.uniform(0, 1, (nx, ny, 2))
     met = column_crossings(lattice.inner(shape.mesh.vertices), shape.mesh.triangles, column)
-    height = np.arange(nz) + rng.uniform(0, 1, (nx * ny, nz))
+    height = rng.random((nx * ny, nz))
+    height += np.arange(nz)
     line, layer = points_wound_around(met, height)
     column = column.reshape(-1, 2)
     points = lattice.world(np.column_stack([column[line], height[line, layer]]))
