@@ -119,6 +119,7 @@ def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monke
     whole = grown_scene()[-1]
     made = {False: replace(whole, left_over=1.0), True: replace(whole, left_over=left_over)}
     monkeypatch.setattr(module, "grow_masks", lambda *_, flat=False: made[flat])
+    monkeypatch.setattr(module, "merge_attachments", lambda *given: given[2])
     found = grown_masks(folder, tmp_path / "made")
     assert (module.FLAT_TAKEN_STATEMENT in found.said) == (left_over == 0)
     assert ("1.0 times as much" in found.incomplete) == (left_over > 0)
