@@ -25,7 +25,7 @@ MIDDLES = {"head": HEAD, "close": CLOSE}
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
-def scene(ball=RED, ground=GREY, seed=0, count=10, belt=None, flat=0.0, other=None, finer=1, floor=FLOOR):
+def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=None, finer=1, floor=FLOOR):
     """Photographs of a ball on a mottled floor, its true masks, and points on both.
 
     belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius

@@ -3,10 +3,12 @@
 import json
 import shutil
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import painted_scene
 import pytest
-from painted_scene import GREY, HIGH, WIDE, agreement, grown_scene, scene
+from painted_scene import GREY, HIGH, WIDE, agreement, grown_scene
 from PIL import Image
 
 from corporeal.cli import main
@@ -27,6 +29,8 @@ from corporeal.reconstruction.masks.grown_masks import GrownMasks, grown_masks
 from corporeal.reconstruction.masks.mask_prompts import MaskPrompt
 from corporeal.reconstruction.masks_figure import MASKS_FIGURE_FILE
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate_reconstruct
+
+scene = partial(painted_scene.scene, count=10)
 
 
 def unheard(fraction, words):
