@@ -2,8 +2,10 @@
 
 import os
 import socket
+import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 # Several processes run the tests, and threads of BLAS that wait for a core spin: a product of
 # 12,000 numbers took 8 ms of processor time, not .006. Workers of xdist read this before NumPy.
@@ -63,6 +65,26 @@ def command(monkeypatch, capsys):
         return 0, capsys.readouterr()
 
     return type_
+
+
+@pytest.fixture
+def mesh_reader_in_process(monkeypatch, request):
+    """Read meshes without a child process for each, which imports for a second what is imported here."""
+    if "mesh_reader_child" in request.fixturenames:
+        return
+    from corporeal.io.mesh import mesh_loader, mesh_reader_process
+
+    def run(command, **_):
+        mesh_reader_process.main(*command[4:])
+        return subprocess.CompletedProcess(command, 0, b"", b"")
+
+    monkeypatch.setattr(mesh_reader_process, "_limit_resources", lambda: None)
+    monkeypatch.setattr(mesh_loader, "subprocess", SimpleNamespace(**vars(subprocess) | {"run": run}))
+
+
+@pytest.fixture
+def mesh_reader_child():
+    """Read meshes as users do: in a child process, within limits of time and memory."""
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,7 @@
 import io
 import os
 import struct
-import subprocess
 import zipfile
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +15,6 @@ from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.io import registry
 from corporeal.io.gltf.gltf_materials import DEFAULT_FINISH
 from corporeal.io.input_files import list_companions
-from corporeal.io.mesh import mesh_loader, mesh_reader_process
 from corporeal.io.mesh.mesh_loader import load_mesh
 from corporeal.io.mesh.raw_mesh import MAX_PIECES
 from corporeal.io.ply_container import kind_of_ply
@@ -28,24 +25,7 @@ MM = 1e-3
 SIZE = np.array([10.0, 20.0, 45.0])
 """Of the block in every file: x, y, and z which is up [mm]."""
 
-
-@pytest.fixture(autouse=True)
-def reader_in_this_process(monkeypatch, request):
-    """Start no process for files that mean well: each would import for a second what this one has imported."""
-    if "reader_process" in request.fixturenames:
-        return
-
-    def run(command, **_):
-        mesh_reader_process.main(*command[4:])
-        return subprocess.CompletedProcess(command, 0, b"", b"")
-
-    monkeypatch.setattr(mesh_reader_process, "_limit_resources", lambda: None)
-    monkeypatch.setattr(mesh_loader, "subprocess", SimpleNamespace(**vars(subprocess) | {"run": run}))
-
-
-@pytest.fixture
-def reader_process():
-    """Read files in a process of its own, within limits of time and memory, as users do."""
+pytestmark = pytest.mark.usefixtures("mesh_reader_in_process")
 
 
 @pytest.fixture
@@ -314,7 +294,7 @@ def test_texture_coordinates_run_down_as_in_gltf(chair):
     np.testing.assert_allclose(sorted(map(tuple, blue.uv)), [(0, 0), (0, 1), (0.25, 1)])
 
 
-def test_companions_are_named_and_come_from_the_same_folder_only(chair, tmp_path, reader_process):
+def test_companions_are_named_and_come_from_the_same_folder_only(chair, tmp_path, mesh_reader_child):
     assert [p.name for p in list_companions(chair)] == ["look.mtl", "half blue.png"]
     (tmp_path / "below").mkdir()
     inner = tmp_path / "below" / "x.obj"
@@ -394,7 +374,7 @@ def processor_seconds():
 
 
 @pytest.mark.slow
-def test_instances_of_instances_end_at_the_deadline(tmp_path, reader_process):
+def test_instances_of_instances_end_at_the_deadline(tmp_path, mesh_reader_child):
     pytest.importorskip("pxr")
     lines = ['#usda 1.0\nclass "c0" {\ndef Mesh "m" {\npoint3f[] points = [(0, 0, 0)]\n}\n}\n']
     for level in range(1, 9):
@@ -505,7 +485,7 @@ LIMITED = [name for name in HOSTILE if name.startswith(("claims", "bomb", "laugh
 
 
 @pytest.mark.parametrize("name", LIMITED)
-def test_a_hostile_file_ends_in_one_sentence(tmp_path, reader_process, name):
+def test_a_hostile_file_ends_in_one_sentence(tmp_path, mesh_reader_child, name):
     refused(tmp_path, name)
 
 

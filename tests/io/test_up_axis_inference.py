@@ -10,6 +10,8 @@ from corporeal.io.mesh.mesh_trimesh import read_dae_names
 QUARTER = trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
 """Turns what has +y up to have +z up."""
 
+pytestmark = pytest.mark.usefixtures("mesh_reader_in_process")
+
 
 def chair():
     """Return a chair with +z up: it also stands on its back."""

@@ -12,6 +12,8 @@ from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.pipeline.stages.assemble import AssembleConfig, assemble
 from glb_maker import Maker, cube
 
+pytestmark = pytest.mark.usefixtures("mesh_reader_in_process")
+
 
 @pytest.fixture
 def models(tmp_path):
