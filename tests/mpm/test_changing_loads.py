@@ -8,8 +8,10 @@ import pytest
 import corporeal as co
 from corporeal.core.errors import UserError
 from corporeal.core.types import Wind
+from corporeal.discretization.discretization_plan import QualityPreset
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.reference.engine import ReferenceEngine
+from corporeal.pipeline.stages.fill import fill
 
 ENGINES = (CpuEngine, ReferenceEngine)
 LIGHT = (0.0, 0.0, -1.62)
@@ -22,7 +24,9 @@ def problem():
     soft = co.ball("seat_foam", radius=0.05, at=(0, 0, 2.0))
     hard = co.ball("granite", radius=0.05, at=(0.5, 0, 2.0))
     scene = co.build_scene(soft, hard)
-    return co.pose_problem(co.prepare_scene(replace(scene, objects=tuple(replace(o, wind=air) for o in scene.objects))))
+    ready = co.prepare_scene(replace(scene, objects=tuple(replace(o, wind=air) for o in scene.objects)))
+    coarse = fill(ready.scene, ready.parts, ready.field, quality=QualityPreset(4, 16, 4000, 20e3, np.inf))
+    return co.pose_problem(replace(ready, particles=coarse))
 
 
 @pytest.mark.parametrize("kind", ENGINES)
