@@ -1,5 +1,6 @@
 """Shared by all tests: shapes are checked, and the network is refused."""
 
+import gc
 import os
 import socket
 import subprocess
@@ -16,6 +17,8 @@ import numpy as np
 import pytest
 from jaxtyping import install_import_hook
 
+from corporeal.core.process_resources import keep_freed_memory, relax_garbage_collection
+
 # Kernels are excluded: neither Warp nor numba can read a wrapped function.
 install_import_hook(
     [
@@ -30,6 +33,14 @@ install_import_hook(
     ],
     "beartype.beartype",
 )
+
+# As the command line does; thousands of tests are a heap that each search for cycles would go through.
+keep_freed_memory()
+relax_garbage_collection()
+
+
+def pytest_collection_finish():
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
