@@ -1,6 +1,7 @@
 """What a sheet does that lies on a floor and is struck."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ def prepared_scene(material, on, size, speed=3.0, at=None):
     return replace(scene, surfaces=(replace(first, extras={"substance": material}), *others))
 
 
+@cache
 def prepared(material, on, size, speed=3.0, at=None):
     return co.prepare_scene(prepared_scene(material, on, size, speed, at))
 
