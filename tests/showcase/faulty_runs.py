@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from video_judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
 
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.simulation.simulation_result import SimulationResult

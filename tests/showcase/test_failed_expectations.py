@@ -1,13 +1,13 @@
 """Every expectation fails in the run that must fail it, and is met by the run as it should be.
 
 A scene is simulated once for all faults that are planted in its frames. Faults that are simulated
-themselves are tried in scenes of some seconds; `corporeal evaluate judge` makes all of them.
+themselves are tried in scenes of some seconds; `benchmarks/judge.py` makes all of them.
 """
 
 import pytest
 from faulty_runs import PLANTED, happened, spoiled
+from video_judge.simulated_controls import SIMULATED_CONTROLS
 
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS
 from corporeal.pipeline import run_pipeline
 from corporeal.showcase.scene_expectations import FAULTY_RUNS, SCENE_EXPECTATIONS, compare_with_expectations
 

@@ -6,10 +6,10 @@ from importlib.resources import files
 from typing import Any
 
 import pytest
+from video_judge.subquestions import Verdict
 
 import corporeal.vlm.answer_schemas
 from corporeal.description.query_scene import INTERVIEW_TASKS
-from corporeal.lab.evaluation.judge.subquestions import Verdict
 from corporeal.vlm import AnswerSchema
 from corporeal.vlm.prompt_files import read_prompt
 
@@ -80,7 +80,7 @@ def test_names_and_docstrings_do_not_count_and_fields_do():
 def test_every_prompt_states_a_version_of_its_own():
     found = [files("corporeal.description").joinpath("prompts", f"{task}.md") for task in INTERVIEW_TASKS]
     found += [files("corporeal.vlm").joinpath("prompts", f"{t}.md") for t in ("sizes", "things", "regions")]
-    found += [files("corporeal.lab.evaluation.judge").joinpath("video.md")]
+    found += [files("video_judge").joinpath("video.md")]
     prompts = [read_prompt(file) for file in found]
     assert len({prompt.version for prompt in prompts}) == len(prompts)
     assert not [prompt for prompt in prompts if "version:" in prompt.text]

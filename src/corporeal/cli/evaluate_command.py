@@ -1,4 +1,4 @@
-"""`corporeal evaluate mass | materials | parts | objects | dynamics | judge`."""
+"""`corporeal evaluate mass | materials | parts | objects | dynamics`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,15 +16,11 @@ from corporeal.lab.evaluation.result_table import ResultTable
 
 if TYPE_CHECKING:
     from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary
-    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
 
 Folder = Annotated[
     Path | None,
     tyro.conf.Positional,
     tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
-]
-Runs = Annotated[
-    Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER", help="Runs, as evaluate dynamics leaves them.")
 ]
 Target = Annotated[
     str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.')
@@ -32,7 +28,7 @@ Target = Annotated[
 
 
 def command_evaluate() -> None:
-    """Compare predictions with ground truth: mass, materials, parts, objects, dynamics, judge."""
+    """Compare predictions with ground truth: mass, materials, parts, objects, dynamics."""
     run_subcommand("evaluate", EVALUATIONS)
 
 
@@ -190,17 +186,13 @@ def evaluate_dynamics() -> None:
         corporeal evaluate dynamics corpus/ --against vomp:fields/ --json d.json
 
     TARGET is "showcase" or a corpus whose scenes are assembled. Each run is written to OUT/SCENE/METHOD in its own
-    process; repeat the command to resume. A failed run is a row. With --judge a vision-language model judges videos of
-    the runs, after a test with control videos; corporeal evaluate judge OUT does the same later.
+    process; repeat the command to resume. A failed run is a row.
     """
     from corporeal.jobs.executor import Executor
     from corporeal.lab.evaluation.dynamics import dynamics_tables
     from corporeal.lab.evaluation.dynamics.dynamics_evaluation import DynamicsConfig
     from corporeal.lab.evaluation.dynamics.dynamics_evaluation import evaluate_dynamics as evaluate
-    from corporeal.lab.evaluation.judge.judge_query import connect_judge
-    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
     from corporeal.pipeline.settings.settings import Settings
-    from corporeal.vlm import NO_MODEL
 
     @dataclass(frozen=True)
     class Dynamics:
@@ -216,22 +208,12 @@ def evaluate_dynamics() -> None:
         """Output file for the report; default OUT/report.html."""
         docs: Path | None = None
         """Also write the measured rows as a documentation page (Markdown)."""
-        judge: str = NO_MODEL
-        """Model that also judges videos of the runs, as --vlm: see evaluate judge. Writes OUT/judge.html and
-        judge.json; --record keeps the answers for replay.
-        """
-        looks: int = 1
-        """Number of looks at each video, each from another side: 1 to 3."""
-        yes: bool = False
-        """Allow a judge that costs more than 5 US$, or whose price is not known."""
         crew: WorkerOptions = field(default_factory=WorkerOptions)
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
     first = ("against", "reference", "detail", "out", "json", "figure")
     doc = evaluate_dynamics.__doc__
     asked = parse(Dynamics, "evaluate dynamics", doc, words=2, first=first)
-    how = JudgeConfig(asked.judge, asked.settings.describe.record, asked.looks, yes=asked.yes)
-    connect_judge(how)  # report a missing key before hours of simulation
     here = Path() if asked.target == "showcase" else Path(asked.target)
     out = asked.out or here / "dynamics"
     with progress_bars() as tell:
@@ -241,8 +223,6 @@ def evaluate_dynamics() -> None:
     for sentence in (*dynamics_tables.ranking_sentences(found), *dynamics_tables.missing_references(found)):
         console.print(sentence, markup=False, highlight=False)
     _write_dynamics(found, asked, out)
-    if asked.judge != NO_MODEL:  # pages and answers are written beside the runs
-        _judge(out, how, out / "judge.json", out / "judge.html")
 
 
 def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
@@ -263,44 +243,6 @@ def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
         dynamics_page.write_dynamics_docs(found, command, asked.docs)
 
 
-def evaluate_judge() -> None:
-    """Judge videos of runs with a vision-language model that is validated on control videos.
-
-    FOLDER holds runs SCENE/METHOD, written by evaluate dynamics. Controls are the run "ours" with one known fault each.
-    For a law of physics the judge counts only if its answers detect the controls of that law; else the tables say that
-    this judge cannot tell.
-    """
-    from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig
-
-    @dataclass(frozen=True)
-    class Judge:
-        folder: Runs = None
-        json: Path | None = None
-        """Output file for answers, intervals and marks (JSON)."""
-        page: Path | None = None
-        """Output file for a page with every video (HTML)."""
-        how: JudgeConfig = field(default_factory=JudgeConfig)
-
-    first = ("judge", "looks", "record", "yes", "json", "page")
-    asked = parse(Judge, "evaluate judge", evaluate_judge.__doc__, words=2, first=first)
-    _judge(_folder(asked.folder, "judge"), asked.how, asked.json, asked.page)
-
-
-def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) -> None:
-    """Judge the runs in OUT, print the result, and write it to the files asked for."""
-    from corporeal.lab.evaluation.judge import judge_page, judge_tables
-    from corporeal.lab.evaluation.judge.judge_runs import judge_runs
-
-    with progress_bars() as tell:
-        found = judge_runs(out, how, console.print, tell("judge"))
-    _show(judge_tables.judge_tables(found.judged, found.result))
-    if json is not None:
-        store.write_json(json, judge_tables.judge_record(found.judged, found.result))
-    if page is not None:
-        with progress_bars() as tell:
-            judge_page.write_judge_page(found.judged, found.result, page, tell("page"))
-
-
 def _show(tables: Sequence[ResultTable]) -> None:
     for table in tables:
         if table.rows:
@@ -313,5 +255,4 @@ EVALUATIONS = {
     "parts": evaluate_parts,
     "objects": evaluate_objects,
     "dynamics": evaluate_dynamics,
-    "judge": evaluate_judge,
 }

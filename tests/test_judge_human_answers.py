@@ -4,16 +4,15 @@ import json
 from pathlib import Path
 
 import pytest
-
-from corporeal.lab.evaluation.judge.detectability import (
+from video_judge.detectability import (
     measure_detectability,
     method_mark,
     trusted_questions,
     video_verdict,
 )
-from corporeal.lab.evaluation.judge.subquestions import Verdict, question_catalogue
+from video_judge.subquestions import Verdict, question_catalogue
 
-FOLDER = Path(__file__).parents[1] / "recordings" / "dynamics"
+FOLDER = Path(__file__).parent / "recordings" / "dynamics"
 KEY = {
     "steel-and-rubber": {
         "film-39a0fb778f90": "capped",

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal.lab.evaluation.judge.camera_staging import PICTURE_SIZE_PX, Staging
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion
 from corporeal.render import colours
 from corporeal.render.camera_placement import CameraAim, camera_axes
+from video_judge.camera_staging import PICTURE_SIZE_PX, Staging
+from video_judge.video_motion import VideoMotion
 
 DOT_INTERVAL_S = 0.05
 """Between two dots on a path [s]."""

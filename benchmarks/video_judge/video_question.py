@@ -11,13 +11,13 @@ from importlib.resources import files
 
 import numpy as np
 
-from corporeal.lab.evaluation.judge.camera_staging import CLOSE_UP_PICTURES, DATED_PICTURES, Staging
-from corporeal.lab.evaluation.judge.judge_pictures import PICTURES_PER_LOOK, judge_pictures, pictures_description
-from corporeal.lab.evaluation.judge.subquestions import question_catalogue
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion
 from corporeal.vlm import OnDemandPictures, Question
 from corporeal.vlm.prompt_files import Prompt, read_prompt
 from corporeal.vlm.token_prices import price_usd
+from video_judge.camera_staging import CLOSE_UP_PICTURES, DATED_PICTURES, Staging
+from video_judge.judge_pictures import PICTURES_PER_LOOK, judge_pictures, pictures_description
+from video_judge.subquestions import question_catalogue
+from video_judge.video_motion import VideoMotion
 
 DYNAMICS_TASK = "dynamics"
 DIGEST_TOLERANCE = 1e-3
@@ -86,7 +86,7 @@ def prompt_text(scene_text: str, places: list[int]) -> str:
 
 @cache
 def _template() -> Prompt:
-    return read_prompt(files("corporeal.lab.evaluation.judge").joinpath("video.md"))
+    return read_prompt(files("video_judge").joinpath("video.md"))
 
 
 @dataclass(frozen=True)

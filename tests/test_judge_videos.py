@@ -6,20 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.judge import judge_pictures, judge_scenes
-from corporeal.lab.evaluation.judge.camera_staging import LOOK_TURNS_DEG, PICTURE_SIZE_PX, close_up_shots, stage_scene
-from corporeal.lab.evaluation.judge.control_effect import (
+from video_judge import judge_pictures, judge_scenes
+from video_judge.camera_staging import LOOK_TURNS_DEG, PICTURE_SIZE_PX, close_up_shots, stage_scene
+from video_judge.control_effect import (
     MIN_VISIBLE_PATH,
     MIN_VISIBLE_SHAPE,
     MotionDifference,
     compare_motions,
 )
-from corporeal.lab.evaluation.judge.edited_controls import EDITED_CONTROLS, GAINED_DISTANCE_RATIO, edit_motion
-from corporeal.lab.evaluation.judge.judge_pictures import PICTURES_PER_LOOK
-from corporeal.lab.evaluation.judge.judge_query import check_judging, query_judge
-from corporeal.lab.evaluation.judge.judge_scenes import (
+from video_judge.edited_controls import EDITED_CONTROLS, GAINED_DISTANCE_RATIO, edit_motion
+from video_judge.judge_pictures import PICTURES_PER_LOOK
+from video_judge.judge_query import check_judging, query_judge
+from video_judge.judge_scenes import (
     CONTROL_NAMES,
     REFERENCE_METHOD,
     JudgeConfig,
@@ -27,12 +25,14 @@ from corporeal.lab.evaluation.judge.judge_scenes import (
     audit_breach,
     gather_videos,
 )
-from corporeal.lab.evaluation.judge.judge_tables import CANNOT_TELL_TEXT, judge_record, judge_tables, weigh_judge
-from corporeal.lab.evaluation.judge.prompt_context import scene_facts
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS, exchange_materials
-from corporeal.lab.evaluation.judge.subquestions import question_catalogue
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion, motion_of_run
-from corporeal.lab.evaluation.judge.video_question import VideoQuestion, motion_digest, video_question
+from video_judge.judge_tables import CANNOT_TELL_TEXT, judge_record, judge_tables, weigh_judge
+from video_judge.prompt_context import scene_facts
+from video_judge.simulated_controls import SIMULATED_CONTROLS, exchange_materials
+from video_judge.subquestions import question_catalogue
+from video_judge.video_motion import VideoMotion, motion_of_run
+from video_judge.video_question import VideoQuestion, motion_digest, video_question
+
+from corporeal.core.errors import UserError
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.pipeline.stages.assemble import AssembleConfig

@@ -3,20 +3,21 @@
 from dataclasses import replace
 from functools import partial
 
+import judge
 import numpy as np
 import pytest
+from video_judge.detectability import VideoVerdict
+from video_judge.judge_page import PICTURES_PER_VIDEO, blind_spots_sentence, write_judge_page
+from video_judge.judge_pictures import SequentialPictures
+from video_judge.judge_query import JudgeVerdicts, distinct_questions
+from video_judge.judge_runs import judged_scenes_in
+from video_judge.judge_scenes import FailedVideo, JudgedVideos
+from video_judge.judge_tables import weigh_judge
+from video_judge.subquestions import question_catalogue
+from video_judge.video_question import JudgingCost, VideoQuestion
 
 from corporeal.core.errors import UserError
 from corporeal.lab.evaluation.dynamics.compared_methods import reference_folder, run_folder
-from corporeal.lab.evaluation.judge.detectability import VideoVerdict
-from corporeal.lab.evaluation.judge.judge_page import PICTURES_PER_VIDEO, blind_spots_sentence, write_judge_page
-from corporeal.lab.evaluation.judge.judge_pictures import SequentialPictures
-from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts, distinct_questions
-from corporeal.lab.evaluation.judge.judge_runs import judged_scenes_in
-from corporeal.lab.evaluation.judge.judge_scenes import FailedVideo, JudgedVideos
-from corporeal.lab.evaluation.judge.judge_tables import weigh_judge
-from corporeal.lab.evaluation.judge.subquestions import question_catalogue
-from corporeal.lab.evaluation.judge.video_question import JudgingCost, VideoQuestion
 from corporeal.pipeline.run_pipeline import RUN_FILE
 from corporeal.vlm import OnDemandPictures, Question
 
@@ -101,3 +102,8 @@ def test_a_folder_without_runs_is_an_error(tmp_path):
         judged_scenes_in(tmp_path)
     with pytest.raises(UserError, match="evaluate dynamics"):
         judged_scenes_in(tmp_path / "absent")
+
+
+def test_a_folder_without_runs_is_told_where_they_come_from(tmp_path):
+    with pytest.raises(UserError, match=r"holds no runs to judge.*evaluate dynamics"):
+        judge.main([str(tmp_path), "--judge", "ask:answers"])

@@ -8,19 +8,19 @@ import numpy as np
 from jaxtyping import UInt8
 
 from corporeal.core.process_resources import usable_cores
-from corporeal.lab.evaluation.judge.camera_staging import (
+from corporeal.render import video_overlay
+from corporeal.render.camera_placement import CameraAim
+from corporeal.render.embree import render_image
+from corporeal.render.ray_scene import RayScene, StudioLight
+from video_judge.camera_staging import (
     CLOSE_UP_PICTURES,
     DATED_PICTURES,
     LOOK_TURNS_DEG,
     PICTURE_SIZE_PX,
     Staging,
 )
-from corporeal.lab.evaluation.judge.path_diagram import path_diagram
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion
-from corporeal.render import video_overlay
-from corporeal.render.camera_placement import CameraAim
-from corporeal.render.embree import render_image
-from corporeal.render.ray_scene import RayScene, StudioLight
+from video_judge.path_diagram import path_diagram
+from video_judge.video_motion import VideoMotion
 
 PICTURES_PER_LOOK = DATED_PICTURES + CLOSE_UP_PICTURES + 1
 

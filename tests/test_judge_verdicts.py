@@ -4,8 +4,7 @@ import random
 from fractions import Fraction
 
 import pytest
-
-from corporeal.lab.evaluation.judge.detectability import (
+from video_judge.detectability import (
     bootstrap_interval,
     jeffreys_interval,
     measure_detectability,
@@ -13,7 +12,7 @@ from corporeal.lab.evaluation.judge.detectability import (
     trusted_questions,
     video_verdict,
 )
-from corporeal.lab.evaluation.judge.subquestions import Verdict, question_catalogue
+from video_judge.subquestions import Verdict, question_catalogue
 
 OURS = "ours"
 FAULT = {c.id: c.questions[0] for c in question_catalogue().control}

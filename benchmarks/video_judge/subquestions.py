@@ -58,7 +58,7 @@ class QuestionCatalogue:
 @cache
 def question_catalogue() -> QuestionCatalogue:
     """Read questions and controls."""
-    file = files("corporeal.lab.evaluation.judge").joinpath("questions.toml")
+    file = files("video_judge").joinpath("questions.toml")
     return from_plain(QuestionCatalogue, tomllib.loads(file.read_text(encoding="utf-8")))
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.core.types import Frame
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion, nearest_frame, object_diagonals
 from corporeal.render.camera_track import FirstContact, first_contact
 from corporeal.simulation.simulation_result import SimulationResult
+from video_judge.video_motion import VideoMotion, nearest_frame, object_diagonals
 
 SLOW_MOTION_RATIO = 4.0
 """How many times slower the control "slow" runs."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion, object_diagonals
+from video_judge.video_motion import VideoMotion, object_diagonals
 
 MIN_YARDSTICK_RATIO = 2.0
 """A control must differ by more than so many times what a finer run does."""

@@ -5,7 +5,8 @@ from dataclasses import asdict, dataclass
 from statistics import fmean
 from typing import Any
 
-from corporeal.lab.evaluation.judge.detectability import (
+from corporeal.lab.evaluation.result_table import ResultTable
+from video_judge.detectability import (
     WHOLE_MARK,
     ConfidenceInterval,
     Detectability,
@@ -15,10 +16,9 @@ from corporeal.lab.evaluation.judge.detectability import (
     method_mark,
     trusted_questions,
 )
-from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts
-from corporeal.lab.evaluation.judge.judge_scenes import CONTROL_NAMES, REFERENCE_METHOD, control_name
-from corporeal.lab.evaluation.judge.subquestions import question_catalogue
-from corporeal.lab.evaluation.result_table import ResultTable
+from video_judge.judge_query import JudgeVerdicts
+from video_judge.judge_scenes import CONTROL_NAMES, REFERENCE_METHOD, control_name
+from video_judge.subquestions import question_catalogue
 
 CANNOT_TELL_TEXT = "this judge cannot tell"
 

@@ -9,18 +9,6 @@ import numpy as np
 from corporeal.core.audit_data import Audit
 from corporeal.core.errors import UserError, check_range
 from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME
-from corporeal.lab.evaluation.judge.camera_staging import LOOK_TURNS_DEG, Staging, stage_scene
-from corporeal.lab.evaluation.judge.control_effect import (
-    COMPARED_AFTER_CONTACT_S,
-    NO_DIFFERENCE,
-    MotionDifference,
-    compare_motions,
-)
-from corporeal.lab.evaluation.judge.edited_controls import EDITED_CONTROLS, edit_motion
-from corporeal.lab.evaluation.judge.prompt_context import scene_facts
-from corporeal.lab.evaluation.judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
-from corporeal.lab.evaluation.judge.video_motion import VideoMotion, motion_of_run
-from corporeal.lab.evaluation.judge.video_question import VideoQuestion, video_question
 from corporeal.materials import find_material_or_default
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import STAGE_FOLDERS
@@ -28,6 +16,18 @@ from corporeal.simulation.audit_file import read_audit
 from corporeal.simulation.audit_messages import ALLOWED_BREACHES, passage_message
 from corporeal.simulation.simulation_result import SimulationResult
 from corporeal.vlm import NO_MODEL
+from video_judge.camera_staging import LOOK_TURNS_DEG, Staging, stage_scene
+from video_judge.control_effect import (
+    COMPARED_AFTER_CONTACT_S,
+    NO_DIFFERENCE,
+    MotionDifference,
+    compare_motions,
+)
+from video_judge.edited_controls import EDITED_CONTROLS, edit_motion
+from video_judge.prompt_context import scene_facts
+from video_judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
+from video_judge.video_motion import VideoMotion, motion_of_run
+from video_judge.video_question import VideoQuestion, video_question
 
 Progress = Callable[[float, str], None]
 REFERENCE_METHOD = OURS_NAME

@@ -12,7 +12,7 @@ from statistics import fmean
 import numpy as np
 from scipy.stats import beta
 
-from corporeal.lab.evaluation.judge.subquestions import MAX_MARK, QuestionCatalogue, Verdict, question_catalogue
+from video_judge.subquestions import MAX_MARK, QuestionCatalogue, Verdict, question_catalogue
 
 INTERVAL_LEVEL = 0.90
 """Of intervals [-]."""

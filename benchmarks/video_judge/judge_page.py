@@ -8,12 +8,12 @@ import numpy as np
 from PIL import Image
 
 from corporeal.core.store import write_bytes
-from corporeal.lab.evaluation.judge.camera_staging import DATED_PICTURES
-from corporeal.lab.evaluation.judge.detectability import VideoVerdict
-from corporeal.lab.evaluation.judge.judge_query import JudgeVerdicts
-from corporeal.lab.evaluation.judge.judge_tables import JudgeResult, judge_tables
 from corporeal.lab.evaluation.result_table import ResultTable
 from corporeal.render.html_page import data_url, escape_html, fill_page, html_figure
+from video_judge.camera_staging import DATED_PICTURES
+from video_judge.detectability import VideoVerdict
+from video_judge.judge_query import JudgeVerdicts
+from video_judge.judge_tables import JudgeResult, judge_tables
 
 Progress = Callable[[float, str], None]
 PICTURES_PER_VIDEO = 6
@@ -50,7 +50,7 @@ def write_judge_page(
             strips[motion] = _strip(question.pictures)
         videos.append(_video_section(verdict, strips[motion], trusted))
     text = fill_page(
-        "corporeal.lab.evaluation.judge",
+        "video_judge",
         "judge.html",
         summary=escape_html(_summary(judged)),
         cannot=escape_html(blind_spots_sentence(result)),

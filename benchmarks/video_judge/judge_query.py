@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.judge.detectability import VideoVerdict, video_verdict
-from corporeal.lab.evaluation.judge.judge_scenes import JudgeConfig, JudgedVideos, check_judging
-from corporeal.lab.evaluation.judge.subquestions import Verdict
-from corporeal.lab.evaluation.judge.video_question import JudgingCost, VideoQuestion, estimate_cost
 from corporeal.vlm import LIVE_CLIENTS, Reply, UnansweredError, VlmClient, connect_vlm
 from corporeal.vlm.human_client import PendingQuestionsError, refuse_pending
 from corporeal.vlm.thread_map import thread_map
+from video_judge.detectability import VideoVerdict, video_verdict
+from video_judge.judge_scenes import JudgeConfig, JudgedVideos, check_judging
+from video_judge.subquestions import Verdict
+from video_judge.video_question import JudgingCost, VideoQuestion, estimate_cost
 
 Progress = Callable[[float, str], None]
 CONFIRM_ABOVE_USD = 5.0
