@@ -19,17 +19,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from corporeal.core.deserialize import from_plain
-from corporeal.core.store import read_json, write_json
-from corporeal.core.types import FeatureCloud
-from corporeal.lab.evaluation.objects_evaluation import (
+from segmentation.objects_evaluation import (
     ObjectsEvaluationConfig,
     ObjectsResult,
     ObjectsRow,
     evaluate_objects,
 )
-from corporeal.lab.evaluation.objects_figure import draw_objects
+from segmentation.objects_figure import draw_objects
+
+from corporeal.core.deserialize import from_plain
+from corporeal.core.store import read_json, write_json
+from corporeal.core.types import FeatureCloud
 from corporeal.reconstruction.segment.object_segmentation import segment_objects
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -207,7 +207,7 @@ until they touch. Points lie on the surface seen in 24 pictures of 256², colour
 pictures, and features are the [descriptor](../how-to/use-image-features.md), which needs no
 weights. Numbers are the mean IoU of objects after Hungarian matching. "Ours" is given the number of
 objects; "not counted" estimates it (in brackets). Masks are exact, numbered anew in each view.
-`corporeal evaluate objects SCENES` does the same for any settled scenes.
+`python benchmarks/objects_of_scenes.py SCENES` does the same for any settled scenes.
 
 {surface}
 
@@ -233,10 +233,10 @@ together):
   cushions. **Cat on table** is borderline: the cat nearly covers the table's width. **Duck on
   armchair** fails: cushions differ more from the frame than from the duck. Instance masks resolve
   all three; two of them warn.
-- **Pairs that warn are not reproducible.** With 19,000 to 22,000 points (`corporeal evaluate
-  objects SCENES --surface-points N`) three packets are separated with .39 to .99, cat on table with
-  .33 to .51, duck on armchair with .34 to .48. Ball on box, which does not warn, keeps .98 to .99,
-  but is counted as 2 to 4 objects where their number is not given.
+- **Pairs that warn are not reproducible.** With 19,000 to 22,000 points (`python
+  benchmarks/objects_of_scenes.py SCENES --surface-points N`) three packets are separated with .39
+  to .99, cat on table with .33 to .51, duck on armchair with .34 to .48. Ball on box, which does
+  not warn, keeps .98 to .99, but is counted as 2 to 4 objects where their number is not given.
 - **Normals** matter. Without them they are estimated from the points and oriented upwards at the
   highest point, which is much worse for some pairs (bottle beside box, cat on table).
 - **No number here comes from learned features.** CLIP features separate by what objects are; how

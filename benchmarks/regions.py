@@ -52,8 +52,9 @@ def scene(points: int, channels: int):
 
 def once(points: int, channels: int) -> None:
     """Take one cloud apart, in this process, and print what it took."""
+    from segmentation.segmentation_scores import named_iou
+
     from corporeal.core.types import ObjectDescription, PartDescription
-    from corporeal.lab.evaluation.segmentation_scores import named_iou
     from corporeal.reconstruction.segment.part_naming import name_parts
 
     thing = ObjectDescription("boxes", "boxes", tuple(PartDescription(f"box {k}", None) for k in range(PARTS)))

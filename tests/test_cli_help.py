@@ -62,7 +62,7 @@ def headings(said):
 def test_no_verb_shows_more_than_six_options_before_the_others(command, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
     seen = dict(verbs_of(command))
-    assert ("evaluate", "parts") in seen and ("corpus", "run") in seen and ("video",) in seen
+    assert ("evaluate", "materials") in seen and ("corpus", "run") in seen and ("video",) in seen
     for words, said in seen.items():
         found = headings(said)
         before = [flag for flag, heading in found.items() if not heading.startswith("more")]
@@ -130,14 +130,14 @@ def test_an_unknown_second_word_shows_the_menu(command):
     code, said = command("evaluate", "weight", "scans/")
     assert code == 2
     assert "Unknown word after evaluate 'weight'" in said.err
-    assert "Choose one of: dynamics, mass, materials, objects, parts." in said.err
+    assert "Choose one of: dynamics, mass, materials." in said.err
 
 
 def test_the_second_words_stand_in_a_column_of_their_own(command):
     _, said = command("evaluate", "--help")
     rows = [line for line in said.out.splitlines() if line.startswith("  corporeal evaluate ")]
     starts = {re.match(r"  corporeal evaluate (\w+ +)", row).end() for row in rows}
-    assert len(rows) == 5 and len(starts) == 1
+    assert len(rows) == 3 and len(starts) == 1
 
 
 def test_a_judge_asks_for_a_folder_of_runs_and_not_of_models(command):
@@ -153,7 +153,7 @@ def test_a_judge_without_runs_is_reported_where_they_come_from(command, tmp_path
 
 
 def test_an_option_of_another_sub_command_is_refused(command):
-    code, said = command("evaluate", "objects", "scenes/", "--anonymous")
+    code, said = command("evaluate", "materials", "scenes/", "--anonymous")
     assert code == 2
     assert "--anonymous" in said.err
 

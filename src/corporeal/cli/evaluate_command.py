@@ -1,4 +1,4 @@
-"""`corporeal evaluate mass | materials | parts | objects | dynamics`."""
+"""`corporeal evaluate mass | materials | dynamics`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Folder = Annotated[
     Path | None,
     tyro.conf.Positional,
-    tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
+    tyro.conf.arg(metavar="FOLDER", help="Models, one object each."),
 ]
 Target = Annotated[
     str, tyro.conf.Positional, tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.')
@@ -28,7 +28,7 @@ Target = Annotated[
 
 
 def command_evaluate() -> None:
-    """Compare predictions with ground truth: mass, materials, parts, objects, dynamics."""
+    """Compare predictions with ground truth: mass, materials, dynamics."""
     run_subcommand("evaluate", EVALUATIONS)
 
 
@@ -111,74 +111,6 @@ def evaluate_materials() -> None:
         store.write_json(asked.json, material_evaluation.recognition_record(rows))
 
 
-def evaluate_parts() -> None:
-    """Compare the parts found in pictures of models with the files' own nodes and materials.
-
-    Each model is rendered from all sides and segmented in the visible points; default: four models of the showcase.
-    --structural dinov2 --semantic clip selects learned features.
-    """
-    from corporeal.description.describe_config import DescribeConfig
-    from corporeal.lab.evaluation import parts_evaluation, parts_figure
-    from corporeal.reconstruction.segment.part_clusters import PartsConfig
-
-    @dataclass(frozen=True)
-    class PartsAsked:
-        folder: Folder = None
-        names: Path | None = None
-        """TOML with descriptions of parts: per file, the file's name of a part = another name."""
-        json: Path | None = None
-        """Output file for rows and errors (JSON)."""
-        figure: Path | None = None
-        """Output file for a picture of the parts (PNG)."""
-        look: parts_evaluation.PartsEvaluationConfig = field(default_factory=parts_evaluation.PartsEvaluationConfig)
-        clusters: PartsConfig = field(default_factory=PartsConfig)
-        describe: DescribeConfig = field(default_factory=DescribeConfig)
-
-    first = ("structural", "semantic", "names", "lying", "json", "figure")
-    asked = parse(PartsAsked, "evaluate parts", evaluate_parts.__doc__, words=2, first=first)
-    names = {} if asked.names is None else parts_evaluation.read_names(asked.names)
-    with progress_bars() as tell:
-        how = parts_evaluation.PartsMethod(asked.look, asked.clusters, asked.describe)
-        found = parts_evaluation.evaluate_parts(asked.folder, names, how, tell("evaluate"))
-    rows = [judged.row for judged in found]
-    _show(parts_evaluation.parts_tables(rows))
-    if asked.json is not None:
-        store.write_json(asked.json, parts_evaluation.parts_record(rows))
-    if asked.figure is not None:
-        parts_figure.draw_parts(found, asked.figure)
-
-
-def evaluate_objects() -> None:
-    """Compare the objects segmented in pictures of settled scenes with the scenes' own.
-
-    FOLDER holds scenes that `assemble` wrote. Objects are segmented in points on the visible surfaces, or in Gaussians:
-    --points-from gaussians.
-    """
-    from corporeal.lab.evaluation import objects_evaluation, objects_figure
-
-    @dataclass(frozen=True)
-    class Objects:
-        folder: Folder = None
-        json: Path | None = None
-        """Output file for rows and errors (JSON)."""
-        figure: Path | None = None
-        """Output file for a picture of the objects (PNG)."""
-        scenes: objects_evaluation.ObjectsEvaluationConfig = field(
-            default_factory=objects_evaluation.ObjectsEvaluationConfig
-        )
-
-    first = ("points-from", "surface-points", "pictures", "kept", "json", "figure")
-    asked = parse(Objects, "evaluate objects", evaluate_objects.__doc__, words=2, first=first)
-    with progress_bars() as tell:
-        found = objects_evaluation.evaluate_objects(_folder(asked.folder, "objects"), asked.scenes, tell("evaluate"))
-    rows = [judged.row for judged in found]
-    _show(objects_evaluation.objects_tables(rows))
-    if asked.json is not None:
-        store.write_json(asked.json, objects_evaluation.objects_record(rows))
-    if asked.figure is not None:
-        objects_figure.draw_objects(found, asked.figure)
-
-
 def evaluate_dynamics() -> None:
     """Compare trajectories with baselines, with a finer run, and with measured rebounds.
 
@@ -252,7 +184,5 @@ def _show(tables: Sequence[ResultTable]) -> None:
 EVALUATIONS = {
     "mass": evaluate_mass,
     "materials": evaluate_materials,
-    "parts": evaluate_parts,
-    "objects": evaluate_objects,
     "dynamics": evaluate_dynamics,
 }

@@ -7,13 +7,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 
 from corporeal import materials
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.io.input_files import model_files_in
 from corporeal.lab.evaluation.result_table import ResultTable
-from corporeal.lab.evaluation.segmentation_scores import roc_area
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.describe import describe
 
@@ -178,3 +178,15 @@ def recognition_record(rows: Sequence[RecognitionRow]) -> dict:
     """Return rows and scores as plain data."""
     verdicts = [asdict(r) | {"verdict": r.verdict} for r in rows]
     return {"rows": verdicts, "scores": asdict(recognition_score(rows))}
+
+
+def roc_area(right: Float[np.ndarray, " R"], wrong: Float[np.ndarray, " W"]) -> float | None:
+    """Return how often what is right is surer than what is wrong (area under the ROC curve).
+
+    Ties count half; 0.5 is chance, None where there is only one kind.
+    """
+    if not (len(right) and len(wrong)):
+        return None
+    ordered = np.sort(wrong)
+    below = np.searchsorted(ordered, right, "left") + np.searchsorted(ordered, right, "right")
+    return float(below.mean() / (2 * len(wrong)))

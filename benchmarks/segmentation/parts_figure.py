@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from corporeal.lab.evaluation.figure_files import save_point_figure
-from corporeal.lab.evaluation.parts_evaluation import PartsResult
+from segmentation.parts_evaluation import PartsResult
+from segmentation.point_figures import save_point_figure
 
 VIEW_DIRECTION = (0.75, -0.55, 0.38)
 """Direction from the object to who looks at it."""

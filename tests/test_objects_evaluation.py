@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 from PIL import Image
+from segmentation import objects_evaluation, objects_figure
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.lab.evaluation import objects_evaluation, objects_figure
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 FACES = np.array([int(digit) for digit in "013032467475045051237276026064157173"]).reshape(-1, 3)

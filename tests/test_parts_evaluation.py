@@ -1,4 +1,4 @@
-"""`corporeal evaluate parts`: photographed models, any names, with and without models that look."""
+"""Parts of models: photographed models, any names, with and without models that look."""
 
 import importlib.util
 import json
@@ -7,13 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import parts_of_models
 import pytest
-
-from corporeal import cli
-from corporeal.core.errors import BadFileError, UserError
-from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.io.gltf.glb_writer import write_glb
-from corporeal.lab.evaluation.parts_evaluation import (
+from segmentation.parts_evaluation import (
     SHOWCASE_MODELS,
     PartsEvaluationConfig,
     PartsMethod,
@@ -22,11 +18,16 @@ from corporeal.lab.evaluation.parts_evaluation import (
     parts_tables,
     read_names,
 )
-from corporeal.lab.evaluation.segmentation_scores import iou_matrix, majority_names, matched_iou, named_iou, roc_area
+from segmentation.segmentation_scores import iou_matrix, majority_names, matched_iou, named_iou
+
+from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.types import Finish, Scene, SceneObject, Surface
+from corporeal.io.gltf.glb_writer import write_glb
+from corporeal.lab.evaluation.material_evaluation import roc_area
 from corporeal.showcase.showcase_scenes import build_single_prop_scene
 from glb_maker import CUBE, CUBE_TRIANGLES
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 FEW = ["--points", "2500", "--photographs", "6", "--photograph-size", "64"]
 CHEAP = PartsMethod(PartsEvaluationConfig(points=2500, photographs=6, photograph_size=64))
 
@@ -87,16 +88,14 @@ def test_the_roc_area_counts_pairs_and_halves_ties():
     assert roc_area(np.array([0.5]), np.zeros(0)) is None
 
 
-def test_a_person_types_it_and_gets_a_table_data_and_a_picture(folder, monkeypatch, capsys):
+def test_a_person_types_it_and_gets_a_table_data_and_a_picture(folder, capsys):
     names = folder / "names.toml"
     names.write_text("[boxes]\nbase = 'wooden base'\ntop = 'green top'\n")
     out, picture = folder / "out.json", folder / "out.png"
     where = ["--names", str(names), "--json", str(out), "--figure", str(picture)]
-    monkeypatch.setattr(sys, "argv", ["corporeal", "evaluate", "parts", str(folder), *FEW, *where])
-    with pytest.raises(SystemExit) as ended:
-        cli.main()
+    parts_of_models.main([str(folder), *FEW, *where])
     shown = capsys.readouterr().out
-    assert ended.value.code in (0, None) and "boxes" in shown and "steel_ball" not in shown
+    assert "boxes" in shown and "steel_ball" not in shown
     (row,) = json.loads(out.read_text())["rows"]
     assert row["parts"] == ["wooden base", "green top"]
     assert picture.stat().st_size > 10_000
@@ -181,7 +180,7 @@ def test_models_that_look_are_asked_for_pixels_and_words(folder, tmp_path):
     """Random weights: what is shown is that everything fits together."""
     if not all(importlib.util.find_spec(name) for name in ("torch", "transformers")):
         pytest.skip("torch or transformers not installed: pip install 'corporeal[learned]'")
-    sys.path.insert(0, str(ROOT / "tests" / "features"))
+    sys.path.insert(0, str(ROOT / "tests" / "reconstruction" / "features"))
     from tiny_models import save_clip, save_dinov2
 
     clip, dinov2 = save_clip(tmp_path / "clip"), save_dinov2(tmp_path / "dinov2")

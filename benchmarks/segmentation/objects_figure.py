@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from corporeal.lab.evaluation.figure_files import save_point_figure
-from corporeal.lab.evaluation.objects_evaluation import ObjectsResult
-from corporeal.lab.evaluation.parts_figure import number_colours, project_points
-from corporeal.lab.evaluation.segmentation_scores import iou_matrix
 from corporeal.reconstruction.segment.optimal_assignment import optimal_assignment
+from segmentation.objects_evaluation import ObjectsResult
+from segmentation.parts_figure import number_colours, project_points
+from segmentation.point_figures import save_point_figure
+from segmentation.segmentation_scores import iou_matrix
 
 COLUMN_TITLES = ("points of photographs", "identity", "superpoints", "components")
 

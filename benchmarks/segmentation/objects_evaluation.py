@@ -27,7 +27,6 @@ from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.io.splat.load_splat import load_splat
 from corporeal.io.splat.splat_ply import write_splat_ply
 from corporeal.lab.evaluation.result_table import ResultTable
-from corporeal.lab.evaluation.segmentation_scores import matched_iou
 from corporeal.multiview.point_cloud_geometry import nearest_neighbours, point_normals
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
@@ -50,6 +49,7 @@ from corporeal.reconstruction.segment.object_segmentation import (
     segment_objects,
 )
 from corporeal.reconstruction.surface.free_space import pieces_by_free_space
+from segmentation.segmentation_scores import matched_iou
 
 Progress = Callable[[float, str], None]
 TOUCHING_EXTENT_RATIO = 0.002

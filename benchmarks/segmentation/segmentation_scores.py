@@ -43,15 +43,3 @@ def majority_names(truth: Int[np.ndarray, " N"], found: Int[np.ndarray, " N"]) -
     both = np.zeros((int(found.max()) + 1, int(truth.max()) + 1))
     np.add.at(both, (found, truth), 1)
     return both.argmax(axis=1)[found]
-
-
-def roc_area(right: Float[np.ndarray, " R"], wrong: Float[np.ndarray, " W"]) -> float | None:
-    """Return how often what is right is surer than what is wrong (area under the ROC curve).
-
-    Ties count half; 0.5 is chance, None where there is only one kind.
-    """
-    if not (len(right) and len(wrong)):
-        return None
-    ordered = np.sort(wrong)
-    below = np.searchsorted(ordered, right, "left") + np.searchsorted(ordered, right, "right")
-    return float(below.mean() / (2 * len(wrong)))

@@ -21,8 +21,8 @@ from corporeal.geometry.mesh import join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.scene_transforms import move_scene, surfaces_bounding_box
 from corporeal.io.input_files import model_files_in
+from corporeal.lab.evaluation.material_evaluation import roc_area
 from corporeal.lab.evaluation.result_table import ResultTable
-from corporeal.lab.evaluation.segmentation_scores import majority_names, matched_iou, named_iou, roc_area
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import CaptureConfig, capture
 from corporeal.pipeline.stages.describe import describe
@@ -33,6 +33,7 @@ from corporeal.reconstruction.features.point_descriptor import mean_view_directi
 from corporeal.reconstruction.segment.part_clusters import PartsConfig, cluster_parts
 from corporeal.reconstruction.segment.part_naming import name_clusters, part_phrases
 from corporeal.showcase.showcase_scenes import build_single_prop_scene
+from segmentation.segmentation_scores import majority_names, matched_iou, named_iou
 
 SHOWCASE_MODELS = ("potted_ficus", "armchair", "floor_lamp", "couch")
 NAMES_FILE_ADVICE = "Write [file] with part = 'its everyday name', as in pot = 'clay pot'."
