@@ -35,7 +35,7 @@ from corporeal.discretization.part_model import PartModel
 from corporeal.materials import find_material
 from corporeal.pipeline.in_memory import load_scene
 from corporeal.pipeline.mass_posterior import ground_with_mass_posterior
-from corporeal.pipeline.settings.ground_config import GroundConfig
+from corporeal.pipeline.settings import GroundConfig
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.fill import part_models
 from corporeal.pipeline.stages.segment import segment

@@ -27,7 +27,7 @@ from recognition.shapes import shape
 from corporeal.discretization.object_masses import warn_of_thick_walls
 from corporeal.geometry.scene_transforms import scale_to_life_size
 from corporeal.pipeline.mass_posterior import MassSampler, sample_masses
-from corporeal.pipeline.settings.ground_config import GroundConfig
+from corporeal.pipeline.settings import GroundConfig
 
 FOLDER = Path(__file__).parent / "recognition"
 LIST, SECOND = FOLDER / "published.toml", FOLDER / "published_second.toml"

@@ -13,6 +13,8 @@ import pytest
 from corporeal.core import store, types
 from corporeal.core.errors import UserError
 from corporeal.core.types import (
+    KIND_OF,
+    STORED_KINDS,
     Finish,
     Hypothesis,
     Law,
@@ -24,7 +26,6 @@ from corporeal.core.types import (
     Structure,
     Surface,
 )
-from corporeal.core.types.stored_kinds import KIND_OF, STORED_KINDS
 
 
 def a_scene():

@@ -13,7 +13,7 @@ from corporeal.fields.field_registration import axis_turns, register_points
 from corporeal.fields.field_specification import parse_field_specification, read_vomp
 from corporeal.fields.impose_field import impose_field, nearest_samples, sum_up_per_part
 from corporeal.fields.sampled_field import check_field
-from corporeal.pipeline.settings.ground_config import GroundConfig, validate
+from corporeal.pipeline.settings import GroundConfig, validate_ground
 from corporeal.pipeline.stages.ground import ground, grounding_warnings
 from fields import synthetic_fields
 
@@ -169,7 +169,7 @@ def test_ground_asks_for_the_field_that_the_command_line_names(tmp_path):
     it = thing("armchair")
     path = written(tmp_path, "vomp", "armchair")
     config = GroundConfig(field=f"vomp:{path}")
-    validate(config)
+    validate_ground(config)
     field = ground(it.scene, it.parts, it.inventory, config)
     assert field.notes and not ours("armchair").notes
 
@@ -190,7 +190,7 @@ def test_ground_asks_for_the_field_that_the_command_line_names(tmp_path):
 )
 def test_a_specification_that_means_nothing_is_refused(spec, words):
     with pytest.raises(UserError, match=re.escape(words)):
-        validate(GroundConfig(field=spec))
+        validate_ground(GroundConfig(field=spec))
 
 
 def test_an_empty_folder_is_refused(tmp_path):

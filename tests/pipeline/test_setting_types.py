@@ -8,8 +8,7 @@ from corporeal.core.setting_types import ReadsPath, WritesPath, paths_read
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.fields.field_specification import FIELD_READERS
 from corporeal.materials.library_entry import SHIPPED_LIBRARY_FILES
-from corporeal.pipeline.settings.ground_config import FIELD_FILES, SHIPPED_LIBRARIES, GroundConfig
-from corporeal.pipeline.settings.settings import Settings
+from corporeal.pipeline.settings import FIELD_FILES, SHIPPED_LIBRARIES, GroundConfig, Settings
 from corporeal.pipeline.stages.compose import ComposeConfig
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 

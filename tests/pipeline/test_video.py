@@ -27,7 +27,7 @@ from corporeal.core.types import (
     Surface,
     Trajectory,
 )
-from corporeal.pipeline.settings.video_config import VideoConfig, validate
+from corporeal.pipeline.settings import VideoConfig, validate_video
 from corporeal.pipeline.stages.video import _box, _reach_ratio, render_video
 from corporeal.render import video_file
 from corporeal.render.video_raycaster import VideoRaycaster
@@ -220,7 +220,7 @@ def test_the_time_is_written_into_the_picture_where_it_is_asked_for(tmp_path):
 
 def test_slowness_that_makes_no_sense_is_refused(tmp_path):
     with pytest.raises(UserError, match="--slow"):
-        validate(replace(SMALL, slow=0.5))
+        validate_video(replace(SMALL, slow=0.5))
 
 
 def test_a_camera_goes_by_where_most_of_an_object_is_and_sees_all_of_what_keeps_its_shape():

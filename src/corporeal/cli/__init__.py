@@ -61,7 +61,7 @@ def command_run() -> None:
     pictures.
     Results that are up to date are reused.
     """
-    from corporeal.pipeline.settings.settings import Settings
+    from corporeal.pipeline.settings import Settings
 
     @dataclass(frozen=True)
     class Run:
@@ -80,7 +80,7 @@ def command_demo() -> None:
     The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a GLB, and then run like
     any other.
     """
-    from corporeal.pipeline.settings.settings import Settings
+    from corporeal.pipeline.settings import Settings
     from corporeal.showcase.showcase_scenes import SHOWCASE_SCENE_BUILDERS, view_direction
 
     first = next(iter(SHOWCASE_SCENE_BUILDERS))

@@ -96,7 +96,7 @@ def _run() -> None:
     finished scenes are skipped, and an interrupted simulation continues from its checkpoint.
     """
     from corporeal.lab.corpus.run_corpus import RunConfig, run_corpus
-    from corporeal.pipeline.settings.settings import Settings
+    from corporeal.pipeline.settings import Settings
 
     @dataclass(frozen=True)
     class Run:

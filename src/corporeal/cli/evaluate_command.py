@@ -124,7 +124,7 @@ def evaluate_dynamics() -> None:
     from corporeal.lab.evaluation.dynamics import dynamics_tables
     from corporeal.lab.evaluation.dynamics.dynamics_evaluation import DynamicsConfig
     from corporeal.lab.evaluation.dynamics.dynamics_evaluation import evaluate_dynamics as evaluate
-    from corporeal.pipeline.settings.settings import Settings
+    from corporeal.pipeline.settings import Settings
 
     @dataclass(frozen=True)
     class Dynamics:

@@ -6,12 +6,12 @@ from corporeal.description import describe_config
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline.run_pipeline import RUN_FILE, Settings, read_run_request
 from corporeal.pipeline.settings import (
-    assemble_config,
-    fill_config,
-    ground_config,
-    segment_config,
-    simulate_config,
-    video_config,
+    validate_assemble,
+    validate_fill,
+    validate_ground,
+    validate_segment,
+    validate_simulate,
+    validate_video,
 )
 from corporeal.reconstruction import reconstruct_config
 from corporeal.vlm import choose_critic, connect_vlm
@@ -29,15 +29,15 @@ def validate_settings(folder: Path, settings: Settings) -> None:
 
     """
     known = read_run_request(folder).settings if (folder / RUN_FILE).exists() else None
-    assemble_config.validate(settings.assemble)
-    segment_config.validate(settings.segment)
-    fill_config.validate(settings.fill)
-    simulate_config.validate(settings.simulate)
-    video_config.validate(settings.video)
+    validate_assemble(settings.assemble)
+    validate_segment(settings.segment)
+    validate_fill(settings.fill)
+    validate_simulate(settings.simulate)
+    validate_video(settings.video)
     if known is None or known.describe != settings.describe:
         _validate_answers(settings.describe)
     if known is None or known.ground != settings.ground:
-        ground_config.validate(settings.ground)
+        validate_ground(settings.ground)
     if known is None or known.reconstruct != settings.reconstruct:
         reconstruct_config.validate_reconstruct(settings.reconstruct)
 

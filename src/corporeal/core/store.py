@@ -26,8 +26,7 @@ import numpy as np
 
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError, UserError
-from corporeal.core.types import Note, NoteKind
-from corporeal.core.types.stored_kinds import KIND_OF, STORED_KINDS
+from corporeal.core.types import KIND_OF, STORED_KINDS, Note, NoteKind
 from corporeal.core.version import __version__
 
 META_FILE = "meta.json"

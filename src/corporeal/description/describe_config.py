@@ -52,9 +52,7 @@ DEFAULT_DESCRIBE_CONFIG = DescribeConfig()
 
 def validate(config: DescribeConfig) -> None:
     """Raise UserError where a setting is invalid for any scene."""
-    from corporeal.render.object_portrait import (
-        DIRECTION_COUNT,  # imports the renderer, which the help does not need
-    )
+    from corporeal.render.object_portrait import DIRECTION_COUNT  # imports the renderer, which the help does not need
 
     for name, value, low, high in (
         ("--views", config.views, 1, DIRECTION_COUNT),

@@ -96,9 +96,7 @@ def _not_read_error(path: Path) -> UserError:
     if kind == ".gif":
         return BadFileError(path, "is a GIF.", f"Convert it to MP4 if it moves. {PHOTOGRAPH_ADVICE}")
     if kind in READABLE_IMAGE_SUFFIXES and not _is_readable_image(path):
-        from corporeal.io.photos.image_loader import (
-            unreadable_reason,  # with it come lenses, which models lack
-        )
+        from corporeal.io.photos.image_loader import unreadable_reason  # with it come lenses, which models lack
 
         return BadFileError(path, f"{unreadable_reason(path)}.", PHOTOGRAPH_ADVICE)
     if kind in READABLE_IMAGE_SUFFIXES and _is_animated_image(path):

@@ -32,8 +32,7 @@ from corporeal.io.input_files import (
 )
 from corporeal.io.scene_toml import write_scene_file
 from corporeal.pipeline.results import RUN_FILES, StageResults
-from corporeal.pipeline.settings.ground_config import GroundConfig
-from corporeal.pipeline.settings.settings import Settings
+from corporeal.pipeline.settings import GroundConfig, Settings
 from corporeal.recognition.readable_names import safe_name
 
 Progress = Callable[[float, str], None]

@@ -15,7 +15,7 @@ from corporeal.materials.library import find_material
 from corporeal.materials.quantities import KEY_STEM_OF_FIELD, QUANTITIES
 from corporeal.pipeline.results import StageResults
 from corporeal.pipeline.run_pipeline import Settings, read_run_request
-from corporeal.pipeline.settings.assemble_config import validate as validate_assemble
+from corporeal.pipeline.settings import validate_assemble
 from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.recognition.readable_names import safe_name
 from corporeal.scene.initial_state import parse_initial_velocity, parse_lift

@@ -13,7 +13,7 @@ from starlette.routing import BaseRoute, Route
 from corporeal.core.errors import UserError
 from corporeal.materials.library import library
 from corporeal.pipeline.run_pipeline import Settings, read_run_request
-from corporeal.pipeline.settings.assemble_config import validate as validate_assemble
+from corporeal.pipeline.settings import validate_assemble
 from corporeal.viewer.run_edits import DETAIL_LEVELS, finite_number, free_run_name, prepare_changed_run
 from corporeal.viewer.run_queue import QueuedRun, RunQueue
 from corporeal.viewer.run_store import RunStore

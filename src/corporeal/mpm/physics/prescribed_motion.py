@@ -77,9 +77,7 @@ def _cubics(time: Float[np.ndarray, " N"], value: Float[np.ndarray, "N 3"]) -> F
 
 
 def _smooth_curve(time: ArrayLike, value: Float[np.ndarray, "N 3"]) -> "CubicHermiteSpline":
-    from scipy.interpolate import (
-        PchipInterpolator,  # few scenes have anything that follows a prescribed path
-    )
+    from scipy.interpolate import PchipInterpolator  # few scenes have anything that follows a prescribed path
 
     return PchipInterpolator(time, value)
 

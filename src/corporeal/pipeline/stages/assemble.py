@@ -24,7 +24,7 @@ from corporeal.geometry.scene_transforms import (
 from corporeal.io.input_files import images_in_folder, is_scene_file, model_files_in, read_scene, videos_in_folder
 from corporeal.io.load_model import MeshFrame, load_model, readable_model_formats
 from corporeal.io.scene_toml import ObjectEntry, SceneFile
-from corporeal.pipeline.settings.assemble_config import AssembleConfig, validate
+from corporeal.pipeline.settings import AssembleConfig, validate_assemble
 from corporeal.recognition.length_unit_inference import InferredUnit, infer_length_unit, infer_shared_unit, unit_notes
 from corporeal.recognition.readable_names import safe_name, unique_names
 from corporeal.recognition.typical_extents import extent_warning
@@ -63,7 +63,7 @@ def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT_CONFIG, up
         UserError: A file cannot be used, or the options don't fit what the files hold.
 
     """
-    validate(config)
+    validate_assemble(config)
     plan = _scene_file_for([Path(p) for p in inputs])
     frame = MeshFrame(up, config.unit)
     blocks = _apply_extents(_unique_names(_read(plan, config.objects, frame)), config.extent)

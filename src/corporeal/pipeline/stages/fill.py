@@ -47,7 +47,7 @@ from corporeal.discretization.vessel_shell import hollow_all_vessels
 from corporeal.geometry.scene_transforms import underside_centre
 from corporeal.materials import find_material
 from corporeal.mpm.physics.prescribed_motion import start_velocity
-from corporeal.pipeline.settings.fill_config import FillConfig
+from corporeal.pipeline.settings import FillConfig
 from corporeal.scene.vessel_contents import add_vessel_contents, vessels_of_contents
 
 DEFAULT_CONFIG = FillConfig()

@@ -41,7 +41,7 @@ from corporeal.materials.range_placement import (
     value_contradictions,
 )
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
-from corporeal.pipeline.settings.ground_config import GroundConfig
+from corporeal.pipeline.settings import GroundConfig
 
 DEFAULT_CONFIG = GroundConfig()
 STRUCTURE_SOURCE_WORDS = {

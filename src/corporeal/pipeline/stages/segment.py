@@ -20,7 +20,7 @@ from corporeal.core.types import (
     Scene,
     with_text,
 )
-from corporeal.pipeline.settings.segment_config import SegmentConfig
+from corporeal.pipeline.settings import SegmentConfig
 from corporeal.recognition.metadata_recognition import substance_hint
 from corporeal.recognition.parts_by_name import identify_parts
 from corporeal.reconstruction.features import TextPictureEncoder, connect_encoder

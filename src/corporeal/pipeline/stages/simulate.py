@@ -20,7 +20,7 @@ from corporeal.core.version import __version__
 from corporeal.discretization.build_model import ModelMapping, build_model, standing_objects
 from corporeal.mpm.engines import build_engine
 from corporeal.mpm.problem import Engine, Problem
-from corporeal.pipeline.settings.simulate_config import SimulateConfig, validate
+from corporeal.pipeline.settings import SimulateConfig, validate_simulate
 from corporeal.simulation.audit import audit
 from corporeal.simulation.audit_file import write_audit
 from corporeal.simulation.checkpoint import Checkpoints, fingerprint
@@ -74,7 +74,7 @@ def simulate(
         DiskError: The disk is full; the frames so far are kept.
 
     """
-    validate(config)
+    validate_simulate(config)
     posed = build_model(scene, particles, field, config.contact)
     build: EngineBuilder = partial(build_engine, engine=config.engine)
     times = frame_times(scene)

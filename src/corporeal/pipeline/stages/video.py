@@ -22,7 +22,7 @@ from corporeal.core.errors import UserError
 from corporeal.core.types import Frame, Gaussians, Particles, Scene, Trajectory, Vector, Video
 from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
-from corporeal.pipeline.settings.video_config import VideoConfig
+from corporeal.pipeline.settings import VideoConfig
 from corporeal.reconstruction.gaussians import rasteriser_numba
 from corporeal.render import colours, video_file, video_overlay
 from corporeal.render.camera_placement import CameraAim, camera_from_aim
