@@ -21,12 +21,11 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from corporeal.core.errors import SimulationError
+from corporeal.core.errors import BadFileError, SimulationError
 from corporeal.core.process_resources import usable_cores
 from corporeal.lab.evaluation.drop_test import DropResult, simulate_drop
 from corporeal.lab.evaluation.rebound_data import (
     MeasuredRebound,
-    contradictory_rebounds,
     measured_rebounds,
     rebound_sources,
 )
@@ -196,6 +195,21 @@ def foretold(found: Sequence[Result]) -> str:
         f"for, and their rows test that it comes out. Of the {len(rows)} other rows {inside} are "
         f"in their range ± {LEEWAY}."
     )
+
+
+def contradictory_rebounds(rows: Sequence[MeasuredRebound], leeway: float) -> Iterator[tuple[MeasuredRebound, ...]]:
+    """Yield the rows of each scene that no value can meet, each within a leeway [-].
+
+    Raises:
+        BadFileError: Rows of one scene are not the same thing on the same.
+
+    """
+    for scene in dict.fromkeys(row.scene for row in rows if row.scene):
+        alike = tuple(row for row in rows if row.scene == scene)
+        if len({(r.material, r.wall, r.diameter, r.speed, r.floor, r.on) for r in alike}) > 1:
+            raise BadFileError("life.toml", f"{scene}: its rows differ.", "Mend the rows.")
+        if max(r.low for r in alike) - leeway > min(r.high for r in alike) + leeway:
+            yield alike
 
 
 def contradicted(found: Sequence[Result]) -> Iterator[str]:

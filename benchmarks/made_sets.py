@@ -23,12 +23,12 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 from as_photographed import add_switches, degraded, look_of
+from colmap_writer import write_colmap
 from PIL import Image
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Views
 from corporeal.geometry.scene_transforms import object_boxes
-from corporeal.io.photos.colmap import write_colmap
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.capture import render_views
 from corporeal.render.camera_placement import CameraAim

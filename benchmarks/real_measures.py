@@ -16,7 +16,7 @@ from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
 from corporeal.io.photos.colmap import ColmapModel, read_colmap
 from corporeal.io.photos.posed_photos import MASK_FOLDERS, find_companion_image
-from corporeal.multiview.silhouette_overlap import silhouette_overlaps
+from corporeal.multiview.silhouette_overlap import compare_silhouettes
 from corporeal.multiview.similarity_transform import decompose_similarity, similarity_matrix
 from corporeal.pipeline.stages.reconstruct import ReconstructedScene
 
@@ -215,7 +215,7 @@ def silhouettes(result: Came, folder: Path, given: ColmapModel) -> dict[str, Any
         cameras.append(Camera(lens.K, image.world_from_camera, lens.width, lens.height))
     if not masks:
         return {}
-    overlap = silhouette_overlaps(result.meshes, cameras, masks, np.random.default_rng(0))
+    overlap = compare_silhouettes(result.meshes, cameras, masks, np.random.default_rng(0)).overlap
     return {"iou": float(np.nanmean(overlap)), "iou_worst": float(np.nanmin(overlap))}
 
 

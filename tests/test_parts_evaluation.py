@@ -24,7 +24,7 @@ from corporeal.core.errors import BadFileError, UserError
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
 from corporeal.io.gltf.glb_writer import write_glb
 from corporeal.lab.evaluation.material_evaluation import roc_area
-from corporeal.showcase.showcase_scenes import build_single_prop_scene
+from corporeal.showcase.showcase_scenes import prop_scene
 from glb_maker import CUBE, CUBE_TRIANGLES
 
 ROOT = Path(__file__).parents[1]
@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
     """A box on a box, whose parts have names, and a ball, which is one part."""
     made = tmp_path_factory.mktemp("models")
     write_glb(made / "boxes.glb", boxes())
-    write_glb(made / "steel_ball.glb", build_single_prop_scene("steel_ball"))
+    write_glb(made / "steel_ball.glb", prop_scene("steel_ball"))
     return made
 
 
@@ -172,7 +172,7 @@ def test_names_that_are_no_names_are_reported(tmp_path, text):
 def test_the_names_of_the_documentation_are_those_of_the_showcase():
     tables = [read_names(ROOT / "benchmarks" / f"parts_{k}.toml") for k in ("each", "asked")]
     for name in SHOWCASE_MODELS:
-        own = {surface.name for surface in build_single_prop_scene(name).surfaces}
+        own = {surface.name for surface in prop_scene(name).surfaces}
         assert all(set(names[name]) == own for names in tables)
 
 

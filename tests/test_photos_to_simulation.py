@@ -5,12 +5,12 @@ from functools import partial
 
 import numpy as np
 import pytest
+from colmap_writer import write_colmap
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from corporeal.core import store
 from corporeal.core.types import Finish, Scene, SceneObject, Surface
-from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.transforms_json import write_views
 from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
 from corporeal.pipeline.stages.capture import CaptureConfig, capture

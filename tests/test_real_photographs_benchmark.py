@@ -9,11 +9,12 @@ import pytest
 import real_measures as measure
 import real_photographs as benchmark
 import trimesh
+from colmap_writer import write_colmap
 from PIL import Image
 
 from corporeal.core.types import Camera
 from corporeal.geometry.mesh import Mesh
-from corporeal.io.photos.colmap import read_colmap, write_colmap
+from corporeal.io.photos.colmap import read_colmap
 from corporeal.multiview.similarity_transform import apply_similarity_to_cameras, similarity_matrix
 from corporeal.reconstruction.gaussians import training_schedule
 from corporeal.render.embree import identify_triangles

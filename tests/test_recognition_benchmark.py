@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 from recognition.facts import FACTS, SETS, facts, judge, read
+from recognition.page import margin_bands
 
 from corporeal import materials
 from corporeal.lab.evaluation.material_evaluation import (
     RecognitionRow,
-    margin_bands,
     margin_roc_area,
     recognition_score,
 )

@@ -32,7 +32,7 @@ from corporeal.reconstruction.features.feature_lifting import back_projection, v
 from corporeal.reconstruction.features.point_descriptor import mean_view_directions, point_descriptor
 from corporeal.reconstruction.segment.part_clusters import PartsConfig, cluster_parts
 from corporeal.reconstruction.segment.part_naming import name_clusters, part_phrases
-from corporeal.showcase.showcase_scenes import build_single_prop_scene
+from corporeal.showcase.showcase_scenes import prop_scene
 from segmentation.segmentation_scores import majority_names, matched_iou, named_iou
 
 SHOWCASE_MODELS = ("potted_ficus", "armchair", "floor_lamp", "couch")
@@ -160,7 +160,7 @@ def evaluate_parts(
     chosen = list(SHOWCASE_MODELS) if folder is None else _models(folder)
     found = []
     for number, each in enumerate(chosen):
-        scene = build_single_prop_scene(each) if isinstance(each, str) else assemble([each])
+        scene = prop_scene(each) if isinstance(each, str) else assemble([each])
         stem = each if isinstance(each, str) else each.stem
         progress(number / len(chosen), stem)
         taken = photographed_object(scene, how.look, look, how.describe)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core.errors import UserError
-from corporeal.lab.evaluation.dynamics.compared_methods import METHOD_NAMES, OURS_NAME, reference_folder, run_folder
+from corporeal.lab.evaluation.dynamics.compared_methods import BASELINE_NAMES, OURS_NAME, reference_folder, run_folder
 from corporeal.pipeline.run_pipeline import RUN_FILE
 from video_judge.judge_query import JudgeVerdicts, check_judging, query_judge
 from video_judge.judge_scenes import JudgeConfig, SceneRuns, gather_videos
@@ -59,7 +59,7 @@ def judged_scenes_in(out: Path) -> list[SceneRuns]:
 
 
 def _scene(out: Path, name: str) -> SceneRuns:
-    runs = {m: run_folder(out, name, m) for m in METHOD_NAMES}
+    runs = {m: run_folder(out, name, m) for m in (OURS_NAME, *BASELINE_NAMES)}
     finer = [reference_folder(out, name, detail) for detail in ("fine", "normal")]
     return SceneRuns(
         name,

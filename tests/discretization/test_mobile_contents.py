@@ -16,7 +16,7 @@ from corporeal.showcase import showcase_scenes
 @pytest.fixture(scope="module")
 def glass():
     """A glass, three fifths full of water."""
-    return in_memory.prepare_scene(showcase_scenes.build_single_prop_scene("tumbler"))
+    return in_memory.prepare_scene(showcase_scenes.prop_scene("tumbler"))
 
 
 def test_the_water_in_a_glass_is_an_object_of_its_own(glass):
@@ -60,7 +60,7 @@ def test_a_vessel_that_is_filled_again_stays_as_it_is(glass):
 
 
 def test_a_push_acts_on_all_that_it_was_to_move():
-    scene = showcase_scenes.build_single_prop_scene("tumbler")
+    scene = showcase_scenes.prop_scene("tumbler")
     pushed = replace(scene.objects[0], push=Push((2.0, 0.0, 0.0)), mass=0.5)
     whole = in_memory.prepare_scene(replace(scene, objects=(pushed,)))
     wall, water = whole.particles.mass_real
@@ -71,7 +71,7 @@ def test_a_push_acts_on_all_that_it_was_to_move():
 
 
 def test_a_pushed_vessel_and_what_is_in_it_are_expected_to_move_as_prescribed():
-    scene = showcase_scenes.build_single_prop_scene("tumbler")
+    scene = showcase_scenes.prop_scene("tumbler")
     pushed = replace(scene.objects[0], push=Push((2.0, 0.0, 0.0), 0.0, 0.5), mass=0.5)
     whole = in_memory.prepare_scene(replace(scene, objects=(pushed,)))
     for treatment in whole.particles.treatments:

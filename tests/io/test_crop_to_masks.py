@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from colmap_writer import write_colmap
 from PIL import Image
 from scipy.ndimage import binary_erosion
 
 from corporeal.core.types import Camera
-from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.crop_to_masks import CropWindow, plan_crop
 from corporeal.io.photos.posed_photos import read_posed_photos
 from corporeal.multiview.viewed_region import find_viewed_region

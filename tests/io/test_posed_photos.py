@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from colmap_writer import write_colmap
 from PIL import Image
 
 from corporeal.core.errors import BadFileError
 from corporeal.core.types import Camera, Finish, Scene, SceneObject, Surface, Views
 from corporeal.geometry.rotation import matrix_from_quaternion, quaternion_from_matrix
-from corporeal.io.photos.colmap import read_colmap, write_colmap
+from corporeal.io.photos.colmap import read_colmap
 from corporeal.io.photos.posed_photos import read_posed_photos
 from corporeal.io.photos.projection_matrices import check_focal, split_projection
 from corporeal.io.photos.transforms_json import write_views

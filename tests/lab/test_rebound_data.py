@@ -4,9 +4,10 @@ from dataclasses import replace
 from math import pi, sqrt
 
 import pytest
+from life import contradictory_rebounds
 
 from corporeal.core.errors import BadFileError
-from corporeal.lab.evaluation.rebound_data import contradictory_rebounds, measured_rebounds, rebound_sources
+from corporeal.lab.evaluation.rebound_data import measured_rebounds, rebound_sources
 from corporeal.materials import find_material
 
 

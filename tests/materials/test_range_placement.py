@@ -12,7 +12,7 @@ from corporeal.materials.material_candidates import (
     quantity_choice,
     value_at_fraction,
 )
-from corporeal.materials.range_modifiers import range_modifier_problems, range_modifiers
+from corporeal.materials.range_modifiers import is_within_range, range_modifier_table, range_modifiers
 from corporeal.materials.range_placement import (
     CONTENTS_DENSITY_FIELD,
     QuantityJudgement,
@@ -47,15 +47,28 @@ def test_the_place_of_a_value_is_where_it_came_from(measured, fraction):
     assert fraction_of(measured, value_at_fraction(measured, fraction)) == pytest.approx(fraction, abs=1e-6)
 
 
+def range_modifier_problems(ranges):
+    """Say what is wrong with the table of uses, one sentence each, beside a library's measured ranges."""
+    for material, known in range_modifier_table().items():
+        if material not in ranges:
+            yield f"there is no material {material!r}"
+            continue
+        for use in known:
+            for field, (low, high) in use.bands.items():
+                whole = ranges[material].get(field)
+                if whole is None or not is_within_range(low, high, whole):
+                    yield f"{material}: {use.words!r} puts {field} outside the measured range"
+
+
 def test_every_treatment_lies_inside_what_was_measured():
     ranges = {name: entry.ranges for name, entry in materials.library().items()}
-    assert range_modifier_problems(ranges) == []
+    assert list(range_modifier_problems(ranges)) == []
     assert sum(bool(range_modifiers(name)) for name in ranges) >= 12
     steel = ranges["steel"] | {"yield_stress": MeasuredRange(5e8, 5.5e8, 6e8, "s")}
     found = range_modifier_problems(ranges | {"steel": steel})
     assert any("'food tin, lid: soft tinplate' puts yield_stress" in f for f in found)
     without = {name: r for name, r in ranges.items() if name != "steel"}
-    assert range_modifier_problems(without) == ["treatments: there is no material 'steel'"]
+    assert list(range_modifier_problems(without)) == ["there is no material 'steel'"]
 
 
 def test_a_range_is_offered_with_its_unit_its_usual_place_and_what_narrows_it():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.multiview.silhouette_overlap import sample_meshes, silhouette_overlaps
+from corporeal.multiview.silhouette_overlap import compare_silhouettes, sample_meshes
 from corporeal.render.camera_placement import camera_from_aim
 from corporeal.render.embree import identify_triangles
 from corporeal.render.ray_scene import RayScene
@@ -24,7 +24,7 @@ def block(scale=1.0):
 
 
 def overlaps(mesh, seen):
-    return silhouette_overlaps([mesh], seen[1], seen[0], np.random.default_rng(0))
+    return compare_silhouettes([mesh], seen[1], seen[0], np.random.default_rng(0)).overlap
 
 
 def test_the_right_surface_fills_its_masks_and_a_small_one_does_not(seen):
@@ -41,7 +41,7 @@ def test_what_is_no_object_at_all_overlaps_nothing(seen):
 
 def test_an_empty_mask_is_no_number(seen):
     masks = [np.zeros_like(seen[0][0]), *seen[0][1:]]
-    found = silhouette_overlaps([block()], seen[1], masks, np.random.default_rng(0))
+    found = compare_silhouettes([block()], seen[1], masks, np.random.default_rng(0)).overlap
     assert np.isnan(found[0]) and not np.isnan(found[1:]).any()
 
 

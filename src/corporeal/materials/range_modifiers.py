@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import files
 
 from corporeal.core.types import MeasuredRange
-from corporeal.materials.quantities import QUANTITIES, parse_quantity_key
+from corporeal.materials.quantities import parse_quantity_key
 
 
 @dataclass(frozen=True)
@@ -21,30 +21,7 @@ class RangeModifier:
 
 def range_modifiers(material: str) -> tuple[RangeModifier, ...]:
     """Return what is known of a material's uses; nothing for most."""
-    return _table().get(material, ())
-
-
-def range_modifier_problems(ranges: Mapping[str, Mapping[str, MeasuredRange]]) -> list[str]:
-    """Return what is wrong with the table, one sentence each.
-
-    Args:
-        ranges: Material → field → measured range, of the library that the table belongs to.
-
-    """
-    found = []
-    for material, known in _table().items():
-        if material not in ranges:
-            found.append(f"treatments: there is no material {material!r}")
-            continue
-        for treatment in known:
-            for field, (low, high) in treatment.bands.items():
-                whole = ranges[material].get(field)
-                if whole is None or not is_within_range(low, high, whole):
-                    found.append(
-                        f"{material}: {treatment.words!r} puts {field} at {low:g} to {high:g} "
-                        f"{QUANTITIES[field].unit}, outside the measured range"
-                    )
-    return found
+    return range_modifier_table().get(material, ())
 
 
 def is_within_range(low: float, high: float, whole: MeasuredRange) -> bool:
@@ -54,7 +31,8 @@ def is_within_range(low: float, high: float, whole: MeasuredRange) -> bool:
 
 
 @cache
-def _table() -> dict[str, tuple[RangeModifier, ...]]:
+def range_modifier_table() -> dict[str, tuple[RangeModifier, ...]]:
+    """Read all materials with what is known of their uses."""
     text = files("corporeal.materials").joinpath("range_modifiers.toml").read_text(encoding="utf-8")
     return {
         material: tuple(_read_modifier(words, row) for words, row in known.items())

@@ -22,19 +22,6 @@ MIN_PIXEL_POINTS_DIVISOR = 4
 """A pixel that holds less than one in so many of the usual number of points is only touched."""
 
 
-def silhouette_overlaps(
-    meshes: Sequence[Mesh],
-    cameras: Sequence[Camera],
-    masks: Sequence[UInt8[np.ndarray, "H W"]],
-    rng: np.random.Generator,
-) -> Float[np.ndarray, " V"]:
-    """Return the intersection over union of surfaces and mask in each view; NaN: an empty mask.
-
-    Args are those of ``compare_silhouettes``.
-    """
-    return compare_silhouettes(meshes, cameras, masks, rng).overlap
-
-
 def compare_silhouettes(
     meshes: Sequence[Mesh],
     cameras: Sequence[Camera],

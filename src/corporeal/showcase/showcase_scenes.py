@@ -256,18 +256,6 @@ def build_showcase_scene(name: str) -> Scene:
     return scene_of_models(name, place_models(composition), composition.models, composition.duration)
 
 
-def build_single_prop_scene(model: str) -> Scene:
-    """Build a scene of one model of the showcase, at rest.
-
-    Raises:
-        UnknownChoiceError: There is no such model.
-
-    """
-    if model not in PROP_BUILDERS:
-        raise UnknownChoiceError("showcase model", model, list(PROP_BUILDERS))
-    return scene_of_models(model, [PROP_BUILDERS[model]()], [PlacedModel(model)], duration=1.0)
-
-
 def scene_of_models(name: str, models: Sequence[PropModel], things: Sequence[PlacedModel], duration: float) -> Scene:
     """Put models, one per object, into a scene."""
     finishes = {id(p.finish): p.finish for m in models for p in m.parts}

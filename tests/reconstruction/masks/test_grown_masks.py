@@ -8,13 +8,13 @@ from functools import partial
 import numpy as np
 import painted_scene
 import pytest
+from colmap_writer import write_colmap
 from painted_scene import GREY, HIGH, WIDE, agreement, grown_scene
 from PIL import Image
 
 from corporeal.cli import main
 from corporeal.core.errors import UserError
 from corporeal.core.types import Gaussians, Views
-from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.mask_files import edited_masks
 from corporeal.io.photos.posed_photos import MASK_FOLDERS, read_posed_photos
 from corporeal.io.photos.transforms_json import write_views

@@ -9,11 +9,11 @@ from dataclasses import replace
 import imageio_ffmpeg
 import numpy as np
 import pytest
+from colmap_writer import write_colmap
 from PIL import Image
 
 from corporeal.core.errors import BadFileError, UserError
 from corporeal.io.input_files import input_kind, lacks_poses, list_input_files, photos_in_folder
-from corporeal.io.photos.colmap import write_colmap
 from corporeal.io.photos.posed_photos import read_posed_photos
 from corporeal.multiview.silhouette_coherence import MIN_MASK_FILLED_FRACTION
 from corporeal.reconstruction import gaussian_source as reconstructing

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +16,6 @@ from corporeal.lab.evaluation.result_table import ResultTable
 from corporeal.pipeline.stages.assemble import assemble
 from corporeal.pipeline.stages.describe import describe
 
-MARGIN_BAND_EDGES = (0.0, 0.35, 0.45, 0.6, 1.01)
-"""Edges of the margins that are looked at together."""
 TRUTH_FILE_ADVICE = "Write [file] with part = ['material', ...], the likeliest first."
 
 MaterialTruth = Mapping[str, Mapping[str, tuple[str, ...]]]
@@ -130,32 +127,6 @@ def margin_roc_area(rows: Sequence[RecognitionRow]) -> float | None:
     """Return how often a right answer has a larger margin than a wrong one, as ``roc_area``."""
     right, wrong = (np.array([r.margin for r in rows if r.verdict == kind]) for kind in ("right", "wrong"))
     return roc_area(right, wrong)
-
-
-@dataclass(frozen=True)
-class MarginBand:
-    """Answers whose margins lie close together."""
-
-    low: float
-    high: float
-    """Edges of the margins."""
-    count: int
-    margin: float
-    """Mean."""
-    right: float
-    """Share that is right."""
-
-
-def margin_bands(rows: Sequence[RecognitionRow]) -> list[MarginBand]:
-    """Group answers by their margins; bands without an answer are left out."""
-    found = []
-    for low, high in pairwise(MARGIN_BAND_EDGES):
-        inside = [r for r in rows if r.answer is not None and low <= r.margin < high]
-        if inside:
-            mean = sum(r.margin for r in inside) / len(inside)
-            right = sum(r.verdict == "right" for r in inside) / len(inside)
-            found.append(MarginBand(low, min(high, 1.0), len(inside), mean, right))
-    return found
 
 
 # ---------------------------------------------------------------- for people and programs

@@ -1,7 +1,6 @@
 """Published rebounds of real objects, from ``life.toml``."""
 
 import tomllib
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files

@@ -16,7 +16,6 @@ from corporeal.pipeline.run_pipeline import Settings
 
 OURS_NAME = "ours"
 BASELINE_NAMES = ("single", "capped", "one", "omniphysgs", "vomp", "pixie", "table")
-METHOD_NAMES = (OURS_NAME, *BASELINE_NAMES)
 ReferenceDetail = Literal["normal", "fine"]
 """Details of a reference."""
 INPUT_FOLDER = "input"
@@ -31,7 +30,7 @@ def run_folder(out: Path, scene: str, method: str) -> Path:
     Args:
         out: Of the evaluation.
         scene: Its name.
-        method: One of ``METHOD_NAMES``.
+        method: ``OURS_NAME`` or one of ``BASELINE_NAMES``.
 
     """
     return out / scene / method
@@ -60,7 +59,7 @@ class Method:
     """One method of a comparison."""
 
     name: str
-    """Of ``places.METHODS``: names its folders."""
+    """Names its folders."""
     spec: str
     """As typed; of a field ("vomp:fields/") with the path."""
 
