@@ -7,8 +7,6 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from corporeal.core.types import Discretization, Law, Material, MaterialField, Particles, Scene, Wall
@@ -16,6 +14,7 @@ from corporeal.discretization.filled_shells import acting_material
 from corporeal.discretization.impact_restitution import restitutions_at_impact
 from corporeal.discretization.layered_sheets import part_proportions
 from corporeal.discretization.rolling_resistance import rolling_resistance_lengths
+from corporeal.geometry.connected_components import connected_components
 from corporeal.geometry.scene_transforms import underside_centre
 from corporeal.mpm.physics.body_distance import pair_gaps
 from corporeal.mpm.problem import FLOOR, NO_WIND_FACES, Body, Joint, Plane, Problem, Tether, WettedSurface, WindFaces
@@ -179,8 +178,7 @@ def divide_plant(particles: Particles, number: int, crown: Int[np.ndarray, " N"]
 def label_clusters(points: Float[np.ndarray, "N 3"], reach: float) -> Int[np.ndarray, " N"]:
     """Label the groups of points that hang together over distances below ``reach`` [m]."""
     pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
-    return connected_components(links, directed=False)[1]
+    return connected_components(pairs[:, 0], pairs[:, 1], len(points))
 
 
 def nearest_label(

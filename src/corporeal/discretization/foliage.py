@@ -8,9 +8,9 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from corporeal.core.types import Material, MaterialField, Particles, PlantRoot, Scene, Structure, Vector
-from corporeal.discretization.mesh_kind import connected_pieces
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.part_model import PartModel
+from corporeal.geometry.connected_components import connected_pieces
 from corporeal.geometry.mesh import Mesh
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
@@ -80,15 +80,6 @@ def weigh_bulk_foliage(
     A is three quarters of its surface: half of it where every leaf shows both its faces, all where
     each covers others. Thickness and density are those stated for its walls, else a usual
     leaf's. What nothing bears is no crown.
-
-    Args:
-        made: How the part is made otherwise.
-        anatomy: The plant.
-        member: The part.
-        field: What it is made of.
-        tissue: What leaves are made of, as thick as in reality.
-        scale: Scene size over real size.
-
     """
     material, k = field.materials[member.part], member.part
     borne = not all(is_leafy(field.materials[m.part]) for m in anatomy.members)

@@ -5,9 +5,8 @@ from enum import IntEnum
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from corporeal.geometry.connected_components import connected_components, connected_pieces
 from corporeal.geometry.mesh import Mesh, boundary_edges
 from corporeal.geometry.mesh_queries import QueryMesh, sphere_directions
 from corporeal.geometry.point_sampling import sample_surface
@@ -27,16 +26,6 @@ class MeshKind(IntEnum):
     """It is a thin wall, modelled with both faces: a vase, a bowl."""
     SHEET = 2
     """It is an open surface: a leaf, a vessel modelled with one face."""
-
-
-def connected_pieces(mesh: Mesh) -> Int[np.ndarray, " T"]:
-    """Give each triangle the number of its connected piece."""
-    f = mesh.triangles
-    links = coo_matrix(
-        (np.ones(2 * len(f)), (f[:, [0, 1]].ravel(), f[:, [1, 2]].ravel())), shape=(len(mesh.vertices),) * 2
-    )
-    label = connected_components(links, directed=False)[1][f[:, 0]]
-    return np.unique(label, return_inverse=True)[1].reshape(-1)
 
 
 def open_sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
@@ -61,9 +50,7 @@ def longest_rim_length(mesh: Mesh) -> float:
     edges, _ = boundary_edges(mesh)
     if not len(edges):
         return 0.0
-    n = len(mesh.vertices)
-    links = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
-    loop = connected_components(links, directed=False)[1][edges[:, 0]]
+    loop = connected_components(edges[:, 0], edges[:, 1], len(mesh.vertices))[edges[:, 0]]
     length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
     return float(np.bincount(loop, length).max())
 

@@ -6,8 +6,6 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError
 
 from corporeal.core.errors import UserError
@@ -15,7 +13,6 @@ from corporeal.core.types import Parts, Scene
 from corporeal.discretization.mesh_kind import (
     MeshKind,
     OuterSkin,
-    connected_pieces,
     inner_face_fraction,
     mesh_kind_of,
     open_sheets,
@@ -23,6 +20,7 @@ from corporeal.discretization.mesh_kind import (
 )
 from corporeal.discretization.open_cavity import volume_below_rim
 from corporeal.discretization.open_vessel_sheet import vessel_sheet_area
+from corporeal.geometry.connected_components import connected_components, connected_pieces
 from corporeal.geometry.mesh import (
     Mesh,
     inward_area_loss_rate,
@@ -330,9 +328,8 @@ def piece_group_masks(piece: np.ndarray, part: np.ndarray, among: np.ndarray) ->
     _, p = np.unique(piece[among], return_inverse=True)
     _, q = np.unique(part[among], return_inverse=True)
     p, q = p.reshape(-1), q.reshape(-1) + p.max() + 1
-    links = coo_matrix((np.ones(len(p)), (p, q)), shape=(q.max() + 1,) * 2)
     label = np.full(len(piece), -1)
-    label[among] = connected_components(links, directed=False)[1][p]
+    label[among] = connected_components(p, q, q.max() + 1)[p]
     return [label == k for k in range(label.max() + 1)]
 
 

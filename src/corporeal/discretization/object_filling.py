@@ -6,10 +6,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.discretization.cavity import vessel_points
-from corporeal.discretization.mesh_kind import connected_pieces, outer_wall_side
+from corporeal.discretization.mesh_kind import outer_wall_side
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.point_filling import PointFilling, fill_body, fill_wall
 from corporeal.discretization.rods import Rod, rod_section_points
+from corporeal.geometry.connected_components import connected_pieces
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.point_sampling import sample_surface, scatter_points

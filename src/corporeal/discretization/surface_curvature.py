@@ -7,11 +7,10 @@ points the body is as round as they.
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from corporeal.core.types import CURVATURE_COLUMNS
+from corporeal.geometry.connected_components import connected_components
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 
@@ -122,10 +121,8 @@ class MeshCurvature:
     def _smooth(self, t: np.ndarray, u: np.ndarray) -> Bool[np.ndarray, " E"]:
         """Which edges, each of triangles t and u, stand for something round."""
         turn = np.einsum("ei,ei->e", self.flat[t], self.flat[u])
-        count = len(self.flat)
         coplanar = turn > np.cos(np.radians(MIN_CURVED_ANGLE_DEG))
-        links = coo_matrix((np.ones(coplanar.sum()), (t[coplanar], u[coplanar])), (count, count))
-        face = connected_components(links, directed=False)[1]
+        face = connected_components(t[coplanar], u[coplanar], len(self.flat))
         area = np.bincount(face, self.area)[face]
         wide = np.maximum(area[t], area[u]) <= MAX_FACE_WIDTH_RATIO * np.minimum(area[t], area[u])
         return coplanar | (wide & (turn > np.cos(np.radians(MAX_SMOOTH_EDGE_ANGLE_DEG))))
@@ -136,9 +133,7 @@ class MeshCurvature:
         Half edges, which are smooth, run from a corner to the next of its triangle.
         """
         a, b = np.append(one, _next_corners(one)), np.append(_next_corners(other), other)
-        count = 3 * len(self.flat)
-        links = coo_matrix((np.ones(len(a)), (a, b)), (count, count))
-        return connected_components(links, directed=False)[1].reshape(-1, 3)
+        return connected_components(a, b, 3 * len(self.flat)).reshape(-1, 3)
 
     def _normals(self) -> Float[np.ndarray, "T 3 3"]:
         """Of every corner; exact for balls (Max 1999, "Weights for computing vertex normals")."""

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import igl
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from corporeal.core.types import Scene
 from corporeal.geometry import box_placement
+from corporeal.geometry.connected_components import connected_components
 from corporeal.geometry.mesh import Mesh, join_meshes
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.geometry.scene_transforms import is_object_inside, object_boxes, surfaces_bounding_box
@@ -61,8 +60,7 @@ def _group_of_piece(scene: Scene) -> np.ndarray:
         and not (things[a] and things[b] and not (is_object_inside(scene, a, b) or is_object_inside(scene, b, a)))
     ]
     rows, columns = np.array(bound, dtype=int).reshape(-1, 2).T
-    graph = coo_array((np.ones(len(bound)), (rows, columns)), shape=(count, count))
-    return connected_components(graph, directed=False)[1]
+    return connected_components(rows, columns, count)
 
 
 def _are_touching(a: Mesh, b: Mesh, margin: float) -> bool:

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import label
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from corporeal.core.types import Scene, Surface
+from corporeal.geometry.connected_components import connected_pieces
 from corporeal.geometry.mesh import Mesh, join_meshes, weld_mesh
 from corporeal.geometry.point_sampling import sample_surface
 from corporeal.pool.mesh_decimation import decimate_scene
@@ -159,11 +158,7 @@ def open_edge_fraction(mesh: Mesh) -> float:
 
 def largest_component_fraction(mesh: Mesh) -> float:
     """Share of the area that the largest connected component has [-]."""
-    t, n = mesh.triangles, len(mesh.vertices)
-    ends = np.concatenate([t[:, :2], t[:, 1:]])
-    links = coo_matrix((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(n, n))
-    component = connected_components(links, directed=False)[1][t[:, 0]]
-    areas = np.bincount(component, mesh.areas)
+    areas = np.bincount(connected_pieces(mesh), mesh.areas)
     return float(areas.max() / areas.sum())
 
 

@@ -7,12 +7,11 @@ are none of the objects, and objects of the floor's own colour are.
 import numpy as np
 from jaxtyping import Bool
 from scipy.ndimage import label
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from corporeal.core.types import Camera, Gaussians
+from corporeal.geometry.connected_components import connected_components
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.gaussians.foreground import (
@@ -94,10 +93,8 @@ def _connected_with_many(gaussians: Gaussians, which: np.ndarray, cell: float) -
     found = label(filled, np.ones((3, 3, 3)))
     assert isinstance(found, tuple)
     count, touched = len(at), found[0][tuple(at.reshape(-1, 3).T)]
-    link = np.repeat(np.arange(count), len(at[0])), count + touched
-    size = count + found[1] + 1
-    graph = coo_array((np.ones(len(touched)), link), shape=(size, size))
-    own = connected_components(graph, directed=False)[1][:count]
+    joined = np.repeat(np.arange(count), len(at[0]))
+    own = connected_components(joined, count + touched, count + found[1] + 1)[:count]
     return np.bincount(own)[own] >= MIN_PIECE_GAUSSIANS_FRACTION * count
 
 

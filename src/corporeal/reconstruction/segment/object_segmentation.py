@@ -11,12 +11,11 @@ from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import FeatureCloud
+from corporeal.geometry.connected_components import connected_components
 from corporeal.multiview.point_cloud_geometry import nearest_neighbours
 from corporeal.reconstruction.segment.cut_proposals import PatchGraph
 from corporeal.reconstruction.segment.graph_cuts import GraphCut, best_graph_cut
@@ -243,8 +242,7 @@ def nearest_neighbour_components(position: Float[np.ndarray, "N 3"], k: int = 20
     """
     near = nearest_neighbours(position, k + 1)[:, 1:]
     rows = np.repeat(np.arange(len(position)), near.shape[1])
-    graph = csr_array((np.ones(near.size, np.int8), (rows, near.ravel())), shape=(len(position),) * 2)
-    return _number_by_size(connected_components(graph, directed=False)[1])
+    return _number_by_size(connected_components(rows, near.ravel(), len(position)))
 
 
 def _number_by_size(number: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:

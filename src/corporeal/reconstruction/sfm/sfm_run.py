@@ -24,11 +24,10 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Int
 from PIL import Image
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
+from corporeal.geometry.connected_components import connected_components
 from corporeal.io.photos.posed_photos import MASK_FOLDERS
 from corporeal.reconstruction.sfm.model_refinement import LensPrior, refine_model
 from corporeal.reconstruction.sfm.prepare_images import IMAGES_FOLDER, MAX_PICTURE_PX, PreparedImages, focal_from_exif
@@ -324,13 +323,7 @@ class _SfmSteps:
 
 
 def names_by_camera(images: Path, gathered: PreparedImages) -> list[list[str]]:
-    """Return the names of pictures that one camera took: of one size, and one focal length in EXIF.
-
-    Args:
-        images: Where they lie.
-        gathered: What lies there.
-
-    """
+    """Return the names of pictures that one camera took: of one size, and one focal length in EXIF."""
     made: dict[tuple[tuple[int, int], float], list[str]] = {}
     for name, size in zip(gathered.names, gathered.sizes, strict=True):
         made.setdefault((size, focal_from_exif(images / name)), []).append(name)
@@ -421,9 +414,7 @@ def _joined_pictures(pycolmap: Any, database: Path, least: int) -> int:
     if not ends:
         return 0
     a, b = np.array(ends).T
-    between = coo_array((np.ones(len(a)), (a, b)), shape=(len(number), len(number)))
-    _, label = connected_components(between, directed=False)
-    return int(np.bincount(label).max())
+    return int(np.bincount(connected_components(a, b, len(number))).max())
 
 
 def _extreme_lens(cameras: Sequence[Any]) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from skimage import measure
 
 from corporeal.core.errors import UserError
 from corporeal.core.types import Camera, Gaussians, Note, NoteKind, Views
-from corporeal.discretization.mesh_kind import connected_pieces
+from corporeal.geometry.connected_components import connected_pieces
 from corporeal.geometry.mesh import Mesh, signed_triangle_volumes, signed_volume
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
