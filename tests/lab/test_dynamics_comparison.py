@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from dynamics_docs import write_dynamics_docs
 from hypothesis import given
 from hypothesis import strategies as st
 from sample_dynamics import body, expecting, pair, run
@@ -278,7 +279,7 @@ def test_json_page_figure_and_docs_tell_the_same_twice(evaluated, tmp_path):
     assert "falls: ours first, beside single." in page and "rolls: no reference" in page and "$" not in page
     dynamics_page.draw_dynamics(found, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
-    dynamics_page.write_dynamics_docs(found, "corporeal evaluate dynamics", tmp_path / "page.md")
+    write_dynamics_docs(found, "corporeal evaluate dynamics", tmp_path / "page.md")
     docs = (tmp_path / "page.md").read_text()
     assert "| falls | single | 1 of 2 |" in docs
     assert "| rolls | single" not in docs

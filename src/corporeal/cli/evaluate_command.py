@@ -138,8 +138,6 @@ def evaluate_dynamics() -> None:
         """Output file for a figure (PNG)."""
         page: Path | None = None
         """Output file for the report; default OUT/report.html."""
-        docs: Path | None = None
-        """Also write the measured rows as a documentation page (Markdown)."""
         crew: WorkerOptions = field(default_factory=WorkerOptions)
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
@@ -169,10 +167,6 @@ def _write_dynamics(found: "DynamicsSummary", asked: Any, out: Path) -> None:
         store.write_json(asked.json, dynamics_record(found))
     if asked.figure is not None:
         dynamics_page.draw_dynamics(found, asked.figure)
-    if asked.docs is not None:
-        command = f"corporeal evaluate dynamics {asked.target} --against "
-        command += f"{' '.join(asked.how.against)} --docs {asked.docs}"
-        dynamics_page.write_dynamics_docs(found, command, asked.docs)
 
 
 def _show(tables: Sequence[ResultTable]) -> None:

@@ -1,4 +1,4 @@
-"""Report and documentation page of an evaluation of dynamics."""
+"""Report of an evaluation of dynamics."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -9,12 +9,7 @@ from matplotlib.figure import Figure
 from corporeal.core import store
 from corporeal.lab.evaluation.dynamics.compared_methods import METHOD_WORDS, OURS_NAME
 from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary
-from corporeal.lab.evaluation.dynamics.dynamics_tables import (
-    dynamics_tables,
-    markdown_table,
-    missing_references,
-    ranking_sentences,
-)
+from corporeal.lab.evaluation.dynamics.dynamics_tables import dynamics_tables, missing_references, ranking_sentences
 from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult
 from corporeal.lab.evaluation.figure_files import save_figure
 from corporeal.lab.evaluation.mass_report import INK_COLOUR, METHOD_COLOURS
@@ -151,25 +146,3 @@ def _html(table: ResultTable) -> str:
     heads = "".join(f"<th>{escape_html(h)}</th>" for h in table.heads)
     rows = "".join(f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in table.rows)
     return f'<h2>{escape_html(table.title)}</h2><div class="wide"><table><tr>{heads}</tr>{rows}</table></div>'
-
-
-def write_dynamics_docs(found: DynamicsSummary, command: str, path: Path) -> None:
-    """Write the measured rows as a page of the documentation; what was not run is left out.
-
-    Args:
-        found: The evaluation.
-        command: That made it.
-        path: Of the page (Markdown).
-
-    """
-    lines = ["# Dynamics benchmark", "", f"Written by `{command}`. {summary_sentence(found)}", ""]
-    lines += [RANKING_RULE, "", *(f"- {s}" for s in ranking_sentences(found)), ""]
-    lines += [f"- {s}" for s in missing_references(found)] + [""]
-    done = {(r.scene, r.method) for r in found.rows if r.numbers or r.error.startswith("failed")}
-    for table in dynamics_tables(found):
-        rows = [r for r in table.rows if table.heads[0] != "scene" or (r[0], r[1]) in done]
-        if rows:
-            text = markdown_table(ResultTable(table.title, table.heads, rows))
-            lines += [f"## {table.title}", "", text, ""]
-    lines += ["## Columns", "", *(f"- **{k}**: {v}" for k, v in COLUMN_EXPLANATIONS.items()), ""]
-    store.write_bytes(path, "\n".join(lines).encode())

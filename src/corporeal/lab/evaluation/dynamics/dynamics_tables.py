@@ -1,7 +1,5 @@
 """Tables of an evaluation of dynamics: per scene, per group, ranks and rebounds."""
 
-from collections.abc import Sequence
-
 from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME
 from corporeal.lab.evaluation.dynamics.dynamics_summary import DynamicsSummary, MethodMean
 from corporeal.lab.evaluation.dynamics.method_ranking import MethodResult
@@ -123,9 +121,3 @@ def number_text(value: float | None) -> str:
 def percent_text(value: float | None) -> str:
     """Write a share as a percentage."""
     return NO_VALUE if value is None else f"{value:.0%}"
-
-
-def markdown_table(table: ResultTable) -> str:
-    """Write a table for the documentation."""
-    lines: list[Sequence[str]] = [table.heads, ["---"] * len(table.heads), *table.rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", "/") for cell in x) + " |" for x in lines)
