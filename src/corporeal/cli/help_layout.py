@@ -106,14 +106,7 @@ def lay_out(kind: type, first: Sequence[str] = ()) -> HelpLayout:
 
 
 def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> list[Option]:
-    """Return every field of a dataclass, and of the dataclasses within it.
-
-    Args:
-        kind: The dataclass.
-        path: Where it lies.
-        given: Its default, if it has one.
-
-    """
+    """Return every field of a dataclass, and of the dataclasses within it."""
     hints = get_type_hints(kind, include_extras=True)
     found = []
     for f in fields(kind):

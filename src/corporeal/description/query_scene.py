@@ -79,12 +79,6 @@ def repeat_interview(
 
     Answers with an unusable reply are left out with a warning; if all are, the first is used, completed from the file.
 
-    Args:
-        interview: Of the object.
-        count: How many answers are wanted.
-        described: Asks about its parts, as often as it is called.
-        direct: Whether its mass is asked for outright.
-
     Raises:
         WaitingError: Questions wait for a person: as many as can be asked now.
 

@@ -54,10 +54,6 @@ def choose_resolution(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> tu
     A plate thinner than two cells is a wall, whoever called it solid; with it the cell may grow,
     so that other plates become thin.
 
-    Args:
-        bodies: What is to be simulated.
-        accuracy: Resolution and step budget.
-
     Returns:
         The bodies with their plates as walls; grid spacing and treatments.
 

@@ -89,14 +89,7 @@ def _only_soft_by_compression(verdict: RigidityVerdict) -> bool:
 def warn_of_wrong_compression(
     parts: Sequence[PartGeometry], unslowed: Sequence[Discretization], made: Sequence[Discretization]
 ) -> list[str]:
-    """Warn where the force on what presses a part cannot be right, and say by how much.
-
-    Args:
-        parts: All of the scene's.
-        unslowed: Treatments before the step budget.
-        made: As they are simulated.
-
-    """
+    """Warn where the force on what presses a part cannot be right, and say by how much."""
     messages = []
     for part, true, treatment in zip(parts, unslowed, made, strict=True):
         if part.pressed < MAX_INVISIBLE_STRAIN:

@@ -61,13 +61,7 @@ class PartVerdicts:
 
 
 def judge_plants(parts: Sequence[PartGeometry], verdicts: Sequence[RigidityVerdict]) -> PartVerdicts:
-    """Make potted soil rigid, and find the crowns of leaves.
-
-    Args:
-        parts: All parts of the scene.
-        verdicts: One per part.
-
-    """
+    """Make potted soil rigid, and find the crowns of leaves."""
     judged = list(verdicts)
     foliage_parts: set[int] = set()
     leafy = {k for k, p in enumerate(parts) if p.leaves >= MIN_FOLIAGE_LEAVES and not p.prescribed}

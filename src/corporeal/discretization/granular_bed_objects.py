@@ -92,12 +92,6 @@ def holding_wall_of(member: MeasuredPart, field: MaterialField, top: QueryMesh) 
     """Return where a part's material is.
 
     A hollow body that is drawn by its outside has no lid where granular material lies on it.
-
-    Args:
-        member: The part.
-        field: What it is made of.
-        top: What is drawn of the granular material.
-
     """
     made = infer_structure(member, part_specification(member.part, field))
     if made.thickness == 0 or made.modelled or is_vessel(member):

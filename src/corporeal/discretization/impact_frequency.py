@@ -32,13 +32,7 @@ class _ImpactOnMat:
     """(1 - ν²)/E as simulated [1/Pa]; 0: it is rigid."""
 
     def frequency(self, part: PartGeometry, treatment: Discretization) -> float:
-        """Angular frequency of the half period that it lasts [rad/s].
-
-        Args:
-            part: What is struck.
-            treatment: How that is simulated.
-
-        """
+        """Angular frequency of the half period that it lasts [rad/s]."""
         plane = 1.0 / (self.compliance + impact_compliance(treatment))
         thick = treatment.thickness or part.size[0]
         return pi / hertz_contact_time(self.landing.mass, self.radius, self.landing.speed, plane, thick)
@@ -51,12 +45,6 @@ def tune_loss_to_impacts(
 
     Of several the mean of the logarithms counts, by their energies. What falls harder itself keeps its slowest
     vibration, and so does what is as high as it is wide.
-
-    Args:
-        parts: All of the scene's.
-        motions: One per object.
-        treatments: One per part, as they are simulated.
-
     """
     impacts = impacts_on_objects(parts, motions, treatments)
     found = []

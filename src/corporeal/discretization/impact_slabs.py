@@ -37,11 +37,6 @@ def slabs_nearer_to_rigid(
 ) -> dict[int, str]:
     """Return which slabs and sheets on the floor are nearer to life as rigid ones.
 
-    Args:
-        parts: All of the scene's.
-        motions: One per object.
-        treatments: As they are simulated.
-
     Returns:
         Number of the part → why, in a clause.
 
@@ -85,12 +80,6 @@ def mark_thin_floor_sheets(
 
     A tenth of a millimetre of paper stores nothing of an impact, and the next step may lead through it to the floor:
     what it is made of says nothing of the rebound.
-
-    Args:
-        parts: All of the scene's.
-        motions: One per object.
-        treatments: As they are simulated.
-
     """
     return tuple(
         replace(treatment, is_floor_covering=True)

@@ -41,13 +41,7 @@ class PartProportions:
 
 
 def part_proportions(particles: Particles, field: MaterialField) -> dict[int, PartProportions]:
-    """Shape of every solid part where one is weak across its layers, by its number; else none.
-
-    Args:
-        particles: Of all parts.
-        field: What they are made of.
-
-    """
+    """Shape of every solid part where one is weak across its layers, by its number; else none."""
     known = layered_materials()
     if not any(m.name in known for m in field.materials):
         return {}
@@ -88,14 +82,7 @@ def layered_restitution_law(
 
 
 def layered_loss_factor(ball: PartGeometry, lands: ObjectLanding, sheet: PartGeometry) -> float | None:
-    """Loss factor of a soft ball and a rigid sheet of layers that it falls on [-]; None: of none.
-
-    Args:
-        ball: The largest part of what falls.
-        lands: How it falls.
-        sheet: The largest part of what it falls on.
-
-    """
+    """Loss factor of a soft ball and a rigid sheet of layers that it falls on [-]; None: of none."""
     one, struck = PartProportions(ball.size, lands.mass), None
     if sheet.structure.kind == "solid":
         struck = _layered_sheet(PartProportions(sheet.size, 0.0), sheet.material)

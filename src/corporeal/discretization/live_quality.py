@@ -73,11 +73,6 @@ def choose_live_quality(demand: LiveDemand, threads: int) -> QualityPreset:
     """Choose the finest cells whose predicted cost is real time, and as many steps as fit.
 
     Spare time buys stiffness: the step budget keeps the order of stiffness.
-
-    Args:
-        demand: Of the scene as it was filled.
-        threads: Of the engine.
-
     """
 
     def steps_at(cells: int) -> float:

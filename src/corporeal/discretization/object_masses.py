@@ -27,11 +27,6 @@ def scale_to_stated_masses(
 ) -> tuple[dict[int, PartModel], tuple[str, ...]]:
     """Let objects weigh what their file states: all parts of one object by the same factor.
 
-    Args:
-        scene: The objects, with the masses that their files state.
-        anatomies: One per object.
-        makes: How every part is made.
-
     Returns:
         How every part is made, and a sentence for each object that its materials and its shape would give another mass.
 

@@ -141,11 +141,6 @@ def field_in_scene_scale(field: MaterialField, scales: Sequence[float]) -> Mater
     """Return what parts are made of with their walls as thick as in the scene.
 
     Lengths that were stated or looked up are real ones; in the scene they are scaled with the rest.
-
-    Args:
-        field: With real lengths.
-        scales: Scene size over real size, one per part.
-
     """
     if all(scale == 1 for scale in scales):
         return field

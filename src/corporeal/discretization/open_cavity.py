@@ -55,14 +55,7 @@ def is_blocked(
 
 
 def volume_below_rim(matter: QueryMesh | None, body: Mesh, rng: np.random.Generator) -> float:
-    """Volume that a level liquid could fill of a closed shape's open hollow [m³].
-
-    Args:
-        matter: What no liquid is in.
-        body: Its surface.
-        rng: Source of the points that are asked.
-
-    """
+    """Volume that a level liquid could fill of a closed shape's open hollow [m³]."""
     corners = body.corners.reshape(-1, 3)
     low, high = corners.min(axis=0), corners.max(axis=0)
     points = low + rng.uniform(0, 1, (CAVITY_SAMPLES_COUNT, 3)) * (high - low)

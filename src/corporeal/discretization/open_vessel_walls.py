@@ -35,12 +35,6 @@ def hollow_if_too_thick(words: PartDescription, seen: FileEvidence, library: str
 
     Metal, glass, plastic and ceramics come as sheets, castings and mouldings: a "brass samovar" of 17 kg is none. Open
     ware that is drawn full, as it looks from outside, is no block either.
-
-    Args:
-        words: What was recognised of a part.
-        seen: All that the file says about it.
-        library: Where materials are looked up.
-
     """
     named = [name.words for name in seen.general if name.words]
     if words.material is None or words.structure is not None or not seen.alone or not named:
@@ -104,13 +98,7 @@ class OpenVesselWall:
 
 
 def with_usual_vessel_wall(words: PartDescription, called: NamedObject) -> PartDescription:
-    """Set the usual wall thickness of open ware, if none is stated.
-
-    Args:
-        words: Of a part.
-        called: The object.
-
-    """
+    """Set the usual wall thickness of open ware, if none is stated."""
     if words.thickness is not None and not words.wall_usual:
         return words
     wall = usual_vessel_wall(words.material, called)
@@ -124,11 +112,6 @@ def usual_vessel_wall(material: str | None, called: NamedObject) -> OpenVesselWa
 
     Where walls grow with the longest side they are interpolated between sizes in logarithms, and are those of the least
     and the largest beyond.
-
-    Args:
-        material: What it is of.
-        called: The object.
-
     """
     if material is None:
         return None
@@ -148,12 +131,6 @@ def sheet_if_drawn_full(words: PartDescription, seen: FileEvidence, library: str
 
     A wall with both faces is as it is drawn, and so are a stack, what is a closed wall whatever it is called, and what
     need not be hollow: a bowl of wood, a steel plate.
-
-    Args:
-        words: What was recognised of a part.
-        seen: All that the file says about it.
-        library: Where materials are looked up.
-
     """
     closed = words.structure is not None and (words.structure != "shell" or not words.thickness)
     if closed or not seen.alone or not seen.general:

@@ -343,14 +343,7 @@ MAX_PLATE_BEHIND_RATIO = 1.5
 
 
 def plate_thickness(member: MeasuredPart, made: PartModel, rng: np.random.Generator) -> float:
-    """Thickness 2 V/A of a solid part that is a plate, flat or bent [m]; 0: it is none.
-
-    Args:
-        member: The part.
-        made: How it is made.
-        rng: Source of the points of its surface that are asked.
-
-    """
+    """Thickness 2 V/A of a solid part that is a plate, flat or bent [m]; 0: it is none."""
     solid = made.structure.kind == "solid" and member.closed and member.volume > 0
     thickness = 2 * member.volume / member.body_area if solid else 0.0
     if not 0 < thickness < MAX_WALL_THICKNESS_FRACTION * member.size[1]:

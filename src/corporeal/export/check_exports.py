@@ -36,14 +36,7 @@ class ReaderFindings:
 
 
 def check_target(target: ExportTarget, folder: Path, asked: ExportRequest) -> ReaderFindings:
-    """Read one target's files again.
-
-    Args:
-        target: What they are.
-        folder: Where they are.
-        asked: What they should hold.
-
-    """
+    """Read one target's files again."""
     writer = EXPORT_WRITERS[target]
     try:
         import_module(writer.check_package or "corporeal")

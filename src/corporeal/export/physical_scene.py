@@ -32,11 +32,6 @@ def identifiers(titles: Iterable[str], taken: Iterable[str] = ()) -> list[str]:
     """Return ASCII identifiers, each once: letters, digits and underscores, no digit in front.
 
     Accents are dropped; letters of other alphabets become underscores, and a name of nothing else becomes ``thing``.
-
-    Args:
-        titles: As people call objects.
-        taken: Identifiers that stand for something else.
-
     """
     taken = list(taken)
     return unique_names([*taken, *map(_identifier, titles)])[len(taken) :]
@@ -60,10 +55,6 @@ RESERVED_NAMES = ("World", "Looks", "Matter", "Physics", "Floor", "Floors", "Hul
 
 def physical_scene(prepared: PreparedScene, motion: SceneMotion) -> PhysicalScene:
     """Take a scene as it stands at an instant of its motion.
-
-    Args:
-        prepared: The scene, its materials and its material points.
-        motion: Of it; its instant is exported.
 
     Raises:
         UserError: An object has no matter.

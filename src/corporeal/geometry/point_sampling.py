@@ -155,10 +155,6 @@ def points_wound_around(
 ) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
     """Find the points that the mesh winds around at all.
 
-    Args:
-        met: Where the columns cross it.
-        heights: Of each column's points, ascending.
-
     Returns:
         Column and layer of each.
 

@@ -36,13 +36,7 @@ FailCallback = Callable[[str, str], NoReturn]
 
 
 def keyframes_from_rows(rows: Sequence[Sequence[object]], fail: FailCallback) -> tuple[Vector, Keyframes]:
-    """Return where a path begins [m], and how it goes on from there.
-
-    Args:
-        rows: Rows of the file.
-        fail: Told what is wrong and what to do.
-
-    """
+    """Return where a path begins [m], and how it goes on from there."""
     table = _checked_rows(rows, fail)
     time, place = table[:, 0], table[:, 1:4]
     if time[0] < 0.0 or time[-1] > MAX_KEYFRAME_TIME_S:

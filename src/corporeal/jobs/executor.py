@@ -43,13 +43,6 @@ def execute_jobs(folder: Path, verb: CorpusVerb, jobs: Sequence[Job], hands: Exe
 
     A job that fails is noted and left; one whose process dies is tried once more. An interrupt
     lets running jobs keep what they have.
-
-    Args:
-        folder: The corpus's.
-        verb: What is done.
-        jobs: One per scene.
-        hands: Who does them, and who is informed.
-
     """
     for place in {job.folder.parent for job in jobs}:
         remove_partial_results(place)

@@ -122,14 +122,7 @@ def exit_reason(code: int) -> str:
 
 @contextmanager
 def local_worker_pool(slots: int, threads: int, logs: Path) -> Iterator[LocalWorkerPool]:
-    """Hire processes of this machine.
-
-    Args:
-        slots: How many at the same time.
-        threads: Of each.
-        logs: Folder for what they print.
-
-    """
+    """Hire processes of this machine."""
     workers = LocalWorkerPool(slots, threads, logs)
     try:
         yield workers

@@ -115,14 +115,7 @@ def library_spelling(name: str, library_name: str, offered: list[str]) -> str | 
 def quantity_choices(
     words: PartDescription, library_name: str = "default", weighing: bool = False
 ) -> dict[str, QuantityChoice]:
-    """Return the open quantities of a part, which a model may place.
-
-    Args:
-        words: The description of the part.
-        library_name: Where its material is looked up.
-        weighing: Offer only what its mass hangs on.
-
-    """
+    """Return the open quantities of a part, which a model may place."""
     if words.material is None:
         return {}
     entry = library_entry(words.material, library_name)

@@ -39,11 +39,6 @@ def unseen_side_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
     """Say between which pictures a side was not photographed, if a wide gap is there.
 
     Of half of the circle and more ``unseen_half_text`` says it.
-
-    Args:
-        cameras: Of the photographs.
-        names: Of these.
-
     """
     gap = _widest_gap(cameras, names)
     if not MIN_UNSEEN_GAP_DEG <= gap.angle < UNSEEN_HALF_GAP_DEG:
@@ -56,13 +51,7 @@ def unseen_side_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | N
 
 
 def unseen_half_text(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
-    """State that half of the circle around it was not photographed, if so.
-
-    Args:
-        cameras: Of the photographs.
-        names: Of these.
-
-    """
+    """State that half of the circle around it was not photographed, if so."""
     gap = _widest_gap(cameras, names)
     if gap.angle < UNSEEN_HALF_GAP_DEG:
         return None
@@ -80,12 +69,7 @@ def widest_unseen_angle(cameras: Sequence[Camera]) -> float:
 
 
 def depth_doubt_text(cameras: Sequence[Camera]) -> str | None:
-    """Return in a clause that photographs leave open how deep objects are; None: they do not.
-
-    Args:
-        cameras: Of the photographs.
-
-    """
+    """Return in a clause that photographs leave open how deep objects are; None: they do not."""
     seen = 360 - widest_unseen_angle(cameras)
     if seen >= MIN_COVERED_ANGLE_DEG or _steepest_elevation(tuple(cameras)) >= STEEP_VIEW_ELEVATION_DEG:
         return None

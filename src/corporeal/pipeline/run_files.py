@@ -53,17 +53,7 @@ def write_run_files(
     progress: Progress,
     more: Mapping[str, Path] | None = None,
 ) -> None:
-    """Write the output files of a run.
-
-    Args:
-        folder: The run's.
-        made: What each stage made.
-        audit: The simulation's.
-        spent: Settings and cost.
-        progress: Called with the fraction done and a description.
-        more: Figures that stages drew, by caption.
-
-    """
+    """Write the output files of a run."""
     started = time.perf_counter()
     # Figures.
     figures = {

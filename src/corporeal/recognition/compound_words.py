@@ -58,11 +58,6 @@ def normalise_compounds(words: Sequence[str], known: KnownWords) -> list[str]:
 
     ``["dumbbel"]`` gives ``["dumbbell"]``, ``["wineglas"]`` ``["wine", "glass"]``, ``["surf", "board"]``
     ``["surfboard"]``, ``["treestump"]`` ``["tree", "stump"]``.
-
-    Args:
-        words: In English, in the singular.
-        known: The words that there are.
-
     """
     right = [correct_doubled_letters(word, known) for word in words]
     return [part for word in _join_compounds(right, known) for part in _split_compound(word, known)]

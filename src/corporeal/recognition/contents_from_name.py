@@ -106,14 +106,7 @@ def _phrases_with_position(said: Sequence[str], known: Collection[WordPhrase]) -
 
 
 def apply_named_contents(found: PartDescription, evidence: FileEvidence, holds: bool) -> PartDescription:
-    """Fill a vessel of one part as its name says.
-
-    Args:
-        found: What was recognised of it.
-        evidence: All that the file says about it.
-        holds: Whether its material has walls.
-
-    """
+    """Fill a vessel of one part as its name says."""
     said = contents_from_name(evidence.thing)
     if said is None or not evidence.alone or not (said.vessel and holds):
         return found

@@ -17,12 +17,6 @@ def move_head_noun_last(words: Sequence[str], known: KnownWords, phrases: Phrase
 
     ``can of coke`` gives ``coke can``, ``barrel oil rusty`` ``oil barrel rusty``, ``bottle with cork`` ``bottle``,
     ``barrel game asset`` ``barrel``.
-
-    Args:
-        words: In English, in the singular.
-        known: Words for substances and objects.
-        phrases: Names of objects that are more than one word.
-
     """
     bare = _remove_phrases(words, (*_phrases("wrapping"), *_phrases("measures")), phrases)
     return _swap_reversed_phrases(_move_complement_first(bare, known, phrases), phrases)

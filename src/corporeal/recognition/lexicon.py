@@ -272,11 +272,6 @@ def hollow_wall_thickness(tokens: tuple[str, ...], material: str) -> float | Non
     """Return the wall [m] of what is hollow where it is of such a material; None: of none.
 
     A chair of plastic is moulded, one of steel is of tubes.
-
-    Args:
-        tokens: Of a name.
-        material: What the object is of.
-
     """
     row = wall_table_row(tokens, material, "walls")
     return None if row is None else row["thickness_mm"] * 1e-3

@@ -30,10 +30,6 @@ def translate_words(words: Sequence[str]) -> list[str]:
 
     ``["seau", "de", "plage"]`` gives ``["plage", "bucket"]``, ``["holzstuhl"]`` ``["wood", "chair"]``; what is not
     known stays as it is.
-
-    Args:
-        words: Of a name, in lower case.
-
     """
     words = _join_hyphenated(words)
     found = [_translate_word(strip_accents(word)) for word in words]

@@ -225,16 +225,7 @@ def _test_poses_by_masks(source: Path, posed: FoundPoses, force: bool, place: Pa
 def _drop_doubted_pictures(
     posed: FoundPoses, grown: GrownMasks, doubted: Path, place: Path, progress: Progress
 ) -> tuple[FoundPoses, GrownMasks]:
-    """Leave out pictures that doubted masks speak against, if masks of the others are accepted.
-
-    Args:
-        posed: Where pictures were taken from.
-        grown: What is returned otherwise, with the poses.
-        doubted: The masks, whose outlines contradict each other.
-        place: Gets the other poses and masks.
-        progress: Called with the fraction done and a description.
-
-    """
+    """Leave out pictures that doubted masks speak against, if masks of the others are accepted."""
     other = replace(posed, folder=place / ALIKE_POSES_FOLDER)
     shutil.rmtree(other.folder, ignore_errors=True)
     shutil.copytree(posed.folder, other.folder)

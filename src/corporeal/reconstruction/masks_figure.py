@@ -25,14 +25,7 @@ OUTLINE_RGB = (230, 60, 40)
 
 
 def masks_figure(source: Path, masked_by: Path | None, path: Path) -> None:
-    """Draw the masks of posed photographs, if they have any and the photographs can be read.
-
-    Args:
-        source: A folder of photographs with poses.
-        masked_by: A folder of masks instead of the photographs' own.
-        path: A PNG.
-
-    """
+    """Draw the masks of posed photographs, if they have any and the photographs can be read."""
     try:
         seen = read_posed_photos(source, SHOWN_SIDE_PX, bare=True, most=MAX_SHOWN_PHOTOGRAPHS)
         cut = read_posed_photos(source, SHOWN_SIDE_PX, masked_by, most=MAX_SHOWN_PHOTOGRAPHS)
@@ -47,15 +40,7 @@ def masks_figure(source: Path, masked_by: Path | None, path: Path) -> None:
 def draw_masks_over(
     pictures: Sequence[UInt8[np.ndarray, "H W 3"]], masks: Bool[np.ndarray, "V H W"], names: Sequence[str], path: Path
 ) -> None:
-    """Draw pictures, paler where no object is, with outlines.
-
-    Args:
-        pictures: At most a few of them are drawn.
-        masks: Which pixels are on objects.
-        names: Of the pictures.
-        path: A PNG.
-
-    """
+    """Draw pictures, paler where no object is, with outlines."""
     steps = np.linspace(0, len(names) - 1, min(len(names), MAX_SHOWN_PHOTOGRAPHS)).round()
     which: list[int] = np.unique(steps.astype(int)).tolist()
     tiles = [SheetTile(_draw_over(pictures[k], masks[k]), names[k]) for k in which]

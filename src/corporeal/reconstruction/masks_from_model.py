@@ -34,12 +34,6 @@ def masks_from_model(
 ) -> tuple[Path, tuple[str, ...], tuple[str, ...]]:
     """Ask a model for masks, and ask of them whether they are of one object.
 
-    Args:
-        config: Names model and words.
-        source: A folder of photographs with poses.
-        place: Gets the masks.
-        progress: Called with the fraction done and a description.
-
     Returns:
         A folder that holds them, how they came about, and what is to be doubted.
 

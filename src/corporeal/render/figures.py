@@ -51,14 +51,7 @@ from corporeal.render.video_choices import ColourQuantity
 def render_recoloured(
     stages: Sequence[RayScene], camera: CameraAim, quality: Quality
 ) -> list[UInt8[np.ndarray, "H W 3"]]:
-    """Take a picture of each stage: the bytes of ``render``, with one search for light.
-
-    Args:
-        stages: One scene, ``painted`` in different colours.
-        camera: Where from.
-        quality: How finely.
-
-    """
+    """Take a picture of each stage: the bytes of ``render``, with one search for light."""
     size = camera.height, camera.width
     pictures = [np.empty((*size, 3), np.uint8) for _ in stages]
     threads = usable_cores()

@@ -96,14 +96,7 @@ class SceneBinding:
 
     @classmethod
     def of(cls, scene: Scene, particles: Particles, skin: SkinBinding) -> "SceneBinding":
-        """Bind a scene's objects to their particles.
-
-        Args:
-            scene: Surfaces at rest.
-            particles: At the start.
-            skin: From ``skin.bind`` of the same two.
-
-        """
+        """Bind a scene's objects to their particles."""
         count = len(scene.objects)
         sizes = [len(s.vertices) for s in scene.surfaces]
         owner = np.repeat(np.array([s.object for s in scene.surfaces], dtype=np.int64), sizes)

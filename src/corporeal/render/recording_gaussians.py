@@ -20,13 +20,7 @@ MIN_OPACITY = 1 / 255
 
 
 def select_gaussians(found: Reconstruction, cast: SceneBinding) -> RecordedGaussians:
-    """Choose and bind Gaussians.
-
-    Args:
-        found: Where the scene's objects stand at the start.
-        cast: From ``Cast.of``, of the same scene.
-
-    """
+    """Choose and bind Gaussians."""
     g, owner = found.gaussians, found.object_of_gaussian
     covers = g.opacity * np.sort(g.scale, axis=1)[:, 1:].prod(axis=1)
     seen = np.flatnonzero((g.opacity > MIN_OPACITY) & (owner < len(cast.vertices)))

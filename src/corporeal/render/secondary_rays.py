@@ -69,16 +69,7 @@ class LightSampler:
     def sparsely(
         self, s: HitBuffer, d: np.ndarray, index: np.ndarray, places: PixelPlaces, sky: int
     ) -> Float32[np.ndarray, "N channels"]:
-        """Light that arrives at samples that share it with those within 12 × 12 pixels.
-
-        Args:
-            s: What samples met.
-            d: Unit directions from the eye.
-            index: Samples that ask.
-            places: Where in the picture they are.
-            sky: Rays to the sky of each.
-
-        """
+        """Light that arrives at samples that share it with those within 12 × 12 pixels."""
         number = np.empty(len(index), np.int64)
         kernels_sparse_light.direction_sets(places.row, places.column, number)
         return self.along(s, d, RayDirections(index, number, places, (DIRECTION_SETS, sky, SUN_RAYS)))

@@ -39,12 +39,7 @@ def web_file(name: str) -> str:
 
 
 def inline_view(take: bytes) -> str:
-    """Return the view of one take as HTML that fetches nothing.
-
-    Args:
-        take: From ``render.take``.
-
-    """
+    """Return the view of one take as HTML that fetches nothing."""
     modules = json.dumps([(name, web_file(name)) for name in VIEW_SCRIPTS]).encode()
     return INLINE_VIEW_HTML.format(modules=_packed(modules), take=_packed(take), style=web_file("viewer.css"))
 

@@ -73,13 +73,7 @@ def preview_contacts(
 
 
 def impact_hops(met: Sequence[Sequence[ObjectKey]], sent: Sequence[ObjectKey]) -> dict[ObjectKey, int]:
-    """Count how far an impact was passed on: 1 for what was struck, 2 for what that struck.
-
-    Args:
-        met: Pairs in the order in which they met.
-        sent: What was moving at the start.
-
-    """
+    """Count how far an impact was passed on: 1 for what was struck, 2 for what that struck."""
     reached = dict.fromkeys(sent, 0)
     for a, b in met:
         for one, other in ((a, b), (b, a)):

@@ -22,12 +22,6 @@ def apply_breaks(whole: SceneWithMaterials, particles: Particles, breaks: Sequen
     """Return a scene in which every piece of what broke is an object with one part.
 
     The first piece keeps the object's number and name; the others come after all there are.
-
-    Args:
-        whole: The scene with all that moves in it.
-        particles: Its material points.
-        breaks: In the order in which objects broke.
-
     """
     for one in breaks:
         share, objects = piece_mass_fractions(one, particles), len(whole.scene.objects)

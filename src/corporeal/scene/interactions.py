@@ -74,12 +74,6 @@ def begin_interaction(
 ) -> SceneInteraction | None:
     """Begin an interaction in a settled scene.
 
-    Args:
-        bodies: What is in it.
-        poses: Where each came to rest.
-        kind: What is to happen.
-        rng: Draws who, how high and how fast.
-
     Returns:
         None: there are too few objects, something stands in every path, or nothing here can do
         it: no storm moves anything, no impact reaches the last of the row.

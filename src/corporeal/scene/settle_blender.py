@@ -74,11 +74,6 @@ def drop_in_blender(
 ) -> DroppedBodies:
     """Drop bodies and wait until all are at rest; not the same bits on every machine.
 
-    Args:
-        bodies: What falls.
-        poses: Where from, free of each other and of the floor.
-        config: The program, and when it is over.
-
     Raises:
         BlenderError: BlenderProc is not installed, fails, takes too long or writes nonsense.
 

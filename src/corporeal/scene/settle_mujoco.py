@@ -87,14 +87,7 @@ class DroppedBodies:
 def drop_in_mujoco(
     bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], config: DropConfig = DEFAULT_DROP_CONFIG
 ) -> DroppedBodies:
-    """Drop bodies and wait until all are at rest.
-
-    Args:
-        bodies: What falls.
-        poses: Where from, free of each other and of the floor.
-        config: When it is over.
-
-    """
+    """Drop bodies and wait until all are at rest."""
     engine = MujocoScene(bodies, poses, config.step)
     _step_until_rest(engine, config, config.longest, config.calm_after)
     engine.let_roll()

@@ -27,15 +27,7 @@ class SceneWithMaterials:
 def add_vessel_contents(
     scene: Scene, parts: Parts, field: MaterialField, contents: Sequence[VesselContents]
 ) -> SceneWithMaterials:
-    """Return a scene with the contents of its vessels as last objects; their walls are empty.
-
-    Args:
-        scene: Without them.
-        parts: Of that scene.
-        field: Materials and contents of its parts.
-        contents: From ``Particles.contents``.
-
-    """
+    """Return a scene with the contents of its vessels as last objects; their walls are empty."""
     whole = SceneWithMaterials(scene, parts, field)
     for one in contents:
         whole = SceneWithMaterials(

@@ -82,13 +82,7 @@ class FactExpectation:
 
 
 def compare_with_expectations(name: str, outcome: Outcome) -> list[Expectation]:
-    """Compare what happened with what must be seen in a scene; empty for scenes of others.
-
-    Args:
-        name: The scene's name.
-        outcome: What happened in it.
-
-    """
+    """Compare what happened with what must be seen in a scene; empty for scenes of others."""
     return [demand.compare(outcome) for demand in SCENE_EXPECTATIONS.get(name, ())]
 
 

@@ -73,15 +73,7 @@ FIXED_MOTION = _ImpactMotion(np.zeros(3), 0.0, np.zeros((3, 3)), np.zeros(3))
 def predict_breakage(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> tuple[PredictedBreakage, ...]:
-    """Predict breakage of every brittle rigid part by its hardest first impact; of fractured ones, by that.
-
-    Args:
-        scene: What was simulated.
-        particles: Its material points.
-        field: What every part is made of.
-        trajectory: How they moved, with the ledger.
-
-    """
+    """Predict breakage of every brittle rigid part by its hardest first impact; of fractured ones, by that."""
     found = {one.part: fracture_event_of(one, scene, field) for one in trajectory.breaks}
     pieces = piece_objects(trajectory.breaks, len(scene.objects))
     for impact in first_impacts(scene, particles, field, trajectory):

@@ -35,15 +35,7 @@ class FractureState:
         return slice(first, first + counts[body])
 
     def with_pieces(self, one: FractureEvent, split: BodySplit, problem: Problem, now: Snapshot) -> "FractureState":
-        """Return the state with the fragments of a body as objects.
-
-        Args:
-            one: The fracture.
-            split: The same of the problem before.
-            problem: In which the pieces are bodies.
-            now: Where particles were just before.
-
-        """
+        """Return the state with the fragments of a body as objects."""
         posed, body, more = self.posed, split.body, split.count - 1
         count = len(self.scene.objects)
         mine = self.rows(body)

@@ -70,14 +70,7 @@ class TrackedSurface:
 
 
 def surface_pairs(scene: Scene, particles: Particles, trajectory: Trajectory) -> tuple[SurfacePairCheck, ...]:
-    """Measure every two objects that came near each other, in the scene's order.
-
-    Args:
-        scene: Its surfaces are those at time 0.
-        particles: The material points.
-        trajectory: How they moved.
-
-    """
+    """Measure every two objects that came near each other, in the scene's order."""
     shown = {s.object for s in scene.surfaces if len(s.triangles)}
     close = [p for p in _close_pairs(particles, trajectory) if shown.issuperset(p)]
     coats = {k: _tracked_surface(scene, particles, k) for k in sorted({b for p in close for b in p})}

@@ -14,13 +14,7 @@ GENERATION_HEADER = "X-Generation"
 
 
 def asset_routes(things: LiveAssets, room: LiveSession) -> tuple[BaseRoute, ...]:
-    """Return the routes.
-
-    Args:
-        things: Droppable objects.
-        room: The live simulation.
-
-    """
+    """Return the routes."""
 
     async def listed(request: Request) -> Response:
         return JSONResponse(await run_in_threadpool(things.listed))

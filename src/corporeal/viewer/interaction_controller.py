@@ -206,12 +206,7 @@ class InteractionController:
     # ---------------------------------------------------------------- objects that are added
 
     def top(self, order: Command) -> float:
-        """Return how high material reaches under an object that is to be added [m].
-
-        Args:
-            order: Which object; it points at the middle.
-
-        """
+        """Return how high material reaches under an object that is to be added [m]."""
         low, high = self._growing.reach(order.thing, drop_height(order))
         wide, place = MIN_CLEARANCE_DX * self.engine.problem.cell, self.engine.snapshot().position
         away = place[:, :2] - np.array(order.point[:2])

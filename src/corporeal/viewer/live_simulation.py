@@ -58,14 +58,7 @@ def no_assets(name: str) -> SceneWithMaterials:
 
 
 def live_editor_of(made: LiveInput, threads: int, find: AssetFinder = no_assets) -> LiveEditor:
-    """Fill a scene again for what can be simulated in real time.
-
-    Args:
-        made: The run.
-        threads: Of the engine.
-        find: Gives by its name what may be dropped into it.
-
-    """
+    """Fill a scene again for what can be simulated in real time."""
     old, assembled = made.results, made.results.assembled
     scene = with_wind_faces(assembled.scene)
     demand = LiveDemand.of(old.particles, made.detail, measure_step_cost(old.prepared, made.engine))
@@ -387,13 +380,7 @@ class LiveSession:
     """The one live simulation of a server, of whichever run was asked for last."""
 
     def __init__(self, read: Callable[[str], LiveInput], find: AssetFinder = no_assets) -> None:
-        """Hold none yet.
-
-        Args:
-            read: Gives by its name what a run's stages made.
-            find: Gives by its name what may be dropped.
-
-        """
+        """Hold none yet."""
         self.read, self.find, self.lock = read, find, threading.Lock()
         self.name = ""
         self.live: LiveSimulation | None = None

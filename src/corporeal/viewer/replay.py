@@ -64,16 +64,7 @@ def read_record(path: Path) -> InteractionRecord:
 
 
 def write_replays(place: Path, progress: Progress, run: Path, kept: Path, beside: Sequence[Path] = ()) -> None:
-    """Do again what a record says with both contacts; write ``multi.take``, ``single.take``.
-
-    Args:
-        place: Folder to write to.
-        progress: Called with the fraction done and what is done.
-        run: That was touched.
-        kept: File of the record.
-        beside: Runs whose objects were dropped.
-
-    """
+    """Do again what a record says with both contacts; write ``multi.take``, ``single.take``."""
     done = read_record(kept)
     progress(0.0, "filling the scene as finely as a draft")
     settings = read_run_request(run).settings
@@ -132,14 +123,6 @@ def replay_frames(
 
     All frames hold all that is there in the end: until it is dropped, an object waits where it will begin, and a page
     hides it.
-
-    Args:
-        growth: The scene.
-        contact: As in reality, or the control.
-        done: What to do.
-        tell: Called with the fraction done.
-        engine: The name of the engine.
-
     """
     posed = growth.at(()).posed
     whole = growth.at(tuple(one for _, one in drop_events(done))).prepared.particles

@@ -12,12 +12,7 @@ class SnapshotFrames:
     """Puts an engine's particles back into the order in which the scene was filled."""
 
     def __init__(self, posed: ModelMapping) -> None:
-        """Remember the order.
-
-        Args:
-            posed: What the engine was given.
-
-        """
+        """Remember the order."""
         self.stress = VonMises(posed.problem)
         self.place = np.empty_like(posed.order)
         self.place[posed.order] = np.arange(len(posed.order))

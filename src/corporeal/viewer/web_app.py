@@ -38,14 +38,7 @@ class SiteOptions:
 
 
 def make_app(shown: SiteOptions, door: AccessPolicy, more: tuple[BaseRoute, ...] = ()) -> Starlette:
-    """Return the application.
-
-    Args:
-        shown: The runs.
-        door: Who may come in.
-        more: Routes of what runs: jobs, uploads, live simulations.
-
-    """
+    """Return the application."""
     pages = _Pages(shown)
     routes = [
         Route("/", pages.first),

@@ -127,14 +127,7 @@ def merge_pieces(name: str, pieces: Sequence[PartDescription]) -> PartDescriptio
 def complete_from_file(
     answered: PartDescription, file: PartDescription, walled: Callable[[str], bool]
 ) -> PartDescription:
-    """Take the material from the file if the model could not name it.
-
-    Args:
-        answered: What the model answered.
-        file: What the file's metadata says of the same part.
-        walled: Whether wall thicknesses of a material were measured.
-
-    """
+    """Take the material from the file if the model could not name it."""
     if answered.material is not None:
         return answered
     why = f"{answered.reason.rstrip('. ')}. " if answered.reason else ""

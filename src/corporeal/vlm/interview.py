@@ -230,14 +230,7 @@ class Interview:
         shape: type[FractionAnswer] | type[ValueAnswer],
         odd: Callable[[FractionAnswer | ValueAnswer], Sequence[str]],
     ) -> tuple[FractionAnswer | ValueAnswer, LookingSource] | None:
-        """Ask question 3, once more where the values do not fit each other; None: no answer.
-
-        Args:
-            offers: Part → what its quantities can be.
-            shape: Whether fractions or values are asked for.
-            odd: Says what does not fit in an answer.
-
-        """
+        """Ask question 3, once more where the values do not fit each other; None: no answer."""
         reply = self._placement(offers, shape, {})
         problems = odd(reply.answer) if reply else ()
         if reply and problems:

@@ -97,11 +97,6 @@ class PhotoInterview:
     ) -> list[int | None] | None:
         """Ask which object each painted region is.
 
-        Args:
-            pictures: Each one followed by itself with painted regions.
-            colours: Of the regions.
-            objects: What there is.
-
         Returns:
             Per region the place of its object, or None where it is none of them; None: no answer.
 
@@ -166,14 +161,7 @@ def object_from_name(source: str) -> SeenObject | None:
 
 
 def named_object_note(source: str, seen: SeenObject, name: str) -> str:
-    """Note that the object was named after the pictures' folder, with advice.
-
-    Args:
-        source: Name of the pictures.
-        seen: The assumed object, with its extent if assumed.
-        name: What it is called in the scene.
-
-    """
+    """Note that the object was named after the pictures' folder, with advice."""
     size, more = "", ""
     if seen.extent is not None:
         usually = with_article(seen.class_name, "usually is", "usually are")
@@ -187,13 +175,7 @@ def named_object_note(source: str, seen: SeenObject, name: str) -> str:
 
 
 def class_extent_note(objects: Sequence[SeenObject], names: Sequence[str]) -> str:
-    """Note that a size was assumed, with advice.
-
-    Args:
-        objects: What there is, as far as it is known.
-        names: What they are called in the scene.
-
-    """
+    """Note that a size was assumed, with advice."""
     sized = [(o, name) for o, name in zip(objects, names, strict=True) if o.extent is not None]
     usually = (with_article(one.class_name, "usually is", "usually are") for one, _ in sized)
     large = (f"{u}, {length_text(one.extent or 0)}" for u, (one, _) in zip(usually, sized, strict=True))

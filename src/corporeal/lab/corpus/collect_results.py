@@ -201,14 +201,7 @@ def _launched_objects(scene: Path) -> list[str]:
 
 
 def scene_measures(audit: RunAudit, kind: InteractionKind, sent: Sequence[str] = ()) -> SceneMeasures:
-    """Condense an audit into the numbers that scenes are compared by.
-
-    Args:
-        audit: Of a finished run.
-        kind: What was to happen.
-        sent: Objects that were sent off at the start.
-
-    """
+    """Condense an audit into the numbers that scenes are compared by."""
     happened, wanted = audit.outcome, audit.expectations
     objects, wrong = happened.objects.values(), breach_messages(audit)
     first = happened.duration_s / max(1, audit.frames - 1)

@@ -245,11 +245,6 @@ def with_wind(
     A scene in which it would move nothing changes its interaction with another one, of as many objects where there is
     one; where none can, its objects fall instead.
 
-    Args:
-        kinds: What is to happen in every scene.
-        sets: The models of every scene.
-        windy: Says what the wind can move.
-
     Returns:
         What happens, and messages about what was changed.
 

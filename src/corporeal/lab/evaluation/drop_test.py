@@ -58,10 +58,6 @@ def drop_scene(row: MeasuredRebound) -> Scene:
 def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
     """Drop one object and watch until it has left what it struck.
 
-    Args:
-        row: What, from how high, on what.
-        settings: Of every stage; the floor is the row's.
-
     Raises:
         UserError: The settings don't go with it, or the simulation cannot go on.
 

@@ -185,14 +185,7 @@ def rigid_state(body: Body) -> np.ndarray:
 
 
 def rigid_body(state: np.ndarray, start: np.ndarray, points: np.ndarray) -> rigid.RigidBody:
-    """Read a rigid state.
-
-    Args:
-        state: Now.
-        start: The same body's at the start.
-        points: What ``rigid_points`` gave.
-
-    """
+    """Read a rigid state."""
     return rigid.RigidBody(
         mass=float(state[0]),
         centre=state[CENTRE : CENTRE + 3],

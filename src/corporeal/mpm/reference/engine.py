@@ -60,13 +60,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
     name = "reference"
 
     def __init__(self, problem: Problem, threads: int | None = None) -> None:
-        """Put all particles into one list.
-
-        Args:
-            problem: What to simulate.
-            threads: As every engine takes them; one is used.
-
-        """
+        """Put all particles into one list."""
         self.problem = problem
         self.steps = StepStatistics()
         self.matter = ParticleConstants.of(problem)

@@ -140,14 +140,7 @@ def compose(
 
 
 def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: Weigh) -> bool:
-    """Return whether wind could move any object of a scene, standing alone.
-
-    Args:
-        assets: Assets of the scene.
-        config: How large objects are.
-        weigh: Returns the mass properties of an object.
-
-    """
+    """Return whether wind could move any object of a scene, standing alone."""
     real = [s.extent for s in _asset_sizes(assets, config)]
     for asset, size, extent in zip(assets, real, scene_extents(real, config.sizing), strict=True):
         points, triangles, _ = _shape(asset, float(extent))

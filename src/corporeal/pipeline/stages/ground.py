@@ -376,15 +376,7 @@ def pair_coefficients(
     structures: Sequence[Structure],
     config: GroundConfig = DEFAULT_CONFIG,
 ) -> PairCoefficients:
-    """Look up friction and restitution of all pairs of parts, and of each with the floor.
-
-    Args:
-        words: Descriptions of all parts.
-        made: Its material.
-        structures: Their structures.
-        config: Which library, and what the floor is made of.
-
-    """
+    """Look up friction and restitution of all pairs of parts, and of each with the floor."""
     surfaces, bodies = [_entry(w, config) for w in words], [*made, _floor(config)]
     surfaces.append(library_entry(config.floor, config.library))
     solid = [*(s.kind == "solid" for s in structures), True]

@@ -43,15 +43,7 @@ vote."""
 def hull_cells_seen_past(
     views: Views, masks: Bool[np.ndarray, "V H W"], hull: VisualHull, pool: ThreadPool
 ) -> Bool[np.ndarray, "X Y Z"]:
-    """Return which cells of a hull more views see past than see something in.
-
-    Args:
-        views: Posed pictures.
-        masks: Pixels on objects.
-        hull: What masks allow.
-        pool: Threads.
-
-    """
+    """Return which cells of a hull more views see past than see something in."""
     looks = HullStereoImages(views, masks)
     # Of plain faces few views know a depth. One without support stays, since what it empties is voted on once more,
     # cell by cell.
@@ -85,14 +77,7 @@ class HullStereoImages:
         self.on = self._at_looks(masks, self.every)
 
     def depths(self, hull: VisualHull, confirmed: int, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
-        """Return how deep views see within a hull [m]; inf: unknown or contradicted.
-
-        Args:
-            hull: What masks allow.
-            confirmed: Other views that must see the same.
-            pool: Threads.
-
-        """
+        """Return how deep views see within a hull [m]; inf: unknown or contradicted."""
         found = np.full((len(self.cameras), *self.grid), np.inf)
         for k, depth in enumerate(found):
             self.fill(k, depth, hull, pool)

@@ -46,12 +46,6 @@ def shaded_floor(views: Views, floor: GroundPlane | None, around: ViewedRegion) 
     """Return which pixels show the floor's own colour, or a shade of it, on the floor.
 
     None where the floor is unknown, or where it is grey.
-
-    Args:
-        views: The pictures.
-        floor: The plane that objects stand on, its normal up.
-        around: The ball that all look at.
-
     """
     nowhere = np.zeros(views.rgb.shape[:3], np.bool_)
     if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:

@@ -47,14 +47,7 @@ DEFAULT_FLOOR_SWEEP = FloorSweepConfig()
 def sweep_floor_plane(
     views: Views, around: ViewedRegion, config: FloorSweepConfig = DEFAULT_FLOOR_SWEEP
 ) -> GroundPlane | None:
-    """Return the level plane on which views see one pattern; None: there is none, or no up.
-
-    Args:
-        views: The pictures.
-        around: The ball that all look at.
-        config: Which planes are tried.
-
-    """
+    """Return the level plane on which views see one pattern; None: there is none, or no up."""
     found = estimate_up_direction(views.cameras)
     if found.sure < MIN_UP_AGREEMENT:
         return None

@@ -23,13 +23,7 @@ class MaskAttachments:
 
 
 def find_mask_attachments(stands: StandingRegions, masks: Bool[np.ndarray, "V H W"]) -> MaskAttachments | None:
-    """Find what hangs on masks; None: nothing does.
-
-    Args:
-        stands: All that stands on the floor.
-        masks: What was taken for objects.
-
-    """
+    """Find what hangs on masks; None: nothing does."""
     room, own = stands.room, stands.room.carved(masks)
     whole, _ = room.pieces(stands.cells | own)
     joined = np.isin(whole, whole[own])

@@ -20,13 +20,7 @@ MASK_THRESHOLD = 0.5
 
 
 def faint_outline_fraction(rgb: UInt8[np.ndarray, "V H W 3"], inside: Float32[np.ndarray, "V H W"]) -> float:
-    """Return along which share of the outlines no edge is seen, the median of all views.
-
-    Args:
-        rgb: The pictures.
-        inside: How far each pixel is inside masks.
-
-    """
+    """Return along which share of the outlines no edge is seen, the median of all views."""
     shares = []
     for picture, mask in zip(rgb, inside > MASK_THRESHOLD, strict=True):
         box = find_objects(mask.astype(np.uint8))

@@ -28,11 +28,6 @@ def reduce_features(features: Float[np.ndarray, "N D"], channels: int = 64) -> F
     |x_i - x_j|² is nearly 2 (1 - cos) of the features i and j: all of it where D ≤ channels, and
     else all but what the axes left out had of it. Rows of zeros are taken as zeros. Features may be in half precision,
     and are only ever widened ``ROWS_PER_BATCH`` rows at a time.
-
-    Args:
-        features: Of any length.
-        channels: How many axes are kept.
-
     """
     count, depth = features.shape
     every = np.linspace(0, count - 1, min(count, AXES_SAMPLE_ROWS)).astype(np.int64)

@@ -16,13 +16,7 @@ DRAWN_RADII = 3.0
 
 
 def cameras_figure(seen: PosedPhotos, path: Path) -> None:
-    """Draw where photographs were taken from.
-
-    Args:
-        seen: Photographs with their cameras and sparse points.
-        path: A PNG.
-
-    """
+    """Draw where photographs were taken from."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
     from matplotlib.figure import Figure
 

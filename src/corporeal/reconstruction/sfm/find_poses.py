@@ -167,13 +167,7 @@ def find_poses(source: Path, folder: Path, progress: Progress) -> FoundPoses:
 
 
 def describe_moved_object(posed: FoundPoses, masks: Path) -> str | None:
-    """Return in a clause that an object did not keep its place in what is around it; None: it did.
-
-    Args:
-        posed: Poses that were found from whole pictures.
-        masks: Of the object, under the names of these.
-
-    """
+    """Return in a clause that an object did not keep its place in what is around it; None: it did."""
     share = hull_fill_fraction(posed.folder / "sparse" / "0", masks)
     if share >= MIN_MASK_FILLED_FRACTION:
         return None

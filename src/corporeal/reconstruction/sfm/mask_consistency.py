@@ -74,11 +74,6 @@ def hull_fill_fraction(place: Path, masks: Path) -> float:
     Of all in small pictures, or of the others in larger ones, whichever is more: a thin object is lost in the former (a
     guitar under right poses .84 and .99), and to small errors of poses in the latter; an axe head that was turned over
     has .86 and .82.
-
-    Args:
-        place: Holds the model.
-        masks: PNG pictures with the names of its pictures.
-
     """
     compared = _masked_cameras(place, masks)
     if compared is None:

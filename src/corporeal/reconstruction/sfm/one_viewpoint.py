@@ -82,14 +82,7 @@ def _rotation_error(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], fo
 def describe_one_viewpoint(
     joined: Bool[np.ndarray, "N N"], same: Bool[np.ndarray, "N N"], by: str = "a shift, a turn and a scale alone"
 ) -> str | None:
-    """Return in a clause that most of N pictures are from one place, if they are.
-
-    Args:
-        joined: Which two share points.
-        same: Which two were taken from one viewpoint.
-        by: What these differ by, in words.
-
-    """
+    """Return in a clause that most of N pictures are from one place, if they are."""
     pairs, alike = (int(np.triu(which, 1).sum()) for which in (joined, joined & same))
     if pairs < MIN_PAIRS or alike < MIN_EXPLAINED_PAIRS_FRACTION * pairs:
         return None

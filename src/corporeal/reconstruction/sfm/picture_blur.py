@@ -28,13 +28,7 @@ MIN_EDGE_SLOPE = 0.05
 
 
 def blurred_pictures(folder: Path, names: Sequence[str]) -> tuple[str, ...]:
-    """Return which pictures are heavily blurred.
-
-    Args:
-        folder: Holds them.
-        names: Of all that are looked at.
-
-    """
+    """Return which pictures are heavily blurred."""
     found = []
     for name in names:
         with Image.open(folder / name) as picture:

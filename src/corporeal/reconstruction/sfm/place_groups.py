@@ -95,12 +95,7 @@ class PlaceGroups:
 
 
 def place_groups(shared: Int[np.ndarray, "N N"]) -> PlaceGroups:
-    """Return the groups of pictures that are joined well within and not at all with one another.
-
-    Args:
-        shared: Points that each two pictures share.
-
-    """
+    """Return the groups of pictures that are joined well within and not at all with one another."""
     joined = shared >= MIN_SHARED_POINTS
     _, label = connected_components(csr_array(joined), directed=False)
     least = max(MIN_GROUP_PICTURES, MIN_GROUP_FRACTION * len(shared))
@@ -129,12 +124,7 @@ def copies_share_enough(shared: Int[np.ndarray, "N N"], sizes: Sequence[tuple[in
 
 
 def hopelessness_reason(shared: Int[np.ndarray, "N N"]) -> str | None:
-    """Return in a clause why a long search cannot find poses; None: it may.
-
-    Args:
-        shared: Points that each two pictures share.
-
-    """
+    """Return in a clause why a long search cannot find poses; None: it may."""
     joined = int((shared >= MIN_SHARED_POINTS).any(axis=1).sum())
     if joined >= MIN_JOINED_FRACTION * len(shared):
         return None

@@ -201,13 +201,6 @@ def _cropping_note(sizes: Sequence[tuple[int, int]]) -> list[str]:
 def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], twins: int) -> None:
     """Reject what shows too little; that some show the same as others says nothing against these.
 
-    Args:
-        source: The folder.
-        good: Photographs that can be used.
-        asked: Those that were looked at.
-        bad: Why the others cannot be used.
-        twins: How many of them show the same as others.
-
     Raises:
         BadFileError: Too few are left, or most are broken or blank.
 

@@ -30,12 +30,7 @@ UNCROPPED_HINT = "Use the original photographs; crop none, or all in the same wa
 
 
 def principal_point_spread(place: Path) -> float:
-    """Return how far apart the middles of lenses lie, in the longer side; 0: pictures are whole.
-
-    Args:
-        place: A COLMAP model.
-
-    """
+    """Return how far apart the middles of lenses lie, in the longer side; 0: pictures are whole."""
     pycolmap = require_pycolmap()
     model = _one_camera_per_picture(pycolmap, pycolmap.Reconstruction(str(place)))
     adjust_bundle(pycolmap, model, of_lens="nothing")  # as they are found, points on edges count less

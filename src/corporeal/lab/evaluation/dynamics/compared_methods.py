@@ -25,14 +25,7 @@ NUMBERS_FILE = "dynamics.json"
 
 
 def run_folder(out: Path, scene: str, method: str) -> Path:
-    """Return the folder of one method's run of one scene.
-
-    Args:
-        out: Of the evaluation.
-        scene: Its name.
-        method: ``OURS_NAME`` or one of ``BASELINE_NAMES``.
-
-    """
+    """Return the folder of one method's run of one scene."""
     return out / scene / method
 
 

@@ -106,14 +106,7 @@ class DynamicsSummary:
 def summarise_dynamics(
     scenes: Sequence[EvaluatedScene], comparison: MethodComparison, errors: Mapping[str, str]
 ) -> DynamicsSummary:
-    """Read all runs that are finished and compare them.
-
-    Args:
-        scenes: All that are evaluated.
-        comparison: Who is compared with what.
-        errors: Name of a failed job → why.
-
-    """
+    """Read all runs that are finished and compare them."""
     done = {job.name for job in dynamics_jobs(scenes, comparison) if job.done}
     state = _EvaluationState(comparison, done, errors)
     methods = [m.name for m in comparison.methods]

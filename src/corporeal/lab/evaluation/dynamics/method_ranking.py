@@ -24,12 +24,7 @@ class RankCorrelation:
 
 
 def rank_correlation(groups: Iterable[Sequence[RankedPair]]) -> RankCorrelation:
-    """Correlate the ranks of x and y within each group, all groups counted together.
-
-    Args:
-        groups: Of (x, y).
-
-    """
+    """Correlate the ranks of x and y within each group, all groups counted together."""
     balance = untied_x = untied_y = 0
     for group in groups:
         for (a, b), (c, d) in combinations(group, 2):
