@@ -1,10 +1,8 @@
 """The public names: few, loaded when used, never shadowed, and clear about bad input."""
 
-import ast
 import pkgutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -59,18 +57,6 @@ def test_every_public_name_can_be_loaded_and_is_listed():
 
 def test_no_public_name_is_that_of_a_module_of_the_package():
     assert not set(co.__all__) & {module.name for module in pkgutil.iter_modules(co.__path__)}
-
-
-def test_type_checkers_see_the_names_that_are_loaded():
-    tree = ast.parse(Path(co.__file__).read_text())
-    (block,) = [node for node in tree.body if isinstance(node, ast.If)]
-    seen = {
-        alias.asname or alias.name: f"{line.module.removeprefix('corporeal.')}:{alias.name}"
-        for line in block.body
-        if isinstance(line, ast.ImportFrom) and line.module
-        for alias in line.names
-    }
-    assert seen == co._HOME
 
 
 def test_an_unknown_name_is_an_attribute_error():
