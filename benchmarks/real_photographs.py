@@ -33,6 +33,7 @@ import real_measures as measure
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.core.terminal import progress_bars, show_table
 from corporeal.pipeline.stages.reconstruct import ReconstructedScene, reconstruct
 from corporeal.reconstruction.gaussian_source import OBJECT_POSES_FOLDER
@@ -63,7 +64,6 @@ NOTES = Path(__file__).with_name("photograph_notes.toml")
 """For each kind of page: what stands in its head (``page``), and beside sets by name (``sets``)."""
 EVERY = 2.0
 """Between two readings of the clock that are kept [s]."""
-Progress = Callable[[float, str], None]
 
 
 class Clock:

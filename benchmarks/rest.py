@@ -26,10 +26,11 @@ import numpy as np
 from rich.console import Console
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.discretization.discretization_plan import DetailLevel
 from corporeal.geometry.rotation import fit_rigid_motion
 from corporeal.io.scene_toml import SceneFile, write_scene_file
-from corporeal.pipeline.run_pipeline import Progress, Settings, open_run
+from corporeal.pipeline.run_pipeline import Settings, open_run
 from corporeal.pipeline.stages.assemble import AssembleConfig
 from corporeal.pipeline.stages.fill import FillConfig
 from corporeal.simulation.audit_file import read_audit

@@ -30,7 +30,7 @@ from corporeal.pipeline.run_pipeline import Settings, run
 from corporeal.simulation.checkpoint import CheckpointConfig, Checkpoints
 often = CheckpointConfig(min_interval_s=0.05, max_write_time_fraction=1.0)
 simulate.Checkpoints = partial(Checkpoints, config=often)
-silent = lambda fraction, words: None
+silent = no_progress
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
 slow_to_import = {"trimesh", "networkx", "matplotlib", "scipy.cluster", "torch", "pydantic_ai"}
 assert not slow_to_import & set(sys.modules), slow_to_import & set(sys.modules)

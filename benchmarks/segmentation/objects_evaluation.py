@@ -7,7 +7,7 @@ nearest neighbours, the rule of published pipelines.
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Camera, FeatureCloud, Gaussians, Scene, Views
 from corporeal.geometry.gaussian_transforms import gaussian_subset
 from corporeal.geometry.mesh import join_meshes
@@ -51,7 +52,6 @@ from corporeal.reconstruction.segment.object_segmentation import (
 from corporeal.reconstruction.surface.free_space import pieces_by_free_space
 from segmentation.segmentation_scores import matched_iou
 
-Progress = Callable[[float, str], None]
 TOUCHING_EXTENT_RATIO = 0.002
 """Objects touch that are nearer than this, as a share of the scene's extent."""
 MAX_SURFACE_POINTS = 60_000
@@ -129,7 +129,7 @@ class ObjectsResult:
 
 
 def evaluate_objects(
-    folder: Path, config: ObjectsEvaluationConfig = DEFAULT_CONFIG, progress: Progress = lambda share, words: None
+    folder: Path, config: ObjectsEvaluationConfig = DEFAULT_CONFIG, progress: Progress = no_progress
 ) -> list[ObjectsResult]:
     """Segment every scene of a folder into objects, and compare with the truth.
 

@@ -6,7 +6,7 @@ from the pictures, as points of photographs do. Which node or material a point i
 
 import time
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Int
 
 from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import FeatureCloud, Inventory, PartDescription, Scene, Views
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.geometry.mesh import join_meshes
@@ -116,9 +117,6 @@ class FeatureModels:
     """None: no model compares points with words."""
 
 
-Progress = Callable[[float, str], None]
-
-
 @dataclass(frozen=True)
 class PartsMethod:
     """How parts are looked for."""
@@ -142,7 +140,7 @@ class PartsResult:
 
 
 def evaluate_parts(
-    folder: Path | None, names: PartNames, how: PartsMethod, progress: Progress = lambda share, text: None
+    folder: Path | None, names: PartNames, how: PartsMethod, progress: Progress = no_progress
 ) -> list[PartsResult]:
     """Find the parts of every model that has several, and compare.
 

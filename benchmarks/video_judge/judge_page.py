@@ -1,12 +1,13 @@
 """Report of a judged evaluation: detection rates first, then all videos."""
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.store import write_bytes
 from corporeal.lab.evaluation.result_table import ResultTable
 from corporeal.render.html_page import data_url, escape_html, fill_page, html_figure
@@ -15,16 +16,13 @@ from video_judge.detectability import VideoVerdict
 from video_judge.judge_query import JudgeVerdicts
 from video_judge.judge_tables import JudgeResult, judge_tables
 
-Progress = Callable[[float, str], None]
 PICTURES_PER_VIDEO = 6
 """Pictures of a video on the page."""
 JPEG_QUALITY = 80
 """Of their JPEG."""
 
 
-def write_judge_page(
-    judged: JudgeVerdicts, result: JudgeResult, path: Path, progress: Progress = lambda fraction, words: None
-) -> None:
+def write_judge_page(judged: JudgeVerdicts, result: JudgeResult, path: Path, progress: Progress = no_progress) -> None:
     """Write the page; ``PICTURES_PER_VIDEO`` pictures of every video's first look are rendered for it.
 
     Args:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.vlm import LIVE_CLIENTS, Reply, UnansweredError, VlmClient, connect_vlm
 from corporeal.vlm.human_client import PendingQuestionsError, refuse_pending
 from corporeal.vlm.thread_map import thread_map
@@ -12,7 +13,6 @@ from video_judge.judge_scenes import JudgeConfig, JudgedVideos, check_judging
 from video_judge.subquestions import Verdict
 from video_judge.video_question import JudgingCost, VideoQuestion, estimate_cost
 
-Progress = Callable[[float, str], None]
 CONFIRM_ABOVE_USD = 5.0
 """Above this cost ``--yes`` is required [US$]."""
 MAX_PARALLEL_QUESTIONS = 4
@@ -37,7 +37,7 @@ def query_judge(
     videos: JudgedVideos,
     config: JudgeConfig,
     say: Callable[[str], None],
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
     judge: VlmClient | None = None,
 ) -> JudgeVerdicts:
     """Ask about all videos, each in a conversation of its own, in an order that tells nothing.

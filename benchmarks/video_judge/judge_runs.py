@@ -5,13 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.lab.evaluation.dynamics.compared_methods import BASELINE_NAMES, OURS_NAME, reference_folder, run_folder
 from corporeal.pipeline.run_pipeline import RUN_FILE
 from video_judge.judge_query import JudgeVerdicts, check_judging, query_judge
 from video_judge.judge_scenes import JudgeConfig, SceneRuns, gather_videos
 from video_judge.judge_tables import JudgeResult, weigh_judge
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)

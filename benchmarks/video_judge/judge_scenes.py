@@ -1,6 +1,6 @@
 """All videos of several scenes: references, controls and methods, ready to be asked about."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from corporeal.core.audit_data import Audit
 from corporeal.core.errors import UserError, check_range
+from corporeal.core.progress import Progress, no_progress
 from corporeal.lab.evaluation.dynamics.compared_methods import OURS_NAME
 from corporeal.materials import find_material_or_default
 from corporeal.pipeline import run_pipeline
@@ -29,7 +30,6 @@ from video_judge.simulated_controls import SIMULATED_CONTROLS, simulate_control
 from video_judge.video_motion import VideoMotion, motion_of_run
 from video_judge.video_question import VideoQuestion, video_question
 
-Progress = Callable[[float, str], None]
 REFERENCE_METHOD = OURS_NAME
 CONTROL_NAMES = (*EDITED_CONTROLS, *SIMULATED_CONTROLS)
 DEFAULT_CONTROL_SCENES = 12
@@ -117,7 +117,7 @@ def check_judging(config: JudgeConfig) -> None:
 
 
 def gather_videos(
-    scenes: Sequence[SceneRuns], out: Path, config: JudgeConfig, progress: Progress = lambda fraction, words: None
+    scenes: Sequence[SceneRuns], out: Path, config: JudgeConfig, progress: Progress = no_progress
 ) -> JudgedVideos:
     """Make all videos: read runs back, simulate and edit controls.
 

@@ -4,7 +4,6 @@
 and soft materials. Each is an ordinary run in a folder of its own, so what is finished is not done again.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,7 +17,6 @@ from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
 from corporeal.simulation.simulation_result import SimulationResult
 
-Progress = Callable[[float, str], None]
 SIMULATED_CONTROLS = ("halfgravity", "wrong", "single", "capped")
 REMAINING_GRAVITY_FRACTION = 0.5
 """Of gravity that is left in the control "halfgravity" [-]."""

@@ -6,6 +6,10 @@ Progress = Callable[[float, str], None]
 """Called with the fraction done and a description."""
 
 
+def no_progress(fraction: float, words: str) -> None:
+    """Tell nobody."""
+
+
 def subprogress(progress: Progress, begin: float, end: float, what: str = "") -> Progress:
     """Tell of a part of the work as of the whole.
 

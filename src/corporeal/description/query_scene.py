@@ -13,6 +13,7 @@ from importlib.resources import files
 import numpy as np
 
 from corporeal import materials
+from corporeal.core.progress import Progress
 from corporeal.core.types import (
     Inventory,
     MassEvidence,
@@ -173,7 +174,6 @@ def placements_from_answer(
 
 
 INTERVIEW_TASKS = ("parts", "ranking", "materials", "thickness", "placement", "mass", "extents")
-ProgressCallback = Callable[[float, str], None]
 
 
 class SceneQuery:
@@ -199,7 +199,7 @@ class SceneQuery:
             partial(has_wall_thickness, library),
         )
 
-    def inventory(self, file: list, annotations: Mapping, progress: ProgressCallback) -> Inventory:
+    def inventory(self, file: list, annotations: Mapping, progress: Progress) -> Inventory:
         """Ask about every object, and about the sizes of all."""
         count = len(self.scene.objects)
         interviews = [self._interview(number) for number in range(count)]

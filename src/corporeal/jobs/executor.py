@@ -5,13 +5,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from corporeal.core.progress import Progress
 from corporeal.jobs.job import (
     CorpusVerb,
     Job,
     JobEvent,
     JobManifest,
     ManifestRow,
-    ProgressCallback,
     WorkerPool,
     WorkerPoolFactory,
     remove_partial_results,
@@ -32,7 +32,7 @@ class Executor:
 
     hire: WorkerPoolFactory
     """Opens the workers."""
-    progress: ProgressCallback
+    progress: Progress
     """Called with the fraction done."""
     say: EventCallback
     """Told what happens."""

@@ -21,10 +21,9 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from corporeal.core import store
+from corporeal.core.progress import Progress
 from corporeal.core.store import disk_errors
 
-ProgressCallback = Callable[[float, str], None]
-"""Called with the fraction done and a description."""
 PARTIAL_FOLDER_SUFFIX = ".part"
 
 
@@ -55,7 +54,7 @@ class Job:
         return store.read_meta(self.folder).seconds
 
 
-def perform_job(job: Job, progress: ProgressCallback) -> None:
+def perform_job(job: Job, progress: Progress) -> None:
     """Do a job in this process."""
     start = time.perf_counter()
     place = job.folder

@@ -17,9 +17,10 @@ from pathlib import Path
 
 from corporeal.core.deserialize import from_plain
 from corporeal.core.process_resources import usable_cores
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.store import disk_errors
 from corporeal.jobs.executor import EventCallback, Executor
-from corporeal.jobs.job import Job, JobEvent, ProgressCallback
+from corporeal.jobs.job import Job, JobEvent
 from corporeal.jobs.worker_process import WorkerMessage, pack_job
 
 LOG_FOLDER = "logs"
@@ -135,7 +136,7 @@ def local_executor(
     folder: str | Path,
     slots: int = 0,
     threads: int = 1,
-    progress: ProgressCallback = lambda fraction, words: None,
+    progress: Progress = no_progress,
     say: EventCallback = lambda words: None,
 ) -> Executor:
     """Let processes of this machine do the jobs of a corpus.

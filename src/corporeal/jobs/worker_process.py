@@ -17,7 +17,8 @@ from dataclasses import asdict, dataclass
 from typing import Literal
 
 from corporeal.core.errors import UserError
-from corporeal.jobs.job import Job, ProgressCallback, perform_job
+from corporeal.core.progress import Progress
+from corporeal.jobs.job import Job, perform_job
 
 EXIT_ABANDONED, EXIT_STOPPED = 3, 130
 """Exit codes."""
@@ -71,7 +72,7 @@ def pack_job(job: Job) -> PackedJob:
     return PackedJob(sys.path, pickle.dumps(job))
 
 
-def attempt_job(packed: PackedJob, progress: ProgressCallback) -> str | None:
+def attempt_job(packed: PackedJob, progress: Progress) -> str | None:
     """Do a packed job; return what went wrong in a sentence, None when nothing did."""
     try:
         sys.path[:] = packed.path
@@ -86,7 +87,7 @@ def attempt_job(packed: PackedJob, progress: ProgressCallback) -> str | None:
     return None
 
 
-def _throttle(say: ProgressCallback) -> ProgressCallback:
+def _throttle(say: Progress) -> Progress:
     """Pass on progress a few times a second at most."""
     last = 0.0
 

@@ -6,10 +6,10 @@
 import shutil
 import tempfile
 import weakref
-from collections.abc import Callable
 from pathlib import Path
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.core.types import Scene
 from corporeal.discretization.build_model import build_model
 from corporeal.geometry.gaussian_transforms import UpAxisChoice, chosen_up_axis
@@ -25,7 +25,6 @@ from corporeal.pipeline.stages.simulate import simulate
 from corporeal.scene.vessel_contents import add_vessel_contents
 from corporeal.simulation.simulation_result import PreparedScene, SimulationResult
 
-Progress = Callable[[float, str], None]
 DEFAULT_SETTINGS = Settings()
 
 

@@ -4,13 +4,14 @@ import resource
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from corporeal import materials
 from corporeal.core import store
 from corporeal.core.audit_data import Audit, Expectation, Outcome, RunAudit
+from corporeal.core.progress import Progress
 from corporeal.core.types import Inventory, Note, Reconstruction, Scene, Video
 from corporeal.discretization.object_scaling import part_scales
 from corporeal.pipeline.results import StageResults
@@ -24,8 +25,6 @@ from corporeal.showcase.scene_expectations import compare_with_expectations
 from corporeal.simulation.audit import reject_expectations
 from corporeal.simulation.audit_file import write_audit
 from corporeal.simulation.run_hints import run_hints
-
-Progress = Callable[[float, str], None]
 
 MAX_VIEW_BYTES = 4_000_000
 """Maximum size of the 3D view in the report [bytes]."""

@@ -18,6 +18,7 @@ from typing import Any, Literal
 from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.core.setting_types import paths_read
 from corporeal.core.types import Inventory, MaterialField, Particles, Parts, Reconstruction, Scene, Trajectory, Video
 from corporeal.geometry.gaussian_transforms import chosen_up_axis
@@ -35,8 +36,6 @@ from corporeal.pipeline.results import RUN_FILES, StageResults
 from corporeal.pipeline.settings import GroundConfig, Settings
 from corporeal.recognition.readable_names import safe_name
 
-Progress = Callable[[float, str], None]
-"""Called with the fraction done and a description."""
 ProgressOfStage = Callable[[str], Progress]
 """Returns the progress callback of a stage."""
 

@@ -5,13 +5,14 @@ A pool is a folder with ``pool.json`` (assets, and rejections with reasons), ``v
 what had to be cleaned, decimated or converted).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.io.load_model import readable_model_formats
 from corporeal.pool import abo, objaverse
 from corporeal.pool.asset_pool import AssetPool, PoolAsset, PoolRejection
@@ -65,7 +66,6 @@ def _of_objaverse(folders: Sequence[Path], wanted: objaverse.WantedModels) -> li
 
 POOL_FILE = "pool.json"
 INDEX_POOL_AGAIN = "Make it again: corporeal assets index FOLDER --pool POOL."
-IndexProgress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def index_pool(
     folders: Sequence[Path],
     pool_folder: Path,
     config: IndexConfig = DEFAULT_INDEX_CONFIG,
-    progress: IndexProgress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> AssetPool:
     """Judge every model below the folders and keep the good ones in the pool.
 

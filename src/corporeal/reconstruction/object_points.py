@@ -10,7 +10,7 @@ from jaxtyping import Int
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
-from corporeal.core.progress import Progress
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import FeatureCloud, Views
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
 from corporeal.reconstruction.features.feature_lifting import LiftedFeatures, known_features, uplift_features
@@ -45,7 +45,7 @@ def radiance_field_points(
     most: int,
     config: RadianceFieldConfig,
     checkpoint: Path | None = None,
-    progress: Callable[[float, str], None] = lambda fraction, words: None,
+    progress: Callable[[float, str], None] = no_progress,
 ) -> tuple[TrainedField, FieldPoints]:
     """Learn a field of the objects, and take points from where it is dense and Gaussians agree.
 

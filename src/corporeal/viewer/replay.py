@@ -15,6 +15,7 @@ import numpy as np
 from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.process_resources import usable_cores
+from corporeal.core.progress import Progress
 from corporeal.core.types import Frame, Particles
 from corporeal.discretization.discretization_plan import QUALITY_PRESETS
 from corporeal.mpm.engines import DEFAULT_ENGINE
@@ -31,7 +32,6 @@ from corporeal.viewer.run_store import RunStore
 from corporeal.viewer.snapshot_frames import SnapshotFrames
 from corporeal.viewer.wind_faces import with_wind_faces
 
-Progress = Callable[[float, str], None]
 Contact = Literal["multi", "single"]
 CONTACT_MODES: tuple[Contact, ...] = ("multi", "single")
 """One velocity field per object, and the control beside."""

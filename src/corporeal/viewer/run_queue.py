@@ -15,7 +15,8 @@ from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
-from corporeal.jobs.job import Job, JobEvent, ProgressCallback
+from corporeal.core.progress import Progress
+from corporeal.jobs.job import Job, JobEvent
 from corporeal.jobs.local_workers import LocalWorkerPool
 from corporeal.pipeline.run_pipeline import Settings, run, stages_for
 
@@ -51,11 +52,11 @@ class JobProgress:
 
 
 def run_in_process(
-    place: Path, progress: ProgressCallback, inputs: list[Path], folder: Path, settings: Settings, until: str
+    place: Path, progress: Progress, inputs: list[Path], folder: Path, settings: Settings, until: str
 ) -> None:
     """Do one run, in a process of its own; every word about progress begins with its stage."""
 
-    def tell(verb: str) -> ProgressCallback:
+    def tell(verb: str) -> Progress:
         return lambda fraction, words: progress(fraction, f"{verb}: {words}")
 
     run(inputs, folder, settings, tell, until)

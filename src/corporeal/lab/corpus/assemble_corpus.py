@@ -18,11 +18,12 @@ import numpy as np
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.io.gltf.gltf_reader import read_gltf_model
 from corporeal.io.photos.transforms_json import write_views
 from corporeal.io.scene_toml import SceneFile, write_scene_file
 from corporeal.jobs.executor import Executor, execute_jobs
-from corporeal.jobs.job import Job, ManifestRow, ProgressCallback
+from corporeal.jobs.job import Job, ManifestRow
 from corporeal.lab.corpus.corpus_plan import (
     PLAN_FILE,
     CorpusConfig,
@@ -211,7 +212,7 @@ def _showcase_job(folder: Path, scene: PlannedScene) -> Job:
 
 
 def compose_scene(
-    folder: Path, progress: ProgressCallback, pool: AssetPool, config: ComposeConfig, capturing: CaptureConfig
+    folder: Path, progress: Progress, pool: AssetPool, config: ComposeConfig, capturing: CaptureConfig
 ) -> None:
     """Compose one scene and take its pictures, in the process of a worker."""
     weigher = partial(asset_mass_properties, folder=pool.folder)
@@ -225,7 +226,7 @@ def compose_scene(
 
 
 def planned_scene(
-    folder: Path, progress: ProgressCallback, pool: AssetPool, config: ComposeConfig, capturing: CaptureConfig
+    folder: Path, progress: Progress, pool: AssetPool, config: ComposeConfig, capturing: CaptureConfig
 ) -> None:
     """Compose a scene of a plan; where it does not come to rest, from other seeds and otherwise.
 
@@ -256,7 +257,7 @@ def fallback_compose_configs(config: ComposeConfig) -> list[ComposeConfig]:
     return same + [replace(config, arrangement=a) for a in others]
 
 
-def showcase_scene(folder: Path, progress: ProgressCallback, name: str) -> None:
+def showcase_scene(folder: Path, progress: Progress, name: str) -> None:
     """Write one scene of the showcase, in the process of a worker."""
     progress(0.0, "building")
     path = run_pipeline.write_showcase(name, folder)

@@ -9,7 +9,7 @@ from typing import Any
 from PIL import Image
 
 from corporeal.core import store
-from corporeal.jobs.job import ProgressCallback
+from corporeal.core.progress import Progress, no_progress
 from corporeal.lab.corpus.collect_results import MIN_WIND_MOTION_M, CorpusResults, SceneRecord, collect_results
 from corporeal.lab.corpus.corpus_breakdown import (
     BreakdownLine,
@@ -44,7 +44,7 @@ BREAKDOWN_COLUMNS = (
 )
 
 
-def report_corpus(folder: Path, progress: ProgressCallback = lambda fraction, words: None) -> list[Path]:
+def report_corpus(folder: Path, progress: Progress = no_progress) -> list[Path]:
     """Write the report beside the scenes; return the files.
 
     Raises:

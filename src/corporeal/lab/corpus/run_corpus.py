@@ -10,8 +10,9 @@ from pathlib import Path
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress
 from corporeal.jobs.executor import Executor, execute_jobs
-from corporeal.jobs.job import Job, ManifestRow, ProgressCallback
+from corporeal.jobs.job import Job, ManifestRow
 from corporeal.lab.corpus.corpus_plan import CorpusPlan, PlannedScene, read_plan
 from corporeal.pipeline import run_pipeline
 from corporeal.pipeline.run_pipeline import Settings
@@ -92,17 +93,17 @@ def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[s
     )
 
 
-def run_scene(folder: Path, progress: ProgressCallback, scene: Path, settings: Settings) -> None:
+def run_scene(folder: Path, progress: Progress, scene: Path, settings: Settings) -> None:
     """Take one scene through the pipeline, in the process of a worker."""
     with store.lock_folder(folder, ORPHAN_WORKER_TIMEOUT_S):
         pass
     run_pipeline.run([scene], folder, settings, _overall_progress(progress))
 
 
-def _overall_progress(progress: ProgressCallback) -> run_pipeline.ProgressOfStage:
+def _overall_progress(progress: Progress) -> run_pipeline.ProgressOfStage:
     """Spread the stages over one bar."""
 
-    def tell(verb: str) -> ProgressCallback:
+    def tell(verb: str) -> Progress:
         low, high = TIME_SHARE_OF_VERB[verb]
         return lambda done, words: progress(low + (high - low) * done, f"{verb} {words}")
 

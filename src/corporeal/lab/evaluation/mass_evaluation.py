@@ -21,6 +21,7 @@ from scipy.spatial import ConvexHull
 
 from corporeal.core import store
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Inventory, PartDescription, Scene
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.geometry.scene_transforms import scale_to_life_size
@@ -203,15 +204,12 @@ class MassComparison:
     """Method → in words."""
 
 
-Progress = Callable[[float, str], None]
-
-
 def predict_masses(
     objects: Sequence[WeighedObject],
     describing: DescribeConfig,
     grounding: GroundConfig,
     config: MassConfig,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> list[MassPrediction]:
     """Predict every object's mass; a model that answers over a network is asked in parallel.
 

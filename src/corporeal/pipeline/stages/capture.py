@@ -3,7 +3,7 @@
 The cameras are spread evenly over a hemisphere, each as near as possible with every object in view. Deterministic.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
@@ -13,14 +13,13 @@ from jaxtyping import Float
 
 from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Camera, Scene, Views
 from corporeal.geometry.scene_transforms import object_boxes
 from corporeal.render.camera_placement import VIEW_DIRECTION, CameraAim, camera_from_aim, fit_cameras_around
 from corporeal.render.embree import first_seen, render_image
 from corporeal.render.kernels_hits import HIT_NOTHING
 from corporeal.render.ray_scene import RayScene, StudioLight
-
-Progress = Callable[[float, str], None]
 
 PICTURE_FILL_FRACTION = 0.9
 """Maximum share of the picture that objects cover."""
@@ -45,9 +44,7 @@ class CaptureConfig:
 DEFAULT_CONFIG = CaptureConfig()
 
 
-def capture(
-    scene: Scene, config: CaptureConfig = DEFAULT_CONFIG, progress: Progress = lambda fraction, words: None
-) -> Views:
+def capture(scene: Scene, config: CaptureConfig = DEFAULT_CONFIG, progress: Progress = no_progress) -> Views:
     """Render views of a scene and its floor from a hemisphere.
 
     Raises:
@@ -64,7 +61,7 @@ def render_views(
     scene: Scene,
     aims: Sequence[CameraAim],
     config: CaptureConfig = DEFAULT_CONFIG,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> Views:
     """Render views of a scene from given cameras; all have one size.
 

@@ -13,6 +13,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from corporeal.core.errors import UnknownChoiceError, UserError
+from corporeal.core.progress import Progress
 from corporeal.core.setting_types import ReadsPath, WritesPath
 from corporeal.core.types import GRAVITY_VECTOR
 from corporeal.discretization.object_scaling import SceneSizing, scene_extents
@@ -42,7 +43,6 @@ from corporeal.scene.settling_body import BodyPose, MassProperties, SettlingBody
 from corporeal.scene.wind_threshold import lowest_wind_threshold
 from corporeal.vlm.real_sizes import RealExtent, estimate_real_extent, find_class_sizes
 
-Progress = Callable[[float, str], None]
 Weigh = Callable[[PoolAsset, float], MassProperties]
 """Returns the mass properties of an asset of a real extent [m], about the middle of its box."""
 

@@ -1,8 +1,9 @@
 """Describe: name the objects of the scene and the materials of their parts."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import replace
 
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Inventory, ObjectDescription, PartDescription, Scene
 from corporeal.description.apply_annotations import apply_annotations, load_annotations
 from corporeal.description.describe_config import DEFAULT_DESCRIBE_CONFIG, DescribeConfig, validate
@@ -13,14 +14,12 @@ from corporeal.recognition.metadata_recognition import substance_hint
 from corporeal.recognition.parts_by_name import identify_parts
 from corporeal.vlm import choose_critic, connect_vlm
 
-Progress = Callable[[float, str], None]
-
 
 def describe(
     scene: Scene,
     config: DescribeConfig = DEFAULT_DESCRIBE_CONFIG,
     library: str = "default",
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
     from_pictures: Collection[int] = (),
 ) -> Inventory:
     """Name every object's parts and their materials.

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Int
 
 from corporeal.core.errors import UserError, with_notes
-from corporeal.core.progress import Progress, subprogress
+from corporeal.core.progress import Progress, no_progress, subprogress
 from corporeal.core.types import (
     Camera,
     Finish,
@@ -108,7 +108,7 @@ def reconstruct(
     extents: Sequence[str] = (),
     viewer: PhotoInterview = NO_VIEWER,
     folder: Path | None = None,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> ReconstructedScene:
     """Reconstruct the objects of a scene from photographs or a splat.
 
@@ -226,12 +226,6 @@ def _name_objects(
 def _align_upright(source: Path, taken: GaussianScene, config: ReconstructConfig, folder: Path | None) -> GaussianScene:
     """Align the reconstruction with gravity, and find objects in photographs without masks.
 
-    Args:
-        source: Named in errors.
-        taken: What was learned.
-        config: How.
-        folder: Where masks lie that are rejected, and a figure of others is drawn.
-
     Raises:
         UserError: The objects cannot be separated from the background.
 
@@ -260,15 +254,7 @@ def _not_worth_error(source: Path, why: str, lie: str, taken: GaussianScene) -> 
 def _reason_not_worth(
     found: FoundObjects, photographers: Sequence[Camera], masked: bool, count: int | None
 ) -> str | None:
-    """Return why what was found is not worth simulating, if it is not.
-
-    Args:
-        found: Objects.
-        photographers: Cameras of the photographs; (): unknown.
-        masked: Whether masks were given.
-        count: Stated number of objects; None: not stated.
-
-    """
+    """Return why what was found is not worth simulating, if it is not."""
     taken = found.taken
     why = boxes_rejection_reason(found.boxes, photographers, masked, taken.quality)
     if why is not None or taken.masks is None or not photographers:

@@ -15,6 +15,7 @@ from corporeal.core import store
 from corporeal.core.audit_data import SettledObjectOutcome, SettlingOutcome
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import SimulationError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import FractureEvent, Frame, MaterialField, Particles, Scene, Trajectory
 from corporeal.core.version import __version__
 from corporeal.discretization.build_model import ModelMapping, build_model, standing_objects
@@ -44,7 +45,6 @@ from corporeal.simulation.trajectory_files import (
 SETTLING_FILE = "settling.json"
 """File on the static equilibrium before time 0."""
 
-Progress = Callable[[float, str], None]
 EngineBuilder = Callable[[Problem], Engine]
 Relax = Callable[[], dict[str, np.ndarray]]
 
@@ -55,7 +55,7 @@ def simulate(
     field: MaterialField,
     config: SimulateConfig,
     folder: Path,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> Trajectory:
     """Step the scene through its duration and write frames, ledger and ``audit.json``.
 
@@ -225,14 +225,7 @@ class SimulationRun:
             raise SimulationError(f"{error} {done} of {len(self.times)} frames are in {self.folder}.") from error
 
     def _break(self, number: int, since: float, saved: dict[str, np.ndarray]) -> None:
-        """Fracture what was overloaded since the last frame, and simulate again from there.
-
-        Args:
-            number: Of the frame that was written last.
-            since: Time of the one before it [s].
-            saved: The state then.
-
-        """
+        """Fracture what was overloaded since the last frame, and simulate again from there."""
         while True:
             impact = next_breaking_impact(self.stage, self.breaks, self.whole, self.folder, number, since)
             if impact is None:

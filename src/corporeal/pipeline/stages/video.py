@@ -19,6 +19,7 @@ from PIL import Image
 from scipy.spatial import KDTree
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Frame, Gaussians, Particles, Scene, Trajectory, Vector, Video
 from corporeal.geometry.srgb import srgb_to_linear
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
@@ -68,11 +69,9 @@ HAZE_DISTANCE_RATIO = 0.1
 MAX_FOLLOWED_SCENE_SIZES = 2.5
 """Distance beyond which the camera ignores objects [sizes of the scene]."""
 
-Progress = Callable[[float, str], None]
-
 
 def render_video(
-    played: SimulationResult, config: VideoConfig, folder: Path, progress: Progress = lambda fraction, words: None
+    played: SimulationResult, config: VideoConfig, folder: Path, progress: Progress = no_progress
 ) -> Video:
     """Write ``video.mp4`` and ``thumbnail.png``: the scene, moved by its particles.
 
@@ -439,13 +438,6 @@ def _frame_scenes(
     """Scenes of all pictures in order; the next is prepared while one is rendered.
 
     Without visible motion the previous one is reused.
-
-    Args:
-        troupe: Everything that moves.
-        trajectory: How.
-        places: Of the pictures among the frames: see ``render.pace``.
-        aim_at: Where the camera is at a time [s].
-
     """
     held, made = LastRenderedPose(aim_at), None
 

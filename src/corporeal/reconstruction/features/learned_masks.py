@@ -1,7 +1,7 @@
 """Masks and instances of photographs by a learned segmentation model."""
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from jaxtyping import Int, UInt8
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError, UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.io.image_decoder import decode_image
 from corporeal.io.photos.image_loader import PosedPhotoFile, exif_quarter_turns_of_file, stored_size
 from corporeal.io.photos.mask_files import (
@@ -25,8 +26,6 @@ from corporeal.io.photos.posed_photos import INSTANCE_FOLDERS, MASK_FOLDERS, lis
 from corporeal.multiview.epipolar import projection_matrix
 from corporeal.multiview.viewed_region import find_viewed_region
 from corporeal.reconstruction.features.mask_models import MaskInstance, MaskModel
-
-Progress = Callable[[float, str], None]
 
 CAMERA_PICTURE_PX = 64
 """Pictures from which only cameras are wanted are read so small [px]."""
@@ -48,7 +47,7 @@ def learned_masks(
     folder: Path,
     masker: MaskModel,
     words: Sequence[str],
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> LearnedMasks:
     """Ask a model for masks of posed photographs, and write them where people can correct them.
 

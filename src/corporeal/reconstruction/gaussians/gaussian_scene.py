@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from corporeal.core.errors import UserError
-from corporeal.core.progress import Progress, subprogress
+from corporeal.core.progress import Progress, no_progress, subprogress
 from corporeal.core.types import Camera, Gaussians, Note, NoteKind, Vector, Views
 from corporeal.geometry.gaussian_transforms import UpAxis, UpAxisChoice
 from corporeal.geometry.spherical_harmonics import SH_DC_COEFFICIENT
@@ -150,7 +150,7 @@ def load_or_train_gaussians(
     source: Path,
     training: TrainConfig,
     checkpoint: Path | None = None,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
     instances: bool = False,
     masked: MaskSource = MASKS_BESIDE_PICTURES,
 ) -> GaussianScene:

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from scipy.ndimage import binary_dilation, distance_transform_cdt, maximum_filter
 
 from corporeal.core.errors import UserError
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Camera, Views
 from corporeal.geometry.grid_interpolation import trilinear_weights
 from corporeal.reconstruction.gaussians import kernels_radiance, training_checkpoint
@@ -28,8 +29,6 @@ from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.train_gaussians import GREY_BACKGROUND
 from corporeal.reconstruction.gaussians.training_schedule import Masks, check_training_views, shrink_picture
 from corporeal.reconstruction.gaussians.visual_hull import carve_tight_hull
-
-Progress = Callable[[float, str], None]
 
 SAMPLE_STRIDE_CUBES = 1.0
 """Between samples along a ray [cubes]."""
@@ -286,7 +285,7 @@ def train_field(
     masks: Masks,
     config: RadianceFieldConfig = DEFAULT_FIELD,
     checkpoint: Path | None = None,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> TrainedField:
     """Learn a field of objects from posed pictures.
 

@@ -7,13 +7,13 @@ not been.
 """
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float32
 
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Gaussians, Vector, Views
 from corporeal.multiview.lines_of_sight import LinesOfSight
 from corporeal.reconstruction.gaussians import densification, exposure_gains, training_checkpoint
@@ -41,8 +41,6 @@ from corporeal.reconstruction.gaussians.kernels_training import adam_rows
 from corporeal.reconstruction.gaussians.plane_sweep import sweep_planes
 from corporeal.reconstruction.gaussians.thread_pool import ThreadPool
 from corporeal.reconstruction.gaussians.training_schedule import DEFAULT_TRAINING, Masks, TrainConfig, TrainingSchedule
-
-Progress = Callable[[float, str], None]
 
 LEARNING_RATES = {
     PARAM_MEAN: 3e-4,
@@ -92,7 +90,7 @@ def train_gaussians(
     points: StartPoints | LinesOfSight | None = None,
     config: TrainConfig = DEFAULT_TRAINING,
     checkpoint: Path | None = None,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
 ) -> TrainedGaussians:
     """Learn Gaussians from posed pictures.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.core import store
-from corporeal.core.progress import Progress, subprogress
+from corporeal.core.progress import Progress, no_progress, subprogress
 from corporeal.core.types import Views
 from corporeal.io.photos.mask_files import (
     MASK_RECORD_FILE,
@@ -81,7 +81,7 @@ def grown_masks(
     source: Path,
     folder: Path,
     pointed: MaskPrompt | None = None,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
     testing: bool = False,
     doubted: bool = False,
 ) -> GrownMasks:

@@ -6,12 +6,12 @@ New masks are taken if they hold all of the old ones and more, most of which han
 as well as before.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
 
+from corporeal.core.progress import Progress
 from corporeal.core.types import Views
 from corporeal.reconstruction.masks.floor_parallax import MIN_PIECE_TO_MASK_RATIO, pixels_to_mask_ratio
 from corporeal.reconstruction.masks.mask_attachments import MaskAttachments
@@ -23,8 +23,6 @@ from corporeal.reconstruction.masks.region_growing import (
     grow_masks,
     widen_silhouettes,
 )
-
-Progress = Callable[[float, str], None]
 
 MIN_KEPT_FRACTION = 0.95
 """Share of the masks before that new ones must hold, in the median view."""

@@ -6,7 +6,6 @@ belongs to objects and what does not. So a colour that the floor has, too, is lo
 other picture knows better.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +13,7 @@ from jaxtyping import Bool, Float, Float32, UInt8
 from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
+from corporeal.core.progress import Progress, no_progress
 from corporeal.core.types import Views
 from corporeal.multiview.silhouette_outliers import find_cropped_masks
 from corporeal.reconstruction.masks.colour_likelihood import (
@@ -36,8 +36,6 @@ from corporeal.reconstruction.masks.reduce_views import reduce_views
 from corporeal.reconstruction.masks.residual_pixels import pixels_before_floor, residual_fraction
 from corporeal.reconstruction.masks.total_variation import TotalVariationCutter
 from corporeal.reconstruction.masks.voxel_volume import VoxelVolume, lower_floor, voxel_volume
-
-Progress = Callable[[float, str], None]
 
 ROUND_PICTURE_PX, MASK_PICTURE_PX = 192, 384
 """Longer side of the pictures that rounds look at, and of the masks that come out [px]."""
@@ -127,7 +125,7 @@ class _CutPictures:
 def grow_masks(
     views: Views,
     seeds: MaskSeeds,
-    progress: Progress = lambda fraction, words: None,
+    progress: Progress = no_progress,
     flat: bool = False,
     fitting: bool = False,
 ) -> RegionGrowingResult | None:

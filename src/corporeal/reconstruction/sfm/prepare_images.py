@@ -3,7 +3,7 @@
 import numbers
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from PIL import Image, ImageOps
 
 from corporeal.core import store
 from corporeal.core.errors import BadFileError
+from corporeal.core.progress import Progress
 from corporeal.io.image_decoder import IMAGE_FORMATS, MAX_IMAGE_PIXELS, as_eight_bit_image
 from corporeal.io.input_files import nested_images, photos_in_folder, unread_images_note, unused_nested_images_note
 from corporeal.io.photos.image_loader import (
@@ -23,8 +24,6 @@ from corporeal.io.photos.image_loader import (
 )
 from corporeal.io.photos.posed_photos import INSTANCE_FOLDERS, MASK_FOLDERS, find_companion_image, unused_masks_note
 from corporeal.recognition.readable_names import safe_name, single_line_text
-
-Progress = Callable[[float, str], None]
 
 MAX_PICTURE_PX = 1600
 """Longer side of what points are looked for in [px]."""
@@ -318,12 +317,6 @@ def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> l
     """Write masks of photographs that were cut out, if most were; say so where few are.
 
     Of an alpha that hides all, or nothing, the meaning is unknown.
-
-    Args:
-        alphas: By the names of the photographs.
-        total: Photographs, those without alpha, too.
-        folder: Gets masks; what lies there already was given beside the photographs, and counts.
-
     """
     opaque = {name: np.asarray(alpha) for name, alpha in alphas.items()}
     clear = [name for name, own in opaque.items() if own.min() == OPAQUE_ALPHA_U8]

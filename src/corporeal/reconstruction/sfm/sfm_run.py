@@ -27,6 +27,7 @@ from PIL import Image
 
 from corporeal.core.errors import UserError
 from corporeal.core.process_resources import usable_cores
+from corporeal.core.progress import Progress
 from corporeal.geometry.connected_components import connected_components
 from corporeal.io.photos.posed_photos import MASK_FOLDERS
 from corporeal.reconstruction.sfm.model_refinement import LensPrior, refine_model
@@ -71,8 +72,6 @@ def match_partners(shared: Int[np.ndarray, "N N"]) -> PicturePairs:
 def _pairs_at_distance(apart: range | tuple[int, ...], total: int) -> PicturePairs:
     return [(k, k + d) for k in range(total) for d in apart if k + d < total]
 
-
-Progress = Callable[[float, str], None]
 
 SfmStrategy = Literal["plain", "masked", "thorough"]
 """masked: points on objects alone, for objects that were turned over or moved between pictures. thorough: affine

@@ -12,7 +12,7 @@ world that stands still, and all cameras put at one place.
 import contextlib
 import logging
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from PIL import Image
 from scipy.ndimage import laplace
 
 from corporeal.core.errors import BadFileError
+from corporeal.core.progress import Progress
 from corporeal.reconstruction.sfm.screen_recording import is_screen_recording
 
 MIN_PIXEL_CONTRAST_U8 = 12.0
@@ -63,8 +64,6 @@ class StaticPixels:
         still = self.high.astype(int) - self.low <= STATIC_RANGE_U8
         return float((clear & still).sum() / clear.sum())
 
-
-Progress = Callable[[float, str], None]
 
 CHOSEN_FRAMES = 60
 """Stretches of equal change; each gives one frame."""

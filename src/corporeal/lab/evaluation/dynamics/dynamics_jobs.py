@@ -5,7 +5,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from corporeal.core import store
-from corporeal.jobs.job import Job, ProgressCallback
+from corporeal.core.progress import Progress
+from corporeal.jobs.job import Job
 from corporeal.lab.evaluation.dynamics.compared_methods import (
     OUR_METHOD,
     Method,
@@ -72,7 +73,7 @@ def _job(scene: EvaluatedScene, folder: Path, settings: Settings) -> Job:
     )
 
 
-def run_and_measure(folder: Path, progress: ProgressCallback, scene: Path, settings: Settings) -> None:
+def run_and_measure(folder: Path, progress: Progress, scene: Path, settings: Settings) -> None:
     """Run a scene up to simulate and keep what is compared, in the process of a worker."""
     with store.lock_folder(folder, ORPHAN_WAIT_S):
         pass
@@ -81,10 +82,10 @@ def run_and_measure(folder: Path, progress: ProgressCallback, scene: Path, setti
     write_run_measures(folder, measure_run(folder))
 
 
-def _only_simulation(progress: ProgressCallback) -> run_pipeline.ProgressOfStage:
+def _only_simulation(progress: Progress) -> run_pipeline.ProgressOfStage:
     """Show the progress of the simulation; what comes before takes little."""
 
-    def tell(verb: str) -> ProgressCallback:
+    def tell(verb: str) -> Progress:
         share = 0.95 if verb == "simulate" else 0.0
         return lambda done, words: progress(share * done, f"{verb} {words}")
 

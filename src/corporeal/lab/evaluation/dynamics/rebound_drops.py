@@ -7,8 +7,9 @@ from pathlib import Path
 from corporeal.core import store
 from corporeal.core.deserialize import from_plain
 from corporeal.core.errors import BadFileError
+from corporeal.core.progress import Progress
 from corporeal.fields.field_specification import FIELD_READERS
-from corporeal.jobs.job import Job, ProgressCallback
+from corporeal.jobs.job import Job
 from corporeal.lab.evaluation.drop_test import DropResult, simulate_drop
 from corporeal.lab.evaluation.dynamics.compared_methods import Method, method_settings
 from corporeal.lab.evaluation.rebound_data import MeasuredRebound, measured_rebounds
@@ -66,7 +67,7 @@ def drop_folder(out: Path, row: MeasuredRebound, method: Method) -> Path:
     return out / REBOUNDS_FOLDER / safe_name(row.name) / method.name
 
 
-def drop_and_save(folder: Path, progress: ProgressCallback, row: MeasuredRebound, settings: Settings) -> None:
+def drop_and_save(folder: Path, progress: Progress, row: MeasuredRebound, settings: Settings) -> None:
     """Drop one object, in the process of a worker."""
     progress(0.0, "dropping")
     store.write_json(folder / DROP_FILE, simulate_drop(row, settings))
