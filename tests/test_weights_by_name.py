@@ -5,7 +5,7 @@ from names import weigh
 from trimesh.creation import icosphere, revolve
 
 from corporeal import materials
-from corporeal.recognition.construction_from_mass import best_mass_fit, construction_materials
+from corporeal.recognition.construction_from_mass import best_mass_fit, construction_table
 
 
 def bell():
@@ -57,4 +57,5 @@ def test_the_commoner_way_is_taken_where_it_fits():
 
 
 def test_ways_are_of_what_the_library_has():
-    assert construction_materials() <= set(materials.library())
+    ways = [way for row in construction_table() for way in row["ways"]]
+    assert {way[key] for way in ways for key in ("material", "contents") if key in way} <= set(materials.library())

@@ -4,7 +4,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.pipeline.stages.describe import describe
-from corporeal.recognition.contents_from_name import known_contents
+from corporeal.recognition.lexicon import contents_table
 from sample_scenes import plain, scene
 
 
@@ -80,4 +80,4 @@ def test_contents_that_are_a_part_are_there():
 
 
 def test_contents_are_in_the_library():
-    assert known_contents() <= set(materials.library())
+    assert set(contents_table()["contents"]) <= set(materials.library())

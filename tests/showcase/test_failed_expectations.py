@@ -4,19 +4,21 @@ A scene is simulated once for all faults that are planted in its frames. Faults 
 themselves are tried in scenes of some seconds; `benchmarks/judge.py` makes all of them.
 """
 
+from typing import get_args
+
 import pytest
 from faulty_runs import PLANTED, happened, spoiled
 from video_judge.simulated_controls import SIMULATED_CONTROLS
 
 from corporeal.pipeline import run_pipeline
-from corporeal.showcase.scene_expectations import FAULTY_RUNS, SCENE_EXPECTATIONS, compare_with_expectations
+from corporeal.showcase.scene_expectations import SCENE_EXPECTATIONS, FaultName, compare_with_expectations
 
 SHORT = ("steel-and-rubber", "ketchup-stops", "honey-poured")
 
 
 def test_faults_are_simulated_or_planted():
     assert set(PLANTED) | set(SIMULATED_CONTROLS) >= {d.spoiled_by for row in SCENE_EXPECTATIONS.values() for d in row}
-    assert set(PLANTED) < set(FAULTY_RUNS)
+    assert set(PLANTED) < set(get_args(FaultName))
 
 
 @pytest.mark.slow

@@ -2,14 +2,15 @@
 
 from dataclasses import replace
 from math import inf, pi
+from typing import get_args
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 from corporeal.showcase.scene_expectations import (
-    FAULTY_RUNS,
     SCENE_EXPECTATIONS,
+    FaultName,
     MeasureExpectation,
     compare_with_expectations,
 )
@@ -41,7 +42,7 @@ def test_every_scene_says_what_must_be_seen():
 
 def test_every_expectation_names_a_run_that_must_not_meet_it():
     demands = [d for row in SCENE_EXPECTATIONS.values() for d in row]
-    assert {d.spoiled_by for d in demands} <= set(FAULTY_RUNS)
+    assert {d.spoiled_by for d in demands} <= set(get_args(FaultName))
     assert all(d.low < d.high for d in demands if isinstance(d, MeasureExpectation))
     assert all((d.low, d.high) != (-inf, inf) for d in demands if isinstance(d, MeasureExpectation))
 

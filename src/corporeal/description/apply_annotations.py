@@ -64,15 +64,7 @@ def apply_annotations(
 def _apply_annotation(
     annotation: PartAnnotation | None, words: PartDescription, path: Path | None, called: NamedObject
 ) -> PartDescription:
-    """Override a description by an annotation; fields that it leaves open stay.
-
-    Args:
-        annotation: None: no annotation.
-        words: The description so far.
-        path: The annotation file.
-        called: The object.
-
-    """
+    """Override a description by an annotation; fields that it leaves open stay."""
     if annotation is None:
         return words
     where = f"Stated in {Path(str(path)).name}."

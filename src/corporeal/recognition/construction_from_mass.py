@@ -46,7 +46,7 @@ def construction_hypotheses(scene: Scene, number: int, described: ObjectDescript
     ):
         return None
     named = [name_tokens(name) for name in names]
-    row = next((r for r in _table() for n in named if head_noun_in(n, r["words"])), None)
+    row = next((r for r in construction_table() for n in named if head_noun_in(n, r["words"])), None)
     if row is None:
         return None
     own = {t.material for n in named for t in substance_terms(n)}
@@ -88,14 +88,9 @@ def _constructed_part(part: PartDescription, way: dict, mass: float) -> PartDesc
     )
 
 
-def construction_materials() -> frozenset[str]:
-    """Materials of walls, of solids and of what is in them."""
-    ways = [way for row in _table() for way in row["ways"]]
-    return frozenset(way[key] for way in ways for key in ("material", "contents") if key in way)
-
-
 @cache
-def _table() -> list[dict]:
+def construction_table() -> list[dict]:
+    """Read the ways in which weights are built."""
     path = files("corporeal.recognition").joinpath("construction_from_mass.toml")
     (rows,) = tomllib.loads(path.read_text(encoding="utf-8")).values()
     return rows

@@ -185,8 +185,3 @@ def _phrases(part: str, row: str) -> frozenset[WordPhrase]:
 def _marker_words(row: str) -> frozenset[str]:
     rows = contents_table()["words"]
     return frozenset(rows[row])
-
-
-def known_contents() -> frozenset[str]:
-    """Materials that names may say is in a vessel."""
-    return frozenset(contents_table()["contents"])

@@ -490,14 +490,7 @@ def _all_unknown(s: HitBuffer) -> Bool[np.ndarray, " S"]:
 
 
 def _of_rows(tiles: np.ndarray, rows: tuple[int, int], first: int) -> np.ndarray:
-    """Kinds of the tiles in some rows of pixels; of those above and below none is to be changed.
-
-    Args:
-        tiles: Kinds (rows, columns).
-        rows: The first row of the picture and the one after the last.
-        first: The picture's row that tiles begin with.
-
-    """
+    """Kinds of the tiles in some rows of pixels; of those above and below none is to be changed."""
     kept = np.full_like(tiles, TILE_UNTOUCHED)
     mine = slice((rows[0] - first) // TILE_PX, -(-(rows[1] - first) // TILE_PX))
     kept[mine] = tiles[mine]

@@ -1,8 +1,8 @@
 """Expected outcomes of the showcase scenes, and their comparison.
 
 The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order. Each expectation bounds
-a measure from both sides where too much is as wrong as too little, and names a run that must not meet it: one of
-``FAULTY_RUNS``, each the same scene with one known fault.
+a measure from both sides where too much is as wrong as too little, and names a run that must not meet it: the same
+scene with one known fault, ``FaultName``.
 """
 
 from collections.abc import Callable
@@ -16,17 +16,8 @@ from corporeal.core.audit_data import Expectation, ObjectOutcome, Outcome
 
 OutcomeMeasure = Callable[[Outcome], float | None]
 FaultName = Literal["single", "capped", "wrong", "halfgravity", "frozen", "squashed", "toppled", "shifted"]
-FAULTY_RUNS: dict[FaultName, str] = {
-    "single": "one velocity field for all objects",
-    "capped": "Young's moduli capped by the published rule",
-    "wrong": "stiff and soft materials exchanged",
-    "halfgravity": "half of gravity",
-    "frozen": "nothing moves",
-    "squashed": "every object ends at seven tenths of its height",
-    "toppled": "every object ends on its side",
-    "shifted": "every object ends a tenth of its length aside",
-}
-"""Runs with one fault: four are simulated, the others made from the frames of a sound run."""
+"""A fault of a run: one velocity field for all, capped moduli, stiff and soft exchanged, half of gravity, nothing moves;
+or every object ends at seven tenths of its height, on its side, or a tenth of its length aside."""
 
 
 @dataclass(frozen=True)
