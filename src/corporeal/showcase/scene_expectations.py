@@ -16,8 +16,8 @@ from corporeal.core.audit_data import Expectation, ObjectOutcome, Outcome
 
 OutcomeMeasure = Callable[[Outcome], float | None]
 FaultName = Literal["single", "capped", "wrong", "halfgravity", "frozen", "squashed", "toppled", "shifted"]
-"""A fault of a run: one velocity field for all, capped moduli, stiff and soft exchanged, half of gravity, nothing moves;
-or every object ends at seven tenths of its height, on its side, or a tenth of its length aside."""
+"""A fault of a run: one velocity field for all, capped moduli, stiff and soft exchanged, half of gravity, nothing
+moves; or every object ends at seven tenths of its height, on its side, or a tenth of its length aside."""
 
 
 @dataclass(frozen=True)
