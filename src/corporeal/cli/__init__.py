@@ -266,9 +266,6 @@ COMMANDS |= {verb: _redo_command(verb) for verb in REDO_COMMANDS}
 COMMANDS |= {"assemble": command_assemble, "simulate": command_simulate}
 
 
-# ---------------------------------------------------------------- running the stages
-
-
 def _folder(where: RunFolder, inputs: list[Path]) -> Path:
     return where.out / (where.name or "-".join(map(_scene_name, inputs[:3])) or "scene")
 

@@ -129,9 +129,6 @@ def _report() -> None:
     print(*written, sep="\n")
 
 
-# ---------------------------------------------------------------- execution
-
-
 def _execute(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: str) -> None:
     """Run the jobs with a progress bar or log lines, and print a summary."""
     from corporeal.jobs.executor import Executor

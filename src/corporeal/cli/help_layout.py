@@ -121,9 +121,6 @@ def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> lis
     return found
 
 
-# ---------------------------------------------------------------- headings
-
-
 def _heading(name: str, path: tuple[str, ...], group: list[Option]) -> tuple[str, Any, Any]:
     """Return a field for one heading and the options below it."""
     kind = make_dataclass(name, [_row(option) for option in group], frozen=True)
@@ -159,9 +156,6 @@ def field_docstrings(kind: type) -> dict[str, str]:
                 if isinstance(words, ast.Constant) and isinstance(words.value, str):
                     found[row.target.id] = " ".join(words.value.split())
     return found
-
-
-# ---------------------------------------------------------------- types
 
 
 def _is_offered(kind: type, name: str) -> bool:

@@ -15,9 +15,6 @@ FLOOR_NAME = "floor"
 """The other body of a pair, where it is no object."""
 
 
-# ---------------------------------------------------------------- what happened
-
-
 @dataclass(frozen=True)
 class ObjectOutcome:
     """What happened to one object."""
@@ -135,9 +132,6 @@ class Outcome:
 def pair_name(first: str, second: str) -> str:
     """Name two bodies by which ``Outcome.pairs`` keeps them."""
     return f"{first}|{second}"
-
-
-# ---------------------------------------------------------------- whether to trust it
 
 
 @dataclass(frozen=True)

@@ -226,8 +226,6 @@ def _to_plain_leaf(value: Any) -> Any:
     return value
 
 
-# ---------------------------------------------------------------- anything that flows ↔ npz
-
 UNREADABLE = (OSError, ValueError, KeyError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile)
 """What loading a damaged file, or one with other fields, may raise."""
 
@@ -314,9 +312,6 @@ def _decode(tree: dict, arrays: Any) -> Any:
     if "member" in tree:
         return stored[tree["member"]]
     return stored(**{k: _decode(v, arrays) for k, v in tree["fields"].items()})
-
-
-# ---------------------------------------------------------------- stage folders
 
 
 def result_key(stage: str, config: Any, inputs: list[str]) -> str:

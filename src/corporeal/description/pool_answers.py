@@ -60,9 +60,6 @@ def _in_piece_order(parts: Sequence[PartDescription], like: Sequence[PartDescrip
     return tuple(found)
 
 
-# ---------------------------------------------------------------- parts
-
-
 def _pool_part(same: Sequence[PartDescription]) -> PartDescription:
     """Pool one part over the answers, or the pieces that share its mesh."""
     if not same[0].pieces:
@@ -149,9 +146,6 @@ def _pool_placements(
         fraction = sum(said[k][name].fraction * weights[k] for k in own) / total
         found[name] = replace(said[leading][name], fraction=fraction)
     return found
-
-
-# ---------------------------------------------------------------- judgements
 
 
 def _pool_evidence(said: Sequence[MassEvidence]) -> MassEvidence:

@@ -79,9 +79,6 @@ def build_model(
     )
 
 
-# ------------------------------------------------------------------ bodies
-
-
 @dataclass(frozen=True)
 class BodyPiece:
     """What becomes one body: an object, or of a mixed object what is soft or one rigid inclusion."""
@@ -293,9 +290,6 @@ def slowest_vibration_rad_s(treatment: Discretization, extent: float) -> float:
     return pi * sqrt(shear / treatment.density) / extent
 
 
-# ------------------------------------------------------------------ pairs
-
-
 def part_surface_weights(particles: Particles, pieces: list[BodyPiece]) -> Float[np.ndarray, "B K"]:
     """Share of each part in its body's surface [-], taken as volume^(2/3)."""
     parts = len(particles.treatments)
@@ -337,9 +331,6 @@ def add_wall_rows(table: Float[np.ndarray, "B1 B1"], walls: int) -> Float[np.nda
 def plane_of_wall(wall: Wall) -> Plane:
     """Return a wall as engines know it."""
     return Plane(wall.normal, float(np.dot(wall.normal, wall.point)))
-
-
-# ------------------------------------------------------------------ at rest or not
 
 
 def starts_settled(scene: Scene, particles: Particles) -> bool:

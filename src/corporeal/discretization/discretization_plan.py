@@ -255,9 +255,6 @@ def _plan_with_verdicts(
     return _PlanDraft(chosen, unslowed)
 
 
-# ------------------------------------------------------------------ rigid or not
-
-
 def choose_role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float) -> PartRole:
     """Return how a part takes part in its object.
 
@@ -273,9 +270,6 @@ def choose_role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float)
     if part.object not in mixed:
         return "rigid"
     return "subgrid" if is_grain_on_grid(part, cell) else "inclusion"
-
-
-# ------------------------------------------------------------------ resolution
 
 
 def object_side_range(parts: Sequence[PartGeometry], number: int) -> tuple[float, float]:

@@ -99,9 +99,6 @@ def parse_extent(text: str, only: str = "") -> tuple[str, float]:
     return name, metres
 
 
-# ---------------------------------------------------------------- what is not life-size
-
-
 def part_scales(scene: Scene, parts: Parts) -> tuple[float, ...]:
     """Return scene size over real size of each part's object."""
     return tuple(scene.objects[part.object].scale for part in parts.catalogue)

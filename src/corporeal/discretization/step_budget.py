@@ -165,9 +165,6 @@ def wave_speed(young_pa: float, poisson: float, density: float, loss: float) -> 
     return p_wave_speed(young_pa, poisson, density) * sqrt(stiffening(loss, poisson))
 
 
-# ------------------------------------------------------------------ better rigid
-
-
 def parts_nearer_to_rigid(
     parts: Sequence[PartGeometry],
     motions: Sequence[ExpectedMotion],

@@ -46,9 +46,6 @@ def check_target(target: ExportTarget, folder: Path, asked: ExportRequest) -> Re
     return load_function(writer.check)(folder, asked)
 
 
-# ---------------------------------------------------------------- USD
-
-
 def check_usd(folder: Path, asked: ExportRequest) -> ReaderFindings:
     """Ask OpenUSD's own validators, and compare every body's mass and inertia."""
     from pxr import Usd, UsdPhysics, UsdValidation
@@ -75,9 +72,6 @@ def _moment_error(moments: np.ndarray, solid: ExportedSolid) -> float:
     """Relative difference of principal moments, in any order [-]."""
     wanted = np.linalg.eigvalsh(solid.inertia)
     return float(np.abs(np.sort(moments) / wanted - 1).max())
-
-
-# ---------------------------------------------------------------- MuJoCo
 
 
 def check_mjcf(folder: Path, asked: ExportRequest) -> ReaderFindings:
@@ -151,9 +145,6 @@ def _surfaces_left_out(scene: PhysicalScene) -> tuple[str, ...]:
         return ()
     names = ", ".join(soft)
     return (f"Drift is measured without {names}, which can deform: objects on it fall.",)
-
-
-# ---------------------------------------------------------------- motion and data
 
 
 def check_glb(folder: Path, asked: ExportRequest) -> ReaderFindings:

@@ -140,9 +140,6 @@ def _materials(assets: ET.Element, scene: PhysicalScene, folder: Path) -> None:
         ET.SubElement(assets, "material", item)
 
 
-# ---------------------------------------------------------------- bodies
-
-
 def _planes(world: ET.Element, scene: PhysicalScene) -> list[_PairGeom]:
     ET.SubElement(world, "light", pos="0 0 3", directional="true", dir="-0.3 0.4 -1")
     planes = [("floor", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))]

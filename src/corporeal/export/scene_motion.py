@@ -159,9 +159,6 @@ def disk_array(shape: tuple[int, ...]) -> np.ndarray:
         return np.memmap(file, np.float32, "w+", shape=shape)
 
 
-# ---------------------------------------------------------------- of a run
-
-
 def motion_of_run(played: SimulationResult, at: str) -> SceneMotion:
     """Read a finished simulation.
 
@@ -279,9 +276,6 @@ def _particle_velocity(particles: Particles, trajectory: Trajectory, now: int) -
 def _scene_skin(prepared: PreparedScene) -> SkinBinding:
     field, parts = prepared.field, prepared.parts
     return bind_vertices(prepared.scene, parts, prepared.particles, granular_parts(field), fluid_parts(field))
-
-
-# ---------------------------------------------------------------- of a scene before any simulation
 
 
 def motion_of_scene(prepared: PreparedScene) -> SceneMotion:

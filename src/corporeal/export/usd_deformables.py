@@ -91,9 +91,6 @@ def tetrahedra_of(solid: ExportedSolid, cell: float) -> TetrahedralMesh:
     return TetrahedralMesh(*voxel_tetrahedra(solid.grains.position, TETRAHEDRON_CELL_DX * cell))
 
 
-# ---------------------------------------------------------------- geometry
-
-
 def material_points_prim(solid: ExportedSolid) -> UsdPrim:
     """Material points with mass, velocity, size and number."""
     grains = solid.grains
@@ -124,9 +121,6 @@ def tetrahedra_prim(solid: ExportedSolid, scene: PhysicalScene) -> UsdPrim:
 
 def _box(points: np.ndarray, margin: float) -> np.ndarray:
     return np.array([points.min(axis=0) - margin, points.max(axis=0) + margin])
-
-
-# ---------------------------------------------------------------- physics
 
 
 def make_deformable(solid: ExportedSolid, materials: str, soft: SoftRepresentation) -> UsdPrim:

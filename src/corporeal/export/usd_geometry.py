@@ -118,9 +118,6 @@ def named_colliders(solid: ExportedSolid) -> Iterator[tuple[str, ConvexPiece]]:
         yield "hull", solid.hull.shape
 
 
-# ---------------------------------------------------------------- looks
-
-
 def _material_prim(name: str, finish: Finish, coloured: bool, folder: Path) -> UsdPrim:
     material, path = (
         UsdPrim("Material", name, metadata=[usda_display_name(finish.name)]),

@@ -132,9 +132,6 @@ def _matter(number_: int, matter: PartMaterial, friction: float, engine: TargetE
     return prim
 
 
-# ---------------------------------------------------------------- floor and walls
-
-
 def _floor() -> UsdPrim:
     return _plane("floor")
 
@@ -201,9 +198,6 @@ def _group(name: str, members: list[str], apart: list[str]) -> UsdPrim:
     if apart:
         prim.relate("physics:filteredGroups", [f"/{WORLD_PRIM}/{n}" for n in apart])
     return prim
-
-
-# ---------------------------------------------------------------- rigid bodies
 
 
 def _rigid(solid: ExportedSolid) -> UsdPrim:

@@ -173,9 +173,6 @@ def _sample_mesh(mesh: Mesh, count: int) -> np.ndarray:
     return sample_surface(mesh, count, np.random.default_rng(0))[0]
 
 
-# ---------------------------------------------------------------- one material for everything
-
-
 def _with_uniform_field(found: MaterialField, field: UniformField) -> MaterialField:
     note = f"Numbers are those of {field.method}: a baseline, not a prediction. {BORROWED_NUMBERS_NOTE}"
     reason = f"{field.method} has it so everywhere"
@@ -196,9 +193,6 @@ def _elastic_material(material: Material) -> Material:
     """Make a material fixed-corotated, which loses nothing."""
     grounds = {name: g for name, g in material.grounds.items() if name != "loss"}
     return replace(material, law=Law.COROTATED, loss=0.0, grounds=grounds)
-
-
-# ---------------------------------------------------------------- numbers of a field
 
 
 @dataclass(frozen=True)

@@ -94,9 +94,6 @@ def _cut_convex(unit: np.ndarray, triangles: np.ndarray) -> tuple:
     return tuple((p.vertices, p.triangles) for p in pieces if p is not None)
 
 
-# ---------------------------------------------------------------- where the body is
-
-
 @dataclass(frozen=True)
 class _CellGrid:
     """Cells that the body fills or its surface passes through."""

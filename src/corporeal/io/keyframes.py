@@ -155,9 +155,6 @@ def _vector(row: Float[np.ndarray, "3"]) -> Vector:
     return (x, y, z)
 
 
-# ---------------------------------------------------------------- writing
-
-
 def rows_from_keyframes(start: Vector, path: Keyframes) -> tuple[tuple[float, ...], ...]:
     """Write a path that begins somewhere [m] as rows that ``keyframes_from_rows`` reads back."""
     place = np.array(start) + np.array(path.shift)

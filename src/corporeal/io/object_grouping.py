@@ -76,9 +76,6 @@ def _surface_gap(a: Mesh, b: Mesh) -> float:
     return float(np.sqrt(np.min(squared)))
 
 
-# ---------------------------------------------------------------- what names say
-
-
 def _are_named_as_objects(scene: Scene) -> list[bool]:
     """Tell of each piece whether its name says that it is an object by itself.
 
@@ -107,9 +104,6 @@ def _whole_words(scene: Scene) -> frozenset[str]:
     named = [frozenset(class_name_words(o.class_name)) for o in scene.objects]
     common = frozenset.intersection(*named) if len(set(named)) > 1 else frozenset()
     return frozenset(w for w in said | common if typical_extent(w))
-
-
-# ---------------------------------------------------------------- the scene
 
 
 def _merge_groups(scene: Scene, group: np.ndarray) -> Scene:

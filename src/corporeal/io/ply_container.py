@@ -107,9 +107,6 @@ def format_ply_header(properties: list[str], count: int, comment: str) -> bytes:
     return ("\n".join([*lines, "end_header"]) + "\n").encode("ascii")
 
 
-# ---------------------------------------------------------------- header
-
-
 def _parse_header(path: Path, data: memoryview) -> tuple[str, list[PlyElement], int]:
     """Return byte order ("": text), elements, and where the body begins."""
     head = bytes(data[:MAX_PLY_HEADER_BYTES])
@@ -142,9 +139,6 @@ def _with_property(path: Path, element: PlyElement, words: list[str]) -> PlyElem
     if kind is None or words[-1] in dict(element.properties):
         raise BadFileError(path, f"its header is bad: {' '.join(words)[:80]!r}.", PLY_EXPORT_ADVICE)
     return PlyElement(element.name, element.count, (*element.properties, (words[-1], kind)))
-
-
-# ---------------------------------------------------------------- body
 
 
 class _BinaryBody:

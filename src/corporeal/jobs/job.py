@@ -75,9 +75,6 @@ def remove_partial_results(folder: Path) -> None:
         shutil.rmtree(left, ignore_errors=True)
 
 
-# ---------------------------------------------------------------- who does them
-
-
 @dataclass(frozen=True)
 class JobEvent:
     """What became of a job, or how far it came."""

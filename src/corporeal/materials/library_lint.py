@@ -135,9 +135,6 @@ def _line_of_key(text: str) -> dict[tuple[str, str], int]:
     return lines
 
 
-# ---------------------------------------------------------------- the file
-
-
 def _check_top(found: _ProblemFinder, tables: dict, bases: tuple[str, ...]) -> None:
     base = tables.get("extends")
     if base is not None and base not in bases:
@@ -163,9 +160,6 @@ def _check_names(found: _ProblemFinder, rows: dict[str, dict]) -> None:
             if first != name:
                 what = f"{word!r} also names {first}."
                 found.tell(name, "aliases", what, "Use it for one of the two only.")
-
-
-# ---------------------------------------------------------------- one material
 
 
 def _check_material(found: _ProblemFinder, name: str, row: dict, known: set[str]) -> None:
@@ -252,9 +246,6 @@ def _check_needs(found: _ProblemFinder, name: str, law: Law | None, fields: set[
             right = _list(sorted(one.name.lower() for one in laws))
             what = f"{law.name.lower()} never reads {QUANTITIES[field].words.lower()}."
             found.tell(name, "", what, f"Remove it, or use law = {right}.")
-
-
-# ---------------------------------------------------------------- one number
 
 
 def _check_cell(found: _ProblemFinder, at: _NumberPlace, cell: Any, known: set[str]) -> bool:

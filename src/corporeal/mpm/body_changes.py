@@ -41,8 +41,6 @@ class EngineBodyChanges(EngineInteraction):
             after._take_grips()
         return after
 
-    # ------------------------------------------------------------ accessors
-
     @abstractmethod
     def _successor(self, problem: Problem, change: BodyChange) -> Self:
         """Build an engine of the same kind and options that goes on from here.

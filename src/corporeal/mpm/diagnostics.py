@@ -153,8 +153,6 @@ class EngineReadout(ABC):
             **booked,
         )
 
-    # ------------------------------------------------------------ accessors
-
     @abstractmethod
     def _particles(self) -> Snapshot:
         """Copy every particle's state; those of rigid bodies are overwritten."""

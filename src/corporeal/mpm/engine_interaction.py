@@ -92,8 +92,6 @@ class EngineInteraction(EngineReadout):
         """Mass of a body [kg]."""
         return float(self.problem.bodies[body].volume @ self.problem.bodies[body].density)
 
-    # ------------------------------------------------------------ accessors
-
     @abstractmethod
     def _add_velocity(self, body: int, particle: Int[np.ndarray, " H"], gained: Float[np.ndarray, "H 3"]) -> None:
         """Add to the velocities [m/s] of some particles of a body that bends."""

@@ -132,9 +132,6 @@ def _image_size_doubt(cameras: tuple[Camera, ...]) -> str | None:
     )
 
 
-# ---------------------------------------------------------------- matches
-
-
 def _points_behind_doubt(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> str | None:
     ahead = _fraction_in_front(pairs, cameras)
     if ahead >= 0.5:
@@ -234,9 +231,6 @@ def _fraction_in_front(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -
     return float(np.concatenate(signs).mean()) if signs else 1.0
 
 
-# ---------------------------------------------------------------- lenses
-
-
 def _lens_doubt(pairs: list[_MatchedPair], cameras: tuple[Camera, ...]) -> str | None:
     """Say under which other lens good matches would meet clearly more closely.
 
@@ -277,9 +271,6 @@ def _with_other_lens(cameras: tuple[Camera, ...], factor: float, x: float = 0.0,
     stretch = np.array([[factor, factor, 1], [1, factor, 1], [1, 1, 1.0]])
     shift = [np.array([[0, 0, x * c.width], [0, 0, y * c.height], [0, 0, 0]]) for c in cameras]
     return tuple(replace(c, K=c.K * stretch + s) for c, s in zip(cameras, shift, strict=True))
-
-
-# ---------------------------------------------------------------- silhouettes
 
 
 def _masks_doubt(masks: np.ndarray, cameras: tuple[Camera, ...]) -> str | None:

@@ -144,9 +144,6 @@ def rotation_to_z(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     return np.array([[1 - k * x * x, -k * x * y, -x], [-k * x * y, 1 - k * y * y, -y], [x, y, z]])
 
 
-# ---------------------------------------------------------------- up
-
-
 def _up_from_file_or_cameras(cameras: tuple[Camera, ...], z_up: bool) -> _UpEvidence:
     """Return what is up as the file or its cameras say."""
     seen = estimate_up_direction(cameras) if cameras else None
@@ -239,9 +236,6 @@ def _angle_between(a: np.ndarray, b: np.ndarray) -> float:
 
 def _degrees_text(angle: float) -> str:
     return f"{np.degrees(angle):.1f}°"
-
-
-# ---------------------------------------------------------------- the frame
 
 
 def _scene_ball(cameras: tuple[Camera, ...], points: np.ndarray) -> ViewedRegion:

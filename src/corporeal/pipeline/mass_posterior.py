@@ -421,9 +421,6 @@ def _fix_draw(words: PartDescription, drawn: PartDescription, made: Material, bu
     )
 
 
-# ---------------------------------------------------------------- small functions
-
-
 def hypothesis_label(words: ObjectDescription, drawn: ObjectDescription) -> str:
     """Describe the sampled hypothesis of each uncertain part."""
     in_doubt = [

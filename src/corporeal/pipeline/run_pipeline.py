@@ -357,8 +357,6 @@ class _Run:
         store.save(folder / store.DATA_FILE, value)
         return value
 
-    # ------------------------------------------------------------ the stages
-
     def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
         from corporeal.io.splat.splat_ply import write_splat_ply
         from corporeal.pipeline.stages.reconstruct import reconstruct

@@ -116,9 +116,6 @@ def _row_poses(bodies: Sequence[SettlingBody], rng: np.random.Generator) -> list
     return room.poses()
 
 
-# ---------------------------------------------------------------- how one body stands
-
-
 def _random_rotation(body: SettlingBody, rng: np.random.Generator) -> np.ndarray:
     """Upright where that is stable, else tumbled."""
     return _stance_with_yaw(body.upright, rng) if body.upright.tip >= MIN_TIP_ANGLE_RAD else random_rotation(rng)
@@ -179,9 +176,6 @@ def quaternion_tuple_of(rotation: np.ndarray) -> tuple[float, float, float, floa
     """(w, x, y, z) of a rotation matrix, w ≥ 0."""
     x, y, z, w = (float(c) for c in Rotation.from_matrix(rotation).as_quat(canonical=True))
     return (w, x, y, z)
-
-
-# ---------------------------------------------------------------- what is in the way
 
 
 def _whole_surface(body: SettlingBody) -> ConvexPiece:

@@ -91,9 +91,6 @@ def begin_interaction(
     return begin(SettledBodies(bodies, poses), rng)
 
 
-# ---------------------------------------------------------------- falls
-
-
 def _begin_fall(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction:
     """Hang everything above where it rests, what lies on top higher still."""
     share = float(rng.uniform(*FALL_HEIGHT_SIZES_RANGE))
@@ -122,9 +119,6 @@ def _begin_fall_onto(still: SettledBodies, rng: np.random.Generator) -> SceneInt
             entries = (_entry_at(names[top], over),)
             return SceneInteraction("fall-onto", entries, _watch_duration(sqrt(2 * height / GRAVITY_M_S2)), words)
     return None
-
-
-# ---------------------------------------------------------------- along the floor
 
 
 def _begin_collision(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction | None:
@@ -164,9 +158,6 @@ def _arrival_speed(still: SettledBodies, rng: np.random.Generator) -> float:
     return float(rng.uniform(*IMPACT_SPEED_RATIO_RANGE)) * sqrt(GRAVITY_M_S2 * float(still.sizes.max()))
 
 
-# ---------------------------------------------------------------- wind
-
-
 def _begin_wind(still: SettledBodies, rng: np.random.Generator) -> SceneInteraction | None:
     """Apply wind to everything from one side, somewhat faster than what moves the easiest object.
 
@@ -183,9 +174,6 @@ def _begin_wind(still: SettledBodies, rng: np.random.Generator) -> SceneInteract
             words = f"a wind of {speed:.2g} m/s, in gusts, for {WIND_DURATION_S:g} s"
             return SceneInteraction("wind", entries, 1.5, words)
     return None
-
-
-# ---------------------------------------------------------------- who, and how it is written
 
 
 def _ordered_pairs(still: SettledBodies, rng: np.random.Generator) -> list[tuple[int, int]]:

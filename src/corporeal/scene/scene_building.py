@@ -253,9 +253,6 @@ def _with_overlap_warnings(scene: Scene) -> Scene:
     return replace(scene, warnings=scene.warnings + overlaps)
 
 
-# ---------------------------------------------------------------- what is refused
-
-
 def _check_lengths(name: str, **given: float) -> None:
     for what, value in given.items():
         if not (math.isfinite(value) and value > 0):

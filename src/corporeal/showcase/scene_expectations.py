@@ -77,9 +77,6 @@ def compare_with_expectations(name: str, outcome: Outcome) -> list[Expectation]:
     return [demand.compare(outcome) for demand in SCENE_EXPECTATIONS.get(name, ())]
 
 
-# ---------------------------------------------------------------- measures
-
-
 def only_object(outcome: Outcome, thing: str) -> ObjectOutcome:
     """Return what happened to the only object of its kind."""
     return outcome.objects[f"{thing}_0"]

@@ -82,9 +82,6 @@ def audit(
     return found.noting(warnings)
 
 
-# ------------------------------------------------------------------ laws
-
-
 LEDGER_QUANTITIES = (
     *("momentum", "angular_momentum", "kinetic", "elastic", "potential"),
     *("external_impulse", "plane_impulse", "pair_impulse", "push_work"),

@@ -179,8 +179,6 @@ class _FirstImpacts:
         away = -normal if closing > 0.0 else normal
         return BrittleImpact(a, part, c if c < objects else None, point, away, said)
 
-    # ------------------------------------------------------------ motion before the impact
-
     def _struck(self, frame: Frame, number: int, point: Float[np.ndarray, "3"]) -> int:
         """Part of an object that is nearest to a point."""
         mine = np.flatnonzero(self.particles.object == number)
@@ -235,8 +233,6 @@ class _FirstImpacts:
             return given / size
         away = ledger.centre[k, c] - ledger.centre[k, a]
         return away / np.linalg.norm(away)
-
-    # ------------------------------------------------------------ geometry of the struck part
 
     def _roundness(self, c: int, point: Float[np.ndarray, "3"], frame: Frame) -> float:
         """Radius of what strikes [m]: half the shortest side of the part; inf of a plane."""

@@ -100,9 +100,6 @@ def fracture_body(
     return FracturedRun(stage.with_pieces(one, split, after.problem, now), after, (*breaks, one))
 
 
-# ---------------------------------------------------------------- the pieces
-
-
 @dataclass(frozen=True)
 class _CutPieces:
     """Pieces of an object, where it was at the start."""

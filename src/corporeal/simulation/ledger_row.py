@@ -85,9 +85,6 @@ def rotate_with_body(points: np.ndarray, start: np.ndarray, now: np.ndarray, rot
     return (points - start.mean(axis=0)) @ rotation.T + now.mean(axis=0)
 
 
-# ------------------------------------------------------------------ objects of several bodies
-
-
 def object_of_body(problem: Problem) -> np.ndarray:
     """Return which object each body is of (B,): bodies held together or kept apart are of one."""
     first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.excluded_pairs)}

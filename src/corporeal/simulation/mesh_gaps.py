@@ -240,9 +240,6 @@ def distance_within(
     return distance
 
 
-# ------------------------------------------------------------------ crossings
-
-
 @dataclass(frozen=True)
 class Passage:
     """One object passed through another."""

@@ -162,8 +162,6 @@ class DynamicRelaxation:
             state=self.engine.save(),
         )
 
-    # ------------------------------------------------------------ saving and restoring
-
     def saved(self) -> dict[str, np.ndarray]:
         """State to resume bit for bit."""
         own = {"settling.anchor": self.anchor, "settling.energy": self.energy}

@@ -132,8 +132,6 @@ class InteractionController:
             self.engine.advance(touch.until)
             self.touches.append(touch)
 
-    # ---------------------------------------------------------------- orders
-
     def _bodies(self, number: int) -> list[int]:
         found = np.flatnonzero(self.posed.object_of_body == number).tolist()
         if not found:
@@ -203,8 +201,6 @@ class InteractionController:
             if len(known[body].faces.area):
                 engine.set_wind(body, order.to)
 
-    # ---------------------------------------------------------------- objects that are added
-
     def top(self, order: Command) -> float:
         """Return how high material reaches under an object that is to be added [m]."""
         low, high = self._growing.reach(order.thing, drop_height(order))
@@ -237,8 +233,6 @@ class InteractionController:
         if self.growth is None:
             raise UserError("Nothing can be added to this simulation.")
         return self.growth
-
-    # ---------------------------------------------------------------- the hand
 
     def grip(self, position: np.ndarray) -> np.ndarray | None:
         """Where the hand holds now [m]; None: it holds nothing.

@@ -228,8 +228,6 @@ class LiveSimulation:
             if thread.is_alive():
                 thread.join(10.0)
 
-    # ---------------------------------------------------------------- two threads
-
     def _run(self) -> None:
         """Obey and step; frames are handed over without waiting."""
         self._hand_over()
@@ -334,8 +332,6 @@ class LiveSimulation:
         if moved:
             self.cost += COST_SMOOTHING * (stepping / self.pace - self.cost)
             self.pace = float(np.clip(1 / MAX_FPS / max(self.cost, 1e-3), MIN_FRAME_TIME_S, 1 / MAX_FPS))
-
-    # ---------------------------------------------------------------- pictures
 
     def wait(self, seen: int, patience: float) -> int:
         """Wait until there is a newer picture than number ``seen``; return its number."""

@@ -106,8 +106,6 @@ class ReplayJobs:
             for number in self.replays:
                 self.stop({"id": number})
 
-    # ---------------------------------------------------------------- what becomes of it
-
     def _record(self, name: str) -> InteractionRecord:
         live = self.room.live
         if live is None or self.room.name != name:
@@ -146,8 +144,6 @@ class ReplayJobs:
         if number not in self.replays:
             raise UserError("There is no such replay.")
         return self.replays[number]
-
-    # ---------------------------------------------------------------- what a page reads
 
     async def _state(self, request: Request) -> Response:
         found = self._find(request.path_params["id"])

@@ -78,8 +78,6 @@ class RunQueue:
         self.thread = threading.Thread(target=self._run, name="queue", daemon=True)
         self.thread.start()
 
-    # ---------------------------------------------------------------- what a page asks
-
     def add(self, asked: QueuedRun, settings: Settings) -> QueuedRun:
         """Put a run at the end of the queue.
 
@@ -142,8 +140,6 @@ class RunQueue:
         self.workers.stop()
         self.workers.ready.close()
 
-    # ---------------------------------------------------------------- the thread
-
     def _run(self) -> None:
         while not self.closed:
             with self.lock:
@@ -185,8 +181,6 @@ class RunQueue:
         else:
             self._set(replace(entry, state="failed", error=event.words))
         self.stopping.discard(entry.id)
-
-    # ---------------------------------------------------------------- what is kept
 
     def _entry(self, job: str) -> QueuedRun:
         found = next((e for e in self.entries if e.id == job), None)

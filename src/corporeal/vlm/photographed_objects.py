@@ -132,9 +132,6 @@ class PhotoInterview:
         return self.interviews[-1]
 
 
-# ---------------------------------------------------------------- how large they are
-
-
 def object_of_usual_size(class_name: str) -> SeenObject:
     """Return a named object with the usual size of its class."""
     known = typical_extent(class_name)

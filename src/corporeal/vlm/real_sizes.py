@@ -136,9 +136,6 @@ def estimate_real_extent(name: str, class_name: str, extent: float, metric: bool
     return RealExtent(UNKNOWN_EXTENT_M, "default", "default", "A default size.", (warning,))
 
 
-# ---------------------------------------------------------------- a model's answers
-
-
 def _interview(model: VlmClient, class_name: str) -> Interview:
     prompt = read_prompt(files("corporeal.vlm").joinpath("prompts", "sizes.md"))
     subject = InterviewSubject(class_name, class_name, class_name, "")
@@ -159,9 +156,6 @@ def _size_from_model(interview: Interview) -> ClassSize | None:
         who=reply.model,
         reason=found.reason,
     )
-
-
-# ---------------------------------------------------------------- the table, and doubts
 
 
 def _size_from_table(class_name: str) -> ClassSize | None:

@@ -126,8 +126,6 @@ class GltfCopier:
             self._numbers[view.pointer] = self.merged.view(self.document.view(view), rest)
         return self._numbers[view.pointer]
 
-    # ------------------------------------------------------------ how it looks
-
     def _look(self, primitive: GltfEntry) -> dict:
         """Copy a primitive's material; a broken one refuses no file, as for a reader."""
         try:

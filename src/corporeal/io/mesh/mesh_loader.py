@@ -101,9 +101,6 @@ def companions_in_child(path: Path, reader: Reader) -> list[Path]:
         return [Path(name) for name in store.read_json(Path(folder) / COMPANIONS_FILE)]
 
 
-# ---------------------------------------------------------------- the child
-
-
 def _run_reader_process(
     path: Path, folder: Path, reader: Reader, function: str, max_seconds: int = MAX_MESH_READ_S
 ) -> None:
@@ -143,9 +140,6 @@ def _reader_process_error(path: Path, done: subprocess.CompletedProcess[bytes]) 
         raise BadFileError(path, what, "Simplify the model, or export it as .glb.")
     what = f"its reader ended without a result (exit status {done.returncode})."
     raise BadFileError(path, what, MESH_EXPORT_ADVICE)
-
-
-# ---------------------------------------------------------------- what it read
 
 
 def _check_numbers(path: Path, raw: RawMesh) -> None:

@@ -254,9 +254,6 @@ def read_dae(path: Path) -> RawMesh:
     return RawMesh(*named, up=UP_OF_DAE_AXIS[axis], unit=unit)  # pyright: ignore[reportArgumentType]
 
 
-# ---------------------------------------------------------------- the file
-
-
 def _load_with_trimesh(
     path: Path, kind: str, data: bytes | None = None, resolver: Resolver | None = None, **options: Any
 ) -> trimesh.Scene:
@@ -287,9 +284,6 @@ def _asset_of_dae(path: Path) -> tuple[float | None, str]:
     if unit is not None and not 0 < unit < np.inf:
         raise BadFileError(path, f"states that a unit is {unit:g} m.", MESH_EXPORT_ADVICE)
     return unit, axis
-
-
-# ---------------------------------------------------------------- what it holds
 
 
 def _names_in_obj(data: bytes, keyword: bytes) -> set[bytes]:

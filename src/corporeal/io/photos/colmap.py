@@ -155,9 +155,6 @@ def world_from_camera(
     return pose
 
 
-# ---------------------------------------------------------------- reading
-
-
 @dataclass(frozen=True)
 class _ModelRows:
     """What the three files of a model list."""

@@ -156,9 +156,6 @@ def _stack_photos(prints: list[_LoadedPhoto]) -> LoadedPhotos:
     )
 
 
-# ---------------------------------------------------------------- one photograph
-
-
 def _size(shot: PosedPhotoFile, bad: list[UnusablePhoto]) -> tuple[int, int] | None:
     """Return width and height without unpacking; None where it is bad."""
     if shot.picture is None or not shot.picture.is_file():  # a pipe would be waited for
@@ -363,9 +360,6 @@ def _resize_image(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 def _reduced_size(width: int, height: int, longest: int) -> tuple[int, int]:
     share = min(1.0, longest / max(width, height))
     return max(1, round(width * share)), max(1, round(height * share))
-
-
-# ---------------------------------------------------------------- all of them
 
 
 def _keep_consistently_masked(prints: list[_LoadedPhoto], bad: list[UnusablePhoto]) -> list[_LoadedPhoto]:

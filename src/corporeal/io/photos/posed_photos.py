@@ -219,9 +219,6 @@ def has_posed_photos(folder: Path) -> bool:
     return posed or any(is_colmap(folder / m) for m in COLMAP_MODEL_FOLDERS) or bool(find_projections(folder))
 
 
-# ---------------------------------------------------------------- transforms.json
-
-
 def _list_transforms(path: Path) -> PhotoListing:
     return PhotoListing(path, [_photo_of_frame(frame) for frame in read_transforms_frames(path)], z_up=True)
 
@@ -278,9 +275,6 @@ def unused_masks_note(folder: Path, pictures: Sequence[Path]) -> list[str]:
     return []
 
 
-# ---------------------------------------------------------------- COLMAP
-
-
 def _list_colmap(folder: Path, place: Path) -> PhotoListing:
     model = read_colmap(place)
     root = _images_folder(folder, model)
@@ -304,9 +298,6 @@ def _images_folder(folder: Path, model: ColmapModel) -> Path:
 
 def _as_stated(lens: Lens, width: int, height: int) -> Lens:
     return lens
-
-
-# ---------------------------------------------------------------- projection matrices
 
 
 def _list_projections(folder: Path, pairs: list[tuple[Path, Path]]) -> list[PosedPhotoFile]:

@@ -43,9 +43,6 @@ MAX_VIEW_PIXELS_TOTAL = 2**30
 """Pixels of all views together."""
 
 
-# ---------------------------------------------------------------- writing
-
-
 def write_views(folder: Path, views: Views) -> Path:
     """Write the folder; ``transforms.json`` comes last, so that it names only what is there.
 
@@ -140,9 +137,6 @@ def _depth_in_units(depth: np.ndarray, unit: float) -> np.ndarray:
 def _normals_as_colours(normals: np.ndarray) -> np.ndarray:
     there = normals.any(axis=-1, keepdims=True)
     return np.where(there, np.round((normals + 1) * 127.5), 0).astype(np.uint8)
-
-
-# ---------------------------------------------------------------- reading
 
 
 def read_views(folder: Path) -> Views:

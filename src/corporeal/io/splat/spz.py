@@ -84,9 +84,6 @@ def read_spz(path: Path, data: memoryview) -> Gaussians:
     )
 
 
-# ---------------------------------------------------------------- containers
-
-
 def _header(path: Path, data: bytes) -> _SpzHeader:
     if len(data) < SPZ_HEADER_STRUCT.size or data[:4] != SPZ_SIGNATURE:
         raise BadFileError(path, "is no SPZ file.", COPY_AGAIN_ADVICE)
@@ -170,9 +167,6 @@ def _refuse_bounds(path: Path, data: memoryview, header: _SpzHeader, end: int) -
         if kind == SH_BOUNDS_EXTENSION:
             raise BadFileError(path, "its harmonics have bounds of their own.", SPZ_CONVERT_ADVICE)
         at += EXTENSION_STRUCT.size + length
-
-
-# ---------------------------------------------------------------- numbers
 
 
 def _decode_fixed_point(place: np.ndarray) -> np.ndarray:

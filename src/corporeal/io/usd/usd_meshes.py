@@ -159,9 +159,6 @@ def usd_companions(path: Path) -> list[str]:
     return sorted({str(p) for p in inside if p.resolve() != own and p.is_file()})
 
 
-# ---------------------------------------------------------------- the stage
-
-
 def _is_inside(name: str, folder: Path) -> bool:
     """Whether a path, or a package's with a path in it ("a.usdz[b.png]"), lies in a folder."""
     return Path(name.partition("[")[0]).resolve().is_relative_to(folder.resolve())
@@ -222,9 +219,6 @@ def _visible_prims(stage: Usd.Stage, lost: Counter[str]) -> Iterator[Usd.Prim]:
             continue  # the floor, which is always there
         elif prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer):
             lost[UNREAD_SHAPES] += 1
-
-
-# ---------------------------------------------------------------- meshes
 
 
 def _shape_surfaces(path: Path, prim: Usd.Prim, looks: "_UsdFinishes") -> Iterator[Surface]:
@@ -335,9 +329,6 @@ def _colours(mesh: UsdGeom.Mesh) -> np.ndarray | None:
     if not per_vertex or len(colours) != len(points) or len(colours) < 2:
         return None
     return np.clip(colours, 0, 1)
-
-
-# ---------------------------------------------------------------- looks
 
 
 class _UsdFinishes:

@@ -157,9 +157,6 @@ def _write_lines(file: TextIO, depth: int, lines: str) -> None:
     file.write(indent + lines.replace("\n", "\n" + indent) + "\n")
 
 
-# ---------------------------------------------------------------- values
-
-
 def usda_number(value: float) -> str:
     """Write one number so that the same double is read back."""
     value = float(value)

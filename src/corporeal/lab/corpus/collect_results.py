@@ -197,9 +197,6 @@ def _launched_objects(scene: Path) -> list[str]:
     return [e.name for e in entries if e.name and e.velocity is not None]
 
 
-# ---------------------------------------------------------------- numbers of one scene
-
-
 def scene_measures(audit: RunAudit, kind: InteractionKind, sent: Sequence[str] = ()) -> SceneMeasures:
     """Condense an audit into the numbers that scenes are compared by."""
     happened, wanted = audit.outcome, audit.expectations
@@ -264,9 +261,6 @@ def _did_interaction_happen(kind: InteractionKind, happened: Outcome, landed: in
         moves = (max(t.moved_level_m, t.deepest_squeeze_m) for t in happened.objects.values())
         return max(moves, default=0.0) > MIN_WIND_MOTION_M
     return max(impact_hops(met, sent).values(), default=0) > 1 if kind == "chain" else len(met) > 0
-
-
-# ---------------------------------------------------------------- parts
 
 
 def _parts(scene: str, audit: RunAudit, settings: Settings) -> tuple[PartRecord, ...]:

@@ -126,9 +126,6 @@ def _line(
     )
 
 
-# ---------------------------------------------------------------- as data
-
-
 def scene_rows(corpus: CorpusResults) -> list[dict[str, Any]]:
     """Return one flat row per planned scene, for a table of numbers."""
     return [_row(s) for s in corpus.scenes]

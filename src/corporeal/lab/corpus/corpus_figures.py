@@ -90,9 +90,6 @@ def _draw_figure(
         return out.getvalue()
 
 
-# ---------------------------------------------------------------- what it consists of
-
-
 def _classes(axes: Axes, corpus: CorpusResults) -> None:
     used = Counter(c for s in corpus.scenes for c in s.planned.classes)
     names = sorted(used, key=lambda n: (used[n], n))
@@ -140,9 +137,6 @@ def _rest(axes: Axes, corpus: CorpusResults) -> None:
     axes.legend(frameon=False, fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-# ---------------------------------------------------------------- audits
-
-
 def _penetration(axes: Axes, corpus: CorpusResults) -> None:
     _by_kind(axes, corpus, "max_penetration_dx", log=False)
     axes.set_ylabel("deepest penetration [dx]")
@@ -186,9 +180,6 @@ def _by_kind(axes: Axes, corpus: CorpusResults, name: str, log: bool) -> None:
 def _values(scenes: Sequence[SceneRecord], kind: InteractionKind, name: str, log: bool) -> list[float]:
     mine = [s.numbers for s in scenes if s.numbers and s.planned.interaction == kind]
     return [max(getattr(n, name), LOG_AXIS_MIN) if log else getattr(n, name) for n in mine]
-
-
-# ---------------------------------------------------------------- material and cost
 
 
 def _materials(axes: Axes, corpus: CorpusResults) -> None:

@@ -173,9 +173,6 @@ def read_plan(folder: Path) -> CorpusPlan:
         raise BadFileError(path, what, "Assemble the corpus again.") from error
 
 
-# ---------------------------------------------------------------- what is drawn
-
-
 def choose_classes(by_class: Mapping[str, Sequence[str]], most: int, rng: np.random.Generator) -> list[str]:
     """Choose at most ``most`` classes: those with the most models first, by lot among equals.
 

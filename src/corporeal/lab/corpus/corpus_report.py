@@ -94,9 +94,6 @@ def _csv(table: Sequence[dict[str, Any]]) -> str:
     return out.getvalue()
 
 
-# ---------------------------------------------------------------- at the top
-
-
 def _summary(corpus: CorpusResults) -> str:
     scenes, config = corpus.scenes, corpus.plan.config
     classes = {c for s in scenes for c in s.planned.classes}
@@ -139,9 +136,6 @@ def _failed(corpus: CorpusResults) -> list[SceneRecord]:
     return [s for s in corpus.scenes if s.error]
 
 
-# ---------------------------------------------------------------- groups
-
-
 def _breakdowns(corpus: CorpusResults) -> str:
     whole = total_line(corpus)
     if whole is None:
@@ -177,9 +171,6 @@ def _line(line: BreakdownLine, style: str = "") -> str:
         f"<small>{escape_html(', '.join(line.materials))}</small>",
     )
     return f'<tr class="{style}"><td>{escape_html(line.group)}</td>' + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
-
-
-# ---------------------------------------------------------------- scenes
 
 
 def _scene(scene: SceneRecord) -> str:
@@ -252,9 +243,6 @@ def _failures(corpus: CorpusResults) -> str:
     if not breaches:
         return text
     return f"{text}<p>Bounds that the audits found exceeded:</p><ul>{''.join(breaches)}</ul>"
-
-
-# ---------------------------------------------------------------- at the end
 
 
 def _credits(corpus: CorpusResults) -> str:

@@ -270,9 +270,6 @@ def predict_mass(
     )
 
 
-# ---------------------------------------------------------------- what is left out
-
-
 def anonymise(scene: Scene, file: Path) -> Scene:
     """Replace every name that could tell what an object is by a neutral one, made from its content.
 
@@ -323,9 +320,6 @@ def _describe_piece(words: PartDescription) -> str:
     described = f"{words.name}: {words.material or 'unknown'}"
     described += f", {words.structure}" if words.structure else ""
     return described + (f" of {words.contents}" if words.contents else "")
-
-
-# ---------------------------------------------------------------- against the scales
 
 
 def compare_masses(predictions: Sequence[MassPrediction]) -> MassComparison:

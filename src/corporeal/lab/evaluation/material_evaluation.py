@@ -109,9 +109,6 @@ def _accepted(path: Path, where: str, names: object, library: str) -> tuple[str,
     return tuple(materials.find_material_or_default(name, library).name for name in names)
 
 
-# ---------------------------------------------------------------- how good
-
-
 def recognition_score(rows: Sequence[RecognitionRow]) -> RecognitionScore:
     """Count verdicts; there must be a row."""
     total = len(rows)
@@ -127,9 +124,6 @@ def margin_roc_area(rows: Sequence[RecognitionRow]) -> float | None:
     """Return how often a right answer has a larger margin than a wrong one, as ``roc_area``."""
     right, wrong = (np.array([r.margin for r in rows if r.verdict == kind]) for kind in ("right", "wrong"))
     return roc_area(right, wrong)
-
-
-# ---------------------------------------------------------------- for people and programs
 
 
 def recognition_tables(rows: Sequence[RecognitionRow]) -> list[ResultTable]:

@@ -98,8 +98,6 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
     def _is_rigid(self, field: int) -> bool:
         return self.problem.contact == "multi" and field in self.rigid
 
-    # ------------------------------------------------------------ memory
-
     def _lay_out(self) -> None:
         problem = self.problem
         self.world = np.zeros(1, WORLD_RECORD.dtype)
@@ -253,8 +251,6 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         # One lane of a node says how high mass lies over a floor.
         record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
 
-    # ------------------------------------------------------------ time
-
     @property
     def time(self) -> float:
         """Simulated time so far [s]."""
@@ -352,8 +348,6 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
                 "that overlap at the start."
             )
 
-    # ------------------------------------------------------------ reading and keeping
-
     def save(self) -> SavedArrays:
         """Everything needed to go on later exactly as if nothing had happened."""
         self.book()
@@ -365,8 +359,6 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         self._note_steps()
         self.lost[:] = False
         self.connect()
-
-    # ------------------------------------------------------------ accessors of what is common
 
     def _particles(self) -> Snapshot:
         count = self.first[-1]

@@ -161,8 +161,6 @@ class FieldWindow:
             self.branch[to // 8, :, to % 8] = before.branch[at // 8, :, at % 8]
         self.sort()
 
-    # ------------------------------------------------------------ reading
-
     @cached_property
     def slot(self) -> np.ndarray:
         """Slots in use, in order."""

@@ -52,9 +52,6 @@ def sum_at(node: int, kind: int) -> int:
     ...
 
 
-# ---------------------------------------------------------------- particles to grid
-
-
 @wp.func_native("""
   float *own = mpm::Arena::memory((float *)arena.data);
   int *lists = mpm::Arena::lists((float *)arena.data);
@@ -182,9 +179,6 @@ def add_arena_to_nodes(
 ):
     """Add the arena's sums to the nodes that anything reached, and begin again."""
     ...
-
-
-# ---------------------------------------------------------------- grid to particles
 
 
 @wp.func_native("""

@@ -58,9 +58,6 @@ from corporeal.mpm.formulas.one_lane_contact import (
 wp.set_module_options(block_arena.arena_options(max_unroll=0))
 
 
-# ---------------------------------------------------------------- surfaces
-
-
 @wp.func
 def add_field_sample(
     g: BlockGrid,
@@ -226,9 +223,6 @@ def push_all_supports(
     for i in range(wp.tid(), r.count, stride):
         if contact_near(g, r.home[i]) == 2:
             push_supports(g, c, s, r.home[i], r.cell[i], r.place[i], one, r.volume[i])
-
-
-# ---------------------------------------------------------------- normals and gaps
 
 
 @wp.func

@@ -154,9 +154,6 @@ def relax_contact(c: DeviceContacts, r: DeviceRigidBodies, s: StepGlobals, t: in
     return float(wp.length(change) * soft)
 
 
-# ---------------------------------------------------------------- before
-
-
 @wp.func
 def add_rigid_contact(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: StepGlobals, t: int):
     """Put a contact of two rigid bodies that meet at a node where both of them are."""
@@ -191,9 +188,6 @@ def prepare_contact(c: DeviceContacts, r: DeviceRigidBodies, g: BlockGrid, s: St
             if r.stiff[fc] == 1:
                 wp.atomic_max(s.flag, FLAG_HITS, 1)
     return 0
-
-
-# ---------------------------------------------------------------- the sweeps
 
 
 @wp.kernel
@@ -333,9 +327,6 @@ def apply_rigid_impulses(r: DeviceRigidBodies, s: StepGlobals, lanes: int):
             r.speed_change[b] = wp.vec3d(D(0.0))
             r.moment_change[b] = wp.vec3d(D(0.0))
             r.busy[b] = 0
-
-
-# ---------------------------------------------------------------- after
 
 
 @wp.func

@@ -42,8 +42,6 @@ class DeviceMemory:
         shape = tuple(max(1, n) for n in (count if isinstance(count, tuple) else (count,)))
         return wp.zeros(shape, dtype=kind, device=self.device)
 
-    # ------------------------------------------------------------ grid
-
     def grid(self, problem: Problem, room: int) -> WarpStruct:
         """Make room for some node blocks."""
         g = BlockGrid()
@@ -69,8 +67,6 @@ class DeviceMemory:
         for name in ("meet", "held", "was"):
             setattr(g, name, self.zeros(64 * room, wp.int32))
         return g
-
-    # ------------------------------------------------------------ rigid bodies
 
     def rigid(self, problem: Problem, matter: ParticleConstants) -> WarpStruct:
         """Lay out rigid bodies that have a grid of their own."""
@@ -192,8 +188,6 @@ class DeviceMemory:
         curves = [flow_curve(body, problem.cell) for body in problem.bodies]
         r.flows_by = self.put(np.array(curves), wp.vec3d)
 
-    # ------------------------------------------------------------ contacts
-
     def contacts(self, problem: Problem, room: int) -> WarpStruct:
         """Make room for some nodes where fields meet, and twice as many touches."""
         c = DeviceContacts()
@@ -250,8 +244,6 @@ class DeviceMemory:
         for name, values in zip(NORMAL_CACHE_COLUMNS, (at, fa[:, 0], fc[:, 0], pick[:, 0]), strict=True):
             if len(values):
                 overwrite_rows(getattr(contacts, f"kept_{name}"), np.arange(len(values)), values)
-
-    # ------------------------------------------------------------ what a step shares
 
     def sheet(self, problem: Problem, matter: ParticleConstants) -> WarpStruct:
         """Clock, flags, forces and books at time 0."""

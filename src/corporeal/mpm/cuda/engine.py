@@ -119,8 +119,6 @@ class CudaEngine(EngineInteraction):
         self.arrays.sheet.fast.assign(np.array([0, 0, speed, wave], np.float32))
         self._arrange()
 
-    # ------------------------------------------------------------ time
-
     @property
     def time(self) -> float:
         """Simulated time so far [s]."""
@@ -213,8 +211,6 @@ class CudaEngine(EngineInteraction):
             "detail, or look for parts that overlap at the start."
         )
 
-    # ------------------------------------------------------------ reading and keeping
-
     def save(self) -> dict[str, np.ndarray]:
         """Everything needed to go on later exactly as if nothing had happened."""
         saved = {name: self._read(name) for name in self.kept}
@@ -234,8 +230,6 @@ class CudaEngine(EngineInteraction):
         device_memory.overwrite_rows(self.arrays.sheet.flag, np.array([layout.FLAG_NORMALS_KEPT]), len(choices))
         self._arrange()
         self._read_steps()
-
-    # ------------------------------------------------------------ accessors of what is common
 
     def _particles(self) -> Snapshot:
         m, cell = self.matter, self.problem.cell

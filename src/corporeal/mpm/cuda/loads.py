@@ -45,9 +45,6 @@ def clear_loads(p: DeviceParticles, l: DeviceLoads, s: StepGlobals, stride: int)
         l.loss[0] = D(0.0)
 
 
-# ---------------------------------------------------------------- wind
-
-
 @wp.func
 def gust_signal(l: DeviceLoads, time: wp.float64):
     """Σ a_k sin(2π f_k t + φ_k)."""
@@ -88,9 +85,6 @@ def apply_wind(p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: Step
             wp.atomic_add(l.external, b, wp.vec3d(given))
 
 
-# ---------------------------------------------------------------- tethers
-
-
 @wp.func
 def position_of(p: DeviceParticles, s: StepGlobals, i: int):
     """Where a particle is [m]."""
@@ -117,9 +111,6 @@ def pull_tethered(p: DeviceParticles, r: DeviceRigidBodies, l: DeviceLoads, s: S
         put_vector(l.tether_impulse, i, wp.vec3(J))
         wp.atomic_sub(l.force, h, J)
         wp.atomic_sub(l.moment, h, wp.cross(place, J))
-
-
-# ---------------------------------------------------------------- rigid bodies
 
 
 @wp.func
@@ -187,9 +178,6 @@ def hold_joints(r: DeviceRigidBodies, l: DeviceLoads, s: StepGlobals):
         add_impulse(r, c, J, wp.cross(arm_c, J) + T)
         relative = r.spin[c] - r.spin[a]
         l.loss[0] = l.loss[0] + l.friction[k] * dt * wp.length_sq(relative)
-
-
-# ---------------------------------------------------------------- grips
 
 
 @wp.func

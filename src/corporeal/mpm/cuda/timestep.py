@@ -125,9 +125,6 @@ def begin_frame(s: StepGlobals, r: DeviceRigidBodies, lanes: int):
     plan_group(s, r, wp.tid(), lanes)
 
 
-# ---------------------------------------------------------------- the end of a step
-
-
 @wp.func
 def enter_books(s: StepGlobals, pair: int):
     """Enter what a pair did in this step: how much, when and where."""

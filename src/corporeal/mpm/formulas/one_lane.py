@@ -80,8 +80,6 @@ def law_has_branches(law: wp.float32) -> wp.bool: ...
 def law_is_liquid(law: wp.float32) -> wp.bool: ...
 
 
-# ---------------------------------------------------------------- Maxwell branches
-
 BranchState = wp.types.vector(length=14, dtype=wp.float32)
 """What two branches remember: strain (6: 00 01 02 11 12 22) and θ of one after the other."""
 
@@ -110,9 +108,6 @@ StressVector = wp.types.vector(length=6, dtype=wp.float32)
 def branch_stress(shear: wp.float32, bulk: wp.float32, memory: BranchState, first: int) -> StressVector: ...
 
 
-# ---------------------------------------------------------------- splines
-
-
 @wp.func_native("""
   wp::mat_t<3, 3, wp::float32> n;
   for (int d = 0; d < 3; d++) mpm::Spline<float>::weights(f[d], n.data[d]);
@@ -127,9 +122,6 @@ def spline_weights(f: wp.vec3) -> wp.mat33: ...
   return g;
 """)
 def spline_slopes(f: wp.vec3) -> wp.mat33: ...
-
-
-# ---------------------------------------------------------------- rigid bodies
 
 
 @wp.func_native("""
@@ -215,9 +207,6 @@ def follow_path(
     x: wp.vec3d,
     R: wp.mat33d,
 ) -> PathMotion: ...
-
-
-# ---------------------------------------------------------------- loads
 
 
 @wp.func_native("""

@@ -42,9 +42,6 @@ Scalars = Float[np.ndarray, " E"]
 Indices = Int[np.ndarray, " E"]
 
 
-# ---------------------------------------------------------------- where the face lies
-
-
 def half_space_weight(face: np.ndarray) -> np.ndarray:
     """∫ N(u) du over u < s: share of the quadratic B-spline at 0 that a half space fills [-]."""
     s = np.clip(face, -1.5, 1.5)
@@ -295,9 +292,6 @@ def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: fl
         np.array([n for _, n, _ in rows]).reshape(-1, 3),
         np.array([h for _, _, h in rows], dtype=np.float64),
     )
-
-
-# ---------------------------------------------------------------- which way it looks
 
 
 def unit(v: np.ndarray) -> np.ndarray:

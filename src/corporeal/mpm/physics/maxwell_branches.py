@@ -132,9 +132,6 @@ def complex_modulus(
     return 1.0 + (x / (1.0 + x)) @ strength
 
 
-# ---------------------------------------------------------------- one step
-
-
 def branch_decay(dt: float, time: Float[np.ndarray, " *N"]) -> tuple[np.ndarray, np.ndarray]:
     """Return what is left of old strain, and of strain made evenly during the step [-].
 

@@ -178,9 +178,6 @@ def _rebound(
     )
 
 
-# ---------------------------------------------------------------- finding contacts
-
-
 def find_contacts(scene: ContactScene) -> list[PossibleContacts]:
     """List everything that touches or may touch in this step."""
     fields = np.unique(scene.grid.field).tolist()

@@ -129,8 +129,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         self.steps.smallest = min(self.steps.smallest, dt)
         self.steps.largest = max(self.steps.largest, dt)
 
-    # ------------------------------------------------------------ time step
-
     def stable_step(self) -> float:
         """Largest stable step now [s].
 
@@ -166,8 +164,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         anew = self.steps.count % contact.normal_cache_steps(speed * dt / self.problem.cell) == 0
         return NormalCache.none() if anew else self.kept
 
-    # ------------------------------------------------------------ forces
-
     @property
     def _field(self) -> Int[np.ndarray, " P"]:
         single = self.problem.contact == "single"
@@ -185,8 +181,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         kick = gravity + push
         kick[list(self.guides.guide)] = 0.0
         return kick, push
-
-    # ------------------------------------------------------------ particles to grid and back
 
     def _to_grid(
         self, grid: Stencil, groups: DilatationClusters, kick: np.ndarray, dt: float
@@ -269,8 +263,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         moved = replace(state, centre=centre, speed=speed, spin_momentum=momentum, rotation=turned)
         return moved.follow_rigid(matter)
 
-    # ------------------------------------------------------------ safety and ledger
-
     def _check(self, state: State) -> None:
         """Raise when a particle is not finite or left the domain; the old state stays."""
         self.lost = self._lost(state)
@@ -326,8 +318,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
             impulse=(share[:, :, None] * meeting.impulse).reshape(-1, 3),
         )
 
-    # ------------------------------------------------------------ reading and keeping
-
     def save(self) -> dict[str, np.ndarray]:
         """Everything needed to go on later exactly as if nothing had happened."""
         steps = np.array([self.steps.count, self.steps.smallest, self.steps.largest])
@@ -347,8 +337,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         count, smallest, largest = saved["steps"].tolist()
         self.steps = StepStatistics(int(count), smallest, largest)
         self.lost = self._lost(self.state)
-
-    # ------------------------------------------------------------ accessors of what is common
 
     def _particles(self) -> Snapshot:
         s = self.state

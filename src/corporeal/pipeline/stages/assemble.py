@@ -73,9 +73,6 @@ def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT_CONFIG, up
     return _with_timing(_with_overlaps_named(scene), blocks, plan, config)
 
 
-# ---------------------------------------------------------------- what the files hold
-
-
 def _scene_file_for(inputs: list[Path]) -> SceneFile:
     """Return a scene file for the inputs."""
     if not inputs:
@@ -164,9 +161,6 @@ def _unique_names(blocks: list[_FileObjects]) -> list[_FileObjects]:
     ]
 
 
-# ---------------------------------------------------------------- how large
-
-
 def _apply_extents(blocks: list[_FileObjects], extents: tuple[str, ...]) -> list[_FileObjects]:
     """Scale objects to the extents asked for, and warn of implausible ones."""
     alone = len(blocks) == len(blocks[0].scene.objects) == 1
@@ -249,9 +243,6 @@ def _at_working_extent(scene: Scene, extent: float | None) -> Scene:
     return scale_scene(scene, extent / float(np.ptp(surfaces_bounding_box(scene.surfaces), axis=0).max()))
 
 
-# ---------------------------------------------------------------- where
-
-
 def _place_blocks(blocks: list[_FileObjects], plan: SceneFile, stack: bool) -> list[_FileObjects]:
     """Move each block to its position, or onto the floor beside or above the others."""
     free = [i for i, b in enumerate(blocks) if b.entry and b.entry.position is None]
@@ -304,9 +295,6 @@ def _with_overlaps_named(scene: Scene) -> Scene:
     pairs = ((scene.objects[a].name, scene.objects[b].name) for a, b in overlapping_objects(scene))
     messages = tuple(f"{a} and {b} overlap at the start." for a, b in pairs)
     return replace(scene, warnings=scene.warnings + messages)
-
-
-# ---------------------------------------------------------------- the whole, and how long
 
 
 def _merge_blocks(plan: SceneFile, blocks: list[_FileObjects]) -> Scene:

@@ -151,9 +151,6 @@ def wind_moves_any(assets: Sequence[PoolAsset], config: ComposeConfig, weigh: We
     return False
 
 
-# ---------------------------------------------------------------- what is in it
-
-
 def _possible_kinds(config: ComposeConfig, count: int, rng: np.random.Generator) -> list[InteractionKind]:
     """Return the possible interactions of the objects, in random order."""
     if config.interaction == "none":
@@ -199,9 +196,6 @@ def _asset_by_name(pool: AssetPool, name: str) -> PoolAsset:
     if found is None:
         raise UnknownChoiceError("asset", name, [a.name for a in pool.assets])
     return found
-
-
-# ---------------------------------------------------------------- how large
 
 
 @dataclass(frozen=True)
@@ -282,9 +276,6 @@ def _shape(asset: PoolAsset, extent: float) -> tuple[np.ndarray, np.ndarray, np.
     mesh = join_meshes(read_gltf_model(asset.file, "one").scene.surfaces)
     centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     return (mesh.vertices - centre) * (extent / asset.extent), mesh.triangles, centre
-
-
-# ---------------------------------------------------------------- written down
 
 
 def _write(

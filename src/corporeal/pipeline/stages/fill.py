@@ -115,9 +115,6 @@ def name_objects(warnings: Iterable[str], scene: Scene) -> tuple[str, ...]:
     )
 
 
-# ------------------------------------------------------------------ how it is made
-
-
 def part_models(
     scene: Scene, anatomies: list[MeasuredObject], field: MaterialField, tissue: Material, seed: int
 ) -> dict[int, PartModel]:
@@ -139,9 +136,6 @@ def solid_rods(anatomies: list[MeasuredObject], makes: dict[int, PartModel], see
         for m in a.members
         if makes[m.part].thickness == 0 and (rod := find_rod(m, np.random.default_rng(seed)))
     }
-
-
-# ------------------------------------------------------------------ points
 
 
 def pack_objects(bodies: MeasuredScene, chosen: DiscretizationPlan, seed: int) -> list[ObjectFilling]:
@@ -234,9 +228,6 @@ def initial_velocities(scene: Scene, number: int, points: Float[np.ndarray, "N 3
     if obj.path is not None:
         return start_velocity(obj.path, underside_centre(scene, number), points)
     return np.broadcast_to(np.array(obj.velocity, dtype=np.float64), points.shape)
-
-
-# ------------------------------------------------------------------ in words
 
 
 def fill_sentences(

@@ -150,9 +150,6 @@ def _entry(words: PartDescription, config: GroundConfig) -> MaterialEntry:
     return entry
 
 
-# ---------------------------------------------------------------- numbers
-
-
 def _material(entry: MaterialEntry, words: PartDescription) -> Material:
     grounds = _placed_values(entry, words)
     for field, stated in words.stated.items():
@@ -357,9 +354,6 @@ def _mm(metres: float) -> str:
 
 def _flows(entry: MaterialEntry) -> bool:
     return entry.group == "liquid" or CONSTITUTIVE_LAWS[entry.law].granular
-
-
-# ---------------------------------------------------------------- pairs
 
 
 @dataclass(frozen=True)

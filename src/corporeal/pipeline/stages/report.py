@@ -122,9 +122,6 @@ def report(story: ReportContent, path: Path) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-# ---------------------------------------------------------------- sentences
-
-
 def _summary(story: ReportContent) -> str:
     """Summarize the simulation in a line or two, and list warnings by severity."""
     lists = "".join(_section(k, s, story) for k, s in summary_sections(story.audit).items() if s)
@@ -249,9 +246,6 @@ def _expectations(expectations: Sequence[Expectation]) -> str:
     )
     head = "<tr><th></th><th></th><th>measured</th><th>expected</th></tr>"
     return f'<h2>Expected outcomes of this scene</h2><table class="short">{head}{rows}</table>'
-
-
-# ---------------------------------------------------------------- tables
 
 
 def _part_row(story: ReportContent, k: int) -> str:
@@ -445,9 +439,6 @@ def usage_words(questions: ModelUsage) -> str:
         f"{questions.calls} calls, {questions.input_tokens:,} tokens in, "
         f"{questions.output_tokens:,} out, {questions.seconds:.0f} s waited, {paid}."
     )
-
-
-# ---------------------------------------------------------------- small functions
 
 
 def si_text(value: float, unit: str) -> str:

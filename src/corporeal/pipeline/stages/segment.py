@@ -95,9 +95,6 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
         )
 
 
-# ---------------------------------------------------------------- objects from pictures
-
-
 def _undivided_objects_warning(objects: Sequence[ObjectDescription]) -> list[str]:
     """Return a warning of objects whose pieces are unknown.
 

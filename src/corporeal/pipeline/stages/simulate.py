@@ -97,9 +97,6 @@ def simulate(
     return trajectory
 
 
-# ------------------------------------------------------------------ before time 0
-
-
 def bodies_to_relax(scene: Scene, particles: Particles, posed: ModelMapping) -> tuple[int, ...]:
     """Return bodies to relax: all supported ones, if any deforms."""
     if not scene.settled or not any(scene.gravity):
@@ -156,9 +153,6 @@ def equilibrium_found(scene: Scene, posed: ModelMapping, balance: StaticEquilibr
         for obj, (x, y, z), far in moved
     ]
     return SettlingOutcome(balance.seconds, balance.found, tuple(objects))
-
-
-# ------------------------------------------------------------------ from time 0 on
 
 
 def frame_times(scene: Scene) -> np.ndarray:

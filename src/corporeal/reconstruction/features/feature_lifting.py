@@ -111,9 +111,6 @@ def _map_size(share: csr_array) -> tuple[int, int]:
     return cast("tuple[int, int]", share.shape)
 
 
-# ---------------------------------------------------------------- by Gaussians' weights
-
-
 def uplift_features(
     weights: PointWeights,
     cells: tuple[int, int],
@@ -150,9 +147,6 @@ def _resample_maps(weights: PointWeights, cells: tuple[int, int], maps: Sequence
         return csr_array(share @ bilinear_weights(place, np.ones(len(place), bool), size))
 
     return of
-
-
-# ---------------------------------------------------------------- by where points fall
 
 
 def back_projection(
@@ -227,9 +221,6 @@ def _depth_slope(depth: np.ndarray, axis: int) -> np.ndarray:
     first[axis], last[axis] = (1, 0), (0, 1)
     smaller = np.minimum(np.pad(step, first, constant_values=np.inf), np.pad(step, last, constant_values=np.inf))
     return np.where(np.isfinite(smaller), smaller, 0.0)
-
-
-# ---------------------------------------------------------------- unobserved surface
 
 
 def fill_unseen_points(

@@ -127,9 +127,6 @@ class TrainedField:
         )
 
 
-# ---------------------------------------------------------------- a field and what it looks like
-
-
 def haze_field(low: Float[np.ndarray, "3"], cell: float, filled: Bool[np.ndarray, "X1 Y1 Z1"]) -> RadianceField:
     """Return a field of grey haze.
 
@@ -275,9 +272,6 @@ def field_camera_rows(grid: VoxelGrid, cameras: tuple[Camera, ...]) -> Float32[n
         r[9:12] = (pose[:3, 3] - grid.low) / grid.cell
         r[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     return made
-
-
-# ---------------------------------------------------------------- learning
 
 
 def train_field(

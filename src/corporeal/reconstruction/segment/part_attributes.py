@@ -204,9 +204,6 @@ def _thinness(position: np.ndarray) -> np.ndarray:
     return np.where(size > 3, thin, 0.0)[tree.query(position)[1]]
 
 
-# ---------------------------------------------------------------- words
-
-
 def _words_of_name(name: str) -> list[str]:
     spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     return [_singular_word(w) for w in re.findall("[a-z]+", spaced.lower())]

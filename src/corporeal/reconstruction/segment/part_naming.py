@@ -133,9 +133,6 @@ def _claim_clusters(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
     return part
 
 
-# ---------------------------------------------------------------- without a model
-
-
 def _score_by_attributes(
     clusters: PartClusters, cloud: FeatureCloud, parsed: Sequence[PartDescription]
 ) -> tuple[PartClusters, Float[np.ndarray, "C K"]]:
@@ -147,9 +144,6 @@ def _score_by_attributes(
     clusters = replace(clusters, cluster_of_point=np.unique(cut, return_inverse=True)[1])
     seen = observed_attributes(cloud, clusters.cluster_of_point, clusters.count, up)
     return clusters, log_likelihood(seen, attributes)
-
-
-# ---------------------------------------------------------------- with words' vectors
 
 
 def _score_by_words(clusters: PartClusters, cloud: FeatureCloud, words: np.ndarray) -> Float[np.ndarray, "C K"]:

@@ -131,9 +131,6 @@ def summarise_dynamics(
     )
 
 
-# ---------------------------------------------------------------- rows
-
-
 @dataclass(frozen=True)
 class _EvaluationState:
     """How far the runs of an evaluation came."""
@@ -171,9 +168,6 @@ def _row(scene: str, method: str, reference: ReferenceRun, state: _EvaluationSta
         return MethodResult(scene, method, numbers, None, f"failed: energy grew by {numbers.growth:.1%}")
     against = None if reference.numbers is None else compare_runs(numbers, reference.numbers)
     return MethodResult(scene, method, numbers, against)
-
-
-# ---------------------------------------------------------------- groups
 
 
 def _means(
@@ -222,9 +216,6 @@ def _mean(group: str, method: str, rows: Sequence[MethodResult]) -> MethodMean:
     )
 
 
-# ---------------------------------------------------------------- ranks and life
-
-
 def _ranks(method: str, by_scene: Mapping[str, Mapping[str, MethodResult]], drops: Sequence[MethodDrop]) -> MethodRanks:
     """Correlate ranks within each scene; real numbers are those of ours."""
     stiff: list[list[RankedPair]] = []
@@ -256,9 +247,6 @@ def _life(method: str, drops: Sequence[MethodDrop]) -> MethodRebounds:
         inside=sum(d.off <= RANGE_TOLERANCE for d in drops),
         off=mean(d.off for d in drops),
     )
-
-
-# ---------------------------------------------------------------- as data
 
 
 def dynamics_record(found: DynamicsSummary) -> dict:
