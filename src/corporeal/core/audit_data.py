@@ -252,6 +252,58 @@ class PredictedBreakage:
     """That it broke into; 0: the simulation keeps it whole."""
 
 
+EffectKind = Literal[
+    "deformation",
+    "static_sag",
+    "contact_time",
+    "contact_width",
+    "rebound",
+    "depth_below_support",
+    "penetration",
+    "separated_share",
+    "unaccounted_energy",
+]
+FindingCause = Literal["thickened wall", "softened", "springs", "few cells", "indenter of few cells"]
+FindingSeverity = Literal["grave", "warning", "minor"]
+
+
+@dataclass(frozen=True)
+class FindingEffect:
+    """What of a result differs from what the measured values give."""
+
+    kind: EffectKind
+    """Lengths [m]: largest deformation, compression by load, depth below where it can stand, penetration, width over
+    which it presses. Time of an impact [s]. Shares [-]: rebound over height of fall, what is separated, energy."""
+    simulated: float
+    """In this run: measured in the trajectory, or of the simulated numbers (static_sag, contact_time)."""
+    expected: float
+    """The most that the measured material values give."""
+    grave: bool
+    """Whether the difference can be seen at the size of the object."""
+
+
+@dataclass(frozen=True)
+class AuditFinding:
+    """A part whose motion does not follow from its measured values, or an outcome that contradicts them."""
+
+    object: str | None
+    """None: of the whole scene."""
+    part: str | None
+    """None: of the whole object."""
+    severity: FindingSeverity
+    """grave: an effect can be seen. minor: other numbers than the measured ones, without such an effect."""
+    causes: tuple[FindingCause, ...]
+    """Empty: only the outcome is known."""
+    stiffness_ratio: float | None
+    """Simulated over measured Young's modulus [-]; 0: it has no elastic stiffness of its own."""
+    in_plane_ratio: float | None
+    """Simulated over measured E t of a wall [-]; None: it is no wall."""
+    cells_across: float | None
+    """Narrowest side of what has few cells [cells]."""
+    effects: tuple[FindingEffect, ...]
+    sentence: str
+
+
 @dataclass(frozen=True)
 class Audit:
     """A simulation checked against the laws it must obey."""
@@ -308,6 +360,8 @@ class Audit:
     """One for each."""
     breakage: tuple[PredictedBreakage, ...] = field(default=(), kw_only=True)
     """One per brittle rigid part that something struck."""
+    findings: tuple[AuditFinding, ...] = field(default=(), kw_only=True)
+    """Parts that do not move by their measured values, and outcomes that contradict them; the gravest first."""
 
     @property
     def notes(self) -> tuple[Note, ...]:

@@ -12,10 +12,13 @@ from jaxtyping import Float
 from corporeal.core.audit_data import Audit, EnergyGain, Expectation, PartAudit, SettlingOutcome
 from corporeal.core.types import Ledger, MaterialField, Particles, Scene, SceneObject, Trajectory
 from corporeal.discretization.filled_shells import acting_material
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
+from corporeal.simulation.audit_findings import audit_findings
 from corporeal.simulation.audit_messages import (
     ALLOWED_BREACHES,
     breach_messages,
     equilibrium_warnings,
+    finding_warnings,
     passage_message,
     surface_warnings,
 )
@@ -44,6 +47,9 @@ def audit(
     ledger, cell = trajectory.ledger, particles.cell
     floor = float(ledger.plane_depth.max(initial=0.0))
     pair = float(ledger.overlap.max(initial=0.0))
+    unbooked = unbooked_loss(ledger, scene, cell)
+    of_solids = max(0.0, unbooked - energy_share_of_flows(ledger, scene, particles, field))
+    surfaces = surface_pairs(scene, particles, trajectory)
     found = Audit(
         particles=particles.count,
         objects=len(scene.objects),
@@ -58,10 +64,10 @@ def audit(
         energy_growth=energy_growth(ledger, scene, cell),
         mechanical_growth=energy_growth(ledger, scene, cell, with_losses=False),
         energy_gain=object_gaining_energy(ledger, scene, cell),
-        unbooked_loss=unbooked_loss(ledger, scene, cell),
+        unbooked_loss=unbooked,
         impact_loss=impact_loss(ledger, scene, cell),
         impact_gain=impact_gain(ledger, scene, cell),
-        surfaces=surface_pairs(scene, particles, trajectory),
+        surfaces=surfaces,
         mass_error=mass_error(particles),
         max_penetration_m=max(floor, pair),
         max_penetration_dx=max(floor, pair) / cell,
@@ -71,6 +77,7 @@ def audit(
         parts=part_rows(scene, particles, field),
         breakage=predict_breakage(scene, particles, field, trajectory),
         settling=settling,
+        findings=audit_findings(scene, particles, field, trajectory, of_solids, surfaces),
         warnings=(),
     )
     warnings = (
@@ -78,6 +85,7 @@ def audit(
         *equilibrium_warnings(settling),
         *breach_messages(found),
         *surface_warnings(found.surfaces),
+        *finding_warnings(found.findings),
     )
     return found.noting(warnings)
 
@@ -147,6 +155,18 @@ def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
     balance = balance + ledger.impact_loss
     lost, whole = float((balance[0] - balance).max()), available_energy(ledger, scene, cell)
     return max(0.0, lost) / whole if whole > 0 else 0.0
+
+
+def energy_share_of_flows(ledger: Ledger, scene: Scene, particles: Particles, field: MaterialField) -> float:
+    """Largest kinetic energy of all objects of liquids or grains, over the available energy [-].
+
+    So much of the unbooked loss may be theirs.
+    """
+    loose = np.array([CONSTITUTIVE_LAWS[m.law].loose for m in field.materials], dtype=bool)[particles.part]
+    flows = np.array([loose[particles.object == k].any() for k in range(len(scene.objects))], dtype=bool)
+    whole = available_energy(ledger, scene, particles.cell)
+    most = float(ledger.kinetic[:, : len(flows)][:, flows].max(axis=0, initial=0.0).sum())
+    return most / whole if whole > 0 else 0.0
 
 
 def impact_loss(ledger: Ledger, scene: Scene, cell: float) -> float:

@@ -4,7 +4,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from corporeal.core.audit_data import Audit, PredictedBreakage, SettledObjectOutcome, SettlingOutcome, SurfacePairCheck
+from corporeal.core.audit_data import (
+    Audit,
+    AuditFinding,
+    PredictedBreakage,
+    SettledObjectOutcome,
+    SettlingOutcome,
+    SurfacePairCheck,
+)
 from corporeal.core.types import Note, NoteKind
 
 ALLOWED_BREACHES = {
@@ -81,6 +88,12 @@ def surface_warnings(pairs: Iterable[SurfacePairCheck]) -> list[str]:
                 "smaller of them. A finer --detail brings them closer."
             )
     return found
+
+
+def finding_warnings(findings: Iterable[AuditFinding]) -> list[Note]:
+    """Return the sentences of grave findings, and of those that may be seen."""
+    kinds = {"grave": NoteKind.GRAVE, "warning": NoteKind.DOUBT}
+    return [Note(f.sentence, kinds[f.severity]) for f in findings if f.severity in kinds]
 
 
 def breakage_message(found: PredictedBreakage) -> str:

@@ -98,16 +98,12 @@ class ObjectParticles:
         late = np.flatnonzero(self.time >= self.time[-1] - REST_DURATION_S - 1e-9)
         return np.unique(np.linspace(late[0], late[-1], REST_FRAMES).astype(int))
 
-    def before(self, instant: float) -> int:
-        """Return the number of the last frame before an instant [s]."""
-        return max(0, int(np.searchsorted(self.time, instant)) - 1)
-
     def when(self, instant: float, body: int) -> Float[np.ndarray, "N 3"]:
         """One object's particles [m] at an instant of impact [s]: from the frame before, in flight.
 
         The frame after would already show its effect.
         """
-        k = self.before(instant)
+        k = frame_before(self.time, instant)
         flight = instant - self.time[k]
         velocity = self.ledger.momentum[k, body] / self.ledger.mass[k, body]
         position = self.trajectory.frames[k].position[self.members[body]].astype(float)
@@ -124,7 +120,7 @@ def object_row(body: int, names: list[str], bodies: ObjectParticles) -> ObjectOu
     moved = centre[-1] - centre[0]
     fit = fit_rigid_motion(start, bodies.last[body][-1], np.ones(len(start)))
     rms = ledger.rms_speed[late, body]
-    bounced = bounce(body, bodies, bodies.gravity)
+    bounced = rise_after_impact(bodies.trajectory, body, bodies.gravity, bodies.cell)
     return ObjectOutcome(
         at_rest=bool(rms.max() * REST_DURATION_S < cell),
         rms_speed_end=float(rms[-1]),
@@ -236,7 +232,7 @@ class Bounce:
     """Rebound over fall [-]."""
 
 
-def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
+def rise_after_impact(trajectory: Trajectory, body: int, gravity: float, cell: float) -> Bounce:
     """Height of fall before the first contact, and of the rebound.
 
     The fall is the free fall from rest that ends at its speed, so that an object thrown down has
@@ -245,17 +241,18 @@ def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
     has no ratio.
 
     Args:
+        trajectory: How everything moved, with the ledger.
         body: Which.
-        bodies: All of them over time.
         gravity: Downward acceleration [m/s²].
+        cell: dx [m].
 
     """
-    ledger, time = bodies.ledger, bodies.time
+    ledger, time = trajectory.ledger, trajectory.time
     first = ledger.first_contact[-1, body]
     if np.isnan(first).all():
         return Bounce(None, None, None)
     touch = float(np.nanmin(first))
-    k = bodies.before(touch)
+    k = frame_before(time, touch)
     height = ledger.centre[:, body, 2]
     speed = ledger.momentum[k, body, 2] / ledger.mass[k, body]
     flight = touch - time[k]
@@ -265,8 +262,13 @@ def bounce(body: int, bodies: ObjectParticles, gravity: float) -> Bounce:
     peak = height[k + 1 + rising[0] :].max() if len(rising) else met
     fall = float(0.5 * struck**2 / gravity) if gravity > 0.0 else 0.0
     rebound = max(0.0, float(peak - met))
-    ratio = rebound / fall if fall > bodies.cell / 2 else None
+    ratio = rebound / fall if fall > cell / 2 else None
     return Bounce(fall, rebound, ratio)
+
+
+def frame_before(time: Float[np.ndarray, " F"], instant: float) -> int:
+    """Return the number of the last frame before an instant [s]."""
+    return max(0, int(np.searchsorted(time, instant)) - 1)
 
 
 def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str, PairOutcome]:
