@@ -1,6 +1,14 @@
 """Outcomes and audits made by hand: what a test does not name is as in a run where all is well."""
 
-from corporeal.core.audit_data import ObjectOutcome, Outcome, PairOutcome, PartAudit, RunAudit
+from corporeal.core.audit_data import (
+    AuditFinding,
+    FindingEffect,
+    ObjectOutcome,
+    Outcome,
+    PairOutcome,
+    PartAudit,
+    RunAudit,
+)
 from corporeal.core.types import NO_USAGE
 
 
@@ -37,6 +45,17 @@ def part_audit(**what):
         "mass_kg": 1.0, "real_mass_kg": 1.0, "reason": "",
     }  # fmt: skip
     return PartAudit(**said | what)
+
+
+def audit_finding(**what):
+    """A shelf that buckles."""
+    seen = FindingEffect("deformation", 0.06, 0.005, True)
+    said = {
+        "object": "shelf_0", "part": "boards", "severity": "grave", "causes": ("thickened wall",),
+        "stiffness_ratio": 5e-5, "in_plane_ratio": 1.4e-3, "cells_across": None, "effects": (seen,),
+        "sentence": "shelf_0: boards is simulated with 5e-05 of its measured Young's modulus: it deforms by 60 mm.",
+    }  # fmt: skip
+    return AuditFinding(**said | what)
 
 
 def run_audit(**what):

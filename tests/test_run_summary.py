@@ -9,7 +9,7 @@ from corporeal.core import store
 from corporeal.core.audit_data import PredictedBreakage
 from corporeal.core.types import Note, NoteKind
 from corporeal.simulation.audit_file import AUDIT_FILE
-from sample_findings import run_audit
+from sample_findings import audit_finding, run_audit
 
 
 def breakage(word, ratio, pieces=0):
@@ -59,6 +59,18 @@ def test_what_a_run_says_last_is_in_order_of_weight(tmp_path, capsys):
         "hint: Still.",
         "left out: 1 picture was left out: a.jpg.",
     ]
+
+
+def test_every_grave_finding_is_one_line_at_the_end(tmp_path, capsys):
+    """Of a shelf that buckled like rubber the terminal said that it rebounds too little."""
+    found = tuple(audit_finding(sentence=f"shelf_{k}: boards is softer. Look.") for k in range(7))
+    notes = (*(Note(f.sentence, NoteKind.GRAVE) for f in found), "It may be wrong.")
+    audit = run_audit(warnings=notes, findings=(*found, audit_finding(severity="minor", sentence="A little.")))
+    store.write_json(tmp_path / AUDIT_FILE, store.to_plain(audit))
+    show_summary(tmp_path)
+    said = capsys.readouterr()
+    lines = (said.out + said.err).splitlines()
+    assert lines[-8:] == ["warning: It may be wrong.", *(f"grave: {f.sentence}" for f in found)]
 
 
 def test_in_a_terminal_sentences_stand_beside_their_word(tmp_path, capsys, monkeypatch):

@@ -5,12 +5,13 @@ import pytest
 from corporeal.core.types import Note, NoteKind
 from corporeal.simulation.summary_text import (
     ASSUMPTIONS_SECTION,
+    FINDINGS_SECTION,
     LEFT_OUT_SECTION,
     WARNINGS_SECTION,
     split_advice,
     summary_sections,
 )
-from sample_findings import run_audit
+from sample_findings import audit_finding, run_audit
 
 PIECES = Note("can: nobody looked what it is made up of. --vlm or --annotations name pieces.", NoteKind.ASSUMED)
 UNKNOWN = Note(
@@ -22,8 +23,13 @@ GONE = Note("2 of 10 photographs do not fit the others and were left out: c.jpg,
 
 def test_the_gravest_comes_first_and_each_once():
     warnings = (GONE, PIECES, DEPTH, UNKNOWN, PIECES)
-    said = summary_sections(run_audit(warnings=warnings, hints=("Nothing moves.", PIECES)))
+    soft = audit_finding(sentence="can_0: body is softer.")
+    little = audit_finding(sentence="can_0: tab is softer.", severity="minor")
+    warnings = (*warnings, Note(soft.sentence, NoteKind.GRAVE))
+    told = run_audit(warnings=warnings, hints=("Nothing moves.", PIECES), findings=(soft, little))
+    said = summary_sections(told)
     assert list(said.items()) == [
+        (FINDINGS_SECTION, (soft.sentence,)),
         (WARNINGS_SECTION, (UNKNOWN, DEPTH)),
         (ASSUMPTIONS_SECTION, (PIECES, "Nothing moves.")),
         (LEFT_OUT_SECTION, (GONE,)),
@@ -33,7 +39,7 @@ def test_the_gravest_comes_first_and_each_once():
 @pytest.mark.parametrize("words", [str(GONE), str(PIECES), str(UNKNOWN)])
 def test_words_alone_make_no_kind(words):
     said = summary_sections(run_audit(warnings=(words,)))
-    assert said == {WARNINGS_SECTION: (words,), ASSUMPTIONS_SECTION: (), LEFT_OUT_SECTION: ()}
+    assert said == {FINDINGS_SECTION: (), WARNINGS_SECTION: (words,), ASSUMPTIONS_SECTION: (), LEFT_OUT_SECTION: ()}
 
 
 @pytest.mark.parametrize(

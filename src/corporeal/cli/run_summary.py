@@ -11,6 +11,7 @@ from corporeal.core.terminal import console, print_line, print_table
 from corporeal.simulation.audit_file import read_run_audit
 from corporeal.simulation.audit_messages import breakage_message
 from corporeal.simulation.summary_text import (
+    FINDINGS_SECTION,
     LEFT_OUT_SECTION,
     WARNINGS_SECTION,
     SummarySection,
@@ -24,6 +25,8 @@ MAX_SENTENCES_PER_SECTION = 5
 """Sentences of a section that are printed in full."""
 MAX_LISTED_IMPACTS = 3
 """Impacts with possible breakage that are printed."""
+WORD_STYLES = {FINDINGS_SECTION.word: "bold red", WARNINGS_SECTION.word: "bold yellow"}
+"""How a section's word is printed; all others bold."""
 TABLE_HEADS = ("object", "part", "material", "mass", "simulated as")
 
 
@@ -34,9 +37,13 @@ def show_summary(folder: Path) -> None:
     print_table(TABLE_HEADS, rows[:MAX_PART_ROWS], console)
     if len(rows) > MAX_PART_ROWS:
         print_line(f"and {len(rows) - MAX_PART_ROWS} parts more: see the report.")
-    for section, sentences in summary_sections(audit).items():
-        _listed(section, sentences)
+    sections = summary_sections(audit)
+    for section, sentences in sections.items():
+        if section is not FINDINGS_SECTION:
+            _listed(section, sentences)
     _breakage_sentences(audit.breakage)
+    for sentence in sections[FINDINGS_SECTION]:  # what is read last, each
+        _say(FINDINGS_SECTION.word, sentence)
 
 
 def _breakage_sentences(found: Sequence[PredictedBreakage]) -> None:
@@ -71,6 +78,6 @@ def _say(word: str, sentences: str) -> None:
         return
     first, rest = split_advice(sentences)
     row = Table.grid(padding=(0, 1))
-    style = "bold yellow" if word == WARNINGS_SECTION.word else "bold"
+    style = WORD_STYLES.get(word, "bold")
     row.add_row(Text(f"{word}:", style), Text.assemble(first, " ", (rest, "dim")))
     console.print(row)

@@ -127,7 +127,7 @@ def run_audit(
         peak_memory_mb=peak_memory_mb(),
         settings=spent.settings,
         questions=made.inventory.usage,
-        hints=run_hints(made.assembled.scene, happened, spent.divided, audit.unbooked_loss, audit.parts),
+        hints=run_hints(made.assembled.scene, happened, spent.divided, audit.findings),
     )
 
 

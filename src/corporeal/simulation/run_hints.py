@@ -7,52 +7,44 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from corporeal.core.audit_data import ObjectOutcome, Outcome, PartAudit
-from corporeal.core.types import Law, Scene
+from corporeal.core.audit_data import AuditFinding, ObjectOutcome, Outcome
+from corporeal.core.types import Scene
 from corporeal.recognition.parts_by_name import name_words
 
 MIN_VISIBLE_MOTION_RATIO = 0.01
 """Of an object's length: what moves or bends less cannot be seen [-]."""
 MIN_VISIBLE_TURN_DEG = 1.0
 """The same of its turning [degrees]."""
-REPORTED_LOSS_FRACTION = 0.1
-"""Share of energy lost numerically that is reported [-]."""
-FLOWING_LAWS = frozenset(law.name.lower() for law in (Law.FLUID, Law.DRUCKER_PRAGER))
-"""Laws of materials without shape memory."""
 START_HINT = "Let it fall (--drop 0.5), throw it (--velocity NAME=1,0,0) or push it (scene.toml)."
 
 
-def run_hints(
-    scene: Scene, happened: Outcome, divided: bool, lost: float | None = None, parts: Sequence[PartAudit] = ()
-) -> tuple[str, ...]:
+def run_hints(scene: Scene, happened: Outcome, divided: bool, findings: Sequence[AuditFinding] = ()) -> tuple[str, ...]:
     """Return hints for the next run, in sentences.
 
     Args:
         scene: What was simulated.
         happened: The outcome.
         divided: Whether it was asked for which nodes of a file are objects of their own.
-        lost: Share of the energy that no booked loss accounts for [-]; None: it is not known.
-        parts: How each part was simulated.
+        findings: Of the audit.
 
     """
     joined = () if divided else _one_object_hint(scene)
-    return (*scene.hints, *joined, *_motionless_hint(scene, happened), *_energy_loss_hint(lost, parts))
+    return (*scene.hints, *joined, *_motionless_hint(scene, happened), *_minor_findings_hint(findings))
 
 
-def _energy_loss_hint(share: float | None, parts: Sequence[PartAudit]) -> Iterator[str]:
-    """Hint at numerical energy loss of soft parts on coarse cells."""
-    soft = dict.fromkeys(p.object for p in parts if p.object and _springs_back(p))
-    if share is not None and share > REPORTED_LOSS_FRACTION and soft:
-        yield (
-            f"{share:.0%} of the energy was lost numerically in transfers between material points "
-            f"and grid: soft objects of few cells ({', '.join(soft)}) rebound and swing too "
-            "little. A finer --detail loses less."
-        )
-
-
-def _springs_back(part: PartAudit) -> bool:
-    """Return whether a part is elastic: not liquid, not granular."""
-    return part.treatment != "rigid" and part.law not in FLOWING_LAWS
+def _minor_findings_hint(findings: Sequence[AuditFinding]) -> Iterator[str]:
+    """Say which parts are simulated with other values than measured, where no effect of that can be seen."""
+    minor = [f for f in findings if f.severity == "minor" and f.stiffness_ratio is not None]
+    softer = [f for f in minor if f.stiffness_ratio is not None and 0.0 < f.stiffness_ratio < 1.0]
+    if not softer:
+        return
+    worst = min(softer, key=lambda f: f.stiffness_ratio or 0.0)
+    are = "part is" if len(minor) == 1 else "parts are"
+    yield (
+        f"{len(minor)} {are} simulated with other values than the measured ones, without an effect that can be seen, "
+        f"most of all {worst.object}: {worst.part}, with {worst.stiffness_ratio:.2g} of its Young's modulus. "
+        "The report lists the ratios under Validity."
+    )
 
 
 def _one_object_hint(scene: Scene) -> Iterator[str]:

@@ -25,17 +25,18 @@ class SummarySection:
     """Which they are, the gravest first."""
 
 
+FINDINGS_SECTION = SummarySection("grave", "What contradicts the measured values", "grave findings", ())
 WARNINGS_SECTION = SummarySection("warning", "What may be wrong", "warnings", (NoteKind.GRAVE, NoteKind.DOUBT))
 ASSUMPTIONS_SECTION = SummarySection("hint", "What was assumed, and what changes it", "hints", (NoteKind.ASSUMED,))
 LEFT_OUT_SECTION = SummarySection("left out", "What was left out", "left out", (NoteKind.LEFT_OUT,))
-SECTIONS = (WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SECTION)
+SECTIONS = (FINDINGS_SECTION, WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SECTION)
 """The gravest first."""
 
 
 def summary_sections(audit: RunAudit) -> dict[SummarySection, tuple[str, ...]]:
     """Return the sections of the summary, each sentence once, by severity."""
-    every = (*audit.notes, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
-    return {s: tuple(dict.fromkeys(_of(s, every))) for s in SECTIONS}
+    every = (*rest, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
+    return {s: grave if s is FINDINGS_SECTION else tuple(dict.fromkeys(_of(s, every))) for s in SECTIONS}
 
 
 def split_advice(sentences: str) -> tuple[str, str]:
