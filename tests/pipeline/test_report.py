@@ -4,6 +4,7 @@ from dataclasses import replace
 import pytest
 
 from corporeal import materials
+from corporeal.core.audit_data import FindingEffect
 from corporeal.core.types import (
     NO_USAGE,
     Discretization,
@@ -32,7 +33,7 @@ from corporeal.pipeline.stages.report import (
     usage_words,
 )
 from corporeal.pipeline.stages.segment import segment
-from sample_findings import run_audit
+from sample_findings import audit_finding, run_audit
 from sample_scenes import plain, scene
 
 
@@ -194,3 +195,30 @@ def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
 def test_a_page_of_which_nothing_is_to_be_reported_has_no_lists(page):
     told = page(PartDescription("", "steel", "solid"))
     assert "<h3>What" not in told and "The audit found no violations." in told
+
+
+# ---------------------------------------------------------------- whether to trust it
+
+
+SOUND = "The audit found no violations."
+
+
+def test_a_grave_finding_stands_under_validity_with_part_ratios_and_effect(page):
+    words = PartDescription("", "ABS", "solid", answered_by="recording")
+    said = page(words)
+    assert SOUND in said and 'id="findings"' not in said
+    found = audit_finding()
+    said = page(words, findings=(found,), warnings=(Note(found.sentence, NoteKind.GRAVE),))
+    validity = said[said.index("<h2>Validity</h2>") : said.index("<h2>Materials</h2>")]
+    assert SOUND not in said
+    assert "it deforms by 60 mm." in validity
+    for cell in ("grave", "shelf_0", "boards", "5e-05", "0.0014", "<b>largest deformation</b>", "60 mm", "5 mm"):
+        assert f">{cell}</td>" in validity
+
+
+def test_other_values_without_a_visible_effect_are_listed_and_no_violation(page):
+    words = PartDescription("", "ABS", "solid", answered_by="recording")
+    energy = FindingEffect("unaccounted_energy", 0.125, 0.0, False)
+    said = page(words, findings=(audit_finding(severity="minor", effects=(energy,)),))
+    assert SOUND in said
+    assert ">energy unaccounted for</td>" in said and ">12.5 %</td>" in said

@@ -9,7 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from corporeal.core.audit_data import Expectation, PredictedBreakage, RunAudit
+from corporeal.core.audit_data import (
+    AuditFinding,
+    EffectKind,
+    Expectation,
+    FindingEffect,
+    PredictedBreakage,
+    RunAudit,
+)
 from corporeal.core.types import (
     Discretization,
     Material,
@@ -72,6 +79,18 @@ CHOICE_WORDS = {
     "field": "another method",
     "borrowed": "ours; the other method gives none",
 }
+EFFECT_NAMES: dict[EffectKind, tuple[str, str]] = {
+    "deformation": ("largest deformation", "m"),
+    "static_sag": ("compression by its load", "m"),
+    "contact_time": ("duration of an impact", "s"),
+    "contact_width": ("width of contact", "m"),
+    "rebound": ("rebound over height of fall", ""),
+    "depth_below_support": ("depth below where it can stand", "m"),
+    "penetration": ("depth in what it touches", "m"),
+    "separated_share": ("separated from its object", "%"),
+    "unaccounted_energy": ("energy unaccounted for", "%"),
+}
+"""Kind of effect → name and unit."""
 LONG_REASON_CHARACTERS = 60
 """Minimum length of a reason that is printed once, not at every value [characters]."""
 
@@ -224,9 +243,60 @@ def _impact_words(story: ReportContent, k: int) -> str:
 
 
 def _verdict(story: ReportContent) -> str:
-    if not story.audit.warnings:
-        return '<p class="good">The audit found no violations.</p>'
-    return '<p>What limits this result stands at the <a href="#said">top of the page</a>.</p>'
+    """Say whether the result can be trusted, and which parts do not move by their measured values."""
+    grave = [f for f in story.audit.findings if f.severity == "grave"]
+    if grave:
+        items = "".join(f"<li>{_item(f.sentence, story)}</li>" for f in grave)
+        said = f'<div class="grave"><b>Contradicts the measured values</b><ul>{items}</ul></div>'
+    elif not story.audit.warnings:
+        said = '<p class="good">The audit found no violations.</p>'
+    else:
+        said = ""
+    if story.audit.warnings:
+        said += '<p>What limits this result stands at the <a href="#said">top of the page</a>.</p>'
+    return said + _findings_table(story.audit.findings)
+
+
+def _findings_table(findings: Sequence[AuditFinding]) -> str:
+    """Lay out what is simulated with other values than measured, and what comes of it beside what should."""
+    if not findings:
+        return ""
+    heads = (
+        "",
+        "object",
+        "part",
+        "E",
+        "E t of its wall",
+        "cells across",
+        "effect",
+        "in this run",
+        "as measured",
+    )
+    head = "".join(f"<th>{name}</th>" for name in heads)
+    rows = "".join(_finding_rows(f) for f in findings)
+    return (
+        '<p class="lead">Parts that are simulated with other values than the measured ones, and outcomes that do not '
+        "follow from those: simulated over measured stiffness, and the most that measured values give.</p>"
+        f'<div class="wide"><table id="findings"><tr>{head}</tr>{rows}</table></div>'
+    )
+
+
+def _finding_rows(found: AuditFinding) -> str:
+    """One row per effect; the first names the part and its ratios."""
+    ratios = (found.stiffness_ratio, found.in_plane_ratio, found.cells_across)
+    numbers = ["–" if r is None else f"{r:.2g}" for r in ratios]
+    told = table_cells(
+        found.severity, escape_html(found.object or ""), escape_html(found.part or ""), *numbers, wrap=True
+    )
+    effects = [_effect_cells(e) for e in found.effects] or [table_cells("–", "–", "–")]
+    rest = "".join(f"<tr>{table_cells(*[''] * 6)}{cells}</tr>" for cells in effects[1:])
+    return f"<tr>{told}{effects[0]}</tr>{rest}"
+
+
+def _effect_cells(effect: FindingEffect) -> str:
+    name, unit = EFFECT_NAMES[effect.kind]
+    values = [f"{100 * x:.3g} %" if unit == "%" else si_text(x, unit) for x in (effect.simulated, effect.expected)]
+    return table_cells(f"<b>{name}</b>" if effect.grave else name, *values, wrap=True)
 
 
 def _subject(sentence: str, story: ReportContent) -> str:
@@ -447,7 +517,7 @@ def si_text(value: float, unit: str) -> str:
         return f"{math.degrees(value):.3g}°"
     if unit == "kg/m³":
         return f"{value:.4g} {unit}"
-    if unit not in ("Pa", "m") or value == 0:
+    if unit not in ("Pa", "m", "s") or value == 0:
         return f"{value:.3g} {unit}".strip()
     for size, prefix in SI_PREFIXES:
         if abs(value) >= size * 0.9995:
