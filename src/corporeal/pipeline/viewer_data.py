@@ -132,13 +132,15 @@ def contact_times(happened: Outcome) -> list[dict]:
 
 
 def audit_summary(audit: RunAudit, prepared: PreparedScene) -> dict[str, Any]:
-    """Return warnings with the parts that they are about, expectations, numbers and settings."""
+    """Return grave findings and warnings with the parts that they are about, expectations, numbers and settings."""
+    grave = [f.sentence for f in audit.findings if f.severity == "grave"]
     numbers = (
         *("momentum_residual", "mechanical_growth", "max_penetration_dx", "max_penetration_m"),
         *("steps", "dt_min", "dt_max", "nan_count", "particles_out_of_domain"),
     )
     return {
-        "warnings": _warnings_with_parts(audit.warnings, prepared),
+        "warnings": _sentences_with_parts([w for w in audit.warnings if w not in grave], prepared),
+        "grave": _sentences_with_parts(grave, prepared),
         "expectations": [asdict(e) for e in audit.expectations],
         "numbers": {name: getattr(audit, name) for name in numbers},
         "settings": dict(audit.settings),
@@ -146,9 +148,9 @@ def audit_summary(audit: RunAudit, prepared: PreparedScene) -> dict[str, Any]:
     }
 
 
-def _warnings_with_parts(warnings: Sequence[str], prepared: PreparedScene) -> list[dict]:
+def _sentences_with_parts(sentences: Sequence[str], prepared: PreparedScene) -> list[dict]:
     scene: Scene = prepared.scene
-    return [{"text": w, "parts": parts_named_in(w, scene, prepared.parts)} for w in warnings]
+    return [{"text": w, "parts": parts_named_in(w, scene, prepared.parts)} for w in sentences]
 
 
 def _panel(panel: CategoryPanel | NumericPanel) -> dict[str, Any]:

@@ -107,11 +107,12 @@ export function auditOf(header, openPart) {
     return el('p', {}, header.video ? 'The audit comes with the report, which this run does not have yet.'
       : 'Nothing has been simulated yet: the audit says afterwards what energy, momentum and contacts did.')
   }
-  const warnings = audit.warnings.map(w => el('li', {}, w.text, ' ',
-    w.parts.map(k => el('button', {class: 'link', onclick: () => openPart(k)}, `show ${spoken(header.parts[k].name)}`))))
+  const listed = sentences => el('ul', {}, sentences.map(w => el('li', {}, w.text, ' ',
+    w.parts.map(k => el('button', {class: 'link', onclick: () => openPart(k)}, `show ${spoken(header.parts[k].name)}`)))))
   return el('div', {},
-    audit.warnings.length ? el('div', {class: 'warn'}, el('b', {}, 'Limitations found by the audit'), el('ul', {}, warnings))
-      : el('p', {class: 'good'}, 'The audit found no violations.'),
+    audit.grave.length ? el('div', {class: 'grave'}, el('b', {}, 'Contradicts the measured values'), listed(audit.grave)) : null,
+    audit.warnings.length ? el('div', {class: 'warn'}, el('b', {}, 'Limitations found by the audit'), listed(audit.warnings)) : null,
+    audit.grave.length + audit.warnings.length ? null : el('p', {class: 'good'}, 'The audit found no violations.'),
     audit.expectations.length ? el('h3', {}, 'Expected outcomes of this scene') : null,
     audit.expectations.map(e => el('p', {class: e.met ? 'yes' : 'no'}, `${e.met ? '✓' : '✗'} ${e.sentence} `,
       el('small', {}, `measured ${e.value}, expected ${e.target}`))),

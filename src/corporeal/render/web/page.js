@@ -61,12 +61,13 @@ export class Viewer {
     this.pages = new Map()
     this.addTab('Look', this.lookTab())
     for (const [name, made] of this.options.tabs?.(this) ?? []) this.addTab(name, made)
-    const warnings = first.audit?.warnings.length ?? 0
+    const grave = first.audit?.grave.length ?? 0, warnings = grave + (first.audit?.warnings.length ?? 0)
     this.addTab('Audit', auditOf(first, part => this.openPart(0, part)), warnings)
     this.root.classList.add('viewer')
     this.root.replaceChildren(
       el('div', {class: 'top'}, this.options.home ? el('a', {href: this.options.home}, '← all runs') : null,
-        this.names.flatMap((n, k) => k ? [' beside ', n] : [n]), this.state, this.honest),
+        this.names.flatMap((n, k) => k ? [' beside ', n] : [n]), this.state, this.honest,
+        grave ? el('button', {class: 'link bad', onclick: () => this.openTab('Audit')}, `contradicts measured values: ${grave}`) : null),
       this.see, el('div', {class: 'side'}, this.tabs, this.panel), this.timeline())
     this.openTab('Look')
     this.root.addEventListener('keydown', event => this.keyed(event))
