@@ -38,7 +38,7 @@ class SceneMeasures:
     """What was measured in one scene, as scenes are compared."""
 
     clean: bool
-    """No bound of the audit is broken."""
+    """No bound of the audit is broken, and it has no grave finding."""
     breaches: tuple[str, ...]
     """Sentences for the bounds that are."""
     warnings: tuple[str, ...]
@@ -200,7 +200,8 @@ def _launched_objects(scene: Path) -> list[str]:
 def scene_measures(audit: RunAudit, kind: InteractionKind, sent: Sequence[str] = ()) -> SceneMeasures:
     """Condense an audit into the numbers that scenes are compared by."""
     happened, wanted = audit.outcome, audit.expectations
-    objects, wrong = happened.objects.values(), breach_messages(audit)
+    objects = happened.objects.values()
+    wrong = [*breach_messages(audit), *(f.sentence for f in audit.findings if f.severity == "grave")]
     first = happened.duration_s / max(1, audit.frames - 1)
     landed = sum((p.first_contact_s or 0.0) > first for p in happened.with_floor)
     met = [p for p in happened.between_objects if p.first_contact_s is not None]
