@@ -335,6 +335,13 @@ def test_energy_that_nothing_accounts_for_is_told_by_how_much_it_is(lost, severi
     assert Run([(CUBE, HONEY, SOLID)], falls).findings(lost) == (), "nor does a liquid"
 
 
+def test_of_energy_alone_it_is_said_how_long_an_impact_takes():
+    softer = replace(SOLID, simulated_young_pa=2e5)
+    (found,) = Run([(CUBE, RUBBER, softer)], falls).findings(0.28)
+    assert "28% of the energy is lost" in found.sentence
+    assert "an impact takes about 14 ms instead of 4.5 ms" in found.sentence
+
+
 def test_what_a_liquid_may_have_lost_is_not_asked_of_solids():
     made = Run([(CUBE, HONEY, SOLID)], falls)
     known = made.trajectory.ledger

@@ -4,7 +4,8 @@ import pytest
 
 from corporeal.pipeline import run_files
 from corporeal.pipeline.run_pipeline import read_run
-from sample_findings import run_audit
+from corporeal.pipeline.viewer_data import audit_summary
+from sample_findings import audit_finding, run_audit
 
 
 @pytest.fixture(scope="module")
@@ -28,3 +29,13 @@ def test_what_is_too_large_has_half_the_pictures_and_then_none(made):
 
 def test_a_view_of_two_balls_with_three_js_takes_less_than_two_and_a_half_megabytes(made):
     assert len(view(made)) < 2_500_000
+
+
+def test_a_grave_finding_is_told_apart_from_warnings_and_shows_its_part(made):
+    name = made.scene.objects[0].name
+    found = audit_finding(object=name, sentence=f"{name}: it is softer.")
+    audit = run_audit(findings=(found,), warnings=(found.sentence, "It may be wrong."))
+    told = audit_summary(audit, made.prepared)
+    assert [w["text"] for w in told["grave"]] == [found.sentence]
+    assert [w["text"] for w in told["warnings"]] == ["It may be wrong."]
+    assert [made.parts.catalogue[k].object for k in told["grave"][0]["parts"]] == [0]

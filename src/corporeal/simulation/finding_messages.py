@@ -12,7 +12,10 @@ def finding_sentence(found: AuditFinding, part: MeasuredPart | None) -> str:
     """Say what is simulated otherwise than measured, and what of it can be seen."""
     who = _subject(found)
     how = _treatment_words(found, part)
-    told = [e for e in found.effects if e.grave] or list(found.effects)
+    grave = [e for e in found.effects if e.grave]
+    if all(e.kind == "unaccounted_energy" for e in grave):  # what else an impact does
+        grave += [e for e in found.effects if e.kind == "contact_time"] * bool(grave)
+    told = grave or list(found.effects)
     effects = "; ".join(EFFECT_WORDS[e.kind](e) for e in told)
     if not how:
         return f"{who}: {effects}. {ADVICE}"
