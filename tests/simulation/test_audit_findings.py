@@ -299,6 +299,17 @@ def test_a_rebound_above_the_restitution_of_the_material_is_found(up, grave):
     assert all(f.effects[0].expected == pytest.approx(0.49) for f in findings)
 
 
+def test_what_flies_sideways_may_be_vaulted_up():
+    hit = float(np.sqrt(2 * 0.3 / G))
+
+    def vaults(t, rest):
+        after = t - hit
+        up = -0.5 * G * t**2 if after < 0 else 2.3 * after - 0.5 * G * after**2 - 0.3
+        return rest + np.array((2.0 * t, 0.0, max(up, -0.3)))
+
+    assert Run([(CUBE, STEEL, RIGID)], vaults, touched=hit).findings() == ()
+
+
 @pytest.mark.parametrize(("depth", "grave"), [(0.008, False), (0.03, True)])
 def test_what_sinks_into_another_further_than_contact_gives_is_found(depth, grave):
     made = Run([(CUBE, WOOD, RIGID)], falls)

@@ -263,7 +263,11 @@ class _ObjectCheck:
         if back.ratio is None or back.fall is None or back.rebound is None:
             return
         most = largest_restitution(list(self.parts), self.field) ** 2
-        if back.rebound - most * back.fall > VISIBLE_REBOUND_RATIO * self.moved.length:
+        # What flies sideways or turns may be vaulted up by that.
+        before = ledger.time <= np.nanmin(ledger.first_contact[-1, number])
+        energy = float(ledger.kinetic[before, number].max(initial=0.0))
+        aside = max(0.0, energy / (float(ledger.mass[0, number]) * -self.scene.gravity[2]) - back.fall)
+        if back.rebound - most * back.fall - aside > VISIBLE_REBOUND_RATIO * self.moved.length:
             yield FindingEffect("rebound", back.ratio, most, True)
 
     def _penetration(self, pair: SurfacePairCheck) -> Iterator[FindingEffect]:
