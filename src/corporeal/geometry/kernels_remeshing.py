@@ -57,6 +57,19 @@ def _edge_is_feature(a, b, triangles, patch, alive, head, following):
 
 
 @numba.njit(cache=True)
+def _has_triangle(v, p, q, mesh):
+    triangles, alive, head, following = mesh
+    c = head[v]
+    while c >= 0:
+        t, k = c // 3, c % 3
+        o, r = triangles[t, (k + 1) % 3], triangles[t, (k + 2) % 3]
+        if alive[t] and ((o == p and r == q) or (o == q and r == p)):
+            return True
+        c = following[c]
+    return False
+
+
+@numba.njit(cache=True)
 def _breaks_triangle(u, v, place, x, mesh, mark, stamp, limit):
     """Return whether moving ``u``, of the edge u v, to a place would turn, flatten or double a triangle."""
     triangles, alive, head, following = mesh
@@ -70,7 +83,7 @@ def _breaks_triangle(u, v, place, x, mesh, mark, stamp, limit):
                 away = (x[o, 0] - place[0]) ** 2 + (x[o, 1] - place[1]) ** 2 + (x[o, 2] - place[2]) ** 2
                 if away > limit**2:
                     return True
-            if mark[p] == stamp and mark[q] == stamp:
+            if mark[p] == stamp and mark[q] == stamp and _has_triangle(v, p, q, mesh):
                 return True
             before, good = _cross(x[u], x[p], x[q], old)
             after, better = _cross(place, x[p], x[q], new)
