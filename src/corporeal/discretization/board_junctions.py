@@ -32,10 +32,11 @@ JUNCTION_SNAP_SPACINGS = 0.3
 """Vertices as near to a junction are moved onto it."""
 JUNCTION_BAND_SPACINGS = 2.5
 """Edges are cut by a junction up to this distance."""
-MAX_JOINED_BOARDS = 100
-"""More are foliage, or loose triangles."""
-MIN_TRIANGLE_AREA_SPACINGS2 = 1e-4
-"""Smaller triangles of junctions are left out."""
+MAX_JOINED_BOARDS, MAX_JUNCTION_TRIANGLES = 60, 10_000_000
+"""Boards, and pairs of them times all triangles: more are foliage, pages of a book or loose triangles, and are left as
+they are."""
+MIN_SOURCE_AREA_SPACINGS2, MIN_TRIANGLE_AREA_SPACINGS2 = 1e-10, 1e-4
+"""Smaller triangles of junctions are left out, before and after they are remeshed."""
 JUNCTION_WELD_SPACINGS = 0.8
 """Distance up to which the rim's vertices become those on the face."""
 
@@ -88,10 +89,14 @@ def join_boards(boards: Sequence[Board], spacing: float) -> Board:
         return whole
     reach = JUNCTION_REACH_THICKNESSES * drawn + JUNCTION_REACH_SPACINGS * spacing
     pairs = _pairs_near(state, reach)
+    if len(pairs) * len(owner) > MAX_JUNCTION_TRIANGLES:
+        return whole
+    attached = set()
     for one, other in pairs:
-        state = _attach_rim(state, one, other, reach, spacing)
+        before, state = state, _attach_rim(state, one, other, reach, spacing)
+        attached |= set() if state is before else {(one, other), (other, one)}
     for one, other in pairs:
-        if one < other:
+        if one < other and (one, other) not in attached:
             state = _attach_crossing(state, one, other, spacing)
     if len(state.vertices) == len(mesh.vertices) and (state.vertices == mesh.vertices).all():
         return whole
@@ -114,8 +119,10 @@ def _pairs_near(state: _Assembly, reach: Float[np.ndarray, " S"]) -> list[tuple[
         )
         distance = face.closest(0.5 * (a[some] + b[some]))[0]
         near = distance <= most
-        reaching = np.flatnonzero(~near & (distance <= 0.5 * np.linalg.norm(b[some] - a[some], axis=1)))
-        near[reaching[face.crossings(a[some[reaching]], b[some[reaching]]).way]] = True
+        way = b[some] - a[some]
+        length = np.linalg.norm(way, axis=1)
+        far = np.flatnonzero(~near & (distance <= 0.5 * length))
+        near[far] = face.reach(a[some[far]], way[far]) < length[far]
         pairs += [(int(one), other) for one in np.unique(owner[some[near]])]
     return sorted(pairs)
 
@@ -127,6 +134,8 @@ def _vertex_components(mesh: Mesh) -> Int[np.ndarray, " T"]:
 
 
 def _remeshed(state: _Assembly, whole: Board, spacing: float) -> Board:
+    real = Mesh(state.vertices, state.triangles).areas > MIN_SOURCE_AREA_SPACINGS2 * spacing**2
+    state = _Assembly(state.vertices, state.triangles[real], state.owner[real], state.source[real])
     used, triangles = np.unique(state.triangles, return_inverse=True)
     mesh = Mesh(state.vertices[used], np.ascontiguousarray(triangles.reshape(-1, 3)))
     source = find_patches(mesh, spacing, state.owner)
@@ -179,9 +188,13 @@ class _Rim:
 
 
 def _rim_of(state: _Assembly, one: int) -> _Rim:
-    _, number, count = unique_edges(state.triangles)
-    triangle, k = np.nonzero((count[number] == 1) & (state.owner == one)[:, None])
-    t = state.triangles[triangle]
+    mine = state.owner == one
+    own = np.ascontiguousarray(state.triangles[mine])
+    _, number, count = unique_edges(own)
+    shared = np.zeros(len(state.vertices), dtype=bool)
+    shared[state.triangles[~mine]] = True
+    triangle, k = np.nonzero((count[number] == 1) & ~(shared[own] & shared[np.roll(own, -1, axis=1)]))
+    t = own[triangle]
     edges = np.column_stack([t[np.arange(len(t)), k], t[np.arange(len(t)), (k + 1) % 3]])
     normals = unit_rows(Mesh(state.vertices, t).area_vectors)
     along = state.vertices[edges[:, 1]] - state.vertices[edges[:, 0]]
@@ -246,22 +259,23 @@ def _attach_crossing(state: _Assembly, one: int, other: int, spacing: float) -> 
     middle, length = x[edges[asked]].mean(axis=1), np.linalg.norm(np.diff(x[edges[asked]], axis=1)[:, 0], axis=1)
     asked = asked[QueryMesh(face).closest(middle)[0] <= 0.5 * length]
     a, b = edges[asked].T
-    met = QueryMesh(face).crossings(x[a], x[b])
-    if not len(met.way):
+    way = x[b] - x[a]
+    length = np.linalg.norm(way, axis=1)
+    gone = QueryMesh(face).reach(x[a], way)
+    met = np.flatnonzero(gone < length)
+    if not len(met):
         return state
     # Vertices near the face are moved onto it, and only edges between others are cut.
-    ends = np.where(met.share < 0.5, a[met.way], b[met.way])
-    away = np.minimum(met.share, 1 - met.share) * np.linalg.norm(x[b] - x[a], axis=1)[met.way]
-    onto = np.unique(ends[away < JUNCTION_SNAP_SPACINGS * spacing])
+    ends = np.where(gone < 0.5 * length, a, b)[met]
+    onto = np.unique(ends[np.minimum(gone, length - gone)[met] < JUNCTION_SNAP_SPACINGS * spacing])
     x = x.copy()
     x[onto] = QueryMesh(face).closest(x[onto])[2]
-    way, first = np.unique(met.way, return_index=True)
-    clear = ~np.isin(edges[asked[way]], onto).any(axis=1)
-    way, share = way[clear], met.share[first[clear], None]
+    met = met[~np.isin(edges[asked[met]], onto).any(axis=1)]
+    places = x[a[met]] + (gone / length)[met, None] * way[met]
     cut = np.zeros(len(edges), dtype=bool)
-    cut[asked[way]] = True
+    cut[asked[met]] = True
     before = len(x)
-    state = _split(state, x, cut, x[a[way]] + share * (x[b] - x[a])[way])
+    state = _split(state, x, cut, places)
     new = state.triangles[state.owner == one]
     ends = np.stack([new, np.roll(new, -1, axis=1)], axis=-1)
     triangle, k = np.nonzero(((ends >= before) | np.isin(ends, onto)).all(axis=-1))

@@ -62,7 +62,8 @@ def middle_surface(mesh: TriangleSurface, thickness: float | None, spacing: floa
     - A closed surface with room for two walls behind it is a skin: its wall lies inside, and where that leaves no room,
       both sides share what there is.
     - A closed surface that draws both faces of its walls (a board, a cup) lies in the middle between them.
-    - Boards that touch or overlap, as separate solids or as one, meet in edges that they share.
+    - Boards that touch or overlap, as separate solids or as one, meet in edges that they share; not where they are as
+      many as leaves or pages.
 
     Creases of more than 40° and rims stay.
 
@@ -139,7 +140,7 @@ def _closed_piece_boards(piece: Mesh, thickness: float | None, spacing: float) -
     shape = QueryMesh(fine.mesh)
     walls = measure_walls(fine.mesh, shape)
     if _draws_both_faces(shape, walls, thickness):
-        drawn = _DrawnWall(shape, MAX_WALL_MEDIAN_RATIO * walls.median, thickness)
+        drawn = _DrawnWall(shape, walls.median, thickness)
         faces = [_compact(fine.mesh.only(face)) for face in wall_base_faces(fine, walls)]
         # What was smoothed is a scan, whose rims are ragged.
         return [_wall_board(f if smooth is piece else smooth_rim(f), drawn, spacing) for f in faces]
@@ -151,8 +152,8 @@ class _DrawnWall:
     """A closed mesh that draws both faces of a wall."""
 
     shape: QueryMesh
-    most: float
-    """The other face is no farther [m]."""
+    median: float
+    """Distance between its faces [m]."""
     thickness: float | None
     """Stated [m]."""
 
@@ -180,7 +181,9 @@ def _wall_board(face: Mesh, wall: _DrawnWall, spacing: float) -> Board:
     """Move one face of a wall to the middle."""
     now, projection = remesh(find_patches(face, spacing), spacing)
     now = fit_to_patches(now, projection)
-    drawn = _smoothed(now.mesh, _through_at(now, projection, wall.shape, wall.most))
+    drawn = _smoothed(
+        now.mesh, _through_at(now, projection, wall.shape, MAX_WALL_MEDIAN_RATIO * wall.median), wall.median
+    )
     made = drawn if wall.thickness is None else np.full(len(drawn), wall.thickness)
     return Board(Mesh(_offset_inward(now, 0.5 * drawn), now.mesh.triangles), made, drawn)
 
@@ -197,7 +200,7 @@ def _through_at(
     return np.where(through <= most, through, np.inf)
 
 
-def _smoothed(mesh: Mesh, thickness: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T"]:
+def _smoothed(mesh: Mesh, thickness: Float[np.ndarray, " T"], typical: float) -> Float[np.ndarray, " T"]:
     """Give triangles whose thickness is not known that of their neighbours; take out outliers."""
     _, number, count = unique_edges(mesh.triangles)
     order = np.argsort(number.ravel(), kind="stable")
@@ -213,7 +216,6 @@ def _smoothed(mesh: Mesh, thickness: Float[np.ndarray, " T"]) -> Float[np.ndarra
         if not found.any():
             break
         beside[found, 3] = np.nanmean(beside[found, :3], axis=1)
-    typical = float(np.nanmedian(beside[:, 3]))
     beside[np.isnan(beside[:, 3]), 3] = typical
     return np.maximum(np.nanmedian(beside, axis=1), MIN_WALL_MEDIAN_RATIO * typical)
 
