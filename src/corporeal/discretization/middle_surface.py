@@ -24,6 +24,7 @@ from corporeal.geometry.remeshing import (
     split_long_edges,
     unique_edges,
 )
+from corporeal.geometry.sliver_removal import without_slivers
 from corporeal.geometry.solid_pieces import solid_pieces, weld_solids
 
 MAX_DRAWN_WALL_RATIO = 2.0
@@ -123,7 +124,8 @@ def _mean_thickness(boards: Sequence[Board]) -> float:
 
 
 def _as_shell(board: Board) -> ShellMesh:
-    return ShellMesh(board.mesh.vertices, board.mesh.triangles, board.thickness)
+    mesh, source = without_slivers(board.mesh)
+    return ShellMesh(mesh.vertices, mesh.triangles, board.thickness[source])
 
 
 def _sheet_board(sheet: Mesh, thickness: float, spacing: float) -> Board:
@@ -173,7 +175,8 @@ def _skin_board(skin: Mesh, thickness: float, spacing: float) -> Board:
     through = _through_at(now, projection, QueryMesh(skin), np.inf)
     room = np.where(np.isfinite(through), 0.5 * through, np.inf)
     wall = np.minimum(thickness, room)
-    wall = np.where(np.isfinite(wall), wall, np.min(wall))
+    typical = float(np.median(wall[np.isfinite(wall)])) if np.isfinite(wall).any() else spacing
+    wall = np.where(np.isfinite(wall), np.maximum(wall, MIN_WALL_MEDIAN_RATIO * typical), typical)
     return Board(Mesh(_offset_inward(now, 0.5 * wall), now.mesh.triangles), wall, wall)
 
 
