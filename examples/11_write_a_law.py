@@ -26,16 +26,14 @@ def write_law(package: Path) -> None:
 
 def insert(file: Path, before: str, text: str) -> None:
     """Insert text in front of a line of the file."""
-    if before not in file.read_text():
-        raise ValueError(f"{file} has no {before!r}.")
-    file.write_text(file.read_text().replace(before, text + before, 1))
+    above, below = file.read_text().split(before, 1)  # a ValueError where it has no such line
+    file.write_text(above + text + before + below)
 
 
 def main() -> float:
     """Return the period of a bar of it over the theory's, 2L/c."""
     with tempfile.TemporaryDirectory() as place:
-        package = Path(place) / "corporeal"
-        shutil.copytree(Path(co.__file__).parent, package)
+        package = shutil.copytree(Path(co.__file__).parent, Path(place) / "corporeal")
         write_law(package)
         asked = [sys.executable, str(PARTS / "swing.py"), "saint_venant_rubber"]
         said = json.loads(subprocess.check_output(asked, env=os.environ | {"PYTHONPATH": place}))

@@ -8,6 +8,7 @@ import pytest
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.materials.library_entry import citation
+from corporeal.materials.quantities import QUANTITIES, question_name
 from corporeal.pipeline.stages.describe import describe
 from corporeal.pipeline.stages.ground import UNFIT_PREFIX, ground
 from corporeal.pipeline.stages.segment import segment
@@ -15,6 +16,8 @@ from corporeal.pipeline.stages.segment import segment
 FOLDER = Path(__file__).parent / "recordings"
 KINDS = {"sheet": "shell", "hollow": "shell", "filled": "filled", "solid": "solid", None: "solid"}
 KINDS["packed"] = "solid"
+
+FIELD_OF_QUESTION = {question_name(field): field for field in QUANTITIES}
 
 
 def rows(folder):
@@ -85,8 +88,9 @@ def _check_part(leaf, said, placed):
             _check_placed(structure.contents.grounds["density"], inside)
             assert structure.contents.name == made["contents"]
         for quantity, place in places.items():
-            _check_placed(material.grounds[quantity], place)
-        assert {f for f, g in material.grounds.items() if g.chosen_by == "recording"} == set(places)
+            _check_placed(material.grounds[FIELD_OF_QUESTION[quantity]], place)
+        placed_fields = {f for f, g in material.grounds.items() if g.chosen_by == "recording"}
+        assert placed_fields == {FIELD_OF_QUESTION[quantity] for quantity in places}
     for thing in (material, structure.contents):
         if thing is not None:
             _check_provenance(thing)

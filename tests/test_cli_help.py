@@ -140,18 +140,6 @@ def test_the_second_words_stand_in_a_column_of_their_own(command):
     assert len(rows) == 3 and len(starts) == 1
 
 
-def test_a_judge_asks_for_a_folder_of_runs_and_not_of_models(command):
-    _, said = command("evaluate", "judge", "--help")
-    assert "Runs, as evaluate dynamics leaves them." in " ".join(said.out.split())
-    assert "Models, one object each" not in said.out
-
-
-def test_a_judge_without_runs_is_reported_where_they_come_from(command, tmp_path):
-    code, said = command("evaluate", "judge", str(tmp_path), "--judge", "ask:answers")
-    assert code == 2
-    assert "holds no runs to judge" in said.err and "evaluate dynamics" in said.err
-
-
 def test_an_option_of_another_sub_command_is_refused(command):
     code, said = command("evaluate", "materials", "scenes/", "--anonymous")
     assert code == 2

@@ -25,6 +25,7 @@ SIMULATE = """
 import sys
 from functools import partial
 from pathlib import Path
+from corporeal.core.progress import no_progress
 from corporeal.pipeline.stages import simulate
 from corporeal.pipeline.run_pipeline import Settings, run
 from corporeal.simulation.checkpoint import CheckpointConfig, Checkpoints

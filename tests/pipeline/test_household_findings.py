@@ -6,7 +6,7 @@ import pytest
 
 import corporeal as co
 from corporeal.core.types import NoteKind
-from corporeal.pipeline.settings.settings import Settings
+from corporeal.pipeline.settings import Settings
 from corporeal.simulation.audit_file import read_audit
 from household_models import HOUSEHOLD, write_glb
 

@@ -169,7 +169,7 @@ def test_what_follows_from_measured_values_has_no_finding(material, treatment, m
 
 def test_what_yields_may_be_dented_as_deep_as_its_energy_goes():
     """Plasticine of 10 kPa that fell from 0.3 m is flat at its foot; steel of 300 MPa cannot be."""
-    clay = replace(STEEL, young=5e6, density=1700.0, yield_stress=1e4)
+    clay = replace(STEEL, young_pa=5e6, density=1700.0, yield_stress=1e4)
     soft = replace(SOLID, young_pa=5e6, simulated_young_pa=5e6, density=1700.0, strain=0.01)
     moves = squeezed(0.15)
     assert Run([(CUBE, clay, soft)], moves).findings() == ()
@@ -247,7 +247,7 @@ def test_what_ends_below_where_it_can_stand_is_found(deeper, grave):
 
 
 def test_jelly_may_stand_lower_by_what_its_weight_gives():
-    jelly = replace(RUBBER, young=2e4)
+    jelly = replace(RUBBER, young_pa=2e4)
     soft = replace(SOLID, young_pa=2e4, simulated_young_pa=2e4, strain=0.2)
     moves = lambda t, rest: falls(t, rest, 0.3 + 0.008)  # noqa: E731
     tall = block((0.1, 0.1, 0.15), low=0.3)

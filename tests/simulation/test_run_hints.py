@@ -65,12 +65,7 @@ def test_a_push_or_wind_that_moves_nothing_is_named():
     assert run_hints(shelf("boards", push=push), seen(**FALLS), divided=False) == ()
 
 
-def test_parts_that_are_softer_without_a_visible_effect_are_told_in_one_hint(law, treatment="deformable", thing="shelf_0"):
-    return part_audit(law=law, treatment=treatment, object=thing)
-
-
-@pytest.mark.parametrize(("lost", "told"), [(None, False), (0.02, False), (0.31, True)])
-def test_energy_that_the_grid_took_is_reported_where_it_is_much(lost, told):
+def test_parts_that_are_softer_without_a_visible_effect_are_told_in_one_hint():
     """The duck of the first demo moves at 0.8 % of its E, and nothing in the terminal said so."""
     mild = audit_finding(severity="minor", part="body", stiffness_ratio=0.0078)
     milder = audit_finding(severity="minor", part="beak", stiffness_ratio=0.3)
@@ -79,16 +74,7 @@ def test_energy_that_the_grid_took_is_reported_where_it_is_much(lost, told):
     assert said.startswith("3 parts are simulated with other values")
     assert "most of all shelf_0: body, with 0.0078 of its Young's modulus" in said
     grave = audit_finding()
-    ("parts", "told"),
-    [
-        ([part("fluid")], ""),
-        ([part("drucker_prager"), part("corotated", "rigid", "cup_0")], ""),
-        ([part("fluid"), part("hencky", "shell", "bottle_0")], "(bottle_0)"),
-    ],
-)
-def test_only_what_springs_back_is_reported_to_rebound_too_little(parts, told):
-    """Water that was poured into a glass was said to rebound too little."""
-    said = run_hints(shelf("boards"), seen(**FALLS), divided=False, findings=(grave, swaying)) == ()
+    assert run_hints(shelf("boards"), seen(**FALLS), divided=False, findings=(grave, swaying)) == ()
 
 
 def test_what_stands_still_need_not_be_of_a_file():

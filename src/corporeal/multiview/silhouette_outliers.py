@@ -46,13 +46,7 @@ CENTRE_HALF_SIDE_WIDTHS = 0.05
 
 
 def are_masks_inverted(masks: Bool[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> bool:
-    """Return whether most masks hold most of the borders, and not what all cameras look at.
-
-    Args:
-        masks: Pixels on objects, according to the masks.
-        cameras: Of the pictures.
-
-    """
+    """Return whether most masks hold most of the borders, and not what all cameras look at."""
     frame = np.ones(masks.shape[1:], np.bool_)
     frame[1:-1, 1:-1] = False
     around = np.median(masks[:, frame].mean(axis=1))

@@ -241,12 +241,6 @@ def _drop_doubted_pictures(
 def _refuse_doubted_poses(source: Path, posed: FoundPoses, force: bool, step: str = STAND_STILL_HINT) -> FoundPoses:
     """Reject poses in which neighbours share too little, or say so in a warning.
 
-    Args:
-        source: The photographs.
-        posed: Where they were taken from.
-        force: Whether masks agree with that, or the run is forced.
-        step: What to do beside showing more of a pattern.
-
     Raises:
         BadFileError: They are such, and nothing speaks for them.
 

@@ -86,7 +86,7 @@ def expected_deformation(part: MeasuredPart) -> float:
 
 def _hertz_dent(part: MeasuredPart) -> float:
     """δ = (15 W/(8 E* √R))^(2/5) (Johnson, Contact Mechanics, 1985, §11.4)."""
-    young, poisson = bounded_poisson(part.material.young, part.material.poisson)
+    young, poisson = bounded_poisson(part.material.young_pa, part.material.poisson)
     radius = 0.5 * part.motion.size[0]
     if young <= 0.0 or radius <= 0.0:
         return 0.0
@@ -112,7 +112,7 @@ def is_limp(part: MeasuredPart) -> bool:
         return False
     weight = 1.5 * part.material.density * GRAVITY_M_S2 * part.motion.size[2] ** 3
     flat = part.motion.size[0] < 2.0 * (part.treatment.thickness or 0.0)
-    return weight > part.material.young * part.wall**2 * (1.0 if flat else LIMP_SHAPE_RATIO)
+    return weight > part.material.young_pa * part.wall**2 * (1.0 if flat else LIMP_SHAPE_RATIO)
 
 
 # ------------------------------------------------------------------ weight
@@ -120,7 +120,7 @@ def is_limp(part: MeasuredPart) -> bool:
 
 def expected_sag(part: MeasuredPart) -> float:
     """Compression of a part by what it bears, with measured values [m]."""
-    return _sag(part, part.material.young, part.material.density)
+    return _sag(part, part.material.young_pa, part.material.density)
 
 
 def simulated_sag(part: MeasuredPart) -> float:
@@ -143,11 +143,11 @@ def _sag(part: MeasuredPart, young: float, density: float) -> float:
 def contact_times(part: MeasuredPart) -> tuple[float, float]:
     """Time in which a wave runs up and down the part, 2 H √(ρ/E): simulated and measured [s]."""
     way, made = 2.0 * part.motion.height, part.treatment
-    if made.simulated_young_pa <= 0.0 or part.material.young <= 0.0:
+    if made.simulated_young_pa <= 0.0 or part.material.young_pa <= 0.0:
         return 0.0, 0.0
     return (
         way * sqrt(made.density / made.simulated_young_pa),
-        way * sqrt(part.material.density / part.material.young),
+        way * sqrt(part.material.density / part.material.young_pa),
     )
 
 
@@ -186,4 +186,4 @@ def leaf_length(particles: Particles, k: int, scale: float) -> float:
     tissue = leaf.pick(leaf.typical())
     thickness = (tissue.shell_thickness or 0.0) * scale
     rate = float(np.quantile(particles.rate[mine], SLOWEST_LEAVES_FRACTION))
-    return (tissue.young * thickness**2 / (LEAF_SHIFT_COEFFICIENT * tissue.density * rate**2)) ** 0.25
+    return (tissue.young_pa * thickness**2 / (LEAF_SHIFT_COEFFICIENT * tissue.density * rate**2)) ** 0.25

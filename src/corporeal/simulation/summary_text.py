@@ -35,6 +35,8 @@ SECTIONS = (FINDINGS_SECTION, WARNINGS_SECTION, ASSUMPTIONS_SECTION, LEFT_OUT_SE
 
 def summary_sections(audit: RunAudit) -> dict[SummarySection, tuple[str, ...]]:
     """Return the sections of the summary, each sentence once, by severity."""
+    grave = tuple(f.sentence for f in audit.findings if f.severity == "grave")
+    rest = (note for note in audit.notes if note not in grave)
     every = (*rest, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
     return {s: grave if s is FINDINGS_SECTION else tuple(dict.fromkeys(_of(s, every))) for s in SECTIONS}
 

@@ -278,13 +278,7 @@ class Interview:
         return self._ask(self.model, asked, ObjectsAnswer, things_complaints)
 
     def regions(self, colours: Sequence[str], things: Sequence[str]) -> Reply[RegionsAnswer] | None:
-        """Ask which object each painted region is; None: no answer.
-
-        Args:
-            colours: Names of the regions' colours.
-            things: Objects of the scene, in words.
-
-        """
+        """Ask which object each painted region is; None: no answer."""
         lines = "\n".join(f"{k}. {words}" for k, words in enumerate(things, 1))
         asked = self._question("regions", colours=", ".join(colours), things=lines)
         return self._ask(self.model, asked, RegionsAnswer, lambda a: regions_complaints(a, colours, len(things)))

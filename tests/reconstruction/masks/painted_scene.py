@@ -80,9 +80,9 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
 
 
 @cache
-def grown_scene(other=None):
+def grown_scene(other=None, count=14):
     """Give photographs, true masks, seeds, and what is grown of them: done once."""
-    views, masks, _ = scene(other=other)
+    views, masks, _ = scene(other=other, count=count)
     seeds = seeds_from_cameras(views, None)
     grown = grow_masks(views, seeds)
     assert grown is not None

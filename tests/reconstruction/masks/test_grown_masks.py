@@ -120,7 +120,7 @@ def test_what_masks_hold_a_part_of_is_refused_until_they_are_corrected(tmp_path)
 @pytest.mark.parametrize("left_over", [0.0, 0.5])
 def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monkeypatch, left_over):
     folder, _ = photos
-    whole = grown_scene()[-1]
+    whole = grown_scene(count=10)[-1]
     made = {False: replace(whole, left_over=1.0), True: replace(whole, left_over=left_over)}
     monkeypatch.setattr(module, "grow_masks", lambda *_, flat=False: made[flat])
     monkeypatch.setattr(module, "merge_attachments", lambda *given: given[2])

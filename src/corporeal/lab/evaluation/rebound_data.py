@@ -103,21 +103,6 @@ def _rebound(row: dict) -> MeasuredRebound:
     )
 
 
-def contradictory_rebounds(rows: Sequence[MeasuredRebound], leeway: float) -> Iterator[tuple[MeasuredRebound, ...]]:
-    """Yield the rows of each scene that no value can meet, each within a leeway [-].
-
-    Raises:
-        BadFileError: Rows of one scene are not of the same objects.
-
-    """
-    for scene in dict.fromkeys(row.scene for row in rows if row.scene):
-        alike = tuple(row for row in rows if row.scene == scene)
-        if len({(r.material, r.wall, r.diameter, r.speed, r.floor, r.on) for r in alike}) > 1:
-            raise BadFileError("life.toml", f"{scene}: its rows differ.", "Mend the rows.")
-        if max(r.low for r in alike) - leeway > min(r.high for r in alike) + leeway:
-            yield alike
-
-
 @dataclass(frozen=True)
 class _AirDrag:
     """What air does to a ball that falls and rises: d(v²)/dh = ±2 g (1 ± v²/v_t²)."""

@@ -145,12 +145,6 @@ def neighbours_support_model(attempt: SfmRun, place: Path, gathered: PreparedIma
 
     Many pictures of little that has a pattern share few points, of which each sees enough: what places it are those.
     That nothing contradicts is not enough: neighbours must agree, and join all that must be placed.
-
-    Args:
-        attempt: An attempt at the poses.
-        place: Holds its model.
-        gathered: All pictures.
-
     """
     if not only_sparse(attempt):
         return False

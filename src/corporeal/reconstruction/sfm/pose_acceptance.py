@@ -68,13 +68,7 @@ def only_sparse(attempt: SfmRun) -> bool:
 
 
 def too_few_placed(attempt: SfmRun, others: int) -> str | None:
-    """Return in a clause that most of a folder was not placed, if so.
-
-    Args:
-        attempt: An attempt that is accepted.
-        others: Photographs that were left out before it.
-
-    """
+    """Return in a clause that most of a folder was not placed, if so."""
     total = attempt.pictures + others
     if attempt.registered >= MIN_PLACED_FRACTION * total:
         return None
@@ -82,13 +76,7 @@ def too_few_placed(attempt: SfmRun, others: int) -> str | None:
 
 
 def thorough_in_vain(attempt: SfmRun, blurred: int) -> bool:
-    """Return whether a thorough attempt cannot mend what was doubted.
-
-    Args:
-        attempt: The plain attempt at the poses.
-        blurred: Pictures that are heavily blurred.
-
-    """
+    """Return whether a thorough attempt cannot mend what was doubted."""
     if blurred >= MAX_BLURRED_FRACTION * attempt.pictures:
         return True
     return attempt.joined is not None and attempt.joined < MIN_JOINED_BY_PLAIN_FRACTION * attempt.pictures
