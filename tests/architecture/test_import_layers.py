@@ -30,7 +30,7 @@ SOLVER = [
     {"constants", "native_records"},
     {"problem", "ledger", "laws", "quiet_warp"},
     {"physics"},
-    {"formulas", "material_table"},
+    {"formulas", "material_table", "shells"},
     {"state"},
     {"diagnostics"},
     {"engines", "engine_interaction", "add_bodies", "split_body"},

@@ -92,6 +92,17 @@ MAX_FACE_DEPTH_DX = 1.25
 WALL_REACH = 0.51
 """Nodes higher than this above a wall [cells] ignore it: its infinite mass would grip the inside. Half a cell, and a
 hundredth so that rounding does not decide about nodes at exactly half a cell."""
+SHELL_WALL_REACH_DX = 1.5
+"""A wall holds a shell at all nodes up to this high above it [cells], as nothing within a layer hands on what only the
+lowest nodes bear …"""
+MAX_LAYER_DEVIATION_DX = 0.2
+"""… where the standard deviation of its vertices across the wall is below this [cells]: it is a layer along the wall,
+and does not stand on it."""
+LAYER_DEVIATION_DX = 0.05
+"""What lies within this about a plane [cells] shows a node a layer, whose normal is that of the plane, …"""
+MIN_LAYER_COSINE, FULL_LAYER_COSINE = 0.6, 0.9
+"""… where the normal of a contact is less than this away from it [-]: from the second on it is the layer's. Others are
+contacts of its rim."""
 SURFACE_POINT_REACH_DX = 0.3
 """Surface points of rigid bodies are watched this far above a wall [cells]."""
 CURVATURE_ROW = types.CURVATURE_COLUMNS
@@ -184,6 +195,8 @@ NORMAL_CACHE_TRAVEL_DX = 0.5
 """… or two, four or eight times as often, where something moves farther meanwhile [cells]."""
 FACE_TABLE_INTERVALS = 4096
 """Intervals of the table that says where the face of a half space lies, from 1½ cells to none."""
+SPLINE_DEVIATION_DX = 0.5
+"""Standard deviation of all that a node sees along an axis [cells]: of its quadratic spline."""
 FIRST_BIAS, OTHER_BIAS = 0.10, 0.05
 """Head start of the candidate normals g_a - g_c, and g_a or -g_c [cells]."""
 FIELDS_AT_NODE = 6
@@ -338,6 +351,31 @@ BOUNDING_BOX_DISTANCE_DX = 4.0
 """Bodies farther apart than this [cells] are measured by their bounding boxes."""
 OVERLAP_DEPTH_PARTICLES = 8
 """The depth is the mean over so many deepest particles: one cell's worth, against jitter."""
+
+# ---------------------------------------------------------------- shells
+
+MIN_TRIANGLE_QUALITY = 1e-3
+"""Least area of a triangle over the square of its longest edge [-]."""
+MIN_FIT_SINGULAR_RATIO = 0.1
+"""Singular values of the quadratic fit of a triangle's curvature below this fraction of the largest [-] are left out:
+neighbours of a triangle that nearly coincide do not tell its curvature."""
+QUADRATIC_FIT_SHARE = 0.5
+"""Share of the quadratic fit in a triangle's curvature [-]. On irregular meshes it is a few percent too soft, and the
+mean of the normals as much too stiff (decision mpm-shells)."""
+FIT_RANK_CUTOFF = 1e-9
+"""Energies of free angles below this fraction of the largest count as none [-]."""
+MIN_SQUARED_STRETCH = 1e-6
+"""Squared stretch of a membrane that is pressed flat [-]."""
+NEO_HOOKEAN_ITERATIONS = 4
+"""Newton iterations for the stretch across a neo-Hookean wall; converged to 1e-10 at stretches of 0.3 to 4."""
+NEO_HOOKEAN_ROUNDING = 1e-3
+"""Change of its logarithm by which an iteration in single precision is the last one [-]: what is left is the square of
+that."""
+RETURN_MAP_ITERATIONS = 12
+"""Newton iterations of the plane-stress return map."""
+RETURN_MAP_ROUNDING = 1e-4
+"""Share of the plastic multiplier by which an iteration in single precision changes it when it is the last one [-]:
+what is left is the square of that."""
 
 # ---------------------------------------------------------------- how the processor is kept busy
 

@@ -14,7 +14,9 @@ from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics.rigid import RigidBody
 from corporeal.mpm.physics.springs import has_springs, stored_spring_energy
 from corporeal.mpm.problem import Diagnostics, Problem, Snapshot
-from corporeal.mpm.state import ParticleConstants
+from corporeal.mpm.shells.assemble import Shells
+from corporeal.mpm.shells.forces import shell_energy, vertex_deformation
+from corporeal.mpm.state import ParticleConstants, State, branch_energy, strain_energy
 
 _AXIAL_COMPONENTS = ((2, 1), (0, 2), (1, 0))
 
@@ -126,6 +128,11 @@ class EngineReadout(ABC):
             now.position[mine] = body.particle_position()
             now.velocity[mine] = body.particle_velocity()
             now.deformation[mine] = now.motion[mine] = body.rotation
+        shells = self._shells()
+        if shells:
+            rest = np.concatenate([body.position for body in self.problem.bodies])
+            bent = vertex_deformation(shells.mesh, rest, now.position)
+            now.motion[shells.is_vertex] = now.deformation[shells.is_vertex] = bent[shells.is_vertex]
         return now
 
     def measure(self) -> Diagnostics:
@@ -166,5 +173,21 @@ class EngineReadout(ABC):
         """Every rigid body now, by number."""
 
     @abstractmethod
+    def _shells(self) -> Shells:
+        """Return the thin parts of all bodies."""
+
+    @abstractmethod
     def _booked(self) -> EngineLedger:
         """Return the ledger, with everything entered that has happened."""
+
+
+def particle_energy(matter: ParticleConstants, state: State) -> ParticleEnergy:
+    """Return what each particle holds [J]; a third of what a triangle of a shell does is each vertex'."""
+    energy = ParticleEnergy(strain_energy(matter, state.F, state.log_volume_ratio), branch_energy(matter, state.memory))
+    shells = matter.shells
+    if not shells:
+        return energy
+    held = shell_energy(shells.mesh, shells.material, state.shell, state.position)
+    corner, count = shells.mesh.triangle.ravel(), len(matter.mass)
+    thirds = (np.bincount(corner, np.repeat(one / 3.0, 3), count) for one in (held.elastic, held.relaxing))
+    return ParticleEnergy(*(own + third for own, third in zip(vars(energy).values(), thirds, strict=True)))

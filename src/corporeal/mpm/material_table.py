@@ -62,6 +62,8 @@ class MaterialTable:
     density: Float[np.ndarray, " M"]
     """ρ [kg/m³]"""
     rigid: Bool[np.ndarray, " M"]
+    shell: Bool[np.ndarray, " M"]
+    """Of vertices of shells: without stress of their own."""
     uses_mean_dilatation: Bool[np.ndarray, " M"]
     """Whether pressure comes from a mean dilatation: in fields all stiff in bulk."""
 
@@ -76,14 +78,14 @@ class MaterialTable:
         rows = np.concatenate([_body_rows(problem, b) for b in range(len(problem.bodies))])
         body = rows[:, 0].astype(np.int64)
         field = np.zeros_like(body) if problem.contact == "single" else body
-        soft = rows[:, _RIGID_COLUMN] == 0.0
+        soft = (rows[:, _RIGID_COLUMN] == 0.0) & (rows[:, _SHELL_COLUMN] == 0.0)
         bulky = soft & laws.is_stiff_in_bulk(rows[:, 1].astype(np.int64), rows[:, 2], rows[:, 3])
         for f in np.unique(field).tolist():
             mine = field == f
             rows[mine, _DAMPING_COLUMN] = rows[mine, _DAMPING_COLUMN].max()
             rows[mine, _MEAN_DILATATION_COLUMN] = bulky[mine].all()
         table, row_of_particle = _unique_rows(rows)
-        kinds = {"body": np.int64, "law": np.int64, "rigid": bool, "uses_mean_dilatation": bool}
+        kinds = {"body": np.int64, "law": np.int64, "rigid": bool, "shell": bool, "uses_mean_dilatation": bool}
         named = zip(_COLUMNS, table.T, strict=True)
         return cls(**{n: c.astype(kinds.get(n, np.float64)) for n, c in named}), row_of_particle
 
@@ -151,8 +153,8 @@ class MaterialTable:
 
 
 _COLUMNS = tuple(f.name for f in fields(MaterialTable))
-_DAMPING_COLUMN, _RIGID_COLUMN, _MEAN_DILATATION_COLUMN = map(
-    _COLUMNS.index, ("flip_damping_rate", "rigid", "uses_mean_dilatation")
+_DAMPING_COLUMN, _RIGID_COLUMN, _SHELL_COLUMN, _MEAN_DILATATION_COLUMN = map(
+    _COLUMNS.index, ("flip_damping_rate", "rigid", "shell", "uses_mean_dilatation")
 )
 
 
@@ -184,8 +186,26 @@ def _body_rows(problem: Problem, number: int) -> Float[np.ndarray, "P C"]:
             "flip_damping_rate": np.where(affine, VAST, rate),
             **_branch_columns(body, mu, lam),
         }
+        if body.shell is not None:
+            row = _with_shell(row, body, problem)
     row |= {"body": np.full(count, number), "density": body.density}
     return np.column_stack([row.get(name, none) for name in _COLUMNS]).astype(np.float64)
+
+
+def _with_shell(row: dict[str, np.ndarray], body: Body, problem: Problem) -> dict[str, np.ndarray]:
+    """Take all stress out of the vertices of a body's shell; they forget at the rate of its own waves."""
+    shell = body.shell
+    assert shell is not None
+    vertex = np.zeros(len(body.position), bool)
+    vertex[shell.triangle] = True
+    stiffness = shell.membrane_young_pa / (1.0 - shell.poisson**2)
+    wave = np.sqrt(stiffness / body.density[shell.triangle[:, 0]])
+    grains = np.zeros(1, bool)
+    rate = flip_damping_rate(wave.max(keepdims=True), grains, float(np.linalg.norm(problem.gravity)), problem.cell)[0]
+    bare = {name: np.where(vertex, 0.0, values) for name, values in row.items()}
+    damping = VAST if problem.transfer == "apic" else rate
+    bare["flip_damping_rate"] = np.where(vertex, damping, row["flip_damping_rate"])
+    return bare | {"shell": vertex.astype(float)}
 
 
 def _branch_columns(

@@ -65,6 +65,35 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Shell:
+    """Thin parts of a body at their true thickness: T triangles of its middle surface, whose vertices are particles.
+
+    Forces are those of the triangles (``mpm.shells``). Particles that are vertices have the shell's mass and no stress
+    of their own: their E and ν are not used.
+    """
+
+    triangle: Int[np.ndarray, "T 3"]
+    """Numbers of the body's particles."""
+    thickness: Float[np.ndarray, " T"]
+    """[m]"""
+    law: Int[np.ndarray, " T"]
+    """``types.Law`` values."""
+    young_pa: Float[np.ndarray, " T"]
+    """E in bending [Pa]."""
+    membrane_young_pa: Float[np.ndarray, " T"]
+    """E in the plane [Pa]: below the measured one where the step budget does not allow that."""
+    poisson: Float[np.ndarray, " T"]
+    yield_stress: Float[np.ndarray, " T"]
+    """[Pa]; unused by laws without it."""
+    hardening: Float[np.ndarray, " T"]
+    """H [Pa]"""
+    loss: Float[np.ndarray, " T"]
+    """tan δ [-] around ``vibration``."""
+    vibration: Float[np.ndarray, " T"]
+    """Angular frequency of the slowest vibration [rad/s]; unused without loss."""
+
+
+@dataclass(frozen=True)
 class Body:
     """One object: particles that share a velocity field; P particles, S surface points."""
 
@@ -100,6 +129,8 @@ class Body:
     """n of a liquid [-]; None: 1."""
     rigid: bool = False
     """Six degrees of freedom; the elastic fields are then unused."""
+    shell: Shell | None = None
+    """Its thin parts."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
     curvature: Float[np.ndarray, "S2 Columns"] = field(default_factory=lambda: np.zeros((0, CURVATURE_COLUMNS)))

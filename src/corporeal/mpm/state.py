@@ -16,6 +16,8 @@ from corporeal.mpm.physics import maxwell_branches, rigid
 from corporeal.mpm.physics.flat_facets import BodyFacets, facets_of, has_edges, is_bounded_by_facets
 from corporeal.mpm.physics.maxwell_branches import BranchMemory, MaxwellBranches
 from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.shells.assemble import Shells, vertex_half_wall
+from corporeal.mpm.shells.forces import ShellState
 
 
 def surface_curvature(body: Body) -> Float[np.ndarray, "S 12"]:
@@ -49,6 +51,8 @@ class ParticleConstants:
     """Surface points of each body at the start, from its centre [m]."""
     curvature: tuple[Float[np.ndarray, "S 12"], ...]
     """How the surface curves there at the start: see ``types.CURVATURE_COLUMNS``; zero where it does not."""
+    shells: Shells
+    """Thin parts of all bodies."""
 
     @classmethod
     def of(cls, problem: Problem) -> "ParticleConstants":
@@ -70,6 +74,7 @@ class ParticleConstants:
             arm=np.concatenate([b.position - m.centre for b, m in zip(bodies, masses, strict=True)]),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
             curvature=tuple(surface_curvature(b) for b in bodies),
+            shells=Shells.of(problem),
         )
 
     @cached_property
@@ -158,6 +163,22 @@ class ParticleConstants:
         return self.substances.rigid[self.kind]
 
     @cached_property
+    def shell(self) -> Bool[np.ndarray, " P"]:
+        """Whether the particle is a vertex of a shell."""
+        return self.substances.shell[self.kind]
+
+    @cached_property
+    def is_shell_body(self) -> Bool[np.ndarray, " B"]:
+        """Whether most particles of each body are vertices of shells."""
+        return np.bincount(self.body, self.shell, len(self.total)) > 0.5 * np.bincount(self.body)
+
+    @cached_property
+    def half_wall(self) -> Float[np.ndarray, " P"]:
+        """Half the thickness of the wall at vertices of shells [m]; 0 elsewhere."""
+        shells = self.shells
+        return vertex_half_wall(shells.mesh.triangle, shells.material.thickness, len(self.mass))
+
+    @cached_property
     def wave_speed(self) -> Float[np.ndarray, " P"]:
         """Longitudinal wave speed at rest [m/s]; 0 where rigid."""
         return self.substances.wave_speed[self.kind]
@@ -200,8 +221,8 @@ class ParticleConstants:
 
     @cached_property
     def half_spacing(self) -> Float[np.ndarray, " P"]:
-        """r0: half the distance between particles at rest [m]."""
-        return 0.5 * np.cbrt(self.volume)
+        """r0: half the distance between particles at rest, or half the wall of a shell [m]."""
+        return np.where(self.shell, self.half_wall, 0.5 * np.cbrt(self.volume))
 
     def fit(
         self, body: int, position: Float[np.ndarray, "P 3"], velocity: Float[np.ndarray, "P 3"]
@@ -244,6 +265,13 @@ class Velocities:
         return motion
 
 
+_SHELL_ARRAYS = tuple(f"shell_{f.name}" for f in fields(ShellState))
+
+
+def _named_shell_arrays(shell: ShellState) -> dict[str, np.ndarray]:
+    return dict(zip(_SHELL_ARRAYS, vars(shell).values(), strict=True))
+
+
 @dataclass(frozen=True)
 class State:
     """What changes. Arrays are replaced, never written to, so an old state stays good."""
@@ -266,6 +294,15 @@ class State:
     """What Maxwell branches remember, of the particles that have any (``Matter.relaxing``) …"""
     branch_volume: Float[np.ndarray, "K 2"]
     """… see ``physics.branches.Memory``."""
+    shell_inverse_rest: Float[np.ndarray, "T 2 2"]
+    """History of the triangles of shells, see ``shells.forces.ShellState`` …"""
+    shell_plastic_strain: Float[np.ndarray, " T"]
+    shell_plastic_curvature: Float[np.ndarray, "T 3"]
+    shell_green: Float[np.ndarray, "T 3"]
+    shell_bend: Float[np.ndarray, "T 3"]
+    shell_branch_strain: Float[np.ndarray, "T 2 3"]
+    shell_branch_bend: Float[np.ndarray, "T 2 3"]
+    """… to here."""
     centre: Float[np.ndarray, "B 3"]
     """The rest is used for rigid bodies: centre of mass [m] …"""
     speed: Float[np.ndarray, "B 3"]
@@ -295,6 +332,7 @@ class State:
             log_volume_ratio=np.zeros(count),
             branch_strain=np.zeros((len(matter.relaxing), 2, 3, 3)),
             branch_volume=np.zeros((len(matter.relaxing), 2)),
+            **_named_shell_arrays(ShellState.start(matter.shells.mesh)),
             centre=matter.centre,
             speed=np.stack([linear for linear, _ in fits]),
             spin_momentum=np.stack([angular for _, angular in fits]),
@@ -306,6 +344,15 @@ class State:
     def memory(self) -> BranchMemory:
         """What Maxwell branches remember."""
         return BranchMemory(self.branch_strain, self.branch_volume)
+
+    @property
+    def shell(self) -> ShellState:
+        """History of the triangles of shells."""
+        return ShellState(*(getattr(self, name) for name in _SHELL_ARRAYS))
+
+    def with_shell(self, shell: ShellState) -> "State":
+        """Return the state with another history of triangles."""
+        return replace(self, **_named_shell_arrays(shell))
 
     def spin(self, matter: ParticleConstants) -> Float[np.ndarray, "B 3"]:
         """ω of every body [rad/s]; meaningful where rigid."""
@@ -352,6 +399,7 @@ class State:
         mine, body = self._of(matter, bodies)
         taken = {name: mine for name in ("position", "F", "motion", "plastic", "volume", "log_volume_ratio")}
         taken |= {name: body for name in ("centre", "rotation")}
+        taken |= {name: body[matter.shells.body] for name in _SHELL_ARRAYS}
         found = {}
         for name, chosen in taken.items():
             here = getattr(self, name)
@@ -383,6 +431,8 @@ class State:
                 chosen, taken = body, their_body
             elif name in ("branch_strain", "branch_volume"):
                 chosen, taken = mine[matter.relaxing], theirs[then.relaxing]
+            elif name in _SHELL_ARRAYS:
+                chosen, taken = body[matter.shells.body], their_body[then.shells.body]
             here[chosen] = getattr(there, name)[taken]
             found[name] = here
         return replace(self, **found)

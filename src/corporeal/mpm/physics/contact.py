@@ -14,21 +14,25 @@ from scipy.spatial import KDTree
 from corporeal.mpm.constants import (
     FACE_TABLE_INTERVALS,
     FIRST_BIAS,
+    FULL_LAYER_COSINE,
     HALF_SPACE_TOLERANCE_DX,
     LATTICE_GAP_DX,
     LATTICE_ROWS,
     LATTICE_SLOPE,
     LATTICE_START_DX,
+    LAYER_DEVIATION_DX,
     LIQUID_WALL_REACH_DX,
     MAX_FACE_DEPTH_DX,
     MAX_WETTED_FACES,
     MIN_FILLED_FRACTION,
     MIN_HALF_SPACE_WEIGHT,
+    MIN_LAYER_COSINE,
     NORMAL_CACHE_STEPS,
     NORMAL_CACHE_TRAVEL_DX,
     OTHER_BIAS,
     PARALLEL_EDGE_SINE2,
     PARTICLE_RADIUS_DX,
+    SPLINE_DEVIATION_DX,
     TINY,
     WALL_REACH,
     WETTED_NORMAL_COSINE,
@@ -88,6 +92,46 @@ _MEANS = np.maximum.accumulate(half_space_mean(_FACES))
 def half_space_face(mean: np.ndarray) -> np.ndarray:
     """D = e⁻¹: where the face lies [dx] of a half space whose mean offset is ``mean`` [dx]."""
     return np.interp(mean, _MEANS, _FACES)
+
+
+def half_space_deviation(face: np.ndarray) -> np.ndarray:
+    """Return the standard deviation [dx] of the offsets in the half space u < s, weighted by the B-spline at 0."""
+    s = np.clip(face, -1.5, 1.5)
+    near = -np.abs(s)
+    w = near + 1.5
+    inner = 0.125 + 0.25 * near**3 - near**5 / 5.0
+    square = np.where(near < -0.5, w**5 / 10.0 - 3.0 * w**4 / 8.0 + 3.0 * w**3 / 8.0, inner)
+    square = np.where(s > 0.0, SPLINE_DEVIATION_DX**2 - square, square)
+    weight = np.maximum(half_space_weight(s), MIN_HALF_SPACE_WEIGHT)
+    return np.sqrt(np.maximum(square / weight - half_space_mean(s) ** 2, 0.0))
+
+
+def spread_table() -> Float[np.ndarray, " K"]:
+    """How far half spaces end beyond their mean offset [dx], at ``FACE_TABLE_INTERVALS`` + 1 standard deviations.
+
+    Deviations go from 0 to ``SPLINE_DEVIATION_DX``, that of all that a node sees.
+    """
+    deviation = np.linspace(0.0, SPLINE_DEVIATION_DX, FACE_TABLE_INTERVALS + 1)
+    known = np.maximum.accumulate(half_space_deviation(_FACES))
+    return np.interp(deviation, known, _FACES - half_space_mean(_FACES))
+
+
+_SPREADS = spread_table()
+
+
+def face_of_spread(mean: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """Where material ends [dx] along an axis, from mean and standard deviation of its offsets from a node.
+
+    Of a layer across the axis it is the mean itself, and of a half space ``half_space_face``: what is between ends as
+    far beyond its mean as the half space of the same deviation does.
+
+    Args:
+        mean: [dx]
+        deviation: [dx]
+
+    """
+    place = np.minimum(deviation, SPLINE_DEVIATION_DX) * (FACE_TABLE_INTERVALS / SPLINE_DEVIATION_DX)
+    return mean + np.interp(place, np.arange(len(_SPREADS)), _SPREADS)
 
 
 def face_table() -> Float[np.ndarray, " K"]:
@@ -338,6 +382,26 @@ def normal_cache_steps(travel: float) -> int:
     while count > 1 and count * travel > NORMAL_CACHE_TRAVEL_DX:
         count //= 2
     return count
+
+
+def layer_normals(normal: Vectors, *covariance: Float[np.ndarray, "E 3 3"]) -> Vectors:
+    """Let the normals of contacts be those of the layers that nodes see across them.
+
+    One step of inverse iteration on the covariance of a layer's offsets turns a normal to that of the layer. Where it
+    turns too far, the layer stands on its rim, and the normal stays. Of two layers it is the mean.
+
+    Args:
+        normal: Unit, or zero.
+        covariance: Of the offsets that each node sees of a layer [dx²]; of one body, or of both.
+
+    """
+    share = np.zeros_like(normal)
+    for square in covariance:
+        across = unit(np.linalg.solve(square + LAYER_DEVIATION_DX**2 * np.eye(3), normal[:, :, None])[:, :, 0])
+        cosine = np.sum(across * normal, axis=1)
+        turned = np.clip((cosine - MIN_LAYER_COSINE) / (FULL_LAYER_COSINE - MIN_LAYER_COSINE), 0.0, 1.0)
+        share += unit(normal + turned[:, None] * (across - normal))
+    return unit(share) if covariance else normal
 
 
 def smooth_normals(normal: Vectors, weight: Scalars, index: Int[np.ndarray, "E 3"]) -> Vectors:

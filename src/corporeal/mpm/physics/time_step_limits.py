@@ -1,7 +1,7 @@
 """Wave speeds, stable time steps, and the step budget."""
 
 from collections.abc import Sequence
-from math import inf, log, sqrt
+from math import inf, log, pi, sqrt
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -30,6 +30,23 @@ def p_wave_speed(young_pa: float, poisson: float, density: float) -> float:
 
     """
     return sqrt(young_pa * (1 - poisson) / (density * (1 + poisson) * (1 - 2 * poisson)))
+
+
+def shell_wave_speeds(young_pa: float, poisson: float, density: float, cells: float) -> tuple[float, float]:
+    """Speeds that limit the step of a shell [m/s]: of waves in its plane, and of bending on the grid.
+
+    c = √(E/(ρ (1 - ν²))); bending with the wave number π/dx, ω = (π/dx)² √(D/(ρ t)), limits a step as waves of
+    ω dx/2 = π² t c/(4 √3 dx) do.
+
+    Args:
+        young_pa: E [Pa].
+        poisson: ν [-].
+        density: ρ [kg/m³].
+        cells: Thickness over the grid spacing, t/dx [-].
+
+    """
+    plane = sqrt(young_pa / (density * (1 - poisson**2)))
+    return plane, pi**2 * cells / (4 * sqrt(3)) * plane
 
 
 def young_from_speed(speed: float, poisson: float, density: float) -> float:

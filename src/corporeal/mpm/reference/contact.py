@@ -14,9 +14,12 @@ from corporeal.mpm.constants import (
     FLAT_BODY_GAP_DX,
     IMPACT_SWEEPS,
     LIQUID_WALL_REACH_DX,
+    MAX_LAYER_DEVIATION_DX,
     NODE_SIGHT_DX,
+    SHELL_WALL_REACH_DX,
     SURFACE_SEARCH_RADIUS_DX,
     SWEEPS,
+    TINY_DOUBLE,
     VAST,
     WALL_REACH,
 )
@@ -80,7 +83,7 @@ def resolve_contacts(scene: ContactScene, velocity: Float[np.ndarray, "A 3"], dt
     rebound = _rebound(scene, movers, pair, contacts, rolls)
     struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
     target = np.maximum(contacts.gap, 0.0) / dt - _joined([t.inwards for t in touches], (0,)).astype(np.float64)
-    sweeps = _sweeps(scene, contacts, bool(struck.any()))
+    sweeps = IMPACT_SWEEPS if _is_pressed(scene, pair) else _sweeps(scene, contacts, bool(struck.any()))
     impulse = struck + contact_impulses.solve(contacts, movers, target, sweeps)
     rounds = np.concatenate([t.rounds for t in touches]) if touches else np.zeros(0, dtype=bool)
     braked = brake_rolling(problem, movers, contacts, pair, impulse, rounds)
@@ -129,6 +132,16 @@ def _sweeps(scene: ContactScene, contacts: contact_impulses.ContactList, hit: bo
     if hit or stacked:
         return IMPACT_SWEEPS
     return SWEEPS if shared else 1
+
+
+def _is_pressed(scene: ContactScene, pair: Int[np.ndarray, "E 2"]) -> bool:
+    """Whether a rigid body is on a shell, whose nodes are light: few sweeps hand on only part of what it bears."""
+    shell, rigid = (
+        np.array([is_so(b) for b in range(len(scene.problem.bodies))] + [False] * len(scene.problem.planes))
+        for is_so in (scene.is_shell, scene.is_rigid)
+    )
+    one, other = pair.T
+    return bool(np.any((shell[one] & rigid[other]) | (rigid[one] & shell[other])))
 
 
 def _drop_impossible(touch: PossibleContacts) -> PossibleContacts:
@@ -221,6 +234,8 @@ def _slots_near_wall(
     """
     height = _height(scene, slot, pair[1]) / scene.problem.cell
     near = height <= WALL_REACH
+    if scene.is_shell(pair[0]):
+        near |= height <= SHELL_WALL_REACH_DX
     if scene.pours(pair[0]):
         near |= (height <= LIQUID_WALL_REACH_DX) & np.isin(slot, alone)
     return slot[near]
@@ -279,6 +294,50 @@ class NodeSamples:
         np.maximum.at(out, row, along + extent)
         return out
 
+    def shell_spread(self, scene: ContactScene, slots: Int[np.ndarray, " E"]) -> "ShellSpread":
+        """Where the vertices of the shells of some slots lie, weighted by spline and mass."""
+        order = np.argsort(slots)
+        low = np.searchsorted(slots[order], self.slot, "left")
+        seen = np.flatnonzero(np.searchsorted(slots[order], self.slot, "right") > low)
+        row, particle, slot = order[low[seen]], self.particle[seen], self.slot[seen]
+        near = np.argmax(scene.grid.slot[particle] == slot[:, None], axis=1)
+        weight = scene.grid.weight[particle, near] * scene.matter.mass[particle]
+        count, offset = len(slots), self.offset[seen]
+        full = np.maximum(np.bincount(row, weight, count), TINY_DOUBLE)
+
+        def mean(values: np.ndarray) -> np.ndarray:
+            rows = [np.bincount(row, weight * column, count) / full for column in values.reshape(len(values), -1).T]
+            return np.stack(rows, axis=1)
+
+        middle = mean(offset)
+        apart = offset - middle[row]
+        square = mean(apart[:, :, None] * apart[:, None, :]).reshape(-1, 3, 3)
+        return ShellSpread(middle, square, mean(scene.matter.half_wall[particle])[:, 0])
+
+
+@dataclass(frozen=True)
+class ShellSpread:
+    """Where the vertices of shells lie around some nodes."""
+
+    mean: Float[np.ndarray, "E 3"]
+    """Mean offset [m]."""
+    covariance: Float[np.ndarray, "E 3 3"]
+    """Of the offsets [m²]."""
+    half_wall: Float[np.ndarray, " E"]
+    """[m]"""
+
+    def face(
+        self, normal: Float[np.ndarray, "E 3"], cell: float
+    ) -> tuple[Float[np.ndarray, " E"], Float[np.ndarray, " E"]]:
+        """Where the shells end along n, seen from the node, and the deviation of what is seen there [m].
+
+        Mean and deviation of the vertices' offsets say where their middle surface ends; half the wall comes on top.
+        """
+        mean = np.sum(self.mean * normal, axis=1)
+        square = np.einsum("ei,eij,ej->e", normal, self.covariance, normal)
+        deviation = np.sqrt(np.maximum(square, 0.0))
+        return contact.face_of_spread(mean / cell, deviation / cell) * cell + self.half_wall, deviation
+
 
 def _field_contacts(
     scene: ContactScene, look: NodeSamples, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
@@ -301,9 +360,9 @@ def _field_contacts(
         kept = NormalCache.of_pair(pair, index, which)
     normal = contact.take_candidate(candidates, which)
     normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
-    normal = _facet_normals(scene, look, pair, slots, normal)
+    normal = _layer_normals(scene, look, pair, slots, _facet_normals(scene, look, pair, slots, normal))
     gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
-    asked = np.full(len(a), max(thin) > 0)
+    asked = np.full(len(a), max(thin) > 0 or any(map(scene.is_shell, pair)))
     if all(map(scene.flat, pair)):
         asked |= gap <= FLAT_BODY_GAP_DX * cell
     if not asked.all():
@@ -340,6 +399,19 @@ def _facet_normals(
     slip = scene.speed_at(pair[0], node) - scene.speed_at(pair[1], node)
     known = np.any(normal != 0.0, axis=1)[:, None]
     return np.where(known, facet_normals(normal, slip, first, second), normal)
+
+
+def _layer_normals(
+    scene: ContactScene,
+    look: NodeSamples,
+    pair: tuple[int, int],
+    slots: tuple[np.ndarray, np.ndarray],
+    normal: Float[np.ndarray, "E 3"],
+) -> Float[np.ndarray, "E 3"]:
+    """Take the normals of shells where they are layers there."""
+    shells = [slot for body, slot in zip(pair, slots, strict=True) if scene.is_shell(body)]
+    seen = [look.shell_spread(scene, slot).covariance / scene.problem.cell**2 for slot in shells]
+    return contact.layer_normals(normal, *seen)
 
 
 def _edge_distances(
@@ -403,14 +475,17 @@ def _surface_gap(
     slots: tuple[np.ndarray, np.ndarray],
     normal: Float[np.ndarray, "E 3"],
 ) -> Float[np.ndarray, " E"]:
-    """Open distance where surface points say where a rigid body begins [m].
+    """Open distance where more is known of a surface than what nodes see of a half space [m].
 
-    They do where it is thin: as a whole, or between two rigid bodies there, and between two that are bounded by flat
-    faces.
+    Of a shell it is the spread of its vertices. Of a rigid body it is its surface points where it is thin: as a whole,
+    or between two rigid bodies there, and between two that are bounded by flat faces.
     """
     cell, node = scene.problem.cell, scene.grid.index[slots[0]] * scene.problem.cell
     found: list[np.ndarray | None] = []
-    for body, way in zip(pair, (-normal, normal), strict=True):
+    for body, slot, way in zip(pair, slots, (-normal, normal), strict=True):
+        if scene.is_shell(body):
+            found.append(-look.shell_spread(scene, slot).face(-way, cell)[0])
+            continue
         points = scene.surface(body) if scene.is_rigid(body) else np.zeros((0, 3))
         limits = SURFACE_SEARCH_RADIUS_DX * cell, NODE_SIGHT_DX * cell
         shown = len(points) > 0
@@ -434,9 +509,14 @@ def _wall_contacts(scene: ContactScene, look: NodeSamples, pair: tuple[int, int]
     if scene.slides(field, wall):
         full = scene.full(field, slot)
         gap = contact.gap_of_liquid(look.mean[slot], height, normal, full, cell)
+    elif scene.is_shell(field):
+        face, deviation = look.shell_spread(scene, slot).face(normal, cell)
+        above = (height > WALL_REACH * cell) & (deviation > MAX_LAYER_DEVIATION_DX * cell)
+        gap = np.where(above, np.inf, height - face)
     else:
         gap = contact.gap_to_wall(look.mean[slot], height, normal, cell)
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
-    movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
+    movers = scene.mover_of_slot(slot)
+    slips = (height > WALL_REACH * cell) & (not scene.is_shell(field))
     return PossibleContacts((field, bodies + wall), movers, there, point, normal, gap, slips, layer)

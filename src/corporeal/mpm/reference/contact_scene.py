@@ -94,6 +94,10 @@ class ContactScene:
         """Whether a field moves with six degrees of freedom."""
         return not self.single and self.problem.bodies[field].rigid
 
+    def is_shell(self, field: int) -> bool:
+        """Whether most particles of a field are vertices of shells."""
+        return not self.single and bool(self.matter.is_shell_body[field])
+
     @property
     def feigned(self) -> Float[np.ndarray, " B"]:
         """Spin of each rigid body times the distance of its surface points [m/s]."""

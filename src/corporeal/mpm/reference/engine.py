@@ -24,7 +24,7 @@ from corporeal.mpm.constants import (
     TINY,
     TINY_DOUBLE,
 )
-from corporeal.mpm.diagnostics import BodySums, ParticleEnergy
+from corporeal.mpm.diagnostics import BodySums, particle_energy
 from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics import contact, rigid
@@ -40,17 +40,17 @@ from corporeal.mpm.reference.mean_dilatation import DilatationClusters, group_cl
 from corporeal.mpm.reference.prescribed_bodies import PrescribedBodies
 from corporeal.mpm.reference.springs import add_impulse
 from corporeal.mpm.reference.step_forces import StepForces
+from corporeal.mpm.shells.assemble import Shells, longest_shell_step
+from corporeal.mpm.shells.forces import shell_step
 from corporeal.mpm.state import (
     ParticleConstants,
     State,
     Velocities,
-    branch_energy,
     branch_stress,
     elastic_stress,
     mean_pressure,
     mean_volume,
     return_to_yield_surface,
-    strain_energy,
 )
 
 
@@ -94,6 +94,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         kick, push = self._kicks(dt)
         groups = group_clusters(matter, self.state, self._field, cell)
         mass, old, new = self._to_grid(grid, groups, kick, dt)
+        new = new + self._shell_kick(grid, mass, dt)
         drive = StepForces(self.problem, matter, self.state, grid, self.grips)
         loaded, damped = drive.act((mass, new), (kick, push), dt)
         state, new = loaded.state, loaded.velocity
@@ -155,6 +156,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         strongest = max(float(np.linalg.norm(p)) for p in [self.problem.gravity, *pulls])
         limits += [FREE_FALL_STEP_FRACTION * np.sqrt(cell / max(strongest, TINY)), longest_step(self.problem)]
         limits.append(self.guides.longest_step)
+        limits.append(longest_shell_step(m.shells, self.problem.courant, cell, float(speed.max(initial=0.0))))
         return float(min(min(limits), MAX_STEP_S))
 
     def _kept_choices(self, dt: float) -> NormalCache:
@@ -199,6 +201,17 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         full = np.maximum(mass, TINY_DOUBLE)[:, None]
         return mass, old / full, (old + gained) / full
 
+    def _shell_kick(self, grid: Stencil, mass: np.ndarray, dt: float) -> np.ndarray:
+        """Velocity that the forces of shells give the slots [m/s]; their triangles yield and relax first."""
+        shells = self.matter.shells
+        if not shells:
+            return np.zeros((grid.count, 3))
+        done = shell_step(shells.mesh, shells.material, self.state.shell, self.state.position, dt)
+        self.state = self.state.with_shell(done.state)
+        self.ledger.plastic_loss += done.plastic_loss
+        self.ledger.viscous_loss += done.branch_work
+        return grid.scatter(dt * done.force) / np.maximum(mass, TINY_DOUBLE)[:, None]
+
     def _stress(self, groups: DilatationClusters) -> Float[np.ndarray, "P 3 3"]:
         """Kirchhoff stress τ, of the laws and of branches [Pa]; none in rigid bodies."""
         shared = groups.mean(mean_pressure(self.matter, self.state))[:, None, None] * np.eye(3)
@@ -225,7 +238,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
         v, v_old = np.split(grid.gather(both), 2, axis=1)
         gradient, gradient_old = np.split(grid.gather_gradient(both), 2, axis=1)
         lost_v, lost_c = state.velocity - v_old, state.affine - gradient_old
-        step = np.eye(3) + dt * gradient
+        step = np.eye(3) + dt * np.where(m.shell[:, None, None], 0.0, gradient)
         k, branches = m.relaxing, m.branches
         memory = advance_branches(state.memory, dt * gradient[k], branches.time, dt)
         grown = np.where(m.uses_mean_dilatation, dt * np.trace(gradient, axis1=1, axis2=2), 0.0)
@@ -345,8 +358,7 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
 
     def _sums(self) -> BodySums:
         m, s = self.matter, self.state
-        energy = ParticleEnergy(strain_energy(m, s.F, s.log_volume_ratio), branch_energy(m, s.memory))
-        return BodySums.of(m, self._particles(), s.affine, energy, self.problem.cell)
+        return BodySums.of(m, self._particles(), s.affine, particle_energy(m, s), self.problem.cell)
 
     def _rigid_bodies(self) -> dict[int, rigid.RigidBody]:
         m, s, spin = self.matter, self.state, self.state.spin(self.matter)
@@ -364,6 +376,9 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
             for b, body in enumerate(self.problem.bodies)
             if body.rigid
         }
+
+    def _shells(self) -> Shells:
+        return self.matter.shells
 
     def _booked(self) -> EngineLedger:
         return self.ledger

@@ -1,0 +1,1 @@
+"""Thin shells at their true thickness: triangle meshes whose vertices are particles (decision mpm-shells)."""
