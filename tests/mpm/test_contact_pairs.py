@@ -26,6 +26,50 @@ def test_the_face_is_found_again_from_its_mean():
     assert contact.half_space_face(contact.half_space_mean(face)) == pytest.approx(face, abs=1e-5)
 
 
+@pytest.mark.parametrize("face", [-1.4, -0.7, -0.5, 0.0, 0.4, 0.9, 2.0])
+def test_the_deviation_of_a_half_space_is_its_weighted_integral(face):
+    u = np.linspace(-1.5, min(face, 1.5), 200_001)
+    w = spline(u) / np.trapezoid(spline(u), u)
+    expected = np.sqrt(np.trapezoid(u**2 * w, u) - np.trapezoid(u * w, u) ** 2)
+    assert float(contact.half_space_deviation(np.array(face))) == pytest.approx(expected, abs=1e-6)
+
+
+def test_the_face_of_a_half_space_is_found_from_mean_and_deviation():
+    face = np.linspace(-1.4, 1.2, 50)
+    mean, deviation = contact.half_space_mean(face), contact.half_space_deviation(face)
+    assert contact.face_of_spread(mean, deviation) == pytest.approx(face, abs=1e-3)
+
+
+def test_a_layer_ends_where_it_is():
+    place = np.linspace(-1.4, 1.4, 15)
+    assert contact.face_of_spread(place, np.zeros(15)) == pytest.approx(place, abs=1e-9)
+
+
+def spread(*deviations):
+    return np.diag(np.square(deviations))[None]
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.2, 0.4])
+def test_a_contact_with_a_layer_is_along_its_normal(lean):
+    leaning = np.array([[np.sin(lean), 0.0, np.cos(lean)]])
+    across = contact.layer_normals(leaning, spread(0.5, 0.5, 0.0))
+    assert across == pytest.approx(np.array([[0.0, 0.0, 1.0]]), abs=0.02)
+    assert contact.layer_normals(-leaning, spread(0.5, 0.5, 0.0)) == pytest.approx(-across)
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.1, 0.3])
+def test_a_contact_with_the_rim_of_a_layer_keeps_its_normal(lean):
+    along = np.array([[np.cos(lean), 0.0, np.sin(lean)], [0.0, 0.0, 0.0]])
+    given = np.concatenate([spread(0.5, 0.5, 0.0)] * 2)
+    assert contact.layer_normals(along, given) == pytest.approx(along)
+
+
+def test_what_is_no_layer_keeps_its_normal():
+    leaning = contact.unit(RNG(5).normal(size=(1, 3)))
+    assert contact.layer_normals(leaning, spread(0.4, 0.4, 0.4)) == pytest.approx(leaning)
+    assert np.array_equal(contact.layer_normals(leaning), leaning)
+
+
 def test_the_touching_distance_has_its_measured_values():
     t = contact.touching_distance(np.array([0.0, 0.5, 1.0]))
     assert t == pytest.approx([0.86, 0.95, 1.27], abs=0.03)

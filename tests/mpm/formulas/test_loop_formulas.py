@@ -155,6 +155,25 @@ def test_the_numbers_of_the_method_are_written_from_python():
     assert {"double LATTICE_GAP_DX", "double MAX_FACE_DEPTH_DX", "int SWEEPS"} <= listed.keys()
 
 
+@wp.func_native("""
+  const double *of = (const double *)table.data, *p = (const double *)mean.data;
+  ((double *)out.data)[i] = mpm::Face<double>::of_spread(of, p[i], ((const double *)deviation.data)[i]);
+""")
+def spread_face(table: Doubles, mean: Doubles, deviation: Doubles, i: int, out: Doubles): ...
+
+
+@wp.kernel
+def spread_faces(table: Doubles, mean: Doubles, deviation: Doubles, out: Doubles):
+    spread_face(table, mean, deviation, wp.tid(), out)
+
+
+def test_faces_of_shells_are_those_of_numpy(rng):
+    mean, deviation = rng.uniform(-1.4, 1.4, COUNT), rng.uniform(0.0, 0.6, COUNT)
+    given = [sent(value, wp.float64) for value in (contact.spread_table(), mean, deviation)]
+    found = run(spread_faces, *given, out=(COUNT, wp.float64))
+    assert np.abs(found - contact.face_of_spread(mean, deviation)).max() < DOUBLE
+
+
 @wp.kernel
 def reaches(F: Matrices, n: Vectors, r0: Floats, out: Floats):
     i = wp.tid()

@@ -15,15 +15,17 @@ from corporeal.mpm.cpu import layout
 from corporeal.mpm.cpu.layout import CENTRE, LANES, LOCAL_BOX, PAIR_COLUMNS, RADIUS
 from corporeal.mpm.ledger import EngineLedger
 from corporeal.mpm.physics import rigid
-from corporeal.mpm.physics.contact import face_table
+from corporeal.mpm.physics.contact import face_table, spread_table
 from corporeal.mpm.physics.flat_facets import facets_of, has_edges, is_bounded_by_facets
 from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.shells.assemble import vertex_half_wall
 from corporeal.mpm.state import surface_curvature
 
 CONTACT_LISTS = {
     "junction": layout.JUNCTION_RECORD,
     "meet": layout.MEET_RECORD,
     "side": layout.SIDE_RECORD,
+    "spread": layout.SPREAD_RECORD,
     "touch": layout.TOUCH_RECORD,
     "aim": layout.AIM_RECORD,
     "lean": layout.LEAN_RECORD,
@@ -159,7 +161,7 @@ class ContactMemory:
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
         self.restitution_law = np.ascontiguousarray(problem.restitution_law_of_pair)
-        self.face = face_table()
+        self.face, self.spread_face = face_table(), spread_table()
         self.stage = np.zeros(1, layout.CONTACT_STAGE_RECORD.dtype)
         self.pair = np.zeros(self.friction.size * PAIR_COLUMNS)
         self.light = np.zeros(len(self.friction))
@@ -172,7 +174,9 @@ class ContactMemory:
             restitution_law=self.restitution_law,
             contact_memory=self.stage,
             face=self.face,
+            spread_face=self.spread_face,
         )
+        self._measure_walls(problem)
         if problem.has_rolling_resistance:
             self.rolling_resistance = np.array(problem.rolling_resistance, float)
             write_pointers(world, rolling_resistance=self.rolling_resistance)
@@ -184,6 +188,22 @@ class ContactMemory:
         self.room = 256
         self.lists = {"past": nothing, "choice": nothing, "kept": nothing}
         self.lengthen()
+
+    def _measure_walls(self, problem: Problem) -> None:
+        """Find the vertices of shells, and which bodies are shells for the most part."""
+        walls = [_half_wall(body) / problem.cell for body in problem.bodies]
+        apart = problem.contact == "multi"
+        self.widest_wall = [float(wall.max(initial=0.0)) if apart else 0.0 for wall in walls]
+        self.is_shell = [apart and bool(np.count_nonzero(wall) > 0.5 * len(wall)) for wall in walls]
+        self.half_wall = np.concatenate(walls).astype(np.float32)
+
+    def note_walls(self, record: np.ndarray, field: int) -> None:
+        """Write down how thick the walls of a field's shells are; one that is a shell stands on no plane by itself."""
+        record["is_shell"], record["widest_wall"] = self.is_shell[field], self.widest_wall[field]
+        if self.widest_wall[field] > 0.0:
+            write_pointers(record, half_wall=self.half_wall)
+        if self.is_shell[field]:
+            record["floor"], record["level"] = -1, 0.0
 
     def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
         """Return the plane that a window reaches, and its normal; -1 and 0 if none or several.
@@ -253,6 +273,8 @@ class ContactMemory:
             "line": self.lines * self.room,
             "past": self.lines * self.room,
         }
+        if any(self.is_shell):
+            room["spread"] = room["side"]
         past, kept = self.past, self.kept
         self.lists = {name: np.zeros(n * RECORD_BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
@@ -263,6 +285,13 @@ class ContactMemory:
         self.past, self.kept = past, kept
         self.stage["most_junctions"], self.stage["most_meets"] = room["junction"], room["meet"]
         self.stage["most_sides"], self.stage["most_touches"] = room["side"], room["touch"]
+
+
+def _half_wall(body: Body) -> np.ndarray:
+    """Half the wall at a body's particles that are vertices of its shell [m]."""
+    if body.shell is None or body.rigid:
+        return np.zeros(len(body.position))
+    return vertex_half_wall(body.shell.triangle, body.shell.thickness, len(body.position))
 
 
 def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:

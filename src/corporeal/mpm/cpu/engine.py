@@ -52,6 +52,7 @@ from corporeal.mpm.cpu.particle_reader import ParticleReader
 from corporeal.mpm.cpu.particle_sorter import ParticleSorter
 from corporeal.mpm.cpu.program import CpuProgram
 from corporeal.mpm.cpu.shared_field import CarriedRigidBody
+from corporeal.mpm.cpu.shell_records import ShellRecords
 from corporeal.mpm.diagnostics import BodySums
 from corporeal.mpm.engine_interaction import EngineLoadChanges
 from corporeal.mpm.ledger import EngineLedger
@@ -62,6 +63,7 @@ from corporeal.mpm.physics.rigid import RigidBody
 from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, StepStatistics
+from corporeal.mpm.shells.assemble import Shells
 from corporeal.mpm.state import Velocities
 
 DEFAULT_THREADS = 4
@@ -123,10 +125,13 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         self.contact = ContactMemory(self.world, problem, self.ledger)
         self.winds = WindRecords(problem, self.first, self.ledger.external_impulse, self.rigid, self.points)
         self.springs = SpringRecords(problem, self.first, self.ledger.external_impulse, self.rigid)
+        self.shells = ShellRecords(problem)
         self.grips: dict[int, Grip] = {}
         self.bond, self.bonded = native_tables.bond_records(problem)
         self._wind_clock()
-        self.saving = EngineCheckpoint(self.ledger, self.window, self.rigid, self.contact, self.clock, self.world)
+        self.saving = EngineCheckpoint(
+            self.ledger, self.window, self.rigid, self.contact, self.shells, self.clock, self.world
+        )
         self.connect()
 
     def _fill_fields(self, sorter: ParticleSorter) -> None:
@@ -218,6 +223,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         world["fields"], world["dx"] = len(self.field), self.problem.cell
         world["tasks"], world["nodes"] = len(self.task.row), len(self.node_task)
         world["colour"], world["chores"] = self.task.colours, len(self.task.chore)
+        self.shells.connect(world, self.field, self.problem.contact == "single")
         world["stands"] = self.contact.stand(self.field["floor"], len(self.node_task))
         world["rigids"] = len(self.field) if self.field["rigids"].any() else 0
         self.clock["laid"] = 0
@@ -250,6 +256,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         record["flows_by"] = wall_stress.flow_curve(self.problem.bodies[f], self.problem.cell)
         # One lane of a node says how high mass lies over a floor.
         record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
+        self.contact.note_walls(record, f)
 
     @property
     def time(self) -> float:
@@ -306,8 +313,9 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
     def book(self) -> None:
         """Move what the tasks added up into the ledger."""
         total = self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]].sum(axis=0)
-        self.ledger.plastic_loss += total[0]
-        self.ledger.viscous_loss += total[1] + self.springs.take_loss()
+        plastic_loss, branch_work = self.shells.take_losses()
+        self.ledger.plastic_loss += total[0] + plastic_loss
+        self.ledger.viscous_loss += total[1] + branch_work + self.springs.take_loss()
         self.ledger.push_work += total[2] + self.winds.take_work() + self.springs.take_work()
         self.report[:, [PLASTIC, VISCOUS, REPORT_WORK]] = 0.0
 
@@ -378,6 +386,7 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         rows = np.zeros((len(self.problem.bodies), BODY_SUMS))
         for f, window in self.window.items():
             rows[self.members[f]] = self.reader.total(window, self.material[f])
+        rows[:, 10:12] += self.shells.energy_of_bodies(self._positions(), len(rows))
         return BodySums(
             mass=self.body_loads["mass"].copy(),
             first_moment=rows[:, :3],
@@ -389,9 +398,19 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
             fastest=rows[:, 12],
         )
 
+    def _positions(self) -> np.ndarray:
+        """Positions of the particles of all fields that deform [m]."""
+        position = np.zeros((self.first[-1], 3))
+        for window in self.window.values():
+            position[window.number] = window.position() * self.problem.cell
+        return position
+
     def _rigid_bodies(self) -> dict[int, RigidBody]:
         start = self.springs.start
         return {b: native_tables.rigid_body(state, start[b], self.points[b]) for b, state in self.rigid.items()}
+
+    def _shells(self) -> Shells:
+        return self.shells.shells
 
     def _booked(self) -> EngineLedger:
         self.book()
@@ -447,6 +466,9 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
         for f in fields:
             # What it was strained by there was long ago: branches have forgotten it.
             self.window[f].relax(self.material[f])
+        moved = [b for f in fields for b in self.members[f]]
+        self.shells.restore(saved, moved)
+        self.shells.relax(moved)
         self.connect()
 
     def _successor(self, problem: Problem, change: BodyChange) -> Self:

@@ -10,13 +10,14 @@ from corporeal.mpm.add_bodies import AddedBodies
 from corporeal.mpm.body_changes import BodyChange
 from corporeal.mpm.cpu.contact_memory import ContactMemory
 from corporeal.mpm.cpu.field_window import FieldWindow
+from corporeal.mpm.cpu.shell_records import ShellRecords
 from corporeal.mpm.ledger import EngineLedger
 
 SavedArrays = dict[str, np.ndarray]
 
 CLOCK_FIELDS = ("count", "smallest", "largest", "speed", "wave")
 """What the clock remembers from step to step; the time stands before it."""
-BODY_NUMBER_PATTERN = re.compile(r"(?:field|rigid)(\d+)(?:\.|$)")
+BODY_NUMBER_PATTERN = re.compile(r"(?:field|rigid|shell)(\d+)(?:\.|$)")
 """Number of the body in a name; each has a field of its own where bodies become several."""
 
 
@@ -28,6 +29,7 @@ class EngineCheckpoint:
     window: dict[int, FieldWindow]
     rigid: dict[int, np.ndarray]
     contact: ContactMemory
+    shells: ShellRecords
     clock: np.ndarray
     world: np.ndarray
 
@@ -37,6 +39,7 @@ class EngineCheckpoint:
         for f, window in self.window.items():
             saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
         saved |= {f"rigid{b}": state.copy() for b, state in self.rigid.items()}
+        saved |= self.shells.saved()
         saved["contact"], saved["choices"] = self.contact.past, self.contact.kept
         time = float(self.world["time"][0])
         saved["clock"] = np.array([time, *(float(self.clock[k][0]) for k in CLOCK_FIELDS)])
@@ -47,6 +50,7 @@ class EngineCheckpoint:
         for name in self.ledger.as_arrays():
             getattr(self.ledger, name)[...] = saved[f"ledger.{name}"]
         self._restore_bodies(saved, self.window, self.rigid)
+        self.shells.restore(saved, self.shells.bodies)
         time, *clocked = saved["clock"].tolist()
         self.world["time"] = time
         for name, value in zip(CLOCK_FIELDS, clocked, strict=True):

@@ -35,9 +35,9 @@ BRANCH_CHANNELS = 7
 """Channels of a branch."""
 MAXWELL_CHANNELS = BRANCHES * BRANCH_CHANNELS
 """Channels of what all branches of a particle remember."""
-LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, FLIP_DAMPING_RATE, RHO, RIGID = range(12)
+LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, FLIP_DAMPING_RATE, RHO, STRAINLESS = range(12)
 """Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain p₀/K, of a liquid
-K_c/dtⁿ in this step [Pa] and n, FLIP damping rate [1/s], ρ [kg/m³], 1 where rigid."""
+K_c/dtⁿ in this step [Pa] and n, FLIP damping rate [1/s], ρ [kg/m³], 1 of rigid bodies and of vertices of shells."""
 SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY, STIFFENING = (
     12,
     14,
@@ -52,6 +52,37 @@ SHEAR, BULK, BRANCH_KEPT, BRANCH_FRESH, BRANCH_TIME, PUSH_VELOCITY, CONSISTENCY,
 (3); K_c of a liquid [Pa sⁿ]; how many times stiffer waves find it with branches than without [-]."""
 MATERIAL_COLUMNS = 32
 """Columns with room to spare: a row is two cache lines."""
+
+# ---------------------------------------------------------------- triangles of shells
+
+(WALL_LAW, WALL_MU, WALL_LAMBDA, WALL_POISSON, WALL_YIELD, WALL_HARD, WALL_STIFFNESS, WALL_BENDING) = range(8)
+"""Columns of walls: law, membrane's μ, λ [Pa], ν, σ_y, H [Pa], E/(1 - ν²) of the membrane [Pa], D [N m] …"""
+WALL_HINGE_MOMENT, WALL_THICKNESS, WALL_STRENGTH, WALL_DECAY = 8, 9, 10, 12
+"""… moment of a plastic hinge [N], thickness [m], strength of either Maxwell branch, number of their times."""
+WALL_COLUMNS = 16
+"""Columns with room to spare: a row is a cache line."""
+TRIANGLE_WALL, TRIANGLE_AREA, TRIANGLE_REST = 0, 1, 2
+"""Channels of what never changes of a triangle, [channel][8]: row of walls, area (0: it fills a batch) [m²], B at rest
+(4) [1/m]."""
+TRIANGLE_CHANNELS = 6
+"""Channels of that."""
+(BARE_REST, SHELL_PLASTIC_STRAIN, PLASTIC_CURVATURE, LAST_GREEN, LAST_BEND, SHELL_BRANCH_STRAIN, SHELL_BRANCH_BEND) = (
+    *(0, 4, 5, 8),
+    *(11, 14, 20),
+)
+"""Channels of what changes, see ``shells.forces.ShellState``: B of the stress-free triangle (4), plastic strain,
+plastic curvature (3), Green's strain (3) and curvature (3) at the last step, strain and curvature of branches (6)."""
+SHELL_STATE_CHANNELS = 26
+"""Channels of that."""
+SHELL_PLACES, SHELL_HINGES, SHELL_TRIANGLES, SHELL_CORNERS, SHELL_VERTICES = range(5)
+"""Phases of shells: where vertices are, angles, stress and moments, forces on corners, and on vertices."""
+SHELL_BATCHES_PER_TASK = 32
+"""Batches of eight triangles or hinges of one task."""
+SHELL_VERTICES_PER_TASK = 256
+SHELL_PLASTIC, SHELL_VISCOUS = 0, 1
+"""Columns of such a task's report [J]."""
+SHELL_REPORT_COLUMNS = 8
+"""Columns with room to spare."""
 
 # ---------------------------------------------------------------- blocks and tasks
 
@@ -198,6 +229,8 @@ FIELD_RECORD = NativeRecord(
     ("int", "blocks pool rigids points surfaces pushed uses_mean_dilatation flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
+    ("float *", "half_wall"),  # [particles of all fields] of vertices [cells], else 0; null: the field has none
+    ("double", "widest_wall"),  # the largest of them
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
     ("int", "patches wets shows facets slims"),
     ("int", "pointed"),  # rigid: no node of it meets a plane: points of its own do, or nothing does
@@ -206,6 +239,7 @@ FIELD_RECORD = NativeRecord(
     ("int", "edged"),  # rigid: whether it is known to have edges
     ("int", "bends"),  # rigid: whether it curves outwards or inwards anywhere
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
+    ("int", "shells is_shell"),  # whether any of its particles are vertices of shells, and whether most are
 )
 WIND_RECORD = NativeRecord(  # a body in the wind: see wind_records.py
     "WindLoad",
@@ -228,6 +262,28 @@ GRIP_RECORD = NativeRecord(  # a spring from a body to a point outside: see phys
     ("double", "stiffness damping mass work"),
     ("int", "field first count"),
 )
+SHELL_RECORD = NativeRecord(  # triangles and hinges of all shells, in batches of eight: see shell_records.py
+    "ShellMesh",
+    ("int *", "vertex"),  # of every particle: its number as a vertex, -1: none
+    ("int *", "place"),  # [vertices][4] fixed point, as of particles
+    ("int *", "hinge"),  # [batches][4][8] vertices: of the edge, and opposite to it
+    ("float *", "rest_angle turn"),  # [hinges]: angle at rest, and how far it is from that
+    ("float *", "half"),  # [hinges][2] moment of either triangle at a hinge
+    ("int *", "triangle"),  # [batches][3][8] vertices
+    ("int *", "first_slot"),  # [batches + 1], in threes: one for each side
+    ("int *", "slot"),  # [slots][8] hinge, 0 or 1 for which of its halves, and for winding against it: 30, 1, 1 bits
+    ("float *", "curvature"),  # [slots][3][8] for each radian
+    ("float *", "wall"),  # [walls][WALL_COLUMNS]
+    ("float *", "rest state"),  # [batches][..][8]
+    ("float *", "pull"),  # [batches][12][8] force of membranes on the second and third corner, edges to them
+    ("float *", "corner force"),  # [triangles][3][4], [vertices][4]
+    ("int *", "first_corner corners"),  # of every vertex
+    ("double *", "branch_time"),  # [decays][2]
+    ("float *", "decay"),  # [decays][4]: what a step leaves of old, and of new strain of either branch
+    ("double *", "report"),
+    ("double", "wave bending_step"),  # speed of waves in the plane [m/s]; longest step for bending [s]
+    ("int", "decays hinges triangles vertices"),  # batches of hinges and triangles
+)
 WORLD_RECORD = NativeRecord(
     "World",
     ("ThreadPool *", "thread_pool"),
@@ -239,12 +295,13 @@ WORLD_RECORD = NativeRecord(
     ("double *", "restitution_law"),  # how restitution changes with speed: 5 numbers a pair
     ("double *", "rolling_resistance"),  # c of every pair [m]; null: there is none
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
-    ("double *", "contact_point face impact_loss impact_of_pair"),
+    ("double *", "contact_point face spread_face impact_loss impact_of_pair"),
     ("WindLoad *", "wind_load"),
     ("Bond *", "bond"),
     ("Tether *", "tether"),
     ("Joint *", "joint"),
     ("Grip *", "grip"),
+    ("ShellMesh *", "shell"),
     ("double", "dx dt time"),
     ("double[3]", "kick"),
     ("int", "fields planes tasks full"),
@@ -258,9 +315,11 @@ WORLD_RECORD = NativeRecord(
     (f"int[{COLOURS}]", "bare"),
     ("int", "stands parts"),  # tasks on nodes that may stand on a plane; on contacts
     (f"int[{COLOURS}]", "looks"),  # chores on particles for contact; 0 without any
+    (f"int[{COLOURS}]", "spreads"),  # the same where a shell is listed
     (f"int[{COLOURS}]", "reaches"),  # the same where a normal is chosen anew
     ("int", "rigids turns"),  # fields, where some are rigid; tasks to look at those
-    ("int", "chores spare"),
+    ("int", "chores shelled"),  # shelled: chores, where there are shells
+    ("int", "shell_hinges shell_triangles shell_vertices spare2"),  # tasks
 )
 STEP_RECORDS = (
     POST_RECORD,
@@ -273,6 +332,7 @@ STEP_RECORDS = (
     TETHER_RECORD,
     JOINT_RECORD,
     GRIP_RECORD,
+    SHELL_RECORD,
     WORLD_RECORD,
 )
 
@@ -299,6 +359,11 @@ SIDE_RECORD = NativeRecord(  # one field there
     ("float", "spare"),
     ("double[3]", "v"),
     ("double", "inverse"),
+)
+SPREAD_RECORD = NativeRecord(  # of a side that is a shell: sums over its particles, weighted by spline and mass
+    "Spread",
+    ("float[6]", "square"),  # xx, yy, zz, xy, xz, yz of places about their mean [kg cells²]
+    ("float", "half_wall spare"),  # [kg cells]
 )
 AIM_RECORD = NativeRecord(  # candidate normals of a possible contact of two fields
     "Aim",
@@ -356,6 +421,7 @@ CONTACT_STAGE_RECORD = NativeRecord(
     ("Junction *", "junction"),
     ("Meet *", "meet"),
     ("Side *", "side"),
+    ("Spread *", "spread"),  # of the side of the same number; null: no field is a shell
     ("Touch *", "touch"),
     ("Aim *", "aim"),
     ("Entry *", "entry stand"),
@@ -378,6 +444,7 @@ CONTACT_RECORDS = (
     JUNCTION_RECORD,
     MEET_RECORD,
     SIDE_RECORD,
+    SPREAD_RECORD,
     AIM_RECORD,
     LEAN_RECORD,
     CHOICE_RECORD,

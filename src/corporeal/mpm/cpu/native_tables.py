@@ -138,7 +138,7 @@ class FieldMaterials:
         table = np.zeros((len(s.body), MATERIAL_COLUMNS), np.float32)
         none = np.zeros(len(s.body))
         numbers = (s.mu, s.lam, s.yield_stress, s.hardening, s.cone, s.apex, none, s.flow_index)
-        table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.flip_damping_rate, s.density, s.rigid])
+        table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.flip_damping_rate, s.density, s.rigid | s.shell])
         table[:, CONSISTENCY] = s.consistency
         table[:, STIFFENING] = s.stiffening**2
         branches = s.branches

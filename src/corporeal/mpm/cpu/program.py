@@ -44,15 +44,23 @@ MIN_PARTICLES_PER_READING_THREAD = 4096
     PIECE_STAND,
     PIECE_LIST,
     PIECE_LOOK,
+    PIECE_SPREAD,
     PIECE_FACE,
     PIECE_REACH,
     PIECE_CHOOSE,
     PIECE_SOLVE,
     PIECE_RESOLVE,
-) = range(PIECE_CONTACT, PIECE_CONTACT + 11)
-CONTACT_PIECES = "start mark find stand list look face reach choose solve resolve"
+) = range(PIECE_CONTACT, PIECE_CONTACT + 12)
+CONTACT_PIECES = "start mark find stand list look spread face reach choose solve resolve"
 """Pieces of contact: ``loops/contact_NAME.cpp``."""
-PIECE_NAMES = [*"lay move timestep clear wind spring forces".split(), *CONTACT_PIECES.split()]
+PIECE_SHELL = PIECE_CONTACT + len(CONTACT_PIECES.split())
+"""The first of the pieces of shells, see ``layout.SHELL_PLACES``."""
+SHELL_PIECES = "places hinges triangles corners vertices"
+PIECE_NAMES = [
+    *"lay move timestep clear wind spring forces".split(),
+    *CONTACT_PIECES.split(),
+    *(f"shell {name}" for name in SHELL_PIECES.split()),
+]
 """Of all pieces, by number."""
 
 
@@ -70,6 +78,11 @@ class Phase(NamedTuple):
 
 SCHEDULE = (
     Phase(PIECE_TIMESTEP),
+    Phase(PIECE_SHELL + layout.SHELL_PLACES, "shelled"),
+    Phase(PIECE_SHELL + layout.SHELL_HINGES, "shell_hinges"),
+    Phase(PIECE_SHELL + layout.SHELL_TRIANGLES, "shell_triangles"),
+    Phase(PIECE_SHELL + layout.SHELL_CORNERS, "shell_triangles"),
+    Phase(PIECE_SHELL + layout.SHELL_VERTICES, "shell_vertices"),
     Phase(PIECE_CLEAR, "bare_nodes"),
     *(Phase(PIECE_LAY, "bare", colour) for colour in range(COLOURS)),
     Phase(PIECE_WIND, "wind_tasks"),
@@ -81,6 +94,7 @@ SCHEDULE = (
     Phase(PIECE_STAND, "stands"),
     Phase(PIECE_LIST, "parts"),
     *(Phase(PIECE_LOOK, "looks", colour) for colour in range(COLOURS)),
+    *(Phase(PIECE_SPREAD, "spreads", colour) for colour in range(COLOURS)),
     Phase(PIECE_FACE, "parts"),
     *(Phase(PIECE_REACH, "reaches", colour) for colour in range(COLOURS)),
     Phase(PIECE_REACH, "turns"),
@@ -90,7 +104,7 @@ SCHEDULE = (
     *(Phase(PIECE_MOVE, "colour", colour) for colour in range(COLOURS)),
 )
 """A step. Particles lay the nodes of the next step when they move, so laying is skipped unless the nodes are bare: at
-the start, after a sort, and while a push acts."""
+the start, after a sort, and while a push acts; and in fields with shells, whose forces lie down with their vertices."""
 
 _LOOPS = Path(__file__).parent / "loops"
 
@@ -159,6 +173,10 @@ def _contact_source() -> str:
 def contact_native(memory: MemoryArray, piece: int, index: int): ...
 
 
+@wp.func_native(native_source("shells"))
+def shells_native(memory: MemoryArray, piece: int, index: int): ...
+
+
 @wp.kernel
 def run_tasks(memory: MemoryArray, thread: int):
     order = step_loop_native(memory, thread)
@@ -177,6 +195,8 @@ def run_tasks(memory: MemoryArray, thread: int):
             springs_native(memory, task)
         elif piece == PIECE_FORCES:
             forces_native(memory, task)
+        elif piece >= PIECE_SHELL:
+            shells_native(memory, piece - PIECE_SHELL, task)
         elif piece >= PIECE_CONTACT:
             contact_native(memory, piece - PIECE_CONTACT, task)
         order = step_loop_native(memory, thread)
@@ -220,7 +240,7 @@ class CpuProgram:
     def divide(self, first: list[int], chores: int) -> None:
         """Return where each colour's chores begin, and how many there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
-            if phase.count in ("bare", "colour", "looks", "reaches"):
+            if phase.count in ("bare", "colour", "looks", "spreads", "reaches"):
                 row[1] = first[phase.which]
             elif phase.count == "turns":
                 row[1] = chores

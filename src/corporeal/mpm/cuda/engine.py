@@ -24,6 +24,7 @@ from corporeal.mpm.physics import maxwell_branches
 from corporeal.mpm.physics.rigid import RigidBody, world_inverse_inertia
 from corporeal.mpm.physics.spring_grips import Grip
 from corporeal.mpm.problem import Body, Problem, Snapshot, StepStatistics
+from corporeal.mpm.shells.assemble import Shells
 from corporeal.mpm.state import ParticleConstants, Velocities, branch_energy, strain_energy
 
 KNOWN_FIELDS = {
@@ -301,6 +302,9 @@ class CudaEngine(EngineInteraction):
             )
             for b in np.flatnonzero(r.stiff.numpy())
         }
+
+    def _shells(self) -> Shells:
+        return self.matter.shells
 
     def _booked(self) -> EngineLedger:
         s = self.arrays.sheet

@@ -50,6 +50,13 @@ template <class R> struct Face {
     int i = f < R(FACE_TABLE_INTERVALS - 1) ? (int)f : FACE_TABLE_INTERVALS - 1;
     return table[i] + (table[i + 1] - table[i]) * (f - i);
   }
+  // Where material ends whose offsets have that mean and standard deviation, from a table of
+  // FACE_TABLE_INTERVALS + 1 values over [0, SPLINE_DEVIATION_DX]: twin of contact.face_of_spread.
+  CUDA_CALLABLE static inline R of_spread(const R *table, R mean, R deviation) {
+    R f = (deviation < R(SPLINE_DEVIATION_DX) ? deviation : R(SPLINE_DEVIATION_DX)) * R(FACE_TABLE_INTERVALS / SPLINE_DEVIATION_DX);
+    int i = f < R(FACE_TABLE_INTERVALS - 1) ? (int)f : FACE_TABLE_INTERVALS - 1;
+    return mean + table[i] + (table[i + 1] - table[i]) * (f - i);
+  }
   // Distance t(s) of the mean offsets of two half spaces that touch.
   CUDA_CALLABLE static inline R touching(R s) {
     s = s < 0 ? -s : s;
@@ -107,6 +114,26 @@ template <class R> struct Touched {
       second = apart > PARALLEL_EDGE_SINE2 ? (other - far * cosine) / apart : 0.5 * other;
     }
     for (int i = 0; i < 3; i++) out[i] = first * p[i] + second * q[i];
+  }
+};
+// Normals of layers. Twin of contact.layer_normals.
+struct LayerNormal {
+  // The normal n of a contact with a layer, as that is; square: weight times xx, yy, zz, xy, xz, yz of its
+  // offsets about their mean.
+  CUDA_CALLABLE static inline void turn(const float *square, double weight, const double *n, double *out) {
+    const double per = 1.0 / weight, least = LAYER_DEVIATION_DX * LAYER_DEVIATION_DX;
+    const double a = square[0] * per + least, b = square[1] * per + least, c = square[2] * per + least;
+    const double d = square[3] * per, e = square[4] * per, f = square[5] * per;
+    double m[3] = {(b * c - f * f) * n[0] + (e * f - c * d) * n[1] + (d * f - b * e) * n[2],
+                   (e * f - c * d) * n[0] + (a * c - e * e) * n[1] + (d * e - a * f) * n[2],
+                   (d * f - b * e) * n[0] + (d * e - a * f) * n[1] + (a * b - d * d) * n[2]};
+    const double size = sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
+    const double cosine = size > 0 ? (m[0] * n[0] + m[1] * n[1] + m[2] * n[2]) / size : 0.0;
+    double share = (cosine - MIN_LAYER_COSINE) / (FULL_LAYER_COSINE - MIN_LAYER_COSINE);
+    share = share < 0 ? 0.0 : share > 1 ? 1.0 : share;
+    for (int i = 0; i < 3; i++) out[i] = n[i] + (share > 0 ? share * (m[i] / size - n[i]) : 0.0);
+    const double length = sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2]);
+    for (int i = 0; i < 3 && length > 0; i++) out[i] /= length;
   }
 };
 // How far a particle reaches along n: r0 |Ft n|.

@@ -57,6 +57,25 @@ template <class R> struct Math {
     R r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
     return S::from_bits((k + 127) << 23) * (1.0f + expm1(r));
   }
+  // Angle from the first axis to (x, y) [rad]; 0 of nothing. Relative to it exact where it is small (Cephes' atanf).
+  CUDA_CALLABLE static inline R angle(R y, R x) {
+    R ax = S::size(x), ay = S::size(y), low = S::low(ax, ay), high = S::high(S::high(ax, ay), S::all((float)TINY));
+    M steep = ay > ax, half = low > 0.41421356f * high;
+    R t = S::pick(half, low - high, low) / S::pick(half, low + high, high), s = t * t;
+    R p = -1.38776856e-1f + s * 8.05374449e-2f;
+    p = 1.99777106e-1f + s * p;
+    p = -3.33329491e-1f + s * p;
+    R a = t + t * s * p;
+    a = S::pick(half, 0.78539816f + a, a);
+    a = S::pick(steep, 1.57079633f - a, a);
+    a = S::pick(x < 0.0f, 3.14159265f - a, a);
+    return S::pick(y < 0.0f, -a, a);
+  }
+  // The same angle from -pi to pi, of one within one turn of that.
+  CUDA_CALLABLE static inline R wrapped(R a) {
+    a = S::pick(a > 3.14159265f, (a - 6.28125f) - 1.93530718e-3f, a);
+    return S::pick(a < -3.14159265f, (a + 6.28125f) + 1.93530718e-3f, a);
+  }
   // x^y of a positive number.
   CUDA_CALLABLE static inline R power(R x, R y) { return exp(y * log(x)); }
   CUDA_CALLABLE static inline void rotate(R &app, R &aqq, R &apq, R &arp, R &arq, R *V, int p, int q) {

@@ -1,7 +1,8 @@
 // Empty a range of one field's node blocks.
 int *task = world->list + 4 * index;
 const Field &field = world->field[task[0]];
-for (int b = task[1]; b < task[2]; b++) {
+const bool laid = world->clock->laid && !field.shells;
+for (int b = laid ? task[2] : task[1]; b < task[2]; b++) {
   int *used = field.used + b;
   if (!(*used & 1 << field.side)) continue;
   *used &= ~(1 << field.side);

@@ -62,6 +62,7 @@ struct Around {
   // Whether the particles of two fields are so far apart along an axis that no gap closes in a step.
   static inline bool apart(const Field &F, const Around &A, const Field &G, const Around &B, double far) {
     far += F.flows || G.flows ? mpm::LOOSE_CONTACT_REACH_DX : mpm::DENSE_CONTACT_REACH_DX;
+    far += F.widest_wall + G.widest_wall;
     for (int d = 0; d < 3; d++)
       if (B.low[d] - A.high[d] > far * CELL_UNITS || A.low[d] - B.high[d] > far * CELL_UNITS) return true;
     return false;
@@ -184,7 +185,7 @@ world->parts = stage->junctions ? LIST_PARTS : 0;
 world->turns = stage->junctions ? world->rigids : 0;
 for (int k = 0; k < COLOURS; k++) {
   world->looks[k] = stage->junctions ? world->colour[k] : 0;
-  world->reaches[k] = 0;   // until contact_list counts them
+  world->spreads[k] = world->reaches[k] = 0;   // until contact_list counts them
 }
 // Whether all normals are chosen anew: see normal_cache_steps in physics/contact.py.
 stage->anew = world->clock->count % mpm::Keep::steps(world->clock->speed * dt * inv) == 0;

@@ -1,7 +1,7 @@
 // List the nodes of some blocks, the fields there and their possible contacts.
 int from = (int)((long long)stage->junctions * index / LIST_PARTS),
     to = (int)((long long)stage->junctions * (index + 1) / LIST_PARTS);
-bool asked = false;
+bool asked = false, shells = false;
 for (int j = from; j < to; j++) {
   Junction &J = junctions[j];
   int k = J.meet, s = J.side, t = J.touch;
@@ -43,6 +43,10 @@ for (int j = from; j < to; j++) {
       const Field &F = world->field[J.field[q]];
       S.field = J.field[q];
       S.slot = J.block[q] * 64 + i;
+      if (F.is_shell) {
+        stage->spread[s - 1] = Spread{{0, 0, 0, 0, 0, 0}, 0, 0};
+        shells = true;
+      }
       const float *node = F.node + (size_t)S.slot * 8;
       S.m = node[0];
       S.inverse = 1.0 / node[0];
@@ -99,3 +103,5 @@ for (int j = from; j < to; j++) {
 }
 for (int k = 0; k < COLOURS && asked; k++)
   __atomic_store_n(world->reaches + k, world->colour[k], __ATOMIC_RELAXED);
+for (int k = 0; k < COLOURS && shells; k++)
+  __atomic_store_n(world->spreads + k, world->colour[k], __ATOMIC_RELAXED);

@@ -1,48 +1,5 @@
 // Second pass over the particles around listed nodes: the mean offset of a field's mass there,
 // and its outward gradient of volume. One chore: tasks of one field, each a run of blocks.
-struct Asked {              // nodes of a block's arena that are listed
-  u64 layers[8];            // layer by layer, a bit for each
-  u64 cells[6];             // cells whose particles reach one of them
-  int at[512], side[512], count;   // where each is in the arena, and the field's side there
-  bool several;             // fields meet at some of them, so that gradients are needed
-  Asked(const Stage *stage, const Field &field, int number, const int *record) : layers{}, count(0), several(false) {
-    int listed[27], any = 0;
-    for (int n = 0; n < 27; n++) any |= listed[n] = field.where[4 * record[NEIGHBOURS + n] + 3];
-    if (!any) return;
-    const Reached reached(field, record);
-    for (int n = 0; n < 27; n++)
-      if (listed[n]) list(stage, stage->junction[listed[n] - 1], number, n, reached.nodes(n) & Grid::arena(n));
-    for (int x = 0; x < 6; x++) {
-      u64 m = layers[x] | layers[x + 1] | layers[x + 2];
-      m |= m >> 8 | m >> 16;
-      cells[x] = m | m >> 1 | m >> 2;
-    }
-  }
-  // Nodes of one neighbour. Sides are numbered node by node, and at a node field by field.
-  inline void list(const Stage *stage, const Junction &J, int number, int n, u64 mine) {
-    int q = 0;
-    while (q < J.fields && J.field[q] != number) q++;
-    if (q == J.fields) return;
-    mine &= J.mask & J.have[q];
-    several |= (mine & J.several) != 0;
-    const int corner = (4 * (n / 9 - 1) + 1) * 64 + (4 * (n / 3 % 3 - 1) + 1) * 8 + 4 * (n % 3 - 1) + 1;
-    for (; mine; mine &= mine - 1) {
-      const int i = __builtin_ctzll(mine), node = corner + (i >> 4) * 64 + (i >> 2 & 3) * 8 + (i & 3);
-      int s = stage->meet[Grid::meet(J, i)].side;
-      for (int k = 0; k < q; k++) s += (int)(J.have[k] >> i & 1);
-      __builtin_prefetch(stage->side[s].mean, 1);
-      layers[node >> 6] |= 1ull << (node & 63);
-      at[count] = node;
-      side[count++] = s;
-    }
-  }
-  inline bool by(int cell) const { return cells[cell >> 6] >> (cell & 63) & 1; }
-  inline void empty(f8 *arena) const {
-    for (int row = 0; row < 64; row++)
-      if (layers[row >> 3] >> (8 * (row & 7)) & 255)
-        for (int k = 0; k < 8; k++) arena[8 * row + k] = Simd::all(0.0f);
-  }
-};
 // Eight particles' shares of 27 nodes, mass, mass times offset 3 and outward gradient of volume 3, are
 // products of one factor along each axis.
 struct Shares {

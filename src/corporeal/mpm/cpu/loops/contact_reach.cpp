@@ -132,9 +132,14 @@ for (int number = chore[0]; number < chore[1]; number++) {
       f8 V = *(f8u *)(q + 8 * VO);
       for (int k = 0; k < 9; k++) support.F[k] = *(f8u *)(q + 8 * (DE + k));
       for (int k = 0; k < 9; k += 4) support.F[k] += 1.0f;
-      if (Simd::any(V != volume)) {
+      if (field.half_wall || Simd::any(V != volume)) {
         volume = V;
         for (int l = 0; l < 8; l++) support.reach[l] = (float)(0.5 * cbrt((double)V[l]) * inv);
+      }
+      if (field.half_wall) {   // vertices of shells reach as far as the wall
+        const f8 wall = HalfWall::of(field, q, record[1] - s);
+        support.reach = Simd::pick(wall > 0.0f, wall, support.reach);
+        volume = Simd::all(0.0f);
       }
       support.stretch();
       for (int i = P.low[0]; i <= P.high[0] + 2; i++) {

@@ -55,6 +55,7 @@ struct Rounds {
 };
 Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
+bool pressed = false;         // a rigid body on a shell, whose nodes are light
 double *pair = stage->pair;   // [all][all][PAIR_COLUMNS]
 nt += Points::on_planes(world, touches + nt);
 const int faces = nt;   // contacts of round bodies with faces of others begin here
@@ -94,6 +95,7 @@ for (int t = world->turns ? 0 : stage->touches; t < nt; t++) {   // where none i
   R.e = Rounds::both_rigid(R) ? world->restitution[T.fa * all + T.fc] : 0.0;
   R.waits = 0;
   stacked |= R.ma < 0 && R.mc < 0;
+  pressed |= world->field[T.fa].is_shell || (T.fc < fields && world->field[T.fc].is_shell);
   for (int i = 0; i < 3; i++) T.before[i] = u[i];
   const double *ka = R.ma < 0 ? R.a + KICK : 0, *kc = R.mc < 0 ? R.c + KICK : 0;
   double kick[3];
@@ -151,7 +153,7 @@ if (n) {
   // Then all contacts together. Rigid bodies on one another only yield to each other: with few
   // sweeps stacks creep. So contacts begin with the forces of the last step, and sweeps end when what
   // they change would creep by less than a few thousandths of a cell per second.
-  const int sweeps = impacts || stacked ? mpm::IMPACT_SWEEPS : mpm::SWEEPS;
+  const int sweeps = impacts || stacked || pressed ? mpm::IMPACT_SWEEPS : mpm::SWEEPS;
   const bool known = stage->pasts > 0;
   if (known) {
     int *slot = stage->slot, last = stage->slots - 1;

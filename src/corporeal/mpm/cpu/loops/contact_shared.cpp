@@ -64,6 +64,7 @@ struct Grid {
   }
   // How high nodes of a field can touch a plane [cells].
   static inline double reach(const World *w, int field) {
+    if (w->field[field].is_shell) return mpm::SHELL_WALL_REACH_DX;
     return w->field[field].pours ? mpm::LIQUID_WALL_REACH_DX : mpm::WALL_REACH;
   }
   // Whether a block lies so high over a plane that none of its nodes can touch it.
@@ -113,18 +114,23 @@ struct Pairs {
 // The planes that a block of nodes may touch, and its nodes that may.
 struct Walls {
   int plane[WALLS], count;
-  u64 near[WALLS], wide[WALLS];   // wide: of liquids
+  u64 near[WALLS], wide[WALLS], shell[WALLS];   // wide: of liquids
   Walls(const World *w, const int *at) : count(0) {
+    const bool shells = ((const Stage *)w->contact_memory)->spread != 0;
+    const bool farther = shells && mpm::SHELL_WALL_REACH_DX > mpm::LIQUID_WALL_REACH_DX;
+    const double reach = farther ? mpm::SHELL_WALL_REACH_DX : mpm::LIQUID_WALL_REACH_DX;
     for (int v = 0; v < w->planes && count < WALLS; v++) {
       const double *P = w->plane + 4 * v;
-      if (Grid::over(P, at, w->dx, mpm::LIQUID_WALL_REACH_DX)) continue;
+      if (Grid::over(P, at, w->dx, reach)) continue;
       near[count] = Grid::wall(P, at, w->dx, mpm::WALL_REACH);
       wide[count] = Grid::wall(P, at, w->dx, mpm::LIQUID_WALL_REACH_DX);
+      shell[count] = shells ? Grid::wall(P, at, w->dx, mpm::SHELL_WALL_REACH_DX) : 0;
       plane[count++] = v;
     }
   }
   // Which nodes of a field a plane may touch; where fields meet there may be a body between.
   inline u64 of(const World *w, int field, int number, u64 several) const {
+    if (w->field[field].is_shell) return shell[number];
     return near[number] | (w->field[field].pours ? wide[number] & ~several : 0);
   }
 };
@@ -182,6 +188,60 @@ struct Reached {
     }
   }
   inline u64 nodes(int n) const { return axis[0][n / 9] & axis[1][n / 3 % 3] & axis[2][n % 3]; }
+};
+
+// Nodes of a block's arena that are listed.
+struct Asked {
+  u64 layers[8];            // layer by layer, a bit for each
+  u64 cells[6];             // cells whose particles reach one of them
+  int at[512], side[512], count;   // where each is in the arena, and the field's side there
+  bool several;             // fields meet at some of them, so that gradients are needed
+  Asked(const Stage *stage, const Field &field, int number, const int *record) : layers{}, count(0), several(false) {
+    int listed[27], any = 0;
+    for (int n = 0; n < 27; n++) any |= listed[n] = field.where[4 * record[NEIGHBOURS + n] + 3];
+    if (!any) return;
+    const Reached reached(field, record);
+    for (int n = 0; n < 27; n++)
+      if (listed[n]) list(stage, stage->junction[listed[n] - 1], number, n, reached.nodes(n) & Grid::arena(n));
+    for (int x = 0; x < 6; x++) {
+      u64 m = layers[x] | layers[x + 1] | layers[x + 2];
+      m |= m >> 8 | m >> 16;
+      cells[x] = m | m >> 1 | m >> 2;
+    }
+  }
+  // Nodes of one neighbour. Sides are numbered node by node, and at a node field by field.
+  inline void list(const Stage *stage, const Junction &J, int number, int n, u64 mine) {
+    int q = 0;
+    while (q < J.fields && J.field[q] != number) q++;
+    if (q == J.fields) return;
+    mine &= J.mask & J.have[q];
+    several |= (mine & J.several) != 0;
+    const int corner = (4 * (n / 9 - 1) + 1) * 64 + (4 * (n / 3 % 3 - 1) + 1) * 8 + 4 * (n % 3 - 1) + 1;
+    for (; mine; mine &= mine - 1) {
+      const int i = __builtin_ctzll(mine), node = corner + (i >> 4) * 64 + (i >> 2 & 3) * 8 + (i & 3);
+      int s = stage->meet[Grid::meet(J, i)].side;
+      for (int k = 0; k < q; k++) s += (int)(J.have[k] >> i & 1);
+      __builtin_prefetch(stage->side[s].mean, 1);
+      layers[node >> 6] |= 1ull << (node & 63);
+      at[count] = node;
+      side[count++] = s;
+    }
+  }
+  inline bool by(int cell) const { return cells[cell >> 6] >> (cell & 63) & 1; }
+  inline void empty(f8 *arena) const {
+    for (int row = 0; row < 64; row++)
+      if (layers[row >> 3] >> (8 * (row & 7)) & 255)
+        for (int k = 0; k < 8; k++) arena[8 * row + k] = Simd::all(0.0f);
+  }
+};
+
+// Half the walls of a batch's vertices of shells [cells], else 0.
+struct HalfWall {
+  static inline f8 of(const Field &field, const float *q, int live) {
+    f8 wall = Simd::all(0.0f);
+    for (int l = 0; l < 8 && l < live; l++) wall[l] = field.half_wall[((const int *)(q + 8 * ID))[l]];
+    return wall;
+  }
 };
 
 // Choices of the last step, by block and pair.

@@ -11,6 +11,7 @@ struct Solver {
       const double *P = w->plane + 4 * (-1 - T.c);
       double h = (Vec::dot(P, T.x) - P[3]) * inv;
       if (Grid::slides(w, A.field, -1 - T.c)) return Face::gap_of_liquid(pa, h, filled(w, A));
+      if (w->field[A.field].is_shell) return shell_gap_to_plane(w, T, A, h);
       return Face::gap_to_surface(pa, h);
     }
     const Side &C = sides[T.c];
@@ -20,6 +21,7 @@ struct Solver {
       const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
       return T.mu < mpm::STICKING_FRICTION ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
     }
+    if (F.is_shell || G.is_shell) return shell_gap(w, sides, T, inv);
     if (!F.thin && !G.thin) {
       const double apart = Face::gap(w->face, pa, pc);
       const bool flat = F.flat && G.flat && apart <= mpm::FLAT_BODY_GAP_DX;
@@ -28,6 +30,62 @@ struct Solver {
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
     if (!F.surfaces) return Face::gap_to_thin(pa, sc);
     return G.surfaces ? sc - sa : Face::gap_to_thin(-pc, -sa);
+  }
+  static inline double along(const Side &S, const double *n) { return S.mean[0] * n[0] + S.mean[1] * n[1] + S.mean[2] * n[2]; }
+  // Where a shell ends along n, or against it for a negative sign, and how far its particles lie about their mean
+  // along n: what the node of a side sees of it.
+  static inline double shell_face(const World *w, const Side &S, int number, const double *n, double sign,
+                                  double &deviation) {
+    const Spread &P = ((const Stage *)w->contact_memory)->spread[number];
+    const float *q = P.square;
+    const double square = (q[0] * n[0] * n[0] + q[1] * n[1] * n[1] + q[2] * n[2] * n[2] +
+                           2.0 * (q[3] * n[0] * n[1] + q[4] * n[0] * n[2] + q[5] * n[1] * n[2])) / S.m;
+    const double mean = sign * along(S, n);
+    deviation = sqrt(square > 0 ? square : 0.0);
+    return Face::of_spread(w->spread_face, mean, deviation) + P.half_wall / S.m;
+  }
+  static inline double shell_gap_to_plane(const World *w, const Touch &T, const Side &A, double h) {
+    double deviation;
+    const double face = shell_face(w, A, T.a, T.normal, 1.0, deviation);
+    return h > mpm::WALL_REACH && deviation > mpm::MAX_LAYER_DEVIATION_DX ? mpm::VAST : h - face;
+  }
+  // Open distance of two fields of which one is a shell, or both are.
+  static inline double shell_gap(const World *w, const Side *sides, const Touch &T, double inv) {
+    const double *n = T.normal;
+    const Side &A = sides[T.a], &C = sides[T.c];
+    const Field &F = w->field[A.field], &G = w->field[C.field];
+    double deviation;
+    const double sa = F.is_shell   ? shell_face(w, A, T.a, n, 1.0, deviation)
+                      : F.surfaces ? -begins(w, F, T.x, n, -inv) : 0.0;
+    const double sc = G.is_shell   ? -shell_face(w, C, T.c, n, -1.0, deviation)
+                      : G.surfaces ? begins(w, G, T.x, n, inv) : 0.0;
+    if (!F.is_shell && !F.surfaces) return Face::gap_to_thin(along(A, n), sc);
+    return G.is_shell || G.surfaces ? sc - sa : Face::gap_to_thin(-along(C, n), -sa);
+  }
+  // Let the normal of a contact be that of the shells there, where they are layers across it.
+  static inline void along_layers(const World *w, const Side *sides, Touch &T) {
+    const int side[2] = {T.a, T.c};
+    double sum[3] = {0, 0, 0}, n[3];
+    for (int k = 0; k < 2; k++) {
+      const Side &S = sides[side[k]];
+      if (!w->field[S.field].is_shell) continue;
+      mpm::LayerNormal::turn(((const Stage *)w->contact_memory)->spread[side[k]].square, S.m, T.normal, n);
+      for (int i = 0; i < 3; i++) sum[i] += n[i];
+    }
+    Vec::unit(sum);
+    for (int i = 0; i < 3; i++) T.normal[i] = sum[i];
+  }
+  // What is known of a contact of fields that deform, of which one is a shell: see Together.
+  static inline void see_shell(const World *w, const Side *sides, Touch &T, double inv) {
+    double u[3];
+    along_layers(w, sides, T);
+    slip(sides, T, u);
+    T.target = Vec::dot(u, T.normal);
+    T.gap = shell_gap(w, sides, T, inv) * w->dx;
+  }
+  // Whether a pair of a block's fields that deform holds a shell.
+  static inline bool shell(const World *w, const Junction &J, const Pairs &pairs, int p) {
+    return w->field[J.field[pairs.a[p]]].is_shell || w->field[J.field[pairs.c[p]]].is_shell;
   }
   // Whether two rigid bodies meet at a node where one of them is thin, though not as a whole.
   static inline bool thin_there(const World *w, const Field &F, const Field &G, const Touch &T) {
@@ -366,6 +424,11 @@ if (from < to) {
           }
         }
         together.give(touches, world->face, dx);
+        for (int p = low; p < low + many && stage->spread; p++)
+          for (int k = 0; k < Grid::count(pairs.nodes[p]) && Solver::shell(world, J, pairs, p); k++) {
+            Touch &T = touches[leans[pairs.lean[p] + k].touch];
+            if (T.choice >= 0 && T.active) Solver::see_shell(world, sides, T, inv);
+          }
       }
     }
     for (int k = J.meet; k < end; k++) {
@@ -390,6 +453,8 @@ if (from < to) {
           T.gap = face[T.face].height;
         } else if (Vec::unit(T.normal) <= mpm::TINY) {
           continue;
+        } else if (world->field[T.fa].is_shell || world->field[T.fc].is_shell) {
+          Solver::along_layers(world, sides, T);
         } else if (world->field[T.fa].flat && world->field[T.fc].flat) {
           Solver::along_faces(world, sides, T);
         }

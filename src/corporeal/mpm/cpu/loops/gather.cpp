@@ -1,21 +1,21 @@
 // Material of each lane.
 struct LaneMaterial : mpm::Material<f8> {
-  f8 keep, rho, rigid;   // as the columns that follow
+  f8 keep, rho, strainless;   // as the columns that follow
   MPM_INLINE static LaneMaterial of(const Field &field, const int *kind) {
     LaneMaterial t;
     f8 *to = &t.law;
     i8 all = *(const i8u *)kind;
     if (!Simd::any(all != kind[0])) {
       const float *row = field.material + MATERIAL_COLUMNS * kind[0];
-      for (int k = LAW; k <= RIGID; k++) to[k] = Simd::all(row[k]);
+      for (int k = LAW; k <= STRAINLESS; k++) to[k] = Simd::all(row[k]);
       return t;
     }
-    alignas(32) float lane[RIGID + 1][8];
+    alignas(32) float lane[STRAINLESS + 1][8];
     for (int l = 0; l < 8; l++) {
       const float *row = field.material + MATERIAL_COLUMNS * kind[l];
-      for (int k = LAW; k <= RIGID; k++) lane[k][l] = row[k];
+      for (int k = LAW; k <= STRAINLESS; k++) lane[k][l] = row[k];
     }
-    for (int k = LAW; k <= RIGID; k++) to[k] = *(f8 *)lane[k];
+    for (int k = LAW; k <= STRAINLESS; k++) to[k] = *(f8 *)lane[k];
     return t;
   }
 };
@@ -198,11 +198,13 @@ struct Gather {
     if (Simd::any(off & alive)) astray = 1;
     speed2 = Simd::high(speed2, v2 * on);
 
-    // Trial strain: H += dt L (1 + H). What belongs to a rigid body does not strain.
+    if (!field.uses_mean_dilatation && !Simd::any(t.strainless == 0.0f)) return;
+
+    // Trial strain: H += dt L (1 + H). Rigid bodies and vertices of shells do not strain.
     f8 H[9], A[9];
     float rate = step;
     for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
-    for (int k = 0; k < 9; k++) A[k] = Simd::pick(t.rigid > 0.0f, zero, L[k] * (on * rate));
+    for (int k = 0; k < 9; k++) A[k] = Simd::pick(t.strainless > 0.0f, zero, L[k] * (on * rate));
     Strain::follow(A, H);
 
     // Stress of the law, after the return map of matter that flows.

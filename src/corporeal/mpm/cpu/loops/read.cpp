@@ -47,7 +47,7 @@ struct Read {
       row[6 + i] += m * (x[j] * v[k] - x[k] * v[j] + spread * (C[3 * k + j] - C[3 * j + k]));
     }
     row[9] += 0.5 * m * (v2 + spread * c2);
-    if (!t[RIGID]) {
+    if (!t[STRAINLESS]) {
       const mpm::Material<float> kind = {t[LAW], t[MU], t[LAMBDA]};
       const double bulk = R.uses_mean_dilatation ? mpm::Laws<float>::mean_bulk(kind) : 0;
       double psi = mpm::stored_energy(law, t[MU], t[LAMBDA] - bulk, H);

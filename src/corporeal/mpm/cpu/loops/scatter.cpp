@@ -16,6 +16,18 @@ struct Scatter {
     }
     return work;
   }
+  // Forces of shells on their vertices, lane by lane.
+  static inline void add_forces(const ShellMesh &M, const int *number, int n, f8 *r) {
+    const f8 zero = Simd::all(0.0f);
+    const float *next = (const float *)(number - 8 * ID) + 2 * 8 * CHANNELS;   // nobody has just moved it
+    for (int k = 0; k < CHANNELS * 8; k += 16)
+      if (k < 8 * DE || k >= 8 * ST) __builtin_prefetch(next + k);
+    for (int l = 0; l < n; l++) {
+      const int vertex = M.vertex[number[l]];
+      if (vertex >= 0)
+        r[l] += __builtin_shufflevector(zero, *(const f8u *)(M.force + 4 * (size_t)vertex), 0, 0, 0, 0, 8, 9, 10, 0);
+    }
+  }
   // One lane's share on its 27 nodes: r0 at the first, a more for every node along each axis.
   static inline void lane(f8 *g, const Row *W, int l, f8 r0, f8 a0, f8 a1, f8 a2) {
 #pragma unroll
@@ -92,6 +104,7 @@ struct Scatter {
       for (int k = 1; k < 8; k++) r[k] -= a[j][k] * D[j];
     }
     Simd::turn(r);
+    if (field.shells) add_forces(*world->shell, (const int *)(q + 8 * ID), n, r);
     for (int j = 0; j < 3; j++) Simd::turn(a[j]);
     for (int l = 0; l < n;) {
       if (Simd::together(base, l, n)) {

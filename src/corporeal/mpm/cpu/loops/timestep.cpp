@@ -18,6 +18,12 @@ struct Pace {
       double step = c->rigid_courant * w->dx / (v > mpm::TINY ? v : mpm::TINY);
       if (step < limit) limit = step;
     }
+    if (w->shell_triangles) {
+      const ShellMesh &M = *w->shell;
+      double step = c->courant * w->dx / (M.wave + c->speed);
+      if (M.bending_step < step) step = M.bending_step;
+      if (step < limit) limit = step;
+    }
     return c->fall < limit ? c->fall : limit;
   }
   static inline void close(World *w, Clock *c) {
@@ -66,16 +72,25 @@ struct Pace {
     }
     w->again = 0;
     kick(w, c);
+    if (w->shell_triangles) relax(*w->shell, w->dt);
     if (c->pushed) c->laid = 0;
     // Pushes depend on the step: while there is one, particles are scattered when the step begins.
     c->fused = c->fuse && !c->pushed;
-    w->bare_nodes = c->laid ? 0 : w->nodes;
-    for (int k = 0; k < COLOURS; k++) w->bare[k] = c->laid ? 0 : w->colour[k];
+    const bool bare = !c->laid || w->shelled;
+    w->bare_nodes = bare ? w->nodes : 0;
+    for (int k = 0; k < COLOURS; k++) w->bare[k] = bare ? w->colour[k] : 0;
   }
   // Fractions of strain that a step leaves in a material's branches.
   static inline void relax(float *row, double dt) {
     for (int k = 0; k < mpm::BRANCHES; k++)
       mpm::Branch<float>::kept(dt, row[BRANCH_TIME + k], row[BRANCH_KEPT + k], row[BRANCH_FRESH + k]);
+  }
+  static inline void relax(ShellMesh &M, double dt) {
+    for (int k = 0; k < M.decays; k++)
+      for (int b = 0; b < mpm::BRANCHES; b++) {
+        float *decay = M.decay + 2 * mpm::BRANCHES * k + b;
+        mpm::Branch<float>::kept(dt, M.branch_time[mpm::BRANCHES * k + b], decay[0], decay[mpm::BRANCHES]);
+      }
   }
   // Move a body along its path in this step; adds the work of that, without contacts, to the ledger.
   static inline void guide(World *w, Clock *c, BodyLoad &T, int b) {
