@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from laws import bending, collisions, friction, grains, plastic, rest, rotation, statics, touching, waves
+from laws import bending, collisions, friction, grains, plastic, rest, rotation, shells, statics, touching, waves
 from laws.outcome import Outcome
 
 
@@ -42,5 +42,13 @@ CASES = {
         Case("18", touching.newtons_cradle, (1, 2)),
         Case("19", touching.marble_at_rest, (30, 60)),
         Case("20", touching.plate_holds, (8, 24)),
+        Case("21", shells.bending_strip, (2, 4)),
+        Case("22", shells.stretched_strip, (1, 1)),
+        Case("23", shells.twisted_tubes, (3, 8)),
+        Case("24", shells.buckling_strip, (3, 8)),
+        Case("25", shells.pinched_sphere, (6, 30)),
+        Case("26", shells.inflated_sphere, (1, 1)),
+        Case("27", shells.own_weight, (2, 4)),
+        Case("28", shells.pressed_plate, (2, 4)),
     )
 }
