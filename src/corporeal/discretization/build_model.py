@@ -16,8 +16,21 @@ from corporeal.discretization.layered_sheets import part_proportions
 from corporeal.discretization.rolling_resistance import rolling_resistance_lengths
 from corporeal.geometry.connected_components import connected_components
 from corporeal.geometry.scene_transforms import underside_centre
+from corporeal.mpm.constants import TINY_DOUBLE
 from corporeal.mpm.physics.body_distance import pair_gaps
-from corporeal.mpm.problem import FLOOR, NO_WIND_FACES, Body, Joint, Plane, Problem, Tether, WettedSurface, WindFaces
+from corporeal.mpm.physics.time_step_limits import shell_wave_speeds
+from corporeal.mpm.problem import (
+    FLOOR,
+    NO_WIND_FACES,
+    Body,
+    Joint,
+    Plane,
+    Problem,
+    Shell,
+    Tether,
+    WettedSurface,
+    WindFaces,
+)
 
 ZERO_VELOCITY = (0.0, 0.0, 0.0)
 GRAVITY_RAMP_S = 0.1
@@ -218,7 +231,7 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
         velocity=particles.velocity[mine].astype(float),
         volume=particles.volume[mine].astype(float),
         density=particles.density[mine].astype(float),
-        law=column.pop("law").astype(np.int64),
+        law=column["law"].astype(np.int64),
         rigid=piece.rigid,
         surface=particles.surface[piece.surface].astype(float),
         curvature=piece_curvature(particles, piece),
@@ -229,7 +242,44 @@ def build_body(scene: Scene, particles: Particles, field: MaterialField, piece: 
         tether=leaf_tethers(particles, field, piece),
         path=obj.path,
         pivot=ZERO_VELOCITY if obj.path is None else underside_centre(scene, piece.object),
-        **column,
+        shell=piece_shell(particles, mine, column) if not piece.rigid else None,
+        **{name: values for name, values in column.items() if name != "law"},
+    )
+
+
+def piece_shell(
+    particles: Particles, mine: Int[np.ndarray, " N"], column: dict[str, Float[np.ndarray, " N"]]
+) -> Shell | None:
+    """Return the thin shells among some particles, numbered among them; ``mine`` rises. None: there are none.
+
+    Their E in bending is the measured one, unless bending alone would exceed the step that their waves allow.
+
+    Args:
+        particles: All of the scene's.
+        mine: Numbers of a body's particles.
+        column: Its constitutive numbers, of each of these.
+
+    """
+    own = np.isin(particles.shell_triangle, mine).all(axis=1)
+    if not own.any():
+        return None
+    triangle = np.searchsorted(mine, particles.shell_triangle[own])
+    first, thickness = triangle[:, 0], particles.shell_thickness[own].astype(float)
+    treatment = [particles.treatments[k] for k in particles.part[mine[first]].tolist()]
+    real = np.array([t.bending_young_pa for t in treatment])
+    shell = {name: column[name][first] for name in ("poisson", "hardening", "loss", "vibration")}
+    wave = np.array([t.wave_speed for t in treatment])
+    density, cells = particles.density[mine[first]], thickness / particles.cell
+    fastest = [shell_wave_speeds(*row)[1] for row in zip(real, shell["poisson"], density, cells, strict=True)]
+    slower = np.minimum(1.0, (wave / np.maximum(fastest, TINY_DOUBLE)) ** 2)
+    return Shell(
+        triangle=triangle,
+        thickness=thickness,
+        law=column["law"][first].astype(np.int64),
+        young_pa=real * slower,
+        membrane_young_pa=column["young_pa"][first],
+        yield_stress=np.array([t.yield_stress or 0.0 for t in treatment]),
+        **shell,
     )
 
 

@@ -21,6 +21,7 @@ from corporeal.discretization.part_geometry import PartGeometry
 from corporeal.discretization.part_model import PartModel, plate_as_wall, plate_thickness
 from corporeal.discretization.prescribed_compression import compression_pressures
 from corporeal.discretization.rods import Rod
+from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class SimulationAccuracy:
     detail: DetailLevel | QualityPreset
     stiffness: Literal["true", "capped"]
     seed: int
+    shells: bool = False
+    """Whether deformable walls are triangle shells with their true thickness."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,8 @@ def choose_resolution(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> tu
 def _plan_scene(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> DiscretizationPlan:
     anatomies = enumerate(bodies.anatomies)
     geometries = {m.part: _part_geometry(m, bodies, n) for n, a in anatomies for m in a.members}
+    if accuracy.shells:
+        geometries = {k: replace(g, thin_shell=is_thin_shell(bodies.makes[k], g)) for k, g in geometries.items()}
     ordered = add_compression_strain(bodies, [geometries[k] for k in sorted(geometries)], accuracy.seed)
     masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
     moved = expected_motions(bodies.scene, bodies.anatomies, masses, accuracy.seed, bodies.vessels)
@@ -124,6 +129,13 @@ def _part_geometry(member: MeasuredPart, bodies: MeasuredScene, number: int) -> 
         scale=obj.scale,
         prescribed=obj.path is not None,
     )
+
+
+def is_thin_shell(made: PartModel, part: PartGeometry) -> bool:
+    """Whether a part is nothing but a wall around air, or a sheet, of a material that keeps its shape."""
+    keeps = not CONSTITUTIVE_LAWS[part.material.law].loose
+    wall = made.structure.kind == "shell" and bool(made.structure.thickness) and made.structure.contents is None
+    return keeps and wall and made.held is None and not made.structure.holds and part.leaves == 0
 
 
 def thin_plate_thicknesses(bodies: MeasuredScene, chosen: DiscretizationPlan, seed: int) -> dict[int, float]:

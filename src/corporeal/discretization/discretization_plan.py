@@ -114,6 +114,8 @@ def warn_of_wrong_compression(
 DetailLevel = Literal["draft", "normal", "fine"]
 StiffnessMode = Literal["true", "capped"]
 FILLED_PARTICLES_PER_CELL = 8
+SHELL_VERTICES_PER_CELL_AREA = 4.6
+"""Vertices of equilateral triangles with edges of half a cell, per area of a cell's face [-]."""
 
 
 @dataclass(frozen=True)
@@ -308,7 +310,9 @@ def particles_needed_count(parts: Sequence[PartGeometry], cell: float) -> float:
     volume = 0.0
     for part in parts:
         thickness = part.structure.thickness
-        if part.structure.kind == "shell" and thickness is not None:
+        if part.thin_shell:
+            volume += SHELL_VERTICES_PER_CELL_AREA / FILLED_PARTICLES_PER_CELL * part.area * cell
+        elif part.structure.kind == "shell" and thickness is not None:
             volume += part.area * max(thickness, 2 * cell)
         else:
             volume += part.volume

@@ -36,11 +36,13 @@ from corporeal.materials.restitution_speed import material_at_speed
 from corporeal.mpm.constants import GRID_LOSS_FACTOR, MIN_CELLS_FOR_GRID_LOSS
 from corporeal.mpm.laws import CONSTITUTIVE_LAWS
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_moduli, fall_speed
+from corporeal.mpm.physics.maxwell_branches import stiffening
 from corporeal.mpm.physics.time_step_limits import (
     bounded_poisson,
     closed_wall_factors,
     fold_stiffness_factor,
     limp_wall_factors,
+    shell_wave_speeds,
     stable_step,
 )
 
@@ -126,6 +128,8 @@ def effective_parameters(
     cell = resolved.cell
     if role == "foliage":
         return foliage_parameters(part, verdict, motion)
+    if part.thin_shell and role == "soft":
+        return thin_shell_parameters(part, verdict, motion, resolved)
     soft = role in ("soft", "subgrid")
     part = part_as_contents(part, motion.impact_speed) if soft else part
     material, structure = part.material, part.structure
@@ -165,6 +169,35 @@ def effective_parameters(
                 scale_reason(part, motion),
             )
         ),
+    )
+
+
+def thin_shell_parameters(
+    part: PartGeometry, verdict: RigidityVerdict, motion: ExpectedMotion, resolved: GridResolution
+) -> Discretization:
+    """Give a thin wall its measured numbers; the step budget may lower its stiffness in the plane afterwards."""
+    material, thickness = part.material, part.structure.thickness or 0.0
+    young, poisson = bounded_poisson(material.young_pa, material.poisson)
+    density = mean_density(part)
+    loss = remaining_loss_factor(part, motion, resolved.across)
+    plane, bending = shell_wave_speeds(young, poisson, density, thickness / resolved.cell)
+    wave = max(plane, bending) * sqrt(stiffening(loss, poisson))
+    return Discretization(
+        kind="shell",
+        young_pa=material.young_pa,
+        simulated_young_pa=young,
+        poisson=poisson,
+        density=density,
+        yield_stress=material.yield_stress,
+        thickness=thickness,
+        strain=verdict.strain,
+        impact_speed=motion.impact_speed,
+        loss=loss,
+        wave_speed=wave,
+        step=stable_step(wave, motion.impact_speed, resolved.cell),
+        reason=f"{treatment_reason(verdict, 'soft')} It is a triangle shell, {1e3 * thickness:.3g} mm thick as in "
+        f"reality.{partner_reason(part, motion)}{scale_reason(part, motion)}",
+        bending_young_pa=young,
     )
 
 

@@ -42,7 +42,7 @@ MIN_WALL_MEDIAN_RATIO = 0.1
 
 
 @dataclass(frozen=True)
-class ShellMesh:
+class MiddleSurface:
     """Triangles of the middle surface of a thin part, at rest.
 
     Boards that meet share vertices, and edges there may have three triangles and more. Boards are wound each for
@@ -56,7 +56,7 @@ class ShellMesh:
     """Of the wall [m]."""
 
 
-def middle_surface(mesh: TriangleSurface, thickness: float | None, spacing: float) -> ShellMesh:
+def middle_surface(mesh: TriangleSurface, thickness: float | None, spacing: float) -> MiddleSurface:
     """Return the middle surface of a thin part, with edges of about ``spacing``.
 
     - An open surface is the sheet itself.
@@ -123,9 +123,9 @@ def _mean_thickness(boards: Sequence[Board]) -> float:
     return float(np.average(np.concatenate([b.thickness for b in boards]), weights=area))
 
 
-def _as_shell(board: Board) -> ShellMesh:
+def _as_shell(board: Board) -> MiddleSurface:
     mesh, source = without_slivers(board.mesh)
-    return ShellMesh(mesh.vertices, mesh.triangles, board.thickness[source])
+    return MiddleSurface(mesh.vertices, mesh.triangles, board.thickness[source])
 
 
 def _sheet_board(sheet: Mesh, thickness: float, spacing: float) -> Board:

@@ -1,6 +1,6 @@
 """Material points of one object, part by part."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -8,12 +8,14 @@ from jaxtyping import Bool, Float, Int
 from corporeal.discretization.cavity import vessel_points
 from corporeal.discretization.mesh_kind import outer_wall_side
 from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
+from corporeal.discretization.middle_surface import middle_surface
 from corporeal.discretization.point_filling import PointFilling, fill_body, fill_wall
 from corporeal.discretization.rods import Rod, rod_section_points
 from corporeal.geometry.connected_components import connected_pieces
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.mesh_queries import QueryMesh
 from corporeal.geometry.point_sampling import sample_surface, scatter_points
+from corporeal.mpm.shells.assemble import vertex_volume
 
 FULL_FILL_DEPTH_SPACINGS = 4
 """Below so many spacings under its surface, a rigid object is filled coarsely."""
@@ -37,6 +39,8 @@ class FillRecipe:
     """Above this height [m] there is material in the wall only."""
     vessel: bool = False
     """Whether there is material between the faces of the mesh too, up to its rim."""
+    shell: float = 0.0
+    """Thickness of a triangle shell, whose vertices are all its points [m]; 0: it is none."""
 
 
 @dataclass(frozen=True)
@@ -50,10 +54,30 @@ class ObjectFilling:
     part: Int[np.ndarray, " N"]
     sheet: Bool[np.ndarray, " N"]
     """Whether the point belongs to an open sheet."""
+    triangle: Int[np.ndarray, "T 3"] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    """Points that are the vertices of each triangle of a shell …"""
+    wall: Float[np.ndarray, " T"] = field(default_factory=lambda: np.zeros(0))
+    """… and its thickness there [m]."""
 
     def only(self, chosen: np.ndarray) -> "ObjectFilling":
-        """Return the chosen points."""
-        return ObjectFilling(self.points[chosen], self.volumes[chosen], self.part[chosen], self.sheet[chosen])
+        """Return the chosen points; triangles stay that have all of theirs."""
+        number = np.cumsum(chosen) - 1
+        whole = chosen[self.triangle].all(axis=1)
+        return ObjectFilling(
+            self.points[chosen],
+            self.volumes[chosen],
+            self.part[chosen],
+            self.sheet[chosen],
+            number[self.triangle[whole]],
+            self.wall[whole],
+        )
+
+    @property
+    def is_vertex(self) -> Bool[np.ndarray, " N"]:
+        """Which points are vertices of shells."""
+        found = np.zeros(len(self.points), dtype=bool)
+        found[self.triangle] = True
+        return found
 
 
 def fill_object(
@@ -77,6 +101,10 @@ def fill_object(
     lumps = [_fill_bodies(anatomy, recipes, spacing, rng, coarse=coarse)]
     for member in anatomy.members:
         recipe = recipes[member.part]
+        if recipe.shell > 0.0:
+            lumps[0] = lumps[0].only(lumps[0].part != member.part)
+            lumps.append(_lay_shell(member, recipe.shell, spacing))
+            continue
         face = member.body
         if recipe.rod is not None:
             points = rod_section_points(recipe.rod, recipe.thick, spacing)
@@ -88,19 +116,50 @@ def fill_object(
             )
         elif len(face.triangles) and not (lumps[0].part == member.part).any():
             lumps.append(_lump_point(fill_wall(face, spacing, 0.0, rng), member, sheet=False))
-        if member.lid is not None and 0 < recipe.depth < np.inf:
-            lid = fill_wall(member.lid, spacing, recipe.depth, rng)
-            lumps.append(_lump_point(lid, member, sheet=False))
         if recipe.vessel:
             lumps.append(_fill_vessel(anatomy, member, recipe, spacing * (1 + coarse), rng))
-        if member.sheet_area > 1e-3 * member.body_area:
-            filling = fill_wall(member.sheet, spacing, _fitting_face(member.sheet, recipe.sheet), rng)
-            lumps.append(_lump_point(filling, member, sheet=True))
+        lumps += _fill_lid_and_sheets(member, recipe, spacing, rng)
+    firsts = np.cumsum([0, *(len(p.points) for p in lumps[:-1])])
     return ObjectFilling(
         np.concatenate([p.points for p in lumps]),
         np.concatenate([p.volumes for p in lumps]),
         np.concatenate([p.part for p in lumps]),
         np.concatenate([p.sheet for p in lumps]),
+        np.concatenate([p.triangle + first for p, first in zip(lumps, firsts, strict=True)]),
+        np.concatenate([p.wall for p in lumps]),
+    )
+
+
+def _fill_lid_and_sheets(
+    member: MeasuredPart, recipe: FillRecipe, spacing: float, rng: np.random.Generator
+) -> list[ObjectFilling]:
+    """Fill the wall that is drawn nowhere, and open sheets."""
+    lumps = []
+    if member.lid is not None and 0 < recipe.depth < np.inf:
+        lumps.append(_lump_point(fill_wall(member.lid, spacing, recipe.depth, rng), member, sheet=False))
+    if member.sheet_area > 1e-3 * member.body_area:
+        filling = fill_wall(member.sheet, spacing, _fitting_face(member.sheet, recipe.sheet), rng)
+        lumps.append(_lump_point(filling, member, sheet=True))
+    return lumps
+
+
+def _lay_shell(member: MeasuredPart, thickness: float, spacing: float) -> ObjectFilling:
+    """Mesh the middle surface of a thin part; its vertices are the points."""
+    body, sheet = member.body, member.sheet
+    whole = Mesh(
+        np.concatenate([body.vertices, sheet.vertices]),
+        np.concatenate([body.triangles, sheet.triangles + len(body.vertices)]),
+    )
+    shell = middle_surface(whole, thickness, spacing)
+    volume = vertex_volume(shell.vertices, shell.triangles, shell.thickness)
+    count = len(volume)
+    return ObjectFilling(
+        shell.vertices,
+        np.maximum(volume, 1e-300),
+        np.full(count, member.part),
+        np.zeros(count, dtype=bool),
+        shell.triangles,
+        np.full(len(shell.triangles), thickness),
     )
 
 

@@ -50,6 +50,8 @@ class PartGeometry:
     """Size here over the real object's [-]."""
     prescribed: bool = False
     """Whether the motion of its object is prescribed: it is rigid then, whatever it is made of."""
+    thin_shell: bool = False
+    """Whether it is a triangle shell with its true thickness where it deforms."""
     pressed: float = 0.0
     """Strain that other objects' prescribed motion forces on it [-]: ``pressed``."""
 

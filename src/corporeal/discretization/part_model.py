@@ -420,6 +420,8 @@ def fill_recipe(member: MeasuredPart, made: PartModel, treatment: Discretization
     """Return where a part's material lies on this grid; leaves are one layer."""
     if treatment.kind == "foliage":
         return FillRecipe(0.0, 0.0, 0.0)
+    if treatment.bending_young_pa > 0.0:
+        return FillRecipe(0.0, 0.0, 0.0, shell=treatment.thickness or 0.0)
     simulated = treatment.thickness or max(made.thickness, 2 * cell)
     sheet = made.sheet
     if made.structure.kind == "shell" and treatment.kind == "shell":

@@ -35,7 +35,7 @@ def remove_mixed_points(
             more, less = (i, j) if len(result[i].points) >= len(result[j].points) else (j, i)
             tree = KDTree(result[less].points)
             gap = tree.query(result[more].points, distance_upper_bound=cell / 4)[0]
-            mixed = np.isfinite(gap)
+            mixed = np.isfinite(gap) & ~result[more].is_vertex
             if mixed.any():
                 result[more] = result[more].only(~_keep_one_point(mixed, result[more].part))
     return result

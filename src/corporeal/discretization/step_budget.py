@@ -130,7 +130,8 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         cell: dx [m].
 
     """
-    if counted_wave_speed(treatment) <= limit or treatment.poisson <= MIN_REDUCED_POISSON_RATIO:
+    in_plane = treatment.bending_young_pa > 0.0  # no bulk is squeezed in plane stress
+    if in_plane or counted_wave_speed(treatment) <= limit or treatment.poisson <= MIN_REDUCED_POISSON_RATIO:
         return treatment
 
     def at(poisson: float) -> Discretization:

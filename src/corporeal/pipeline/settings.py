@@ -119,6 +119,10 @@ class FillConfig:
     stiffness: Literal["true", "capped"] = "true"
     """true: measured Young's moduli, as far as the limit on time steps allows; capped: moduli capped so that a fixed
     time step is stable, a baseline for comparison."""
+    walls: Literal["thickened", "shells"] = "thickened"
+    """thickened: a deformable wall thinner than two cells is simulated two cells thick and softer, so that it keeps its
+    mass and its bending or indentation stiffness, but not its stiffness in the plane; shells (experimental): as a
+    triangle shell with its true thickness."""
     seed: int = 0
     """Random seed of measuring and filling objects."""
 

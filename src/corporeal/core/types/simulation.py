@@ -44,6 +44,9 @@ class Discretization:
     """
     vibration: float = 0.0
     """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
+    bending_young_pa: float = 0.0
+    """Young's modulus that acts in the bending of a triangle shell with its true thickness [Pa], where
+    ``simulated_young_pa`` acts in its plane; 0: it is no such shell."""
     is_floor_covering: bool = False
     """Whether it is a rigid sheet that lies on the floor, thinner than half a cell: what strikes it strikes the
     floor."""
@@ -130,6 +133,10 @@ class Particles:
     """Of plants that stand in soil."""
     contents: tuple[VesselContents, ...] = ()
     """What moves in vessels: objects and parts after all that the scene has."""
+    shell_triangle: Int[np.ndarray, "T 3"] = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    """Particles that are the vertices of each triangle of thin shells."""
+    shell_thickness: Float[np.ndarray, " T"] = field(default_factory=lambda: np.zeros(0))
+    """Of the wall at each of them [m]."""
     wetted_point: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Where liquids touch rigid objects, inside of what is hollow too [m]."""
     wetted_normal: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))

@@ -91,7 +91,7 @@ def fill(
     rods = solid_rods(anatomies, makes, config.seed)
     bodies = MeasuredScene(scene, field, anatomies, makes, rods, vessels_of_contents(scene, contents))
     # Grid spacing and treatments follow from all of it.
-    asked = SimulationAccuracy(quality or config.detail, config.stiffness, config.seed)
+    asked = SimulationAccuracy(quality or config.detail, config.stiffness, config.seed, config.walls == "shells")
     bodies, chosen = choose_resolution(bodies, asked)
     refuse_buried_objects(scene, anatomies, chosen.cell)
     # Remove overlaps; volumes and densities add up to the masses.
@@ -195,6 +195,8 @@ def gather_particles(
         curvature=np.concatenate([curvature for _, curvature in surfaces]),
         face=np.concatenate([face for face, _ in windward]),
         particle_of_face=np.concatenate([first + bearer for first, (_, bearer) in zip(firsts, windward, strict=True)]),
+        shell_triangle=np.concatenate([first + p.triangle for first, p in zip(firsts, packings, strict=True)]),
+        shell_thickness=np.concatenate([p.wall for p in packings]),
         mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
         fills=fill_sentences(parts, bodies, chosen, part),
         walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
