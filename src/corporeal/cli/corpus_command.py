@@ -156,7 +156,6 @@ def worker_factory(crew: WorkerOptions, folder: Path) -> Callable[[], Any]:
 
     Raises:
         UserError: A number of workers, threads or GPUs is invalid.
-
     """
     if crew.workers < 0 or crew.threads < 1 or crew.gpus < 0:
         raise UserError("--workers, --threads and --gpus cannot be negative, --threads not 0.")

@@ -82,7 +82,6 @@ def lay_out(kind: type, first: Sequence[str] = ()) -> HelpLayout:
 
     Raises:
         ValueError: ``first`` names an unknown option, or none or too many.
-
     """
     options = options_of(kind)
     named = {option.name: option for option in options if not option.positional}

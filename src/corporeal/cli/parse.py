@@ -20,7 +20,6 @@ def parse(kind: Any, verb: str, description: str | None, words: int = 1, first: 
         description: For the help.
         words: Number of words of the command.
         first: Options that come first in the help, six at most; all others stand under "more".
-
     """
     layout = lay_out(kind, first)
     typed = tyro.cli(

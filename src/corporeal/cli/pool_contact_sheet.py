@@ -27,7 +27,6 @@ def write_pool_contact_sheet(
 
     Raises:
         BadFileError: An asset's file is missing or was changed.
-
     """
     tiles = []
     for k, asset in enumerate(assets):

@@ -26,7 +26,6 @@ def validate_settings(folder: Path, settings: Settings) -> None:
 
     Raises:
         UserError: A key, library or choice is missing or unknown.
-
     """
     known = read_run_request(folder).settings if (folder / RUN_FILE).exists() else None
     validate_assemble(settings.assemble)

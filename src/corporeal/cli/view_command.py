@@ -107,7 +107,6 @@ def _begin(asked: ViewOptions) -> None:
 
     Raises:
         UserError: The folder is read-only or cannot be made.
-
     """
     if asked.read_only or asked.out.exists():
         raise UserError(f"{asked.out} is no folder. Name a run, or a folder of runs with --out.")

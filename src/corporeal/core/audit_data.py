@@ -113,7 +113,6 @@ class Outcome:
 
         Raises:
             KeyError: There are no such two bodies.
-
         """
         name = pair_name(first, second)
         return self.pairs[name if name in self.pairs else pair_name(second, first)]

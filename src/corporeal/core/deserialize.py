@@ -26,7 +26,6 @@ def from_plain(kind: type[T], data: Mapping[str, Any]) -> T:
 
     Raises:
         ValueError: A field without a default is absent, or a value has another structure.
-
     """
     hints = get_type_hints(kind)
     known = fields(kind)  # type: ignore[arg-type]

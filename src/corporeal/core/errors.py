@@ -58,7 +58,6 @@ def check_range(name: str, value: float | None, low: float, high: float) -> None
 
     Raises:
         UserError: It is not from low to high, or no number.
-
     """
     if value is not None and not low <= value <= high:
         raise UserError(f"{name} is {value}. Give a number from {low:g} to {high:g}.")

@@ -18,6 +18,5 @@ def subprogress(progress: Progress, begin: float, end: float, what: str = "") ->
         begin: Fraction of the whole that is done when the part begins.
         end: The same when it ends.
         what: Tells this part from others in which the same is done; follows the words.
-
     """
     return lambda fraction, words: progress(begin + (end - begin) * fraction, f"{words}{what}")

@@ -18,7 +18,6 @@ def load_backend(kind: str, name: str, menu: Mapping[str, str]) -> Any:
     Raises:
         UnknownChoiceError: ``name`` is not on the menu.
         UserError: The backend needs a package that is not installed.
-
     """
     if name not in menu:
         raise UnknownChoiceError(kind, name, list(menu))
@@ -34,7 +33,6 @@ def load_function(place: str, user: str = "") -> Any:
 
     Raises:
         UserError: It needs a package that is not installed.
-
     """
     module, _, attribute = place.partition(":")
     try:

@@ -44,7 +44,6 @@ def paths_read(config: Any) -> list[Path]:
 
     Args:
         config: An instance of a dataclass; dataclasses within it are not searched.
-
     """
     hints = get_type_hints(type(config), include_extras=True)
     found = [_path_read(hints[f.name], getattr(config, f.name)) for f in fields(config)]

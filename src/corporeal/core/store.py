@@ -47,7 +47,6 @@ def disk_errors(path: Path) -> Iterator[None]:
 
     Raises:
         DiskError: The disk is full, read-only, over a quota or not ours.
-
     """
     try:
         yield
@@ -79,7 +78,6 @@ def require_disk_space(folder: Path, needed: int) -> None:
 
     Raises:
         DiskError: Less than that is free.
-
     """
     free = shutil.disk_usage(folder).free
     if needed > free:
@@ -104,7 +102,6 @@ def lock_folder(folder: Path, patience: float = 0.0) -> Iterator[None]:
 
     Raises:
         UserError: Another process works in it.
-
     """
     try:
         with disk_errors(folder):
@@ -162,7 +159,6 @@ def whole_folder(folder: Path) -> Iterator[Path]:
 
     Yields:
         An empty folder to write into.
-
     """
     partial = folder.with_name(f".{folder.name}.part")
     before = folder.with_name(f".{folder.name}.before")
@@ -193,7 +189,6 @@ def read_json(path: Path) -> Any:
 
     Raises:
         BadFileError: The file is damaged.
-
     """
     try:
         return json.loads(path.read_text(encoding="utf-8"))
@@ -235,7 +230,6 @@ def save(path: Path, value: Any) -> None:
 
     Raises:
         TypeError: A dataclass or an enumeration in it has no kind.
-
     """
     arrays: dict[str, Any] = {}
     tree = json.dumps(_encode(value, arrays), allow_nan=True)
@@ -254,7 +248,6 @@ def load(path: Path) -> Any:
 
     Raises:
         BadFileError: The file is absent or damaged.
-
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -367,7 +360,6 @@ def read_meta(folder: Path) -> ResultMeta:
 
     Raises:
         BadFileError: The folder holds no finished result, or the file is damaged.
-
     """
     data = read_json(folder / META_FILE)
     if not isinstance(data, dict):

@@ -137,7 +137,6 @@ def log_lines(
         every: Seconds between two lines on one stage [s].
         now: The clock [s].
         soon: Time after which the beginning of a stage is printed [s].
-
     """
     watched: list[_LoggedStage] = []  # the one that goes on
 

@@ -26,7 +26,6 @@ def load_annotations(
 
     Raises:
         UserError: The file cannot be read, or a name is not in the scene or the library.
-
     """
     if config.annotations is None:
         return {}

@@ -48,7 +48,6 @@ def parts_from_file(
 
     Raises:
         UserError: A number in the file can be no material's.
-
     """
     words: list[list[PartDescription]] = [[] for _ in scene.objects]
     walls = partial(has_wall_thickness, library)
@@ -119,7 +118,6 @@ def _checked_values(surfaces: Sequence[Surface]) -> dict[str, Provenance]:
 
     Raises:
         UserError: A value is impossible for any material.
-
     """
     found = {n: g for n, g in stated_values(surfaces).items() if n in QUANTITIES}
     for name, ground in found.items():

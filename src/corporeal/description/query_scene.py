@@ -82,7 +82,6 @@ def repeat_interview(
 
     Raises:
         WaitingError: Questions wait for a person: as many as can be asked now.
-
     """
     if count == 1:
         return [ObjectAnswer(tuple(described()), _judge_mass(interview, direct))]

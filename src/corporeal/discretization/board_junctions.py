@@ -77,7 +77,6 @@ def join_boards(boards: Sequence[Board], spacing: float) -> Board:
     Args:
         boards: Each remeshed to edges of ``spacing``.
         spacing: [m]
-
     """
     mesh = join_meshes([b.mesh for b in boards])
     thickness, drawn = (np.concatenate([getattr(b, k) for b in boards]) for k in ("thickness", "drawn"))

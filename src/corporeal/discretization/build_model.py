@@ -154,7 +154,6 @@ def label_rigid_inclusions(
         position: Of the particles [m].
         surface: Of the points [m].
         reach: What is nearer hangs together [m].
-
     """
     label = label_clusters(np.concatenate([position, surface]), reach)
     filled, joined = np.unique(label[: len(position)], return_inverse=True)
@@ -172,7 +171,6 @@ def divide_plant(particles: Particles, number: int, crown: Int[np.ndarray, " N"]
         number: Which object.
         crown: Numbers of its leaves' particles.
         first: How many pieces there are already.
-
     """
     mine = np.flatnonzero(particles.object == number)
     points = np.flatnonzero(particles.object_of_surface == number)
@@ -258,7 +256,6 @@ def piece_shell(
         particles: All of the scene's.
         mine: Numbers of a body's particles.
         column: Its constitutive numbers, of each of these.
-
     """
     own = np.isin(particles.shell_triangle, mine).all(axis=1)
     if not own.any():

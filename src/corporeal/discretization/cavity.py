@@ -52,7 +52,6 @@ def measure_cavity(anatomy: MeasuredObject, member: MeasuredPart, thickness: flo
         member: The part with the wall.
         thickness: Of the wall [m].
         rng: Source of the probes.
-
     """
     if is_vessel(member):
         box = np.prod(np.ptp(part_corners(member), axis=0))

@@ -59,7 +59,6 @@ def choose_resolution(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> tu
 
     Returns:
         The bodies with their plates as walls; grid spacing and treatments.
-
     """
     chosen = _plan_scene(bodies, accuracy)
     while thin := thin_plate_thicknesses(bodies, chosen, accuracy.seed):
@@ -89,7 +88,6 @@ def add_compression_strain(bodies: MeasuredScene, parts: list[PartGeometry], see
         bodies: As measured.
         parts: All of the scene's, of which the strain is not known.
         seed: Of the points by which gaps are measured.
-
     """
     compliances = [0.0] * len(bodies.anatomies)
     volumes = [0.0] * len(compliances)

@@ -30,7 +30,6 @@ def sample_contact_points(
 
     Returns:
         The points, on the round surface that the mesh stands for, and how it curves there: see ``geometry.roundness``.
-
     """
     corners = extreme_corners(anatomy.vertices)
     faces = [m.sheet for m in anatomy.members if len(m.sheet.triangles)]

@@ -63,7 +63,6 @@ def too_stiff_to_compress(
         verdicts: On each.
         unslowed: Treatments before the step budget …
         slowed: … and after it.
-
     """
     hard = {
         k: true.wave_speed
@@ -181,7 +180,6 @@ def plan_discretization(
         detail: The one knob of quality, or what it buys.
         stiffness: "capped" is the published rule, a control only.
         floor: What the floor is made of; None: it is not known.
-
     """
     verdicts = [judge_rigidity(part, motions[part.object]) for part in parts]
     judged = PartVerdicts(verdicts)
@@ -265,7 +263,6 @@ def choose_role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float)
         deforms: Whether it would, by itself.
         mixed: Objects some part of which does.
         cell: dx [m].
-
     """
     if deforms:
         return "soft"

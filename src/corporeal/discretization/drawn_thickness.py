@@ -60,7 +60,6 @@ def measure_drawn_shape(surfaces: Sequence[TriangleSurface], scale: float = 1.0)
     Args:
         surfaces: All of the object's.
         scale: Lengths in them over the real ones [-].
-
     """
     mesh = _as_closed_mesh(surfaces)
     if mesh is None:
@@ -75,7 +74,6 @@ def mean_drawn_thickness(surfaces: Sequence[TriangleSurface], scale: float = 1.0
     Args:
         surfaces: All of the object's.
         scale: Lengths in them over the real ones [-].
-
     """
     mesh = _as_closed_mesh(surfaces)
     if mesh is None:
@@ -90,7 +88,6 @@ def is_drawn_as_lump(surfaces: Sequence[TriangleSurface], wall: float, scale: fl
         surfaces: All of the object's, upright.
         wall: As such vessels have [m].
         scale: Lengths in them over the real ones [-].
-
     """
     mesh = _as_closed_mesh(surfaces)
     if mesh is None:

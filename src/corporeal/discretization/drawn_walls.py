@@ -52,7 +52,6 @@ def measure_walls(mesh: Mesh, shape: QueryMesh) -> WallThickness:
     Args:
         mesh: Its triangles.
         shape: What is met.
-
     """
     normals = mesh.normals
     start = mesh.corners.mean(axis=1) - 1e-6 * shape.mesh.extent * normals
@@ -77,7 +76,6 @@ def wall_base_faces(source: FeaturePatches, walls: WallThickness) -> list[Int[np
     Args:
         source: A closed mesh, normals outward, finer than its walls are wide.
         walls: Measured of its triangles against themselves.
-
     """
     mesh = source.mesh
     face = walls.facing & (walls.through < MAX_WALL_MEDIAN_RATIO * walls.median)

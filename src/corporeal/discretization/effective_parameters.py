@@ -105,7 +105,6 @@ def remaining_loss_factor(part: PartGeometry, motion: ExpectedMotion, across: fl
         part: What is struck, as its contents where those are simulated.
         motion: Of its object.
         across: Cells across it [-].
-
     """
     if CONSTITUTIVE_LAWS[part.material.law].loose:
         return 0.0
@@ -296,7 +295,6 @@ def bar_reason(part: PartGeometry, simulated: float) -> str:
     Args:
         part: Which.
         simulated: How thick a known rod would at least be simulated [m].
-
     """
     across = part_width(part)
     known = part.diameter > 0 or part.leaves > 0 or tube_diameter(part) > 0

@@ -29,7 +29,6 @@ def exposed_faces(
 
     Returns:
         Outward area vectors [m²], and the point that bears each.
-
     """
     shown = [m.sheet for m in anatomy.members if len(m.sheet.triangles)]
     sheets = [cut_mesh_to_size(m, spacing) for m in shown]

@@ -44,7 +44,6 @@ def fill_to_volume(anatomy: MeasuredObject, member: MeasuredPart, thickness: flo
         member: The part whose wall holds it.
         thickness: Of the wall where the mesh shows its outside only [m].
         volume: Of what is in it [m³].
-
     """
     corners = part_corners(member)
     low, high = corners.min(axis=0), corners.max(axis=0)
@@ -76,7 +75,6 @@ def limit_to_thin_wall(
         depth: Distance from the wall [m]; negative outside of the hollow.
         inside: Which samples are in the hollow.
         step: Between samples [m].
-
     """
     away = np.asarray(distance_transform_edt(~inside)) - 1.0
     return np.where(inside, depth, np.minimum(depth, -step * away))

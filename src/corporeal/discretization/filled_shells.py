@@ -31,7 +31,6 @@ def part_as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
     Args:
         part: Which.
         speed: At which it is struck [m/s]: a sealed ball is the stiffer the harder.
-
     """
     inner = part.structure.contents
     if inner is None:
@@ -52,7 +51,6 @@ def part_as_sealed_ball(part: PartGeometry, speed: float) -> InflatedBall:
     Args:
         part: Which.
         speed: At which it is struck [m/s]: of some walls the loss depends on it.
-
     """
     structure = part.structure
     radius = (0.75 * part.volume / pi) ** (1.0 / 3.0)

@@ -120,7 +120,6 @@ def leaf_frequencies(
         points: [m]
         tissue: What leaves are made of.
         scale: Scene size over real size: t and the longest leaf are real lengths.
-
     """
     assert tissue.shell_thickness is not None
     middles, lengths = [], []
@@ -238,7 +237,6 @@ def root_joint(
         number: Of the object.
         materials: Of all parts.
         inertia_about: Gives the moment of inertia of all that swings about a point [kg m²].
-
     """
     member = next(m for m in anatomy.members if m.part == found.wood)
     depth = found.top - found.foot

@@ -78,7 +78,6 @@ class HoldingWall:
         Args:
             points: [m]
             inside: Which are behind what the object's faces enclose.
-
         """
         found = np.full(len(points), np.inf)
         if self.body is not None:
@@ -301,7 +300,6 @@ def fill_all_beds(anatomies: Sequence[MeasuredObject], field: MaterialField) -> 
     Args:
         anatomies: One per object.
         field: What all is made of, with walls as thick as in the scene.
-
     """
     loose = loose_matter_parts(field)
     return [with_beds(a, find_beds(a, field, loose)) for a in anatomies]

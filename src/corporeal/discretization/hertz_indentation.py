@@ -34,7 +34,6 @@ def hertz_dent_of_layer(mass: float, radius: float, speed: float, plane: float, 
         speed: [m/s]
         plane: E* of both [Pa].
         most: Thickness of the layer [m].
-
     """
     return min((15.0 * mass * speed**2 / (16.0 * plane * sqrt(radius))) ** 0.4, most)
 
@@ -53,7 +52,6 @@ def yield_mark_of_ball(strength: float, density: float, speed: float) -> float:
         strength: Yield stress Y [Pa].
         density: [kg/m³]
         speed: [m/s]
-
     """
     return min(1.0, speed * sqrt(2.0 * density / (3.0 * HARDNESS_YIELD_RATIO * strength)))
 

@@ -39,7 +39,6 @@ def restitutions_at_impact(
         field: With the restitution at ``NOMINAL_IMPACT_SPEED_M_S``.
         treatments: One per part: they know how fast it will be struck.
         shapes: Of parts by their numbers, where sheets are weak across their layers.
-
     """
     table = np.array(field.restitution)
     laws = np.tile(CONSTANT_RESTITUTION_LAW, (*table.shape, 1))

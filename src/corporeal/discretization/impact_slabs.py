@@ -39,7 +39,6 @@ def slabs_nearer_to_rigid(
 
     Returns:
         Number of the part → why, in a clause.
-
     """
     found = {}
     for k, (part, treatment) in enumerate(zip(parts, treatments, strict=True)):

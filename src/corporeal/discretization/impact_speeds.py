@@ -82,7 +82,6 @@ def expected_motions(
         masses: Of every object [kg].
         seed: Of the points by which free heights are measured.
         vessels: Of each object that lies loose in another, that other.
-
     """
     gravity = float(np.linalg.norm(scene.gravity))
     drops = fall_heights([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
@@ -118,7 +117,6 @@ def share_vessel_drives(
         drives: Of every object by itself.
         masses: Of every object [kg].
         vessels: Of each object that lies loose in another, that other.
-
     """
     found = list(drives)
     for vessel in set(vessels.values()):
@@ -138,7 +136,6 @@ def drive_of_object(obj: SceneObject, anatomy: MeasuredObject, mass: float, dura
         anatomy: Its shape.
         mass: [kg]
         duration: Of the simulation [s].
-
     """
     gained, strongest = np.zeros(3), 0.0
     if obj.path is not None:

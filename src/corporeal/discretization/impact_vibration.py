@@ -38,7 +38,6 @@ def vibration_loss(density: float, speed: float, young_pa: float) -> float:
         density: [kg/m³]
         speed: [m/s]
         young_pa: E, resisted slowly [Pa].
-
     """
     return VIBRATION_LOSS_COEFFICIENT * min(density * speed**2 / young_pa, MAX_IMPACT_NUMBER)
 
@@ -61,7 +60,6 @@ def compensate_vibration_loss(
         unslowed: Treatments before the step budget …
         slowed: … and after it.
         cell: dx [m].
-
     """
     soft = {p.object for p, t in zip(parts, slowed, strict=True) if t.wave_speed > 0.0}
     found = []

@@ -69,7 +69,6 @@ def layered_restitution_law(
         pair: Numbers of two parts.
         speed: Of their impact [m/s].
         packed: Restitution of both without their layers [-].
-
     """
     for ball, sheet in (pair, pair[::-1]):
         one, other = shapes.get(ball), shapes.get(sheet)

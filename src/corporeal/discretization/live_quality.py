@@ -97,7 +97,6 @@ def limit_live_steps(quality: QualityPreset, demand: LiveDemand, cell: float, th
         demand: Of the scene as it was filled before.
         cell: dx that it led to [m].
         threads: Of the engine.
-
     """
     fits = MAX_STEP_TIME_FRACTION * threads / (demand.cost * (demand.cell / cell) ** 3)
     steps = max(fits / demand.stiffened, MIN_STEPS_PER_SECOND)

@@ -113,7 +113,6 @@ def inner_face_fraction(
         width: Shortest side of the part [m].
         rng: Source of the points that are asked.
         count: How many are.
-
     """
     points, triangle = sample_surface(part, count, rng)
     normals, step = part.normals[triangle], 1e-5 * shape.mesh.extent

@@ -154,7 +154,6 @@ class MeasuredPart:
 
         Args:
             thickness: Of the wall [m].
-
         """
         n = self.closing
         if n == 1.0 or not thickness > 0:
@@ -240,7 +239,6 @@ def measure_object(
         triangles: All of the object's.
         part_of_triangle: Index into the catalogue of parts.
         rng: Source of the probes.
-
     """
     mesh, kept = weld_mesh(vertices, triangles, part_of_triangle)
     part = part_of_triangle[kept]
@@ -278,7 +276,6 @@ def measure_assembled(
         part_of_triangle: Of ``shape``.
         alone: The parts; those that have a volume keep it.
         rng: Source of the probes.
-
     """
     probes, spacing = probe_inside(shape, rng)
 
@@ -406,7 +403,6 @@ def measure_objects(scene: Scene, parts: Parts, seed: int) -> list[MeasuredObjec
 
     Raises:
         UserError: A part has no surface.
-
     """
     whole = join_meshes(scene.surfaces)
     anatomies = []
@@ -440,7 +436,6 @@ def refuse_flat_scene(scene: Scene, anatomies: list[MeasuredObject]) -> None:
 
     Raises:
         UserError: Every part is flat.
-
     """
     members = [m for a in anatomies for m in a.members]
     if all(m.volume == 0 and m.size[0] < 1e-6 * m.size[2] for m in members):
@@ -460,7 +455,6 @@ def refuse_buried_objects(scene: Scene, anatomies: list[MeasuredObject], cell: f
 
     Raises:
         UserError: It names the object.
-
     """
     for obj, anatomy in zip(scene.objects, anatomies, strict=True):
         lowest = float(anatomy.vertices[:, 2].min())

@@ -75,7 +75,6 @@ def middle_surface(mesh: TriangleSurface, thickness: float | None, spacing: floa
 
     Raises:
         UserError: No triangles, what is not finite, no thickness, or a solid that draws no wall.
-
     """
     _check_input(mesh, thickness, spacing)
     whole = weld_solids(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.triangles, np.int64))

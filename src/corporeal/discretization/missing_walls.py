@@ -59,7 +59,6 @@ def close_all_missing_walls(anatomies: Sequence[MeasuredObject], field: Material
     Args:
         anatomies: One per object.
         field: What all is made of, with walls as thick as in the scene.
-
     """
     return [with_missing_walls(a, find_missing_walls(a, field, {})) for a in anatomies]
 
@@ -73,7 +72,6 @@ def find_missing_walls(
         anatomy: The object.
         field: What it is made of.
         known: All borders of parts that were measured before; what is measured is added.
-
     """
     found = {}
     for member in anatomy.members:

@@ -53,7 +53,6 @@ def sample_wetted_points(
 
     Returns:
         Points [m] and unit normals out of the material.
-
     """
     faces = [f for m in anatomy.members for f in part_wetted_faces(m, makes[m.part])]
     area = sum(float(mesh.areas.sum()) for mesh, _, _ in faces)
@@ -114,7 +113,6 @@ def pour_contents(
         field: What all is made of, with walls as thick as in the scene.
         anatomies: One per object.
         seed: Of all random numbers.
-
     """
     found: list[VesselContents] = []
     things, own = list(scene.objects), [m.friction for m in field.materials]

@@ -96,7 +96,6 @@ def fill_object(
         spacing: Between points [m].
         rng: Source of all randomness.
         coarse: Whether the deep inside may have points twice as far apart.
-
     """
     lumps = [_fill_bodies(anatomy, recipes, spacing, rng, coarse=coarse)]
     for member in anatomy.members:
@@ -247,7 +246,6 @@ def reference_points(
 
     Returns:
         Points for the body and points for the sheets.
-
     """
     body = anatomy.probes[anatomy.part_of_probe == member.part]
     if len(member.body.triangles) and (wall > 0 or not len(body)):

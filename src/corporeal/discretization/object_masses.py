@@ -32,7 +32,6 @@ def scale_to_stated_masses(
 
     Raises:
         UserError: No material is as dense as that.
-
     """
     made, warnings = dict(makes), []
     for obj, anatomy in zip(scene.objects, anatomies, strict=True):
@@ -64,7 +63,6 @@ def warn_of_implausible_masses(scene: Scene, anatomies: Sequence[MeasuredObject]
         scene: The objects, with what they are.
         anatomies: One per object.
         masses: Of every part, as large as it is in the scene [kg].
-
     """
     doubts = (
         mass_warning(
@@ -87,7 +85,6 @@ def warn_of_masses_not_as_named(
         scene: The objects, with what they are called.
         anatomies: One per object.
         masses: Of every part, as large as it is in the scene [kg].
-
     """
     doubts = (
         mass_from_name_warning(
@@ -117,7 +114,6 @@ def warn_of_thick_walls(
         anatomies: One per object.
         makes: How every part is made.
         field: What it is made of, with walls as thick as in the scene.
-
     """
     doubts = (
         _thick_wall_text(obj, makes[m.part], field.words[m.part], field.materials[m.part])

@@ -56,7 +56,6 @@ def scene_extents(real: Sequence[float], sizing: SceneSizing = DEFAULT_SCENE_SIZ
 
     Raises:
         UserError: γ, L or f cannot be used, or a real extent is no length.
-
     """
     _check_sizing(sizing)
     sizes = np.asarray(real, dtype=np.float64)
@@ -86,7 +85,6 @@ def parse_extent(text: str, only: str = "") -> tuple[str, float]:
 
     Raises:
         UserError: The format is invalid.
-
     """
     name, _, number = text.rpartition("=")
     try:

@@ -25,7 +25,6 @@ def is_below_rim(
         matter: What no liquid is in; None: only sheets.
         faces: What holds it.
         points: [m]
-
     """
     found = np.ones(len(points), dtype=bool)
     if matter is not None:

@@ -45,7 +45,6 @@ def vessel_sheet_area(shape: QueryMesh, part: Mesh, rng: np.random.Generator) ->
         shape: All that may hide it; closed, or open below its rim.
         part: Its surface, normals outward.
         rng: Source of the places that are asked.
-
     """
     found = find_vessel_outside(shape, part, rng)
     return float(part.areas.sum() * np.mean(found.counts * found.evenness))

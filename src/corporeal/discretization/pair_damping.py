@@ -34,7 +34,6 @@ def find_impact_partners(
         motions: One per object.
         rigid: Which parts are.
         floor: What the floor is made of; None: it is not known.
-
     """
     soft = {p.object for p, stiff in zip(parts, rigid, strict=True) if not stiff}
     made = {k: largest_part_of(parts, k) for k in {p.object for p in parts} - soft}
@@ -69,7 +68,6 @@ def pair_loss_factor_of_parts(struck: Material, motion: ExpectedMotion) -> float
     Args:
         struck: What deforms, as it is at that speed.
         motion: Of its object, with what meets it.
-
     """
     energy = sum(p.energy for p in motion.partners)
     losses = struck.loss * energy

@@ -205,7 +205,6 @@ def wall_factors(part: PartGeometry, ratio: float, speed: float) -> tuple[float,
         part: Which.
         ratio: Its thickness over the simulated one [-].
         speed: At which it is struck [m/s].
-
     """
     if part.closed and not is_folding_wall(part, speed):
         return closed_wall_factors(ratio)

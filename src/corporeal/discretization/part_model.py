@@ -186,7 +186,6 @@ def part_mass(
         field: What it is made of.
         room: What goes into it, if it is a vessel [m³].
         leeway: What its mesh leaves open. Walls that are not as it draws them go with the area.
-
     """
     total = 0.0
     for piece in piece_specifications(member.part, field):
@@ -253,7 +252,6 @@ def volume_behind_wall(member: MeasuredPart, made: PartModel, piece: PieceSpecif
         made: How its wall is made.
         piece: How it is built.
         room: What goes into it, if it is a vessel [m³].
-
     """
     material, words = piece.material, piece.words
     own = words.volume_share - words.inner_share
@@ -395,7 +393,6 @@ def choose_wall_thickness(
         shown: What its mesh draws [m]; 0: nothing.
         usual: Usual thickness [m]; 0: unknown.
         guess: Default [m].
-
     """
     if words.thickness:
         whose = THICKNESS_FROM_JUDGE.get(words.built_by, "as is stated")

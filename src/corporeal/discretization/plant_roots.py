@@ -37,7 +37,6 @@ def extend_plants_into_ground(scene: Scene, parts: Parts, field: MaterialField) 
 
     Returns:
         The scene, and what was done to whom, in words.
-
     """
     warnings = []
     for plant in _rootless_plants(scene, parts, field):

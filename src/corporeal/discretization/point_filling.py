@@ -53,7 +53,6 @@ def fill_body(
         deepest: For each point given, how far below the surface there is material [m]; inf: all
             the way, 0: none here.
         rng: Source of the jitter.
-
     """
     points = scatter_points(shape, spacing, rng)
     limit = deepest(points)
@@ -112,7 +111,6 @@ def fill_narrow_body(
 
     Returns:
         Positions, and how thick the body is there [m].
-
     """
     mesh = skin.mesh
     count = int(np.clip(6 * mesh.areas.sum() / spacing**2, 200, 2_000_000))
@@ -169,7 +167,6 @@ def match_moments(
 
     Returns:
         Masses [kg].
-
     """
     masses = masses * wanted_masses.sum() / masses.sum()
     centre = np.average(wanted, axis=0, weights=wanted_masses)

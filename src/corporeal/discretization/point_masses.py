@@ -25,7 +25,6 @@ def remove_mixed_points(
         packings: One per object.
         cell: dx [m].
         together: Vessels and what is in them, which their true surfaces keep apart.
-
     """
     result = list(packings)
     for i in range(len(result)):

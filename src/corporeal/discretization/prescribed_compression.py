@@ -116,7 +116,6 @@ def place_along_path(thing: SampledObject, path: Keyframes, pivot: Vector, times
         path: Of the point ``pivot`` of it.
         pivot: The middle of the underside of its box at the start [m].
         times: [s]
-
     """
     rows, origin = path_rows(path, pivot), np.array(pivot)
     poses = [path_pose(rows, float(t)) for t in times]
@@ -203,7 +202,6 @@ def compression_pressures(
         anatomies: One per object.
         compliances: 1/E of every object, as a whole [1/Pa].
         seed: Of the points by which gaps are measured.
-
     """
     found = [0.0] * len(scene.objects)
     prescribed = [k for k, obj in enumerate(scene.objects) if obj.path is not None]
@@ -374,7 +372,6 @@ class CompressionSide:
         Args:
             later: Where it is then.
             along: Unit vector from the lower to the upper one.
-
         """
         if self.there is None or later.there is None:
             return self.gaps
@@ -410,7 +407,6 @@ class StackedGaps:
         Args:
             low: Gaps from the lower side [m].
             high: To the upper one [m].
-
         """
         number = np.arange(len(self.soft))
         up, down = self.gaps + high[None], low[:, None] + self.gaps

@@ -30,7 +30,6 @@ def cantilever_tip_deflection_ratio(load: float, young_pa: float, length: float,
         young_pa: E [Pa].
         length: L [m].
         depth: h [m].
-
     """
     return 1.5 * load * length**3 / (young_pa * depth**2)
 

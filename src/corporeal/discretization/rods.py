@@ -80,7 +80,6 @@ def rod_section_points(rod: Rod, simulated: float, step: float) -> Float[np.ndar
         rod: The centreline.
         simulated: Diameter on the grid [m].
         step: [m]
-
     """
     lengths = np.linalg.norm(np.diff(rod.points, axis=0), axis=1)
     arc = np.concatenate([[0.0], np.cumsum(lengths)])

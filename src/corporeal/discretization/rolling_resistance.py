@@ -63,7 +63,6 @@ def rolling_resistance_lengths(
         materials: What each is made of where it rolls, as in reality.
         floor: Of all planes; None: it is not known.
         planes: How many there are.
-
     """
     count = len(bodies)
     table = np.zeros((count + planes, count + planes))

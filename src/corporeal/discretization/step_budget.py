@@ -128,7 +128,6 @@ def lower_poisson_ratio(treatment: Discretization, limit: float, cell: float) ->
         treatment: Of any part.
         limit: Largest wave speed that the budget counts [m/s].
         cell: dx [m].
-
     """
     in_plane = treatment.bending_young_pa > 0.0  # no bulk is squeezed in plane stress
     if in_plane or counted_wave_speed(treatment) <= limit or treatment.poisson <= MIN_REDUCED_POISSON_RATIO:
@@ -161,7 +160,6 @@ def wave_speed(young_pa: float, poisson: float, density: float, loss: float) -> 
         poisson: ν [-].
         density: ρ [kg/m³].
         loss: tan δ as simulated [-]: loss stiffens (``mpm.physics.branches``).
-
     """
     return p_wave_speed(young_pa, poisson, density) * sqrt(stiffening(loss, poisson))
 
@@ -181,7 +179,6 @@ def parts_nearer_to_rigid(
 
     Returns:
         Number of the part → why, in a clause.
-
     """
     found = {}
     for k, (true, soft) in enumerate(zip(unslowed, slowed, strict=True)):

@@ -46,7 +46,6 @@ def curve_points(
 
     Returns:
         The points [m], and the curvature at each, see ``types.CURVATURE_COLUMNS``.
-
     """
     if len(points) <= SURROUND_NEIGHBOURS_COUNT or not len(mesh.triangles):
         return points, np.zeros((len(points), CURVATURE_COLUMNS))

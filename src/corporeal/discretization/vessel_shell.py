@@ -38,7 +38,6 @@ def hollow_all_vessels(anatomies: Sequence[MeasuredObject], field: MaterialField
     Args:
         anatomies: One per object.
         field: What all is made of, with walls as thick as in the scene.
-
     """
     return [_hollow_vessel(a, field) for a in anatomies]
 

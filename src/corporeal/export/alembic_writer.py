@@ -31,7 +31,6 @@ def write_alembic(asked: ExportRequest, folder: Path) -> WrittenTarget:
     Raises:
         NothingToWriteError: Nothing moves.
         UserError: The library is not installed.
-
     """
     if not asked.motion.moves:
         raise NothingToWriteError("Nothing was simulated, and Alembic needs motion.")

@@ -74,7 +74,6 @@ def read_animated_glb(path: Path) -> AnimatedGlb:
 
     Raises:
         BadFileError: It cannot be read.
-
     """
     video = AnimatedGlb(GltfDocument(path))
     for animation in video.document.entries("animations"):

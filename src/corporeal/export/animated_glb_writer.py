@@ -54,7 +54,6 @@ def fit_shape_modes(shapes: Float[np.ndarray, "F V 3"], tolerance: float, most: 
         shapes: Vertices at every frame [m]; may lie on the disk.
         tolerance: Largest error of any vertex [m].
         most: So many modes at most; the error may then be larger.
-
     """
     frames, vertices = shapes.shape[:2]
     blocks = [slice(a, a + BLOCK_VERTICES_COUNT) for a in range(0, vertices, BLOCK_VERTICES_COUNT)]
@@ -123,7 +122,6 @@ def write_animated_glb(asked: ExportRequest, folder: Path) -> WrittenTarget:
 
     Raises:
         UserError: The tolerance makes no sense.
-
     """
     low, high = TOLERANCE_RANGE
     if not low <= asked.config.tolerance <= high:

@@ -45,7 +45,6 @@ def finished_runs(corpus: Path) -> list[Path]:
 
     Raises:
         UserError: There are none.
-
     """
     folders = sorted(p.parent for p in (corpus / RUNS_FOLDER).glob(f"*/{RUN_FILE}"))
     found = [f for f in folders if (f / STAGE_FOLDERS["simulate"] / store.META_FILE).exists()]
@@ -65,7 +64,6 @@ def export_dataset(corpus: Path, targets: Sequence[ExportTarget], out: Path, con
 
     Raises:
         UserError: Nothing is finished, a library is missing, or the disk refuses.
-
     """
     runs, rows = finished_runs(corpus), {}
     with store.lock_folder(out), store.disk_errors(out):
@@ -123,7 +121,6 @@ def export_scene(
 
     Raises:
         UserError: There is no such run or target, nothing could be written, a library is missing, or the disk refuses.
-
     """
     for target in targets:
         if target not in EXPORT_WRITERS:

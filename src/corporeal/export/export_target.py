@@ -66,7 +66,6 @@ def read_record(path: Path) -> ExportRecord:
 
     Raises:
         BadFileError: It is damaged.
-
     """
     found = store.read_json(path)
     try:
@@ -152,6 +151,5 @@ class TargetWriter(Protocol):
         Raises:
             NothingToWriteError: The scene has nothing that this format is for.
             UserError: A setting makes no sense.
-
         """
         ...

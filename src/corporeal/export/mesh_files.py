@@ -23,7 +23,6 @@ def format_obj(
         vertices: [m]
         triangles: Vertex numbers.
         uv: Texture coordinates, v running down as in glTF; OBJ's run up.
-
     """
     rows = ["v %.9g %.9g %.9g\n" * len(vertices) % _flat(vertices)]
     corners = np.asarray(triangles) + 1

@@ -50,7 +50,6 @@ def read_particle_table(asked: ExportRequest) -> ParticleTable:
 
     Raises:
         NothingToWriteError: Nothing moves.
-
     """
     if asked.played is None or not asked.motion.moves:
         raise NothingToWriteError("Nothing was simulated, and there is no motion to learn from.")
@@ -167,7 +166,6 @@ def write_h5(asked: ExportRequest, folder: Path) -> WrittenTarget:
     Raises:
         NothingToWriteError: Nothing moves.
         UserError: The library is not installed.
-
     """
     return save_h5(folder, [asked])
 
@@ -177,7 +175,6 @@ def write_npz(asked: ExportRequest, folder: Path) -> WrittenTarget:
 
     Raises:
         NothingToWriteError: Nothing moves.
-
     """
     return save_npz(folder, [asked])
 
@@ -188,7 +185,6 @@ def save_h5(folder: Path, runs: Iterable[ExportRequest]) -> WrittenTarget:
     Raises:
         NothingToWriteError: Nothing moves.
         UserError: The library is not installed, or the disk has no room for a run.
-
     """
     h5py, statistics = import_hdf5(), DatasetStatistics()
     with h5py.File(folder / H5_FILE_NAME, "w") as file:
@@ -210,7 +206,6 @@ def save_npz(folder: Path, runs: Iterable[ExportRequest]) -> WrittenTarget:
 
     Raises:
         NothingToWriteError: Nothing moves.
-
     """
     statistics, provenance = DatasetStatistics(), []
     rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
@@ -243,7 +238,6 @@ def import_hdf5() -> Any:
 
     Raises:
         UserError: It is not installed.
-
     """
     try:
         import h5py

@@ -58,7 +58,6 @@ def physical_scene(prepared: PreparedScene, motion: SceneMotion) -> PhysicalScen
 
     Raises:
         UserError: An object has no matter.
-
     """
     scene, field, particles = prepared.scene, prepared.field, prepared.particles
     empty = [o.name for k, o in enumerate(scene.objects) if not np.any(particles.object == k)]

@@ -168,7 +168,6 @@ def motion_of_run(played: SimulationResult, at: str) -> SceneMotion:
 
     Raises:
         UserError: There is no such instant.
-
     """
     prepared, trajectory = played.prepared, played.trajectory
     now = frame_at(at, trajectory.time)
@@ -203,7 +202,6 @@ def frame_at(at: str, time: Float[np.ndarray, " F"]) -> int:
 
     Raises:
         UserError: There is no such instant.
-
     """
     named = {"start": 0, "end": len(time) - 1}
     if at in named:

@@ -29,7 +29,6 @@ def simplify_colliders(scene: PhysicalScene, most: int) -> tuple[PhysicalScene, 
 
     Raises:
         UserError: There are too few corners to be had.
-
     """
     if most == 0:
         return scene, 0.0

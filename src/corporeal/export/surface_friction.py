@@ -36,7 +36,6 @@ def surface_friction(
         pairs: Friction of every two parts; the last row and column are the floor.
         solid: Which solid each part belongs to: parts of one solid never meet.
         rule: How the engine combines two coefficients.
-
     """
     owner = np.append(solid, -1)
     i, j = np.nonzero(np.triu(owner[:, None] != owner[None, :]))

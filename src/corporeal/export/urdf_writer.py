@@ -22,7 +22,6 @@ def write_urdf(asked: ExportRequest, folder: Path) -> WrittenTarget:
 
     Raises:
         NothingToWriteError: Nothing is rigid.
-
     """
     scene = asked.scene
     rigid = [s for s in scene.solids if s.rigid]

@@ -56,7 +56,6 @@ def voxel_tetrahedra(
 
     Returns:
         Vertices [m], and four vertex numbers a tetrahedron: (b - a) × (c - a) · (d - a) > 0.
-
     """
     low = points.min(axis=0) - 1e-3 * side
     cell = np.unique(np.floor((points - low) / side).astype(np.int64), axis=0)
@@ -130,7 +129,6 @@ def make_deformable(solid: ExportedSolid, materials: str, soft: SoftRepresentati
         solid: What.
         materials: Path of the scope of all materials.
         soft: Which of the two is simulated at first; readers take one geometry a body.
-
     """
     prim = UsdPrim("", solid.name)
     if soft == "none":

@@ -52,7 +52,6 @@ def write_splats(
         moving: All Gaussians, bound to the material points.
         owner: Object of each; -1: of none.
         folder: Where ``splats.usda`` goes.
-
     """
     held = _posed(motion, moving)
     world = UsdPrim("Xform", WORLD_PRIM, metadata=[usda_display_name(scene.title)])
@@ -143,7 +142,6 @@ def write_splat_sequence(asked: ExportRequest, folder: Path) -> WrittenTarget:
 
     Raises:
         NothingToWriteError: The scene was made of surfaces, or nothing moves.
-
     """
     played = asked.played
     if played is None or played.reconstruction is None:

@@ -61,7 +61,6 @@ def register_points(
 
     Raises:
         BadFileError: No turn brings them onto the surface.
-
     """
     looked = surface[:: max(1, len(surface) // MISFIT_POINTS_COUNT)]
     box = np.stack([surface.min(axis=0), surface.max(axis=0)])

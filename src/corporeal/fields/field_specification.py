@@ -38,7 +38,6 @@ def read_vomp(path: Path) -> SampledField:
 
     Raises:
         BadFileError: It is damaged, holds pickled objects, or lacks a column.
-
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -74,7 +73,6 @@ def read_pixie(path: Path) -> SampledField:
 
     Raises:
         BadFileError: It is damaged, lacks a column, or is the normalised prediction.
-
     """
     if path.suffix.lower() in (".npy", ".npz"):
         what = "is Pixie's normalised prediction, without places and units."
@@ -108,7 +106,6 @@ def read_field_table(path: Path) -> SampledField:
 
     Raises:
         BadFileError: A column is missing, or a cell is no number.
-
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -190,7 +187,6 @@ class FieldFiles:
 
         Raises:
             BadFileError: It cannot be used.
-
         """
         return check_field(FIELD_READERS[self.kind][0](path))
 
@@ -200,7 +196,6 @@ def parse_field_specification(spec: str) -> UniformField | FieldFiles | None:
 
     Raises:
         UserError: It is none, or its file does not exist.
-
     """
     kind, colon, rest = spec.partition(":")
     if not spec:

@@ -67,7 +67,6 @@ def sum_up_per_part(
 
     Returns:
         Part → its numbers, for every part that has a point.
-
     """
     sample, near = nearest_samples(placed, points)
     found = {}
@@ -129,7 +128,6 @@ def impose_field(found: MaterialField, scene: Scene, parts: Parts, spec: str) ->
 
     Raises:
         UserError: The field cannot be used with this scene.
-
     """
     field = parse_field_specification(spec)
     if field is None:

@@ -38,7 +38,6 @@ def check_field(field: SampledField) -> SampledField:
 
     Raises:
         BadFileError: It has too few points, or a number that is not finite or impossible.
-
     """
     count = len(field.position)
     if count < MIN_FIELD_POINTS:

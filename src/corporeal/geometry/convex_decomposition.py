@@ -52,7 +52,6 @@ def decompose_convex(
 
     Raises:
         UserError: The mesh has no surface, or numbers that are none.
-
     """
     used, number = np.unique(triangles, return_inverse=True)
     points = np.asarray(vertices, dtype=np.float64)[used]

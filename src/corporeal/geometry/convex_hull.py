@@ -111,7 +111,6 @@ def convex_hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> ConvexP
 
     Raises:
         UserError: The points lie on a line or are fewer than three.
-
     """
     points = np.unique(points, axis=0)
     points = points if len(points) < 3 else _thickened_points(points, thinnest)
@@ -149,7 +148,6 @@ def tip_angle(hull: ConvexPiece, centre: Float[np.ndarray, "3"], down: Float[np.
         hull: The body's.
         centre: Its centre of mass [m].
         down: Unit, in the body's frame: where the floor is.
-
     """
     below = (hull.vertices - centre) @ down
     side = float(np.ptp(hull.vertices, axis=0).max())
@@ -222,7 +220,6 @@ def simplify_convex(hull: ConvexPiece, most: int) -> ConvexPiece:
     Args:
         hull: What.
         most: Number of corners, at least 8.
-
     """
     if len(hull.vertices) <= most:
         return hull

@@ -12,7 +12,6 @@ def bilinear_weights(place: np.ndarray, on: np.ndarray, size: tuple[int, int]) -
         place: x and y of each point, in [0, 1].
         on: Which points take part.
         size: Rows and columns of the map.
-
     """
     rows = np.flatnonzero(on)
     high, wide = size
@@ -38,7 +37,6 @@ def trilinear_weights(place: Float[np.ndarray, "N 3"], shape: tuple[int, int, in
     Args:
         place: In units of the nodes' distance, from the first of them.
         shape: How many nodes there are along each axis, at least 2.
-
     """
     last = np.array(shape) - 1
     inside = np.clip(place, 0, last)

@@ -19,7 +19,6 @@ def collect_segment_crossings(starts, ends, vertices, triangles, met):
 
     Returns:
         How many there are.
-
     """
     count = 0
     low, high = np.full(3, np.inf), np.full(3, -np.inf)

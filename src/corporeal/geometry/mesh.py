@@ -102,7 +102,6 @@ def weld_mesh(
 
     Returns:
         The mesh, and for each of its triangles the number it had.
-
     """
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     triangles = np.ascontiguousarray(triangles, dtype=np.int64)

@@ -78,7 +78,6 @@ def relax_points(
 
     Returns:
         Positions [m].
-
     """
     start, points = points, points.copy()
     free = np.ones(len(points), dtype=bool) if held is None else ~held

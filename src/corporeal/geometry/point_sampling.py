@@ -139,7 +139,6 @@ def column_crossings(
         vertices: In units of the lattice, from the corner of its first cube.
         triangles: Their vertices.
         columns: Where each column stands: within the cube of its number, [i, i + 1) by [j, j + 1).
-
     """
     count = np.zeros(columns.shape[:2], np.int64)
     kernels.collect_crossings(vertices, triangles, columns, count, np.zeros((0, 2)))
@@ -157,7 +156,6 @@ def points_wound_around(
 
     Returns:
         Column and layer of each.
-
     """
     count = np.zeros(len(heights), np.int64)
     crossed = met.first, met.height, met.step
@@ -256,7 +254,6 @@ def sample_surface(
 
     Returns:
         Positions [m] and the triangle of each.
-
     """
     edge = np.cumsum(mesh.areas)
     where = (np.arange(count) + rng.uniform(0, 1, count)) / count * edge[-1]
@@ -279,7 +276,6 @@ def poisson_disk_subset(
         points: Candidates [m]; earlier ones win.
         distance: [m]
         taken: Points that are chosen already.
-
     """
     before = np.zeros((0, 3)) if taken is None else taken
     everything = np.concatenate([before, points])

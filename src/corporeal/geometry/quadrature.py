@@ -59,7 +59,6 @@ def sort_into_cells(points: Float[np.ndarray, "N 3"], spacing: float) -> PointCe
     Args:
         points: At least one [m].
         spacing: About how far apart they are [m].
-
     """
     low = points.min(axis=0)
     span = points.max(axis=0) - low
@@ -97,7 +96,6 @@ def centroidal_points(
 
     Returns:
         Positions [m] and volumes of the cells [m³].
-
     """
     if not len(points):
         return points, np.zeros(0)

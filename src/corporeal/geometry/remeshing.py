@@ -52,7 +52,6 @@ def unique_edges(
     Returns:
         Ends of each edge, smaller number first; edge k of each triangle, from its corner k to the next; and how many
         triangles each edge has.
-
     """
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     size = int(triangles.max(initial=0)) + 1
@@ -177,7 +176,6 @@ def smooth_noise(mesh: Mesh, length: float) -> Mesh:
     Args:
         mesh: Any.
         length: Edge length wanted [m].
-
     """
     if not _is_noisy(mesh, length):
         return mesh
@@ -209,7 +207,6 @@ def find_patches(mesh: Mesh, length: float, label: Int[np.ndarray, " T"] | None 
         mesh: Wound consistently.
         length: Edge length wanted [m]; what is finer makes no patch.
         label: Triangles of different labels belong to different patches.
-
     """
     one, other, along, crease = _crease_edges(mesh)
     same = np.ones(len(one), dtype=bool) if label is None else label[one] == label[other]
@@ -275,7 +272,6 @@ def remesh(
 
     Returns:
         The mesh, whose vertices lie on the source, and what projects onto it.
-
     """
     projection = projection or PatchProjection(source)
     now = source

@@ -36,7 +36,6 @@ def solid_pieces(mesh: Mesh) -> Int[np.ndarray, " T"]:
 
     Args:
         mesh: Normals outward.
-
     """
     edges, number, count = unique_edges(mesh.triangles)
     order = np.argsort(number.ravel(), kind="stable")

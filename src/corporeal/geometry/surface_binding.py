@@ -46,7 +46,6 @@ def bind_to_surface(points: Float[np.ndarray, "N 3"], surface: TriangleSurface) 
     Args:
         points: [m]
         surface: At rest.
-
     """
     mesh = Mesh(np.asarray(surface.vertices, dtype=np.float64), np.asarray(surface.triangles, dtype=np.int64))
     points = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 3)

@@ -31,7 +31,6 @@ def fragment_seeds(points: FragmentPoints, struck: Float[np.ndarray, "3"], rng: 
         points: Of all of the object [m].
         struck: Where it is struck [m].
         rng: Makes the choice.
-
     """
     away = np.linalg.norm(points - struck, axis=1)
     chance = 1.0 / (away**2 + (NEAR_IMPACT_DISTANCE_FRACTION * np.ptp(points, axis=0).max()) ** 2)
@@ -59,7 +58,6 @@ def cut_fragments(surface: Surface, wall: float, seed: Float[np.ndarray, "S 3"])
         surface: Closed.
         wall: Thickness of a hollow object whose outside alone is modelled [m]; 0: it is solid.
         seed: One per piece [m].
-
     """
     body = _fragment_solid(surface, wall)
     if body is None:

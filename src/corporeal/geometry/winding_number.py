@@ -67,7 +67,6 @@ def vertical_line_table(mesh: Mesh, open_edges: OpenEdges | None = None) -> Vert
         mesh: The mesh.
         open_edges: Its own, from ``unbalanced_edges``, where they are known already: they depend
             on its triangles alone.
-
     """
     known = unbalanced_edges(mesh) if open_edges is None else open_edges
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))

@@ -22,7 +22,6 @@ def decode_image(data: bytes, side: int = MAX_IMAGE_SIDE_PX) -> UInt8[np.ndarray
 
     Raises:
         ValueError: The bytes are no such picture, or it is broken or absurdly large.
-
     """
     return _decode_checked(data, lambda picture: as_reduced_array(picture, side))
 
@@ -32,7 +31,6 @@ def as_reduced_array(picture: Image.Image, side: int = MAX_IMAGE_SIDE_PX) -> UIn
 
     Raises:
         ValueError: It claims to be absurdly large.
-
     """
     if picture.width * picture.height > MAX_IMAGE_PIXELS:
         size = f"{picture.width} × {picture.height}"
@@ -45,7 +43,6 @@ def decode_grey_numbers(data: bytes) -> UInt16[np.ndarray, "H W"]:
 
     Raises:
         ValueError: The bytes are no such picture, or it is broken or absurdly large.
-
     """
     return _decode_checked(data, _numbers)
 
@@ -57,7 +54,6 @@ def decode_instances(data: bytes) -> Int32[np.ndarray, "H W"]:
 
     Raises:
         ValueError: The bytes are no such picture, or it is broken or absurdly large.
-
     """
     return _decode_checked(data, _instances)
 

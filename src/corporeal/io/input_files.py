@@ -29,7 +29,6 @@ def input_kind(inputs: Sequence[Path]) -> InputKind:
 
     Raises:
         UserError: Photographs or a splat are named beside something else.
-
     """
     kinds: list[InputKind] = [_path_kind(Path(path)) for path in inputs]
     if len(kinds) > 1 and set(kinds) != {"model"}:
@@ -74,7 +73,6 @@ def read_scene(path: Path) -> SceneFile:
 
     Raises:
         UserError: It cannot be used.
-
     """
     reader = reader_of(path, "scene")
     assert reader is not None, "only scene files are read"
@@ -184,7 +182,6 @@ def unread_images_note(photographs: Sequence[Path]) -> list[str]:
 
     Args:
         photographs: Of one folder; what has the name of one but for its suffix is its raw picture.
-
     """
     if not photographs:
         return []
@@ -205,7 +202,6 @@ def nested_images(folder: Path, photographs: Sequence[Path]) -> list[Path]:
     Args:
         folder: What lies in it, up to two below, is looked at; not where systems hide copies.
         photographs: Those that are used, all of one place.
-
     """
     aside = {file.parent for file in photographs}
     return [
@@ -226,7 +222,6 @@ def unused_nested_images_note(folder: Path, photographs: Sequence[Path]) -> list
     Args:
         folder: Of the photographs.
         photographs: Those that are used; what has the name of one is it in another size or kind.
-
     """
     known = {file.stem for file in photographs}
     more = [file for file in nested_images(folder, photographs) if file.stem not in known]
@@ -277,7 +272,6 @@ def list_companions(path: Path) -> list[Path]:
 
     Raises:
         UserError: The file cannot be read.
-
     """
     reader = reader_of(path)
     if reader is None or not reader.companions:

@@ -60,7 +60,6 @@ def read_keyframe_file(file: Path, fail: FailCallback) -> tuple[Vector, Keyframe
 
     Raises:
         BadFileError: It cannot be read, or a line is none.
-
     """
     if not file.is_file():
         fail(f"there is no file {str(file)!r}.", "Check the path: it counts from the scene file.")

@@ -54,7 +54,6 @@ def load_model(path: Path, objects: ObjectGrouping = "auto", frame: MeshFrame = 
 
     Raises:
         BadFileError: The file cannot be used, or is a glTF and ``frame`` says something.
-
     """
     model = _read_by_suffix(Path(path), objects, frame)
     if objects != "auto" or model.stated or len(model.scene.surfaces) == 1:

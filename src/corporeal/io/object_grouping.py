@@ -38,7 +38,6 @@ def group_pieces_into_objects(whole: Scene, pieces: Scene) -> Scene:
     Args:
         whole: The file as one object.
         pieces: The same file with one object for every piece; surfaces in any order.
-
     """
     if not 1 < len(pieces.objects) <= MAX_PIECES:
         return whole

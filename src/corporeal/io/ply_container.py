@@ -65,7 +65,6 @@ def read_ply_elements(path: Path, data: memoryview) -> dict[str, PlyColumns]:
 
     Raises:
         BadFileError: It is no PLY, or it ends before its header says.
-
     """
     order, elements, start = _parse_header(path, data)
     body = _TextBody(path, data[start:]) if not order else _BinaryBody(path, data[start:], order)

@@ -14,7 +14,6 @@ def decode_data_uri(uri: str) -> bytes:
 
     Raises:
         ValueError: It is broken.
-
     """
     head, comma, body = uri.partition(",")
     if not comma:
@@ -44,7 +43,6 @@ def read_beside(folder: Path, uri: str, most: int) -> bytes:
 
     Raises:
         ValueError: It leads elsewhere, is missing, or is larger than ``most`` bytes.
-
     """
     path = path_beside(folder, uri)
     if path is None:

@@ -172,7 +172,6 @@ def reader_of(path: Path, *kinds: ReaderKind) -> Reader | None:
     Args:
         path: It may be absent.
         kinds: The readers that are asked; without any, all.
-
     """
     suffix = path.suffix.lower()
     fitting = [r for r in readers_of(*kinds) if suffix in r.suffixes or path.name in r.folder_files[:1]]
@@ -195,7 +194,6 @@ def require_packages(reader: Reader, path: Path) -> None:
 
     Raises:
         BadFileError: A package is missing.
-
     """
     missing = [name for name in reader.packages if find_spec(name) is None]
     if missing:

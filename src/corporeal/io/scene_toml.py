@@ -99,7 +99,6 @@ def read_scene_file(path: Path) -> SceneFile:
 
     Raises:
         BadFileError: It is no TOML, has an unknown key, or a value of the wrong kind or size.
-
     """
     return _checked_scene(path, _parsed(path, _load(path)))
 
@@ -110,7 +109,6 @@ def write_scene_file(path: Path, scene: SceneFile) -> None:
     Raises:
         BadFileError: Reading would refuse it; nothing is written.
         UserError: The disk refuses it.
-
     """
     data = "\n".join(_lines(replace(scene, path=path))).encode(errors="surrogatepass")
     _checked_scene(path, _parsed(path, data))

@@ -147,7 +147,6 @@ def local_executor(
         threads: Of each scene.
         progress: Called with the fraction done.
         say: Told each event in a sentence.
-
     """
     slots = slots or max(1, usable_cores() // threads)
     return Executor(lambda: local_worker_pool(slots, threads, Path(folder) / LOG_FOLDER), progress, say)

@@ -98,7 +98,6 @@ def ray_worker_pool(slots: int, threads: int, gpus: float, address: str) -> Iter
 
     Raises:
         UserError: Ray is not installed, or there is no such cluster.
-
     """
     os.environ.update(RAY_ENVIRONMENT)
     try:

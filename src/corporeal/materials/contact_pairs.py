@@ -87,7 +87,6 @@ def pair_restitution(a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IMPACT
         a: One body.
         b: The other.
         speed: Of the impact [m/s].
-
     """
     solid = a.solid and b.solid
     by_person = any(is_stated_by_person(s.material, "restitution") for s in (a, b))
@@ -140,7 +139,6 @@ def pair_restitution_law(a: ImpactBody, b: ImpactBody, speed: float = NOMINAL_IM
         a: One body.
         b: The other.
         speed: Of the impact [m/s].
-
     """
     now, slow, fast = (pair_restitution(a, b, v).value for v in (speed, 0.0, FULL_YIELD_SPEED_M_S))
     limit = yield_restitution(*_yielding_materials(a, b), FULL_YIELD_SPEED_M_S)

@@ -136,7 +136,6 @@ def crush_restitution(ball: ImpactingBall, sheet: LayeredSheet, speed: float, pa
         sheet: What is struck.
         speed: Of the impact [m/s].
         packed: Restitution of the ball and the packed sheet [-].
-
     """
     made, struck = material_across_layers(sheet.material), material_at_speed(ball.material, speed)
     of_sheet = compliance_share(made, struck)
@@ -167,7 +166,6 @@ def crush_restitution_law(ball: ImpactingBall, sheet: LayeredSheet, speed: float
         sheet: What is struck.
         speed: Of the impact [m/s].
         packed: As in ``crush_restitution``.
-
     """
     whole, slower, now = (crush_restitution(ball, sheet, v, packed) for v in (0.0, 0.25 * speed, speed))
     power = max(0.0, log(slower / now) / log(4.0)) if min(slower, now) > 0.0 else 0.0

@@ -32,7 +32,6 @@ def library(name: str = "default") -> dict[str, MaterialEntry]:
 
     Raises:
         UserError: There is no such library, or the file has a mistake.
-
     """
     if name in SHIPPED_LIBRARY_FILES:
         return shipped_library(name)
@@ -56,7 +55,6 @@ def find_material(name: str, library_name: str = "default") -> MaterialEntry:
 
     Raises:
         UnknownChoiceError: No material has that name or alias.
-
     """
     known, wanted = library(library_name), comparable_name(name)
     named = [e for e in known.values() if wanted == comparable_name(e.name)]
@@ -84,7 +82,6 @@ def find_material_or_default(name: str, library_name: str) -> MaterialEntry:
 
     Raises:
         UnknownChoiceError: Neither has that name or alias.
-
     """
     try:
         return find_material(name, library_name)
@@ -97,7 +94,6 @@ def library_counterpart(entry: MaterialEntry, library_name: str) -> MaterialEntr
 
     Raises:
         UserError: The library has neither.
-
     """
     known = library(library_name)
     for name in (entry.name, entry.published):
@@ -114,7 +110,6 @@ def read_library(path: Path) -> dict[str, MaterialEntry]:
 
     Raises:
         BadFileError: The file cannot be read, or has a mistake; the first one is reported.
-
     """
     try:
         stat = path.stat()
@@ -128,7 +123,6 @@ def check_library(path: Path) -> list[LibraryProblem]:
 
     Raises:
         BadFileError: The file cannot be read.
-
     """
     return lint_library(_text(path), source_table(), tuple(SHIPPED_LIBRARY_FILES))
 

@@ -56,7 +56,6 @@ class MaterialEntry:
         Raises:
             OutOfRangeError: A value lies outside the measured range.
             UserError: The library has no such number, or nothing can be computed with it.
-
         """
         for name, ground in grounds.items():
             quantity, allowed = QUANTITIES[name], self.ranges.get(name)

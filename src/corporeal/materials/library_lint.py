@@ -62,7 +62,6 @@ def lint_library(text: str, sources: Mapping[str, Any], bases: tuple[str, ...]) 
         text: The TOML file.
         sources: Source keys that are known without the file saying so.
         bases: Names that ``extends`` may have.
-
     """
     try:
         tables = tomllib.loads(text)

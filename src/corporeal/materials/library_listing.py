@@ -117,7 +117,6 @@ def materials_json(
         parts: The catalogue.
         masses: Of each part in the scene [kg], where they are known.
         scales: Scene size over real size of each part.
-
     """
     pieces = field.pieces or ((),) * len(field.materials)
     rows = zip(parts.catalogue, field.materials, field.structures, field.words, pieces, strict=True)

@@ -16,7 +16,6 @@ def restitution_of_loss(loss: float) -> float:
 
     Args:
         loss: Loss factor η = tan δ [-], from 0 to 2.
-
     """
     return exp(LOG_RESTITUTION_LINEAR * loss + LOG_RESTITUTION_QUADRATIC * loss * loss)
 
@@ -31,7 +30,6 @@ def loss_of_restitution(restitution: float) -> float:
 
     Args:
         restitution: e [-], from 0.11 (loss 2) to 1.
-
     """
     inside = LOG_RESTITUTION_LINEAR**2 + 4.0 * LOG_RESTITUTION_QUADRATIC * log(restitution)
     return (-LOG_RESTITUTION_LINEAR - sqrt(inside)) / (2.0 * LOG_RESTITUTION_QUADRATIC)

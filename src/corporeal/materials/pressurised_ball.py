@@ -47,7 +47,6 @@ def lost_volume_fraction(squeeze: float) -> float:
 
     Args:
         squeeze: x/R [-].
-
     """
     return 0.75 * squeeze**2 * (1.0 - squeeze / 3.0)
 
@@ -60,7 +59,6 @@ def pressed_gauge_pressure(gauge: float, squeeze: float = REFERENCE_SQUEEZE_RATI
     Args:
         gauge: Before [Pa].
         squeeze: Depth over radius [-].
-
     """
     return (ATMOSPHERIC_PRESSURE_PA + gauge) * (
         1.0 - lost_volume_fraction(squeeze)
@@ -85,7 +83,6 @@ def is_carried_by_air(gauge: float, skin: Material, thickness: float, radius: fl
         skin: Material of the wall.
         thickness: Of the wall [m].
         radius: Of the ball [m].
-
     """
     return 2.0 * pi * radius * pressed_gauge_pressure(gauge) > wall_stiffness(skin, thickness, radius)
 
@@ -147,7 +144,6 @@ def equivalent_solid(ball: InflatedBall, energy: float) -> EquivalentSolid:
     Args:
         ball: What is struck.
         energy: Of the impact [J].
-
     """
     depth = max(ball.squeeze(energy), REFERENCE_SQUEEZE_RATIO)
     flat = pi * ball.radius**2 * (2.0 * depth - depth**2)
@@ -181,7 +177,6 @@ def sealed_air_material(gauge: float) -> Material:
 
     Args:
         gauge: Pressure above that of the air around it [Pa].
-
     """
     young_pa = MODULUS_PRESSURE_RATIO * pressed_gauge_pressure(gauge)
     density = AIR_DENSITY * (1.0 + gauge / ATMOSPHERIC_PRESSURE_PA)
@@ -226,7 +221,6 @@ def solid_with_ruled_restitution(material: Material, rebound: float | None) -> M
     Args:
         material: What it is made of.
         rebound: Restitution on a hard floor [-]; None: no rule is known.
-
     """
     if rebound is None or is_stated_by_person(material, "restitution"):
         return material
@@ -248,7 +242,6 @@ def air_with_ruled_restitution(inner: Material, rebound: float | None) -> Materi
     Args:
         inner: What wall and air are simulated as.
         rebound: Restitution on a hard floor [-]; None: no rule is known.
-
     """
     if rebound is None:
         return inner

@@ -72,7 +72,6 @@ def parse_quantity_key(key: str) -> tuple[str, float]:
 
     Raises:
         UserError: The key names no quantity, or the unit is not one of that quantity's.
-
     """
     if key in QUANTITIES and QUANTITIES[key].unit == "-":
         return key, 1.0

@@ -56,7 +56,6 @@ def value_contradictions(
 
     Returns:
         Field → why it does not fit, in a clause.
-
     """
     found = {}
     for bond in QUANTITY_BONDS:

@@ -54,7 +54,6 @@ def material_at_speed(material: Material, speed: float) -> Material:
     Args:
         material: With its values at the speed at which it was rated.
         speed: Of the impact [m/s].
-
     """
     rating = rated_restitutions().get(material.name)
     if rating is None:
@@ -83,7 +82,6 @@ def yield_restitution(a: Material, b: Material, speed: float) -> float:
         a: One material.
         b: The other; the denser is taken for the ball's.
         speed: Of the impact [m/s].
-
     """
     weak = [m.yield_stress for m in (a, b) if m.law is Law.VON_MISES and m.yield_stress]
     if not weak or speed <= 0.0:

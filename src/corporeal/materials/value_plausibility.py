@@ -32,7 +32,6 @@ def range_doubt(key: str, span: tuple[float, float], name: str, group: str, law:
         name: The material's name in the file.
         group: The material's group, "" for none.
         law: The material's law, where it has a known one.
-
     """
     field, factor = parse_quantity_key(key)
     quantity = QUANTITIES[field]

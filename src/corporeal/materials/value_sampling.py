@@ -184,7 +184,6 @@ def sample_material_field(
         rng: Source of the draw.
         library: Where materials are looked up.
         floor: What the floor and the walls are made of.
-
     """
     grades = GradeDraws(rng, {})
     made = [_draw_material(m, owner, grades, library) for m, owner in zip(field.materials, object_of_part, strict=True)]

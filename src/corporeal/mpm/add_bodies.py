@@ -43,7 +43,6 @@ def adopt_running_conditions(problem: Problem, running: Problem) -> Problem:
     Args:
         problem: With those that join after all others.
         running: What was simulated until now.
-
     """
     blown = [replace(body, wind=old.wind) for body, old in zip(problem.bodies, running.bodies, strict=False)]
     return replace(

@@ -72,7 +72,6 @@ class BodySums:
             affine: C [1/s].
             energy: What each holds.
             cell: dx [m].
-
         """
         x, v, mass, spread = now.position, now.velocity, matter.mass, 0.25 * cell**2
         swirl = np.stack([affine[:, i, j] - affine[:, j, i] for i, j in _AXIAL_COMPONENTS], axis=1)

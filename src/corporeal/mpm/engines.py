@@ -32,7 +32,6 @@ def engine_class(engine: str) -> type[Engine]:
 
     Raises:
         UnknownChoiceError: There is no such engine.
-
     """
     return registry.load_backend("engine", engine, ENGINES)
 
@@ -48,7 +47,6 @@ def build_engine(problem: Problem, engine: str = DEFAULT_ENGINE, threads: int | 
     Raises:
         UnknownChoiceError: There is no such engine.
         UserError: The engine does not work on this machine, or cannot solve the problem.
-
     """
     chosen = registry.load_backend("engine", engine, ENGINES)
     return chosen(problem) if threads is None else chosen(problem, threads=threads)
@@ -59,7 +57,6 @@ def require(engine: Engine, capability: type[C]) -> C:
 
     Raises:
         UserError: It has not.
-
     """
     require_of_class(type(engine), capability)
     assert isinstance(engine, capability)
@@ -71,7 +68,6 @@ def require_of_class(engine: type[Engine], capability: type) -> None:
 
     Raises:
         UserError: It has not.
-
     """
     if not issubclass(engine, capability):
         raise UserError(

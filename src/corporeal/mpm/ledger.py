@@ -84,7 +84,6 @@ class EngineLedger:
             normal: Of every contact, from the first partner to the second.
             point: Where it acts [m].
             time: Now [s].
-
         """
         bodies = len(self.external_impulse)
         size = np.sum(impulse * normal, axis=1)

@@ -73,7 +73,6 @@ class MaterialTable:
 
         Raises:
             SimulationError: A particle follows a law that there is not.
-
         """
         rows = np.concatenate([_body_rows(problem, b) for b in range(len(problem.bodies))])
         body = rows[:, 0].astype(np.int64)
@@ -140,7 +139,6 @@ class MaterialTable:
         Args:
             row: Of each particle.
             dt: Of this step [s].
-
         """
         drag = self.consistency[row] * dt ** -self.flow_index[row]
         given = [f.name for f in fields(YieldParameters) if f.name != "drag"]

@@ -41,7 +41,6 @@ class NativeRecord:
 
         Raises:
             ValueError: A type is none of these.
-
         """
         self.name = name
         inner = NUMPY_TYPE_NAMES | {record.name: record.dtype for record in within}

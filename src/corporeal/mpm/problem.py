@@ -348,7 +348,6 @@ class Engine(Protocol):
         Raises:
             SimulationError: A particle is not finite or left the domain; the message says which body, when, and what to
                 do. The state is that of the last good check.
-
         """
         ...
 
@@ -402,7 +401,6 @@ class InteractiveEngine(Protocol):
 
         Raises:
             UserError: There is no such body, or something is not finite.
-
         """
         ...
 
@@ -417,7 +415,6 @@ class InteractiveEngine(Protocol):
 
         Raises:
             UserError: There is no such body, it is not held, or something is not finite.
-
         """
         ...
 
@@ -427,7 +424,6 @@ class InteractiveEngine(Protocol):
         Args:
             body: Which.
             position: Of all particles, as ``snapshot`` gives it now [m].
-
         """
         ...
 
@@ -441,7 +437,6 @@ class VariableLoadEngine(Protocol):
 
         Raises:
             UserError: It is not finite.
-
         """
         ...
 
@@ -451,7 +446,6 @@ class VariableLoadEngine(Protocol):
         Raises:
             UserError: There is no such body, it was given no faces for the wind, or the velocity
                 is not finite.
-
         """
         ...
 
@@ -468,7 +462,6 @@ class BodyAddingEngine(Protocol):
 
         Args:
             problem: With the new bodies, as they start, after all others.
-
         """
         ...
 

@@ -420,7 +420,6 @@ class State:
             then: Particle constants of the other problem, in which these bodies have their numbers.
             matter: Of this one.
             whole: Bodies that are the same in both.
-
         """
         mine, body = self._of(matter, whole)
         theirs, their_body = there._of(then, whole)

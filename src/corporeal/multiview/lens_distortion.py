@@ -76,7 +76,6 @@ def undistort_image(
 
     Raises:
         ValueError: The lens bends more than that allows.
-
     """
     if lens.straight:
         return picture, lens.K
@@ -98,7 +97,6 @@ def redistort_image(picture: Float32[np.ndarray, "H W"], lens: Lens) -> Float32[
 
     Raises:
         ValueError: The lens bends more than that allows.
-
     """
     if lens.straight:
         return picture

@@ -53,7 +53,6 @@ class LinesOfSight:
             low: Middle of the first cell.
             side: Of a cell.
             shape: How many cells there are along x, y and z.
-
         """
         # numba takes a quarter of a second to import, and models have no lines of sight.
         from corporeal.multiview.kernels_lines_of_sight import march_lines

@@ -74,7 +74,6 @@ def choose_metric_scale(
 
     Raises:
         UserError: A size is not positive and finite.
-
     """
     witnesses = [distance, scale_from_extents(stated), file, scale_from_extents(usual)]
     heard = [w for w in witnesses if w is not None]
@@ -90,7 +89,6 @@ def scale_from_extents(extents: Sequence[ObjectExtent]) -> MetricScale | None:
 
     Raises:
         UserError: A size is not positive and finite.
-
     """
     if not extents:
         return None
@@ -146,7 +144,6 @@ def scale_from_distance(a: Vector, b: Vector, metres: float) -> MetricScale:
 
     Raises:
         UserError: The points are one, or the distance is not positive and finite.
-
     """
     units = math.dist(a, b)
     scale = _scale_ratio(metres, units, "The distance of the two points")
@@ -164,7 +161,6 @@ def stated_metric_scale(per_unit: float | None, points: MeasuredDistance | None,
 
     Raises:
         UserError: Both were stated, or a statement makes no sense.
-
     """
     if per_unit is not None and points is not None:
         raise UserError("--metres-per-unit and --known-distance exclude each other. Give one of them.")
@@ -186,7 +182,6 @@ def implausible_scene_extent(extent: float) -> str | None:
 
     Args:
         extent: Of the whole [m].
-
     """
     low, high = PLAUSIBLE_SCENE_EXTENTS_M
     if low <= extent <= high:

@@ -38,7 +38,6 @@ def point_normals(
         position: World [m].
         near: Neighbours of every point.
         towards: Roughly where the outside is, of any length.
-
     """
     made = np.empty((len(position), 3))
     for start in range(0, len(position), 1 << 16):
@@ -64,7 +63,6 @@ def medial_ball_thickness(
     Args:
         position: World [m].
         normal: Unit, outward.
-
     """
     tree = KDTree(position, leafsize=KDTREE_LEAF_SIZE)
     every = np.linspace(0, len(position) - 1, min(MAX_FITTED_BALLS, len(position))).astype(np.int64)

@@ -111,7 +111,6 @@ def outlier_views(
         masks: 255: the object; views with an empty one say nothing.
         cameras: In any frame and unit.
         bounds: Of what is right.
-
     """
     if len(cameras) < MIN_VIEWS_FOR_OUTLIERS:
         return ()

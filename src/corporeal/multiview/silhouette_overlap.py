@@ -35,7 +35,6 @@ def compare_silhouettes(
         cameras: One or more.
         masks: 255: the objects. Of any size, in the proportions of the camera's picture.
         rng: Where points fall on the surfaces.
-
     """
     points = sample_meshes(meshes, SILHOUETTE_SAMPLES_COUNT, rng)
     found = []

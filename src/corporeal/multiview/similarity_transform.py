@@ -43,7 +43,6 @@ def decompose_similarity(matrix: SimilarityMatrix) -> SimilarityTransform:
 
     Raises:
         ValueError: The matrix mirrors, shears, or is not finite.
-
     """
     if not np.isfinite(matrix).all():
         raise ValueError("A matrix with numbers that are not finite is not a similarity.")

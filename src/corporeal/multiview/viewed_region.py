@@ -30,7 +30,6 @@ def find_viewed_region(cameras: tuple[Camera, ...], points: Float[np.ndarray, "N
         cameras: One or more.
         points: On what is in the pictures. Where all cameras look the same way, so that their axes do not cross, the
             middle of those that most of them see is the ball's.
-
     """
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     axes, sines = (np.stack(each) for each in zip(*map(_centre_ray, cameras), strict=True))

@@ -104,7 +104,6 @@ def align_world(
         of_objects: Points that are on objects for sure, as masks tell; None: unknown.
         usual: What is up in such files as a rule; for want of cameras.
         stated: Stated by the user.
-
     """
     points, of_objects = (_fewer_points(points), None if of_objects is None else _fewer_points(of_objects))
     around = _scene_ball(cameras, points if of_objects is None else of_objects)

@@ -48,7 +48,6 @@ def load_scene(
     Raises:
         UserError: The file does not exist or cannot be used; photographs and splats hold no
             objects before they are reconstructed.
-
     """
     path = Path(path)
     if not path.exists():
@@ -76,7 +75,6 @@ def prepare_scene(
 
     Raises:
         UserError: A setting is invalid, or the scene cannot be filled.
-
     """
     progress(0.0, "recognising")
     inventory = describe(scene, settings.describe, settings.ground.library)
@@ -98,7 +96,6 @@ def pose_problem(prepared: PreparedScene, settings: Settings = DEFAULT_SETTINGS)
     Args:
         prepared: The scene.
         settings: ``settings.simulate.contact`` is used.
-
     """
     contact = settings.simulate.contact
     return build_model(prepared.scene, prepared.particles, prepared.field, contact).problem
@@ -121,7 +118,6 @@ def simulate_scene(
     Raises:
         UserError: A setting is invalid, or the scene cannot be filled.
         SimulationError: The simulation diverged.
-
     """
     ready = scene if isinstance(scene, PreparedScene) else prepare_scene(scene, settings, progress)
     place = Path(tempfile.mkdtemp(prefix="corporeal-") if folder is None else folder)

@@ -117,7 +117,6 @@ class MassSampler:
         Args:
             field: What it is made of.
             leeways: Of what each member's surface encloses; None: as its mesh says.
-
         """
         found = np.zeros(len(self.scene.objects))
         built = self._as_built(field)
@@ -201,7 +200,6 @@ def ground_with_mass_posterior(
 
     Raises:
         UserError: As ``ground``.
-
     """
     if not inventory.transcript:  # only ranges are uncertain
         return ground(scene, parts, _with_named_mass(scene, parts, inventory, grounding), grounding)
@@ -291,7 +289,6 @@ def sample_hypotheses(
         mixtures: Masses of its objects, in their order; empty: no evidence.
         rng: Source of the draw.
         library: Where materials are looked up.
-
     """
     words = draw_hypotheses(inventory, rng, library)
     if not mixtures:

@@ -82,7 +82,6 @@ def run(
     Raises:
         UserError: An input cannot be used, the disk is full, another process works in the folder, or the simulation
             cannot go on.
-
     """
     folder = Path(folder)
     with open_run([Path(path) for path in inputs], folder, settings, tell, until):
@@ -106,7 +105,6 @@ def open_run(
 
     Yields:
         The results and their key.
-
     """
     with store.lock_folder(folder), store.disk_errors(folder):
         work = _Run(inputs, folder, settings, tell)
@@ -127,7 +125,6 @@ def read_run_request(folder: Path) -> RunRequest:
 
     Raises:
         UserError: The folder is not a run.
-
     """
     if not folder.exists():
         raise UserError(f"{folder} is not a run: there is no such folder. Check the path.")
@@ -141,7 +138,6 @@ def read_run(folder: Path) -> StageResults:
 
     Raises:
         UserError: The folder is not a run.
-
     """
     read_run_request(folder)
     made = StageResults()
@@ -184,7 +180,6 @@ def stage_states(folder: Path) -> list[StageState]:
 
     Raises:
         UserError: The folder is not a run.
-
     """
     inputs = read_run_request(folder).inputs
     rows = []
@@ -203,7 +198,6 @@ def stages_for(inputs: list[Path]) -> tuple[str, ...]:
 
     Raises:
         UserError: The inputs cannot be combined.
-
     """
     return STAGES[1:] if input_kind(inputs) == "model" else STAGES
 
@@ -225,7 +219,6 @@ def write_showcase(name: str, folder: Path) -> Path:
 
     Raises:
         UnknownChoiceError: There is no such scene.
-
     """
     from corporeal.showcase.showcase_scenes import build_showcase_scene
 
@@ -247,7 +240,6 @@ def write_cached_showcase(name: str, folder: Path) -> Path:
 
     Raises:
         UnknownChoiceError: There is no such scene.
-
     """
     recipe = store.result_key("showcase", {p: version(p) for p in SHOWCASE_PACKAGES}, [name, store.source_digest()])
     kept = store.cache_folder("scenes") / f"{name}-{recipe}.glb"

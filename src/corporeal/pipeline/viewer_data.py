@@ -41,7 +41,6 @@ def record_trajectory(cast: SceneBinding, trajectory: Trajectory, fps: float = M
         cast: From ``bind_scene``.
         trajectory: Frames are read one by one.
         fps: [1/s]
-
     """
     count = len(trajectory.frames)
     length = float(trajectory.time[-1] - trajectory.time[0]) if count > 1 else 0.0
@@ -67,7 +66,6 @@ def viewer_recording(
         recording: From ``record_trajectory``; None: as for ``happened``.
         audit: Warnings and numbers, where the run has been reported on.
         found: Gaussians of the reconstruction, to be shown; None: surfaces only.
-
     """
     summary = scene_summary(prepared)
     if happened is not None:

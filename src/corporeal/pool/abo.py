@@ -47,7 +47,6 @@ def abo_candidates(root: Path) -> list[PoolCandidate]:
 
     Raises:
         UserError: The folder has not ABO's layout, or a table in it is broken.
-
     """
     if not (root / ABO_MODELS_TABLE).is_file():
         raise UserError(f"{root}: {ABO_MODELS_TABLE} is not there. {ABO_UNPACK_HELP}")

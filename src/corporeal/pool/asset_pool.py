@@ -27,7 +27,6 @@ def draw_least_used(
 
     Raises:
         ValueError: There are fewer names than asked for, and none may repeat.
-
     """
     if not names or (count > len(names) and not repeat):
         raise ValueError(f"{count} of {len(names)}")
@@ -41,7 +40,6 @@ def parse_count_range(asked: str) -> tuple[int, int]:
 
     Raises:
         UserError: It is neither.
-
     """
     low, _, high = asked.partition("-")
     if not low.strip().isdigit() or not (high or low).strip().isdigit():

@@ -136,7 +136,6 @@ class _SourceTexture:
             triangles: New triangles on them.
             face: For each vertex, the nearest old triangle.
             weights: Where in it.
-
         """
         corners = x[triangles]
         middle = corners.mean(axis=1)

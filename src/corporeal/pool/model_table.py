@@ -43,7 +43,6 @@ def read_model_table(path: Path, places: Sequence[Path]) -> dict[Path, ModelRow]
 
     Raises:
         BadFileError: It is no such table.
-
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:

@@ -52,7 +52,6 @@ def objaverse_candidates(cache: Path | None = None) -> list[PoolCandidate]:
 
     Raises:
         UserError: There is no such cache, or a file in it is broken.
-
     """
     root = (cache or OBJAVERSE_CACHE).expanduser()
     if not (root / OBJAVERSE_PATHS_FILE).is_file():
@@ -74,7 +73,6 @@ def fetch_objaverse(wanted: WantedModels) -> Path:
 
     Raises:
         UserError: The package is not installed, the network fails, or a category is unknown.
-
     """
     try:
         package: Any = importlib.import_module("objaverse")
@@ -97,7 +95,6 @@ def choose_models(lvis: dict[str, list[str]], wanted: WantedModels) -> list[str]
 
     Raises:
         UserError: A category is unknown.
-
     """
     known = {category_words(category): uids for category, uids in lvis.items()}
     chosen = []

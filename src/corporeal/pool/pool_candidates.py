@@ -40,7 +40,6 @@ def candidates_in(folders: Sequence[Path], table: Path | None = None, pool: Path
 
     Raises:
         UserError: A folder is absent, or a table cannot be used.
-
     """
     declared = {} if table is None else read_model_table(table, [table.parent, *folders])
     found: dict[Path, PoolCandidate] = {}
@@ -60,7 +59,6 @@ def model_files_below(folder: Path, pool: Path | None = None) -> list[Path]:
 
     Raises:
         UserError: There is no such folder.
-
     """
     if not folder.is_dir():
         raise UserError(f"{folder}: there is no such folder. Name a folder that holds models.")

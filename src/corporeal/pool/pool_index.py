@@ -41,7 +41,6 @@ def find_candidates(folders: Sequence[Path], config: OriginConfig, pool: Path) -
 
     Raises:
         UserError: There is nothing, or a folder, table or collection cannot be used.
-
     """
     if config.origin == "folders":
         found = candidates_in(folders, config.csv, pool)
@@ -98,7 +97,6 @@ def index_pool(
 
     Raises:
         UserError: A folder is absent, a table cannot be used, or another process works here.
-
     """
     folders = [Path(f) for f in folders]
     with store.lock_folder(pool_folder):
@@ -118,7 +116,6 @@ def read_pool(folder: Path) -> AssetPool:
 
     Raises:
         UserError: There is none in the folder, or its index is damaged.
-
     """
     members, rejections = _read_index(Path(folder))
     assets = sorted((m.asset for m in members), key=lambda a: (a.class_name, a.name))

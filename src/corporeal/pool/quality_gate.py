@@ -90,7 +90,6 @@ def inspect_model(
 
     Raises:
         Rejected: It is not good enough.
-
     """
     count = sum(len(s.triangles) for s in scene.surfaces)
     if count > max_read_triangles:

@@ -72,7 +72,6 @@ def singularise_words(words: Sequence[str], known: KnownWords, without_s: Callab
         words: Of a name.
         known: The words that there are.
         without_s: Cuts the s of a plural.
-
     """
     found: list[str] = []
     for word in words:

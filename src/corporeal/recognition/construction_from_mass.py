@@ -62,7 +62,6 @@ def best_mass_fit(masses: Sequence[float], said: float) -> int:
     Args:
         masses: Of the object, made in each way [kg].
         said: Stated by its name [kg].
-
     """
     off = [max(mass / said, said / mass) if mass > 0 else inf for mass in masses]
     well = [k for k, far in enumerate(off) if far <= GOOD_MASS_FIT_RATIO]

@@ -45,7 +45,6 @@ def infer_length_unit(file: Path, class_name: str, extent: float) -> InferredUni
         file: Its suffix tells whether it is of a kind that is made for printing.
         class_name: What it is.
         extent: Its largest extent, in the file's unit.
-
     """
     order = PRINT_UNIT_ORDER if file.suffix.lower() == ".stl" else METRES_OF_MODELLING_UNIT
     sizes = {name: extent * METRES_OF_MODELLING_UNIT[name] for name in order}
@@ -73,7 +72,6 @@ def infer_shared_unit(
         file: The mesh.
         extent: Its largest extent, in the file's unit.
         others: What the other meshes were taken for.
-
     """
     named = {o.unit for o in others if o is not None and o.unit}
     if (found is not None and found.unit) or len(named) != 1:

@@ -70,7 +70,6 @@ def mass_from_name_warning(name: str, mass: float, *names: str) -> str | None:
         name: Of the object, for the sentence.
         mass: That came out [kg].
         names: All that it is called.
-
     """
     said = mass_from_name(*names)
     if said is None or mass <= 0.0 or 1 / MASS_AGREEMENT_RATIO <= mass / said <= MASS_AGREEMENT_RATIO:

@@ -173,7 +173,6 @@ def infer_hollow_structure(
         evidence: All that the file says about it.
         walled: Whether wall thicknesses of a material were measured.
         from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
-
     """
     ware = from_pictures and any(names_open_vessel(name.words) for name in evidence.general)
     if ware and words.structure == "shell" and words.inflation is None:

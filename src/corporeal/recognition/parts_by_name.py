@@ -49,7 +49,6 @@ def name_words(name: str, phrases: Collection[tuple[str, ...]] = ()) -> list[str
     Args:
         name: Of a node, a mesh, a finish or a file.
         phrases: Of two words in which such a word means something: "yoga mat", "ice cube".
-
     """
     found = [w.lower() for run in letter_runs(name) for w in _cut_camel_case(run)]
     pairs = [pair in phrases for pair in pairwise(found)]

@@ -87,7 +87,6 @@ def numbered_names(classes: Sequence[str], titles: Sequence[str] = ()) -> list[s
         classes: What each object is, in words.
         titles: What each is called in its file. Where all of a class end in numbers of their own ("block_10",
             "block_11"), these are kept: a scene file that names them means them. Otherwise k counts from 0.
-
     """
     stems = [safe_name(words).replace(" ", "_") or "object" for words in classes]
     own = [re.search(r"(\d{1,6})$", title) for title in titles] or [None] * len(stems)

@@ -119,7 +119,6 @@ def apply_inflation(words: PartDescription, stated: float | None, usual: float |
         words: Of one part.
         stated: Stated gauge pressure [Pa]; None: none is stated.
         usual: That such objects have [Pa]; None: they are not sealed.
-
     """
     if words.structure not in SEALABLE_STRUCTURES:
         return words

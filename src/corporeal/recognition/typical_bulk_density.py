@@ -55,7 +55,6 @@ def typical_bulk_density(class_name: str, longest: float) -> TypicalBulkDensity 
     Args:
         class_name: Class of the object.
         longest: Its longest side [m].
-
     """
     named = normalised_words(class_name, _compounds())
     known = [e for e in _table() if set(singular_words(e.words)) <= set(named)]
@@ -71,7 +70,6 @@ def mass_warning(name: str, class_name: str, mass: float, sides: tuple[float, fl
         class_name: What it is.
         mass: [kg]
         sides: Of the smallest box around it [m].
-
     """
     across, deep = sorted(sides)[1:]
     room, face = sides[0] * sides[1] * sides[2], across * deep

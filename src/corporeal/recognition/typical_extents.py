@@ -66,7 +66,6 @@ def normalised_words(class_name: str, compounds: Mapping[str, tuple[str, ...]]) 
     Args:
         class_name: Class of an object: "golfball", "Kühlschrank".
         compounds: A known compound → the words that it is made of.
-
     """
     known = _vocabulary()
     said = [remove_unknown_accents(w, known.words) for w in translate_words(plain_words(class_name))]

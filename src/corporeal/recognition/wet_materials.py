@@ -22,7 +22,6 @@ def wet_material_values(
         names: Of the object and of its part.
         material: What it is made of.
         dry: Density of that [kg/m³].
-
     """
     said = {word for name in names for word in name.words}
     for row in _table():

@@ -76,7 +76,6 @@ def gaussians_from_source(
 
     Raises:
         BadFileError: Where pictures were taken from, or what they are of, cannot be determined.
-
     """
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="corporeal-") as name:
@@ -162,7 +161,6 @@ def _find_source_poses(source: Path, config: ReconstructConfig, folder: Path, pr
 
     Raises:
         BadFileError: They cannot be estimated, or are right for the surroundings of the object alone.
-
     """
     if not lacks_poses(source):
         return None
@@ -187,7 +185,6 @@ def _test_poses_by_masks(source: Path, posed: FoundPoses, force: bool, place: Pa
 
     Raises:
         BadFileError: It did not.
-
     """
     asking = subprogress(
         progress,
@@ -243,7 +240,6 @@ def _refuse_doubted_poses(source: Path, posed: FoundPoses, force: bool, step: st
 
     Raises:
         BadFileError: They are such, and nothing speaks for them.
-
     """
     if not posed.doubt:
         return posed

@@ -39,7 +39,6 @@ def masks_from_model(
 
     Raises:
         UserError: There is no such model, or what it found is no object.
-
     """
     masker = connect_mask_model(config.masks)
     learned = learned_masks(source, place, masker, config.object_names, progress)
@@ -66,7 +65,6 @@ def several_objects_reason(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Cam
 
     Returns:
         The clause, and which share of a mask the hull of all fills.
-
     """
     over = int(find_cropped_masks(masks >= MASK_MIN_U8).sum())
     share = silhouette_coherence(masks, cameras)

@@ -59,7 +59,6 @@ def radiance_field_points(
 
     Raises:
         UserError: Cameras, pictures and masks do not belong together.
-
     """
     gaussians, cameras, masks = taken.gaussians, taken.cameras, taken.masks
     masks = pixels_covered(gaussians, cameras, of_objects) if masks is None else masks
@@ -89,7 +88,6 @@ def foreground_of(source: Path, taken: GaussianScene) -> Foreground:
 
     Raises:
         UserError: Nothing stands out.
-
     """
     seen = gaussian_visibility(taken.gaussians, taken.cameras, taken.masks)
     found = np.flatnonzero(foreground_gaussians(taken.gaussians, taken.cameras, seen, taken.floor))

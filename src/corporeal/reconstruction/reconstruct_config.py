@@ -113,7 +113,6 @@ def validate_reconstruct(
         extents: Real largest extents, such as "duck=0.1" [m].
         asked: Whether a person or a model will be asked for the objects.
         source: What the pictures are called.
-
     """
     # A person who asks for help needs neither what trains nor what answers.
     from corporeal.reconstruction.gaussians import training_schedule

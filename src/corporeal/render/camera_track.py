@@ -90,7 +90,6 @@ def camera_track(shot: CameraShot, reel: MotionBounds, size: tuple[int, int], vi
         reel: What moves.
         size: Of the picture [px].
         view: Direction from the scene to the camera; None: where objects hide each other least.
-
     """
     seen = {"wide": [], "close": _struck_object(reel), "follow": _moving(reel)}[shot]
     if not seen:

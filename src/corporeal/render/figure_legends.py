@@ -115,7 +115,6 @@ def names_legend(entries: Sequence[LegendEntry], middle: float, top: float) -> P
         entries: Names and their colours.
         middle: Of the panel, from the left [px].
         top: Where the key begins [px].
-
     """
     rows = -(-len(entries) // 2)
     columns = [c for c in (entries[:rows], entries[rows:]) if c]
@@ -140,7 +139,6 @@ def scale_legend(marks: Sequence[ScaleTick], ramp: Float[np.ndarray, "N 3"], mid
         ramp: Colours from left to right, sRGB.
         middle: Of the panel, from the left [px].
         top: Where the key begins [px].
-
     """
     width, height = SCALE_BAR_SIZE_PX
     left, low = middle - width / 2, top + height

@@ -146,7 +146,6 @@ def fields_figure(
 
     Raises:
         UserError: The file cannot be written.
-
     """
     stage = RayScene(scene)
     camera = fit_camera(_boxes(scene), picture_px, fill=0.93)
@@ -174,7 +173,6 @@ def panel_legend(panel: CategoryPanel | NumericPanel, share: np.ndarray, corner:
         panel: What is shown.
         share: Pixels in which each part is seen.
         corner: Left and top of its picture [px].
-
     """
     left, top = corner
     middle, below = left + SHEET_PANEL_SIZE_PX[0] / 2, top + SHEET_PANEL_SIZE_PX[1]
@@ -191,7 +189,6 @@ def write_filmstrip(video: Video, path: Path, count: int = 6, width: int = 340) 
 
     Raises:
         UserError: The video cannot be read, or the file cannot be written.
-
     """
     last = max((len(video.times) or video_file.count_frames(video.path)) - 1, 0)
     numbers = [int(k) for k in np.unique(np.linspace(0, last, count).round())]
@@ -209,7 +206,6 @@ def write_image_row(pictures: Sequence[np.ndarray], words: Sequence[str], path: 
 
     Raises:
         UserError: The file cannot be written.
-
     """
     height, width = pictures[0].shape[:2]
     gap, foot = 6, 30

@@ -31,7 +31,6 @@ class LastRenderedPose:
             place: Of the vertices [m].
             normal: Their unit normals.
             time: Of the pose [s].
-
         """
         if self._pose is not None and len(place):
             before, turned = self._pose

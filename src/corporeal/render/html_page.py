@@ -16,7 +16,6 @@ def fill_page(room: str, name: str, **content: object) -> str:
         room: The package ("corporeal.pipeline.stages").
         name: Of the template, which names ``$style``.
         content: What takes the place of each ``$name``.
-
     """
     text = files(room).joinpath(name).read_text(encoding="utf-8")
     style = files("corporeal.render").joinpath("page.css").read_text(encoding="utf-8")

@@ -59,7 +59,6 @@ def mark_inaccurate_pixels(s, index, d, light, normal, depth, lit, first, lamps,
         first: The picture's row and column of the first one.
         lamps: The studio.
         out: Marks (rows, columns).
-
     """
     room = np.empty((5, 3), np.float32), np.empty(LIGHT_CHANNELS_PADDED, np.float32)
     _mark_inaccurate_pixels(s, index, d, light, normal, depth, lit, first, lamps, room, out)
@@ -154,7 +153,6 @@ def sets_needed(index, lit, normal, depth, out):
         normal: Of what pixels met (rows, columns, 3).
         depth: Its logarithm (rows, columns).
         out: Sets of directions of each (N,), 1 to ``MAX_SETS_PER_PIXEL``.
-
     """
     h, w = lit.shape
     half = SET_SIDE_PX // 2
@@ -177,7 +175,6 @@ def sampling_sets(who, row, column, out):
         row: Where in the picture they are (N,).
         column: The same.
         out: Numbers of sets (N,).
-
     """
     times = 0
     for k in range(len(row)):
@@ -195,7 +192,6 @@ def mean_of_sets(index, times, light, out):
         times: How often each asked (N,).
         light: One answer after the other (sum of ``times``, channels).
         out: Of all pixels (P, channels).
-
     """
     n = 0
     for k in range(len(index)):
@@ -223,7 +219,6 @@ def blend_resampled_light(s, index, light, normal, depth, asks, counts, known, r
         counts: Rays of each to the sky and to the sun.
         known: Light that was there before; then what is to be taken (rows, columns, channels).
         room: Thrice as much, the first third of it zeros; see ``kernels_ask.smooth``.
-
     """
     near, far = (-2, -1, 0, 1), (-4, 0, 4)
     off, wide, spare = room

@@ -56,7 +56,6 @@ def mark_shadowed_tiles(d, eye, lamps, ways, boxes, blur, shape, near, far):
         shape: Rows and columns of pixels.
         near: Marks of tiles (rows, columns): the sun, or some of a tile is above the horizon.
         far: The sky.
-
     """
     room = np.empty(3, np.float32), boxes.copy(), boxes.copy()
     hulls = boxes[:1].copy(), bounding_box_of(boxes)
@@ -156,7 +155,6 @@ def queue_corner_rays(tiles, eye, frame, tangent, size, first, lamps, ways, boxe
 
     Returns:
         How many rays are to be cast.
-
     """
     room = np.empty(3), np.empty(3, np.float32), bounding_box_of(boxes)
     return _queue_corner_rays(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker)
@@ -194,7 +192,6 @@ def subtract_hidden_sky(asker, free, ways, columns, light):
         ways: All that corners look along, as there.
         columns: Of corners.
         light: At the corners (rows, columns, 2): sky, its height.
-
     """
     many = len(ways) - 1
     for n in range(len(free)):
@@ -215,7 +212,6 @@ def floor_view_terms(d, index, eye, lamps, out):
         eye: Where they come from [m].
         lamps: The studio.
         out: Highlight, grazing share, and how much of the floor is seen before the backdrop (P, 3).
-
     """
     up, scratch = np.zeros(3, np.float32), np.empty(3, np.float32)
     up[2] = 1
@@ -245,7 +241,6 @@ def shade_soft_tiles(tiles, shape, lamps, sky, glances, mirrored, wall, out):
         mirrored: What each pixel of the band mirrors in the empty studio (P, 3).
         wall: Light of the backdrop (P, 3).
         out: Of the band (P, 3).
-
     """
     traits = np.zeros(6, np.float32)
     traits[1], traits[4] = FLOOR_ROUGHNESS, 1
@@ -295,7 +290,6 @@ def mark_outlined_tiles(vertices, triangles, eye, frame, tangent, size, out):
         tangent: Of half the vertical field of view.
         size: Width and height of the picture [px].
         out: Marks (rows, columns) of tiles; all of them where a triangle begins behind the eye.
-
     """
     row, column = np.empty(len(vertices)), np.empty(len(vertices))
     ahead = np.empty(len(vertices), np.bool_)

@@ -315,7 +315,6 @@ def shade_one(n, e, tint, traits, light, lamps, room, out):
         lamps: The studio.
         room: Scratch (2, 3).
         out: The light (3,).
-
     """
     spot, graze = view_terms(n, e, traits[1], lamps.sun, room[0])
     shade_with_view_terms(dot(n, lamps.sun), spot, graze, tint, traits, light, lamps, room[1], out)
@@ -331,7 +330,6 @@ def view_terms(n, e, rough, sun, h):
         rough: Roughness.
         sun: Unit direction towards it.
         h: Scratch (3,).
-
     """
     _normalised(sun[0] - e[0], sun[1] - e[1], sun[2] - e[2], h)
     alpha = max(rough * rough, 0.02)
@@ -354,7 +352,6 @@ def shade_with_view_terms(cos, spot, graze, tint, traits, light, lamps, sky, out
         lamps: The studio.
         sky: Scratch (3,).
         out: The light (3,).
-
     """
     metal, rough, through, emission, solid = traits[0], traits[1], traits[2], traits[3], traits[4]
     for c in range(3):

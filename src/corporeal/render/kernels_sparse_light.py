@@ -57,7 +57,6 @@ def mark_sampled_pixels(s, on, known, first, out):
         known: Which pixels were looked at (rows, columns).
         first: The picture's row and column of the first one.
         out: Marks (P,).
-
     """
     h, w = known.shape
     row, column = first
@@ -145,7 +144,6 @@ def queue_light_rays(s, index, number, pixel, lamps, ways, counts, boxes, o, w, 
 
     Returns:
         How many rays are to be cast.
-
     """
     hull = bounding_box_of(boxes)
     return _queue_light_rays(s, index, number, pixel, lamps, ways, counts, (hull, boxes), o, w, ray, asker, light)
@@ -270,7 +268,6 @@ def smooth_shared_light(data, normal, depth, on, has, spare):
         on: Which of them met something.
         has: Which of them have light; then all that could be given some.
         spare: Room like ``data``; of NumPy's making, whose large arrays are on large pages.
-
     """
     had = np.zeros_like(has)
     total = np.empty(LIGHT_CHANNELS_PADDED, np.float32)

@@ -103,7 +103,6 @@ def share_neighbour_light(s, row, column, light, normal, depth, known, out):
         depth: Of the pixels.
         known: Which pixels know their light.
         out: Light of every sample.
-
     """
     missing = np.zeros(len(s.kind), np.bool_)
     _share_neighbour_light(s, row, column, light, normal, depth, known, out, missing)
@@ -163,7 +162,6 @@ def mark_edges(s, picture, active, shape, inner, out):
         shape: Rows and columns.
         inner: The first row to answer for and the one after the last.
         out: The answer (P,).
-
     """
     w = shape[1]
     for i in range(inner[0], inner[1]):
@@ -231,7 +229,6 @@ def write_srgb(picture, wanted, row, size, first, out):
         size: Of the picture: width, height.
         first: The picture's first row to be written and the one after the last.
         out: The picture (height, width, 3).
-
     """
     width, height = size
     for i in range(first[0], first[1]):
@@ -274,7 +271,6 @@ def finer_rays(eye, frame, tangent, size, block, pixels, o, d, row, column):
         d: Unit directions.
         row: Of each sample, from the first row on.
         column: From the first column on.
-
     """
     first, left, columns = block
     count = len(EDGE_SAMPLE_OFFSETS)

@@ -47,7 +47,6 @@ def liquid_surface(points: Float[np.ndarray, "N 3"], spacing: float) -> LiquidSu
     Args:
         points: Places of the particles; what is not finite is left out [m].
         spacing: Between particles at rest [m].
-
     """
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 2:

@@ -70,7 +70,6 @@ def render_portraits(
 
     Returns:
         (size, size, 3) uint8 each. The coloured picture comes last, where there are several parts.
-
     """
     stage, box, parts = _isolated_object(scene, part_of_surface)
     size = (portrait.size, portrait.size)

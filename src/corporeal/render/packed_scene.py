@@ -82,7 +82,6 @@ def with_new_triangles(
         triangles: New ones (N, 3), int32.
         finish: Of each new one (N,), int32.
         vertices: How many there are then, of which the first are those before.
-
     """
     more, new = vertices - len(look.uv), len(triangles)
     return look._replace(

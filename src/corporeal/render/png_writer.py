@@ -17,7 +17,6 @@ def write_png(picture: Image.Image, path: Path) -> None:
 
     Raises:
         DiskError: The disk refuses it.
-
     """
     with disk_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -85,7 +85,6 @@ class RayScene:
         Args:
             gone: Of each triangle (T,), whether it is a liquid's at rest.
             liquids: New surfaces, behind all that stay.
-
         """
         there, first, look = copy(self), len(self.vertices), self.look
         vertices, normals, triangles, finish = [self.vertices], [self.normals], [], []

@@ -243,7 +243,6 @@ def pack_recording(
         recording: From ``record_frames``; None: frames come later, from a simulation that runs.
         summary: What the page shows of the run: goes into the header as it is.
         splats: Of a scene that was made of Gaussians.
-
     """
     block = ArrayBlock()
     low, high = _view_bounds(cast, recording)

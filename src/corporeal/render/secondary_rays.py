@@ -110,7 +110,6 @@ class LightSampler:
             on: Pixels that met something.
             block: The part of the picture that they are in.
             arrived: Light that they share; then what arrives.
-
         """
         surface = arrived.normal, arrived.log
         doubt = np.zeros(arrived.known.shape, np.bool_)

@@ -24,7 +24,6 @@ def tiles_with_surfaces(
         frame: Right, up and back of the camera, as rows.
         tangent: Of half the vertical field of view.
         size: Width and height [px].
-
     """
     seen = np.zeros([-(-n // TILE_PX) for n in size[::-1]], np.bool_)
     if stage.shown:

@@ -117,7 +117,6 @@ def bind_vertices(
         particles: What carries the surfaces.
         loose: Which parts are granular or liquid.
         fluid: Which parts are fluids, whose normals are those of the posed surface; None: none.
-
     """
     owners = _owners(scene, parts)
     skin = _bind(vertex_positions(scene), vertex_normals(scene), owners, particles, loose)

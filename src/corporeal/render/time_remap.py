@@ -16,7 +16,6 @@ def frame_positions(time: Float[np.ndarray, " F"], slow: float, about: float | N
         time: Of the frames [s].
         slow: How many times slower the video is about the instant.
         about: The instant [s]; None: all of it is slow.
-
     """
     last = len(time) - 1
     places, at = [0.0], 0.0

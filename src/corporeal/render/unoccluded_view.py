@@ -41,7 +41,6 @@ def unoccluded_view(
         object_of_vertex: Which object each vertex of its surfaces belongs to.
         boxes: What the camera keeps in the picture [m].
         size: Of the picture [px].
-
     """
     places = _sample_vertices(object_of_vertex)
     if len(places) < 2:

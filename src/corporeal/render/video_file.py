@@ -87,7 +87,6 @@ def open_video(path: Path, fps: int, size: tuple[int, int], credit: str = "") ->
 
     Raises:
         UserError: The size is odd, the disk is full, or the encoder is missing or fails.
-
     """
     check_size(*size)
     partial = path.with_name(f".{path.stem}.part{path.suffix}")
@@ -153,7 +152,6 @@ def count_frames(path: Path) -> int:
 
     Raises:
         UserError: The video cannot be read.
-
     """
     try:
         count, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
@@ -167,7 +165,6 @@ def read_frames(path: Path, wanted: list[int]) -> list[np.ndarray]:
 
     Raises:
         UserError: The video cannot be read.
-
     """
     numbers = sorted(set(wanted))
     chosen = "+".join(rf"eq(n\,{k})" for k in numbers)

@@ -138,7 +138,6 @@ class VideoRaycaster:
             camera: Where from.
             quality: How finely.
             threads: At once; None: as many as there are cores.
-
         """
         last = self._last
         if last is None or last[0] is not stage or last[1:3] != (camera, quality):
@@ -288,7 +287,6 @@ class _FrameRender(RenderJob):
             near: Which pixels of the part, and those above and below that they hang on.
             blocks: The band, and the part of it.
             rows: The first row of the picture to answer for and the one after the last.
-
         """
         block, part = blocks
         rays = Rays(crop_values(rays.origin, *blocks), crop_values(rays.direction, *blocks))
@@ -451,7 +449,6 @@ class _FrameRender(RenderJob):
             lit: Room for the light that arrives (S, WIDE).
             known: Fills ``lit`` where light is known already, and says where it is not.
             depth: Surfaces that were looked through.
-
         """
         o, d = rays.origin, rays.direction
         hit = self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)

@@ -45,7 +45,6 @@ def arrange_bodies(
             above that one; ``row``: in a line along +x, heavy ones first
         and flat ones last, broadside on.
         rng: Source of random numbers.
-
     """
     ways = {"scatter": _scatter_poses, "stack": _stack_poses, "onto": _onto_poses, "row": _row_poses}
     if arrangement not in ways:

@@ -55,7 +55,6 @@ def preview_contacts(
 
     Returns:
         In the order in which they met; what touches at the start is left out.
-
     """
     engine = MujocoScene(still.bodies, still.poses, PREVIEW_STEP_S)
     engine.roughen([b.friction for b in still.bodies])
@@ -117,7 +116,6 @@ def find_collision_chain(still: SettledBodies, arrival: float, rng: np.random.Ge
 
     Returns:
         None: from neither end.
-
     """
     scale = sqrt(GRAVITY_M_S2 * float(still.sizes.max()))
     last = float(rng.uniform(*LAST_IMPACT_SPEED_RATIO_RANGE)) * scale
@@ -139,7 +137,6 @@ def chain_start_speed(still: SettledBodies, row: Sequence[int], arrival: float, 
         row: Numbers of the objects, the mover first.
         arrival: Least speed at the second [m/s].
         last: Least speed at the last [m/s].
-
     """
     bodies = [still.bodies[k] for k in row]
     mass = np.cumsum([b.mass for b in bodies])

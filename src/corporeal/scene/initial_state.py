@@ -21,7 +21,6 @@ def parse_lift(text: str) -> tuple[str, float]:
 
     Raises:
         UserError: It says something else.
-
     """
     name, _, number = text.rpartition("=")
     (metres,) = _parse_numbers(number, 1) or (math.nan,)
@@ -35,7 +34,6 @@ def parse_initial_velocity(text: str) -> tuple[str, Vector]:
 
     Raises:
         UserError: It says something else.
-
     """
     name, _, numbers = text.rpartition("=")
     said = _parse_numbers(numbers, 3)
@@ -58,7 +56,6 @@ def with_initial_state(scene: Scene, lifts: Sequence[str], velocities: Sequence[
 
     Raises:
         UserError: There is no object of such a name.
-
     """
     for name, metres in map(parse_lift, lifts):
         scene = move_scene(scene, np.array([0.0, 0.0, metres]), _object_number(scene, name, "--lift"))

@@ -77,7 +77,6 @@ def begin_interaction(
     Returns:
         None: there are too few objects, something stands in every path, or nothing here can do
         it: no storm moves anything, no impact reaches the last of the row.
-
     """
     if len(bodies) < MIN_OBJECTS_OF_KIND[kind]:
         return None

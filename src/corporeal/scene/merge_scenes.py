@@ -20,7 +20,6 @@ def merge_filled_scenes(
         there: What joins it, filled with the same grid spacing; its names are not taken.
         friction: Of the parts of both, in this order, and the floor; see ``MaterialField``.
         restitution: The same.
-
     """
     a, b = here.whole, there.whole
     whole = SceneWithMaterials(

@@ -17,7 +17,6 @@ def repose_reconstruction(found: Reconstruction, scene: Scene) -> Reconstruction
 
     Raises:
         UserError: Not all that were found are in the scene.
-
     """
     names = [o.name for o in scene.objects]
     if not set(found.names) <= set(names):

@@ -67,7 +67,6 @@ def measure_rest(bodies: Sequence[SettlingBody], poses: Sequence[BodyPose], deep
         bodies: What claims it.
         poses: Where.
         deepest: Penetration allowed [m].
-
     """
     clouds = [p.world(_surface_points(b)) for b, p in zip(bodies, poses, strict=True)]
     everything = np.concatenate(clouds)

@@ -73,7 +73,6 @@ def ball(
     Raises:
         UnknownChoiceError: The library has no such material.
         UserError: The radius is not positive, or a number is not finite.
-
     """
     _check_lengths(name, radius=radius)
     at = (0.0, 0.0, radius) if at is None else at
@@ -100,7 +99,6 @@ def box(
     Raises:
         UnknownChoiceError: The library has no such material.
         UserError: A side is not positive, or a number is not finite.
-
     """
     width, depth, height = _checked_vector(name, "size", size)
     _check_lengths(name, width=width, depth=depth, height=height)
@@ -129,7 +127,6 @@ def cylinder(
     Raises:
         UnknownChoiceError: The library has no such material.
         UserError: A length is not positive, or a number is not finite.
-
     """
     _check_lengths(name, radius=radius, height=height)
     at = (0.0, 0.0, height / 2) if at is None else at
@@ -156,7 +153,6 @@ def solid(
     Raises:
         UnknownChoiceError: The library has no such material.
         UserError: The mesh is not closed or inside out, or a number is not finite.
-
     """
     vertices, triangles = np.asarray(vertices, float), np.asarray(triangles, np.int64)
     if not np.isfinite(vertices).all():
@@ -187,7 +183,6 @@ def build_scene(
 
     Raises:
         UserError: There is no solid, one reaches below the floor, or a number makes no sense.
-
     """
     if not solids:
         raise UserError("A scene needs at least one solid: corporeal.ball('rubber', 0.03).")

@@ -62,7 +62,6 @@ def write_composition(folder: Path, composition: SceneComposition) -> None:
 
     Raises:
         DiskError: The disk refuses it.
-
     """
     rows = [_composed_object(asdict(one)) for one in composition.objects]
     store.write_json(folder / COMPOSITION_FILE, asdict(composition) | {"objects": rows})
@@ -73,7 +72,6 @@ def read_composition(folder: Path) -> SceneComposition:
 
     Raises:
         BadFileError: The file is absent, damaged, or of a version that had other fields.
-
     """
     path = folder / COMPOSITION_FILE
     data = store.read_json(path)
@@ -93,7 +91,6 @@ def write_certificate(folder: Path, certificate: RestCertificate) -> None:
 
     Raises:
         DiskError: The disk refuses it.
-
     """
     store.write_json(folder / CERTIFICATE_FILE, asdict(certificate))
 
@@ -103,7 +100,6 @@ def read_certificate(folder: Path) -> RestCertificate:
 
     Raises:
         BadFileError: The file is absent, damaged, or of a version that had other fields.
-
     """
     path = folder / CERTIFICATE_FILE
     data = store.read_json(path)

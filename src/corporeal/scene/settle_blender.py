@@ -76,7 +76,6 @@ def drop_in_blender(
 
     Raises:
         BlenderError: BlenderProc is not installed, fails, takes too long or writes nonsense.
-
     """
     with tempfile.TemporaryDirectory(prefix="corporeal-settle-") as name:
         folder = Path(name)

@@ -63,7 +63,6 @@ def settle_bodies(
 
     Raises:
         UserError: No attempt came to rest, or BlenderProc does not work; it says why.
-
     """
     if not bodies:
         raise UserError("There is nothing to settle. Give at least one body.")

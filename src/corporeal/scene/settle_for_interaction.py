@@ -56,7 +56,6 @@ def settle_for_interaction(
 
     Raises:
         UserError: No rest is found, or nothing can happen.
-
     """
     ways = _possible_arrangements(arrangement, kinds, len(bodies), rng)
     reason = ""

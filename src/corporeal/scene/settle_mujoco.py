@@ -137,7 +137,6 @@ class MujocoScene:
 
         Raises:
             UserError: More contacts than there is room for.
-
         """
         try:
             mujoco.mj_step(self.model, self.data)

@@ -46,7 +46,6 @@ def cubes_mass_properties(
         points: Their middles [m].
         mass: [kg]
         size: Their sides [m].
-
     """
     total = float(mass.sum())
     centre = mass @ points / total

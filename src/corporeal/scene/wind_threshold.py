@@ -30,7 +30,6 @@ def drag_areas(area: Float[np.ndarray, "A 3"], heading: Float[np.ndarray, "3"]) 
     Args:
         area: Outward area vectors of faces at rest [m²].
         heading: Where the air goes, unit.
-
     """
     size = np.linalg.norm(area, axis=1)
     inward = -area / np.maximum(size, 1e-30)[:, None]
@@ -67,7 +66,6 @@ def wind_threshold(body: SettlingBody, pose: BodyPose, heading: Float[np.ndarray
         body: What; its material says how rough it is.
         pose: How it stands.
         heading: Where the wind goes, along the floor, unit.
-
     """
     weight = body.mass * GRAVITY_M_S2
     points = pose.world(body.hull.vertices)
@@ -93,7 +91,6 @@ def wind_headings(first: float) -> Float[np.ndarray, "H 2"]:
 
     Args:
         first: Bearing of the first [rad].
-
     """
     bearing = first + 2 * np.pi * np.arange(WIND_DIRECTIONS_COUNT) / WIND_DIRECTIONS_COUNT
     return np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
@@ -109,7 +106,6 @@ def wind_drag_of(
         pose: How it stands.
         heading: Where the wind goes, along the floor, unit.
         pivot: Any point of the edge, which is level and across the wind [m].
-
     """
     mesh = body.shape.mesh
     corners = pose.world(mesh.vertices)[mesh.triangles]

@@ -250,7 +250,6 @@ def build_showcase_scene(name: str) -> Scene:
 
     Raises:
         UnknownChoiceError: There is no scene of this name.
-
     """
     composition = _composition_of(name)
     return scene_of_models(name, place_models(composition), composition.models, composition.duration)
@@ -286,7 +285,6 @@ def view_direction(name: str) -> PropPoint:
 
     Raises:
         UnknownChoiceError: There is no scene of this name.
-
     """
     return _composition_of(name).view
 
@@ -365,7 +363,6 @@ def prop_scene(name: str) -> Scene:
 
     Raises:
         UnknownChoiceError: There is no model of this name.
-
     """
     if name not in PROP_BUILDERS:
         raise UnknownChoiceError("showcase model", name, list(PROP_BUILDERS))

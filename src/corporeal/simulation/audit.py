@@ -42,7 +42,6 @@ def audit(
         field: What every part is made of.
         trajectory: How they moved, with the ledger.
         settling: How everything found its balance before time 0; None: it did not.
-
     """
     ledger, cell = trajectory.ledger, particles.cell
     floor = float(ledger.plane_depth.max(initial=0.0))

@@ -18,7 +18,6 @@ def write_audit(folder: Path, audit: Audit) -> None:
 
     Raises:
         DiskError: It cannot be written.
-
     """
     store.write_json(folder / AUDIT_FILE, audit)
 
@@ -28,7 +27,6 @@ def read_audit(folder: Path) -> Audit:
 
     Raises:
         BadFileError: The file is absent, damaged, or of a version that had other fields.
-
     """
     return _read(Audit, folder, f"Simulate again: corporeal simulate {folder.parent}.")
 
@@ -38,7 +36,6 @@ def read_run_audit(folder: Path) -> RunAudit:
 
     Raises:
         BadFileError: The file is absent, damaged, or of a version that had other fields.
-
     """
     return _read(RunAudit, folder, f"Make it again: corporeal report {folder}.")
 

@@ -74,7 +74,6 @@ def audit_findings(
         trajectory: How they moved, with the ledger.
         unbooked: Share of the energy that no booked loss accounts for, less what liquids and grains may have lost [-].
         surfaces: Pairs of objects that came near each other.
-
     """
     drafts: list[_Draft] = []
     springs = False

@@ -56,7 +56,6 @@ class Checkpoints:
             folder: Where they are, beside the frames.
             name: Fingerprint of the problem; checkpoints with another one are ignored.
             config: How often they are written.
-
         """
         self.folder, self.name, self.config = folder, name, config
         self.written, self.seconds = time.monotonic(), 0.0

@@ -30,7 +30,6 @@ class EnergyWatch:
             names: Of the objects, in the ledger's order.
             pull: Strength of gravity [m/s²].
             cell: dx [m].
-
         """
         self.names, self.smallest = names, pull * cell
         self.time = np.inf
@@ -52,7 +51,6 @@ class EnergyWatch:
 
         Raises:
             SimulationError: An object gained energy without external work.
-
         """
         moving = row.kinetic + row.elastic
         energy = moving + row.potential
@@ -91,7 +89,6 @@ def energy_gain(
 
     Returns:
         None where it never grew so much.
-
     """
     grown = balance - balance[0]
     beyond = np.flatnonzero(~(grown <= allowed))

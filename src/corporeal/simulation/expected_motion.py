@@ -177,7 +177,6 @@ def leaf_length(particles: Particles, k: int, scale: float) -> float:
         particles: The material points.
         k: Which part.
         scale: Size of its object over that of the real one [-].
-
     """
     mine = (particles.part == k) & (particles.rate > 0.0) if len(particles.rate) else np.zeros(0, dtype=bool)
     if not mine.any():

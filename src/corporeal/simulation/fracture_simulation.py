@@ -50,7 +50,6 @@ def next_breaking_impact(
         folder: Where the frames are.
         number: Of the last one.
         since: [s]
-
     """
     now = read_ledger(folder, number).first_contact
     if not np.any(now > since):
@@ -78,7 +77,6 @@ def fracture_body(
 
     Raises:
         UserError: The engine cannot break bodies.
-
     """
     owner = stage.posed.object_of_body
     (bodies,) = np.nonzero(owner == impact.object)

@@ -42,7 +42,6 @@ def measure_outcome(scene: Scene, particles: Particles, field: MaterialField, tr
         particles: Its material points.
         field: What every part is made of: grains are marked, what holds together is dented.
         trajectory: How they moved, with the ledger.
-
     """
     names = [o.name for o in scene.objects]
     bodies = ObjectParticles(scene, particles, field, trajectory)
@@ -176,7 +175,6 @@ def vertical_extent(points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "
         points: Now [m].
         start: At the start [m].
         cell: dx [m].
-
     """
     now, before = _along_z(points), _along_z(start)
     squeezed = min(1.0, now / before) if before > 0.0 else 1.0
@@ -245,7 +243,6 @@ def rise_after_impact(trajectory: Trajectory, body: int, gravity: float, cell: f
         body: Which.
         gravity: Downward acceleration [m/s²].
         cell: dx [m].
-
     """
     ledger, time = trajectory.ledger, trajectory.time
     first = ledger.first_contact[-1, body]

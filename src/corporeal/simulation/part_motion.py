@@ -76,7 +76,6 @@ def measure_motion(
         particles: The material points at rest.
         field: What every part is made of.
         trajectory: How they moved.
-
     """
     loose = np.array([CONSTITUTIVE_LAWS[m.law].loose for m in field.materials], dtype=bool)
     whole = np.flatnonzero(~loose[particles.part])
@@ -214,7 +213,6 @@ def separated_particles(
         now: Where they are [m].
         links: From ``rest_links``.
         reach: How much farther than ``LINK_STRETCH_RATIO`` times its length a link holds [m].
-
     """
     if len(rest) < 2:
         return np.zeros(len(rest), dtype=bool)

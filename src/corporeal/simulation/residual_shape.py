@@ -76,7 +76,6 @@ def residual_dent(
         start: Where the particles started [m].
         now: Where they are in each of the last frames [m].
         threshold: Smaller displacements are no dent [m].
-
     """
     shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
     around = KDTree(start).query(start, k=min(PATCH_PARTICLES, len(start)))[1].reshape(len(start), -1)

@@ -26,7 +26,6 @@ def run_hints(scene: Scene, happened: Outcome, divided: bool, findings: Sequence
         happened: The outcome.
         divided: Whether it was asked for which nodes of a file are objects of their own.
         findings: Of the audit.
-
     """
     joined = () if divided else _one_object_hint(scene)
     return (*scene.hints, *joined, *_motionless_hint(scene, happened), *_minor_findings_hint(findings))

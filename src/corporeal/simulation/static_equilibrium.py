@@ -62,7 +62,6 @@ def settling_problem(problem: Problem, hung: set[int]) -> Problem:
     Args:
         problem: Of the video.
         hung: Unsupported bodies: gravity does not pull them.
-
     """
     x, y, z = problem.gravity
     bodies = [
@@ -89,7 +88,6 @@ class DynamicRelaxation:
             engine: Fresh, of the problem.
             problem: What ``settling_problem`` returned.
             hung: Bodies that are held where they are.
-
         """
         self.engine, self.cell, self.hung = engine, problem.cell, hung
         group = object_of_body(problem)
@@ -108,7 +106,6 @@ class DynamicRelaxation:
         Args:
             pause: Called with the time [s] whenever the state can be saved.
             max_seconds: Gives up after so long [s].
-
         """
         found = False
         while not found and self.engine.time < max_seconds:

@@ -55,7 +55,6 @@ def surface_mark(
             column is none of its surface [m].
         cell: Grid spacing dx, of particles half a cell apart [m].
         threshold: What fell by less belongs to no mark [m].
-
     """
     columns = HeightColumns.over(start, COLUMN_WIDTH_DX * cell)
     before = columns.heights(start)

@@ -81,7 +81,6 @@ def read_arrays(path: Path, start: str = "", without: str = "\0") -> dict[str, n
 
     Raises:
         BadFileError: The file is absent or damaged.
-
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -147,7 +146,6 @@ def read_ledger(folder: Path, number: int) -> Ledger:
 
     Raises:
         BadFileError: The frame is absent or damaged, or its ledger has other fields.
-
     """
     path = frame_path(folder, number)
     found = read_arrays(path, LEDGER_PREFIX)
@@ -215,7 +213,6 @@ def read_trajectory(folder: Path) -> Trajectory:
 
     Raises:
         BadFileError: The trajectory is unfinished or damaged.
-
     """
     path = folder / LEDGER_FILE
     ledger = _ledger(path, read_arrays(path))

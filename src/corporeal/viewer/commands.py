@@ -57,7 +57,6 @@ def parse_command(text: str) -> Command:
 
     Raises:
         UserError: It is not in the table, or a number is not finite.
-
     """
     if len(text) > MAX_COMMAND_BYTES:
         raise UserError("An order is too long.")

@@ -72,7 +72,6 @@ class InteractionController:
 
         Raises:
             UserError: The engine cannot solve the problem, or does not work on this machine.
-
         """
         self.engine, self.growth = build_engine(problem, engine, threads), growth
         self.added: tuple[AddedObject, ...] = ()
@@ -90,7 +89,6 @@ class InteractionController:
 
         Raises:
             SimulationError: The state became impossible; the engine is where it was.
-
         """
         until = self.engine.time + seconds
         self.engine.advance(until)
@@ -104,7 +102,6 @@ class InteractionController:
 
         Raises:
             UserError: It cannot be done.
-
         """
         acts = {RECORDED_GRAB: self._hold, "pull": self._pull, "drop": self._drop}
         acts |= {"gravity": self._gravity, "wind": self._wind, RECORDED_ADD: self._join}
@@ -145,7 +142,6 @@ class InteractionController:
             bodies: Among which.
             places: Of all particles, now or at the start [m].
             point: In the same.
-
         """
         rows = np.concatenate([np.arange(self.first[b], self.first[b + 1]) for b in bodies])
         row = int(rows[np.linalg.norm(places[rows] - np.array(point), axis=1).argmin()])
@@ -239,7 +235,6 @@ class InteractionController:
 
         Args:
             position: Of all particles, in the engine's order [m].
-
         """
         if self.held is None:
             return None

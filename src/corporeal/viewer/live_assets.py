@@ -34,7 +34,6 @@ class AssetKey:
 
         Raises:
             UserError: It names nothing.
-
         """
         place, slash, name = text.partition("/")
         if not (place and slash and name):
@@ -59,7 +58,6 @@ class LiveAssets:
 
         Raises:
             UserError: There is none of this name.
-
         """
         key = AssetKey.of(text)
         if key.place == SHOWCASE_PREFIX and key.name in POOL_PROP_BUILDERS:

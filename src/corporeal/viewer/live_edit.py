@@ -66,7 +66,6 @@ class LiveEditor:
             quality: With which; its grid spacing is what came of it.
             find: Gives an object by its name.
             config: From which the scene's materials came, for friction.
-
         """
         self.quality = replace(quality, cell=prepared.particles.cell)
         self.find, self.config = find, config
@@ -78,7 +77,6 @@ class LiveEditor:
 
         Raises:
             UserError: There is no such object, or it cannot be filled so coarsely.
-
         """
         if added not in self.scenes:
             before = self.at(added[:-1]).prepared
@@ -101,7 +99,6 @@ class LiveEditor:
 
         Raises:
             UserError: There is no such object, or it cannot be filled so coarsely.
-
         """
         key = (thing, height)
         if key not in self.filled:

@@ -95,7 +95,6 @@ class SceneDisplay:
         Args:
             grown: The scene.
             generation: Another for every scene, so that pictures are not put on a wrong one.
-
         """
         self.prepared, self.generation = grown.prepared, generation
         self.cast: SceneBinding = bind_scene(grown.prepared)
@@ -150,7 +149,6 @@ class LiveSimulation:
 
         Raises:
             UserError: The engine cannot solve the scene, or does not work on this machine.
-
         """
         self.growth, self.threads, self.engine = growth, threads, engine
         self.prepared = growth.at(()).prepared
@@ -199,7 +197,6 @@ class LiveSimulation:
         Args:
             single: With one velocity field for all, the control.
             twin: With that control beside, to which the same is done.
-
         """
         shared = replace(self.posed.problem, contact="single")
         problem = shared if single else self.posed.problem
@@ -388,7 +385,6 @@ class LiveSession:
 
         Raises:
             UserError: There is no such run, or it cannot be simulated.
-
         """
         with self.lock:
             if self.live is None or self.name != name:

@@ -34,7 +34,6 @@ def free_run_name(runs: Path, wanted: str) -> str:
 
     Raises:
         UserError: There is nothing left of the wanted name.
-
     """
     base = safe_name(wanted).strip("._- ") or "scene"
     stem = re.sub(r"-\d+$", "", base)
@@ -55,7 +54,6 @@ def prepare_changed_run(run: Path, made: StageResults, asked: Mapping[str, Any])
 
     Raises:
         UserError: Something asked is not known, or a value lies outside its measured range.
-
     """
     before = read_run_request(run)
     settings, runs = before.settings, run.parent
@@ -117,7 +115,6 @@ def finite_number(value: Any, what: str) -> float:
 
     Raises:
         UserError: It is none.
-
     """
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise UserError(f"{what} is no number.")

@@ -83,7 +83,6 @@ class RunQueue:
 
         Raises:
             UserError: A run of that name is waiting or running.
-
         """
         with self.lock:
             busy = [e for e in self.entries if e.state in ("waiting", "running")]
@@ -101,7 +100,6 @@ class RunQueue:
 
         Raises:
             UserError: There is none, or it is over.
-
         """
         with self.lock:
             entry = self._entry(job)
@@ -120,7 +118,6 @@ class RunQueue:
 
         Raises:
             UserError: There is none, or it has not ended.
-
         """
         with self.lock:
             entry = self._entry(job)

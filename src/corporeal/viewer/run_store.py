@@ -74,7 +74,6 @@ class RunStore:
 
         Raises:
             UserError: There is no such run.
-
         """
         known = self.runs()
         if name not in known:
@@ -90,7 +89,6 @@ class RunStore:
 
         Raises:
             UserError: There is no such run, it cannot be read, or it is not filled yet.
-
         """
         run = self.path(name)
         key = (name, _changed(run))
@@ -107,7 +105,6 @@ class RunStore:
 
         Raises:
             UserError: There is no such run, it cannot be read, or it is not filled yet.
-
         """
         settings = read_run_request(self.path(name)).settings
         made, engine = self.open(name).made, settings.simulate.engine
@@ -131,7 +128,6 @@ def load_run(run: Path) -> LoadedRun:
 
     Raises:
         UserError: It cannot be read, or it is not filled yet.
-
     """
     made = read_run(run)
     if made.fill is None:

@@ -47,7 +47,6 @@ def open_listener(address: ListenAddress) -> socket.socket:
 
     Raises:
         UserError: The port is taken, or there is no such address.
-
     """
     try:
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
@@ -84,7 +83,6 @@ def serve(app: Starlette, listener: socket.socket, ready: Callable[[], None], br
         listener: From ``open_listener``.
         ready: Called as soon as visitors can come.
         browse: An address to open in the user's browser; "": none.
-
     """
     settings = uvicorn.Config(
         app,

@@ -59,7 +59,6 @@ class UploadInbox:
 
         Raises:
             UserError: There is none of that name.
-
         """
         if TOKEN_PATTERN.fullmatch(name):
             for known in ("scene.glb", "splat.ply", "photos"):
@@ -93,7 +92,6 @@ class UploadInbox:
 
         Raises:
             UserError: It is nothing that is understood.
-
         """
         raw = folder / "upload"
         with raw.open("rb") as file:

@@ -45,7 +45,6 @@ def unpack_zip(source: Path, folder: Path, most: int = MAX_UNPACKED_BYTES) -> in
     Raises:
         BadFileError: It is no zip, or holds what no set of photographs needs: links, paths that lead out, other
             archives, too many files, or too much in them.
-
     """
     left = _UnpackBudget(most)
     try:
@@ -84,7 +83,6 @@ def _places(entry: zipfile.ZipInfo, of: str) -> tuple[str, ...]:
 
     Raises:
         BadFileError: They don't, or it is nothing that belongs to photographs.
-
     """
     kind = stat.S_IFMT(entry.external_attr >> 16)
     if kind not in (0, stat.S_IFREG):

@@ -162,7 +162,6 @@ class VlmClient(Protocol):
         Raises:
             UnansweredError: There is no usable answer to this question; others may be answered.
             UserError: No question will be answered; the message says what to do.
-
         """
         ...
 
@@ -173,7 +172,6 @@ def choose_critic(spec: str, asked: str) -> str:
     Args:
         spec: The model, as in --vlm.
         asked: The critic asked for; "": none.
-
     """
     theirs = spec.startswith("openai:") and "@" not in spec
     return asked or (DEFAULT_OPENAI_CRITIC if theirs else spec)
@@ -190,7 +188,6 @@ def connect_vlm(spec: str, record: Path | None = None) -> VlmClient | None:
 
     Raises:
         UserError: The name is unknown, its package is not installed, or its key is not set.
-
     """
     name, _, rest = spec.partition(":")
     if name == NO_MODEL:

@@ -53,7 +53,6 @@ def read_annotations(
 
     Raises:
         BadFileError: The file is not such a file, or names an object or part that does not exist.
-
     """
     annotations: dict[tuple[str, str], PartAnnotation] = {}
     for name, given in read_annotation_mapping(path).items():
@@ -77,7 +76,6 @@ def read_annotation_mapping(path: Path) -> dict:
 
     Raises:
         BadFileError: It cannot be read, or is not such a mapping.
-
     """
     try:
         parsed = yaml.safe_load(path.read_text(encoding="utf-8"))

@@ -204,7 +204,6 @@ def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
     Args:
         answer: What was answered.
         box: Volume of the smallest box around the object [m³]; 0: not known.
-
     """
     if not answer.low_kg <= answer.likely_kg <= answer.high_kg:
         return ["low_kg, likely_kg and high_kg must be in this order."]
@@ -242,7 +241,6 @@ def placement_complaints(
         answer: Places, or values.
         wanted: Part → its quantities.
         bounds: (part, quantity) → low and high in the unit the question named.
-
     """
     found = name_complaints([p.part for p in answer.parts], list(wanted))
     if found:

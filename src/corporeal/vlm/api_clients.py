@@ -213,7 +213,6 @@ class ApiClient(ABC):
             UnansweredError: No usable answer within the patience.
             UserError: The key is refused, the model is unknown, the account is empty, or there is no server: no other
                 question would be answered either.
-
         """
         if self._over is not None:
             raise self._over

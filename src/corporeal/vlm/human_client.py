@@ -68,7 +68,6 @@ class HumanClient:
 
         Raises:
             WaitingError: There is no answer yet, or it is invalid; the page says why.
-
         """
         page = self.pages / self._name(question, answer)
         found = _read_answer(page.with_suffix(".json"), answer, check)
@@ -97,7 +96,6 @@ def refuse_pending(results: list, spec: str) -> list:
 
     Raises:
         WaitingError: Questions wait: the message says how many, where, and what to do.
-
     """
     waiting = sum(r.count for r in results if isinstance(r, PendingQuestionsError))
     if waiting:

@@ -181,7 +181,6 @@ def contradiction_with_file(words: PartDescription, material: str | None, wall: 
         material: What the file states it is made of.
         wall: How thick the file states its wall is [m]; 0: stated solid; None: unknown.
         put: How thick the model put its wall [m].
-
     """
     stated, answered = [], []
     if material not in (None, words.material) and words.answered_by in LOOKING_SOURCE_NAMES:
@@ -261,7 +260,6 @@ def strange_share_notes(answer: ThicknessAnswer, doubt: float) -> list[str]:
     Args:
         answer: Of how much of what it draws is real.
         doubt: How far its edges leave its volume open: deviation of the logarithm [-].
-
     """
     found = []
     for part in answer.parts:

@@ -140,7 +140,6 @@ class Interview:
 
         Returns:
             The best decomposition, and the whole answer.
-
         """
         asked = self._question("parts", most=str(MAX_PARTS))
         reply = self._ask(self.model, asked, PartsAnswer, parts_complaints)
@@ -174,7 +173,6 @@ class Interview:
 
         Returns:
             The answer, and who gave it: "model" or "recording".
-
         """
         named = _part_list(parts)
         hollowed = "hollowed" if self.subject.drawn.hollowed else "whole"
@@ -196,7 +194,6 @@ class Interview:
         Args:
             parts: Those whose material fills what is drawn.
             thin: How coarse the scan is, and how thick it draws the object.
-
         """
         tenth, quarter, half = map(millimetres_text, thin.behind)
         least, greatest = (f"{share:g}" for share in REAL_VOLUME_SHARE_RANGE)

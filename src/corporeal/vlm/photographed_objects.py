@@ -72,7 +72,6 @@ class PhotoInterview:
 
         Raises:
             UserError: The model is unavailable.
-
         """
         self.scene = scene
         self.model = connect_vlm(vlm, record)
@@ -83,7 +82,6 @@ class PhotoInterview:
 
         Args:
             pictures: Of the scene, H x W x 3, uint8, sRGB.
-
         """
         if self.model is None:
             return []
@@ -99,7 +97,6 @@ class PhotoInterview:
 
         Returns:
             Per region the place of its object, or None where it is none of them; None: no answer.
-
         """
         if self.model is None:
             return None
@@ -196,7 +193,6 @@ def check_stated_extents(stated: Sequence[str], objects: Sequence[SeenObject], s
         stated: Sizes that a person gave for some, such as "duck=0.1" [m].
         objects: Known objects; others are objects.
         source: What the pictures are called, by which a lone object may be called.
-
     """
     by_name = None if objects else object_from_name(source)
     known = object_names(objects or [obj for obj in [by_name] if obj])
@@ -225,7 +221,6 @@ def decide_metric_scale(
 
     Raises:
         UserError: A size is stated of nothing that is there.
-
     """
     only = next(iter(sizes)) if len(sizes) == 1 else ""
     wanted = [parse_extent(text, only) for text in stated]

@@ -33,7 +33,6 @@ def read_prompt(file: Traversable | Path) -> Prompt:
 
     Raises:
         ValueError: Its first line states no version.
-
     """
     text = file.read_text(encoding="utf-8")
     stated = VERSION.match(text)

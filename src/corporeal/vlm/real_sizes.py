@@ -87,7 +87,6 @@ def find_class_sizes(classes: Iterable[str], vlm: str = "metadata", record: Path
         UserError: The model is unavailable, a recording is missing, or questions wait for a
             person's
             answers.
-
     """
     named = list(dict.fromkeys(classes))
     model = connect_vlm(vlm, record)
@@ -118,7 +117,6 @@ def estimate_real_extent(name: str, class_name: str, extent: float, metric: bool
         extent: Largest extent in the file [its own unit].
         metric: Whether that unit is the metre.
         sizes: What is known of its class, among others.
-
     """
     known = sizes.usual.get(class_name)
     if metric:

@@ -43,7 +43,6 @@ class ReplayClient:
         Raises:
             UserError: There is none; the message names the field in which the nearest one differs. Or there is one that
                 no longer fits what can be answered.
-
         """
         row = self._row(recording_key_row(question, answer))
         if row is None:

@@ -36,7 +36,6 @@ def thread_map(
 
     Raises:
         Exception: The first fatal error; jobs that wait are dropped.
-
     """
     waiting: SimpleQueue[int] = SimpleQueue()
     finished: SimpleQueue[_FinishedJob] = SimpleQueue()

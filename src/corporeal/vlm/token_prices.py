@@ -14,7 +14,6 @@ def price_usd(model: str, input_tokens: int, output_tokens: int) -> float | None
         model: As a person types it: "openai:gpt-5.4".
         input_tokens: Of the prompt, pictures included.
         output_tokens: Of the answer, with what the model thought before it.
-
     """
     provider, _, name = model.partition(":")
     price = _table().get(provider, {}).get(name)

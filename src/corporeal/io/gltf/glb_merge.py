@@ -62,7 +62,6 @@ def merge_glb_files(path: Path, members: Sequence[MergeMember], name: str, extra
         BadFileError: A member's file cannot be used.
         UserError: There is none, two have one name, a pose or an extra is no finite number, or the file would be too
             large.
-
     """
     _check_members(members)
     merged = MergedDocument()

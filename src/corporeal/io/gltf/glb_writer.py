@@ -28,7 +28,6 @@ def write_glb(path: Path, scene: Scene) -> None:
 
     Raises:
         ValueError: A number in the scene is NaN or infinite, which JSON cannot say.
-
     """
     Path(path).write_bytes(encode_glb(scene))
 

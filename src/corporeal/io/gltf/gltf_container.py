@@ -43,7 +43,6 @@ def pack_glb(document: dict, binary: bytes | bytearray) -> bytes:
 
     Raises:
         ValueError: A number in the document is NaN or infinite, which JSON cannot say.
-
     """
     chunk = bytes(binary) + b"\0" * (-len(binary) % 4)
     if chunk:

@@ -43,7 +43,6 @@ class MergedDocument:
 
         Raises:
             UserError: The file would grow beyond what is read back.
-
         """
         self.binary += b"\0" * (-len(self.binary) % 4)
         if len(self.binary) + len(data) > self.max_bytes:

@@ -246,7 +246,6 @@ def gltf_companions(path: Path) -> list[Path]:
 
     Raises:
         BadFileError: Its JSON cannot be read.
-
     """
     if path.suffix.lower() == ".glb":
         return []

@@ -31,7 +31,6 @@ def placed_nodes(document: GltfDocument) -> Iterator[PlacedNode]:
 
     Raises:
         BadFileError: A node has two parents or is its own ancestor.
-
     """
     nodes = document.entries("nodes") or _implied_nodes(document)
     if len(nodes) > MAX_NODES:

@@ -75,7 +75,6 @@ def read_glb(path: Path, objects: ObjectGrouping = "auto") -> Scene:
 
     Raises:
         BadFileError: The file cannot be used.
-
     """
     return read_gltf_model(path, objects).scene
 

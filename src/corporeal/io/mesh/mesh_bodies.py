@@ -21,7 +21,6 @@ def apply_body_statements(
         owners: Path of the body of each object; other paths are shapes of no body.
         bodies: As ``mesh_raw.RawMesh`` has them.
         turn: Rotation from the axes of the file.
-
     """
     pairs = list(zip(scene.objects, owners, strict=True))
     named = [safe_name(str(bodies[p]["title"])) if p in bodies else o.name for o, p in pairs]

@@ -66,7 +66,6 @@ def load_mesh(
 
     Raises:
         BadFileError: The file cannot be used.
-
     """
     path = Path(path)
     read_file_bytes(path)  # refuses what is absent, empty, or too large to be read
@@ -108,7 +107,6 @@ def _run_reader_process(
 
     Raises:
         BadFileError: It cannot, or not within the limits.
-
     """
     require_packages(reader, path)
     command = [sys.executable, "-P", "-m", "corporeal.io.mesh.mesh_reader_process", function]
@@ -147,7 +145,6 @@ def _check_numbers(path: Path, raw: RawMesh) -> None:
 
     Raises:
         BadFileError: There are some, or there are no triangles.
-
     """
     if not raw.surfaces:
         raise BadFileError(path, "holds no triangles.", MESH_EXPORT_ADVICE)

@@ -57,7 +57,6 @@ def triangulate_mixed_faces(path: Path, data: memoryview) -> tuple[bytes, tuple[
 
     Raises:
         BadFileError: It ends within its faces.
-
     """
     faces = _find_faces(data)
     if faces is None or _are_rows_equal(data, faces):

@@ -48,6 +48,5 @@ def read_raw_mesh(path: Path) -> RawMesh:
 
     Raises:
         BadFileError: The file is absent or damaged.
-
     """
     return RawMesh(**store.load(path))

@@ -31,7 +31,6 @@ def infer_up_axis(
         vertices: In the file's axes and unit.
         triangles: Vertex numbers.
         taken: The axis that is taken, since the file states none.
-
     """
     other = OTHER_UP_AXIS.get(taken)
     if other is None:

@@ -59,7 +59,6 @@ class ColmapModel:
 
         Raises:
             BadFileError: Its camera is missing, or of a model that is not read.
-
         """
         camera = self.cameras.get(image.camera)
         if camera is None:
@@ -78,7 +77,6 @@ def read_colmap(folder: Path) -> ColmapModel:
 
     Raises:
         BadFileError: A file is missing or broken, or it holds no images.
-
     """
     folder = Path(folder)
     binary = (folder / "images.bin").is_file() and (folder / "cameras.bin").is_file()
@@ -119,7 +117,6 @@ def lens_of_camera(folder: Path, camera: ColmapCamera) -> Lens:
 
     Raises:
         BadFileError: It is of a model that is not read, or a number is bad.
-
     """
     if camera.model not in PARAMETER_COUNT_OF_CAMERA_MODEL:
         known = ", ".join(PARAMETER_COUNT_OF_CAMERA_MODEL)
@@ -144,7 +141,6 @@ def world_from_camera(
 
     Raises:
         BadFileError: They are not finite, or the quaternion's length is 0.
-
     """
     length = np.linalg.norm(turn)
     if not np.isfinite([*turn, *shift]).all() or length < 1e-6:

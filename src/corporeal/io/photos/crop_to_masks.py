@@ -54,7 +54,6 @@ def plan_crop(boxes: Float[np.ndarray, "V 2"], size: tuple[int, int], largest: t
         boxes: Sides of the boxes about masks, in those of the pictures.
         size: That the whole photographs would be reduced to [px].
         largest: Size of the photographs as they are [px].
-
     """
     longest = max(size)
     needed = float((boxes * size).max()) * (1 + 2 * CROP_MARGIN_FRACTION) if len(boxes) else longest

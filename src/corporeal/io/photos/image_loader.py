@@ -112,7 +112,6 @@ def load_photos(source: Path, shots: list[PosedPhotoFile], longest: int, close: 
 
     Raises:
         BadFileError: Fewer than three can be used, or most cannot, or all are too large together.
-
     """
     bad: list[UnusablePhoto] = []
     sizes = [_size(shot, bad) for shot in shots]
@@ -267,7 +266,6 @@ def rotated_mask_problem(mask: tuple[int, int], picture: tuple[int, int]) -> str
     Args:
         mask: Width and height [px]; of other proportions it is stretched, as some models have it.
         picture: Likewise.
-
     """
     (width, height), (wide, high) = mask, picture
     ratio, swapped = width * high / (height * wide), width * wide / (height * high)

@@ -108,7 +108,6 @@ def read_posed_photos(
     Raises:
         BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used; or no mask has the
             name of a photograph.
-
     """
     found = list_posed_photos(path)
     shots = found.shots
@@ -150,7 +149,6 @@ def list_posed_photos(path: Path) -> PhotoListing:
 
     Raises:
         BadFileError: There are no poses, or one of them is bad.
-
     """
     path = Path(path)
     if not path.exists():

@@ -42,7 +42,6 @@ def read_projection(path: Path) -> Float[np.ndarray, "3 4"]:
 
     Raises:
         BadFileError: It is none, or it is not finite.
-
     """
     try:
         if path.stat().st_size > MAX_MATRIX_FILE_BYTES:
@@ -66,7 +65,6 @@ def split_projection(
 
     Raises:
         BadFileError: The left part is singular: no finite camera.
-
     """
     M = P[:, :3]
     size = np.linalg.norm(M)
@@ -87,7 +85,6 @@ def check_focal(path: Path, K: Float[np.ndarray, "3 3"], width: int, height: int
 
     Raises:
         BadFileError: The focal length or the principal point is absurd.
-
     """
     side = max(width, height)
     focal = K[0, 0] / side, K[1, 1] / side

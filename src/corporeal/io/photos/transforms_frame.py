@@ -113,7 +113,6 @@ def read_transforms_frames(path: Path) -> list[TransformsFrame]:
 
     Raises:
         BadFileError: It is no such file.
-
     """
     if not path.is_file():
         raise BadFileError(path, "there is no such file.", "Name a folder that holds one.")

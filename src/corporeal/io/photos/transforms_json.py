@@ -52,7 +52,6 @@ def write_views(folder: Path, views: Views) -> Path:
     Raises:
         UserError: A camera is skewed, which the format cannot say; more than 65534 objects or parts; the disk refuses
             it.
-
     """
     path = folder / TRANSFORMS_FILE
     unit = _depth_unit(views)
@@ -148,7 +147,6 @@ def read_views(folder: Path) -> Views:
     Raises:
         BadFileError: It is no such folder, a number or picture in it is bad, the pictures are not all of one size, or a
             lens bends straight lines.
-
     """
     path = folder / TRANSFORMS_FILE
     shots = read_transforms_frames(path)

@@ -61,7 +61,6 @@ def read_ksplat(path: Path, data: memoryview) -> Gaussians:
 
     Raises:
         BadFileError: It is cut off, or its numbers contradict each other.
-
     """
     sections, level = struct.unpack_from("<I", data, 4)[0], struct.unpack_from("<H", data, 20)[0]
     low, high = struct.unpack_from("<ff", data, 36)

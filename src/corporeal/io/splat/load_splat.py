@@ -25,7 +25,6 @@ def load_splat(path: Path, up: UpAxis | None = None) -> Gaussians:
 
     Raises:
         BadFileError: It is no splat, it is broken, or most of it cannot be used.
-
     """
     path = Path(path)
     path = _file_to_read(path) if path.is_dir() else path

@@ -40,7 +40,6 @@ def read_sog(path: Path, data: memoryview) -> Gaussians:
 
     Raises:
         BadFileError: It is broken, of another version, or lacks a file.
-
     """
     if data[:4] == ZIP_SIGNATURE:
         return read_sog_zip(path, data)
@@ -54,7 +53,6 @@ def read_sog_zip(path: Path, data: memoryview, max_file_bytes: int = MAX_SOG_FIL
 
     Raises:
         BadFileError: It is broken, of another version, or lacks a file.
-
     """
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))

@@ -35,7 +35,6 @@ def read_antimatter15(path: Path, data: memoryview) -> Gaussians:
 
     Raises:
         BadFileError: The file's length is no multiple of 32 bytes.
-
     """
     if len(data) % SPLAT_RECORD_DTYPE.itemsize:
         what = f"is {len(data):,} bytes long, which is no multiple of {SPLAT_RECORD_DTYPE.itemsize}."

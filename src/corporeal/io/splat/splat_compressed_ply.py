@@ -29,7 +29,6 @@ def read_splat_ply(path: Path, data: memoryview) -> Gaussians:
 
     Raises:
         BadFileError: It is broken, or its vertices are no Gaussians.
-
     """
     elements = read_ply_elements(path, data)
     if is_compressed_ply(elements):
@@ -47,7 +46,6 @@ def gaussians_from_chunks(path: Path, elements: dict[str, PlyColumns]) -> Gaussi
 
     Raises:
         BadFileError: A property is missing, or chunks and Gaussians don't fit together.
-
     """
     chunks, vertices = elements["chunk"], elements["vertex"]
     sides = [f"{end}_{axis}" for end in ("min", "max") for axis in "xyz"]

@@ -31,7 +31,6 @@ def gaussians_from_vertices(path: Path, vertices: PlyColumns) -> Gaussians:
 
     Raises:
         BadFileError: Properties are missing, or there is an odd number of harmonics.
-
     """
     missing = [name for name in REQUIRED_PROPERTIES if name not in vertices]
     if missing:
@@ -54,7 +53,6 @@ def sh_rest_coefficients(path: Path, columns: PlyColumns) -> np.ndarray:
 
     Raises:
         BadFileError: Their number fits no degree from 0 to 3.
-
     """
     names = [name for name in columns if name.startswith("f_rest_")]
     if len(names) not in SH_COUNT_OF_REST_PROPERTIES or set(names) != {f"f_rest_{k}" for k in range(len(names))}:
@@ -72,7 +70,6 @@ def write_splat_ply(path: Path, gaussians: Gaussians) -> Path:
 
     Raises:
         DiskError: The disk refuses it.
-
     """
     rests = [f"f_rest_{k}" for k in range(3 * (gaussians.sh.shape[1] - 1))]
     names = [

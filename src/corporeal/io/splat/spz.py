@@ -62,7 +62,6 @@ def read_spz(path: Path, data: memoryview) -> Gaussians:
 
     Raises:
         BadFileError: It is broken, larger than it may be, or of another version.
-
     """
     if data[:2] == GZIP_SIGNATURE:
         header, attributes = _one_stream(path, data)

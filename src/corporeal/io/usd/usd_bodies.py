@@ -82,7 +82,6 @@ def read_usd_physics(path: str | Path) -> tuple[StatedBody, ...]:
     Raises:
         BadFileError: It cannot be read.
         UserError: The library is not installed.
-
     """
     try:
         from pxr import Tf, Usd

@@ -99,7 +99,6 @@ def read_usd(path: Path) -> RawMesh:
 
     Raises:
         BadFileError: It cannot be read, or leads out of its folder.
-
     """
     stage = _open_stage(path)
     unit = _unit(path, UsdGeom.GetStageMetersPerUnit(stage))  # 0.01 where it states none

@@ -66,7 +66,6 @@ def asset_mass_properties(asset: PoolAsset, extent: float, folder: Path | None =
 
     Raises:
         UserError: It cannot be filled.
-
     """
     config = FillConfig()
     asked = {"extent": round(extent, 6), "class": asset.class_name, "version": MASS_CACHE_VERSION}
@@ -132,7 +131,6 @@ def assemble_corpus(folder: Path, config: CorpusConfig, sources: Sources, hands:
     Raises:
         UserError: The pool is empty or lost what the plan needs, the folder holds a corpus that was planned otherwise,
             or another process works in it.
-
     """
     with store.lock_folder(folder):
         made = _planned_corpus(folder, config, sources)
@@ -166,7 +164,6 @@ def assembly_jobs(folder: Path, made: CorpusPlan, sources: Sources) -> list[Job]
 
     Raises:
         UserError: The pool no longer has an asset of the plan.
-
     """
     pool = sources.pool
     if pool is None:
@@ -232,7 +229,6 @@ def planned_scene(
 
     Raises:
         UserError: It never came to rest; the reason is that of the planned way.
-
     """
     first: UserError | None = None
     for way in fallback_compose_configs(config):

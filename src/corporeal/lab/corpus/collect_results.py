@@ -156,7 +156,6 @@ def collect_results(folder: Path) -> CorpusResults:
 
     Raises:
         UserError: The folder is no corpus, or a file of it is damaged.
-
     """
     plan = read_plan(folder)
     assembled, ran = read_manifest_rows(folder, "assemble"), read_manifest_rows(folder, "run")

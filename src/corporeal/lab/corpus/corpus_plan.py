@@ -113,7 +113,6 @@ def plan_corpus(models: Sequence[PoolAsset], config: CorpusConfig, windy: WindTe
 
     Raises:
         UserError: The pool is empty, or a number makes no sense.
-
     """
     if config.preset == "seven":
         ignored = " ".join(config.changes)
@@ -159,7 +158,6 @@ def read_plan(folder: Path) -> CorpusPlan:
     Raises:
         UserError: The folder is no corpus.
         BadFileError: ``corpus.json`` is damaged.
-
     """
     path = folder / PLAN_FILE
     if not path.exists():
@@ -197,7 +195,6 @@ def interactions_and_counts(
         kinds: The interactions that are possible.
         count: Fewest and most objects.
         rng: Decides between equals.
-
     """
     used: Counter[str] = Counter()
     for _ in range(scenes):
@@ -244,7 +241,6 @@ def with_wind(
 
     Returns:
         What happens, and messages about what was changed.
-
     """
     happens, messages = list(kinds), []
     for k in [k for k, kind in enumerate(kinds) if kind == "wind" and not windy(sets[k])]:

@@ -49,7 +49,6 @@ def report_corpus(folder: Path, progress: Progress = no_progress) -> list[Path]:
 
     Raises:
         UserError: The folder is no corpus, or the disk refuses it.
-
     """
     progress(0.0, "reading the runs")
     corpus = collect_results(folder)

@@ -51,7 +51,6 @@ def run_corpus(folder: Path, config: RunConfig, settings: Settings, hands: Execu
     Raises:
         UserError: The folder is no corpus, no scene of it is assembled, or another process works
             in it.
-
     """
     plan = read_plan(folder)
     if config.first is not None and config.first < 1:

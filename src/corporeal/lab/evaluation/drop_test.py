@@ -60,7 +60,6 @@ def simulate_drop(row: MeasuredRebound, settings: Settings) -> DropResult:
 
     Raises:
         UserError: The settings don't go with it, or the simulation cannot go on.
-
     """
     settings = replace(settings, ground=replace(settings.ground, floor=row.floor))
     prepared = prepare_scene(drop_scene(row), settings)
@@ -101,7 +100,6 @@ def advance_until_rise(engine: Engine, look: float, longest: float) -> Diagnosti
         engine: At time 0.
         look: How often it is looked at [s].
         longest: What has not risen by then does not [s].
-
     """
     while engine.time < longest:
         engine.advance(engine.time + look)

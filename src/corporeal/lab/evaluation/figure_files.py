@@ -13,7 +13,6 @@ def save_figure(figure: Figure, path: Path) -> None:
 
     Raises:
         DiskError: The disk refuses it.
-
     """
     FigureCanvasAgg(figure)
     with disk_errors(path):

@@ -110,7 +110,6 @@ def hull_volume_mass(hull: Sequence[float], measured: Sequence[float]) -> list[f
     Args:
         hull: Volume of each object's convex hull [m³].
         measured: [kg]
-
     """
     x, y = np.log(np.asarray(hull, dtype=float)), np.log(np.asarray(measured, dtype=float))
     return [_without(k, x, y) for k in range(len(x))]
@@ -216,7 +215,6 @@ def predict_masses(
     Raises:
         UserError: What the first object that failed says, or how many questions about all of them wait for a person's
             answers.
-
     """
     live = describing.vlm.partition(":")[0] in LIVE_CLIENTS
     jobs = [partial(predict_mass, obj, describing, grounding, config) for obj in objects]

@@ -72,7 +72,6 @@ def mass_figure(rows: Sequence[MassPrediction], path: Path) -> None:
 
     Raises:
         UserError: No object's mass is known.
-
     """
     known = [r for r in rows if r.mass_true is not None]
     if not known:

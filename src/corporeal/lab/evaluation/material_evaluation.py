@@ -63,7 +63,6 @@ def evaluate_materials(
 
     Raises:
         UserError: The folder holds none of them, or an object has no part of a name.
-
     """
     found = model_files_in(folder) if folder.is_dir() else []
     known = [path for path in found if path.stem in truth]
@@ -87,7 +86,6 @@ def read_material_truth(path: Path, library: str = "default") -> MaterialTruth:
 
     Raises:
         BadFileError: The file cannot be read, or says something else.
-
     """
     try:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -53,7 +53,6 @@ def models_in_folder(folder: Path) -> list[WeighedObject]:
 
     Raises:
         UserError: There is none.
-
     """
     found = model_files_in(folder) if folder.is_dir() else []
     if not found:
@@ -66,7 +65,6 @@ def read_measured_masses(folder: Path, table: Path) -> list[WeighedObject]:
 
     Raises:
         BadFileError: The table cannot be used, or speaks of none of the models.
-
     """
     models = {w.name: w for w in models_in_folder(folder)}
     rows = _rows(table)
@@ -135,7 +133,6 @@ def read_abo(folder: Path, split: str) -> list[WeighedObject]:
 
     Raises:
         UserError: There is no such split, or a scene has no mesh or no weight.
-
     """
     splits, weights = (store.read_json(folder / ABO_SPLITS_FILE), store.read_json(folder / ABO_WEIGHTS_FILE))
     for path, given in ((folder / ABO_SPLITS_FILE, splits), (folder / ABO_WEIGHTS_FILE, weights)):

@@ -137,7 +137,6 @@ def simulate_ensemble(
 
     Raises:
         UserError: The folder is no run, or the number of samples makes no sense.
-
     """
     if not 1 <= samples <= MAX_MEMBERS:
         raise UserError(f"--samples is {samples}. Give a number from 1 to {MAX_MEMBERS}.")

@@ -73,7 +73,6 @@ def measured_rebounds() -> tuple[MeasuredRebound, ...]:
 
     Raises:
         BadFileError: A range is none, or its source is missing.
-
     """
     return tuple(_rebound(row) for row in _table()["rebound"])
 

@@ -61,7 +61,6 @@ def rigid_grid(
         state: Its rigid state, see ``layout``.
         points: Its particles in its own frame, see ``tables``.
         cell: dx [m].
-
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
     surface, curvature = body.surface - state[CENTRE : CENTRE + 3], surface_curvature(body)
@@ -135,7 +134,6 @@ def _sort_into_cubes(points: np.ndarray, width: float) -> tuple[np.ndarray, np.n
 
     Returns:
         The points, and for each cube the first and last of them, its middle and its radius [m].
-
     """
     cube = np.floor(points[:, :3] / width).astype(np.int64)
     order = np.lexsort(cube.T)
@@ -211,7 +209,6 @@ class ContactMemory:
         Args:
             origin: The window's first block.
             dim: How many blocks it has along each axis.
-
         """
         ends = 4.0 * self.cell * np.stack([origin, origin + dim])
         normal = self.plane[:, :3]

@@ -81,7 +81,6 @@ class CpuEngine(EngineBodyChanges, EngineLoadChanges):
             problem: What to simulate.
             threads: How many threads share the loops; None: as many as there are cores, up to 4. The result does not
                 depend on it.
-
         """
         self.problem = problem
         self.threads = threads or min(DEFAULT_THREADS, usable_cores())

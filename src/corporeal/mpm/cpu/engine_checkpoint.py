@@ -85,7 +85,6 @@ def continued(own: SavedArrays, saved: SavedArrays, change: BodyChange, shared: 
         saved: Of the engine before.
         change: Who comes of whom.
         shared: Whether all bodies share one field.
-
     """
     books = {f"ledger.{k}": v for k, v in change.inherited(_ledger_arrays(saved)).items()}
     kept = _select_bodies(saved, change.whole)

@@ -76,7 +76,6 @@ class FieldWindow:
             rows: All other channels, (P, CHANNELS); places are filled in here.
             material: What they are made of.
             sorter: Who sorts.
-
         """
         self.count, self.sorter = len(rows), sorter
         corner = np.floor(place.min(axis=0) / 4).astype(np.int64) - 1
@@ -138,7 +137,6 @@ class FieldWindow:
         Args:
             before: Of the first of this one's particles.
             material: What this one's are made of.
-
         """
         slot = np.empty(self.count, np.int64)
         slot[self.number] = self.slot

@@ -68,7 +68,6 @@ class WindRecords:
             impulse: The ledger's external impulses, which the native piece adds to.
             rigid: States of the rigid bodies.
             points: Particles of the rigid bodies in their own frames.
-
         """
         windy = [b for b, body in enumerate(problem.bodies) if body.wind and len(body.faces.area)]
         self.body = windy
@@ -240,7 +239,6 @@ class SpringRecords:
             first: Number of each body's first particle.
             impulse: The ledger's external impulses, which grips add to.
             rigid: States of the rigid bodies.
-
         """
         self.problem, self.first, self.impulse, self.rigid = problem, first, impulse, rigid
         self.start = {b: rigid_state(problem.bodies[b]) for b in rigid}

@@ -99,7 +99,6 @@ class ParticleSorter:
             planes: Normals and offsets [cells], (W, 4).
             domain: How deep in a plane and how far from the origin [cells] a particle is lost.
             program: Whose threads share the copying.
-
         """
         self.record = np.zeros(1, SORTING_RECORD.dtype)
         self.plane = np.ascontiguousarray(planes, float)
@@ -118,7 +117,6 @@ class ParticleSorter:
 
         Returns:
             Whether one is lost, and which share of them is outside of the block it was sorted into.
-
         """
         self.old = np.ascontiguousarray(window.block[:, :5])
         self._point(part=window.part, history=window.history, branch=window.branch, old=self.old)

@@ -56,7 +56,6 @@ class ShellRecords:
 
         Args:
             problem: What to simulate.
-
         """
         self.shells = Shells.of(problem)
         self.record = np.zeros(1, SHELL_RECORD.dtype)
@@ -155,7 +154,6 @@ class ShellRecords:
             world: Whose tasks on particles are known.
             fields: Of the world.
             shared: Whether all bodies share one field.
-
         """
         fields["shells"] = 0
         fields["shells"][[0] if shared and self.bodies else self.bodies] = 1
@@ -201,7 +199,6 @@ class ShellRecords:
         Args:
             position: Of all particles [m].
             bodies: Number of all.
-
         """
         shells = self.shells
         if not shells:
@@ -239,7 +236,6 @@ def _wall_rows(shells: Shells, decay: Int[np.ndarray, " T"]) -> Float[np.ndarray
     Args:
         shells: All.
         decay: Number of its relaxation times.
-
     """
     m = shells.material
     mu, lam = lame_parameters(m.membrane_young_pa, m.poisson)
@@ -268,7 +264,6 @@ def _hinge_slots(
     Returns:
         Where each batch's slots begin, what stands in them (numbers after all hinges stand for none), and the curvature
         for each radian.
-
     """
     t, half = mesh.hinge_triangle, 2 * np.arange(len(mesh.hinge))[:, None] + [0, 1]
     corner = mesh.triangle[t]

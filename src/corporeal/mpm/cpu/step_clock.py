@@ -20,7 +20,6 @@ def body_loads(
         rigid: States of rigid bodies.
         rows: Body of every row of each field's table of materials, in order.
         paths: Of bodies with prescribed motion; they must stay alive.
-
     """
     records = np.zeros(len(problem.bodies), BODY_LOAD_RECORD.dtype)
     for b, body in enumerate(problem.bodies):

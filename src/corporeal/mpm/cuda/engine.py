@@ -59,7 +59,6 @@ class CudaEngine(EngineInteraction):
 
         Raises:
             UserError: There is no such GPU, or the problem asks for what only other engines do.
-
         """
         self.device = require_device(device)
         _refuse_unknown(problem)
@@ -397,7 +396,6 @@ def require_device(device: str) -> str:
 
     Raises:
         UserError: It is not, or its driver is too old for a whole frame in one graph.
-
     """
     known = [found.alias for found in wp.get_devices()]
     cards = [found.alias for found in wp.get_cuda_devices()]

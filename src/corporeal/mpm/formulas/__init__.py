@@ -30,7 +30,6 @@ def cpp_law_lists() -> list[str]:
 
     Raises:
         ImportError: A law of the menu is not in ``laws.h``.
-
     """
     written = set(re.findall(r"struct Rule<(\w+), R>", (FORMULAS_FOLDER / "laws.h").read_text()))
     for law in Law:
@@ -58,7 +57,6 @@ def formula_options(*headers: Path, numbers: Mapping[str, int] | None = None, **
         headers: Headers of the module's own, after those of the formulas.
         numbers: What they know by name in ``namespace mpm``.
         others: More options of ``wp.set_module_options``.
-
     """
     folders = [str(folder) for folder in (FORMULAS_FOLDER, *(header.parent for header in headers))]
     text = cpp_preamble() + constants.cpp_definitions(numbers or {})

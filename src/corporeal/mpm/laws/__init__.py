@@ -83,7 +83,6 @@ def flow(law: LawNumbers, F: Matrices, numbers: YieldParameters, plastic: Scalar
         numbers: Of the materials.
         plastic: Equivalent plastic strain so far.
         volume: Volume correction so far.
-
     """
     out = ReturnMapResult(F.copy(), np.zeros(len(F)), volume.copy(), np.zeros(len(F)))
     for rule, k in _by_law(law):

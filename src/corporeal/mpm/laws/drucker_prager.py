@@ -45,7 +45,6 @@ def return_drucker_prager(
         cone: α, of ``cone_slope``.
         apex: p₀/K, of ``apex_strain``.
         volume: Volume correction v_c so far.
-
     """
     strain = strain + volume[:, None] / 3.0
     trace = np.sum(strain, axis=1)

@@ -89,7 +89,6 @@ def apply_return_map(
         F: Trial elastic deformation gradients.
         numbers: Of the material.
         back: The map.
-
     """
     U, stretch, V = signed_svd(F)
     strain = log_strain(stretch)

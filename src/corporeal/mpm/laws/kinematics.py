@@ -19,7 +19,6 @@ def signed_svd(F: Matrices) -> tuple[Matrices, Vectors, Matrices]:
 
     Returns:
         U, the stretches Σ in descending order, and V (not its transpose).
-
     """
     U, stretch, Vt = np.linalg.svd(F)
     mirror_u, mirror_v = np.sign(determinant(U)), np.sign(determinant(Vt))

@@ -24,7 +24,6 @@ def return_von_mises(
         yield_stress: Initial uniaxial yield stress σ_y [Pa].
         hardening: H [Pa].
         plastic: Equivalent plastic strain ε_p so far.
-
     """
     part, size = deviator(strain)
     radius = np.sqrt(2.0 / 3.0) * (yield_stress + hardening * plastic) / (2.0 * mu)

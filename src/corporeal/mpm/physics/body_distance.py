@@ -37,7 +37,6 @@ def pair_gaps(
 
     Returns:
         Gap, negative when particles interleave, inf on the diagonal; depth, 0 when apart.
-
     """
     count = len(bodies)
     if squeezed is None:
@@ -127,7 +126,6 @@ def overlap_depth(points: np.ndarray, tree: KDTree, squeezed: np.ndarray | None,
         tree: Of the other body's.
         squeezed: Their volumes over those at rest [-]; None: all at rest, so that counting does.
         cell: Grid spacing dx [m].
-
     """
     if len(points) == 0:
         return 0.0
@@ -155,7 +153,6 @@ def plane_depth(
             r ‖Fᵀ n‖ along n; grains that have flowed far are no ellipsoid any more, so it is
             at most 2 r.
         cell: Grid spacing dx [m].
-
     """
     normal = np.array(plane.normal)
     height = points @ normal - plane.offset

@@ -128,7 +128,6 @@ def face_of_spread(mean: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     Args:
         mean: [dx]
         deviation: [dx]
-
     """
     place = np.minimum(deviation, SPLINE_DEVIATION_DX) * (FACE_TABLE_INTERVALS / SPLINE_DEVIATION_DX)
     return mean + np.interp(place, np.arange(len(_SPREADS)), _SPREADS)
@@ -190,7 +189,6 @@ def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: floa
         normal: Along which, unit.
         around: [m]
         behind: [m]
-
     """
     offset = points[None, :] - node[:, None]
     along = np.einsum("enk,ek->en", offset, normal)
@@ -209,7 +207,6 @@ def sees_thin_place(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarr
         places: Surface points behind which it is thin [m].
         node: Where it is looked from [m].
         far: How far [m].
-
     """
     square = np.sum((places[None, :] - node[:, None]) ** 2, axis=2)
     return np.any(square < far**2, axis=1)
@@ -227,7 +224,6 @@ def touching_offset(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: flo
         mean_c: Of the other [m].
         normal: n, unit.
         cell: dx [m].
-
     """
     (far, p), (other, q) = (_edge_distance(mean / cell, normal) for mean in (mean_a, mean_c))
     cosine = np.sum(p * q, axis=1)
@@ -311,7 +307,6 @@ def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: fl
         node: Nodes [m].
         place: Mean place of the liquid at each [m].
         cell: dx [m].
-
     """
     rows: list[tuple[int, np.ndarray, float]] = []
     around = KDTree(surface.point).query_ball_point(place, WETTED_REACH_DX * cell)
@@ -364,7 +359,6 @@ def widest_candidate(
         reach_a: s_a(n) = max (x·n + R) over a's particles [m], R = r0 ‖Fᵀn‖.
         reach_c: s_c(n) = min (x·n - R) over c's particles [m].
         cell: dx [m].
-
     """
     bias = np.array([FIRST_BIAS, OTHER_BIAS, OTHER_BIAS]) * cell
     absent = np.all(candidates == 0.0, axis=2)
@@ -393,7 +387,6 @@ def layer_normals(normal: Vectors, *covariance: Float[np.ndarray, "E 3 3"]) -> V
     Args:
         normal: Unit, or zero.
         covariance: Of the offsets that each node sees of a layer [dx²]; of one body, or of both.
-
     """
     share = np.zeros_like(normal)
     for square in covariance:
@@ -411,7 +404,6 @@ def smooth_normals(normal: Vectors, weight: Scalars, index: Int[np.ndarray, "E 3
         normal: Unit normals at the pair's nodes.
         weight: min(m_a, m_c) [kg].
         index: The nodes' grid indices.
-
     """
     low = index.min(axis=0) - 1
     shape = tuple(index.max(axis=0) - low + 2)

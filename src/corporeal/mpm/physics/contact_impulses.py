@@ -114,7 +114,6 @@ def target_speeds(
         rebound: How they rebound.
         cell: dx [m].
         dt: [s]
-
     """
     approach = approach_of(speed, rebound)
     closing = speed * dt > contacts.gap
@@ -147,7 +146,6 @@ def solve_impacts(contacts: ContactList, movers: Movers, rebound: ReboundRules, 
 
     Returns:
         Impulses J [N s], as of ``solve``.
-
     """
     total = np.zeros((len(contacts.a), 3))
     for _ in range(MAX_IMPACTS_PER_STEP):

@@ -34,7 +34,6 @@ def support_point_shift(
 
     Returns:
         The shifts, and whether each point is the surface in that direction at all, and not its neighbours.
-
     """
     normal, along = curvature[:, :3], curvature[:, 3:6]
     ball, arc, reach = curvature[:, 6], curvature[:, 7], curvature[:, 8]
@@ -105,7 +104,6 @@ def height_over(rows: Rows, place: Vectors) -> HeightsOverCurve:
     Args:
         rows: One for each place.
         place: Seen from its point [m].
-
     """
     normal, along = rows[:, :3], rows[:, 3:6]
     across = np.cross(normal, along)
@@ -124,7 +122,6 @@ def _over(k: Scalars, s: Scalars, h: Scalars) -> tuple[np.ndarray, ...]:
         k: Its curvature [1/m].
         s: How far along its tangent a place lies [m].
         h: How far over its tangent [m].
-
     """
     down, turn = 1.0 + k * h, k * s
     size = np.hypot(turn, down)
@@ -142,7 +139,6 @@ def ball_centre(rows: Rows, towards: Vectors) -> Vectors:
     Args:
         rows: Of round points.
         towards: Unit, in the frame of the rows.
-
     """
     normal, along = rows[:, :3], rows[:, 3:6]
     radius, moved = ball_radius(rows), np.where(rows[:, 6] > 0.0, rows[:, 7], 0.0)
@@ -172,7 +168,6 @@ def speed_into_hollow(round_rows: Rows, rows: Rows, square: Scalars, dt: float) 
         rows: Of what it meets.
         square: Of the speed at which its middle moves along the surface [m²/s²].
         dt: [s]
-
     """
     least = np.minimum(rows[:, 10:].min(axis=1), 0.0)
     return -0.5 * least / (1.0 + least * ball_radius(round_rows)) * square * dt

@@ -37,7 +37,6 @@ def facets_of(surface: Float[np.ndarray, "S 3"], curvature: Float[np.ndarray, "S
     Args:
         surface: In the body's frame [m].
         curvature: See ``types.CURVATURE_COLUMNS``.
-
     """
     curved = np.any(curvature[:, [6, 7, 10, 11]] != 0.0, axis=1)
     known = np.any(curvature[:, :3] != 0.0, axis=1) & ~curved
@@ -74,7 +73,6 @@ def has_edges(rows: Float[np.ndarray, "S W"]) -> bool:
     Args:
         rows: How its surface curves at its points, ``types.CURVATURE_COLUMNS``; without normals where that is not
             known.
-
     """
     return bool(np.any(rows[:, :3].any(axis=1) & (rows[:, 6:8].sum(axis=1) <= 0.0)))
 
@@ -115,7 +113,6 @@ def facet_normals(
         slip: Speed of a over c there [m/s].
         first: Faces of a.
         second: Faces of c.
-
     """
     cosine, other = normal @ first.outward.T, -normal @ second.outward.T
     one, two = np.argmax(cosine, axis=1), np.argmax(other, axis=1)

@@ -83,7 +83,6 @@ def restitution_at_speed(restitution: float, law: Float[np.ndarray, "5"], speed:
         restitution: e_r: at the law's speed [-].
         law: v_r [m/s], s [s/m], q [-], least and most e.
         speed: v [m/s].
-
     """
     rated, slope, power, least, most = law
     now = restitution * (max(speed, TINY_DOUBLE) / rated) ** -power - slope * (speed - rated)
@@ -109,7 +108,6 @@ def equivalent_punch_radius(radius: float, thickness: float, cell: float) -> flo
         radius: Of the disc over which it spreads, with its cell [m].
         thickness: h: of what is pressed, from the contact before it [m].
         cell: dx [m].
-
     """
     spread = max(radius**2 - cell**2, 0.0)
     return max(radius, LAYER_STIFFNESS_FACTOR * spread / max(thickness, TINY_DOUBLE))
@@ -126,7 +124,6 @@ def responds_within_impact(stiffness: float, mass: float, strikes: float, behind
         mass: m [kg].
         strikes: Inverse mass of what strikes [1/kg].
         behind: Inverse mass of what is behind [1/kg].
-
     """
     between = stiffness * (1.0 / mass + behind) + 1.0 / mass
     return between > SUPPORT_FREQUENCY_RATIO2 * (strikes + behind / (1.0 + mass * behind))

@@ -17,7 +17,6 @@ def bulk_modulus(density: float, speed: float) -> float:
     Args:
         density: ρ [kg/m³].
         speed: Largest speed that is expected [m/s].
-
     """
     return density * (SOUND_TO_FLOW_SPEED_RATIO * speed) ** 2
 

@@ -66,7 +66,6 @@ def fit_branches(loss: float) -> BranchFit:
 
     Args:
         loss: tan δ [-], from 0.02 to 2.
-
     """
     low, high = LOSS_BAND_LOW_RATIO, LOSS_BAND_HIGH_RATIO
     frequency = np.geomspace(low, high, 60)
@@ -94,7 +93,6 @@ def relaxing_bulk(mu: Float[np.ndarray, " *N"], lam: Float[np.ndarray, " *N"]) -
     Args:
         mu: μ [Pa].
         lam: λ [Pa].
-
     """
     return np.minimum(lam, LOCAL_BULK_RATIO * mu) + 2 / 3 * mu
 
@@ -108,7 +106,6 @@ def stiffening(loss: float, poisson: float) -> float:
     Args:
         loss: tan δ [-].
         poisson: ν [-], below 1/2.
-
     """
     if loss < MIN_LOSS_FACTOR:
         return 1.0
@@ -126,7 +123,6 @@ def complex_modulus(
         strength: g, over the relaxed modulus [-].
         time: T [s].
         frequency: ω [rad/s].
-
     """
     x = 1j * frequency[:, None] * time
     return 1.0 + (x / (1.0 + x)) @ strength
@@ -155,7 +151,6 @@ def advance_branches(
         increment: dt ∇v [-].
         time: T [s].
         dt: The step [s].
-
     """
     trace = np.trace(increment, axis1=1, axis2=2)
     A = (increment - trace[:, None, None] / 3.0 * np.eye(3))[:, None]

@@ -124,7 +124,6 @@ class PathFollower:
             dt: [s]
             centre: Where the body's centre of mass is now [m].
             rotation: How it has turned so far.
-
         """
         there = path_pose(self.rows, end)
         velocity = (there.place + there.rotation @ self.arm - centre) / dt
@@ -150,7 +149,6 @@ def path_followers(problem: Problem) -> dict[int, PathFollower]:
 
     Raises:
         UserError: A body with a path is not rigid, or something else moves it too.
-
     """
     found = {}
     jointed = {b for joint in problem.joints for b in (joint.first, joint.second)}
@@ -202,7 +200,6 @@ def fastest_velocity(path: Keyframes, reach: float) -> Float[np.ndarray, "3"]:
     Args:
         path: How it moves.
         reach: How far its points are from what it turns about [m].
-
     """
     t = np.linspace(path.time[0], path.time[-1], SPEED_SAMPLES_PER_INTERVAL * len(path.time))
     if len(path.time) == 1:

@@ -136,7 +136,6 @@ def thinness(surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"]
         surface: Points on the body's surface [m]; without any it is 0.
         normal: Which way it looks there; 0 where that is not known.
         cell: dx [m].
-
     """
     if len(surface) == 0:
         return 0

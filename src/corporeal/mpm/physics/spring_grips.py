@@ -90,7 +90,6 @@ def updated_grips(
         target: Where to [m].
         stiffness: Of the spring [N/m]; 0 lets go.
         total: Mass of the whole body [kg].
-
     """
     if not 0.0 <= stiffness < np.inf:
         raise UserError(f"A pull's stiffness is {stiffness} N/m. Give 0 (let go) or more.")
@@ -109,7 +108,6 @@ def check_grip(problem: Problem, body: int, *vectors: Vector | None) -> None:
 
     Raises:
         UserError: It says what to give.
-
     """
     if not 0 <= body < len(problem.bodies):
         raise UserError(f"There is no body {body}. Choose 0 to {len(problem.bodies) - 1}.")
@@ -123,7 +121,6 @@ def require_finite(*vectors: Vector | None) -> None:
 
     Raises:
         UserError: It says what to give.
-
     """
     if not all(np.isfinite(v).all() for v in vectors if v is not None):
         raise UserError("A vector is not finite. Give three numbers.")

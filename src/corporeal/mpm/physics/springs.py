@@ -34,7 +34,6 @@ def stored_spring_energy(
         problem: Where the springs are.
         position: Of all particles [m].
         bodies: The rigid ones, by number.
-
     """
     energy, first = np.zeros(len(problem.bodies)), 0
     for b, body in enumerate(problem.bodies):

@@ -27,7 +27,6 @@ def p_wave_speed(young_pa: float, poisson: float, density: float) -> float:
         young_pa: Young's modulus E [Pa].
         poisson: Poisson's ratio ν [-], below 1/2.
         density: Mass density ρ [kg/m³].
-
     """
     return sqrt(young_pa * (1 - poisson) / (density * (1 + poisson) * (1 - 2 * poisson)))
 
@@ -43,7 +42,6 @@ def shell_wave_speeds(young_pa: float, poisson: float, density: float, cells: fl
         poisson: ν [-].
         density: ρ [kg/m³].
         cells: Thickness over the grid spacing, t/dx [-].
-
     """
     plane = sqrt(young_pa / (density * (1 - poisson**2)))
     return plane, pi**2 * cells / (4 * sqrt(3)) * plane
@@ -72,7 +70,6 @@ def stable_step(wave: float, motion: float, cell: float, courant: float = COURAN
         motion: Largest particle speed |v| [m/s].
         cell: Grid spacing dx [m].
         courant: s [-].
-
     """
     speed = wave + motion
     return courant * cell / speed if speed > 0 else inf
@@ -91,7 +88,6 @@ def flip_damping_rate(
         granular: Which of it is granular.
         pull: Strength g of gravity [m/s²]; without any, all forget alike.
         cell: dx [m].
-
     """
     rings = FLIP_DAMPING_FRACTION * wave / cell
     settles = GRANULAR_DAMPING_FRACTION * sqrt(pull / cell) if pull > 0 else inf
@@ -157,7 +153,6 @@ def fit_young_compression(parts: Sequence[tuple[float, float]], limit: float) ->
     Args:
         parts: Young's modulus [Pa] and wave speed [m/s] of each.
         limit: Largest wave speed.
-
     """
     fast = [(young_pa, speed / limit) for young_pa, speed in parts if speed > limit]
     knee = min(young_pa / over**2 for young_pa, over in fast) / 4

@@ -38,7 +38,6 @@ def flow_curve(body: Body, cell: float) -> FlowCurve:
     Args:
         body: The liquid.
         cell: dx [m].
-
     """
     pours = np.flatnonzero(np.isin(body.law, laws.LIQUID_LAWS))
     if body.rigid or len(pours) == 0:
@@ -62,7 +61,6 @@ def drag_span(mass: Scalars, full: float, height: Scalars, cell: float, dt: floa
         height: Of the nodes over the wall [m].
         cell: dx [m].
         dt: [s]
-
     """
     h = height / cell
     away = np.abs(h)
@@ -88,7 +86,6 @@ def wall_slip(free: float, softness: float, layer: Float[np.ndarray, " 4"]) -> f
         free: Without the wall's drag [m/s].
         softness: 1/m_eff [1/kg].
         layer: Span [m² s], then the flow curve.
-
     """
     s = softness * layer[0]
     excess, drag, index = free - s * layer[1], s * layer[2], layer[3]

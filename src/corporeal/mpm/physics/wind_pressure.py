@@ -54,7 +54,6 @@ def wind_impulses(
         seen: Velocity of the air relative to each face [m/s].
         mass: What each face moves [kg]: a face never becomes faster than the air.
         dt: [s]
-
     """
     size = np.maximum(np.linalg.norm(area, axis=1), TINY)
     normal = area / size[:, None]

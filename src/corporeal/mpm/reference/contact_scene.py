@@ -163,7 +163,6 @@ class ContactScene:
             mean: Its mean offset from each [m].
             height: Of the nodes over the wall [m].
             normal: Into the wall.
-
         """
         body, cell = self.problem.bodies[field], self.problem.cell
         full = contact.full_cell_mass(body, cell)

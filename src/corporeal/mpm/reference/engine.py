@@ -229,7 +229,6 @@ class ReferenceEngine(EngineBodyChanges, EngineLoadChanges):
 
         Returns:
             The state after it, and the work done on Maxwell branches [J].
-
         """
         m, state = self.matter, self.state
         forget = np.minimum(1.0, m.flip_damping_rate * dt)

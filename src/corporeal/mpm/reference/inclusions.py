@@ -68,7 +68,6 @@ def join_bodies(
         mass: Of the points [kg].
         place: [m]
         velocity: [m/s]
-
     """
     speed, moment = motion
     total = own.total + float(mass.sum())
@@ -107,7 +106,6 @@ class FrameBonds:
             grid: Where everything is.
             mass: Of every slot [kg].
             velocity: Of every slot, after forces [m/s].
-
         """
         made: list[FrameComposite] = []
         taken = np.zeros(grid.count, bool)

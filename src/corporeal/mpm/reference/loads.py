@@ -65,7 +65,6 @@ def apply_loads(
         state: With gravity and pushes in the velocities of rigid bodies.
         grid: Where the particles are.
         slots: Mass [kg] and velocity after all other forces [m/s] of the slots.
-
     """
     mass, velocity = slots
     bodies = len(state.centre)

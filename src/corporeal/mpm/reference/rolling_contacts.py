@@ -62,7 +62,6 @@ def brake_roll(
         normal: Unit, from the first to the second.
         impulse: J that the contact transmits in this step [N s].
         bounds: μ [-], and the greatest M [N m s].
-
     """
     friction, most = bounds
     across = spin - (spin @ normal) * normal
@@ -119,7 +118,6 @@ def brake_rolling(
         pair: Two bodies, or a body and B + plane, for each contact.
         impulse: What each transmits [N s].
         rounds: At which of them something round may roll.
-
     """
     extra, moment, energy = np.zeros_like(impulse), np.zeros((len(problem.bodies), 3)), 0.0
     found = np.flatnonzero(rounds) if problem.has_rolling_resistance else ()

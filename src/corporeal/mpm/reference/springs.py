@@ -40,7 +40,6 @@ def apply_springs(
         state: Before gravity and pushes.
         kicks: What both add to the bodies' velocities in this step, and the pushes alone [m/s]; the result has them.
         dt: [s]
-
     """
     kick, push = kicks
     if problem.contact == "single":
@@ -89,7 +88,6 @@ def load_holder(
         first: Number of the body's first particle.
         matter: All particles.
         gained: Velocity that gravity gives in this step [m/s].
-
     """
     state, h = pulled.state, tether.holder
     own = first + np.flatnonzero(tether.rate)

@@ -38,7 +38,6 @@ class StepForces:
 
         Returns:
             The motion after it with what came from outside, and what dampers took [J].
-
         """
         (mass, velocity), kick, matter = slots, kicks[0], self.matter
         kicked = replace(self.state, speed=self.state.speed + kick)

@@ -36,7 +36,6 @@ class Shells:
 
         Raises:
             SimulationError: A shell has no thickness, a degenerate triangle, or a law that shells cannot follow.
-
         """
         meshes, materials, body, density, first = [], [], [], [], 0
         vertex = np.zeros(sum(len(b.position) for b in problem.bodies), bool)
@@ -74,7 +73,6 @@ def longest_shell_step(shells: Shells, courant: float, cell: float, speed: float
         courant: s [-].
         cell: dx [m].
         speed: Largest |v| of their vertices [m/s].
-
     """
     if not shells:
         return np.inf
@@ -98,7 +96,6 @@ def check_shell(body: Body) -> None:
 
     Raises:
         SimulationError: It says what and why.
-
     """
     shell = body.shell
     if shell is None:

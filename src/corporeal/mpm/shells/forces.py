@@ -130,7 +130,6 @@ def shell_step(
         state: Their history.
         x: Vertices now [m].
         dt: Of the step [s].
-
     """
     state, plastic_loss = yielded(mesh, material, state, x)
     state, work = relaxed(mesh, material, state, x, dt)

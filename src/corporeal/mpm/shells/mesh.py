@@ -42,7 +42,6 @@ def shell_mesh(vertices: Float[np.ndarray, "V 3"], triangle: Int[np.ndarray, "T 
         vertices: [m]
         triangle: Vertices of each; an edge may have any number of triangles.
         poisson: ν [-], on which the curvature at free edges depends.
-
     """
     triangle = np.asarray(triangle, np.int64)
     corner = vertices[triangle]
@@ -173,7 +172,6 @@ def _angle_of_curvature(
         foot: Of the neighbour's opposite vertex on the side, over its length, from its start [-].
         height: Of that vertex over the side [m].
         known: Which sides have a neighbour.
-
     """
     start, edge, outward = _sides(flat)
     own_foot = np.einsum("tki,tki->tk", flat - start, edge) / np.einsum("tki,tki->tk", edge, edge)

@@ -159,7 +159,6 @@ def membrane_flow(material: ShellMaterial, C: Sym, plastic: Float[np.ndarray, " 
         material: Of the triangles.
         C: Trial FᵀF.
         plastic: Equivalent plastic strain α so far [-].
-
     """
     E, nu, count = material.membrane_young_pa, material.poisson, len(C)
     principal = _Principal.of(C)

@@ -61,7 +61,6 @@ def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT_CONFIG, up
 
     Raises:
         UserError: A file cannot be used, or the options don't fit what the files hold.
-
     """
     validate_assemble(config)
     plan = _scene_file_for([Path(p) for p in inputs])

@@ -49,7 +49,6 @@ def capture(scene: Scene, config: CaptureConfig = DEFAULT_CONFIG, progress: Prog
 
     Raises:
         UserError: The scene is empty, or a setting is out of range.
-
     """
     _check(scene, config)
     progress(0.0, "placing the cameras")
@@ -70,7 +69,6 @@ def render_views(
         aims: Of the cameras, which take the place of ``views`` and ``size`` of the configuration.
         config: Quality and threads.
         progress: Called with the fraction done and a description.
-
     """
     stage = RayScene(scene, StudioLight(front=VIEW_DIRECTION))  # shadows are the same in all views
     shape = (len(aims), aims[0].height, aims[0].width)

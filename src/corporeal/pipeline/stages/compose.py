@@ -115,7 +115,6 @@ def compose(
 
     Raises:
         UserError: The pool lacks what is asked for, no rest is found, or no interaction is possible.
-
     """
     tell = progress or (lambda fraction, words: None)
     rng = np.random.default_rng(config.seed)

@@ -39,7 +39,6 @@ def describe(
     Raises:
         UserError: An annotation or a recording does not fit the scene, a model is unavailable, or questions wait for a
             person's answers.
-
     """
     made = _describe_scene(scene, config, library, progress, from_pictures)
     with_walls = (_with_unseen_walls(o) if k in from_pictures else o for k, o in enumerate(made.objects))

@@ -72,7 +72,6 @@ def fill(
         field: What every part is made of.
         config: Resolution.
         quality: Resolution instead of that of ``config.detail``.
-
     """
     # Movable contents become objects.
     contents = pour_loose_contents(scene, parts, field, config.seed)

@@ -79,7 +79,6 @@ def ground(scene: Scene, parts: Parts, inventory: Inventory, config: GroundConfi
     Raises:
         OutOfRangeError: An annotated value lies outside the measured range.
         UserError: The library has no such material or quantity.
-
     """
     words = tuple(_part_description(inventory, part.object, part.name) for part in parts.catalogue)
     entries = [_entry(w, config) for w in words]
@@ -288,7 +287,6 @@ def with_sealed_air(structure: Structure, material: Material, words: PartDescrip
         material: Of its wall.
         words: Its description.
         radius: Of the object [m].
-
     """
     gauge = words.inflation
     if structure.kind != "shell" or structure.thickness is None or gauge is None:

@@ -122,7 +122,6 @@ def reconstruct(
 
     Raises:
         UserError: The input cannot be used, holds nothing that could be an object, or an option does not fit it.
-
     """
     validate_reconstruct(config, extents, viewer.model is not None, scene_name(source))
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
@@ -202,7 +201,6 @@ def _name_objects(
         objects: What each is, if stated.
         config: What was asked for.
         extents: Real largest extents, such as "duck=0.1" [m].
-
     """
     measured, z_up, title = metric_scale(config), found.taken.z_up, scene_name(source)
     unnamed = [obj.class_name for obj in objects] == [UNKNOWN_CLASS]
@@ -228,7 +226,6 @@ def _align_upright(source: Path, taken: GaussianScene, config: ReconstructConfig
 
     Raises:
         UserError: The objects cannot be separated from the background.
-
     """
     made = turn_upright(taken, config.up, config.floor_at)
     cut_out = None if taken.masks is not None else made.masks

@@ -58,7 +58,6 @@ def segment(
 
     Raises:
         UserError: The inventory describes another scene.
-
     """
     identity = identify_parts(scene, substance_hint)
     _agree(scene, inventory, [p.name for p in identity.catalogue])

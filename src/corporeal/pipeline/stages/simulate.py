@@ -72,7 +72,6 @@ def simulate(
     Raises:
         SimulationError: The simulation diverged; the frames so far are kept.
         DiskError: The disk is full; the frames so far are kept.
-
     """
     validate_simulate(config)
     posed = build_model(scene, particles, field, config.contact)
@@ -195,7 +194,6 @@ class SimulationRun:
             progress: Called with the fraction done and a description.
             lying: Bodies that are brought to static equilibrium before time 0.
             relax: Returns the state in it.
-
         """
         done = self.begin(lying, relax)
         saved = self.engine.save()

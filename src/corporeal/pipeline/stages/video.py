@@ -85,7 +85,6 @@ def render_video(
     Raises:
         UserError: The scene is empty, Gaussians are asked for and there are none, the disk
             is full, or the encoder fails.
-
     """
     scene, trajectory = played.prepared.scene, played.trajectory
     if len(trajectory.frames) == 0:

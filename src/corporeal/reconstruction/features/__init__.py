@@ -54,7 +54,6 @@ def connect_encoder(spec: str, folder: Path | None = None) -> PictureEncoder | N
 
     Raises:
         UserError: The name is unknown, its packages are not installed, or there is no such folder.
-
     """
     name, _, rest = spec.partition(":")
     if name == NO_ENCODER:

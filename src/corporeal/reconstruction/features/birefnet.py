@@ -62,7 +62,6 @@ class BiRefNet:
 
         Raises:
             UserError: The file is no such model.
-
         """
         height, width = picture.shape[:2]
         entry = self.session.get_inputs()[0]

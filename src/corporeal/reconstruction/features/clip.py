@@ -59,7 +59,6 @@ class Clip:
 
         Raises:
             UserError: The weights cannot be had.
-
         """
         vision = self.model.config.vision_config
         rows, columns = patch_grid(picture, vision.image_size, vision.patch_size)
@@ -76,7 +75,6 @@ class Clip:
 
         Raises:
             UserError: The weights cannot be had.
-
         """
         longest = self.model.config.text_config.max_position_embeddings
         made = np.zeros((len(names), self.model.config.projection_dim), np.float32)

@@ -36,7 +36,6 @@ class Dinov2:
 
         Raises:
             UserError: The weights cannot be had.
-
         """
         config = self.model.config
         rows, columns = patch_grid(picture, config.image_size, config.patch_size)

@@ -67,7 +67,6 @@ def lift_features(weights: PointWeights, maps: Sequence[np.ndarray], count: int,
 
     Raises:
         UserError: A map's size does not agree with its weights', or with the other maps' depth.
-
     """
     if not len(maps):
         raise UserError("There are no views to take features from. Give at least one picture.")
@@ -128,7 +127,6 @@ def uplift_features(
         count: Number of Gaussians.
         least: Weight in a view from which a Gaussian counts as seen in it [px]; less where there are more Gaussians
             than pixels.
-
     """
     return lift_features(_resample_maps(weights, cells, maps), maps, count, least)
 
@@ -164,7 +162,6 @@ def back_projection(
         depth: What the middle of each pixel shows, along the camera's z [m]; inf: nothing.
         maps: Of each view, h x w x D, over the same picture, in any resolution.
         leeway: Of the depth test, as a share of the depth.
-
     """
 
     def weights(view: int) -> csr_array:
@@ -232,7 +229,6 @@ def fill_unseen_points(
 
     Raises:
         UserError: No view shows any point.
-
     """
     known, missing = np.flatnonzero(lifted.seen > 0), np.flatnonzero(lifted.seen == 0)
     if not len(missing):

@@ -62,7 +62,6 @@ def learned_masks(
     Raises:
         UserError: The photographs or the weights cannot be used, words are missing, or most photographs show nothing
             that was looked for.
-
     """
     if masker.needs_words and not words:
         raise UserError("These masks are found by words: name the objects with --object-names.")

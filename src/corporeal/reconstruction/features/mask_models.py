@@ -58,7 +58,6 @@ class MaskModel(Protocol):
             picture: sRGB.
             words: Names of what is looked for.
             at: Column and row of a pixel on it [px].
-
         """
         ...
 
@@ -79,7 +78,6 @@ def connect_mask_model(spec: str) -> MaskModel:
     Raises:
         UserError: The name is unknown, its packages are not installed, or the folder holds no such weights. Nothing is
             fetched.
-
     """
     named = split_model_spec(spec)
     if named is None:

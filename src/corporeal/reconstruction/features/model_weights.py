@@ -50,7 +50,6 @@ class ModelWeights:
 
         Raises:
             UserError: There is no such file, or it cannot be had.
-
         """
         self.holds([name])
         path = Path(self.place) / name if self.local else self._fetched(name, self.revision)
@@ -61,7 +60,6 @@ class ModelWeights:
 
         Raises:
             BadFileError: ``config.json`` is another kind's.
-
         """
         kind = self.read(CONFIG_FILE).get("model_type")
         if kind != self.kind:
@@ -72,7 +70,6 @@ class ModelWeights:
 
         Raises:
             BadFileError: There is none of them.
-
         """
         if self.local and not any((Path(self.place) / name).is_file() for name in names):
             raise BadFileError(self.place, f"there is no {' or '.join(names)}.", "Save it with save_pretrained.")
@@ -82,7 +79,6 @@ class ModelWeights:
 
         Raises:
             UserError: They cannot be had, are damaged, or do not fill the model.
-
         """
         self.check()
         options = {} if self.local else {"revision": self.revision}
@@ -102,7 +98,6 @@ class ModelWeights:
 
         Raises:
             UserError: It cannot be had, or is damaged.
-
         """
         options = {} if self.local else {"revision": self.revision}
         try:
@@ -138,7 +133,6 @@ def find_weights(kind: str, spec: str, default: str) -> ModelWeights:
 
     Raises:
         UserError: There is no such folder, or it holds something else.
-
     """
     spec = spec or default
     if Path(spec).expanduser().is_dir():
@@ -160,7 +154,6 @@ def weights_in_folder(folder: Path, kinds: Sequence[str]) -> ModelWeights:
 
     Raises:
         UserError: They are of another kind, or something of them is missing.
-
     """
     said = ModelWeights(kinds[0], str(folder)).read(CONFIG_FILE).get("model_type")
     made = ModelWeights(next((kind for kind in kinds if kind == said), kinds[0]), str(folder))
@@ -174,7 +167,6 @@ def picture_statistics(weights: ModelWeights) -> dict[str, Any]:
 
     Raises:
         UserError: No file of the model says them.
-
     """
     known: dict[str, Any] = {}
     for name in (PROCESSOR_FILE, PREPROCESSOR_FILE):

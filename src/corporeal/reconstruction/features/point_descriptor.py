@@ -67,7 +67,6 @@ def point_descriptor(
         towards: Where the outside is; ``mean_view_directions`` says it.
         finish: Roughness and metallic in [0, 1], where they are known.
         config: How much each look counts.
-
     """
     near = nearest_neighbours(position, config.neighbours)
     hue = (rgb2lab(np.clip(colour, 0, 1)[None])[0] - GREY_LAB) / 100
@@ -114,7 +113,6 @@ def mean_view_directions(
             weight.
         least: Views with a smaller share speak for the other side. Gaussians let some light through, so that all views
             see a little of what is behind others.
-
     """
     seen, ahead = np.zeros(position.shape), np.zeros(position.shape)
     for camera, share in zip(cameras, shares, strict=True):

@@ -76,7 +76,6 @@ def add_point_features(
 
     Raises:
         UserError: A model cannot be had, or no view shows any point.
-
     """
     of_spec = {}
     for spec in dict.fromkeys(specs):

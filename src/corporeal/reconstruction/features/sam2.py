@@ -45,7 +45,6 @@ class Sam2:
 
         Raises:
             UserError: The weights cannot be loaded.
-
         """
         height, width = picture.shape[:2]
         side = self.model.prompt_encoder.image_embedding_size[0] * self._patch

@@ -54,7 +54,6 @@ class Sam3:
 
         Raises:
             UserError: The weights cannot be loaded.
-
         """
         side = self.model.config.image_size
         pixels = prepare_picture(picture, (side, side), self.statistics)

@@ -56,7 +56,6 @@ def prepare_picture(
         picture: sRGB.
         size: Rows and columns [px].
         statistics: ``image_mean`` and ``image_std`` of its ``preprocessor_config.json``.
-
     """
     resized = Image.fromarray(picture).resize((size[1], size[0]), Image.Resampling.BICUBIC)
     values = np.asarray(resized, np.float32) / MAX_U8

@@ -30,7 +30,6 @@ def carve_volume(
 
     Raises:
         UserError: Nothing is inside all masks.
-
     """
     hull = carve_tight_hull(views, masks, pool, config)
     past = hull_cells_seen_past(views, masks, hull, pool)

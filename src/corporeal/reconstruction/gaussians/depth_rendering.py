@@ -65,7 +65,6 @@ def restrict_depth_to_objects(
         rendering: Of N Gaussians.
         of_object: Which of them are objects'; the others hide these.
         masks: Pixels that show objects; None: unknown.
-
     """
     met = np.where(of_object[rendering.met], rendering.met, -1)
     spilt = np.zeros(met.shape, bool) if masks is None else (met >= 0) & ~masks

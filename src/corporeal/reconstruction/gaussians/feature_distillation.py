@@ -87,7 +87,6 @@ def distil_features(
 
     Raises:
         UserError: Maps and cameras do not go together, or the field is empty.
-
     """
     _check(cameras, maps)
     x, y, z = (-(-(n - 1) // NODE_SPACING_RATIO) + 1 for n in field.row.shape)

@@ -39,7 +39,6 @@ def floor_height_from_outlines(
 
     Raises:
         UserError: Nothing is inside all masks.
-
     """
     with ThreadPool(threads) as pool:
         hull = carve_tight_hull(views, masks, pool, config)

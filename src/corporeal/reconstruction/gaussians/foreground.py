@@ -67,7 +67,6 @@ def gaussian_visibility(
 
     Raises:
         UserError: There is not a mask for each camera.
-
     """
     if masks is not None and len(masks) != len(cameras):
         raise UserError(f"There are {len(masks)} masks for {len(cameras)} cameras. Give one each.")
@@ -106,7 +105,6 @@ def foreground_gaussians(
         seen: What they see of the Gaussians, and what of that is inside masks.
         floor: Whether a floor is among the Gaussians; masks leave none.
         layer_radii: Height of the layer that is floor, in radii of what the cameras look at [-].
-
     """
     kept = (seen.weight > seen.least) & (gaussians.opacity > FAINT_OPACITY)
     if seen.inside is not None:
@@ -171,7 +169,6 @@ def gaussians_below_floor(gaussians: Gaussians, owner: Int[np.ndarray, " N"], lo
         gaussians: In the world's frame: +z up, the floor at z = 0.
         owner: Whose each is; -1: no object's.
         longest: Side of the objects' boxes [in the unit of the Gaussians].
-
     """
     return (owner >= 0) & (gaussians.mean[:, 2] < -MIN_SUNK_DEPTH_FRACTION * longest)
 

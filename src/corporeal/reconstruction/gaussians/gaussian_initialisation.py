@@ -88,7 +88,6 @@ def points_on_hull(
     """Return points on the visual hull, the surface of what masks and lines of sight allow.
 
     within: share of them that is inside, as small as those on the hull: wide ones would show through plain faces.
-
     """
     views, masks, fine = outlines.views, outlines.masks, outlines.hull
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]

@@ -166,7 +166,6 @@ def load_or_train_gaussians(
 
     Raises:
         UserError: The input cannot be used.
-
     """
     progress(0.0, f"reading {source.name}")
     if input_kind([source]) == "splat":
@@ -217,7 +216,6 @@ def _load_photographs(
 
     Raises:
         UserError: They cannot be used, lack masks that segment objects, or these are inverted.
-
     """
     shown = _drop_inconsistent(read_posed_photos(source, longest, masked.by, masked.bare, close=True))
     if instances and shown.views.object_of_pixel is None:
@@ -249,7 +247,6 @@ class _TrainingInput:
 
         Returns:
             What was learned, from which masks, and what was left out of these, in a sentence.
-
         """
         trained = replace(self, progress=subprogress(self.progress, 0.0, FIRST_TRAINING_PROGRESS)).of(masks)
         odd = mask_contamination(trained.gaussians, self.views, masks)
@@ -276,7 +273,6 @@ def turn_upright(taken: GaussianScene, up: UpAxisChoice = "auto", floor: float |
         taken: In the file's own frame.
         up: Which axis of the file points up; auto: what the file or the cameras say.
         floor: Its height along up, in the file's unit; None: it is looked for.
-
     """
     alone = taken.masks is not None and taken.seen is None  # nothing but objects is known
     sparse = taken.seen
@@ -356,7 +352,6 @@ def pose_warnings(
 
     Raises:
         UserError: They are certainly wrong.
-
     """
     looked = shown
     if looked is None or max(looked.views.rgb.shape[1:3]) < FEATURE_IMAGE_SIDE_PX:

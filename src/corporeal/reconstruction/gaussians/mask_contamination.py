@@ -43,7 +43,6 @@ def mask_contamination(
         views: The photographs.
         masks: Their pixels on objects, as far as is known.
         threads: None: one per core that this process may use.
-
     """
     with ThreadPool(threads) as pool:
         seen = render_depth(gaussians, views.cameras, pool)

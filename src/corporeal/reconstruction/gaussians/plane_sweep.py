@@ -64,7 +64,6 @@ def sweep_planes(
 
     Raises:
         UserError: The pictures agree nowhere.
-
     """
     looks = _SweepImages(views, config.max_depths)
     depths = looks.depths(pool)

@@ -134,7 +134,6 @@ def haze_field(low: Float[np.ndarray, "3"], cell: float, filled: Bool[np.ndarray
         low: Of the first cube [m].
         cell: Side of a cube [m].
         filled: Which cubes may hold something.
-
     """
     x, y, z = filled.shape
     corner = np.zeros((x + 1, y + 1, z + 1), np.bool_)
@@ -204,7 +203,6 @@ def field_surface_points(
 
     Raises:
         UserError: No view shows anything of the field.
-
     """
     depth = np.stack([render_field(field, camera, threads).depth for camera in cameras])
     found, view = _ray_ends(cameras, depth)
@@ -234,7 +232,6 @@ def _ray_ends(
     """Return where rays lose half of their light [m], and of which view each is.
 
     max_pixels: where pictures have more together, rays are of every so-many-th row and column.
-
     """
     apart = int(np.ceil(np.sqrt(depth.size / max_pixels)))
     view, v, u = np.nonzero(np.isfinite(depth[:, ::apart, ::apart]))
@@ -261,7 +258,6 @@ def field_camera_rows(grid: VoxelGrid, cameras: tuple[Camera, ...]) -> Float32[n
 
     Raises:
         UserError: A camera is skewed.
-
     """
     made = np.empty((len(cameras), 16), np.float32)
     for r, camera in zip(made, cameras, strict=True):
@@ -292,7 +288,6 @@ def train_field(
 
     Raises:
         UserError: There are too few pictures, masks of another shape, or cameras and pictures do not belong together.
-
     """
     begun = time.monotonic()
     check_training_views(views, masks)

@@ -48,7 +48,6 @@ def draw(theta: ParameterMatrix, camera: PinholeCamera, background: np.ndarray, 
 
     Raises:
         UserError: There is no CUDA.
-
     """
     require_cuda()
     leaf = torch.from_numpy(np.ascontiguousarray(theta)).cuda().requires_grad_()

@@ -77,7 +77,6 @@ def render(
 
     Raises:
         UserError: The camera is skewed.
-
     """
     with ThreadPool(threads) as pool:
         eye = pinhole_of_camera(camera, near=near)
@@ -181,7 +180,6 @@ def pinhole_of_camera(camera: Camera, scale: float = 1.0, near: float = NEAR_DEP
 
     Raises:
         UserError: The camera is skewed.
-
     """
     K = camera.K
     if abs(K[0, 1]) > 1e-6 * K[0, 0]:

@@ -60,7 +60,6 @@ def masks_above_floor(
         floor: Whether a floor is among the Gaussians.
         threads: None: one per processor.
         layer_radii: Height of that layer, in radii of what the cameras look at [-].
-
     """
     radius = find_viewed_region(cameras, gaussians.mean).radius
     of_objects = foreground_gaussians(

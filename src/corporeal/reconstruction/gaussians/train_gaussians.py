@@ -105,7 +105,6 @@ def train_gaussians(
     Raises:
         UserError: There are too few pictures, masks of another shape, a skewed camera, or cameras and pictures do not
             belong together.
-
     """
     begun = time.monotonic()
     schedule = TrainingSchedule(views, masks, points, config)

@@ -70,7 +70,6 @@ def carve_tight_hull(
 
     Raises:
         UserError: Nothing is inside all masks.
-
     """
     around = find_viewed_region(views.cameras)
     middle, reach = np.array(around.centre), 1.5 * around.radius
@@ -94,7 +93,6 @@ def carve_hull(
 
     Raises:
         UserError: Nothing is left.
-
     """
     side = float(np.cbrt(np.prod(high - low) / config.grid_cells))
     axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
@@ -211,7 +209,6 @@ def pixel_width(rows: Float[np.ndarray, "V _"], place: Float[np.ndarray, "3"]) -
     Args:
         rows: Cameras as ``camera_rows`` gives them; more may follow in each row.
         place: [m]
-
     """
     pose = rows[:, :12].reshape(-1, 3, 4)
     ahead = pose[:, 2, :3] @ place + pose[:, 2, 3]

@@ -30,7 +30,6 @@ def equalise_exposure(views: Views, floor: GroundPlane | None, around: ViewedReg
         floor: The plane that objects stand on; None: unknown.
         around: The ball that all look at.
         longest: Longer side of the pictures that exposures are read from [px].
-
     """
     if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:
         return views

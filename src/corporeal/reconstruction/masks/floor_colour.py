@@ -78,7 +78,6 @@ def floor_cell_colours(
         camera: That took it.
         patch: Cells along each side whose mean it is.
         darkest: Of 255; what is darker counts as that, so that noise is not a ratio.
-
     """
     size, at = (ground.count, ground.count), ground.seen_by(camera)
     out = np.empty((*size, 3))

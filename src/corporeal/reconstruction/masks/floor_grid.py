@@ -91,7 +91,6 @@ def pixels_on_agreed_floor(
         around: The ball that all look at.
         agreeing: Says of a view in which cells of the square others agree with it.
         wide: Whether as many views are asked, too, that look from any other side.
-
     """
     made = np.zeros((len(cameras), cameras[0].height, cameras[0].width), np.bool_)
     ground, slant = floor_grid(cameras, floor, around), ray_slants(cameras, floor, around)

@@ -73,7 +73,6 @@ def find_standing_regions(
         masks: What was taken for objects: under them the floor is looked for.
         floor: The plane that objects stand on, its normal up; None: points do not tell.
         around: The ball that all cameras look at.
-
     """
     if len(views.cameras) <= MIN_AGREEING_PARTNERS:
         return None

@@ -37,7 +37,6 @@ def shows_floor_pattern(views: Views, floor: GroundPlane | None, around: ViewedR
         views: The pictures; a patch is PATCH of their pixels wide.
         floor: The plane that objects stand on, its normal up.
         around: The ball that all look at.
-
     """
     if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:
         return np.zeros(views.rgb.shape[:3], np.bool_)

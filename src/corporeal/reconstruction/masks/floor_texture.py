@@ -44,7 +44,6 @@ def floor_light(seen: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 
 
     Args:
         seen: Logarithms of colours; nan: not in the picture.
-
     """
     terms = _light_terms(seen.shape[1])
     few = np.zeros(seen.shape[1:3], np.bool_)
@@ -123,7 +122,6 @@ def floor_fit(
         floor: The plane that objects stand on; None: unknown, nor anything of a pixel.
         around: The ball that all look at.
         sure: Pixels that show the floor for certain, by its pattern.
-
     """
     made = np.full(views.rgb.shape[:3], FIT_UNKNOWN, np.uint8)
     if floor is None or len(views.cameras) <= MIN_AGREEING_PARTNERS:

@@ -99,7 +99,6 @@ def grown_masks(
 
     Raises:
         UserError: The photographs cannot be used, or nothing is at the place that is pointed at.
-
     """
     made_by = store.result_key(
         f"grown masks {MASKS_METHOD_VERSION}", (pointed, testing, *("doubted",) * doubted), [store.path_digest(source)]

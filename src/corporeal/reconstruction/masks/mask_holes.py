@@ -28,7 +28,6 @@ def close_mask_holes(
         inside: How far each pixel is inside, 0 to 1, at any size.
         cameras: Of the pictures.
         room: Cells, as these cameras see them in pictures of ``room.shape``.
-
     """
     size = room.shape[2], room.shape[1]
     rough = [np.asarray(Image.fromarray(one).resize(size, Image.Resampling.BOX)) for one in inside]

@@ -67,7 +67,6 @@ def picture_prompt(source: Path, shown: PosedPhotos, views: Views, pointed: Mask
 
     Raises:
         UserError: There is no such photograph, or the place is beside it.
-
     """
     view = _find_photograph(source, shown, pointed.photograph)
     shot = next(s for s in list_posed_photos(source).shots if s.name == shown.names[view])
@@ -108,7 +107,6 @@ def seeds_from_prompt(views: Views, points: Float[np.ndarray, "N 3"] | None, spo
 
     Raises:
         UserError: Nothing there can be distinguished from its surroundings.
-
     """
     k, width = spot.view, views.rgb.shape[2]
     first = cut_at_prompt(views.rgb[k], spot.corners)

@@ -59,7 +59,6 @@ def seeds_from_cameras(views: Views, points: Float[np.ndarray, "N 3"] | None) ->
     Args:
         views: The pictures.
         points: On all that they show, such as COLMAP's; None: there are none.
-
     """
     around = find_viewed_region(views.cameras)
     far = picture_distance_radii(views, around)

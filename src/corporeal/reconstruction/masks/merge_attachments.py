@@ -47,7 +47,6 @@ def merge_attachments(
         grown: What came of them.
         progress: Called with the fraction done and a description.
         flat: As in ``grow_masks``.
-
     """
     if grown.hanging is None:
         return grown

@@ -40,7 +40,6 @@ def find_object_beside_masks(
         stands: All that stands on the floor.
         masks: What was taken for objects.
         near: The same and what borders on it, which is left out.
-
     """
     piece, count = stands.room.pieces(stands.beside(near))
     found = [

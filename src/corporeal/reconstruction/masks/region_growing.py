@@ -138,7 +138,6 @@ def grow_masks(
         flat: Whether what lies flat on the floor may be objects, too: only colours tell then.
         fitting: Whether colours count together with how well they fit the floor at their place. Outlines are then a
             pixel wide of the object, since what is mixed does not fit.
-
     """
     views = equalise_exposure(views, seeds.floor, seeds.around, ROUND_PICTURE_PX)
     rough = reduce_views(views, ROUND_PICTURE_PX)

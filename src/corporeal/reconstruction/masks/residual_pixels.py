@@ -24,7 +24,6 @@ def residual_fraction(
         coloured: Pixels that would be objects' if colours and edges alone decided.
         masks: What was taken for objects.
         where: Pixels that count, none near objects.
-
     """
     beside, taken = (coloured & where).sum(axis=(1, 2)), masks.sum(axis=(1, 2))
     return float(np.median(beside / np.maximum(taken, 1)))

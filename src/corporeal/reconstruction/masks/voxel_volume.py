@@ -131,7 +131,6 @@ def voxel_volume(
         around: The ball.
         floor: Nothing is below it, and nothing in a thin layer above; None: unknown.
         cone: Pixels that cells must be seen in, if a view shows them; None: any.
-
     """
     line = (np.arange(VOXELS_ACROSS) + 0.5) / VOXELS_ACROSS * 2 - 1
     cells = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)

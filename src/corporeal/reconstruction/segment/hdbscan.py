@@ -54,7 +54,6 @@ def hdbscan(
         samples: A point is in a dense place where this many, itself included, are near.
         selection: The clusters that persist longest over all densities ("mass"), or the finest
             ones ("leaf").
-
     """
     if len(points) < 2:
         return DenseClusters(np.full(len(points), NOISE_LABEL), np.zeros(len(points)))

@@ -50,7 +50,6 @@ def assign_instances(
 
     Raises:
         UserError: Masks are asked for and there are none, there are no points, or more objects than can be.
-
     """
     if rule == "components":
         return _assign_by_neighbours(cloud, count)
@@ -78,7 +77,6 @@ def assign_by_numbers(
         masks: What each view takes each point for; -1: unknown.
         count: How many objects there are, if known.
         found_by: What the numbers are, in a clause.
-
     """
     known, number = np.unique(masks, return_inverse=True)
     votes = np.zeros((cloud.count, len(known)), np.int64)

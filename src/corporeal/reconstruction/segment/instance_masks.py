@@ -33,7 +33,6 @@ def lift_labels(
 
     Raises:
         UserError: A view's labels and weights are of different sizes.
-
     """
     made = np.full((len(labels), count), -1, np.int64)
     for view, label in enumerate(labels):

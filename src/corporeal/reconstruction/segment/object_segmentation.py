@@ -50,7 +50,6 @@ def join_nearest_pieces(
         piece_of_point: 0 … the number of pieces - 1.
         position: Of the points.
         most: How many objects there are at most; None: not given.
-
     """
     label, count = piece_of_point.copy(), int(piece_of_point.max(initial=-1)) + 1
     if most is None or count <= most:
@@ -185,7 +184,6 @@ def segment_objects(
 
     Raises:
         UserError: There are no points, or more objects than can be.
-
     """
     _check_cloud(cloud, count)
     # Points become patches, and patches that meet a graph.

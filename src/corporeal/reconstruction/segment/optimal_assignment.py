@@ -12,7 +12,6 @@ def optimal_assignment(similarity: Float[np.ndarray, "A B"]) -> Int[np.ndarray, 
 
     Args:
         similarity: Any numbers, larger is more alike; -inf: never.
-
     """
     found = np.full(len(similarity), -1, np.int64)
     if not similarity.size:

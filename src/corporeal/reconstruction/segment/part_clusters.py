@@ -103,7 +103,6 @@ def cluster_parts(cloud: FeatureCloud, config: PartsConfig = DEFAULT_PARTS) -> P
     Args:
         cloud: Points of one object; ``structural`` is ĝ.
         config: How finely.
-
     """
     if not cloud.count:
         return PartClusters(np.zeros(0, np.int64), np.zeros(0))

@@ -70,7 +70,6 @@ def name_parts(
         described_object: Its parts, at least one.
         words: One unit vector per part in the space of ``cloud.semantic``; None: no model.
         config: How finely the object is taken apart first.
-
     """
     none = np.zeros(cloud.count, np.int64)
     if not cloud.count:
@@ -96,7 +95,6 @@ def name_clusters(
         cloud: Points of one object, the world's z up.
         words: One unit vector per part in the space of ``cloud.semantic``; None: no model.
         parsed: The parts.
-
     """
     if words is None:
         clusters, score = _score_by_attributes(clusters, cloud, parsed)

@@ -67,7 +67,6 @@ def cut_patches(
         normal: Unit, outward; None: found from the points, outward being up where it is highest
             and the same on either side of every fold.
         count: How many patches, about; fewer where there are too few points.
-
     """
     known = normal is not None
     if normal is None:

@@ -39,7 +39,6 @@ def superpoints(
             alone decides.
         count: How many patches, about.
         alike: Difference of appearance that counts as much as one patch's width.
-
     """
     place = np.asarray(position, np.float64)
     first, width = _grid_cells(place, count)

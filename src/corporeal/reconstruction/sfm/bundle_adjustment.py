@@ -49,7 +49,6 @@ def solve_bundle(bundle: Bundle, exact: float) -> Bundle:
     Args:
         bundle: Where it begins.
         exact: Error [px] from which on a sighting counts for less (Cauchy's loss).
-
     """
     error, slopes = _whitened_errors(bundle), _jacobian(bundle)
     cost, damping = _robust_cost(error, exact), INITIAL_DAMPING

@@ -109,7 +109,6 @@ def remove_doppelgangers(attempt: SfmRun, place: Path, gathered: PreparedImages)
         attempt: An attempt at the poses.
         place: Holds the model, which is changed.
         gathered: All pictures.
-
     """
     if model_doubts(attempt):
         return attempt
@@ -131,7 +130,6 @@ def doppelganger_groups(model: ColmapModel, compared: Collection[tuple[str, str]
     Args:
         model: With tracks. Without, or where all agree, there is one group.
         compared: Names of the pictures that were matched with one another, in either order.
-
     """
     names = [image.name for image in model.images]
     if not len(model.sightings):
@@ -218,7 +216,6 @@ def agreeing_groups(agreed: Float[np.ndarray, "N N"]) -> list[list[int]]:
 
     Args:
         agreed: Positive: in favour of one place; 0: nothing is known.
-
     """
     label = np.arange(len(agreed))
     between = agreed.astype(float)

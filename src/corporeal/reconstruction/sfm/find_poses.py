@@ -146,7 +146,6 @@ def find_poses(source: Path, folder: Path, progress: Progress) -> FoundPoses:
 
     Raises:
         UserError: pycolmap is not installed, or the poses cannot be found or not be accepted.
-
     """
     if not source.exists():
         raise BadFileError(source, "there is no such file or folder.", "Check the path.")
@@ -188,7 +187,6 @@ def drop_pictures_of_something_else(posed: FoundPoses, masks: Path) -> FoundPose
     Args:
         posed: Poses that were found from whole pictures.
         masks: Of the object, grown under these, with the names of its pictures.
-
     """
     place = posed.folder / "sparse" / "0"
     names = pictures_of_something_else(place, masks)
@@ -218,7 +216,6 @@ def find_object_poses(posed: FoundPoses, masks: Path, folder: Path, progress: Pr
 
     Returns:
         Poses that can be accepted and that masks agree with; None: there are none.
-
     """
     begun = {
         "source": store.path_digest(posed.folder),
@@ -308,7 +305,6 @@ def _find_places(
 
     Returns:
         What is searched, and how many photographs show another place.
-
     """
     if (folder / MASK_FOLDERS[0]).is_dir():  # what was turned over shares nothing, and masks help
         return gathered, 0

@@ -36,7 +36,6 @@ def remove_by_masks(attempt: SfmRun, folder: Path, place: Path) -> SfmRun:
         attempt: An attempt at the poses.
         folder: Holds ``masks`` where some were given; else nothing is done.
         place: Holds the model, which is changed.
-
     """
     masks = folder / MASK_FOLDERS[0]
     if not attempt.registered or not masks.is_dir():
@@ -59,7 +58,6 @@ def pictures_of_something_else(place: Path, masks: Path) -> tuple[str, ...]:
     Args:
         place: Holds the model.
         masks: That were grown, and are accepted: PNG pictures with the names of its pictures.
-
     """
     compared = _masked_cameras(place, masks)
     if compared is None:

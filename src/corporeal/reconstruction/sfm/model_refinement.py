@@ -45,7 +45,6 @@ def whitening_matrices(grey: Float[np.ndarray, "H W"], points: Float[np.ndarray,
 
     Returns:
         Matrices: across an edge an error keeps its length, along it it becomes shorter.
-
     """
     smooth = gaussian_filter(grey, EDGE_GRADIENT_SIGMA_PX, truncate=WINDOW_SIGMAS)
     down, across = np.gradient(smooth)
@@ -104,7 +103,6 @@ def refine_model(pycolmap: Any, model: Any, taken: Mapping[str, LensPrior], imag
 
     Returns:
         The model, or another one in its place.
-
     """
     adjust_bundle(pycolmap, model)
     model = _free_principal_points(pycolmap, model, taken)
@@ -160,7 +158,6 @@ def adjust_bundle(
         model: Is changed.
         loose: Numbers of the cameras of which this is adjusted; none: of all.
         of_lens: What of lenses is adjusted.
-
     """
     options = pycolmap.BundleAdjustmentOptions()
     options.print_summary = False
@@ -188,7 +185,6 @@ def adjust_bundle_by_edges(pycolmap: Any, model: Any, images: Path) -> None:
         pycolmap: The library.
         model: Is changed.
         images: Where its pictures lie.
-
     """
     shown = [model.images[number] for number in model.reg_image_ids()]
     lenses, numbers = sorted({image.camera_id for image in shown}), sorted(model.points3D)

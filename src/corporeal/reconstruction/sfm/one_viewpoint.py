@@ -41,7 +41,6 @@ def is_same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], 
         a: Of the one [px].
         b: The same points, of the other [px].
         longest: Longer side of the pictures [px].
-
     """
     x, y = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
     kept, off = np.ones(len(x), bool), np.zeros(len(x))

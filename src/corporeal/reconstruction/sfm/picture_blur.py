@@ -42,7 +42,6 @@ def picture_blur(grey: Float[np.ndarray, "H W"]) -> float:
 
     Args:
         grey: Of 255.
-
     """
     height, width = grey.shape
     top, left = max(0, height - MIDDLE_SIDE_PX) // 2, max(0, width - MIDDLE_SIDE_PX) // 2

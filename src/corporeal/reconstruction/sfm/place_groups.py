@@ -116,7 +116,6 @@ def copies_share_enough(shared: Int[np.ndarray, "N N"], sizes: Sequence[tuple[in
     Args:
         shared: Points that each two pictures share.
         sizes: Of the large ones [px]; those that are hardly larger have no more points than copies.
-
     """
     if min(max(size) for size in sizes) < LARGE_PICTURE_RATIO * SMALL_COPY_PX:
         return False
@@ -198,7 +197,6 @@ def match_small_copies(folder: Path, gathered: PreparedImages, progress: Callabl
         folder: Holds ``images``; gets ``stamps`` where there are some.
         gathered: What lies there.
         progress: Called with the fraction done.
-
     """
     pycolmap = require_pycolmap()
     shutil.rmtree(folder / STAMPS, ignore_errors=True)

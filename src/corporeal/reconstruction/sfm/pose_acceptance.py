@@ -99,7 +99,6 @@ def mask_contradiction_doubt(attempt: SfmRun) -> str | None:
 
     Args:
         attempt: An attempt at the poses, after its outliers were left out.
-
     """
     if attempt.filled >= MIN_MASK_FILLED_FRACTION:
         return None

@@ -85,7 +85,6 @@ def prepare_images(source: Path, folder: Path, progress: Progress) -> PreparedIm
 
     Raises:
         BadFileError: Too few can be used.
-
     """
     found = photos_in_folder(source)
     step = max(1, -(-len(found) // MAX_PHOTOGRAPHS))
@@ -181,7 +180,6 @@ def count_single_sizes(sizes: Sequence[tuple[int, int]]) -> int:
 
     Args:
         sizes: Width and height of each; held upright or level is one size.
-
     """
     counts = Counter((min(size), max(size)) for size in sizes)
     alone = sum(count == 1 for count in counts.values())
@@ -202,7 +200,6 @@ def _refuse_few(source: Path, good: int, asked: int, bad: list[UnusablePhoto], t
 
     Raises:
         BadFileError: Too few are left, or most are broken or blank.
-
     """
     if good >= max(MIN_PHOTOS, (asked - twins) / 2):
         return
@@ -341,7 +338,6 @@ def _find_mask(file: Path, source: Path, kinds: tuple[str, ...], size: tuple[int
 
     Raises:
         _UnusableError: It lies across the photograph.
-
     """
     mask = find_companion_image(file, source, kinds)
     if mask is None:

@@ -54,7 +54,6 @@ def page_shift(before: Float[np.ndarray, "H W"], after: Float[np.ndarray, "H W"]
     Args:
         before: Greys.
         after: Of the same size.
-
     """
     window = np.outer(np.hanning(before.shape[0]), np.hanning(before.shape[1]))
     a, b = (np.fft.rfft2((one - one.mean()) * window) for one in (before, after))

@@ -58,7 +58,6 @@ def match_partners(shared: Int[np.ndarray, "N N"]) -> PicturePairs:
 
     Args:
         shared: Points that each two share when small; 0: they are not joined.
-
     """
     total = len(shared)
     few = ((shared > 0).sum(axis=1) < FEW_PARTNERS).tolist()
@@ -136,7 +135,6 @@ def require_pycolmap() -> Any:
 
     Raises:
         UserError: It is not installed.
-
     """
     try:
         import pycolmap
@@ -163,7 +161,6 @@ def run_sfm(folder: Path, out: Path, gathered: PreparedImages, way: SfmStrategy,
         gathered: What lies there.
         way: How points are found and matched.
         progress: Called with the fraction done and a description.
-
     """
     pycolmap = require_pycolmap()
     out.mkdir(parents=True, exist_ok=True)

@@ -113,7 +113,6 @@ def write_video_frames(path: Path, folder: Path, progress: Progress, max_seconds
     Raises:
         BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it is a recording of a
             screen.
-
     """
     video = _open_video(path, max_seconds)
     change, sharp = [0.0], []
@@ -156,7 +155,6 @@ def choose_frames(change: Float[np.ndarray, " F"], sharp: Float[np.ndarray, " F"
         change: Difference of each frame from the one before [-].
         sharp: Variance of each frame's Laplacian [-].
         count: Stretches.
-
     """
     way = np.cumsum(np.where(change > CHANGE_NOISE_U8, change, 0.0))
     if way[-1] <= 0:

@@ -49,7 +49,6 @@ class WatermarkDetector:
             b: Of the other.
             own: Points of the one [px].
             other: The same, of the other.
-
         """
         size = self.sizes[a]
         if size == self.sizes[b]:
@@ -81,7 +80,6 @@ def write_watermark_masks(
         names: Of the pictures.
         sizes: Theirs [px].
         folder: Gets a picture for each.
-
     """
     folder.mkdir(parents=True, exist_ok=True)
     for name, size in zip(names, sizes, strict=True):

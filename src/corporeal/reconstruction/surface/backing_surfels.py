@@ -45,7 +45,6 @@ def add_backing_surfels(
 
     Returns:
         All of them, those that were there first, and whose each is.
-
     """
     made, of = [gaussians], [owner]
     for k, solid in enumerate(solids):

@@ -25,7 +25,6 @@ def open_by_ball(
         before: Distance to a surface, negative inside [cells].
         after: The same of one that lies deeper.
         radius: Of the ball [cells].
-
     """
     taken = (before < 0) & (after >= 0)
     if not taken.any():

@@ -132,7 +132,6 @@ def build_closed_surfaces(
 
     Raises:
         UserError: An object has no Gaussians, or no camera sees any of it.
-
     """
     count = int(object_of_gaussian.max(initial=-1)) + 1
     if not count:
@@ -376,7 +375,6 @@ def _fit_surface(
 
     Returns:
         It, and how far photographs know each vertex; None: there are none.
-
     """
     rendering, mean, belief = scene.rendering, neighbour_mean_matrix(mesh), None
     mesh = smooth_taubin(mesh, scene.floor, SMOOTHING_PASSES, mean)

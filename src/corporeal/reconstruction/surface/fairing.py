@@ -41,7 +41,6 @@ def smooth_taubin(mesh: Mesh, floor: float, passes: int, mean: csr_array) -> Mes
         floor: Nothing is below it [m].
         passes: How often.
         mean: As ``neighbour_mean_matrix`` returns it.
-
     """
     v = mesh.vertices.copy()
     low = v[:, 2] < floor + FLOOR_TOLERANCE_M
@@ -74,7 +73,6 @@ def fair_unobserved_patches(
         cell: Of the grid that the surface was carved from [m].
         floor: Nothing is moved below it [m].
         mean: As ``neighbour_mean_matrix`` returns it.
-
     """
     v, normals = mesh.vertices.copy(), mesh.vertex_normals
     some = np.flatnonzero(unknown)

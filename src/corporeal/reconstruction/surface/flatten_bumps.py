@@ -39,7 +39,6 @@ def flatten_bumps(
         pixel: How wide one is at the surface [m].
         cell: Of the grid that the surface was carved from [m].
         floor: Nothing is moved below it [m].
-
     """
     mesh = agreed.mesh
     known = np.flatnonzero(agreed.belief > MIN_FILL_BELIEF)
@@ -77,7 +76,6 @@ def _fit_planes(
 
     Returns:
         A point and the normal of each plane.
-
     """
     middle = places.mean(axis=1)
     off = places - middle[:, None]

@@ -51,7 +51,6 @@ def pieces_by_free_space(
         cameras: From where they were learned, or are looked at.
         masks: Pixels that show objects, where given.
         config: How finely.
-
     """
     low, high = np.percentile(position, (STRAY_POINTS_PERCENT, 100 - STRAY_POINTS_PERCENT), axis=0)
     room = GRID_PADDING_FRACTION * (high - low)

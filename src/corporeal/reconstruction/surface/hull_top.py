@@ -69,7 +69,6 @@ def lower_hull_top(
         cameras: As ``DepthRendering.rows``.
         shape: Rows and columns of their pictures.
         pool: Threads.
-
     """
     z, lowest = mesh.vertices[:, 2], _least_view_angle(mesh, cameras)
     low, high = float(z.min()), float(z.max())

@@ -43,7 +43,6 @@ def build_object_surfaces(
 
     Raises:
         UserError: No camera sees anything of an object.
-
     """
     nearest = KDTree(position).query(taken.gaussians.mean[of_objects])[1]
     owner, kept = _owner_with_company(taken, of_objects, object_of_point[nearest])
@@ -63,7 +62,6 @@ def pieces_of_objects(
         taken: The Gaussians, upright, and the cameras that they are looked at by.
         of_objects: Which of them belong to objects.
         position: Points in the same frame.
-
     """
     owner, kept = _owner_with_company(taken, of_objects, np.zeros(len(of_objects), np.int64))
     shown = gaussian_subset(taken.gaussians, kept)

@@ -68,7 +68,6 @@ def find_object_outlines(
         rendering: What the cameras see.
         cell: Of the grid that the object was carved from [m].
         pool: Threads.
-
     """
     out = np.empty(mine.shape, np.float32)
     rest = mine, rendering.depth, BEHIND_CELLS * cell, MAX_OUTLINE_MOVE_PX, out
@@ -93,7 +92,6 @@ def fit_to_outlines(
         still: Vertices that stay where they are.
         floor: Nothing is moved below it, nor off it [m].
         pool: Threads.
-
     """
     views = len(outlines.cameras)
     mean, out = neighbour_mean_matrix(mesh), np.empty((views, len(mesh.vertices)), np.float32)

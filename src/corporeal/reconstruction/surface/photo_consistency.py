@@ -102,7 +102,6 @@ def move_to_agreement(
         cell: Of the grid that the object was carved from [m].
         floor: Nothing is moved below it, nor off it [m].
         pool: Threads.
-
     """
     mean, belief = neighbour_mean_matrix(mesh), np.zeros(len(mesh.vertices))
     movable = movable & (mesh.vertices[:, 2] >= floor + FLOOR_TOLERANCE_M)
@@ -144,7 +143,6 @@ def smoothed_normals(mesh: Mesh, mean: csr_array, fine: float) -> Float[np.ndarr
         mesh: The surface.
         mean: As ``neighbour_mean_matrix`` returns it.
         fine: Cells of the grid that it was carved from in a square pixel.
-
     """
     normals = _neighbour_means(mesh.vertex_normals, mean, max(1, round(NORMAL_SMOOTHING_ITERATIONS * fine)))
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY_LENGTH)

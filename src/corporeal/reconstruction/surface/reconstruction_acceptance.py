@@ -51,7 +51,6 @@ def boxes_rejection_reason(
         cameras: That took the photographs; (): unknown, and no result.
         masked: Whether masks were given or made by a model.
         quality: How well pictures agree with photographs held back; None: none was.
-
     """
     if not cameras:
         return None
@@ -86,7 +85,6 @@ def pieces_rejection_reason(pieces: int, cameras: Sequence[Camera]) -> str | Non
     Args:
         pieces: Of all objects where their number was not stated, else the most of one.
         cameras: That took the photographs; (): unknown, and no result.
-
     """
     if pieces < 2 or not cameras or (unseen := widest_unseen_angle(cameras)) < UNSEEN_HALF_GAP_DEG:
         return None
@@ -103,7 +101,6 @@ def cropping_rejection_reason(masks: Bool[np.ndarray, "V H W"]) -> str | None:
 
     Args:
         masks: Pixels that were taken for objects, as no masks were given.
-
     """
     count = int(find_cropped_masks(masks).sum())
     if count <= MAX_CROPPED_FRACTION * len(masks):
@@ -120,7 +117,6 @@ def colour_rejection_reason(masks: Bool[np.ndarray, "V H W"], coloured: Bool[np.
     Args:
         masks: Which pixels show what was taken for objects, by where it is.
         coloured: The same, by its colours, which are unreliable alone; None: unknown.
-
     """
     if coloured is None or not coloured.any():
         return None
@@ -142,7 +138,6 @@ def overlap_rejection_reason(
         cameras: That took the photographs.
         masks: Pixels of objects, given or found.
         given: Whether a person or a model of objects gave them.
-
     """
     shown = [k for k in range(len(cameras)) if masks[k].any()]
     chosen = shown[:: -(-len(shown) // COMPARED_VIEWS)] if shown else []

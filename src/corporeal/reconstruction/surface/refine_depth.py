@@ -44,7 +44,6 @@ def refine_depth(
         masks: Their pixels on objects.
         pool: Threads.
         config: How the visual hull is carved.
-
     """
     try:
         hull = carve_tight_hull(views, masks, pool, config)
@@ -74,7 +73,6 @@ def fill_plain_depth(
         depth: [m]; inf: unknown.
         on: Pixels on objects, beside which nothing goes on.
         plain: Pixels whose surroundings have one colour.
-
     """
     known = np.isfinite(depth) & on
     if not known.any():

@@ -29,7 +29,6 @@ def remove_flakes(mesh: Mesh, pixel: float, floor: float) -> Mesh:
         mesh: Closed.
         pixel: How wide one is at the surface [m].
         floor: Nothing is below it, and what lies on it stays [m].
-
     """
     mean = neighbour_mean_matrix(mesh)
     for _ in range(FLAKE_PASSES):

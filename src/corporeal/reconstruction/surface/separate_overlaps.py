@@ -87,7 +87,6 @@ def separate_overlaps(meshes: Sequence[Mesh], cells: Sequence[float], floor: flo
         meshes: Closed, one for each object.
         cells: Of the grids that they were carved from [m].
         floor: What lies on it stays on it, whatever else is there [m].
-
     """
     seams = _overlaps(meshes, cells, floor)
     while seams:

@@ -33,7 +33,6 @@ def restore_silhouettes(
         mine: Pixels that show the object.
         cameras: As ``DepthRendering.rows``.
         pool: Threads.
-
     """
     taken = (before < 0) & (after >= 0)
     if not taken.any():

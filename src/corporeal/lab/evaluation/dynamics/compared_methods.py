@@ -65,7 +65,6 @@ def parse_method(spec: str) -> Method:
 
     Raises:
         UserError: There is no such method, or its files are missing.
-
     """
     name, colon, _ = spec.partition(":")
     if name not in BASELINE_NAMES or (colon and name in ("single", "capped", "omniphysgs")):
@@ -92,7 +91,6 @@ def method_settings(method: Method, base: Settings, scene: str) -> Settings:
         method: Which.
         base: Ours.
         scene: Its name; of a folder of fields PATH/SCENE/ or PATH/SCENE.npz is taken where it is.
-
     """
     if method.name == OURS_NAME:
         return base

@@ -51,7 +51,6 @@ def evaluate_dynamics(
 
     Raises:
         UserError: A name is unknown, nothing is there to evaluate, or another process works here.
-
     """
     if repeated := [s for s in config.against if config.against.count(s) > 1]:
         raise UserError(f"--against names {repeated[0]} twice.")
@@ -77,7 +76,6 @@ def scenes_of(target: str, out: Path) -> list[EvaluatedScene]:
 
     Raises:
         UserError: The folder is no corpus, or no scene of it is assembled.
-
     """
     if target == SHOWCASE_TARGET:
         return [_showcase(name, out / name / INPUT_FOLDER) for name in SHOWCASE_SCENES]
@@ -100,7 +98,6 @@ def select_scenes(scenes: Sequence[EvaluatedScene], only: Sequence[str]) -> list
 
     Raises:
         UnknownChoiceError: There is no such scene.
-
     """
     names = [s.name for s in scenes]
     for name in only:

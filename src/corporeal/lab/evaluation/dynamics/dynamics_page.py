@@ -25,7 +25,6 @@ def draw_dynamics(found: DynamicsSummary, path: Path) -> None:
 
     Raises:
         UserError: The disk refuses the file.
-
     """
     scenes = list(dict.fromkeys(row.scene for row in found.rows if row.numbers))
     size = (max(7.0, 1.3 * len(scenes) + 2), 6.4)
@@ -92,7 +91,6 @@ def write_dynamics_page(found: DynamicsSummary, path: Path) -> None:
 
     Raises:
         UserError: The disk refuses it.
-
     """
     with TemporaryDirectory() as folder:
         drawing = Path(folder) / "figure.png"

@@ -78,7 +78,6 @@ def read_drops(out: Path, method: Method) -> list[MethodDrop]:
 
     Raises:
         BadFileError: A file is damaged.
-
     """
     found = []
     for row in measured_rebounds():

@@ -48,7 +48,6 @@ def compare_runs(run: RunMeasures, reference: RunMeasures) -> RunDifference:
 
     Raises:
         ValueError: They are not of one scene.
-
     """
     mine = {body.name: body for body in run.bodies}
     couples = [(mine[b.name], b) for b in reference.bodies if b.name in mine]

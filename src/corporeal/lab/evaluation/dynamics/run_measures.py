@@ -75,7 +75,6 @@ def measure_run(folder: Path) -> RunMeasures:
 
     Raises:
         BadFileError: Its audit cannot be read.
-
     """
     made = run_pipeline.read_run(folder)
     simulated = folder / run_pipeline.STAGE_FOLDERS["simulate"]
@@ -136,7 +135,6 @@ def read_run_measures(folder: Path) -> RunMeasures:
 
     Raises:
         BadFileError: It is absent or damaged.
-
     """
     path = folder / NUMBERS_FILE
     try:
