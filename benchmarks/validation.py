@@ -1,4 +1,4 @@
-"""Hold the engine to nature: twenty-eight experiments with known answers.
+"""Hold the engine to nature: twenty-nine experiments with known answers.
 
     python benchmarks/validation.py [--quick] [--case N ...] [--json FILE] [--docs]
 

@@ -10,7 +10,7 @@ from scipy import sparse
 from scipy.spatial import Delaunay
 
 from corporeal.core.types import Law
-from corporeal.mpm.problem import Shell
+from corporeal.mpm.problem import Body, Shell
 from corporeal.mpm.shells.assemble import shell_material, vertex_volume
 from corporeal.mpm.shells.forces import ShellState, shell_forces
 from corporeal.mpm.shells.mesh import ShellMesh, shell_mesh
@@ -90,6 +90,28 @@ class Sheet:
         size = 3 * len(at)
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
         return sparse.csc_matrix(entries, shape=(size, size))
+
+
+def sheet_body(sheet: Sheet, velocity: Float[np.ndarray, "V 3"], at: tuple[float, float, float]) -> Body:
+    """Return a body that is nothing but the shell, moved to ``at`` [m]."""
+    none = np.zeros(len(sheet.position))
+    return Body(
+        name="sheet",
+        position=sheet.position + np.array(at),
+        velocity=velocity,
+        volume=sheet.mass / sheet.density,
+        density=none + sheet.density,
+        law=np.full(len(none), Law.COROTATED.value),
+        young_pa=none + sheet.young_pa,
+        poisson=none + sheet.poisson,
+        yield_stress=none,
+        hardening=none,
+        friction_angle=none,
+        cohesion=none,
+        loss=none,
+        vibration=none,
+        shell=sheet.shell,
+    )
 
 
 def _force_stencil(mesh: ShellMesh, count: int) -> list[set[int]]:

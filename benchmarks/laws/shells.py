@@ -1,4 +1,4 @@
-"""Shells: cases 21 to 28, of the mesh by itself, without a grid."""
+"""Shells: cases 21 to 28 of the mesh by itself, and 29 on a grid."""
 
 from math import pi, sqrt
 
@@ -8,9 +8,12 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import spsolve
 
+from corporeal.mpm.engines import build_engine
 from corporeal.mpm.physics.time_step_limits import thin_wall_factors
+from laws.bodies import problem
 from laws.outcome import Check, Outcome, relative
-from laws.shell_meshes import Sheet, slit_tube, sphere, strip, tube
+from laws.shell_meshes import Sheet, sheet_body, slit_tube, sphere, strip, tube
+from laws.watching import crossing
 
 PVC = 7e6
 """E of soft PVC [Pa]."""
@@ -21,14 +24,19 @@ ROARK_PATCH = {1.0: 0.337, 1.4: 0.286}
 r (12 (1 - ν²))^¼/√(R t) (Reissner 1946; Young and Budynas 2002, Roark's Formulas for Stress and Strain, table 13.3)."""
 
 
+def free_bar_shape(place: np.ndarray, length: float) -> np.ndarray:
+    """Deflection of a free bar's first bending mode at some places along it [m]: 2 at the first end [-]."""
+    x = place * FREE_FREE / length
+    k = (np.cosh(FREE_FREE) - np.cos(FREE_FREE)) / (np.sinh(FREE_FREE) - np.sin(FREE_FREE))
+    return np.cosh(x) + np.cos(x) - k * (np.sinh(x) + np.sin(x))
+
+
 def free_bar_frequency(sheet: Sheet, length: float) -> float:
     """Angular frequency of the first bending mode of a strip that nothing holds [rad/s]."""
-    x, mass = sheet.position[:, 0] * FREE_FREE / length, sheet.mass
-    k = (np.cosh(FREE_FREE) - np.cos(FREE_FREE)) / (np.sinh(FREE_FREE) - np.sin(FREE_FREE))
-    shape = np.cosh(x) + np.cos(x) - k * (np.sinh(x) + np.sin(x))
+    mass, shape = sheet.mass, free_bar_shape(sheet.position[:, 0], length)
     root = np.repeat(1.0 / np.sqrt(mass), 3)
     square, modes = eigh(root[:, None] * sheet.stiffness().toarray() * root)
-    wanted = np.zeros((len(x), 3))
+    wanted = np.zeros((len(mass), 3))
     wanted[:, 2] = shape * np.sqrt(mass)
     return float(np.sqrt(square[np.argmax(np.abs(wanted.ravel() @ modes))]))
 
@@ -210,3 +218,34 @@ def _navier(x: float, y: float) -> float:
     odd = np.arange(1, 60, 2)
     m, n = np.meshgrid(odd, odd)
     return float(np.sum(16.0 * np.sin(m * pi * x) * np.sin(n * pi * y) / (pi**6 * m * n * (m**2 + n**2) ** 2)))
+
+
+def strip_on_grid(walls: tuple[float, ...], cells: int = 12) -> list[float]:
+    """Period over theory's of a free strip's first mode on a grid, for some walls [cells]; ``cells`` along it."""
+    length = 0.12
+    cell, found = length / cells, []
+    position, triangle = strip(length, length / 3, cell / 2)
+    for wall in walls:
+        sheet = Sheet(position, triangle, thickness=wall * cell, young_pa=PVC)
+        shape = free_bar_shape(position[:, 0], length)
+        velocity = np.zeros_like(position)
+        velocity[:, 2] = 0.02 * shape
+        posed = problem(sheet_body(sheet, velocity, (0.0, 0.0, 1.0)), cell=cell)
+        engine = build_engine(posed, "cpu", threads=1)
+        theory = 2 * pi / ((FREE_FREE / length) ** 2 * sqrt(PVC / (12.0 * sheet.density)) * sheet.thickness)
+        times = np.linspace(0.0, 1.7 * theory, 300)[1:]
+        moved = []
+        for time in times.tolist():
+            engine.advance(time)
+            moved.append(float(sheet.mass * shape @ (engine.snapshot().position[:, 2] - 1.0)))
+        found.append(float(np.diff(crossing(times, np.array(moved)))[0]) / theory)
+    return found
+
+
+def shells_on_grid(quick: bool = False) -> Outcome:
+    """Case 29: the first bending mode of a free strip on a grid, by its wall over a cell."""
+    walls = (0.1, 0.5) if quick else (0.05, 0.1, 0.2, 0.5)
+    ratios = strip_on_grid(walls)
+    checks = [relative(f"period over theory, t = {w} dx", r, 1.0, 5.0) for w, r in zip(walls, ratios, strict=True)]
+    words = "12 cells along it, the CPU engine; the control of thin walls is case 23"
+    return Outcome("29", "A strip of a shell on a grid", words, tuple(checks))

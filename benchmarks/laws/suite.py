@@ -50,5 +50,6 @@ CASES = {
         Case("26", shells.inflated_sphere, (1, 1)),
         Case("27", shells.own_weight, (2, 4)),
         Case("28", shells.pressed_plate, (2, 4)),
+        Case("29", shells.shells_on_grid, (4, 12)),
     )
 }

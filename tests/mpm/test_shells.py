@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laws.shell_meshes import Sheet, sphere, strip
+from laws.shell_meshes import Sheet, sheet_body, sphere, strip
 
 from corporeal.core.errors import SimulationError
 from corporeal.core.types import Law
 from corporeal.mpm.engines import ENGINES
 from corporeal.mpm.physics.maxwell_branches import complex_modulus
-from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.problem import Problem
 from corporeal.mpm.reference.engine import ReferenceEngine
-from corporeal.mpm.shells.assemble import vertex_volume
 from corporeal.mpm.shells.forces import ShellState, shell_energy, shell_forces, shell_step
 from corporeal.mpm.shells.mesh import shell_mesh
 
@@ -29,33 +28,11 @@ def dome(law: Law = Law.NEO_HOOKEAN, **more) -> Sheet:
     return Sheet(position, triangle, 0.002, 1e7, 0.3, law=law, **more)
 
 
-def body_of(sheet: Sheet, velocity: np.ndarray, at=(0.0, 0.0, 1.0)) -> Body:
-    none = np.zeros(len(sheet.position))
-    volume = vertex_volume(sheet.position, sheet.triangle, np.full(len(sheet.triangle), sheet.thickness))
-    return Body(
-        name="sheet",
-        position=sheet.position + np.array(at),
-        velocity=velocity,
-        volume=volume,
-        density=none + sheet.density,
-        law=np.full(len(none), Law.COROTATED.value),
-        young_pa=none + sheet.young_pa,
-        poisson=none + sheet.poisson,
-        yield_stress=none,
-        hardening=none,
-        friction_angle=none,
-        cohesion=none,
-        loss=none,
-        vibration=none,
-        shell=sheet.shell,
-    )
-
-
 def free_flight(sheet: Sheet, cell: float = 0.01) -> Problem:
     velocity = np.zeros_like(sheet.position)
     velocity[:, 2] = np.cos(np.pi * sheet.position[:, 0] / 0.05) * (1.0 + 10.0 * sheet.position[:, 1])
     none = np.zeros((2, 2))
-    return Problem((body_of(sheet, velocity),), cell, none, none, gravity=(0.0, 0.0, 0.0))
+    return Problem((sheet_body(sheet, velocity, (0.0, 0.0, 1.0)),), cell, none, none, gravity=(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("law", ELASTIC_LAWS)
@@ -194,7 +171,7 @@ def test_the_reference_engine_goes_on_exactly_from_a_checkpoint():
 )
 def test_what_cannot_be_a_shell_is_refused_in_one_sentence(change, words):
     sheet = Sheet(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]]), np.array([[0, 1, 2]]), 0.01, 1e7)
-    body = body_of(sheet, np.zeros((3, 3)))
+    body = sheet_body(sheet, np.zeros((3, 3)), (0.0, 0.0, 1.0))
     assert body.shell is not None
     wrong = replace(body, shell=replace(body.shell, **change))
     none = np.zeros((2, 2))
@@ -206,7 +183,7 @@ def test_a_sheet_comes_to_rest_half_its_wall_above_the_floor():
     cell, thick = 0.01, 0.001
     sheet = Sheet(*strip(0.03, 0.03, cell / 2), thickness=thick, young_pa=7e6, poisson=0.3)
     table = np.full((2, 2), 0.5)
-    body = body_of(sheet, np.zeros_like(sheet.position), at=(0.003, 0.001, 0.003))
+    body = sheet_body(sheet, np.zeros_like(sheet.position), (0.003, 0.001, 0.003))
     engine = ReferenceEngine(Problem((body,), cell, table, np.zeros((2, 2))))
     engine.advance(0.05)
     height = engine.snapshot().position[:, 2]

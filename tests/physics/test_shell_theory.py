@@ -14,6 +14,7 @@ from laws import shells
         shells.inflated_sphere,
         shells.own_weight,
         shells.pressed_plate,
+        shells.shells_on_grid,
     ],
 )
 def test_a_shell_by_itself_is_as_stiff_as_theory_says(case):

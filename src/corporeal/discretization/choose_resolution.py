@@ -72,7 +72,11 @@ def _plan_scene(bodies: MeasuredScene, accuracy: SimulationAccuracy) -> Discreti
     anatomies = enumerate(bodies.anatomies)
     geometries = {m.part: _part_geometry(m, bodies, n) for n, a in anatomies for m in a.members}
     if accuracy.shells:
-        geometries = {k: replace(g, thin_shell=is_thin_shell(bodies.makes[k], g)) for k, g in geometries.items()}
+        calm = [obj.wind is None for obj in bodies.scene.objects]
+        geometries = {
+            k: replace(g, thin_shell=calm[g.object] and is_thin_shell(bodies.makes[k], g))
+            for k, g in geometries.items()
+        }
     ordered = add_compression_strain(bodies, [geometries[k] for k in sorted(geometries)], accuracy.seed)
     masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
     moved = expected_motions(bodies.scene, bodies.anatomies, masses, accuracy.seed, bodies.vessels)
