@@ -21,6 +21,10 @@ from corporeal.mpm.laws.constitutive_law import lame_parameters
 
 Sym = Float[np.ndarray, "T 3"]
 """Components 11, 22, 12 of a symmetric tensor in the triangle's frame."""
+Stretches = Float[np.ndarray, "T 2"]
+Scalars = Float[np.ndarray, " T"]
+StressAndEnergy = tuple[Stretches, Scalars]
+"""Principal Kirchhoff stresses [Pa] and energy per rest volume [J/m³]."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +99,7 @@ def membrane_response(material: ShellMaterial, C: Sym) -> MembraneResponse:
     return MembraneResponse(principal.tensor(tau / principal.c), energy)
 
 
-def _principal_tau(
-    material: ShellMaterial, stretch: Float[np.ndarray, "T 2"]
-) -> tuple[Float[np.ndarray, "T 2"], Float[np.ndarray, " T"]]:
+def _principal_tau(material: ShellMaterial, stretch: Stretches) -> StressAndEnergy:
     mu, lam = map(np.asarray, lame_parameters(material.membrane_young_pa, material.poisson))
     tau, energy = np.zeros_like(stretch), np.zeros(len(stretch))
     for k, answer in (
@@ -110,7 +112,8 @@ def _principal_tau(
     return tau, energy
 
 
-def _neo_hookean(stretch, mu, lam):
+def _neo_hookean(stretch: Stretches, mu: Scalars, lam: Scalars) -> StressAndEnergy:
+    """μ (λ_3² - 1) + λ ln J = 0, by Newton's method for ln λ_3."""
     log_area = np.log(stretch).sum(axis=1)
     y = -lam / (lam + 2.0 * mu) * log_area
     for _ in range(NEO_HOOKEAN_ITERATIONS):
@@ -121,7 +124,8 @@ def _neo_hookean(stretch, mu, lam):
     return mu[:, None] * (stretch**2 - across[:, None]), energy
 
 
-def _corotated(stretch, mu, lam):
+def _corotated(stretch: Stretches, mu: Scalars, lam: Scalars) -> StressAndEnergy:
+    """2μ (λ_3 - 1) λ_3 + λ J (J - 1) = 0 is linear in λ_3 once divided by it."""
     area = np.prod(stretch, axis=1)
     across = (2.0 * mu + lam * area) / (2.0 * mu + lam * area**2)
     g = 2.0 * mu[:, None] * stretch * (stretch - 1.0)
@@ -129,7 +133,8 @@ def _corotated(stretch, mu, lam):
     return g - (2.0 * mu * across * (across - 1.0))[:, None], energy
 
 
-def _hencky(stretch, mu, lam):
+def _hencky(stretch: Stretches, mu: Scalars, lam: Scalars) -> StressAndEnergy:
+    """2μ ln λ_3 + λ ln J = 0."""
     strain = np.log(stretch)
     across = -lam / (lam + 2.0 * mu) * strain.sum(axis=1)
     swelling = strain.sum(axis=1) + across
