@@ -4,7 +4,7 @@ A hinge is an edge between two triangles. The second fundamental form of a trian
 three dihedral angles: half of it is that of the quadratic surface through its three vertices and the three opposite
 vertices of its neighbours, half that of normals at its sides which are the means of both triangles' (Grinspun, Gingold,
 Reisman and Zorin 2006, "Computing discrete shape operators on general meshes"). Both are exact on regular meshes. Where
-a side is free and its angle is missing, the quadratic surface is that of least bending energy: no moment acts there.
+a side is free and its angle is missing, that of least bending energy is taken: no moment acts there.
 """
 
 from collections import defaultdict
