@@ -28,6 +28,7 @@ def test_an_example_is_short(path):
     assert len(path.read_text().splitlines()) <= LONGEST
 
 
+@pytest.mark.slow
 def test_a_rubber_ball_comes_back_but_not_all_the_way():
     assert 0.3 < example("01_drop_a_ball.py") < 0.98
 
@@ -36,6 +37,7 @@ def test_sound_runs_nearly_five_times_faster_in_steel_than_in_lead():
     assert example("02_look_up_materials.py") == pytest.approx(5100 / 1160, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_sliding_block_stops_where_coulomb_says():
     assert example("03_slide_a_block.py") == pytest.approx(1.0, abs=0.03)
 
@@ -50,6 +52,7 @@ def test_a_model_becomes_a_report_and_no_momentum_goes_astray():
     assert example("05_run_a_model.py") < 1e-3
 
 
+@pytest.mark.slow
 def test_a_material_with_less_loss_bounces_higher_than_rubber():
     assert 1.0 < example("06_add_a_material.py") < 1.67, "and no higher than it fell"
 

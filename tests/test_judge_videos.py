@@ -78,6 +78,7 @@ def edited_only(monkeypatch):
 # ---------------------------------------------------------------- controls
 
 
+@pytest.mark.slow
 def test_frozen_stays_reversed_ends_as_it_began_and_slow_takes_four_times_as_long(played):
     ours = motion_of_run(played)
     end = float(played.trajectory.time[-1])

@@ -129,6 +129,7 @@ def test_evidence_chooses_among_ways_and_every_value_stays_inside_its_range():
     assert float(scale.of(field)[0]) == pytest.approx(m.mass, rel=0.05)
 
 
+@pytest.mark.slow
 def test_evidence_sets_no_value_and_beyond_three_widths_it_warns_what_would_reconcile():
     far = judged(SOLID_MASS / 100)
     (m,) = weigh(replace(STEEL, probability=1.0), evidence=far).mixtures

@@ -98,6 +98,7 @@ def weighed_by(tmp_path_factory):
     return weighed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "life", "unit"), [(n, m, u) for n, _, m, u in THINGS], ids=[t[0] for t in THINGS])
 def test_an_object_by_its_name_weighs_what_such_objects_do_or_is_doubted(weighed_by, name, life, unit):
     found = weighed_by(name)

@@ -42,6 +42,7 @@ def test_every_shape_is_closed():
     assert [row["name"] for row in ROWS if not shape(row["shape"]).is_watertight] == []
 
 
+@pytest.mark.slow
 def test_the_open_half_weighs_what_is_published(tmp_path):
     """Before decision mass-by-name its ALDE was .38, and five were off by more than 2.5."""
     off = []

@@ -25,6 +25,7 @@ def prepared(material, on, size, speed=3.0, at=None):
     return co.prepare_scene(prepared_scene(material, on, size, speed, at))
 
 
+@pytest.mark.slow
 def test_a_rubber_mat_on_the_floor_that_steps_would_soften_is_rigid():
     ready = prepared("potato", "rubber", (0.12, 0.12, 0.01), 2.0)
     assert [t.kind for t in ready.particles.treatments] == ["rigid", "rigid"]
@@ -46,6 +47,7 @@ def test_a_large_mat_is_a_sheet_and_rigid_as_a_sheet_of_paper_is():
     assert [t.kind for t in paper.particles.treatments] == ["rigid", "rigid"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(0.12, 0.12, 0.01), (0.28, 0.21, 1e-4)])
 def test_what_is_pushed_stays_as_soft_as_it_is(size):
     """It may be pulled out from under what falls."""
@@ -57,6 +59,7 @@ def test_what_is_pushed_stays_as_soft_as_it_is(size):
     assert co.prepare_scene(scene).particles.treatments[1].kind != "rigid"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("material", ["steel", "wood", "seat_foam"])
 def test_a_ball_comes_back_from_paper_as_from_the_floor_below(material):
     """A sheet of a tenth of a millimetre was a mattress: foam came back with .1 more."""
@@ -73,6 +76,7 @@ def test_a_ball_comes_back_from_paper_as_from_the_floor_below(material):
     assert left(scene) == pytest.approx(left(bare), abs=0.04 * 3.0)
 
 
+@pytest.mark.slow
 def test_a_steel_ball_comes_back_from_felt_as_felt_returns_it():
     """Pressed through to the floor, a softened mat threw it higher than it fell."""
     mat = co.box("felt", (0.2, 0.2, 0.006), name="mat")
@@ -84,6 +88,7 @@ def test_a_steel_ball_comes_back_from_felt_as_felt_returns_it():
     assert returned.low**2 <= ratio <= returned.high**2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.06, 0.3])
 def test_how_wide_a_mat_is_does_not_matter(width):
     """A floor holds it, though it is many times heavier than what strikes it."""

@@ -76,6 +76,7 @@ def rough(mesh, by):
     return trimesh.Trimesh(fine.vertices + moved[:, None] * fine.vertex_normals, f, process=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ware", OUTSIDES)
 def test_ware_from_pictures_weighs_what_its_sheet_does_whatever_fills_its_hollow(ware):
     found = {how: area_found(drawn(OUTSIDES[ware], how)) for how in HOLLOWS}

@@ -33,6 +33,7 @@ def made_of(mesh, path, **how):
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("from_pictures", [True, False])
 def test_one_piece_of_each_kind_weighs_what_is_published(tmp_path, from_pictures):
     """Before decision mass-open-ware their mean logarithm was .56 from pictures, and 1.29 as full meshes."""

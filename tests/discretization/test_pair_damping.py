@@ -131,6 +131,7 @@ def test_nothing_is_dented_deeper_than_it_is_thick():
     assert hertz_contact_time(1e-3, 0.01, 1.0, 4e10, 1.0) == pytest.approx(hertz, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_verb_says_what_a_slab_loses_for():
     # It does not lie on the floor, where it would be rigid.
     slab = co.box("rubber", (0.06, 0.06, 0.01), at=(0, 0, 0.0052), name="slab")

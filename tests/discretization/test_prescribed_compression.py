@@ -76,6 +76,7 @@ PRESSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRESSED)
 def test_what_cannot_go_away_is_strained_by_the_way_over_its_length(name):
     things, strain = PRESSED[name]
@@ -109,6 +110,7 @@ FREE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FREE)
 def test_what_can_go_away_or_is_only_touched_stays_rigid_and_nothing_is_reported(name):
     ready = treated(*FREE[name])
@@ -117,6 +119,7 @@ def test_what_can_go_away_or_is_only_touched_stays_rigid_and_nothing_is_reported
     assert max(t.strain for t in ready.treatments) < 5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("material", ["steel", "wood"])
 def test_what_is_hard_stays_rigid_in_a_hand_and_one_sentence_says_that_no_force_is_right(material):
     ready = treated(cube(material), *fingers(0.004))
@@ -151,6 +154,7 @@ def test_a_wall_holds_what_is_pushed_against_it():
     assert co.prepare_scene(thing).particles.treatments[0].kind == "rigid"
 
 
+@pytest.mark.slow
 def test_a_cube_of_foam_in_a_hand_presses_back_with_its_modulus_times_area_and_strain():
     """E A ε = 60 kPa · (60 mm)² · .1 = 21.6 N; held by friction a few percent more."""
     pair = fingers(0.004)

@@ -39,6 +39,7 @@ def pressed(stiffness):
     return most
 
 
+@pytest.mark.slow
 def test_under_the_published_cap_rubber_is_softer_than_foam_and_in_truth_it_is_not():
     rubber, foam = pressed("capped")
     assert rubber > 1.4 * foam

@@ -40,6 +40,7 @@ def made_of(words):
     return MaterialField((STEEL,), (Structure("shell", WALL),), (words,), none, none)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filled", FILLED)
 def test_a_cup_that_is_filled_in_holds_what_a_cup_of_its_wall_does(filled):
     before = anatomy_of(drawn(filled))
@@ -51,6 +52,7 @@ def test_a_cup_that_is_filled_in_holds_what_a_cup_of_its_wall_does(filled):
     assert cup.shape.inside(np.array([[0, 0, 0.002], [0.0405, 0, 0.05]])).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("filled", FILLED)
 def test_it_weighs_and_its_wall_is_as_before(filled):
     field, anatomy = made_of(WARE), anatomy_of(drawn(filled))

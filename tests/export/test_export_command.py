@@ -30,6 +30,7 @@ def complaints(said):
     return [line.removeprefix("corporeal: ") for line in lines]
 
 
+@pytest.mark.slow
 def test_a_run_is_exported_from_the_command_line(command, run_folder, tmp_path):
     before = contents(run_folder)
     out = tmp_path / "для других"

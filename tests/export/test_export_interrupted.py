@@ -80,6 +80,7 @@ def test_killed_at_any_time_leaves_whole_targets_or_none(run_folder, tmp_path, c
     assert [p.name for p in out.iterdir() if p.name.startswith(".") and p.name != store.LOCK_FILE] == []
 
 
+@pytest.mark.slow
 def test_killed_over_an_older_export_leaves_the_older_one(run_folder, tmp_path):
     out = tmp_path / NAME
     verb.export_scene(run_folder, ["usd"], out)
@@ -128,6 +129,7 @@ def test_a_full_disk_is_one_sentence(run_folder, tmp_path, target):
     assert "Traceback" not in said
 
 
+@pytest.mark.slow
 def test_a_read_only_disk_is_one_sentence(run_folder, tmp_path):
     place = tmp_path / "диск"
     place.mkdir()

@@ -100,6 +100,7 @@ def test_a_board_slides_from_the_angle_of_its_friction_on(written):
     assert sliding(folder, angle, seconds) == pytest.approx(wanted, rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("restitution", [0.4, 0.6, 0.8, 0.9])
 def test_a_ball_returns_the_share_of_its_speed_that_it_should(written, restitution):
     scene = co.build_scene(co.ball("steel", 0.03, (0, 0, 0.08)))

@@ -93,6 +93,7 @@ def test_what_is_not_there_is_reported(tmp_path):
         read_usd_physics(tmp_path / "x.usda")
 
 
+@pytest.mark.slow
 def test_our_own_come_back_as_a_scene_with_all_that_they_carry(played, tmp_path):
     """Out, in, prepared again: the same names, motion, materials, frictions and masses."""
     before = played.prepared

@@ -43,6 +43,7 @@ def test_there_are_24_ways_to_turn_axes_into_axes():
     assert len({turn.tobytes() for turn in axis_turns()}) == 24
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", synthetic_fields.FRAMES)
 @pytest.mark.parametrize("kind", WRITERS)
 @pytest.mark.parametrize("name", ["armchair", "rubber_duck", "potted_ficus", "floor_lamp"])
@@ -105,6 +106,7 @@ def test_a_part_beyond_the_field_keeps_our_numbers(tmp_path):
     assert re.search(r"leaves \(only \d+% of it lies near a point", field.notes[0])
 
 
+@pytest.mark.slow
 def test_pixies_kinds_choose_laws_with_what_these_need(tmp_path):
     it, before = thing("armchair"), ours("armchair")
     laws = {0: Law.COROTATED, 1: Law.VON_MISES, 2: Law.DRUCKER_PRAGER, 3: Law.VON_MISES}

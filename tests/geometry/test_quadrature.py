@@ -72,6 +72,7 @@ def face_as_nodes_see_it(made: PointFilling, above: float):
     return np.array(offset), np.array(share)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("above", "half"), [(-0.5, 0.8438), (0.0, 0.5), (0.5, 0.1562)])
 def test_a_tilted_face_is_plain_and_where_it_is(alike, above, half):
     """Contact reads where a face is from mean offsets on nodes: they must not depend on chance."""

@@ -484,6 +484,7 @@ LIMITED = [name for name in HOSTILE if name.startswith(("claims", "bomb", "laugh
 """May take memory or time without end, or end the process."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LIMITED)
 def test_a_hostile_file_ends_in_one_sentence(tmp_path, mesh_reader_child, name):
     refused(tmp_path, name)

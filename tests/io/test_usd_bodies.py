@@ -156,6 +156,7 @@ def test_what_no_matter_has_is_one_sentence(tmp_path, density, mass, said):
         co.prepare_scene(co.load_scene(path))
 
 
+@pytest.mark.slow
 def test_one_changed_density_is_another_mass(kitchen):
     masses = [
         np.bincount(p.object, p.mass)[1] for p in (co.prepare_scene(kitchen(d)).particles for d in ("0.6", "0.75"))
@@ -205,6 +206,7 @@ def test_shapes_that_are_stated_by_numbers_have_their_volume(tmp_path, kind, mir
         np.testing.assert_allclose(tip, [0, 0, 1.5], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_run_begins_with_what_is_stated(kitchen, tmp_path):
     """`corporeal run kitchen.usda`: through the verbs of a run's folder."""
     from corporeal.pipeline.run_pipeline import read_run

@@ -129,6 +129,7 @@ def test_a_folder_that_cannot_be_resumed_appears_whole_or_not_at_all(tmp_path):
     assert [p.name for p in (tmp_path / "runs").iterdir()] == ["a"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))])
 def test_killed_at_random_moments_it_loses_nothing_and_does_nothing_twice(tmp_path, seed):
     chance = random.Random(seed)

@@ -23,6 +23,7 @@ def problems():
     return few, all_
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", ["multi", "single"])
 def test_who_was_there_goes_on_as_if_nothing_had_happened(problems, contact):
     few, more = (replace(p, contact=contact) for p in problems)

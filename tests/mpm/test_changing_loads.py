@@ -29,6 +29,7 @@ def problem():
     return co.pose_problem(replace(ready, particles=coarse))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ENGINES)
 def test_another_gravity_pulls_from_then_on(problem, kind):
     engine = kind(problem)

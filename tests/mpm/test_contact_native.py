@@ -146,6 +146,7 @@ def mat_on_a_slab(apart):
     return problem(body(slab + lift, rigid=True, surface=faces), body(mat + lift, velocity=(0, 0, -0.1)), planes=())
 
 
+@pytest.mark.slow
 def test_a_mat_on_a_slab_meets_it_as_in_the_reference():
     """Nodes pass over runs of the slab's surface points that are far from their line."""
     fast, sure = side_by_side(mat_on_a_slab(0.02), 6)

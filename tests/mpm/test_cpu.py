@@ -18,6 +18,7 @@ def side_by_side(given, steps):
     return step_together(CpuEngine(given, threads=1), ReferenceEngine(given), steps)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", list(Law))
 def test_every_law_moves_as_in_the_reference_through_impact_and_friction(law):
     low = body(ball((0, 0, 0.055), 0.05), law, (0, 0, -0.5))
@@ -40,6 +41,7 @@ def test_every_law_moves_as_in_the_reference_through_impact_and_friction(law):
     assert ours.contact_point == pytest.approx(theirs.contact_point, abs=1e-5, nan_ok=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", list(Law))
 @pytest.mark.parametrize("stretch", [(40.0, -15.0, 25.0), (-25.0, -25.0, 5.0)])
 def test_every_law_holds_far_beyond_where_its_series_do(law, stretch):

@@ -70,6 +70,7 @@ MEETINGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MEETINGS)
 def test_shells_meet_others_as_in_the_reference(name):
     given = MEETINGS[name]()

@@ -56,6 +56,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_shells_move_as_in_the_reference(case):
     given = free(CASES[case]())
@@ -84,6 +85,7 @@ def test_steps_are_as_long_as_in_the_reference(case):
     assert fast.stable_step() == pytest.approx(sure.stable_step(), rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contact", ["multi", "single"])
 def test_a_shell_hits_the_floor_beside_a_solid_as_in_the_reference(contact):
     points, triangle = tube()

@@ -47,6 +47,7 @@ def same(here, there):
 # ---------------------------------------------------------------- the reference
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", list(Law))
 def test_every_law_moves_as_in_the_reference_through_impact_and_friction(law):
     low = body(ball((0, 0, 0.055)), law, (0, 0, -0.5))
@@ -255,6 +256,7 @@ def assert_compiles(module, folder, architectures):
     assert written == [[f".sm{arch}", ".cubin"] for arch in architectures]
 
 
+@pytest.mark.slow
 def test_rigid_inclusions_compile_for_cards_without_one(tmp_path):
     assert_compiles(program.bonds, tmp_path, ARCHITECTURES)
 

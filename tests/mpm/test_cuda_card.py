@@ -132,6 +132,7 @@ def test_gather_reads_and_writes_no_channel_but_those_that_are_counted():
 # ---------------------------------------------------------------- groups
 
 
+@pytest.mark.slow
 def test_a_group_of_threads_sums_and_moves_what_one_thread_does(monkeypatch):
     """The processor can take turns among the threads of a group, at every place where they meet."""
     engine = engine_of(HEAP)

@@ -81,6 +81,7 @@ def test_a_rigid_block_on_an_incline_slides_as_coulomb_says(friction):
         assert measure.friction_loss == pytest.approx(grip * moved[0], rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_soft_block_comes_to_rest_on_the_floor_and_is_borne_by_it():
     block = brick((0.005, 0.003, 0.05), (0.1, 0.1, 0.1), young_pa=3e5, loss=1.0)
     engine = on_device(problem(block, gravity_ramp=0.05, friction=0.5))

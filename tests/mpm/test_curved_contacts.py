@@ -59,6 +59,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("engine", ["cpu", "cuda"])
 def test_what_is_round_moves_as_in_the_reference(engine, case):

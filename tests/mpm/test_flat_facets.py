@@ -33,6 +33,7 @@ def test_a_box_has_six_faces_that_end_at_its_edges():
     assert held.tolist() == [True, True, True, False]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True], ids=["ball first", "board first"])
 @pytest.mark.parametrize("engine", ["cpu", "cuda"])
 def test_a_ball_on_a_board_moves_as_in_the_reference(engine, turned):
@@ -50,6 +51,7 @@ def test_a_ball_on_a_board_moves_as_in_the_reference(engine, turned):
     assert moved == pytest.approx(given.bodies[int(turned)].velocity[0] * theirs.mass[int(turned)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [False, True], ids=["on nodes", "round"])
 @pytest.mark.parametrize("engine", ["cpu", "cuda"])
 def test_a_thin_board_that_is_moved_has_its_own_surface(engine, known):
@@ -144,6 +146,7 @@ def valley(turned):
     return (below, ball) if turned else (ball, below)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True], ids=["ball first", "valley first"])
 @pytest.mark.parametrize("engine", ["cpu", "cuda"])
 def test_a_ball_in_a_valley_meets_both_faces_and_nothing_else(engine, turned):

@@ -112,6 +112,7 @@ def test_a_ball_on_the_arm_of_a_chair_bounces_off_wood():
     assert speed[2] - speed[0] == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_chair_stands(engine):
     frame, cushion = chair()
     run = engine(

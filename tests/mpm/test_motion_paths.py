@@ -56,6 +56,7 @@ def test_a_path_at_rest_rests():
         assert prescribed_motion.path_pose(rows, time).place[0] == pytest.approx(PIVOT[0] + 0.1, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_speeds_of_a_path_are_smooth_and_no_larger_than_stated():
     guide = prescribed_motion.PathFollower.of(mover())
     centre = np.array([0.25, -0.1, 0.45])

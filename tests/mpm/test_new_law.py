@@ -95,6 +95,7 @@ def test_a_law_stands_in_four_files_and_no_others(larger):
     assert set(differing(pair)) == PLACES
 
 
+@pytest.mark.slow
 def test_the_tests_of_laws_and_formulas_hold_for_it(larger):
     """Stress is the slope of the energy; C++ agrees to 2e-6 at both widths; waves are bounded."""
     done = checked(larger)
@@ -115,6 +116,7 @@ def test_a_law_that_dispatch_forgets_fails_them(tmp_path):
     assert "test_the_stored_energy_is_that_of_numpy" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["reference", *(pytest.param(e, marks=pytest.mark.slow) for e in ("cpu", "cuda"))])
 def test_a_bar_of_it_swings_as_theory_and_rubber_do_in_every_engine(engine, larger):
     """On 16 cells a bar seems 3 % longer, whatever its law; an unstressed one would not turn."""
@@ -130,6 +132,7 @@ def test_it_compiles_for_cards_without_one(larger, tmp_path):
     assert [name.split(".")[-2] for name in made] == ["sm86", "sm90", "sm120"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("without", "words"),
     {

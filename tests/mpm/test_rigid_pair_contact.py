@@ -125,6 +125,7 @@ def test_places_are_those_of_numpy_in_either_precision(dtype):
     np.testing.assert_allclose(found[steady], exact[steady], atol=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fast", ["cpu", "cuda"])
 def test_a_board_that_slides_below_an_edge_throws_nothing_up_as_in_the_reference(fast):
     """At 3 m/s, .3 cells from the ends of both: nodes there lean by more than 18°."""

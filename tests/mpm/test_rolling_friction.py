@@ -146,6 +146,7 @@ CASES["board that moves"] = lambda: over_a_board(path=ALONG)
 CASES["light board"] = lambda: over_a_board(density=2000.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("engine", ["cpu", "cuda"])
 def test_what_is_braked_moves_as_in_the_reference(engine, case):

@@ -50,6 +50,7 @@ def energy(measure):
     return measure.kinetic.sum() + measure.elastic.sum() + measure.potential.sum()
 
 
+@pytest.mark.slow
 def test_contact_starts_when_the_surfaces_meet(engine):
     _, measures = head_on(engine)
     expected = 0.5 * CELL / SPEED
@@ -143,6 +144,7 @@ def test_light_and_heavy_collide_as_their_masses_say(patient_engine):
     assert drift < run.round_off * measures[0].momentum.max()
 
 
+@pytest.mark.slow
 def test_a_collision_conserves_momentum_and_never_gains_energy(holds):
     holds("1", quick=True)
 

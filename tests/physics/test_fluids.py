@@ -22,6 +22,7 @@ from corporeal.mpm.reference.engine import ReferenceEngine
 G = 9.81
 
 
+@pytest.mark.slow
 def test_a_film_of_honey_runs_down_a_slope_as_a_parabola(fast_engine):
     assert film_on_a_slope(10.0, cells=6) < 0.08
 
@@ -61,6 +62,7 @@ def test_the_step_does_not_see_the_viscosity(engine, viscosity):
     assert steps[0] == steps[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("yield_shear", "index"), [(0.0, 1.0), (20.0, 1.0), (10.0, 0.5)])
 def test_engines_agree_on_how_a_liquid_flows(engine, yield_shear, index):
     """A lump that spins apart: what it loses is the reference's, momentum stays."""

@@ -100,6 +100,7 @@ def test_blocks_and_stacks_of_five_stay_and_the_floor_carries_them(holds):
     holds("11", quick=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("walls_off", [0.0, 1.0])
 def test_water_stands_as_high_wherever_planes_lie_on_the_grid(fast_engine, walls_off):
     """Six cells deep, the floor or the walls at ten places between nodes; level within 1 %."""

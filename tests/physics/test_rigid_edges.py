@@ -35,6 +35,7 @@ def run_of(*solids, gravity=(0.0, 0.0, -G), time=0.4):
     return engine, engine.measure().centre[-1] - start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [0, 20])
 @pytest.mark.parametrize(("beyond", "falls"), [(-0.05, False), (0.15, True)])
 def test_a_cube_falls_off_a_slab_once_its_middle_is_beyond_the_edge(degrees, beyond, falls):
@@ -79,6 +80,7 @@ def test_a_ball_rolls_down_a_gutter_slower_than_on_a_plane():
     assert np.abs(way[[0, 2]]).max() < 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("thick", [0.01, 0.03])
 def test_a_board_pulled_away_drags_a_cube_by_friction_alone(thick):
     """At 3 m/s: v = μ g t until the board's end is under the cube's edge, and no throw.

@@ -48,6 +48,7 @@ def lying_cylinder(radius, at):
     return co.solid("steel", np.array(shape.vertices) + at, shape.faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on_board", [False, True], ids=["floor", "board"])
 @pytest.mark.parametrize("shape", ["ball", "cylinder"])
 def test_what_is_round_rolls_down_five_degrees_as_far_as_it_should(shape, on_board):
@@ -81,6 +82,7 @@ def ramp(slope, low=0.05, length=0.5, wide=0.1):
     return trimesh.convex.convex_hull(np.array(corners, dtype=float)), high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "radius"), [(15, 0.03), (10, 0.02)], ids=["hole", "far node"])
 def test_a_ball_rolls_down_a_ramp_without_a_hop(degrees, radius):
     """The first fell into a hole between the ramp's points, the second hit a node 3.4 cells off."""
@@ -169,6 +171,7 @@ def test_a_marble_swings_in_a_bowl_as_a_pendulum_does():
     assert found.impact_loss < 1e-3 * found.mass[0] * G * (R - MARBLE) * (1 - np.cos(lean))
 
 
+@pytest.mark.slow
 def test_a_marble_rolls_off_a_dome():
     """θ'' = g sin θ/((R + r)(1 + I/(m r²))) until the dome no longer bears it."""
     R, start = 0.08, np.radians(10)

@@ -46,6 +46,7 @@ def falls_on(engine, loss):
     return m.momentum[0, 2] / m.mass[0] / SPEED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ratio", "loss"), [(1 / 3, 0.6), (1.0, 0.6), (3.0, 0.6), (1.0, 0.1)])
 def test_a_rigid_ball_loses_its_share_of_the_compliance(fast_engine, ratio, loss):
     """Whichever loses more: a composite of two lossy half-spaces, at three ratios of moduli."""

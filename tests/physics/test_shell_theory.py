@@ -4,6 +4,7 @@ import pytest
 from laws import shells
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case",
     [

@@ -15,6 +15,7 @@ SHEET = (0.3, 0.3, 1.5 * CELL)
 LOW = np.array([0.13, 0.31, 0.0]) * CELL
 
 
+@pytest.mark.slow
 def test_a_rule_for_impacts_is_as_good_as_fine_springs():
     given = squeezed.cases()
     off = np.abs(squeezed.errors("held where it swings quickly", given))

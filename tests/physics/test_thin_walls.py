@@ -38,6 +38,7 @@ def posed(*solids):
     return replace(problem, gravity_ramp=0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wall", "most"), [(None, 0.01), (0.01, 0.3)], ids=["block", "crate"])
 def test_a_mug_stands_on_what_is_under_it(wall, most):
     """It stayed .46 cells above the block, and .98, where it had begun, above the crate."""

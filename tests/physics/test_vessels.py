@@ -4,6 +4,7 @@ import pytest
 from laws.vessels import Tumbler, level_error, outside
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wall", [0.003, 0.0005])
 def test_water_stands_in_a_glass_as_high_as_it_was_poured(fast_engine, wall):
     """Eight cells across, and walls of .38 and .06 cells."""

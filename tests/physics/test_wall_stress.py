@@ -39,6 +39,7 @@ def test_a_film_of_three_cells_flows_as_fast_wherever_its_wall_lies(place):
     assert abs(film_flow(Film(10.0, 3, place))) < 0.08
 
 
+@pytest.mark.slow
 def test_shorter_steps_do_not_hold_it_back():
     """A held node takes what transfers bring to it in every step: .88 and .67 of the flow."""
     long, short = (film_flow(Film(10.0, 3, courant=courant)) for courant in (0.4, 0.1))
@@ -56,6 +57,7 @@ def test_what_the_floor_takes_is_booked(engine):
     assert seen.plane_impulse[0, 0] == pytest.approx(-lost, abs=2e-5 * abs(before[0]))
 
 
+@pytest.mark.slow
 def test_a_paste_stays_on_a_slope_that_its_yield_stress_holds(fast_engine):
     """ρ g h sin α is .7 and 2.5 of it; between the ends, at four cells."""
     speeds, thick, paste = [], 0.02, PASTE

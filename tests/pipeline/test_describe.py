@@ -108,6 +108,7 @@ def test_a_scene_of_a_thousand_surfaces_is_described_in_a_moment():
     assert [p.material for p in thing.parts] == ["steel"]
 
 
+@pytest.mark.slow
 def test_an_object_of_a_thousand_parts_is_described_in_seconds():
     colours = [(k / 1000, 0.0, 0.0, 1.0) for k in range(1000)]
     pieces = [(f"steel_{k}", plain(f"m{k}", colour=c), {}) for k, c in enumerate(colours)]
@@ -616,6 +617,7 @@ def test_a_material_of_ones_own_can_be_annotated_and_stated(tmp_path, base):
 # ---------------------------------------------------------------- real objects
 
 
+@pytest.mark.slow
 def test_real_files_are_recognised_as_the_facts_recorded_about_them_say(shared_assets):
     recorded = {(r.file, r.part): r.answer for r in judge(facts())}
     seen = {}

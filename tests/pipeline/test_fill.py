@@ -200,6 +200,7 @@ def test_a_solid_whose_mesh_is_a_vessel_weighs_its_wall_not_its_contents():
     assert particles.position[inside, 2].max() < 0.5 + 0.05
 
 
+@pytest.mark.slow
 def test_every_particle_bears_the_name_of_the_part_it_lies_in():
     seat = put(trimesh.creation.box((0.4, 0.4, 0.1)), 0.1)
     foot = put(trimesh.creation.box((0.1, 0.1, 0.1)), 0.0)
@@ -219,6 +220,7 @@ def test_a_leaf_without_volume_still_has_particles_and_a_mass():
     assert particles.mass[particles.part == 0].sum() == pytest.approx(1100 * stem.volume, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_narrow_sheet_is_as_light_as_its_thick_wall_and_no_hollow_body():
     """A gutter of foil, open above: what is narrow and closed is filled, a sheet is not."""
     foil = Structure("shell", 1e-4)
@@ -294,6 +296,7 @@ def test_every_real_object_can_be_filled(folder, shared_assets):
         assert particles.volume.min() > 0
 
 
+@pytest.mark.slow
 def test_a_rigid_object_touches_with_its_own_surface_only():
     """Another object's corners once held a ball up in the air."""
     floor = put(trimesh.creation.box((0.4, 0.4, 0.1)), 0.0)

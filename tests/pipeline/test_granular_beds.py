@@ -63,6 +63,7 @@ WAYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", WAYS)
 def test_soil_weighs_the_same_however_it_is_drawn(way):
     pot, soil, volume = WAYS[way]
@@ -74,6 +75,7 @@ def test_soil_weighs_the_same_however_it_is_drawn(way):
     assert ("fills terracotta below its surface" in particles.fills[1]) is (soil is not PLUG)
 
 
+@pytest.mark.slow
 def test_the_pot_around_it_weighs_what_it_did():
     alone = filled((turned(POT), CLAY, WALL))
     for pot in (POT, WITH_LINE):
@@ -109,6 +111,7 @@ def test_a_heap_on_a_plate_stays_as_it_is_drawn():
     assert "fills" not in particles.fills[1]
 
 
+@pytest.mark.slow
 def test_a_sheet_of_sand_on_a_table_stays_one_and_is_reported_of():
     table = trimesh.creation.box((1.0, 1.0, 0.03))
     table.apply_translation((0, 0, 0.7))

@@ -48,6 +48,7 @@ def made(splat):
     return reconstruct(splat, config, ("crate=0.4",))
 
 
+@pytest.mark.slow
 def test_objects_come_out_in_metres_on_the_floor(made):
     found, scene = made.found, made.scene
     assert [(o.name, o.class_name) for o in scene.objects] == [("crate", "crate"), ("blue pillar", "blue pillar")]
@@ -162,6 +163,7 @@ class Enough(Exception):  # noqa: N818
     """All that a test wants to know."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lifting", ["uplift", "back-projection", pytest.param("radiance", marks=pytest.mark.slow)])
 def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, monkeypatch):
     def stopped(cloud, *_):

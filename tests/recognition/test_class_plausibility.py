@@ -207,6 +207,7 @@ sprocket crankshaft weathervane railing pulley sail scissor plier""".split()
 """Things that are pieces of others, of any size."""
 
 
+@pytest.mark.slow
 def test_what_is_known_by_its_name_has_a_usual_mass_and_size():
     """A name that becomes known must not go unchecked: 429 of 1,098 had no mass."""
     things = {" ".join(t.phrase) for t in lexicon_terms() if t.kind == "thing"}

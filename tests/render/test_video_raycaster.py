@@ -44,6 +44,7 @@ def test_a_video_shows_what_an_even_cast_shows(name):
     assert off <= 1.1 * usual + 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_rays_that_are_not_cast_would_not_have_changed_the_picture(name, monkeypatch):
     made = VideoRaycaster().picture(stage(name), front(), "draft", 1)

@@ -41,6 +41,7 @@ def test_the_menu_has_all_props():
     assert set(PROP_BUILDERS) == set(TABLE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TABLE)
 def test_every_part_is_closed_and_faces_outwards(models, name):
     for part in models[name].parts:

@@ -35,6 +35,7 @@ def described(written):
         return {name: (s, *grounded(s, "showcase")) for name, s in written.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(showcase_scenes.SHOWCASE_SCENE_BUILDERS))
 def test_every_question_is_answered_from_recordings(described, name):
     scene, inventory, _ = described[name]

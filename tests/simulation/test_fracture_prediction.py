@@ -35,6 +35,7 @@ def test_a_plate_that_falls_flat_is_struck_as_fast_as_it_fell():
     assert found.word == "may break"
 
 
+@pytest.mark.slow
 def test_a_plate_with_a_rim_is_as_thin_as_its_wall():
     """Its box is 4 times as high, and would bear 13 times the energy."""
     flat = [[0, 0], [0.12, 0], [0.12, 0.004], [0, 0.004]]

@@ -97,6 +97,7 @@ def test_a_tilted_tile_is_struck_as_the_sheet_that_it_is_and_stays_whole_by_defa
     assert found.breakage[0].word == "would break"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("config", "word"),
     [
@@ -118,6 +119,7 @@ def test_on_the_command_line_that_is_one_sentence_before_anything_is_done(comman
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_the_reference_engine_breaks_a_coarse_tile_as_the_cpu_engine_does():
     quality = QualityPreset(2, 8, 1000, 20e3, np.inf, cell=0.01)
     ready = co.prepare_scene(replace(tile(14.0, height=0.04), duration=0.003, fps=1000))

@@ -38,6 +38,7 @@ def live(shelf):
     return live
 
 
+@pytest.mark.slow
 def test_an_object_falls_from_above_what_is_pointed_at_and_strikes_it(live):
     engine, before = live.hands.engine, live.growth.at(()).prepared
     scene = live.growth.at(live.hands.added).prepared.scene
@@ -86,6 +87,7 @@ def test_pictures_and_the_honest_line_know_it(live):
     assert [o["name"] for o in header["objects"]] == ["ball", "stone", "ball_1"]
 
 
+@pytest.mark.slow
 def test_a_hand_that_holds_something_goes_on_holding_it(shelf):
     live = LiveSimulation(live_editor_of(shelf.made("drop"), 1, LiveAssets(shelf).find), 1)
     place = tuple(live.hands.start[0].tolist())
@@ -107,6 +109,7 @@ def test_a_hand_that_holds_something_goes_on_holding_it(shelf):
     assert live.face is live.bare and len(live.hands.engine.problem.bodies) == 2
 
 
+@pytest.mark.slow
 def test_a_replay_at_draft_drops_it_at_the_same_time(small_run, live, tmp_path):
     done = InteractionRecord("drop", tuple(live.hands.touches))
     write_record(tmp_path / "touches.json", done)
@@ -121,6 +124,7 @@ def test_a_replay_at_draft_drops_it_at_the_same_time(small_run, live, tmp_path):
         assert header["video"]["since"] == {"2": when}
 
 
+@pytest.mark.slow
 def test_what_cannot_be_dropped_is_refused_and_the_simulation_goes_on(shelf):
     live = LiveSimulation(live_editor_of(shelf.made("drop"), 1, LiveAssets(shelf).find), 1)
     for thing, word in (

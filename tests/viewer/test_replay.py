@@ -48,6 +48,7 @@ def touched(made):
     return live
 
 
+@pytest.mark.slow
 def test_a_record_is_read_as_it_was_written(touched, tmp_path):
     done = InteractionRecord("drop", tuple(touched.hands.touches))
     write_record(tmp_path / "touches.json", done)
@@ -90,6 +91,7 @@ def test_a_replay_at_draft_lifts_the_ball_too_and_is_the_same_every_time(made, t
     assert last.position[mine, 2].mean() < frames[0].position[mine, 2].mean()
 
 
+@pytest.mark.slow
 def test_both_takes_of_a_replay_are_written(small_run, touched, tmp_path):
     done = InteractionRecord("drop", tuple(touched.hands.touches))
     write_record(tmp_path / "touches.json", done)

@@ -28,6 +28,7 @@ def moved(problem, wind=None):
     return engine.snapshot().position
 
 
+@pytest.mark.slow
 def test_calm_air_moves_nothing_and_any_object_can_still_be_blown_at(problem):
     assert all(body.wind is not None and len(body.faces.area) for body in problem.bodies)
     without = replace(problem, bodies=tuple(replace(b, wind=None) for b in problem.bodies))

@@ -172,6 +172,7 @@ def numbered(k):
     return Question("colours", f"Which colour has number {k}?", f"s/{k}")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.slow)])
 def test_many_estimations_against_a_slow_failing_server_lose_and_double_nothing(tmp_path, count):
     busy = Busy(every=max(count // 4, 12))

@@ -65,6 +65,7 @@ def test_a_typed_answer_about_several_pictures_comes_back_with_what_it_took():
     assert ASKED.prompt in request.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "told"),
     [
@@ -219,6 +220,7 @@ def test_a_pause_that_the_server_asks_for_is_kept():
     assert server.requests[1].time - start >= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"),
     [

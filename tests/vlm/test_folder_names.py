@@ -66,6 +66,7 @@ def test_a_lone_object_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
     assert not any("0.5 m" in w for w in found.warnings)
 
 
+@pytest.mark.slow
 def test_a_stated_size_is_the_size_whatever_the_name_says(tmp_path):
     came = made(tmp_path, "axe", ("axe=0.103",))
     assert np.ptp(came.found.boxes[0], axis=0).max() == pytest.approx(0.103, rel=0.05)
@@ -100,6 +101,7 @@ def test_sizes_of_unnamed_objects_can_be_stated():
     assert decide_metric_scale({"axe": 2.0}, [object_of_usual_size("axe")], ["object=0.5"]).metres_per_unit == 0.25
 
 
+@pytest.mark.slow
 def test_an_estimated_size_names_its_source(tmp_path):
     (said,) = [w for w in made(tmp_path, "one", object_names=("banana",)).found.warnings if "large" in w]
     assert said == (

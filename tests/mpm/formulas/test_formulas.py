@@ -207,6 +207,7 @@ def astray(law, F, H, found):
     return wrong / size, wrong / np.maximum(size, np.linalg.norm(exact, axis=1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1, 8])
 @pytest.mark.parametrize("law", list(Law))
 def test_the_stress_of_every_law_is_that_of_float64(law, width, H):

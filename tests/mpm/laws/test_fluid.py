@@ -38,6 +38,7 @@ def test_a_newtonian_liquid_resists_by_its_viscosity_however_long_the_step(over)
     assert stress == pytest.approx(viscosity * rate, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_paste_resists_as_herschel_and_bulkley_say():
     """Every index at every rate: a particle each, since thousands of steps cost as much for one."""
     index, rate = (grid.ravel() for grid in np.meshgrid([0.3, 0.5, 1.0, 1.6], [0.1, 3.0, 20.0]))

@@ -42,6 +42,7 @@ def length(rows):
     return np.linalg.norm(rows.astype(np.float64), axis=-1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("high", "wide", "rows", "columns"), [(56, 56, 4, 4), (28, 42, 4, 6), (112, 70, 6, 4), (56, 105, 4, 8)]
 )

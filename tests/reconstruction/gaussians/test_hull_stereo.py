@@ -74,6 +74,7 @@ def emptied(solid, contrast):
         return found, hull_cells_seen_past(views, masks, found, pool)
 
 
+@pytest.mark.slow
 def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls():
     found, empty = emptied(without_lid(), 0.25)
     x, y, z = np.moveaxis(found.cells, -1, 0)
@@ -141,6 +142,7 @@ def deeper(views, masks, shown, far):
         return refine_depth(rendering, views, masks, pool, COARSE).depth
 
 
+@pytest.mark.slow
 def test_photographs_see_below_a_thin_lid_of_gaussians(lidless):
     """Through a lid that hides less than half they know better, and leave its sides."""
     views, masks, shown, true = lidless

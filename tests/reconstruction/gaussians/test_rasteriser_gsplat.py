@@ -97,6 +97,7 @@ def stand_in(monkeypatch):
     return torch
 
 
+@pytest.mark.slow
 def test_drawings_and_gradients_are_those_of_the_processor(stand_in):
     from corporeal.reconstruction.gaussians import rasteriser_gsplat
 

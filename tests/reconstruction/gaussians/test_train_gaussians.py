@@ -110,6 +110,7 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
     assert small < deep() / 1.2
 
 
+@pytest.mark.slow
 def test_a_scene_without_masks_starts_from_a_sweep(scene):
     views, _ = scene
     out = train_gaussians(views, config=SMALL)
@@ -167,6 +168,7 @@ def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_pa
     np.testing.assert_array_equal(last.gaussians.mean, whole.mean)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", ["seed", "hull", "torn"])
 def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, spoil):
     views, masks = scene

@@ -21,6 +21,7 @@ UP = np.array([0.0, 0.0, 1.0])
 scene = partial(painted_scene.scene, finer=2)
 
 
+@pytest.mark.slow
 def test_growing_begins_with_a_floor_that_no_points_show():
     views, _, points = scene(count=20)
     seeds = seeds_from_cameras(views, points[points[:, 2] > FLOOR + 0.1])
@@ -29,6 +30,7 @@ def test_growing_begins_with_a_floor_that_no_points_show():
     assert seeds.floor.offset == pytest.approx(FLOOR, abs=0.02 * seeds.around.radius)
 
 
+@pytest.mark.slow
 def test_views_of_other_floors_show_none():
     views, _, _ = scene(count=8)
     each = np.stack([scene(seed=k, count=8)[0].rgb[k] for k in range(8)])

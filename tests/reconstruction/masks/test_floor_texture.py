@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import painted_scene
+import pytest
 from painted_scene import GREY, agreement
 
 from corporeal.core.types import Views
@@ -61,6 +62,7 @@ def test_without_a_floor_nothing_is_known():
     assert (floor_fit(views, None, find_viewed_region(views.cameras), none) == FIT_UNKNOWN).all()
 
 
+@pytest.mark.slow
 def test_masks_on_a_print_of_their_colours_are_believed(monkeypatch):
     views, masks, points = printed()
     seeds, all_grown = seeds_from_cameras(views, points), []

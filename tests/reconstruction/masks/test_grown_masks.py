@@ -64,6 +64,7 @@ def grey(tmp_path_factory):
     return place / "photos", views, grown_masks(place / "photos", place / "made")
 
 
+@pytest.mark.slow
 def test_masks_are_written_and_read_as_given_ones(grown):
     folder, masks, made = grown
     read = read_posed_photos(folder, WIDE, made.folder)
@@ -72,6 +73,7 @@ def test_masks_are_written_and_read_as_given_ones(grown):
     assert len(list((made.folder / "masks").glob("*.png"))) == len(masks)
 
 
+@pytest.mark.slow
 def test_masks_lie_on_the_photograph_as_it_is_stored(photos, tmp_path):
     """With a lens that bends, what is written is bent as the photograph is."""
     folder, masks = photos
@@ -117,6 +119,7 @@ def test_what_masks_hold_a_part_of_is_refused_until_they_are_corrected(tmp_path)
     assert not find_or_grow_masks(ReconstructConfig(), photos, run, unheard).incomplete
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("left_over", [0.0, 0.5])
 def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monkeypatch, left_over):
     folder, _ = photos
@@ -129,6 +132,7 @@ def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monke
     assert ("1.0 times as much" in found.incomplete) == (left_over > 0)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_distinguished_is_not_written(grey):
     photos, _, made = grey
     assert made.folder is None and "No masks were grown" in made.said[0]
@@ -164,6 +168,7 @@ def test_a_place_that_is_not_there_is_named(photos, tmp_path, pointed, words):
         grown_masks(photos[0], tmp_path / "made", pointed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lens", [{}, {"k1": -0.2}], ids=["straight", "bent"])
 def test_a_point_is_in_the_pixels_of_the_photograph(photos, tmp_path, lens):
     folder, masks = photos

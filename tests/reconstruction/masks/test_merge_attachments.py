@@ -29,6 +29,7 @@ def before_and_after(other):
     return masks, grown, merge_attachments(views, seeds, grown, unheard)
 
 
+@pytest.mark.slow
 def test_a_head_of_another_colour_is_taken_in():
     """A hammer in the colours of its handle lost its grey head."""
     masks, before, after = before_and_after("head")
@@ -36,6 +37,7 @@ def test_a_head_of_another_colour_is_taken_in():
     assert agreement(after.inside, masks).mean() > 0.93
 
 
+@pytest.mark.slow
 def test_a_small_object_close_beside_it_is_taken_in():
     """Its hull is a piece of its own, of less than a tenth of the ball's, and no crumb."""
     masks, before, after = before_and_after("close")
@@ -43,12 +45,14 @@ def test_a_small_object_close_beside_it_is_taken_in():
     assert agreement(after.inside, masks).mean() > 0.93
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", [None, "ball", "disc"])
 def test_what_does_not_touch_it_or_lies_there_is_not(other):
     _, before, after = before_and_after(other)
     assert after is before
 
 
+@pytest.mark.slow
 def test_what_is_not_held_in_the_end_is_not_taken():
     """Hanging pixels that have the floor's colours: growing does not believe them."""
     views, _, seeds, grown = grown_scene()

@@ -49,6 +49,7 @@ def test_what_masks_hold_is_not_beside_them():
     assert told(views, both, GROUND) is None
 
 
+@pytest.mark.slow
 def test_a_run_says_what_was_left_out_until_masks_are_corrected(tmp_path):
     views, _, _ = scene(other="ball")
     photos, made = tmp_path / "photos", tmp_path / "made"

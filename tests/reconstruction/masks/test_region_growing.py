@@ -18,6 +18,7 @@ from corporeal.reconstruction.masks.region_growing import grow_masks
 from corporeal.reconstruction.masks.total_variation import TotalVariationCutter
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False], ids=["points", "no points"])
 def test_what_all_cameras_look_at_is_found(known):
     views, masks, points = scene()

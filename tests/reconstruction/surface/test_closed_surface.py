@@ -45,6 +45,7 @@ def box(low, high):
     return trimesh.creation.box(bounds=[low, high])
 
 
+@pytest.mark.slow
 def test_a_ball_on_the_floor_becomes_a_closed_ball():
     ball = trimesh.creation.icosphere(4, 0.5).apply_translation([0, 0, 0.5])
     gaussians, owner = together(clad(ball))
@@ -132,6 +133,7 @@ def test_what_stands_on_legs_is_hollow_below():
 LEGS = [(x, y) for x in (-0.44, 0.44) for y in (-0.44, 0.44)]
 
 
+@pytest.mark.slow
 def test_every_place_in_touching_objects_belongs_to_one_of_them():
     below, above = (box([-0.5, -0.5, 0], [0.5, 0.5, 0.4]), box([-0.25, -0.25, 0.4], [0.25, 0.25, 0.9]))
     gaussians, owner = together(clad(below, 5000), clad(above, 3000))
