@@ -24,6 +24,7 @@ def typed(monkeypatch, tmp_path, command):
     return command
 
 
+@pytest.mark.slow
 def test_a_folder_of_models_becomes_a_certified_scene_with_views(typed, tmp_path):
     code, text = typed("assemble", "--from", "models", "--classes", "box", "plank", *VIEWS)
     assert code == 0, text.err
@@ -37,6 +38,7 @@ def test_a_folder_of_models_becomes_a_certified_scene_with_views(typed, tmp_path
     assert "corporeal run scenes/box-plank-0/scene.toml" in text.out
 
 
+@pytest.mark.slow
 def test_the_pool_that_was_made_serves_again_and_another_seed_is_another_scene(typed, tmp_path):
     assert typed("assemble", "--from", "models", "--count", "1", "--views", "0")[0] == 0
     said = ("assemble", "--from", "scenes/pool", "--count", "1", "--seed", "4", "--views", "0")

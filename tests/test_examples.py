@@ -71,6 +71,7 @@ def test_an_ensemble_spreads_a_rebound_but_not_beyond_reason():
     assert 0.02 < example("09_vary_the_materials.py") < 0.8
 
 
+@pytest.mark.slow
 def test_a_bar_of_a_law_of_ones_own_swings_at_its_period():
     assert example("11_write_a_law.py") == pytest.approx(1.0, abs=0.04)
 

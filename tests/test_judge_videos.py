@@ -293,6 +293,7 @@ def judged_by(oracle, run, folder):
     return judged, weigh_judge(judged)
 
 
+@pytest.mark.slow
 def test_an_oracle_is_believed_of_what_its_controls_show_and_of_nothing_else(run, tmp_path, edited_only):
     judged, result = judged_by(True, run, tmp_path)
     assert result.believed == {

@@ -10,6 +10,7 @@ from corporeal.lab.evaluation.rebound_data import measured_rebounds
 ROWS = {row.name: row for row in measured_rebounds()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rubber ball", "basketball", "ball of memory foam", "wooden ball"])
 def test_what_is_dropped_at_draft_comes_back_as_in_life(name):
     found = life.tried(ROWS[name], "draft", 0)

@@ -62,6 +62,7 @@ def spread(mesh, answered_by):
     return float(np.log(high / low))
 
 
+@pytest.mark.slow
 def test_a_modelled_shape_is_in_doubt_only_where_a_name_alone_tells_what_it_is():
     """Gold's density is known to .1 %; what was drawn of it is not."""
     modelled = trimesh.creation.icosphere(2, RADIUS)
@@ -96,6 +97,7 @@ def judged(mass, factor=1.2):
     return MassEvidence(mass / factor, mass, mass * factor, "It looks so.")
 
 
+@pytest.mark.slow
 def test_the_prediction_is_the_median_of_the_mixture_and_its_interval_spans_the_ways():
     (m,) = weigh(STEEL, SHELL).mixtures
     solid, hollow = m.hypotheses
@@ -109,6 +111,7 @@ def test_the_prediction_is_the_median_of_the_mixture_and_its_interval_spans_the_
     assert other.mass < 0.3 * solid.mass
 
 
+@pytest.mark.slow
 def test_evidence_chooses_among_ways_and_every_value_stays_inside_its_range():
     (without,) = weigh(STEEL, SHELL).mixtures
     said = judged(without.hypotheses[1].mass)
@@ -310,6 +313,7 @@ def test_a_wall_as_thick_as_a_scan_draws_it_is_as_open_as_the_scan():
     assert scale.of(field, [VolumeLeeway(1.2)])[0] == pytest.approx(scale.of(field)[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_ensemble_draws_ways_as_often_as_the_evidence_leaves_them_likely():
     _, inventory = a_ball(STEEL, SHELL)
     light = weigh(STEEL, SHELL).mixtures[0].hypotheses[1].mass

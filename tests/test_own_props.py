@@ -96,6 +96,7 @@ def test_a_thicker_wall_weighs_more():
     assert thicker.mass == pytest.approx(2 * ball.mass)
 
 
+@pytest.mark.slow
 def test_files_have_neutral_names_and_say_nothing_of_matter(tmp_path):
     write(tmp_path)
     rows = list(csv.DictReader((tmp_path / "truth" / "masses.csv").open()))

@@ -94,6 +94,7 @@ def test_a_loaf_and_a_candle_are_one_substance_all_through():
     assert household.candle().mass == pytest.approx(900 * np.pi * 0.035**2 * 0.1365, rel=0.01)
 
 
+@pytest.mark.slow
 def test_files_go_on_from_the_batch_before_and_say_nothing_of_matter(tmp_path):
     write(tmp_path, 2)
     rows = list(csv.DictReader((tmp_path / "truth" / "masses.csv").open()))

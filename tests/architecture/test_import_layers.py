@@ -88,6 +88,7 @@ def packages_of(folder):
     return {path.relative_to(folder).parts[0].removesuffix(".py") for path in folder.rglob("*.py")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("folder", "packages"), [(ROOT, PACKAGES), (ROOT / "mpm", SOLVER)], ids=["package", "mpm"])
 def test_imports_point_down(folder, packages):
     assert packages_of(folder) - {"__init__", "__main__"} == set(layers(packages))

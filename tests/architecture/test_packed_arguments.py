@@ -68,6 +68,7 @@ def test_extents_and_sequences_of_one_kind_may_pass(text):
     assert not list(packed(text))
 
 
+@pytest.mark.slow
 def test_no_parameter_is_a_tuple_of_unlike_values():
     """A small frozen dataclass says what each of them is."""
     found = {name: list(packed((ROOT / name).read_text())) for name in SOURCES}

@@ -98,6 +98,7 @@ RULES = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @RULES
 def test_what_another_file_wrote_is_read_by_the_names_of_fields(find, allowed):
     found = {room(path): find(path.read_text()) for path in SOURCES}

@@ -38,6 +38,7 @@ OPEN = [*((1e-5, 0.0), (R, 0.0), (R, HEIGHT), (R - WALL, HEIGHT)), *((R - WALL, 
 CLOSED = [(1e-5, 0.0), (R, 0.0), (R, HEIGHT), (1e-5, HEIGHT)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fill", [0.3, 0.6])
 def test_a_tumbler_holds_so_much_up_to_its_level(fill):
     volume = fill * np.pi * (R - WALL) ** 2 * (HEIGHT - BASE)
@@ -74,6 +75,7 @@ def cones(*rings):
     return sum(np.pi * (z - y) * (a * a + a * b + b * b) / 3 for (a, y), (b, z) in pairwise(rings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("profile", "volume"),
     [(BOWL, cones((0.028, 0.004), (0.047, 0.023), (0.067, 0.06))), (MORTAR, cones((0.035, 0.02), (0.045, 0.08)))],

@@ -40,6 +40,7 @@ def test_foam_that_is_as_soft_as_in_life_stays_soft():
     assert ready.particles.treatments[1].kind == "deformable"
 
 
+@pytest.mark.slow
 def test_a_large_mat_is_a_sheet_and_rigid_as_a_sheet_of_paper_is():
     mat = prepared("potato", "rubber", (0.6, 0.6, 0.01), 2.0)
     assert mat.particles.treatments[1].kind == "rigid"
@@ -101,6 +102,7 @@ def test_how_wide_a_mat_is_does_not_matter(width):
     assert left / 2.0 == pytest.approx(pair, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_ball_on_cardboard_is_not_a_ball_on_a_box():
     sheet, cube = (
         co.pose_problem(prepared("rubber", "corrugated_cardboard", size))

@@ -22,6 +22,7 @@ def prepared(name):
     return co.prepare_scene(drop_scene(row(name)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["red tennis ball", "racquetball"])
 def test_a_ball_full_of_air_rebounds_as_stated_however_deep_it_is_dented(name):
     """Both are dented by half of their radius: the loss of their matter alone was 0.04 too much."""

@@ -19,6 +19,7 @@ def glass():
     return in_memory.prepare_scene(showcase_scenes.prop_scene("tumbler"))
 
 
+@pytest.mark.slow
 def test_the_water_in_a_glass_is_an_object_of_its_own(glass):
     assert [o.name for o in glass.scene.objects] == ["tumbler_0", "tumbler_0_water"]
     assert [p.name for p in glass.parts.catalogue] == ["glass", "water"]

@@ -86,6 +86,7 @@ def test_ware_from_pictures_weighs_what_its_sheet_does_whatever_fills_its_hollow
     assert max(off.values()) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ware", ["bowl", "cup", "plate"])
 def test_roughness_adds_no_matter(ware):
     outside = OUTSIDES[ware]

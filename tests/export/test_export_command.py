@@ -142,6 +142,7 @@ def breaking(monkeypatch):
     return set_
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "told"),
     [
@@ -229,6 +230,7 @@ def test_the_menu_has_a_writer_for_every_target():
 # ---------------------------------------------------------------- many scenes
 
 
+@pytest.mark.slow
 def test_a_corpus_becomes_one_data_set(run_folder, tmp_path):
     import numpy as np
 

@@ -90,6 +90,7 @@ def test_one_changed_mass_is_found(written, asked):
     assert check_target("h5", folder, asked).measured["mass_off_kg"] > 0
 
 
+@pytest.mark.slow
 def test_a_still_is_no_data(settled, tmp_path):
     with pytest.raises(NothingToWriteError, match="no motion to learn from"):
         write_npz(settled, tmp_path)

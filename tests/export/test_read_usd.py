@@ -117,6 +117,7 @@ def test_our_own_come_back_as_a_scene_with_all_that_they_carry(played, tmp_path)
     np.testing.assert_allclose(after.particles.mass_real, before.particles.mass_real, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_left_out_of_the_simulation_is_still_one_object(played, tmp_path):
     write_usd(asked_of(played, soft="none"), tmp_path)
     scene = co.load_scene(tmp_path / "sim.usda")

@@ -172,6 +172,7 @@ def entry(folder, drawn):
     return ObjectEntry(**(drawn | made))
 
 
+@pytest.mark.slow
 @given(drawn=scene_files)
 @settings(max_examples=30, deadline=None)
 def test_what_is_written_is_read_back(drawn):

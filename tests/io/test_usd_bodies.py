@@ -111,6 +111,7 @@ def test_bodies_are_objects_and_so_is_what_they_stand_on(kitchen):
     assert "no meshes" not in told
 
 
+@pytest.mark.slow
 def test_what_is_stated_is_simulated_and_says_who_stated_it(kitchen):
     scene = kitchen()
     prepared = co.prepare_scene(scene)
@@ -133,6 +134,7 @@ def _warnings(prepared):
     return prepared.particles.warnings
 
 
+@pytest.mark.slow
 def test_what_no_such_material_has_is_believed_and_doubted(kitchen):
     scene = kitchen("5")
     prepared = co.prepare_scene(scene)
@@ -141,6 +143,7 @@ def test_what_no_such_material_has_is_believed_and_doubted(kitchen):
     assert "measured values are" in told and told.startswith("block: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("density", "mass", "said"),
     [
@@ -164,6 +167,7 @@ def test_one_changed_density_is_another_mass(kitchen):
     assert masses[1] / masses[0] == pytest.approx(0.75 / 0.6, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_the_whole_file_is_one_object_where_that_is_asked(kitchen, tmp_path):
     kitchen()
     config = co.AssembleConfig(objects="one")

@@ -52,6 +52,7 @@ def made(ran):
     return simulate_ensemble(ran, 3, 0, None, silent)
 
 
+@pytest.mark.slow
 def test_members_differ_and_stay_in_their_ranges(ran, made):
     assert [member.number for member in made.members] == [0, 1, 2]
     young_pa = [member.drawn[0]["young_pa"] for member in made.members]

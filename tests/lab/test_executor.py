@@ -88,6 +88,7 @@ def test_what_is_done_is_not_done_again_until_its_key_changes(tmp_path):
     assert rows["a"].attempts == 1, "attempts count from the change of the key"
 
 
+@pytest.mark.slow
 def test_failures_say_why_leave_the_others_alone_and_are_tried_again_by_the_next_call(tmp_path):
     jobs = [
         job(tmp_path, "refused", fake_jobs.refuse, words="the shape is no shape"),

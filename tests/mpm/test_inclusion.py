@@ -98,6 +98,7 @@ def test_a_chair_in_free_flight_turns_as_one_body(engine):
     assert measured.pair_impulse[0, 1] == 0.0
 
 
+@pytest.mark.slow
 def test_a_ball_on_the_arm_of_a_chair_bounces_off_wood():
     """The frame's own surface meets others with its restitution, bond or not."""
     frame, cushion = chair()

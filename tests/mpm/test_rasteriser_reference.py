@@ -103,6 +103,7 @@ def test_the_step_respects_the_wave_and_the_motion():
     assert lossy.stable_step() == pytest.approx(slow.stable_step() / at_once, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", list(Law))
 def test_every_law_survives_a_hard_fall(law):
     engine = ReferenceEngine(problem(cube((0.0, 0.0, 0.0205), law=law, velocity=(0.0, 0.0, -2.0))))

@@ -51,6 +51,7 @@ def test_a_node_beyond_two_edges_acts_where_they_cross():
     assert between == pytest.approx([0.1, 0.0, 0.0], abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [False, True], ids=["block first", "board first"])
 def test_a_block_over_an_edge_moves_as_in_the_reference(turned):
     """The board ends .4 cells behind the next nodes."""

@@ -129,6 +129,7 @@ def test_a_sheet_of_water_lies_on_the_floor_and_is_braked(fast_engine, place):
     assert least - 0.02 < speed < least + 0.11 * G * 0.06
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["reference", "cuda"])
 def test_engines_agree_on_a_sheet_that_lands(engines, name):
     given = falling_sheet(0.35)

@@ -124,6 +124,7 @@ def flight(law, poisson, cells, duration):
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [Law.NEO_HOOKEAN, Law.COROTATED, Law.HENCKY])
 def test_nearly_incompressible_matter_does_not_burst_in_flight(law):
     """With the mean of J where particles stand it was 3e-5 after .2 s, and 3.8 after .4 s."""

@@ -107,6 +107,7 @@ def test_a_ball_dents_mud_and_the_dent_stays(fast_engine):
     assert run.snapshot().plastic_strain[:count].max() > 0.1
 
 
+@pytest.mark.slow
 def test_how_far_sand_runs_out_does_not_depend_on_how_stiff_its_grains_are():
     """Heaps of stiff grains once came out shorter: they took more steps, each with its loss."""
     cell, far = grains.RADIUS / 5, []
@@ -119,6 +120,7 @@ def test_how_far_sand_runs_out_does_not_depend_on_how_stiff_its_grains_are():
     assert far[1] == pytest.approx(far[0], rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_column_of_sand_runs_out_as_lube_measured_and_stops():
     heap = grains.sand_column(8)
     assert heap.spread == pytest.approx(grains.LUBE, rel=0.15)

@@ -74,6 +74,7 @@ def test_what_is_pushed_slides_on_for_its_braking_distance(fast_engine):
     assert m.centre[1, 0] == pytest.approx(-0.05 + 0.2, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_prescribed_motion_is_exact_and_in_the_ledger_to_the_last_digit(engine):
     """Momentum and energy change by what contacts, gravity and the mover give, and no more."""
     turn = np.linspace(0.0, 3.0, 7)

@@ -65,6 +65,7 @@ def gutter(length=0.4):
     return mesh
 
 
+@pytest.mark.slow
 def test_a_ball_rolls_down_a_gutter_slower_than_on_a_plane():
     """It turns about a line r cos 45° below its middle: a = g sin θ/(1 + 2 I/(m r²))."""
     slope, radius, time = np.radians(5.0), 0.02, 0.5

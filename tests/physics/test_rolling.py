@@ -61,6 +61,7 @@ def test_what_is_round_rolls_down_five_degrees_as_far_as_it_should(shape, on_boa
     assert np.abs(way[1:]).max() < 0.02 * radius
 
 
+@pytest.mark.slow
 def test_a_marble_that_rolls_slowly_over_a_board_goes_on():
     """It slides first: 5/7 of .3 m/s are left when it rolls, a bit less by its own inertia."""
     marble = co.ball("glass", RADIUS, (-0.2, 0.0, THICK + RADIUS), velocity=(0.3, 0.0, 0.0))

@@ -51,6 +51,7 @@ FINE_RUNOUT = 1.33
 """Of 98 % of the sand on 20 cells across the radius, where the policy's fine grid has them."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("word", "aim"), [("draft", 0.3), pytest.param("normal", 0.1, marks=pytest.mark.slow)])
 def test_sand_runs_out_on_coarse_grids_about_as_far_as_on_a_fine_one(word, aim):
     (far,) = detail.collapse(word)

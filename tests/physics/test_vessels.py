@@ -39,6 +39,7 @@ def test_through_a_thin_wall_water_leaks_but_for_its_true_surface(fast_engine):
     assert leaked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["reference", "cpu", "cuda"])
 def test_engines_agree_on_where_water_touches_glass(engines, name):
     glass = Tumbler(0.014)

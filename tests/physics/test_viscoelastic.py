@@ -69,6 +69,7 @@ def sag(engine, loss, side=0.1):
     return side / 2 - float(run.measure().centre[0, 2])
 
 
+@pytest.mark.slow
 def test_loss_stiffens_an_impact_and_no_load_that_rests(fast_engine):
     """Loss over a band is stiffening (causality): at .3 an impact meets 1/G∞ = 1.54 times E.
 

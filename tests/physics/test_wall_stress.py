@@ -33,6 +33,7 @@ def layer(liquid, *, speed=0.0, place=0.0, gravity=DOWN, cell=0.01, cells=3):
     return problem(body, cell=cell, friction=2.0, planes=[floor(place * cell)], gravity=gravity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [0.0, 0.25, 0.5, 0.75])
 def test_a_film_of_three_cells_flows_as_fast_wherever_its_wall_lies(place):
     """Nodes that were held let it flow by 12 % too slow, 30 % too fast, 53 and 37 % too slow."""

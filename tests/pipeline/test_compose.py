@@ -71,6 +71,7 @@ def test_every_interaction_begins_from_a_certified_rest_and_free_of_overlap(pool
     assert any(~still | np.array(acting))
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_in_another_process(pool, tmp_path):
     code = (
         "import pickle, sys; from pathlib import Path;"

@@ -169,6 +169,7 @@ def test_a_shell_too_narrow_to_be_hollow_is_filled_with_its_walls_mass():
     assert "filled as a solid" in particles.fills[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("whole", "hollow"),
     [
@@ -209,6 +210,7 @@ def test_every_particle_bears_the_name_of_the_part_it_lies_in():
     assert particles.mass_real == pytest.approx([1100 * 0.016, 7850 * 0.001], rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_leaf_without_volume_still_has_particles_and_a_mass():
     leaf = trimesh.Trimesh([[0, 0, 0.5], [0.1, 0, 0.5], [0.1, 0.1, 0.52]], [[0, 1, 2]])
     stem = put(trimesh.creation.cylinder(0.002, 0.5), 0.0)
@@ -306,6 +308,7 @@ def test_a_rigid_object_touches_with_its_own_surface_only():
     assert particles.surface[:, 2].min() > 0.19
 
 
+@pytest.mark.slow
 def test_what_stands_in_the_wind_shows_its_whole_surface_to_it():
     brick = put(trimesh.creation.box((0.1, 0.2, 0.3)), 0.0)
     leaf = trimesh.Trimesh([[1, 0, 1], [2, 0, 1], [1, 0, 2.0]], [[0, 1, 2]])
@@ -573,6 +576,7 @@ def test_open_ware_from_pictures_has_the_usual_wall_not_the_one_that_is_drawn():
     assert particles.mass_real[0] == pytest.approx(7850 * cup.area / 2 * 1e-3, rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unseen", [True, False])
 def test_a_cup_that_pictures_drew_as_a_lump_has_no_lid(unseen):
     """A mesh that somebody made is read as it is drawn: a closed shell."""

@@ -83,6 +83,7 @@ def test_the_pot_around_it_weighs_what_it_did():
         assert particles.mass_real[0] == pytest.approx(alone.mass_real[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_coffee_fills_its_cup():
     mass, _ = soil_of(POT, SHEET, COFFEE)
     assert mass == pytest.approx(1000.0 * INSIDE, rel=0.02)
@@ -121,6 +122,7 @@ def test_a_sheet_of_sand_on_a_table_stays_one_and_is_reported_of():
     assert any("nothing of the same object holds it" in w for w in particles.warnings)
 
 
+@pytest.mark.slow
 def test_a_scene_is_weighed_with_what_fills_its_pots():
     scene, parts, field = inputs(thing((turned(POT), CLAY, WALL), (turned(SHEET), SOIL)))
     heavy = MassSampler(scene, parts, GroundConfig(), 0).of(field)

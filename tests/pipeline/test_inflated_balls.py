@@ -39,6 +39,7 @@ def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
     assert particles.treatments[0].simulated_young_pa == structure.contents.young_pa
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name, rebound",
     [
@@ -172,6 +173,7 @@ def test_a_sealed_wall_that_is_struck_too_lightly_to_flex_bounces_no_less(speed)
     assert row.low - 0.03 < found.restitution < row.high + 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "material", "sealed"),
     [

@@ -56,6 +56,7 @@ def filled(*parts):
     return fill(*inputs(thing(*parts)))
 
 
+@pytest.mark.slow
 def test_a_box_weighs_the_same_whether_its_top_is_drawn_or_hidden_below_foam(drawn, hidden):
     assert hidden.mass_real[0] == pytest.approx(drawn.mass_real[0], rel=0.03)
     assert "closed below the soft part on it, though not drawn" in hidden.fills[0]

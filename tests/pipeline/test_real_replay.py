@@ -29,6 +29,7 @@ def described(shared_assets):
     return {name: (scene, *grounded(scene, "real")) for name, scene in made.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_real_object_is_grounded_from_recordings_and_every_number_says_why(described, name):
     scene, inventory, field = described[name]

@@ -143,6 +143,7 @@ class Seer(PhotoInterview):
         return [1, 0]
 
 
+@pytest.mark.slow
 def test_a_model_that_sees_the_pictures_names_objects_and_their_sizes(splat):
     result = reconstruct(splat, COARSE, viewer=Seer())
     found, scene = result.found, result.scene

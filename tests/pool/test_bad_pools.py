@@ -48,6 +48,7 @@ def hostile(kind, whole, rng):
     return b""
 
 
+@pytest.mark.slow
 def test_a_third_of_the_files_is_broken_and_the_rest_comes_out(tmp_path):
     rng = random.Random(0)
     for k in range(70):

@@ -267,6 +267,7 @@ def test_companions_count_as_content_and_a_gltf_becomes_a_glb(tmp_path):
     assert index_pool([folder], tmp_path / "pool").assets[0].extent == pytest.approx(0.4)
 
 
+@pytest.mark.slow
 def test_an_obj_becomes_a_glb_and_its_picture_counts_as_content(tmp_path):
     vertices, triangles, uv = ball()
     lines = ["mtllib ball.mtl", "usemtl look"]

@@ -42,6 +42,7 @@ def test_an_unknown_scene_is_refused_with_the_menu():
         showcase_scenes.build_showcase_scene("duck-on-custard")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_overlaps_at_the_start(name):
     composition = showcase_scenes.SHOWCASE_SCENE_BUILDERS[name]()

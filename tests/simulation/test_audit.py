@@ -229,6 +229,7 @@ def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(sto
     assert energy_growth(ledger, SCENE, CELL, with_losses=False) == pytest.approx(0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "value", "word"),
     [

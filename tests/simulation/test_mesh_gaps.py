@@ -95,6 +95,7 @@ def straight(start, end, frames):
     return np.linspace(start, end, frames)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frames", [3, 12, 60])
 def test_a_ball_that_goes_through_a_plate_is_named_however_fast_it_is(video, frames):
     (pair,) = video(plate_at(), straight((0.01, 0.02, 0.2), (0.01, 0.02, 0.01), frames))

@@ -79,6 +79,7 @@ class Plain:
         self.inner.start_from(saved, bodies)
 
 
+@pytest.mark.slow
 def test_the_reference_engine_is_pulled_blown_at_and_joined_in_a_live_session(results, tmp_path):
     made = LiveInput(results, "draft", engine="reference")
     live = LiveSimulation(live_editor_of(made, 1, LiveAssets(RunStore((), tmp_path)).find), 1, made.engine)

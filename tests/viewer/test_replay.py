@@ -71,6 +71,7 @@ def test_the_control_beside_is_at_the_same_instant_and_was_pulled_as_well(touche
     np.testing.assert_array_equal(alone.engine.snapshot().position, there.snapshot().position)
 
 
+@pytest.mark.slow
 def test_a_replay_at_draft_lifts_the_ball_too_and_is_the_same_every_time(made, touched):
     done = InteractionRecord("drop", tuple(touched.hands.touches))
     prepared = refill_as_draft(made.results, FillConfig())

@@ -111,6 +111,7 @@ def test_an_upload_is_known_by_its_first_bytes_and_gets_a_name_of_ours(server):
     assert left(server) == ["photos", "scene.glb"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "data",
     [b"", b"{}", b'{"asset": {"version": "2.0"}}', b'file = "/etc/passwd"', b"\x7fELF" + bytes(50),
@@ -158,6 +159,7 @@ def test_the_disk_keeps_its_spare_room(server):
     assert left(server) == []
 
 
+@pytest.mark.slow
 def test_every_hostile_file_is_taken_in_or_refused_and_the_server_lives(server, shared_assets):
     folder = shared_assets / "hostile"
     files = sorted(p for p in folder.rglob("*") if p.is_file())

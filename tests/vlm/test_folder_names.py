@@ -54,6 +54,7 @@ def test_a_name_says_what_is_shown_unless_it_is_of_the_photographs(name, class_n
     assert found is None or found.extent == object_of_usual_size(class_name).extent
 
 
+@pytest.mark.slow
 def test_a_lone_object_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
     came = made(tmp_path, "banana")
     (thing,), found = came.scene.objects, came.found
@@ -76,12 +77,14 @@ def test_a_stated_size_is_the_size_whatever_the_name_says(tmp_path):
     assert made(tmp_path, "axe", ("object=0.103",)).scene.objects[0].name == "axe"
 
 
+@pytest.mark.slow
 def test_a_named_object_is_not_called_as_the_folder(tmp_path):
     came = made(tmp_path, "banana", object_names=("crate",))
     assert [o.name for o in came.scene.objects] == ["crate"]
     assert not any("banana" in w for w in came.found.warnings)
 
 
+@pytest.mark.slow
 def test_a_folder_of_photographs_makes_nothing_one_of_paper(tmp_path):
     came = made(tmp_path, "photos")
     (thing,) = came.scene.objects

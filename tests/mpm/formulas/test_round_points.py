@@ -34,6 +34,7 @@ def some(seed=0):
     return np.column_stack([normal, along, ball, arc, reach, inside, curved]), unit(normal + lean)
 
 
+@pytest.mark.slow
 def test_the_fast_engines_shift_as_numpy_does():
     rows, towards = some()
     flat = wp.array(rows.reshape(-1), dtype=wp.float64, device="cpu")

@@ -89,6 +89,7 @@ def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls():
     assert not empty[~found.inside].any()
 
 
+@pytest.mark.slow
 def test_what_is_full_stays_full():
     full = block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])
     found, empty = emptied(full, 0.25)
@@ -155,6 +156,7 @@ def test_photographs_see_below_a_thin_lid_of_gaussians(lidless):
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(shown))
 
 
+@pytest.mark.slow
 def test_what_hides_most_light_is_no_lid(lidless):
     """As in a mirror: photographs agree on what lies behind its face, and Gaussians hide it."""
     views, masks, shown, _ = lidless

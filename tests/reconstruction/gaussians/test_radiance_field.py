@@ -167,6 +167,7 @@ def learned():
     return views, masks, train_field(views, masks, replace(SMALL, steps=60))
 
 
+@pytest.mark.slow
 def test_points_of_a_learned_field_lie_on_the_surface(learned):
     views, _, made = learned
     assert made.quality.psnr > 22

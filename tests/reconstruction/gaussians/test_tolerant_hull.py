@@ -39,6 +39,7 @@ def kept_and_added(masks, cameras, config=DEFAULT_HULL):
     return (made.inside & true).sum() / true.sum(), (made.inside & ~true).sum() / true.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [12, 30])
 def test_outlines_that_are_off_by_ten_of_640_pixels_eat_little(count):
     cameras = around(count, (SIDE, SIDE), focal=1.3 * SIDE)

@@ -143,6 +143,7 @@ class KilledError(Exception):
     pass
 
 
+@pytest.mark.slow
 def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_path):
     views, masks = scene
     path = tmp_path / "training.npz"

@@ -53,6 +53,7 @@ def test_a_shadow_is_floor_and_what_casts_it_is_not(ball):
     assert found[masks].mean() < 0.01
 
 
+@pytest.mark.slow
 def test_masks_that_are_grown_leave_the_shadow_out():
     """The ball is as dark as the shadow: colours alone take both."""
     views, masks, shadows, points = shadowed(SLATE, OAK)

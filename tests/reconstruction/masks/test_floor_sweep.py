@@ -49,6 +49,7 @@ def test_cameras_that_lean_anyhow_know_no_level_plane():
     assert sweep_floor_plane(Views(views.rgb, tuple(leaning)), find_viewed_region(tuple(leaning))) is None
 
 
+@pytest.mark.slow
 def test_a_floor_between_two_heights_that_are_tried_is_found():
     """Under a flash the share of the nearest of them was below what a floor needs."""
     views, _, _ = scene(count=20)

@@ -102,6 +102,7 @@ def test_what_was_corrected_is_kept_and_makes_results_stale(grown, tmp_path):
     assert np.asarray(Image.open(mask)).min() == 255
 
 
+@pytest.mark.slow
 def test_what_masks_hold_a_part_of_is_refused_until_they_are_corrected(tmp_path):
     views, _, points = scene(flat=0.33)
     photos, run = tmp_path / "tea set", tmp_path / "run"

@@ -60,6 +60,7 @@ def test_how_thin_masks_are():
     assert rim_fraction(np.zeros_like(inside)) == 0
 
 
+@pytest.mark.slow
 def test_right_masks_have_edges_and_stand_on_the_floor(grown):
     assert grown.faint < 0.02 and mask_doubt(grown) is None
     assert lacking_attachment_reason(grown) is None and thinness_reason(grown) is None

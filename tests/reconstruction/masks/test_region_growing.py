@@ -28,6 +28,7 @@ def test_what_all_cameras_look_at_is_found(known):
     assert agreement(grown.inside, masks).min() > 0.85
 
 
+@pytest.mark.slow
 def test_what_looks_like_all_around_it_is_doubted():
     """Without a colour of its own no outline is to be believed."""
     views, _, _ = scene(ball=GREY)

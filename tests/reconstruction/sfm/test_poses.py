@@ -145,6 +145,7 @@ def turned_over(tmp_path, monkeypatch):
     return folder, models, tried
 
 
+@pytest.mark.slow
 def test_an_object_that_was_turned_over_is_posed_by_what_its_masks_show(turned_over, tmp_path):
     """All pictures fit by the floor, and no count of the model speaks against that."""
     folder, models, tried = turned_over
@@ -187,6 +188,7 @@ def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_
     assert angle.max() < 0.01 and place.max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how", ["refused", *(pytest.param(how, marks=pytest.mark.slow) for how in ("forced", "found", "still"))]
 )
@@ -451,6 +453,7 @@ def video(path, count, smeared=lambda k: False, size=(320, 240)):
     return path
 
 
+@pytest.mark.slow
 def test_a_video_gives_sharp_frames(tmp_path):
     path = video(tmp_path / "a.mp4", 120, lambda k: k % 12 < 4)
     said = write_video_frames(path, tmp_path / "frames", silent)
@@ -464,6 +467,7 @@ def test_a_video_gives_sharp_frames(tmp_path):
     assert np.abs(shown - paper[y : y + 240, x : x + 320]).mean() < 12, "and not another frame"
 
 
+@pytest.mark.slow
 def test_a_video_that_was_held_upright_is_turned(tmp_path, caplog):
     video(tmp_path / "a.mp4", 60)
     program = imageio_ffmpeg.get_ffmpeg_exe()

@@ -34,12 +34,14 @@ def stamped(tmp_path, rng):
     return SimpleNamespace(folder=tmp_path / "poses", gathered=gathered)
 
 
+@pytest.mark.slow
 def test_what_is_stamped_on_pictures_joins_none(stamped):
     looked = match_small_copies(stamped.folder, stamped.gathered, lambda fraction: None)
     assert not (looked.shared >= MIN_SHARED_POINTS).any() and looked.stood_still is None
     assert f"{COUNT} photographs have a watermark" in looked.said
 
 
+@pytest.mark.slow
 def test_no_points_are_looked_for_on_it_and_all_others_are(stamped):
     match_small_copies(stamped.folder, stamped.gathered, lambda fraction: None)
     with Image.open(stamped.folder / "stamps" / "3.jpg.png") as mask:
