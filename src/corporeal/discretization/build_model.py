@@ -16,9 +16,7 @@ from corporeal.discretization.layered_sheets import part_proportions
 from corporeal.discretization.rolling_resistance import rolling_resistance_lengths
 from corporeal.geometry.connected_components import connected_components
 from corporeal.geometry.scene_transforms import underside_centre
-from corporeal.mpm.constants import TINY_DOUBLE
 from corporeal.mpm.physics.body_distance import pair_gaps
-from corporeal.mpm.physics.time_step_limits import shell_wave_speeds
 from corporeal.mpm.problem import (
     FLOOR,
     NO_WIND_FACES,
@@ -250,8 +248,6 @@ def piece_shell(
 ) -> Shell | None:
     """Return the thin shells among some particles, numbered among them; ``mine`` rises. None: there are none.
 
-    Their E in bending is the measured one, unless bending alone would exceed the step that their waves allow.
-
     Args:
         particles: All of the scene's.
         mine: Numbers of a body's particles.
@@ -261,19 +257,14 @@ def piece_shell(
     if not own.any():
         return None
     triangle = np.searchsorted(mine, particles.shell_triangle[own])
-    first, thickness = triangle[:, 0], particles.shell_thickness[own].astype(float)
+    first = triangle[:, 0]
     treatment = [particles.treatments[k] for k in particles.part[mine[first]].tolist()]
-    real = np.array([t.bending_young_pa for t in treatment])
     shell = {name: column[name][first] for name in ("poisson", "hardening", "loss", "vibration")}
-    wave = np.array([t.wave_speed for t in treatment])
-    density, cells = particles.density[mine[first]], thickness / particles.cell
-    fastest = [shell_wave_speeds(*row)[1] for row in zip(real, shell["poisson"], density, cells, strict=True)]
-    slower = np.minimum(1.0, (wave / np.maximum(fastest, TINY_DOUBLE)) ** 2)
     return Shell(
         triangle=triangle,
-        thickness=thickness,
+        thickness=particles.shell_thickness[own].astype(float),
         law=column["law"][first].astype(np.int64),
-        young_pa=real * slower,
+        young_pa=np.array([t.bending_young_pa for t in treatment]),
         membrane_young_pa=column["young_pa"][first],
         yield_stress=np.array([t.yield_stress or 0.0 for t in treatment]),
         **shell,

@@ -31,6 +31,7 @@ from corporeal.mpm.physics.time_step_limits import (
     compress_young,
     fit_young_compression,
     p_wave_speed,
+    shell_wave_speeds,
     stable_step,
 )
 
@@ -315,6 +316,8 @@ def slow_waves(treatment: Discretization, speed: float, cell: float, because: st
     """Slow a deformable part's waves down to ``speed`` [m/s], and say why."""
     if treatment.kind == "rigid" or speed >= treatment.wave_speed:
         return treatment
+    if treatment.bending_young_pa > 0.0:
+        return slow_shell_waves(treatment, speed, cell, because)
     factor = speed / treatment.wave_speed
     strong = treatment.yield_stress
     return replace(
@@ -324,6 +327,28 @@ def slow_waves(treatment: Discretization, speed: float, cell: float, because: st
         wave_speed=speed,
         step=stable_step(speed, treatment.impact_speed, cell),
         reason=f"{treatment.reason} {because}: {1 / factor:.3g} times.",
+    )
+
+
+def slow_shell_waves(treatment: Discretization, speed: float, cell: float, because: str) -> Discretization:
+    """Slow a thin shell's waves down to ``speed`` [m/s]: those in its plane and those of bending, each as far as asked.
+
+    It yields at its measured stress.
+    """
+    stiffer = sqrt(stiffening(treatment.loss, treatment.poisson))
+    numbers = treatment.bending_young_pa, treatment.poisson, treatment.density, (treatment.thickness or 0.0) / cell
+    bending_speed = stiffer * shell_wave_speeds(*numbers)[1]
+    plane_speed = stiffer * shell_wave_speeds(treatment.simulated_young_pa, *numbers[1:])[0]
+    plane, bending = (min(1.0, (speed / wave) ** 2) for wave in (plane_speed, bending_speed))
+    words = (f"in its plane {1 / plane:.3g} times", f"in bending {1 / bending:.3g} times")
+    softer = " and ".join(w for w, factor in zip(words, (plane, bending), strict=True) if factor < 1.0)
+    return replace(
+        treatment,
+        simulated_young_pa=treatment.simulated_young_pa * plane,
+        bending_young_pa=treatment.bending_young_pa * bending,
+        wave_speed=speed,
+        step=stable_step(speed, treatment.impact_speed, cell),
+        reason=f"{treatment.reason} {because}: it is softer {softer}.",
     )
 
 

@@ -36,10 +36,10 @@ def _treatment_words(found: AuditFinding, part: MeasuredPart | None) -> str:
     elif found.causes and found.stiffness_ratio is not None and found.stiffness_ratio < 0.999:
         words.append(f"with {found.stiffness_ratio:.2g} of its measured Young's modulus")
     if found.in_plane_ratio is not None and part is not None and part.wall and part.treatment.thickness:
-        words.append(
-            f"{found.in_plane_ratio:.2g} of its stiffness in the plane of its wall "
-            f"({_length(part.wall)} thick, simulated {_length(part.treatment.thickness)} thick)"
-        )
+        thick = f"{_length(part.wall)} thick"
+        if part.treatment.thickness > part.wall:
+            thick += f", simulated {_length(part.treatment.thickness)} thick"
+        words.append(f"{found.in_plane_ratio:.2g} of its stiffness in the plane of its wall ({thick})")
     if found.cells_across is not None:
         words.append(f"only {found.cells_across:.1f} grid cells across")
     return ", ".join(words)
