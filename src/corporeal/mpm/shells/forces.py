@@ -1,6 +1,6 @@
 """Forces of a shell on its vertices, and the history of its triangles."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -44,10 +44,6 @@ class ShellState:
         count = len(mesh.triangle)
         none, branches = np.zeros((count, 3)), np.zeros((count, 2, 3))
         return cls(mesh.inverse_rest, np.zeros(count), none, none, none, branches, branches)
-
-    def as_arrays(self) -> dict[str, np.ndarray]:
-        """Copy everything into a dict."""
-        return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
 
 
 @dataclass(frozen=True)
