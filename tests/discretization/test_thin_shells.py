@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 import corporeal as co
+from corporeal.core.types import Structure
 from corporeal.discretization.build_model import build_model
+from corporeal.discretization.object_filling import ObjectFilling
+from corporeal.discretization.part_model import PartModel
+from corporeal.discretization.point_masses import warn_of_unmeshed_walls
 from corporeal.discretization.step_budget import slow_waves
 
 DEFAULT = co.Settings()
@@ -60,3 +64,25 @@ def test_what_the_budget_takes_of_plane_and_bending_is_said_of_each(duck):
     assert "in its plane 4 times" in slower.reason and "bending" not in slower.reason
     slowest = slow_waves(slower, 0.01 * treatment.wave_speed, cell, "The step budget reduces its wave speed")
     assert slowest.bending_young_pa < treatment.bending_young_pa and "in bending" in slowest.reason
+
+
+@pytest.mark.parametrize(("laid", "warned"), [(1.0, False), (0.95, False), (0.6, True), (1.3, True)])
+def test_a_mesh_that_holds_another_amount_of_material_is_reported(duck, laid, warned):
+    density = 1000.0
+    packing = ObjectFilling(
+        points=np.eye(3),
+        volumes=np.full(3, laid / 3 / density),
+        part=np.zeros(3, np.int64),
+        sheet=np.zeros(3, bool),
+        triangle=np.array([[0, 1, 2]]),
+        wall=np.full(1, 0.001),
+    )
+    made = PartModel(Structure("shell", 0.001), False, 0.001, 0.0, 0.75, 0.25, 1.0, 0.001, density)
+    treatment = replace(next(t for t in duck.particles.treatments if t.kind == "shell"), density=density)
+    found = list(warn_of_unmeshed_walls([packing], {0: made}, [treatment]))
+    assert bool(found) == warned
+    assert all(f"hold {laid:.2g} of its material" in words for words in found)
+
+
+def test_the_duck_is_meshed_whole(duck):
+    assert not any("of its material" in str(words) for words in duck.particles.warnings)

@@ -1,6 +1,6 @@
 """Masses of material points, and removal of overlaps between objects."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,9 @@ from corporeal.discretization.mesh_measures import MeasuredObject, MeasuredPart
 from corporeal.discretization.object_filling import ObjectFilling, reference_points
 from corporeal.discretization.part_model import PartModel, is_porous_shell
 from corporeal.discretization.point_filling import match_moments
+
+MAX_UNMESHED_WALL_FRACTION = 0.1
+"""The material of a shell's triangles may differ from the part's by this share without a word [-]."""
 
 
 def remove_mixed_points(
@@ -48,6 +51,21 @@ def _keep_one_point(mixed: np.ndarray, part: np.ndarray) -> np.ndarray:
         if mixed[own].all():
             mixed[own[0]] = False
     return mixed
+
+
+def warn_of_unmeshed_walls(
+    packings: Sequence[ObjectFilling], makes: Mapping[int, PartModel], treatments: Sequence[Discretization]
+) -> Iterator[str]:
+    """Warn where the triangles of a shell hold another amount of material than the part, whose mass they bear."""
+    for number, packing in enumerate(packings):
+        for part in np.unique(packing.part[packing.is_vertex]).tolist():
+            made, laid = makes[part], float(packing.volumes[packing.part == part].sum())
+            share = laid * treatments[part].density / (made.body_mass + made.sheet_mass)
+            if abs(share - 1.0) > MAX_UNMESHED_WALL_FRACTION:
+                yield (
+                    f"Object {number + 1} of the scene: the triangles of a thin wall hold {share:.2g} of its material, "
+                    "and its whole mass is spread over them: where it is thick or joined it is not as in reality."
+                )
 
 
 def weigh_points(

@@ -41,7 +41,7 @@ from corporeal.discretization.object_masses import (
 from corporeal.discretization.object_scaling import field_in_scene_scale, is_not_life_size, part_scales
 from corporeal.discretization.part_model import PartModel, describe_fill, fill_recipe, infer_part_model
 from corporeal.discretization.plant_roots import extend_plants_into_ground
-from corporeal.discretization.point_masses import remove_mixed_points, weigh_points
+from corporeal.discretization.point_masses import remove_mixed_points, warn_of_unmeshed_walls, weigh_points
 from corporeal.discretization.rods import Rod, find_rod
 from corporeal.discretization.vessel_shell import hollow_all_vessels
 from corporeal.geometry.scene_transforms import underside_centre
@@ -199,7 +199,7 @@ def gather_particles(
         mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
         fills=fill_sentences(parts, bodies, chosen, part),
         walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
-        warnings=chosen.warnings,
+        warnings=(*chosen.warnings, *warn_of_unmeshed_walls(packings, makes, chosen.treatments)),
     )
 
 
